@@ -148,6 +148,21 @@ def test_one_that_never_speaks_is_told_of_too():
     assert drive.mission.state is State.DEGRADED
 
 
+def test_a_charge_that_jumps_to_and_fro_is_told_of():
+    drive = Battery(0.3)
+    drive.run(State.COVERING)
+    assert drive.mission.charging.gauge.level is None
+    for second in range(70):
+        drive.level = 0.9 if second % 2 else 0.1
+        drive.tell(pose_at(*drive.cell))
+    assert drive.mission.charging.gauge.level is None
+    assert drive.mission.state is State.DEGRADED
+    assert drive.mission.reason.startswith("no charge of the battery for 60 s, it jumps to and fro")
+    # Once it holds it counts.
+    drive.level = 0.1
+    drive.run(State.CHARGING)
+
+
 def test_silent_while_it_charges_it_stays_where_it_is():
     drive = Battery(0.15)
     drive.run(State.CHARGING)
@@ -242,6 +257,26 @@ def test_started_again_while_it_charges_it_stays_in_its_dock():
     for _ in range(8):
         again.go()
     again.finish()
+
+
+@pytest.mark.parametrize(
+    ("power", "state"), [("charging", State.CHARGING), ("discharging", State.RETURNING)]
+)
+def test_started_again_no_path_leads_it_out_of_its_dock(power, state):
+    # It came to stand a little beside the pose that the configuration has.
+    dock = Dock(x_m=-0.5 * CELL, y_m=5.5 * CELL, yaw_deg=180.0, approach_m=4 * CELL)
+    drive = Battery(0.15, dock=dock)
+    drive.run(State.CHARGING)
+    note = drive.mission.snapshot().note
+    again = Battery(None, AT_DOCK, OrderState.from_json(note), dock=dock)
+    for _ in range(5):
+        again.tell(pose_at(*AT_DOCK))
+    assert again.mission.state is State.BLOCKED
+    assert again.mission.reason == "near the dock: waits for the battery to say if it charges"
+    assert not len(again.mission.route.path.cells)
+    again.level, again.power = 0.15, power
+    again.tell(pose_at(*AT_DOCK))
+    assert again.mission.state is state
 
 
 def test_in_its_dock_it_need_not_stand_where_paths_lead():

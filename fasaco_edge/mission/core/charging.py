@@ -41,11 +41,13 @@ class BatteryGauge:
     Attributes:
         level: charge from 0 to 1; None before one is believed.
         power: what the supply does, as its message says; "" before there was one.
+        heard_at: when the last charge came, believed or not [s].
     """
 
     def __init__(self) -> None:
         self.level: float | None = None
         self.power = ""
+        self.heard_at = float("-inf")
         self._told_at = 0.0
         # A charge that is to come for some time, and since when.
         self._claim: tuple[float, float] | None = None
@@ -59,7 +61,7 @@ class BatteryGauge:
         return median(self._drains) if len(self._drains) >= FEWEST else None
 
     def silent_s(self, now: float) -> float:
-        """Return how long no charge has come, or since the beginning none [s]."""
+        """Return how long no charge has come that is believed, or since the beginning none [s]."""
         return now - self._told_at
 
     def begin(self, now: float) -> None:
@@ -71,7 +73,7 @@ class BatteryGauge:
         self.power = event.power
         if event.level is None:
             return
-        self._told_at = now
+        self.heard_at = now
         if self.level is None or abs(event.level - self.level) > JUMP:
             claim, level = self._claim, self.level
             # It may drain on meanwhile, or come in coarse steps: what counts is to which side.
@@ -84,7 +86,7 @@ class BatteryGauge:
             if now - self._claim[1] < HOLD_S:
                 return
             self._since = None
-        self._claim, self.level = None, event.level
+        self._claim, self.level, self._told_at = None, event.level, now
         # By its own clock, as robots drive by it: that of a simulation may be faster.
         at_s = 1e-9 * event.stamp_ns if event.stamp_ns else now
         self._measure(event.level, at_s, drives=drives and event.power != "charging")
@@ -138,7 +140,9 @@ class Charging:
             return ""
         if self.gauge.silent_s(now) <= self.policy.silent_s:
             return ""
-        return f"no charge of the battery for {self.policy.silent_s:g} s"
+        silent_s = self.policy.silent_s
+        jumps = ", it jumps to and fro" if now - self.gauge.heard_at <= silent_s else ""
+        return f"no charge of the battery for {silent_s:g} s{jumps}"
 
     def is_due(self, now: float) -> bool:
         """Tell whether the robot has to go and charge now.

@@ -128,6 +128,8 @@ class Executive:
             return State.PAUSED, order.why_paused
         if order.errand == "charge" and self._is_docked():
             return State.CHARGING, self.charging.why(self._now)
+        if order.errand == "charge" and self._may_be_docked():
+            return State.BLOCKED, "near the dock: waits for the battery to say if it charges"
         if not order.errand and not order.is_open:
             is_idle = order.order is None
             return (State.IDLE, order.why) if is_idle else (State.DONE, self.orders.ending)
@@ -308,13 +310,26 @@ class Executive:
         place, stamped = self.policy.dock or self.policy.home, self.map.pose
         if place is None or stamped is None:
             return False
-        pose, stand = stamped.pose, place.stand
-        if math.hypot(pose.x - place.x_m, pose.y - place.y_m) <= DOCKED_M:
+        if math.hypot(stamped.pose.x - place.x_m, stamped.pose.y - place.y_m) <= DOCKED_M:
             return True
-        reach_m = math.hypot(place.x_m - stand.x, place.y_m - stand.y) + NEAR_M
-        is_near = math.hypot(pose.x - stand.x, pose.y - stand.y) <= reach_m
         charges = self._state is State.CHARGING or self.charging.gauge.power == "charging"
-        return is_near and charges
+        return charges and self._is_near_dock()
+
+    def _may_be_docked(self) -> bool:
+        """Tell whether a robot of whose battery nothing was heard yet may be in its dock.
+
+        So it is after a restart: no path may lead it out of there.
+        """
+        return not self.charging.gauge.power and self._is_near_dock()
+
+    def _is_near_dock(self) -> bool:
+        """Tell whether the robot may be where its base moves it from before the dock."""
+        place, stamped = self.policy.dock or self.policy.home, self.map.pose
+        if place is None or stamped is None:
+            return False
+        pose, stand = stamped.pose, place.stand
+        reach_m = math.hypot(place.x_m - stand.x, place.y_m - stand.y) + NEAR_M
+        return math.hypot(pose.x - stand.x, pose.y - stand.y) <= reach_m
 
     def _arrive(self) -> Decision:
         """End the way of an errand."""

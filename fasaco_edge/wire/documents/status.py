@@ -145,7 +145,7 @@ class BatteryReport(Document, frozen=True):
     Attributes:
         level: its charge.
         power: what the supply does, as its message says; "" before there was one.
-        age_s: how long no charge has come.
+        age_s: how long no charge has come that is believed.
         drain_per_h: what driving takes an hour, as measured.
         turns_back_at: the robot goes to charge at this level.
         goes_on_at: it goes on at this level; null where it does not charge.
