@@ -86,7 +86,14 @@ class LatchedSubscription(Subscription):
     """
 
     def __init__(
-        self, session: zenoh.Session, key: str, receive: Receive, depth: int, asker: Asker
+        self,
+        session: zenoh.Session,
+        key: str,
+        receive: Receive,
+        depth: int,
+        asker: Asker,
+        *,
+        in_order: bool = False,
     ) -> None:
         self._session = session
         self._receive = receive
@@ -117,7 +124,8 @@ class LatchedSubscription(Subscription):
         self._tokens = f"{key}/@adv/pub/**"
         self._query_tokens_at = 0.0
         self._awaits_tokens = False
-        super().__init__(session.declare_subscriber(key, self._on_sample))
+        take = zenoh.handlers.Callback(self._on_sample, indirect=not in_order)
+        super().__init__(session.declare_subscriber(key, take))
         asker.add(self)
 
     def ask(self) -> None:

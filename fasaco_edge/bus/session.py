@@ -36,6 +36,7 @@ from fasaco_edge.bus.settings import BusSettings, first_line, session_config
 from fasaco_edge.errors import BusUnavailable
 from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.topic_types import VOLATILE, Qos, Topic
+from fasaco_edge.wire.topics import IN_ORDER
 
 LOG = logging.getLogger(__name__)
 
@@ -104,7 +105,8 @@ class Bus:
 
     def listen(self, keys: Keys, topic: Topic, callback: Callable[[Sample], None]) -> Subscription:
         """Subscribe to a topic of the contract, see ``subscribe``."""
-        return self.subscribe(keys.of(topic), callback, topic.is_latched)
+        in_order = topic.name in IN_ORDER
+        return self.subscribe(keys.of(topic), callback, topic.is_latched, in_order=in_order)
 
     def subscribe(
         self,
@@ -112,21 +114,30 @@ class Bus:
         callback: Callable[[Sample], None],
         latched: bool = False,
         history: int = 1,
+        *,
+        in_order: bool = False,
     ) -> Subscription:
         """Call ``callback`` with each sample on ``key``, on a Zenoh thread.
 
         A latched subscription receives the newest sample of latched publishers
         first, or of those of each as many as ``history``, also of those that come later.
+
+        By default each subscription has a thread of its own: of two, what was sent first may come
+        last. What comes ``in_order`` comes as it was sent, among all such subscriptions, on the
+        thread that reads the link; its callback must not call Zenoh, and return soon.
         """
 
         def receive(sample: zenoh.Sample) -> None:
             callback(Sample.of(sample))
 
-        subscription = (
-            LatchedSubscription(self._session, key, receive, history, self._asker)
-            if latched
-            else Subscription(self._session.declare_subscriber(key, receive))
-        )
+        subscription: Subscription
+        if latched:
+            subscription = LatchedSubscription(
+                self._session, key, receive, history, self._asker, in_order=in_order
+            )
+        else:
+            take = zenoh.handlers.Callback(receive, indirect=not in_order)
+            subscription = Subscription(self._session.declare_subscriber(key, take))
         self._lent.append(subscription)
         return subscription
 

@@ -66,7 +66,8 @@ class RosBridge:
             take(sample.as_type(topic.schema))  # ROS names no type beside a sample
 
         key = self._config.input_key(topic)
-        subscription = self._bus.subscribe(key, post, topic.latched, topic.depth)
+        in_order = kind in topics.IN_ORDER
+        subscription = self._bus.subscribe(key, post, topic.latched, topic.depth, in_order=in_order)
         self._announce("MS", topic)
         return subscription
 

@@ -131,7 +131,13 @@ class _NoBus(Bus):
         pass
 
     def subscribe(
-        self, key: str, callback: object, latched: bool = False, history: int = 1
+        self,
+        key: str,
+        callback: object,
+        latched: bool = False,
+        history: int = 1,
+        *,
+        in_order: bool = False,
     ) -> Subscription:
         return Subscription(None)
 

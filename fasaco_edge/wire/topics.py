@@ -237,6 +237,8 @@ TOPICS = (
     *(RECORDER, RECORDER_ALIVE),
     CMD_VEL,
 )
+# They have one order, that of their one publisher: an update changes the map before it.
+IN_ORDER = frozenset({MAP.name, MAP_UPDATE.name})
 QOS = {topic.name: topic.qos for topic in TOPICS if topic.qos is not None}
 
 QUERIES = (

@@ -21,9 +21,12 @@ from fasaco_edge.bus.queries import Reply
 from fasaco_edge.bus.session import open_bus
 from fasaco_edge.bus.settings import BusSettings
 from fasaco_edge.errors import BusUnavailable
+from fasaco_edge.wire import topics
+from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.topics import QOS
 from tests.support.outsider import Ear, open_client
 from tests.support.processes import free_endpoint
+from tests.support.senders import Sender
 
 KEY = "test/@v1/key"
 SCHEMA = "nav_msgs/msg/Path"
@@ -63,6 +66,24 @@ def until(holds):
 
 def history():
     return zenoh.ext.HistoryConfig(max_samples=1, detect_late_publishers=True)
+
+
+def test_a_map_and_its_updates_come_as_they_were_sent(bus, endpoint):
+    """An update that came before its map would be lost; by default each key has its own thread."""
+    heard = []
+    both = topics.MAP, topics.MAP_UPDATE
+    keys = [Keys().of(topic) for topic in both]
+    for topic in both:
+        bus.listen(Keys(), topic, lambda sample: heard.append((sample.key, sample.payload)))
+    with open_bus(BusSettings("client", (endpoint,))) as mapper:
+        senders = [Sender(mapper, topic) for topic in both]
+        # Once both are heard what is sent is, too.
+        until(lambda: [sender.put(b"first") for sender in senders] and len(set(heard)) == 2)
+        sent = [(key, b"%d" % number) for number in range(400) for key in keys]
+        for place, (_, payload) in enumerate(sent):
+            senders[place % 2].put(payload)
+        until(lambda: heard[-1] == sent[-1])
+    assert heard[-len(sent) :] == sent
 
 
 def test_a_sample_goes_out_with_type_and_attachment(bus, client):

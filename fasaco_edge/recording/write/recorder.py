@@ -207,7 +207,8 @@ class Recorder:
             # As the daemon has it: ROS names no type beside a sample.
             self._inbox.post(topic, sample.as_type(schema) if schema else sample)
 
-        self._bus.subscribe(key, post, latched, depth)
+        in_order = topic in topics.IN_ORDER
+        self._bus.subscribe(key, post, latched, depth, in_order=in_order)
 
     def _sync(self) -> None:
         now_ns = time.monotonic_ns()
