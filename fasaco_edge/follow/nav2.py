@@ -2,20 +2,19 @@
 
 A goal is a piece of the path that begins where the robot is. The next one is sent while the robot
 is still on its way to the end: Nav2 goes over to it without standing. Where the path comes back to
-itself, that piece may begin only shortly before the end; it is sent as much earlier as Nav2 takes
-to answer. No clock, no session.
+itself, that piece begins only shortly before the end: a controller that has it goes on at whatever
+part is nearest, and would leave out the rest of the way there. No clock, no session.
 """
 
 from __future__ import annotations
 
 import math
-from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 
 from fasaco_edge.errors import MalformedMessage
 from fasaco_edge.follow.nav2_requests import AskResult, Cancellations, Request, SendGoal
-from fasaco_edge.follow.pieces import STEP_M, Line, end_of_piece, start_of_piece
+from fasaco_edge.follow.pieces import STEP_M, Line, end_of_piece
 from fasaco_edge.follow.supervision import Patience, State, Supervision
 from fasaco_edge.grid.geometry import Point, Pose2D
 from fasaco_edge.wire.messages.follow_path import (
@@ -31,10 +30,9 @@ from fasaco_edge.wire.messages.path_points import PathPoints
 # drives in so many seconds; and only if it leads on by so much [m].
 AHEAD_M, AHEAD_S = 0.5, 3.0
 GAIN_M = 0.3
-# A goal is sent where it begins so far ahead of the robot [m], as controllers are done so near to
-# the end of the one before, too; and as much further as the robot drives while a request is on its
-# way, by the fastest of so many answers: one that came too early would cut a part of the path off.
-EARLY_M, ANSWERS = 0.1, 8
+# Where the path comes back to itself, the next goal begins so far before the end of the one before,
+# and is sent so far before that [m]: what is left out there is less than half of a tool.
+TIP_M, EARLY_M = 0.1, 0.05
 # Where a path begins further off, it is not driven [m]; how far on it the robot may be by then.
 BEGINNING_M = 1.0
 # Where two paths are as near as this to each other they are the same [m].
@@ -60,7 +58,6 @@ class Goal:
     Attributes:
         id: of the goal, 16 bytes.
         start, end: on the line [m].
-        sent_at: when it was sent [s].
         next_start: where the next one may begin, infinite where it has to wait for the end of this
             one; None as long as nobody looked [m].
     """
@@ -68,7 +65,6 @@ class Goal:
     id: bytes
     start: float
     end: float
-    sent_at: float
     next_start: float | None = None
 
 
@@ -102,9 +98,6 @@ class Nav2Follower(Supervision):
         self.tally = Tally()
         self._near = near
         self._ahead = AHEAD_M + AHEAD_S * speed
-        self._speed = speed
-        # How long Nav2's last answers took [s].
-        self._answers: deque[float] = deque(maxlen=ANSWERS)
         self._new_id = new_id
         self._here: Point | None = None
         self._came_at: float | None = None
@@ -161,8 +154,6 @@ class Nav2Follower(Supervision):
         if self._pending is None or self._pending.id != goal_id:
             return
         goal, self._pending = self._pending, None
-        if accepted is not None:
-            self._answers.append(now - goal.sent_at)
         if accepted:
             self._active = goal
             self._moved_last = None
@@ -220,7 +211,7 @@ class Nav2Follower(Supervision):
         elif goal is self._active:
             self._watch(goal, now)
             if goal.end - self._way <= self._ahead and goal.end < whole:
-                self._send_next(goal, now)
+                self._send_next(goal)
 
     def _begin(self, whole: float, now: float) -> None:
         """Send a goal where Nav2 has none."""
@@ -229,27 +220,30 @@ class Nav2Follower(Supervision):
         if whole - self._way <= STEP_M:
             self.state, self.detail = State.DRIVEN, ""
         elif now >= self._retry_at:
-            self._send(self._way, now)
+            self._send(self._way)
 
-    def _send_next(self, goal: Goal, now: float) -> None:
+    def _send_next(self, goal: Goal) -> None:
         """Send the next goal, once the robot is near enough to where that begins."""
         assert self._line is not None
         if goal.next_start is None:
-            first = max(goal.end - self._ahead, goal.start)
-            goal.next_start = start_of_piece(
-                self._line, first, goal.end, goal.end + GAIN_M, self._near
-            )
-        start = max(goal.next_start, self._way)
-        early = EARLY_M + 0.5 * self._speed * min(self._answers, default=0.0)
-        # What lies between robot and goal is not driven along the line, so it has to be straight.
-        if start - self._way <= early and not self._line.corners(self._way + STEP_M, start):
-            self._send(start, now)
+            goal.next_start = self._start_after(goal)
+        if goal.next_start - self._way <= EARLY_M:
+            self._send(max(goal.next_start, self._way))
 
-    def _send(self, start: float, now: float) -> None:
+    def _start_after(self, goal: Goal) -> float:
+        """Return how early a piece may begin that leads on from a goal; infinite if none does."""
+        assert self._line is not None
+        for before_m in (self._ahead, TIP_M, 0.0):
+            start = max(goal.end - before_m, goal.start)
+            if end_of_piece(self._line, start, self._near) >= goal.end + GAIN_M:
+                return start
+        return math.inf
+
+    def _send(self, start: float) -> None:
         """Send the piece that begins there."""
         assert self._line is not None
         end = end_of_piece(self._line, start, self._near)
-        goal = self._pending = Goal(self._new_id(), start, end, now)
+        goal = self._pending = Goal(self._new_id(), start, end)
         self.tally.goals += 1
         points = self._line.poses(goal.start, goal.end)
         self._requests.append(SendGoal(goal.id, points, self._path_frame))
@@ -276,7 +270,7 @@ class Nav2Follower(Supervision):
             return True
         if shift is None:
             # Nav2 goes over to it from what it drives.
-            self._send(way, now)
+            self._send(way)
         else:
             goal.start, goal.end = goal.start + shift, goal.end + shift
             # What follows may be another line.

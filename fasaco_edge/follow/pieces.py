@@ -22,8 +22,6 @@ APART = 2.0
 CORNER_RAD = math.radians(60.0)
 # A piece is no longer [m].
 MOST_M = 20.0
-# Where a piece may begin is found to this [m].
-PLACE_M = 0.02
 # Points are read as they are needed, so many at a time.
 CHUNK = 500
 # Nearer points are one [m].
@@ -143,36 +141,6 @@ def end_of_piece(line: Line, start: float, near: float) -> float:
             late = [corner for corner in corners if corner >= way - 2.0 * APART * near]
             return late[-1] if late and late[-1] > start + LEAST_M else ways[index - 1]
     return stop
-
-
-def start_of_piece(line: Line, first: float, last: float, wanted: float, near: float) -> float:
-    """Return how early a piece may begin that leads as far as ``wanted``.
-
-    Places are ways along the line.
-
-    Args:
-        line: the path.
-        first: where it may begin at the earliest [m].
-        last: where it has to begin at the latest [m].
-        wanted: how far it has to lead [m].
-        near: how near the piece may not come to itself [m].
-
-    Returns:
-        the place, to ``PLACE_M``; infinite if none of these pieces leads as far [m].
-    """
-    if end_of_piece(line, last, near) < wanted:
-        return math.inf
-    if end_of_piece(line, first, near) >= wanted:
-        return first
-    # The later a piece begins, the further it leads.
-    short, leads = first, last
-    while leads - short > PLACE_M:
-        middle = 0.5 * (short + leads)
-        if end_of_piece(line, middle, near) >= wanted:
-            leads = middle
-        else:
-            short = middle
-    return leads
 
 
 def _touched(

@@ -11,10 +11,10 @@ from fasaco_edge.follow.nav2 import (
     GIVE_UP_S,
     RETRY_S,
     STANDS_S,
+    TIP_M,
     Nav2Follower,
 )
 from fasaco_edge.follow.nav2_requests import MOST_CANCELLED, AskResult, CancelGoal, SendGoal
-from fasaco_edge.follow.pieces import STEP_M
 from fasaco_edge.follow.supervision import Patience, State
 from fasaco_edge.grid.geometry import Pose2D, StampedPose
 from fasaco_edge.wire.messages.follow_path import (
@@ -127,39 +127,11 @@ def test_where_the_path_turns_back_the_next_goal_begins_just_before_the_end():
     for centimetre in range(1, 296):
         sent += [(centimetre / 100, request) for request in drive.step(centimetre / 100)]
     ((at, back),) = sent
-    # The piece may not come nearer to itself: it begins no more than that before the turn.
-    assert 3.0 - NEAR <= back.points[0][0] < 3.0
+    # Of the way to the turn a controller that goes on at the way back leaves out no more than that.
+    assert back.points[0] == (pytest.approx(3.0 - TIP_M), 0.0)
+    assert at == pytest.approx(3.0 - TIP_M - EARLY_M, abs=0.011)
     assert (3.0, 0.0) in back.points
     assert back.points[-1] == (0.0, 0.0)
-    # It goes out where it begins so soon that what is cut off is no more than a controller leaves.
-    assert at == pytest.approx(back.points[0][0] - EARLY_M, abs=0.015)
-
-
-def test_the_next_goal_goes_out_as_much_earlier_as_answers_take():
-    drive = Drive(*BACK)
-    (goal,) = drive.step(0.0)
-    drive.now += 0.6
-    drive.accept(goal)
-    assert drive.step(0.0) == [AskResult(goal.id)]
-    at, back = next(
-        (centimetre / 100, request)
-        for centimetre in range(1, 300)
-        for request in drive.step(centimetre / 100)
-    )
-    # Half of the time there and back.
-    assert back.points[0][0] - at == pytest.approx(EARLY_M + 0.3 * SPEED, abs=0.015)
-
-
-def test_a_goal_that_begins_behind_a_corner_waits_until_the_robot_is_there():
-    # At the end of the spur the path turns back, and the piece may begin 7 cm behind its corner.
-    drive = Drive((0.0, 0.0), (3.0, 0.0), (3.0, 0.2), (3.0, -3.0))
-    drive.begun()
-    places = [*((step / 100, 0.0) for step in range(1, 300)), *((3.0, y / 100) for y in range(20))]
-    (x, y), request = next((place, sent) for place in places for sent in drive.step(*place))
-    begins = request.points[0]
-    assert begins[0] == 3.0
-    assert 0.05 < begins[1] < EARLY_M
-    assert math.dist((x, y), (3.0, 0.0)) <= STEP_M
 
 
 def test_where_the_rest_is_short_the_next_goal_waits_for_the_end():
