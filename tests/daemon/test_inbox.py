@@ -6,6 +6,7 @@ import gc
 import json
 import weakref
 
+import msgspec
 import numpy as np
 import pytest
 
@@ -13,7 +14,9 @@ from fasaco_edge.bus.arrival import Sample
 from fasaco_edge.bus.queries import Question, Reply
 from fasaco_edge.bus.session import open_bus
 from fasaco_edge.bus.settings import BusSettings
+from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.daemon.loop.answers import Commands
+from fasaco_edge.daemon.loop.fleet import FleetEar
 from fasaco_edge.daemon.loop.inbox import (
     MOST_POSES,
     Inbox,
@@ -34,10 +37,11 @@ from fasaco_edge.mission.core.events import (
 )
 from fasaco_edge.mission.core.mission import Mission, MissionConfig
 from fasaco_edge.wire.keys import Keys
+from fasaco_edge.wire.limits import MAX_JSON_BYTES
 from fasaco_edge.wire.messages.battery import BatteryState, encode_battery
 from fasaco_edge.wire.messages.poses import PoseDecoder
 from fasaco_edge.wire.schemas import POSE_STAMPED
-from fasaco_edge.wire.topics import QUEUE_LENGTHS
+from fasaco_edge.wire.topics import FLEET, QUEUE_LENGTHS
 from tests.support.outsider import TIMEOUT_S, open_client
 from tests.support.processes import free_endpoint
 from tests.support.rooms import (
@@ -105,6 +109,22 @@ def test_a_battery_is_heard_and_held_until_there_is_a_mission(arrivals):
     held = HeldEvents()
     assert held.take([*events, *events]) == []
     assert held.events == events[-1:]
+
+
+def test_what_a_fleet_says_too_long_is_dropped_on_arrival():
+    config = msgspec.convert({"robot": {"name": "r1"}, "fleet": {"name": "hall"}}, DaemonConfig)
+    keys, mailbox = config.keys(), make_mailbox(MAX_PIXELS)
+    with open_bus(BusSettings("peer", (), (free_endpoint(),))) as bus:
+        poses, ear = PoseDecoder(POSE_STAMPED, None), FleetEar(config)
+        inbox = Inbox(bus, keys, mailbox, poses, MAX_PIXELS, fleet=ear)
+        bus.publisher(Keys("r2").of(FLEET)).put(bytes(MAX_JSON_BYTES + 1))
+        batch = take_batch(mailbox, TIMEOUT_S)
+        assert batch.samples == []
+        events, faults = inbox.decode(batch)
+        assert events == []
+        assert [str(fault) for fault in faults] == [
+            "a fleet message of 1048577 bytes was dropped: it may have at most 1048576"
+        ]
 
 
 def test_a_command_waits_for_the_poses_before_it_and_takes_them_in_no_larger_cycles(arrivals):

@@ -45,12 +45,12 @@ class FleetEar:
         self._keys, self._fleet, self._cell_m = config.keys(), config.fleet.name, config.cell_m
         self._heard_at: dict[str, float] = {}
 
-    def listen(self, bus: Bus, post: Callable[[Sample, float], None]) -> None:
-        """Hand on what others say, and when [s, monotonic], as far as they keep to their rate."""
+    def listen(self, bus: Bus, post: Callable[[Sample], None]) -> None:
+        """Hand on what others say, as far as they keep to their rate."""
 
         def post_due(sample: Sample) -> None:
-            if self._is_due(sample.key, now := time.monotonic()):
-                post(sample, now)
+            if self._is_due(sample.key, time.monotonic()):
+                post(sample)
 
         bus.subscribe(self._keys.of_all(FLEET), post_due)
 

@@ -194,8 +194,7 @@ class Inbox:
         for topic in (topics.MAP_UPDATE, topics.POSE, topics.BATTERY):
             bus.listen(keys, topic, poster(mailbox, topic.name, max_pixels))
         if fleet is not None:
-            name = topics.FLEET.name
-            fleet.listen(bus, lambda said, at: mailbox.post(name, Received(name, said, at)))
+            fleet.listen(bus, poster(mailbox, topics.FLEET.name, max_pixels))
 
     def ask_for_map(self, now: float) -> None:
         """Ask the publishers of the map for their newest one, unless that was done lately."""
@@ -282,5 +281,6 @@ def _bare(error: FasacoError) -> FasacoError:
 
 def _size_fault(dropped: Oversized) -> FasacoError:
     kind = dropped.kind.replace("_", " ")
-    text = f"a {kind} of {dropped.size} bytes was dropped: it may have at most {dropped.most}"
+    was = f"a {kind} message of {dropped.size} bytes was dropped"
+    text = f"{was}: it may have at most {dropped.most}"
     return MapTooLarge(text) if dropped.kind in MAPS else MalformedMessage(text)

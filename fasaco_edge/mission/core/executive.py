@@ -126,10 +126,8 @@ class Executive:
         order = self.orders.order_state
         if order.paused:
             return State.PAUSED, order.why_paused
-        if order.errand == "charge" and self._is_docked():
-            return State.CHARGING, self.charging.why(self._now)
-        if order.errand == "charge" and self._may_be_docked():
-            return State.BLOCKED, "near the dock: waits for the battery to say if it charges"
+        if order.errand == "charge" and (docked := self._why_in_dock()):
+            return docked
         if not order.errand and not order.is_open:
             is_idle = order.order is None
             return (State.IDLE, order.why) if is_idle else (State.DONE, self.orders.ending)
@@ -302,6 +300,17 @@ class Executive:
         elif not errand and charging.is_due(self._now):
             orders.set_state(replace(orders.order_state, errand="charge"))
 
+    def _why_in_dock(self) -> tuple[State, str] | None:
+        """Return the state and reason of a robot that is, or may be, in its dock; else None.
+
+        It may be there after a restart, until the battery was heard: no path may lead it out.
+        """
+        if self._is_docked():
+            return State.CHARGING, self.charging.why(self._now)
+        if not self.charging.gauge.power and self._is_near_dock():
+            return State.BLOCKED, "near the dock: waits for the battery to say if it charges"
+        return None
+
     def _is_docked(self) -> bool:
         """Tell whether the robot is where it charges, moved by its base from before the dock, too.
 
@@ -314,13 +323,6 @@ class Executive:
             return True
         charges = self._state is State.CHARGING or self.charging.gauge.power == "charging"
         return charges and self._is_near_dock()
-
-    def _may_be_docked(self) -> bool:
-        """Tell whether a robot of whose battery nothing was heard yet may be in its dock.
-
-        So it is after a restart: no path may lead it out of there.
-        """
-        return not self.charging.gauge.power and self._is_near_dock()
 
     def _is_near_dock(self) -> bool:
         """Tell whether the robot may be where its base moves it from before the dock."""
