@@ -158,6 +158,17 @@ class Mailbox(Generic[Item]):
                 self._free_at = now + self._spacing.seconds
             return items
 
+    def hold(self) -> None:
+        """Keep what is spaced, and what depends on it, until ``let_go``."""
+        with self._changed:
+            self._free_at = math.inf
+
+    def let_go(self) -> None:
+        """Hand out again what ``hold`` has kept."""
+        with self._changed:
+            self._free_at = -math.inf
+            self._changed.notify()
+
     def take_lost(self, kind: str) -> int:
         """Return how many items of a queued kind were lost since the last call."""
         with self._changed:
@@ -180,6 +191,9 @@ class Mailbox(Generic[Item]):
     def _held(self, now: float) -> tuple[str, ...]:
         """Return the kinds that have to wait."""
         spacing = self._spacing
-        if spacing is None or now >= self._free_at or not self._queued[spacing.kind]:
+        if spacing is None or now >= self._free_at:
+            return ()
+        # Alone, what depends on it is free between two of it.
+        if not self._queued[spacing.kind] and self._free_at < math.inf:
             return ()
         return (spacing.kind, *spacing.followers)

@@ -120,8 +120,8 @@ def floor_pixels(max_pixels: int) -> int:
 def mask_bytes(config: DaemonConfig, limit: int | None) -> int:
     """Return what it may take to read a keep-out mask under a memory limit [bytes].
 
-    As much as the map and the update that are decoded in a cycle: in one that reads the
-    configuration again none is. A small picture is always read.
+    As much as the map and the update that are decoded in a cycle: while the configuration is read
+    again none is. A small picture is always read.
     """
     share = MASK_COPIES * afforded(config, limit).map.max_pixels
     return max(share - PILLOW_BYTES, LEAST_MASK_BYTES)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import threading
 from collections.abc import Callable
+from concurrent.futures import Future
 from pathlib import Path
 
 from msgspec import structs
@@ -57,7 +58,7 @@ def read_config(path: Path | None) -> DaemonConfig:
 
 
 class Reload:
-    """Reads the configuration again on request.
+    """Reads the configuration again on request, on a thread of its own: a mask may take seconds.
 
     Attributes:
         asked: set by the signal.
@@ -67,17 +68,43 @@ class Reload:
         self.asked = threading.Event()
         self._read = read
         self._manager = manager
+        self._reading: Future[DaemonConfig] | None = None
 
-    def read(self, running: DaemonConfig) -> DaemonConfig:
+    @property
+    def is_reading(self) -> bool:
+        """Whether it has begun to read, and what it has read was not taken yet."""
+        return self._reading is not None
+
+    @property
+    def is_read(self) -> bool:
+        """Whether there is something to take."""
+        return self._reading is not None and self._reading.done()
+
+    def begin(self, ended: Callable[[], None]) -> None:
+        """Begin to read; ``ended`` is called once that is done, on the thread that has read."""
+        self.asked.clear()
+        self._manager.reloading()
+        reading = self._reading = Future()
+
+        def run() -> None:
+            try:
+                reading.set_result(self._read())
+            except BaseException as error:
+                reading.set_exception(error)
+            ended()
+
+        threading.Thread(target=run, name="reload", daemon=True).start()
+
+    def take(self, running: DaemonConfig) -> DaemonConfig:
         """Return the running configuration with those changes in the file that can be taken.
 
         Raises:
             BadConfiguration: the file is wrong.
         """
-        self.asked.clear()
-        self._manager.reloading()
+        assert self._reading is not None
+        reading, self._reading = self._reading, None
         try:
-            written = self._read()
+            written = reading.result()
         except BadConfiguration as error:
             text = "configuration refused, the previous one stays in force: %s (%s)"
             extra = {"event": "reload_refused", "code": error.code}

@@ -216,6 +216,19 @@ def test_of_a_flood_few_are_taken_and_the_newest_always():
     assert turns < 5 * takes
 
 
+def test_what_is_held_waits_until_it_is_let_go_and_nothing_else_does():
+    box = spaced()
+    box.hold()
+    box.post("update", 1)
+    box.post("map", "new")
+    box.post("pose", "here")
+    assert box.take(0.3) == [("pose", "here")]
+    threading.Timer(0.1, box.let_go).start()
+    assert box.take(60.0) == [("map", "new"), ("update", 1)]
+    box.post("map", "newer")
+    assert box.take(60.0) == [("map", "newer")]
+
+
 def test_where_nothing_is_spaced_everything_is_taken_at_once():
     box = Mailbox({"map": Queue(2)}, Spacing("map", 0.0))
     for number in range(100):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import threading
+
 import msgspec
 import pytest
 
@@ -15,6 +17,7 @@ from fasaco_edge.daemon.reload import (
     with_changeable,
 )
 from fasaco_edge.errors import BadConfiguration
+from tests.support.outsider import TIMEOUT_S
 
 RUNNING = DaemonConfig()
 
@@ -26,9 +29,21 @@ def configured(**sections) -> DaemonConfig:
 def reloaded(written: DaemonConfig) -> DaemonConfig:
     reload = Reload(lambda: written, ServiceManager({}))
     reload.asked.set()
-    config = reload.read(RUNNING)
+    return taken_by(reload)
+
+
+def taken_by(reload: Reload) -> DaemonConfig:
+    """Return what is taken once it is read."""
+    ended = threading.Event()
+    reload.begin(ended.set)
+    assert reload.is_reading
     assert not reload.asked.is_set()
-    return config
+    assert ended.wait(TIMEOUT_S)
+    assert reload.is_read
+    try:
+        return reload.take(RUNNING)
+    finally:
+        assert not reload.is_reading
 
 
 @pytest.mark.parametrize(
@@ -80,7 +95,7 @@ def test_what_is_wrong_is_kept_out(caplog):
 
     reload = Reload(read, ServiceManager({}))
     with pytest.raises(BadConfiguration):
-        reload.read(RUNNING)
+        taken_by(reload)
     assert "configuration refused" in caplog.text
     assert "planner.ants" in caplog.text
 

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import pytest
 import yaml
+from PIL import Image
 
 from tests.support.outsider import Outsider
 from tests.support.processes import Daemon, daemon_process
@@ -80,6 +81,34 @@ def test_a_reload_is_told_and_in_force(tmp_path):
         manager.wait("READY=1")
         assert outsider.ask("@rpc/config").json()["planner"]["seed"] == 7
         status = outsider.wait_status(lambda status: status["config"]["planner"]["seed"] == 7)
+        assert status["errors"]["total"] == 0
+
+
+def test_a_large_mask_is_read_beside_the_loop(tmp_path):
+    """Commands are carried out meanwhile, and maps wait: they are decoded in the same memory."""
+    mask = Image.new("L", (6000, 6000), 254)
+    mask.paste(0, (0, 0, 6000, 100))
+    mask.save(tmp_path / "mask.png")
+    text = "image: mask.png\nresolution: 0.05\norigin: [0, 50, 0]\nnegate: 0\n"
+    (tmp_path / "mask.yaml").write_text(text)
+    with service(tmp_path) as (running, manager), Outsider(running.endpoint) as outsider:
+        outsider.put("map", map_bytes(pillared_room()))
+        outsider.put("pose", pose_bytes(1.0, 1.0))
+        outsider.wait_status(lambda status: status["path"])
+        rewritten(running, mission={"keep_out_mask": "mask.yaml"})
+        manager.wait("RELOADING=1")
+        said = len(manager.said)
+        pause = json.dumps({"command": "pause"})
+        (reply,) = outsider.session.get(f"{outsider.prefix}/@rpc/mission", payload=pause)
+        assert json.loads(reply.ok.payload.to_bytes())["state"] == "paused"
+        assert "READY=1" not in manager.said[said:]
+        outsider.put("map", map_bytes(two_rooms(door=True)))
+        manager.wait("READY=1", 100.0)
+        config = outsider.ask("@rpc/config").json()
+        assert config["mission"]["keep_out_mask"].startswith("mask:")
+        rows, _ = two_rooms(door=True).shape
+        status = outsider.wait_status(lambda status: (status["map"] or {}).get("rows") == rows)
+        assert status["state"] == "paused"
         assert status["errors"]["total"] == 0
 
 

@@ -104,6 +104,7 @@ class Loop:
         """Run cycles until ``stop`` is set."""
         while not stop.is_set():
             if self._follow_claim(time.monotonic()):
+                self._begin_reload()
                 self._cycle(take_batch(self._bus.mailbox, self._tick_s()))
             else:
                 stop.wait(TICK_S)
@@ -115,7 +116,7 @@ class Loop:
 
     def _cycle(self, batch: Batch) -> None:
         taken = time.monotonic()
-        if self._host.reload.asked.is_set() and not self._runner.loading:
+        if self._host.reload.is_read and not self._runner.loading:
             self._reload_config(batch)
         now = time.monotonic()
         events, faults = self._bus.inbox.decode(batch)
@@ -163,11 +164,22 @@ class Loop:
             self._status.yield_reason = claim.reason
         return not claim.is_uncertain(now)
 
+    def _begin_reload(self) -> None:
+        """Have the configuration read again, if that is asked for.
+
+        Maps wait meanwhile: a keep-out mask is read in the memory that they are decoded in.
+        """
+        reload, mailbox = self._host.reload, self._bus.mailbox
+        if reload.asked.is_set() and not reload.is_reading and not self._runner.loading:
+            mailbox.hold()
+            reload.begin(partial(mailbox.post, "reloaded", None))
+
     def _reload_config(self, batch: Batch) -> None:
-        """Read the configuration again, and restart the mission if it has changed."""
+        """Take the configuration that was read again; restart the mission if it has changed."""
         reload, watchdog = self._host.reload, self._host.watchdog
+        self._bus.mailbox.let_go()
         try:
-            config = reload.read(self.config)
+            config = reload.take(self.config)
         except BadConfiguration as error:
             self._status.faults.count([error], is_logged=True)
             watchdog.remark = f"configuration refused: {error}"
