@@ -194,6 +194,9 @@ class PlannerConfig(Section, frozen=True):
     ``velocities`` is ``8:1`` for cohorts from 8 down to 1, ``1:8``, ``4`` or ``8,4,1``.
     The paper's ants see no further than their neighbours; a robot's see what will soon
     be cut off, which saves it revisits (``tests/benchmarks/RESULTS.md``).
+
+    ``align`` is what rows of cells lie along where a line is driven: the building's walls, once
+    the map shows them for certain; the axes of the map frame; or an angle to these [deg].
     """
 
     name: PlannerName = "fasaco"
@@ -210,6 +213,7 @@ class PlannerConfig(Section, frozen=True):
     budget_s: Annotated[float, Meta(gt=0, le=3600)] = 0.1
     spare_share: Annotated[float, Meta(ge=0, le=1)] = 0.05
     line: Literal["cells", "quick", "thorough"] = "thorough"
+    align: Literal["walls", "axes"] | Annotated[float, Meta(ge=-45, le=45)] = "axes"
 
     def colony(self) -> ColonyConfig:
         """Return these as a colony.
@@ -322,6 +326,19 @@ class DaemonConfig(Section, frozen=True):
         if self.planner.line == "cells":
             return robot.tool_width_m
         return robot.tool_width_m * (1.0 - robot.overlap)
+
+    @property
+    def lattice_deg(self) -> float | None:
+        """The angle of the cells' rows to the x axis of the map frame [deg]; None for the walls'.
+
+        Walks through the centres of cells, and robots that share cells, keep to the axes: those of
+        a fleet would each see other walls first.
+        """
+        if self.planner.line == "cells" or self.planner.align == "axes":
+            return 0.0
+        if self.planner.align == "walls":
+            return 0.0 if self.fleet else None
+        return float(self.planner.align)
 
     def keys(self) -> Keys:
         """Return the keys of this robot.

@@ -1,4 +1,4 @@
-"""The direction of a building's walls on its map, and grids turned to lie along it.
+"""The direction of a building's walls on its map.
 
 Cells of the coverage lattice lie along the axes of the map frame. Where walls lie askew to these,
 each lane ends askew at a wall. Laid over a map that is turned back by the walls' angle, cells lie
@@ -20,12 +20,12 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.grid.geometry import GridGeometry, Pose2D
+from fasaco_edge.grid.geometry import GridGeometry
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.kernels.lattice.footprint import Thresholds
 
@@ -108,23 +108,6 @@ def wall_direction(grid: OccupancyGrid) -> WallDirection | None:
     if abs(angle_deg) > 45.0 - NEAR_DEG:
         angle_deg = 45.0
     return WallDirection(angle_deg, round(peak.share, 3), round(wall_m, 1), is_of_rim)
-
-
-def turned_geometry(geometry: GridGeometry, by_deg: float) -> GridGeometry:
-    """Return the placement of a grid turned by ``by_deg`` [deg] about the map frame's origin.
-
-    Turned by minus their angle, the walls of a building lie along the axes.
-    """
-    origin = geometry.origin
-    ((x, y),) = turned_points(np.array([(origin.x, origin.y)]), by_deg).tolist()
-    return replace(geometry, origin=Pose2D(x, y, origin.yaw + math.radians(by_deg)))
-
-
-def turned_points(points: NDArray[np.float64], by_deg: float) -> NDArray[np.float64]:
-    """Return points x, y [m], float64 (n, 2), turned by ``by_deg`` about the frame's origin."""
-    cos, sin = math.cos(math.radians(by_deg)), math.sin(math.radians(by_deg))
-    x, y = points[:, 0], points[:, 1]
-    return np.stack([cos * x - sin * y, sin * x + cos * y], axis=1)
 
 
 @dataclass(frozen=True, slots=True)

@@ -130,6 +130,8 @@ class MissionConfig:
         plans_on_trail: whether the planner's ants walk on it.
         robot: its name in a fleet that shares the work; "" without one.
         battery: when to charge; None for never.
+        lattice_deg: the angle of the cells' rows to the x axis of the map frame [deg]; None for
+            along the walls, once the map shows them.
     """
 
     footprint: Footprint
@@ -142,3 +144,4 @@ class MissionConfig:
     plans_on_trail: bool = False
     robot: str = ""
     battery: BatteryPolicy | None = None
+    lattice_deg: float | None = 0.0

@@ -17,7 +17,8 @@ from fasaco_edge.grid.fine_raster import RobotDiscs, map_to_raster
 from fasaco_edge.grid.floor import Floor, StandLattice
 from fasaco_edge.grid.lattice import Cell, CoverageLattice
 from fasaco_edge.grid.occupancy import OccupancyGrid
-from fasaco_edge.grid.walls import turned_geometry, wall_direction
+from fasaco_edge.grid.turning import turned_geometry
+from fasaco_edge.grid.walls import wall_direction
 from fasaco_edge.offline.settings import AXES, HOME, WALLS
 from fasaco_edge.planners.line import LINES, line_over
 

@@ -253,7 +253,8 @@ class Replay:
         mission = self.mission
         if recorded is None or mission.lattice is None:
             return None
-        return digest(mission.lattice.centres(update.cells).tobytes()) == recorded.digest
+        xy = mission.lattice.centres(update.cells) if update.xy is None else update.xy
+        return digest(xy.tobytes()) == recorded.digest
 
 
 class ReplayPlanner:

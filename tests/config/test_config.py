@@ -375,3 +375,19 @@ def test_recordings_have_room_for_two_parts(tmp_path):
     file.write_text("recording: {part_mb: 60, quota_mb: 100}")
     with pytest.raises(BadConfiguration, match=r"recording\.quota_mb must be 0 or at least"):
         load_config(file)
+
+
+@pytest.mark.parametrize(
+    ("text", "lattice_deg"),
+    [
+        ("planner: {align: axes}", 0.0),
+        ("planner: {align: walls}", None),
+        ("planner: {align: -12}", -12.0),
+        # Cells that robots share, and centres of cells, keep to the axes.
+        ("{planner: {align: walls}, fleet: {name: hall}}", 0.0),
+        ("{planner: {align: 30}, fleet: {name: hall}}", 30.0),
+        ("planner: {align: walls, line: cells}", 0.0),
+    ],
+)
+def test_at_which_angle_cells_lie(load, text, lattice_deg):
+    assert load(text).lattice_deg == lattice_deg

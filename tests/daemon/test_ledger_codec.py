@@ -95,6 +95,22 @@ def test_what_a_fleet_has_swept_is_kept_in_a_version_of_its_own():
     assert contents(read) == contents(ledger)
 
 
+@pytest.mark.parametrize("fleet", [b"", b'{"version": 1}'])
+def test_cells_at_an_angle_are_kept_in_a_version_of_their_own(fleet):
+    ledger = replace(driven((-1, 5)), lattice_deg=-29.7, fleet=fleet, note="{}")
+    payload = encode_ledger(ledger)
+    assert struct.unpack_from("<I", payload, 8) == (5,)
+    read = decode_ledger(payload, CELL_M)
+    assert (read.lattice_deg, read.fleet, read.note) == (-29.7, fleet, "{}")
+    assert contents(read) == contents(ledger)
+
+
+@pytest.mark.parametrize("lattice_deg", [float("nan"), float("inf"), -91.0])
+def test_an_impossible_angle_is_refused(lattice_deg):
+    with pytest.raises(LedgerFileError, match="cells at"):
+        decode_ledger(encode_ledger(replace(driven((0, 0)), lattice_deg=lattice_deg)), CELL_M)
+
+
 def test_a_ledger_without_a_trail_is_read_with_none():
     plain = struct.pack("<dQIIII", 0.3, 0, 3, 0, 0, 0) + b"map" + b"{}"
     ledger = decode_ledger(enveloped(zlib.compress(plain), version=2), CELL_M)
@@ -206,9 +222,9 @@ def test_another_file_is_no_ledger():
 
 def test_another_version_is_named_with_what_to_do():
     with pytest.raises(
-        LedgerMismatchError, match="version 5, this release reads versions 1 to 4"
+        LedgerMismatchError, match="version 6, this release reads versions 1 to 5"
     ) as told:
-        decode_ledger(enveloped(b"whatever it holds", version=5), CELL_M)
+        decode_ledger(enveloped(b"whatever it holds", version=6), CELL_M)
     assert "install the release that wrote it" in told.value.hint
     assert "rename the file back" in told.value.hint
 

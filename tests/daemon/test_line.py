@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 
@@ -9,6 +11,7 @@ from fasaco_edge.bench.floor import SweepingRobot, judge_floor
 from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D
 from fasaco_edge.grid.occupancy import OccupancyGrid
+from fasaco_edge.wire.messages.maps import CoverageValue, decode_occupancy_grid
 from tests.daemon.test_mission import START, planned
 from tests.support.outsider import Outsider
 from tests.support.processes import daemon_process
@@ -56,3 +59,29 @@ def test_by_default_the_path_is_a_line_that_sweeps_the_rims(tmp_path):
         way = [tuple(point) for point in points[:12].tolist()]
         drive(outsider, way)
         outsider.wait_status(lambda status: status["floor"]["swept_m2"] > 0.3)
+
+
+def test_cells_at_an_angle_are_published_where_they_lie_in_the_map_frame(tmp_path):
+    pixels = pillared_room()
+    with (
+        daemon_process(tmp_path, planner={"line": "thorough", "align": 30}) as running,
+        Outsider(running.endpoint) as outsider,
+    ):
+        paths, grids = outsider.listen("path"), outsider.listen("coverage")
+        outsider.put("map", map_bytes(pixels))
+        outsider.put("pose", pose_bytes(*START))
+        points, _ = planned(paths.wait(lambda heard: True))
+        figures = swept_by(pixels, points)
+        assert figures.illegal_share == 0.0
+        assert figures.swept_m2 > 0.8 * figures.reachable_m2
+        coverage = decode_occupancy_grid(grids.wait(lambda heard: True).payload)
+        assert coverage.geometry.origin.yaw == pytest.approx(math.radians(30.0))
+        rows, cols = np.nonzero(coverage.cells == CoverageValue.TO_COVER)
+        assert len(rows) > 0.8 * len(coverable_cells(pixels))
+        for row, col in zip((rows + 0.5).tolist(), (cols + 0.5).tolist(), strict=True):
+            x, y = coverage.geometry.to_map(col, row)
+            assert pixels[int(y / RESOLUTION_M), int(x / RESOLUTION_M)] == 0
+        told = outsider.wait_status(lambda status: status["path"])
+        assert told["map"]["lattice_deg"] == 30.0
+        home = told["mission"]["home"]
+        assert math.dist((home["x"], home["y"]), START) < TOOL_M

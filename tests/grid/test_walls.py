@@ -12,7 +12,8 @@ from fasaco_edge.grid import walls
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D
 from fasaco_edge.grid.map_files import find_map, read_map
 from fasaco_edge.grid.occupancy import OccupancyGrid
-from fasaco_edge.grid.walls import turned_geometry, turned_points, wall_direction
+from fasaco_edge.grid.turning import turned_geometry, turned_points
+from fasaco_edge.grid.walls import wall_direction
 
 UNKNOWN, FREE, WALL = -1, 0, 100
 

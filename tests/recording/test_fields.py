@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 
 from fasaco_edge.grid.geometry import Window
+from fasaco_edge.grid.turning import turned_point
 from fasaco_edge.recording.arrow import pa
 from fasaco_edge.recording.read.drawn import MOST_FIELDS, FieldSampler
 
@@ -14,7 +17,7 @@ def strict(kind):
     return pa.field("item", kind, nullable=False)
 
 
-def rows_of(*images, x=0.6, y=-0.3, cell_m=0.3):
+def rows_of(*images, x=0.6, y=-0.3, cell_m=0.3, yaw=None):
     """Rows as a recorder writes them: images with the top row first."""
     column = {
         "GridMap:data": pa.array(
@@ -29,7 +32,23 @@ def rows_of(*images, x=0.6, y=-0.3, cell_m=0.3):
             [[{"width": image.shape[1], "height": image.shape[0]}] for image in images]
         ),
     }
+    if yaw is not None:
+        turn = [0.0, 0.0, math.sin(yaw / 2), math.cos(yaw / 2)]
+        column["GridMap:quaternion"] = pa.array(
+            [[turn]] * len(images), pa.list_(pa.list_(strict(pa.float32()), 4))
+        )
     return pa.RecordBatch.from_pydict(column)
+
+
+def test_a_field_at_an_angle_has_the_cells_that_it_is_of():
+    sampler = FieldSampler()
+    x, y = turned_point(0.6, -0.3, -25.0)
+    sampler.take(rows_of(np.ones((2, 3), np.uint8), x=x, y=y, yaw=math.radians(-25.0)), [5])
+    sampler.take(rows_of(np.ones((2, 3), np.uint8), yaw=0.0), [6])
+    askew, straight = sampler.spread()
+    assert askew.window == straight.window == Window(-1, 2, 1, 5)
+    assert askew.yaw_deg == pytest.approx(-25.0, abs=1e-4)
+    assert straight.yaw_deg == 0.0
 
 
 def test_a_field_stands_upright_where_it_was_drawn():

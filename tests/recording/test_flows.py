@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+import math
+from dataclasses import replace
+
 import numpy as np
+import pytest
 
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D
+from fasaco_edge.grid.turning import turned_points
 from fasaco_edge.recording.scene.flows import flows_of, fork_at
 
 EDGE = 0.5
@@ -30,6 +35,17 @@ def arrows(*rows):
 def test_a_lane_is_an_arrow_and_so_is_the_way_back():
     assert arrows("EEEN", "WWWW") == [(0, 0, 3, 0), (3, 0, 0, 1), (3, 1, -4, 0)]
     assert arrows("N", "N", ".", "S") == [(0, 0, 0, 2), (0, 3, 0, -1)]
+
+
+def test_of_cells_at_an_angle_the_arrows_are_so_too():
+    geometry, pointed, share = of(["EEEN", "WWWW"])
+    straight, askew = (
+        flows_of(replace(geometry, origin=Pose2D(1.0, 2.0, yaw)), pointed, share)
+        for yaw in (0.0, math.radians(25.0))
+    )
+    assert askew.vectors == pytest.approx(turned_points(straight.vectors, 25.0))
+    there = turned_points(straight.origins - (1.0, 2.0), 25.0)
+    assert askew.origins - (1.0, 2.0) == pytest.approx(there)
 
 
 def test_a_lane_is_cut_where_it_is_less_decided():

@@ -129,3 +129,13 @@ def test_a_robot_that_floods_is_heard_at_its_rate():
         assert ear._is_due(key, at)
     assert all(ear._is_due(f"fasaco/@v1/other{number}/fleet", 65.0) for number in range(63))
     assert not ear._is_due("fasaco/@v1/another/fleet", 65.0)
+
+
+def test_a_robot_whose_cells_lie_at_another_angle_is_left_out():
+    cell_m = CONFIG.cell_m
+    assert heard(said(cell_m=cell_m, lattice_deg=0.0)).misfit == ""
+    told = heard(said(cell_m=cell_m, lattice_deg=12.5)).misfit
+    assert told == "its cells lie at 12.5 degrees to the map frame, here at 0"
+    older = json.loads(said(cell_m=cell_m))
+    older.pop("lattice_deg", None)
+    assert heard(json.dumps(older).encode()).misfit == ""

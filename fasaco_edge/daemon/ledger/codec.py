@@ -13,6 +13,7 @@ broken one. Little endian:
     total      uint64    visits in all
     counts     7 uint32  bytes of the frame, cells under the tool, tiles, tiles of floor, rows and
                          columns of the trail, bytes of the fleet
+    angle      float64   of the cells' rows to the x axis of the map frame [deg]
     frame      UTF-8
     cells      int64 (row, col) of each cell under the tool
     places     int64 (row, col) of each tile
@@ -26,8 +27,9 @@ broken one. Little endian:
     fleet      what other robots have swept, JSON (``mission.fleet.shared``)
     note       UTF-8, up to the end: JSON of the order, with a version of its own; may be empty
 
-Versions before are read, too. Version 3, which is written of a robot without a fleet, lacks
-``fleet`` and its count. Version 2 knows no trail: its counts, ``corner`` and ``trail`` are
+Versions before are read, too. Version 4, which is written where cells lie along the map frame's
+axes, lacks ``angle``. Version 3, which is written of such a robot without a fleet, lacks
+``fleet`` and its count, too. Version 2 knows no trail: its counts, ``corner`` and ``trail`` are
 not in it. Version 1 knows no floor, either: nor are the fourth count, ``floor`` and ``swept``.
 """
 
@@ -51,12 +53,12 @@ from fasaco_edge.mission.coverage.swept_floor import MOST_FLOOR_TILES
 from fasaco_edge.planners.living_trail import NO_TRAIL, TrailSnapshot
 
 MAGIC = b"FASACOLG"
-VERSION = 4
+VERSION = 5
 
 _ENVELOPE = struct.Struct("<8sIIQ")
 _CHECKED = struct.Struct("<IQ")
-_MORE_COUNTS = {1: 0, 2: 1, 3: 3, 4: 4}
-_HEADS = {version: struct.Struct(f"<dQ{3 + n}I") for version, n in _MORE_COUNTS.items()}
+_COUNTS = {1: "3I", 2: "4I", 3: "6I", 4: "7I", 5: "7Id"}
+_HEADS = {version: struct.Struct(f"<dQ{counts}") for version, counts in _COUNTS.items()}
 _PLACE_BYTES, _TILE_BYTES, _FLOOR_BYTES = 16, 2 * TILE * TILE, FLOOR_TILE * ROW_BYTES
 # Of a cell: two for each direction.
 _TRAIL_BYTES = 8
@@ -68,6 +70,8 @@ MOST_BYTES = (
     + 16_000_000
 )
 """Of a body, and of a file, which is smaller; longer ones are not read."""
+# Cells look alike after a quarter-turn [deg].
+MOST_LATTICE_DEG = 90.0
 # Number of values of pheromone that are rounded at a time.
 _AT_ONCE = 1 << 18
 # Mostly zeros and ones: the fastest level takes a hundredth of the size.
@@ -84,7 +88,9 @@ def encode_ledger(snapshot: LedgerSnapshot) -> bytes:
 
 
 def _version_of(snapshot: LedgerSnapshot) -> int:
-    return VERSION if snapshot.fleet else VERSION - 1
+    if snapshot.lattice_deg:
+        return 5
+    return 4 if snapshot.fleet else 3
 
 
 def _parts(snapshot: LedgerSnapshot) -> Iterator[bytes]:
@@ -92,8 +98,9 @@ def _parts(snapshot: LedgerSnapshot) -> Iterator[bytes]:
     counts = (len(frame), len(snapshot.under_tool), len(snapshot.tiles), len(floor))
     # One larger than what is read would make the ledger unreadable.
     trail = snapshot.trail if snapshot.trail.tau.size <= 4 * MAX_LATTICE_CELLS else NO_TRAIL
-    more = (*trail.tau.shape[:2], *([len(snapshot.fleet)] if snapshot.fleet else ()))
-    yield _HEADS[_version_of(snapshot)].pack(snapshot.cell_m, snapshot.total, *counts, *more)
+    version = _version_of(snapshot)
+    more = (*trail.tau.shape[:2], len(snapshot.fleet), snapshot.lattice_deg)[: version - 1]
+    yield _HEADS[version].pack(snapshot.cell_m, snapshot.total, *counts, *more)
     yield frame
     yield np.array(sorted(snapshot.under_tool), "<i8").tobytes()
     yield np.array(sorted(snapshot.tiles), "<i8").tobytes()
@@ -159,10 +166,10 @@ def _inflated(body: bytes) -> bytes:
 def _decode_body(plain: bytes, version: int) -> LedgerSnapshot:
     head = _HEADS[version]
     cell_m, total, *counts = head.unpack_from(plain)
-    frame_bytes, cell_count, tile_count, floor_count, rows, cols, fleet_bytes = (
+    frame_bytes, cell_count, tile_count, floor_count, rows, cols, fleet_bytes, lattice_deg = (
         *counts,
-        *(0, 0, 0, 0),
-    )[:7]
+        *(0, 0, 0, 0, 0.0),
+    )[:8]
     for count, most in ((tile_count, MOST_TILES), (floor_count, MOST_FLOOR_TILES)):
         if count > most:
             raise ValueError(f"{count} tiles, {most} are read at most")
@@ -181,6 +188,9 @@ def _decode_body(plain: bytes, version: int) -> LedgerSnapshot:
         )
     if not (math.isfinite(cell_m) and cell_m > 0):
         raise ValueError(f"cells of {cell_m} m")
+    # A negated comparison, so that NaN is caught too.
+    if not abs(lattice_deg) <= MOST_LATTICE_DEG:
+        raise ValueError(f"cells at {lattice_deg} degrees")
     tiles = _tiles(plain, cells_end, tile_count, np.dtype("<u2"), (TILE, TILE))
     swept = _tiles(plain, tiles_end, floor_count, np.dtype(np.uint8), (FLOOR_TILE, ROW_BYTES))
     return LedgerSnapshot(
@@ -195,6 +205,7 @@ def _decode_body(plain: bytes, version: int) -> LedgerSnapshot:
         note=plain[fleet_end:].decode(),
         fleet=plain[trail_end:fleet_end],
         trail=_trail(plain[floor_end:trail_end], rows, cols) if version >= 3 else NO_TRAIL,
+        lattice_deg=lattice_deg,
     )
 
 

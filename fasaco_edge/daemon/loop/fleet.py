@@ -43,6 +43,7 @@ class FleetEar:
     def __init__(self, config: DaemonConfig) -> None:
         assert config.fleet
         self._keys, self._fleet, self._cell_m = config.keys(), config.fleet.name, config.cell_m
+        self._lattice_deg = config.lattice_deg or 0.0
         self._heard_at: dict[str, float] = {}
 
     def listen(self, bus: Bus, post: Callable[[Sample], None]) -> None:
@@ -74,6 +75,11 @@ class FleetEar:
         misfit = ""
         if abs(member.cell_m - self._cell_m) > 1e-9:
             misfit = f"its cells are {member.cell_m:g} m wide, here they are {self._cell_m:g} m"
+        if abs(member.lattice_deg - self._lattice_deg) > 1e-9:
+            misfit = (
+                f"its cells lie at {member.lattice_deg:g} degrees to the map frame, here at "
+                f"{self._lattice_deg:g}"
+            )
         return MemberHeard(
             robot=robot,
             misfit=misfit,
@@ -139,6 +145,7 @@ class FleetVoice:
             version=FLEET_VERSION,
             fleet=self._fleet,
             cell_m=self._cell_m,
+            lattice_deg=mission.turn.deg,
             frame=mission.ledger.frame,
             state=str(mission.state),
             x=round(stamped.pose.x, 3),

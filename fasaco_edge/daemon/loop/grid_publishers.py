@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import time
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from fasaco_edge.daemon.loop.last_samples import ShownTrail
-from fasaco_edge.grid.geometry import GridGeometry
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.wire.messages.maps import coverage_values
 
@@ -47,7 +47,7 @@ class CoveragePublisher:
         if lattice is None or grid is None:
             return
         self._published_at, self._key = now, key
-        geometry = GridGeometry.of_cells(lattice.window, lattice.cell_m)
+        geometry = mission.turn.cells(lattice.window, lattice.cell_m)
         values = coverage_values(lattice.states, mission.covered.visits(lattice.window))
         self._outbox.coverage(OccupancyGrid(geometry, values, grid.frame, grid.stamp_ns))
 
@@ -73,7 +73,7 @@ class FloorPublisher:
         self._published_at, self._key = now, key
         shown = floor.snapshot().shown(MOST_SQUARES, grid.frame, grid.stamp_ns)
         if shown is not None:
-            self._outbox.floor(shown)
+            self._outbox.floor(replace(shown, geometry=mission.turn.geometry(shown.geometry)))
 
 
 class TrailPublisher:
@@ -105,8 +105,9 @@ class TrailPublisher:
             return
         self._due = now + max(PERIOD_S, cells / CELLS_PER_S)
         steps = max(len(mission.route.path.ahead) - 1, 0)
+        of_path = mission.route.revision, steps
         shown = ShownTrail(
-            held, lattice.cell_m, grid.frame, mission.route.revision, steps, time.time_ns()
+            held, lattice.cell_m, grid.frame, *of_path, time.time_ns(), mission.turn.deg
         )
         self._kept = key
         self._outbox.keep_trail(shown)

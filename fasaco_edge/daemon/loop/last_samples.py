@@ -15,6 +15,7 @@ from fasaco_edge.daemon.loop.answers import Said, answering, check
 from fasaco_edge.errors import BadQuery, NotYet
 from fasaco_edge.grid.geometry import GridGeometry
 from fasaco_edge.grid.occupancy import OccupancyGrid
+from fasaco_edge.grid.turning import turned_geometry
 from fasaco_edge.planners.living_trail import (
     TrailSnapshot,
     branching,
@@ -119,6 +120,7 @@ class ShownTrail:
         revision: of the path in force.
         steps: of it, still to be driven.
         stamp_ns: of the moment [ns].
+        lattice_deg: the angle of the cells to the map frame [deg].
     """
 
     held: TrailSnapshot
@@ -127,6 +129,7 @@ class ShownTrail:
     revision: int
     steps: int
     stamp_ns: int
+    lattice_deg: float = 0.0
 
     def field(self) -> tuple[bytes, bytes]:
         """Return the field as payload and attachment."""
@@ -138,10 +141,12 @@ class ShownTrail:
             branching=round(branching(tau), 4),
         )
         seen = ColonySnapshot(self.held.window, self.cell_m, field, 0, 0, 0, self.steps)
-        return encode_pheromone(seen, self.frame, self.stamp_ns), encode_json(about)
+        payload = encode_pheromone(seen, self.frame, self.stamp_ns, self.lattice_deg)
+        return payload, encode_json(about)
 
     def directions(self) -> bytes:
         """Return where it points to as a payload."""
-        geometry = GridGeometry.of_cells(self.held.window, self.cell_m)
+        plain = GridGeometry.of_cells(self.held.window, self.cell_m)
+        geometry = turned_geometry(plain, self.lattice_deg)
         values = direction_values(*directions(self.held.tau))
         return encode_occupancy_grid(OccupancyGrid(geometry, values, self.frame, self.stamp_ns))

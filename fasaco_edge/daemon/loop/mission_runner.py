@@ -324,6 +324,7 @@ def mission_config(config: DaemonConfig, chosen: CoveragePlanner) -> MissionConf
         isinstance(chosen, Fasaco),
         robot.name if config.fleet else "",
         config.battery or None,
+        config.lattice_deg,
     )
 
 

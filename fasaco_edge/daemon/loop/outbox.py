@@ -158,12 +158,12 @@ class Outbox:
         """Keep the living trail for who asks for it."""
         self._last.keep_living(shown)
 
-    def pheromone(self, seen: PlanSnapshot, frame: str) -> None:
+    def pheromone(self, seen: PlanSnapshot, frame: str, lattice_deg: float) -> None:
         """Keep the pheromone field, and publish it if anyone listens."""
-        self.guard.attempt("pheromone", lambda: self._say_pheromone(seen, frame))
+        self.guard.attempt("pheromone", lambda: self._say_pheromone(seen, frame, lattice_deg))
 
-    def _say_pheromone(self, seen: PlanSnapshot, frame: str) -> None:
-        payload = encode_pheromone(seen.snapshot, frame, time.time_ns())
+    def _say_pheromone(self, seen: PlanSnapshot, frame: str, lattice_deg: float) -> None:
+        payload = encode_pheromone(seen.snapshot, frame, time.time_ns(), lattice_deg)
         reply = Reply(payload, schemas.PHEROMONE_GRID)
         self._last.keep_trail(seen.plan, seen.snapshot.cohort, reply)
         if self.shows_pheromone:
@@ -191,16 +191,16 @@ def path_attachment(mission: Mission, update: PathUpdate) -> PathAttachment:
         reason=update.reason,
         steps=max(len(update.cells) - 1, 0),
         plan_ms=round(1e3 * update.plan_s, 3),
-        changed=rectangle(update.changed, mission.lattice.cell_m),
+        changed=rectangle(update.changed, mission),
     )
 
 
-def rectangle(window: Window | None, cell_m: float) -> Rectangle | None:
-    """Return where a window of the lattice lies in the map's frame [m]; None without one."""
-    if window is None:
+def rectangle(window: Window | None, mission: Mission) -> Rectangle | None:
+    """Return what is around a window of the lattice in the map's frame [m]; None without one."""
+    if window is None or mission.lattice is None:
         return None
-    edges = (window.col0, window.row0, window.col1, window.row1)
-    return Rectangle(*(round(edge * cell_m, 3) for edge in edges))
+    bounds = mission.turn.cells(window, mission.lattice.cell_m).bounds()
+    return Rectangle(*(round(edge, 3) for edge in bounds))
 
 
 class PublishGuard:

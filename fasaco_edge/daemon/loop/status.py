@@ -209,6 +209,7 @@ def _map(mission: Mission | None) -> MapReport | None:
         revision=mission.map_revision,
         stamp_ns=mission.grid.stamp_ns,
         frame=mission.grid.frame,
+        lattice_deg=round(mission.turn.deg, 1),
     )
 
 
@@ -295,7 +296,6 @@ def mission_report(
     """Return this part of the status; ``standing`` is how many keep-out zones hold for all."""
     order, zone = order_state.order, order_state.current_zone
     home = mission.home if mission else order_state.home
-    lattice = mission.lattice if mission else None
     return MissionReport(
         ordered=None if order is None else ("itself" if order_state.automatic else "command"),
         stage=None if order is None else str(order_state.stage),
@@ -306,7 +306,7 @@ def mission_report(
         zones=_zones(mission, order_state),
         keep_out=(0 if order is None else len(order.keep_out)) + standing,
         return_home=bool(order and order.return_home),
-        home=None if home is None or lattice is None else Point(*_centre(home, lattice.cell_m)),
+        home=None if home is None or mission is None else _place(mission, home),
         tries=order_state.tries,
         unreached=_unreached(mission),
     )
@@ -332,7 +332,7 @@ def _unreached(mission: Mission | None) -> UnreachedReport:
         UnreachedArea(
             area.cells,
             round(area.cells * cell_m**2, 3),
-            *_centre(area.cell, cell_m),
+            *_centre(mission, area.cell, cell_m),
             reason=area.reason,
         )
         for area in found.areas
@@ -341,6 +341,11 @@ def _unreached(mission: Mission | None) -> UnreachedReport:
     return UnreachedReport(found.cells, m2, areas, found.areas_left_out)
 
 
-def _centre(cell: tuple[int, int], cell_m: float) -> tuple[float, float]:
-    row, col = cell
-    return round((col + 0.5) * cell_m, 3), round((row + 0.5) * cell_m, 3)
+def _place(mission: Mission, cell: tuple[int, int]) -> Point | None:
+    lattice = mission.lattice
+    return None if lattice is None else Point(*_centre(mission, cell, lattice.cell_m))
+
+
+def _centre(mission: Mission, cell: tuple[int, int], cell_m: float) -> tuple[float, float]:
+    x, y = mission.turn.centre(cell, cell_m)
+    return round(x, 3), round(y, 3)

@@ -34,7 +34,7 @@ from fasaco_edge.mission.line.layer import LineLayer
 from fasaco_edge.mission.map.inputs import InputMonitor
 from fasaco_edge.mission.map.map_state import MapState
 from fasaco_edge.mission.orders.mask import mask_polygons
-from fasaco_edge.mission.orders.order import located
+from fasaco_edge.mission.orders.order import located, turned_order
 from fasaco_edge.mission.orders.order_state import OrderState, Stage
 from fasaco_edge.mission.orders.sequencer import Sequencer
 
@@ -54,6 +54,8 @@ class EventHandler:
     fleet: FleetLayer
     battery: BatteryGauge
     policy: MissionPolicy
+    # Of the cells' rows to the x axis of the map frame [deg].
+    lattice_deg: float = 0.0
     _now: float = field(default=0.0, init=False)
     # What the events of a step lead to.
     _path: PathUpdate | None = field(default=None, init=False)
@@ -232,7 +234,7 @@ class EventHandler:
         """Carry out a command; what is wrong with it is its answer."""
         before = self.orders.order_state
         try:
-            order = located(event.order, self.policy.zones)
+            order = turned_order(located(event.order, self.policy.zones), -self.lattice_deg)
             if event.command == "start":
                 self.map.check_zones(order)
             has_home = self.policy.place("home") is not None

@@ -9,14 +9,17 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import replace
 
+from fasaco_edge.errors import LedgerMismatchError, MapTooFar, MapTooLarge
 from fasaco_edge.grid.geometry import StampedPose
-from fasaco_edge.grid.lattice import Cell, CoverageLattice
+from fasaco_edge.grid.lattice import Cell, CoverageLattice, lattice_window
 from fasaco_edge.grid.occupancy import OccupancyGrid
+from fasaco_edge.grid.turning import turned_geometry
 from fasaco_edge.mission.config import MissionConfig
-from fasaco_edge.mission.core.charging import Charging
+from fasaco_edge.mission.core.charging import BatteryGauge, Charging
 from fasaco_edge.mission.core.event_handler import EventHandler
-from fasaco_edge.mission.core.events import Decision, Event
+from fasaco_edge.mission.core.events import Decision, Event, MapReceived, PathUpdate, PoseReceived
 from fasaco_edge.mission.core.executive import Executive
+from fasaco_edge.mission.core.lattice_turn import LatticeTurn
 from fasaco_edge.mission.core.route import Route
 from fasaco_edge.mission.core.trail_layer import TrailLayer
 from fasaco_edge.mission.coverage.drive_meter import DriveMeter, DriveTimes
@@ -24,12 +27,14 @@ from fasaco_edge.mission.coverage.ledger import CoverageLedger, LedgerSnapshot
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
 from fasaco_edge.mission.coverage.progress import Coverage, ZoneProgress, zone_progress
 from fasaco_edge.mission.coverage.swept_floor import SweptFloor
+from fasaco_edge.mission.coverage.turned_ledger import turned_ledger
 from fasaco_edge.mission.coverage.unreached import Unreached
 from fasaco_edge.mission.fleet.layer import FleetLayer
 from fasaco_edge.mission.fleet.shared import SharedProgress
 from fasaco_edge.mission.line.layer import FloorToSweep, LineLayer
 from fasaco_edge.mission.map.inputs import InputMonitor
 from fasaco_edge.mission.map.map_state import MapState
+from fasaco_edge.mission.map.wall_watch import WallWatch
 from fasaco_edge.mission.orders.order_state import OrderState
 from fasaco_edge.mission.orders.sequencer import Sequencer
 from fasaco_edge.planners.living_trail import LivingTrail
@@ -49,6 +54,20 @@ class Mission:
 
     def __init__(self, config: MissionConfig, order: OrderState | None = None) -> None:
         """Begin with an order; by default with one for everything that can be reached."""
+        self._config = config
+        self._drive, self._gauge = DriveMeter(), BatteryGauge()
+        self._walls = WallWatch()
+        if config.lattice_deg is not None:
+            self._walls.end()
+        self._lay_cells(config.lattice_deg or 0.0)
+        self.restore_order(order or OrderState.autostart())
+
+    def _lay_cells(self, deg: float) -> None:
+        """Begin with a mission over cells at an angle to the map frame [deg]."""
+        self._turn = LatticeTurn(deg)
+        # By how much the cells are turned against those of the ledger that is restored [deg].
+        self._turned_by_deg = 0.0
+        config = self._turn.config(self._config)
         self._map = MapState(config)
         cell_m, sweeping = config.footprint.cell_m, config.sweeping
         self._ledger = MissionLedger(cell_m, sweeping.tool_m if sweeping else cell_m)
@@ -59,28 +78,36 @@ class Mission:
         owners = self._map, self._ledger, monitor, self._orders, self.route
         self._line = LineLayer(sweeping, self._map, self._ledger, self._orders, self.route)
         self._trail = TrailLayer(config, self._map, self.route)
-        self._drive = DriveMeter()
-        self.charging = Charging(config, self._map, self._orders, self.route)
-        measured = self._drive, self.fleet, self.charging.gauge
-        self._handler = EventHandler(*owners, self._line, self._trail, *measured, config.policy)
+        self.charging = Charging(config, self._map, self._orders, self.route, self._gauge)
+        measured = self._drive, self.fleet, self._gauge
+        self._handler = EventHandler(
+            *owners, self._line, self._trail, *measured, config.policy, self._turn.deg
+        )
         decided_by = self._trail, self.fleet, self.charging
         self._executive = Executive(*owners, *decided_by, config.policy)
-        self.restore_order(order or OrderState.autostart())
 
     def restore_ledger(self, before: LedgerSnapshot) -> None:
         """Go on where a ledger from before a restart ended, unless the map contradicts it.
 
-        To be called before the first step. A contradiction, see ``coverage.mission_ledger``, is
-        reported as a fault (LedgerMismatchError) with the map that shows it; what was covered
-        since the restart still counts then.
+        To be called before the first step, and before ``restore_order``. A contradiction, see
+        ``coverage.mission_ledger``, is reported as a fault (LedgerMismatchError) with the map that
+        shows it; what was covered since the restart still counts then.
         """
-        self._ledger.resume(before)
+        if self._config.lattice_deg is None and before.lattice_deg:
+            self._lay_cells(before.lattice_deg)
+            self._walls.end()
+        self._resume(before)
+
+    def _resume(self, before: LedgerSnapshot, *, is_confirmed: bool = False) -> None:
+        self._turned_by_deg = self._turn.deg - before.lattice_deg
+        before = turned_ledger(before, self._turn.deg)
+        self._ledger.resume(before, is_confirmed=is_confirmed)
         self._trail.resume(before.trail)
         self._map.frames.activate(before.frame)
 
     def restore_order(self, order: OrderState) -> None:
         """Go on with an order from before a restart; to be called before the first step."""
-        self._handler.begin_order(order)
+        self._handler.begin_order(self._turn.order(order, self._turned_by_deg))
         self.state, self.reason = self._executive.status()
 
     def step(self, events: Iterable[Event], now: float) -> Decision:
@@ -91,13 +118,72 @@ class Mission:
                 reported as a fault and changes nothing.
             now: time [s] of any steady clock.
         """
-        happened = self._handler.handle(events, now)
+        events = list(events)
+        begun = self._make_room(events, now)
+        happened = self._along_walls(self._handle(events, now), now)
         decided = self._executive.decide(now)
         self.state, self.reason = self._executive.status()
-        path = decided.path or happened.path
+        path = decided.path or happened.path or begun
         self._trail.finish(path)
         path = self._line.finish(path, now)
+        if path is not None:
+            path = self._turn.path(path, self.lattice)
         return replace(happened, plan=decided.plan, path=path)
+
+    def _handle(self, events: Iterable[Event], now: float) -> Decision:
+        return self._handler.handle(map(self._turn.event, events), now)
+
+    def _along_walls(self, happened: Decision, now: float) -> Decision:
+        """Lay the cells along the walls once these are certain; return all that has happened."""
+        walls, pose, grid = self._walls, self.pose, self.grid
+        is_other = any(isinstance(fault, LedgerMismatchError) for fault in happened.faults)
+        if is_other and self._config.lattice_deg is None:
+            walls.begin()
+        # What was set aside for an errand is of the cells there are.
+        if walls.is_over or pose is None or grid is None or self.order_state.errand:
+            return happened
+        deg = walls.look(grid, pose.pose)
+        # Askew, a lattice spans up to twice the cells; and the map may grow.
+        if deg is None or deg == self._turn.deg or not self._fits(grid, deg, share=0.5):
+            return happened
+        why = f"cells lie along the walls from now on, at {deg:.1f} degrees to the map frame"
+        stop = self._turn_cells(deg, why, now)
+        return replace(happened, path=stop or happened.path)
+
+    def _make_room(self, events: Iterable[Event], now: float) -> PathUpdate | None:
+        """Lay the cells along the map frame's axes again for a map that fits in no other way."""
+        if self._config.lattice_deg is not None or not self._turn.deg:
+            return None
+        maps = [event.grid for event in events if isinstance(event, MapReceived)]
+        if all(self._fits(grid, self._turn.deg) or not self._fits(grid, 0.0) for grid in maps):
+            return None
+        return self._turn_cells(0.0, "the map is too large for cells along the walls", now)
+
+    def _fits(self, grid: OccupancyGrid, deg: float, share: float = 1.0) -> bool:
+        """Tell whether a lattice at an angle [deg] takes no more than a share of its cells."""
+        geometry, most = turned_geometry(grid.geometry, -deg), self._config.max_lattice_cells
+        try:
+            lattice_window(geometry, self._config.footprint.cell_m, int(share * most))
+        except (MapTooLarge, MapTooFar):
+            return False
+        return True
+
+    def _turn_cells(self, deg: float, why: str, now: float) -> PathUpdate | None:
+        """Go on over cells at another angle [deg]; return the path that stops the robot, if any."""
+        before, order, route = self.snapshot(), self.order_state, self.route
+        is_confirmed = self._ledger.is_confirmed
+        held: list[Event] = [MapReceived(self.grid)] if self.grid is not None else []
+        held += [PoseReceived(self.pose)] if self.pose is not None else []
+        # No path may be driven that nobody watches.
+        stop = route.stop(why, now)
+        self._lay_cells(deg)
+        self._resume(before, is_confirmed=is_confirmed)
+        self.restore_order(order)
+        self.route.succeed(route)
+        self._drive.break_track()
+        self._handle(held, now)
+        self.route.want(why)
+        return stop
 
     def coverage(self) -> Coverage | None:
         """Return how much is covered; None before there is a map."""
@@ -122,7 +208,13 @@ class Mission:
     def snapshot(self) -> LedgerSnapshot:
         """Return all that is to outlive a restart: what is covered, and how far the order is."""
         trail, note = self._trail.snapshot(), self.order_state.to_json()
-        return replace(self._ledger.snapshot(), trail=trail, note=note)
+        ledger, lattice_deg = self._ledger.snapshot(), self._turn.deg
+        return replace(ledger, trail=trail, note=note, lattice_deg=lattice_deg)
+
+    @property
+    def turn(self) -> LatticeTurn:
+        """At which angle to the map frame cells lie: places on the lattice are turned by that."""
+        return self._turn
 
     @property
     def order_state(self) -> OrderState:
@@ -137,7 +229,7 @@ class Mission:
     @property
     def grid(self) -> OccupancyGrid | None:
         """The newest map; None before there is one."""
-        return self._map.grid
+        return self._turn.grid(self._map.grid)
 
     @property
     def map_revision(self) -> int:
@@ -147,11 +239,11 @@ class Mission:
     @property
     def pose(self) -> StampedPose | None:
         """The newest pose; None before there is one."""
-        return self._map.pose
+        return self._turn.pose(self._map.pose)
 
     @property
     def lattice(self) -> CoverageLattice | None:
-        """The lattice over the newest map; None before there is one."""
+        """The lattice over the newest map, in its own frame; None before there is one."""
         return self._map.lattice
 
     @property
@@ -180,5 +272,5 @@ class Mission:
 
     @property
     def floor(self) -> SweptFloor:
-        """Which floor is swept."""
+        """Which floor is swept, in the lattice's frame."""
         return self._ledger.floor

@@ -73,6 +73,13 @@ class Route:
         # How the last plan failed, and when; "" where it did not.
         self._failure = "", 0.0
 
+    def succeed(self, before: Route) -> None:
+        """Go on counting where another route ended; the plan under way there is of no use here."""
+        self.revision, self.plans, self.attempts = before.revision, before.plans, before.attempts
+        self.unchanged, self.outdated = before.unchanged, before.outdated
+        self.pending, self._attempt = before.pending, before._attempt
+        self._is_abandoned = self.pending is not None
+
     @property
     def is_planning(self) -> bool:
         """Whether a plan that is needed is under way."""

@@ -56,6 +56,8 @@ class LedgerSnapshot:
         note: the order and how far it is, as JSON, see ``orders.order_state``; "" for none.
         trail: the pheromone.
         fleet: what other robots have swept, see ``fleet.shared``; b"" for nothing.
+        lattice_deg: the angle of the cells' rows to the x axis of the map frame [deg]. Cells, floor
+            and trail lie along them, about the frame's origin; the order is of the map frame.
     """
 
     cell_m: float
@@ -67,6 +69,7 @@ class LedgerSnapshot:
     note: str = ""
     trail: TrailSnapshot = NO_TRAIL
     fleet: bytes = b""
+    lattice_deg: float = 0.0
 
     @property
     def cells(self) -> int:

@@ -206,9 +206,14 @@ class MissionLedger:
     def _nothing(self, frame: str) -> _Covered:
         return _Covered(CoverageLedger(self._cell_m, frame), SweptFloor(self._tool_m))
 
-    def resume(self, before: LedgerSnapshot) -> None:
-        """Go on with the ledger from before a restart."""
-        self._resumed = before, self._nothing("")
+    @property
+    def is_confirmed(self) -> bool:
+        """Whether no map may contradict it any more."""
+        return self._resumed is None
+
+    def resume(self, before: LedgerSnapshot, *, is_confirmed: bool = False) -> None:
+        """Go on with the ledger from before a restart; ``is_confirmed``: see the property."""
+        self._resumed = None if is_confirmed else (before, self._nothing(""))
         floor = SweptFloor.restored(before.floor, self._tool_m)
         self._covered = _Covered(CoverageLedger.restored(before), floor)
         self.shared.resume(before.fleet)

@@ -21,6 +21,7 @@ from fasaco_edge.grid.floor_map import FloorMap
 from fasaco_edge.grid.geometry import Point, Polygon, StampedPose, Window, polygon_bounds
 from fasaco_edge.grid.lattice import COVERABLE, UNKNOWN, Cell, CoverageLattice, lattice_window
 from fasaco_edge.grid.occupancy import MapPatch, OccupancyGrid, without_base
+from fasaco_edge.grid.turning import turned_geometry
 from fasaco_edge.mission.config import MissionConfig
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
 from fasaco_edge.mission.coverage.progress import Coverage, FreeArea
@@ -255,13 +256,16 @@ class MapState:
     def check_zones(self, order: MissionOrder) -> None:
         """Check that part of each zone lies on the map; without a map nothing is checked.
 
+        In the map frame, as zones are given and told of.
+
         Raises:
             OrderError: a zone lies outside.
         """
         if self.grid is None:
             return
-        west, south, east, north = whole = self.grid.geometry.bounds()
-        for index, zone in enumerate(order.zones):
+        geometry = turned_geometry(self.grid.geometry, self._config.lattice_deg or 0.0)
+        west, south, east, north = whole = geometry.bounds()
+        for index, zone in enumerate(order.as_given.zones):
             x0, y0, x1, y1 = polygon_bounds(zone.polygon) if zone.polygon else whole
             if x1 <= west or x0 >= east or y1 <= south or y0 >= north:
                 raise OrderError(

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 import re
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Annotated, Any, Literal, TypeVar, get_args
 
 import msgspec
@@ -16,6 +16,7 @@ from msgspec import Meta
 from fasaco_edge.errors import OrderError
 from fasaco_edge.grid.geometry import FARTHEST_M, Polygon
 from fasaco_edge.grid.polygons import polygon_flaw
+from fasaco_edge.grid.turning import turned_polygon
 
 # Limits of an order: it is kept with the ledger, written once a second.
 MOST_ZONES = 100
@@ -54,12 +55,19 @@ class MissionOrder:
         keep_out: polygons (x, y) [m] in the map frame that the robot must not touch.
         return_home: whether to drive back to the start at the end.
         keep_covered: whether cells covered before count in the first pass.
+        given: the same order in the map frame, where the polygons are turned, see ``turned_order``.
     """
 
     zones: tuple[Zone, ...] = (Zone(EVERYTHING, None),)
     keep_out: tuple[Polygon, ...] = ()
     return_home: bool = False
     keep_covered: bool = False
+    given: MissionOrder | None = field(default=None, compare=False, repr=False)
+
+    @property
+    def as_given(self) -> MissionOrder:
+        """The order in the map frame, to the last bit as it was given."""
+        return self.given or self
 
 
 EVERYTHING_ONCE = MissionOrder()
@@ -139,7 +147,8 @@ def read_command(document: object) -> tuple[CommandName, MissionOrder]:
 
 
 def order_document(order: MissionOrder) -> dict[str, object]:
-    """Return ``order`` as ``read_order`` reads it."""
+    """Return ``order`` as ``read_order`` reads it, in the map frame."""
+    order = order.as_given
     rest = {
         "keep_out": order.keep_out,
         "return_home": order.return_home,
@@ -176,6 +185,19 @@ def located(order: MissionOrder, standing: tuple[StandingZone, ...]) -> MissionO
         for zone in order.zones
     )
     return replace(order, zones=tuple(zones))
+
+
+def turned_order(order: MissionOrder, by_deg: float) -> MissionOrder:
+    """Return an order whose polygons are those given, turned by ``by_deg`` [deg]."""
+    given = order.as_given
+    if not by_deg:
+        return given
+    zones = tuple(
+        replace(zone, polygon=turned_polygon(zone.polygon, by_deg)) if zone.polygon else zone
+        for zone in given.zones
+    )
+    keep_out = tuple(turned_polygon(polygon, by_deg) for polygon in given.keep_out)
+    return replace(given, zones=zones, keep_out=keep_out, given=given)
 
 
 def command_document(command: CommandName, order: MissionOrder) -> dict[str, object]:

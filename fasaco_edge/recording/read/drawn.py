@@ -5,6 +5,7 @@ A review keeps some fields, spread over all of the time; all else is read when s
 
 from __future__ import annotations
 
+import math
 import zlib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
@@ -14,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.grid.geometry import Window
+from fasaco_edge.grid.turning import turned_point
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.arrow import pa
 from fasaco_edge.recording.read.frames import Chunk, chunks, column, wall_ns
@@ -25,6 +27,7 @@ MOST_FIELDS = 64
 _POINT = pa.list_(pa.field("item", pa.float32(), nullable=False), 3)
 _STRIPS = pa.list_(pa.list_(pa.field("item", _POINT, nullable=False)))
 _PLACE = pa.list_(_POINT)
+_TURN = pa.list_(pa.list_(pa.field("item", pa.float32(), nullable=False), 4))
 _DATA = pa.list_(pa.list_(pa.field("item", pa.uint8(), nullable=False)))
 _CELL = pa.list_(pa.float32())
 
@@ -37,6 +40,7 @@ class DrawnField:
         at_ns: when, by the recorder's clock [ns].
         window: the cells it spans, as it was drawn: relative to where 0 was.
         cell_m: edge of a cell [m].
+        yaw_deg: of its cells' rows, about where 0 was [deg]; the window is of cells so turned.
         anchor: where 0 was, (x, y) [m] in the map frame, for those who know.
     """
 
@@ -44,6 +48,7 @@ class DrawnField:
     window: Window
     _packed: bytes
     cell_m: float
+    yaw_deg: float = 0.0
     anchor: tuple[float, float] = (0.0, 0.0)
 
     @property
@@ -62,6 +67,7 @@ def fields_in(batch: pa.RecordBatch, times: list[int]) -> Iterator[DrawnField]:
     data = column(batch, "GridMap:data", _DATA)
     cells = column(batch, "GridMap:cell_size", _CELL)
     places = column(batch, "GridMap:translation", _PLACE)
+    turns = column(batch, "GridMap:quaternion", _TURN)
     if data is None or cells is None or places is None:
         return
     formats = batch.column("GridMap:format").to_pylist()
@@ -71,10 +77,15 @@ def fields_in(batch: pa.RecordBatch, times: list[int]) -> Iterator[DrawnField]:
         cell_m, (x, y, _) = cells[row].as_py()[0], places[row].as_py()[0]
         if levels.size != shape[0] * shape[1] or not cell_m > 0:
             raise ValueError(f"a field of {levels.size} cells, {shape[0]} x {shape[1]} told")
+        yaw_deg = 0.0
+        if turns is not None:
+            _, _, sine, cosine = turns[row].as_py()[0]
+            yaw_deg = math.degrees(2.0 * math.atan2(sine, cosine))
+        x, y = turned_point(x, y, -yaw_deg)
         corner = Window(0, 0, *shape).moved(round(y / cell_m), round(x / cell_m))
         # An image's row 0 is its top.
         upright = np.ascontiguousarray(levels.reshape(shape)[::-1])
-        yield DrawnField(at_ns, corner, zlib.compress(upright.data, 1), cell_m)
+        yield DrawnField(at_ns, corner, zlib.compress(upright.data, 1), cell_m, yaw_deg)
 
 
 @dataclass(slots=True)

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D
+from fasaco_edge.grid.turning import turned_points
 from fasaco_edge.kernels import COL_STEP, EAST, NORTH, ROW_STEP
 
 # A run is cut where the trail is more decided or less than at its beginning by so much.
@@ -46,7 +48,7 @@ def flows_of(
     A cell that is as much for one direction as for any other has none.
 
     Args:
-        geometry: of the cells, whose yaw is 0.
+        geometry: of the cells.
         pointed: int8 (rows, cols), direction 0..3 of the trail, -1 for none.
         share: float32 (rows, cols), its share of the cell's pheromone.
     """
@@ -72,8 +74,10 @@ def flows_of(
             begins.append((row, col, up * length, right * length, total / length))
     found = np.array(begins, np.float64).reshape(-1, 5)
     edge, origin = geometry.resolution, geometry.origin
-    centres = (found[:, 1::-1] + 0.5) * edge + (origin.x, origin.y)
-    return Flows(centres, found[:, 3:1:-1] * edge, found[:, 4])
+    yaw_deg = math.degrees(origin.yaw)
+    centres = turned_points((found[:, 1::-1] + 0.5) * edge, yaw_deg)
+    centres += (origin.x, origin.y)
+    return Flows(centres, turned_points(found[:, 3:1:-1] * edge, yaw_deg), found[:, 4])
 
 
 def fork_at(

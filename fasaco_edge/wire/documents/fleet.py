@@ -53,6 +53,7 @@ class FleetMember(Document, frozen=True):
         division: number of the newest division of what is left that it knows.
         open_cells: how many cells it knows that are still to be swept.
         swept: tiles of what it has swept in this epoch: those with news first, then all in turn.
+        lattice_deg: the angle of its cells' rows to the x axis of the map frame [deg].
     """
 
     version: Annotated[int, Meta(ge=1)]
@@ -67,6 +68,7 @@ class FleetMember(Document, frozen=True):
     division: Whole
     open_cells: Whole
     swept: Annotated[tuple[SweptTile, ...], Meta(max_length=MAX_FLEET_TILES)]
+    lattice_deg: Annotated[float, Meta(ge=-90, le=90)] = 0.0
 
 
 class _Head(msgspec.Struct, frozen=True):

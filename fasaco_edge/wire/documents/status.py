@@ -48,6 +48,7 @@ class MapReport(Document, frozen=True):
         revision: goes up by one with each new state of the map; updates that come together count
             once.
         frame: name of its frame.
+        lattice_deg: the angle of the cells' rows to the x axis of that frame.
     """
 
     rows: Ordinal = 1
@@ -56,6 +57,7 @@ class MapReport(Document, frozen=True):
     revision: Ordinal = 1
     stamp_ns: int = 0
     frame: str = ""
+    lattice_deg: float = 0.0
 
 
 class PoseReport(Point, frozen=True):

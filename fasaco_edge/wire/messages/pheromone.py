@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.grid.geometry import GridGeometry
+from fasaco_edge.grid.turning import turned_geometry
 from fasaco_edge.planners.planner import ColonySnapshot
 from fasaco_edge.wire.limits import MAX_GRID_CELLS
 from fasaco_edge.wire.messages.cdr import CdrReader, CdrWriter, refuse
@@ -67,8 +68,12 @@ class PheromoneMessage:
         return scale[self.levels]
 
 
-def encode_pheromone(snapshot: ColonySnapshot, frame: str, stamp_ns: int) -> bytes:
+def encode_pheromone(
+    snapshot: ColonySnapshot, frame: str, stamp_ns: int, lattice_deg: float = 0.0
+) -> bytes:
     """Return ``snapshot`` as a fasaco_msgs/PheromoneGrid.
+
+    ``lattice_deg`` is the angle of its cells' rows to the x axis of the map frame [deg].
 
     Raises:
         MalformedMessage: the message would be one that ``decode_pheromone`` refuses.
@@ -76,7 +81,8 @@ def encode_pheromone(snapshot: ColonySnapshot, frame: str, stamp_ns: int) -> byt
     writer = CdrWriter(PHEROMONE_GRID)
     levels, trail_min, trail_max = _quantised(snapshot.trail, writer.message)
     write_header(writer, frame, stamp_ns)
-    geometry = GridGeometry.of_cells(snapshot.window, snapshot.cell_m)
+    plain = GridGeometry.of_cells(snapshot.window, snapshot.cell_m)
+    geometry = turned_geometry(plain, lattice_deg)
     if levels.shape != (geometry.rows, geometry.cols):
         refuse(writer.message, "levels", f"{geometry.rows, geometry.cols}", levels.shape)
     write_grid_geometry(writer, geometry, stamp_ns)

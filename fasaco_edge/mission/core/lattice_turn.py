@@ -1,0 +1,135 @@
+"""The turn between the map frame, which all messages are of, and the frame that a mission plans in.
+
+Cells lie along the axes of the latter. Both have one origin: maps, poses and places are turned as
+they come in, paths as they go out. What is turned by nothing stays the same to the last bit.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import TypeVar
+
+import msgspec
+
+from fasaco_edge.grid.geometry import GridGeometry, Point, StampedPose, Window
+from fasaco_edge.grid.lattice import Cell, CoverageLattice
+from fasaco_edge.grid.occupancy import OccupancyGrid
+from fasaco_edge.grid.turning import (
+    turned_geometry,
+    turned_point,
+    turned_points,
+    turned_polygon,
+    turned_pose,
+)
+from fasaco_edge.mission.config import MissionConfig, Place
+from fasaco_edge.mission.core.events import (
+    Event,
+    MapReceived,
+    MemberHeard,
+    PathUpdate,
+    PoseReceived,
+)
+from fasaco_edge.mission.orders.mask import mask_polygons
+from fasaco_edge.mission.orders.order import turned_order
+from fasaco_edge.mission.orders.order_state import OrderState
+
+_AnyPlace = TypeVar("_AnyPlace", bound=Place)
+
+
+@dataclass(frozen=True, slots=True)
+class LatticeTurn:
+    """Cells whose rows lie at an angle to the x axis of the map frame.
+
+    Attributes:
+        deg: the angle [deg].
+    """
+
+    deg: float = 0.0
+
+    def config(self, config: MissionConfig) -> MissionConfig:
+        """Return the configuration of a mission over these cells; standing zones stay as given."""
+        policy = config.policy
+        if self.deg:
+            polygons = policy.keep_out + mask_polygons(policy.keep_out_mask)
+            policy = msgspec.structs.replace(
+                policy,
+                keep_out=tuple(turned_polygon(polygon, -self.deg) for polygon in polygons),
+                keep_out_mask="",
+                home=self._place(policy.home),
+                dock=self._place(policy.dock),
+            )
+        return replace(config, policy=policy, lattice_deg=self.deg)
+
+    def event(self, event: Event) -> Event:
+        """Return an event as the mission takes it; an order is turned once it is located."""
+        if not self.deg:
+            return event
+        match event:
+            case MapReceived(grid):
+                return MapReceived(_turned_grid(grid, -self.deg))
+            case PoseReceived(pose):
+                return PoseReceived(_turned_stamped(pose, -self.deg))
+            case MemberHeard(x=x, y=y):
+                x, y = turned_point(x, y, -self.deg)
+                return replace(event, x=x, y=y)
+        return event
+
+    def order(self, state: OrderState, turned_by_deg: float) -> OrderState:
+        """Return an order as the mission takes it.
+
+        Args:
+            state: its polygons may be turned already.
+            turned_by_deg: by how much the cells have turned since home was noted [deg].
+        """
+        order = None if state.order is None else turned_order(state.order, -self.deg)
+        home = state.home
+        if home is not None and turned_by_deg:
+            x, y = turned_point(home[1] + 0.5, home[0] + 0.5, -turned_by_deg)
+            home = math.floor(y), math.floor(x)
+        return replace(state, order=order, home=home)
+
+    def path(self, update: PathUpdate, lattice: CoverageLattice | None) -> PathUpdate:
+        """Return a path as it is published."""
+        if not self.deg or lattice is None:
+            return update
+        xy = lattice.centres(update.cells) if update.xy is None else update.xy
+        yaw = update.end_yaw
+        yaw = None if yaw is None else math.remainder(yaw + math.radians(self.deg), math.tau)
+        return replace(update, xy=turned_points(xy, self.deg), end_yaw=yaw)
+
+    def grid(self, grid: OccupancyGrid | None) -> OccupancyGrid | None:
+        """Return a map of the mission's in the map frame."""
+        return grid if grid is None or not self.deg else _turned_grid(grid, self.deg)
+
+    def pose(self, stamped: StampedPose | None) -> StampedPose | None:
+        """Return a pose of the mission's in the map frame."""
+        return stamped if stamped is None or not self.deg else _turned_stamped(stamped, self.deg)
+
+    def cells(self, window: Window, cell_m: float) -> GridGeometry:
+        """Return the placement of a window of cells, ``cell_m`` [m] wide, in the map frame."""
+        return self.geometry(GridGeometry.of_cells(window, cell_m))
+
+    def geometry(self, geometry: GridGeometry) -> GridGeometry:
+        """Return a placement of the mission's in the map frame."""
+        return turned_geometry(geometry, self.deg) if self.deg else geometry
+
+    def centre(self, cell: Cell, cell_m: float) -> Point:
+        """Return the centre (x, y) [m] of a cell, ``cell_m`` [m] wide, in the map frame."""
+        x, y = (cell[1] + 0.5) * cell_m, (cell[0] + 0.5) * cell_m
+        return turned_point(x, y, self.deg) if self.deg else (x, y)
+
+    def _place(self, place: _AnyPlace | None) -> _AnyPlace | None:
+        if place is None:
+            return None
+        x, y = turned_point(place.x_m, place.y_m, -self.deg)
+        yaw_deg = math.remainder(place.yaw_deg - self.deg, 360.0)
+        return msgspec.structs.replace(place, x_m=x, y_m=y, yaw_deg=yaw_deg)
+
+
+def _turned_grid(grid: OccupancyGrid, by_deg: float) -> OccupancyGrid:
+    return replace(grid, geometry=turned_geometry(grid.geometry, by_deg))
+
+
+def _turned_stamped(stamped: StampedPose, by_deg: float) -> StampedPose:
+    return replace(stamped, pose=turned_pose(stamped.pose, by_deg))

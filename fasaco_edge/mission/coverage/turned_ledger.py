@@ -1,0 +1,84 @@
+"""A ledger carried over to cells at another angle.
+
+Which floor is swept says all there is to know: a cell counts as covered where the floor at its
+centre is. The trail, which is of steps between cells, begins anew, and so does what other robots
+have swept: they tell it again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from types import MappingProxyType
+
+import numpy as np
+
+from fasaco_edge.grid.geometry import GridGeometry, Window
+from fasaco_edge.grid.turning import turned_geometry
+from fasaco_edge.mission.coverage.floor_tiles import (
+    FLOOR_TILE,
+    PIXEL_M,
+    FloorSnapshot,
+    Mask,
+    Place,
+    Similarity,
+    swept_on,
+)
+from fasaco_edge.mission.coverage.ledger import TILE, LedgerSnapshot
+from fasaco_edge.planners.living_trail import NO_TRAIL
+
+
+def turned_ledger(before: LedgerSnapshot, lattice_deg: float) -> LedgerSnapshot:
+    """Return what a ledger holds, of cells at ``lattice_deg`` [deg] to the map frame."""
+    by_deg = before.lattice_deg - lattice_deg
+    if not by_deg:
+        return before
+    floor = before.floor
+    tiles = {
+        place: np.packbits(swept, axis=1)
+        for place, swept in _turned(floor, by_deg, FLOOR_TILE, PIXEL_M)
+    }
+    visits = {
+        place: swept.astype(np.uint16)
+        for place, swept in _turned(floor, by_deg, TILE, before.cell_m)
+    }
+    return replace(
+        before,
+        total=sum(int(np.count_nonzero(tile)) for tile in visits.values()),
+        tiles=MappingProxyType(visits),
+        under_tool=frozenset(),
+        floor=FloorSnapshot(MappingProxyType(tiles), floor.changes),
+        trail=NO_TRAIL,
+        fleet=b"",
+        lattice_deg=lattice_deg,
+    )
+
+
+def _turned(
+    floor: FloorSnapshot, by_deg: float, side: int, edge_m: float
+) -> Iterator[tuple[Place, Mask]]:
+    """Yield where the centres of squares lie on swept floor, tile by tile; of some tiles all.
+
+    Args:
+        floor: as it lies now; the tiles are of floor turned by ``by_deg``.
+        by_deg: in degrees.
+        side: of a tile, in squares.
+        edge_m: of a square [m].
+    """
+    tile_m = FLOOR_TILE * PIXEL_M
+    places: set[Place] = set()
+    for row, col in floor.tiles:
+        here = GridGeometry.of_cells(Window(row, col, row + 1, col + 1), tile_m)
+        x0, y0, x1, y1 = turned_geometry(here, by_deg).bounds()
+        rows, cols = (
+            range(int(low // (side * edge_m)), int(high // (side * edge_m)) + 1)
+            for low, high in ((y0, y1), (x0, x1))
+        )
+        places |= {(i, j) for i in rows for j in cols}
+    for place in sorted(places):
+        row, col = side * place[0], side * place[1]
+        window = Window(row, col, row + side, col + side)
+        squares = turned_geometry(GridGeometry.of_cells(window, edge_m), -by_deg)
+        swept = swept_on(floor.swept_in, Similarity.of(squares), Window(0, 0, side, side))
+        if swept.any():
+            yield place, swept
