@@ -136,6 +136,12 @@ class MappingRobot:
         """Drive until the daemon says that all is covered, or what else ends it."""
         deadline = time.monotonic() + TIMEOUT_S
         tick_s = SIMULATION.tick_s / SPEED
+        self._publish()
+        # Its clock stands until it has a path, however long the daemon loads: what it believes for
+        # a while, it believes while it drives.
+        while not self.notes:
+            assert time.monotonic() < deadline, f"no path; the last was {self.status}"
+            time.sleep(0.02)
         due = time.monotonic()
         while not ends(self.status):
             assert time.monotonic() < deadline, f"never done; the last was {self.status}"
