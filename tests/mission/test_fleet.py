@@ -301,6 +301,22 @@ def test_what_many_robots_say_in_a_moment_holds_nobody_up():
     assert np.count_nonzero(ours.mission.shared.swept(Window(0, 0, 300, 300))) == 24 * 3
 
 
+def test_more_robots_than_there_is_room_for_do_not_push_each_other_out():
+    fleet = FleetDrive(HALL, TWO)
+    ours, other = fleet.robots.values()
+    report, names = other.report(), [f"m{number}" for number in range(MOST_ROBOTS + 8)]
+    for second in range(20):
+        said = [replace(report, robot=name, x=0.5 + 0.2 * (second % 2)) for name in names]
+        decision = ours.tell(*said, after=0.0)
+        assert [fault.code for fault in decision.faults] == ["fleet_member"] * 8
+        ours.tick()
+    assert list(ours.mission.fleet.members) == names[:MOST_ROBOTS]
+    assert ours.mission.fleet.number <= 3
+    # Those that are gone make room.
+    later = [replace(report, robot=name) for name in names[8:]]
+    assert not ours.tell(*later, after=GONE_S + 1.0).faults
+
+
 def test_a_robot_without_a_part_does_not_divide_again_and_again():
     fleet = FleetDrive(HALL, TWO)
     ours, other = fleet.robots.values()

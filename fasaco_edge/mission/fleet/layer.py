@@ -124,7 +124,7 @@ class FleetLayer:
             left_out = f"its frame is {event.frame!r}, here it is {frame!r}"
         place, moved_at = (event.x, event.y), now
         if before is None:
-            self._make_room()
+            self._make_room(event.robot, now)
         elif not before.has_moved(event):
             place, moved_at = before.place, before.moved_at
         member = Member(event, now, left_out, place, moved_at)
@@ -292,9 +292,15 @@ class FleetLayer:
             swept = swept & self._is_own(self._division, area)
         return int(np.count_nonzero(swept))
 
-    def _make_room(self) -> None:
-        """Make room for another robot: the one not heard for longest goes."""
+    def _make_room(self, robot: str, now: float) -> None:
+        """Make room for another robot: the one not heard for longest goes, if it is gone.
+
+        Were it not, as many as there is room for and one more would take turns, and each time what
+        is left would be divided anew.
+        """
         if len(self.members) < MOST_ROBOTS:
             return
         name = min(self.members, key=lambda name: (self.members[name].heard_at, name))
+        if now - self.members[name].heard_at <= GONE_S:
+            raise FleetError(f"{robot}: {MOST_ROBOTS} others of a fleet are heard at most")
         del self.members[name]
