@@ -44,3 +44,11 @@ def test_a_walk_that_is_the_same_is_one_run():
     walk = walk_of(3, 40)
     assert common_runs(walk, walk, 8).tolist() == [[0, 0, 40, 0]]
     assert common_runs(walk, walk[::-1].copy(), 8).tolist() == [[0, 40, 40, 1]]
+
+
+def test_walks_far_apart_have_nothing_in_common():
+    """In memory for one of them, not for all that lies between."""
+    walk = walk_of(5, 40)
+    for place in ((0, 4_000_000), (-4_000_000, 4_000_000), (100, 0), (0, -100), (-100, 0)):
+        assert not len(common_runs(walk, walk + np.array(place, np.int32), 1))
+        assert not len(common_runs(walk + np.array(place, np.int32), walk, 1))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 from dataclasses import replace
 
 import numpy as np
@@ -12,6 +13,7 @@ from fasaco_edge.bench.floor import SweepingRobot, judge_floor
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D
 from fasaco_edge.grid.lattice import Footprint
 from fasaco_edge.grid.occupancy import OccupancyGrid
+from fasaco_edge.host.processes import peak_mb
 from fasaco_edge.mission.config import Sweeping
 from fasaco_edge.mission.core.events import MapReceived, State
 from fasaco_edge.mission.core.mission import Mission
@@ -107,3 +109,23 @@ def test_a_map_that_turns_by_a_degree_with_each_message():
     robot.finish()
     assert_clear(robot, grid)
     assert robot.mission.floor_to_sweep().left_m2 < 0.5
+
+
+@pytest.mark.parametrize("far_m", [8_000.0, 900_000.0])
+def test_a_map_that_jumps_far_away_and_back_costs_no_more_memory_than_one(far_m):
+    """As when SLAM begins anew: no line is sought in all that lies between."""
+    near = room(2.4, 1.8)
+    geometry = near.geometry
+    origin = Pose2D(geometry.origin.x + far_m, geometry.origin.y - far_m)
+    far = OccupancyGrid(replace(geometry, origin=origin), near.cells)
+    robot = Robot(Mission(CONFIG))
+    robot.tell(MapReceived(near))
+    robot.drive(5)
+    before_mb, (x, y) = peak_mb(os.getpid()), robot.at
+    robot.at = (x + far_m, y - far_m)
+    robot.tell(MapReceived(far))
+    robot.drive(5)
+    robot.at = (x, y)
+    robot.tell(MapReceived(near))
+    assert peak_mb(os.getpid()) < before_mb + 100.0
+    robot.finish()

@@ -30,13 +30,11 @@ def common_runs(
         ``before``; how many steps it has; 1 where ``before`` goes the other way, else 0.
     """
     size, most = len(before), len(after)
-    row0 = min(before[:, 0].min(), after[:, 0].min())
-    col0 = min(before[:, 1].min(), after[:, 1].min())
-    row1 = max(before[:, 0].max(), after[:, 0].max())
-    col1 = max(before[:, 1].max(), after[:, 1].max())
-    cols = col1 - col0 + 1
+    # Of the walk before alone, whose lattice bounds it: the other one may be a thousand miles away.
+    row0, col0 = before[:, 0].min(), before[:, 1].min()
+    rows, cols = before[:, 0].max() - row0 + 1, before[:, 1].max() - col0 + 1
     # The visits of each cell of the walk before, in order.
-    first = np.full((row1 - row0 + 1) * cols, -1, np.int32)
+    first = np.full(rows * cols, -1, np.int32)
     following = np.empty(size, np.int32)
     for at in range(size - 1, -1, -1):
         cell = (before[at, 0] - row0) * cols + before[at, 1] - col0
@@ -47,7 +45,9 @@ def common_runs(
     count = begin = 0
     while begin < most - 1:
         longest, origin, backward = 0, 0, 0
-        visit = first[(after[begin, 0] - row0) * cols + after[begin, 1] - col0]
+        row, col = after[begin, 0] - row0, after[begin, 1] - col0
+        is_within = 0 <= row < rows and 0 <= col < cols
+        visit = first[row * cols + col] if is_within else -1
         while visit >= 0:
             steps = 0
             while (
