@@ -13,6 +13,7 @@ import math
 import os
 from collections.abc import Iterator
 from dataclasses import dataclass
+from numbers import Real
 from pathlib import Path
 
 import msgspec
@@ -112,10 +113,11 @@ def read_bare_image(path: str | Path, resolution_m: float) -> OccupancyGrid:
             f"{path}: {kind} {own}; --resolution is for an image alone",
             hint="leave --resolution out, or give the image",
         )
-    if not MIN_RESOLUTION_M <= resolution_m <= MAX_RESOLUTION_M:
+    is_number = isinstance(resolution_m, Real)
+    if not (is_number and MIN_RESOLUTION_M <= resolution_m <= MAX_RESOLUTION_M):
         raise MapFileError(
             f"{path}: resolution must be from {MIN_RESOLUTION_M:g} to {MAX_RESOLUTION_M:g} "
-            f"[m/pixel], got {resolution_m:g}",
+            f"[m/pixel], got {shown(resolution_m)}",
             hint="give the edge of a pixel in metres, as 0.05",
         )
     image = read_image(path)

@@ -35,5 +35,9 @@ def whole(file: Path) -> Iterator[Path]:
         if mode is not None:
             new.chmod(stat.S_IMODE(mode))
         new.replace(target)
+    except OSError as error:
+        if error.filename == os.fspath(new):
+            error.filename = os.fspath(file)  # what was asked for
+        raise
     finally:
         new.unlink(missing_ok=True)

@@ -14,6 +14,7 @@ from fasaco_edge.grid.lattice import Cell, CoverageLattice, Footprint
 from fasaco_edge.grid.map_files import find_map, read_bare_image, read_coverage_grid, read_map
 from fasaco_edge.grid.occupancy import FREE, UNKNOWN, OccupancyGrid
 from fasaco_edge.planners.grids import start_cell
+from fasaco_edge.text import shown
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -76,6 +77,10 @@ def load_map(
         free = source.copy()
         free.setflags(write=False)
         return Map("array", free=free)
+    if not isinstance(source, str | Path):
+        raise MapFileError(
+            f"a map is a file, the name of a built-in one or a NumPy array, got {shown(source)}"
+        )
     file = find_map(source)
     if file.suffix == ".npy":
         _without_pixels(str(file), resolution_m, unknown_free)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import operator
 import time
 from collections.abc import Callable
 from dataclasses import replace
@@ -95,15 +96,16 @@ def plan(
     """
     if start is not None and start_xy is not None:
         raise BadConfiguration("start and start_xy cannot both be given")
-    named = end in (ANYWHERE, HOME) if isinstance(end, str) else _is_cell(end)
-    require(named, "end", f"be {ANYWHERE}, {HOME} or a cell (row, col)", end)
-    require(start is None or _is_cell(start), "start", "be a cell (row, col)", start)
-    is_point = start_xy is None or (
-        len(start_xy) == 2 and all(math.isfinite(at) for at in start_xy)
-    )
-    require(is_point, "start_xy", "be a point (x, y) [m]", start_xy)
-    robot = checked(robot or RobotConfig())
-    search = search or Search()
+    require(isinstance(map, Map), "map", "be what load_map returns", map)
+    robot = RobotConfig() if robot is None else robot
+    search = Search() if search is None else search
+    require(isinstance(robot, RobotConfig), "robot", "be a Robot", robot)
+    require(isinstance(search, Search), "search", "be a Search", search)
+    if not isinstance(end, str) or end not in (ANYWHERE, HOME):
+        end = _cell("end", end, f"be {ANYWHERE}, {HOME} or a cell (row, col)")
+    start = None if start is None else _cell("start", start, "be a cell (row, col)")
+    start_xy = None if start_xy is None else _point("start_xy", start_xy)
+    robot = checked(robot)
     if planner is not None:
         require(isinstance(planner, FunctionType), "planner", "be a function", planner)
         search = replace(search, local_search=False)
@@ -115,9 +117,34 @@ def plan(
     return Plan(map, robot, line, search, ground, problem, path, xy, ended_by, wall_s, cpu_s)
 
 
-def _is_cell(cell: Cell) -> bool:
-    """Tell whether it is two whole numbers that any map may have."""
-    return len(cell) == 2 and all(isinstance(at, int) and abs(at) <= MOST_INDEX for at in cell)
+def _cell(name: str, given: object, expectation: str) -> Cell:
+    """Return what was given as a cell, two whole numbers that any map may have.
+
+    Raises:
+        BadConfiguration: it is none.
+    """
+    try:
+        row, col = (operator.index(at) for at in given)  # type: ignore[attr-defined]
+        is_cell = abs(row) <= MOST_INDEX and abs(col) <= MOST_INDEX
+    except (TypeError, ValueError):
+        is_cell = False
+    require(is_cell, name, expectation, given)
+    return row, col
+
+
+def _point(name: str, given: object) -> tuple[float, float]:
+    """Return what was given as a point.
+
+    Raises:
+        BadConfiguration: it is none.
+    """
+    try:
+        x, y = (float(at + 0.0) for at in given)  # type: ignore[attr-defined]
+        is_point = math.isfinite(x) and math.isfinite(y)
+    except (TypeError, ValueError, OverflowError):
+        is_point = False
+    require(is_point, name, "be a point (x, y) [m]", given)
+    return x, y
 
 
 def checked(robot: RobotConfig) -> RobotConfig:

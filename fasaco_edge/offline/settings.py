@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from numbers import Integral, Real
 
 from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.planners.colony import ColonyConfig, parse_velocities
@@ -21,6 +22,15 @@ MOST_ANGLE_DEG = 360.0
 BUDGET_S = 1.0
 SEARCH_Q0, PAPER_Q0 = 0.98, 0.7
 SEARCH_VISIBILITY, PAPER_VISIBILITY = "fewest-open", "neighbour"
+
+
+# By annotation: what a member has to be, NumPy's numbers included.
+_KINDS: dict[str, tuple[type, str]] = {
+    "str": (str, "be a text"),
+    "bool": (bool, "be True or False"),
+    "int": (Integral, "be a whole number"),
+    "float": (Real, "be a number"),
+}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -59,6 +69,11 @@ class Search:
     target_gap: float | None = None
 
     def __post_init__(self) -> None:
+        for field in fields(self):
+            kind, expectation = _KINDS[str(field.type).removesuffix(" | None")]
+            value = getattr(self, field.name)
+            is_open = value is None and str(field.type).endswith("None")
+            require(is_open or isinstance(value, kind), field.name, expectation, value)
         known = ", ".join(PLANNERS)
         require(self.planner in PLANNERS, "planner", f"be one of {known}", self.planner)
         require(1 <= self.threads <= 64, "threads", "be in 1..64", self.threads)

@@ -142,3 +142,61 @@ def test_to_import_the_package_loads_no_planner():
     )
     with pytest.raises(AttributeError, match="no attribute 'plot'"):
         _ = fe.plot
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ({"map": "office"}, "map must be what load_map returns, got office"),
+        ({"robot": {"radius_m": 0.2}}, "robot must be a Robot, got {'radius_m': 0.2}"),
+        ({"search": {"seed": 1}}, "search must be a Search, got {'seed': 1}"),
+        ({"start": 5}, r"start must be a cell \(row, col\), got 5"),
+        ({"start": (0.0, 0.0)}, r"start must be a cell \(row, col\), got \(0.0, 0.0\)"),
+        ({"start_xy": 5}, r"start_xy must be a point \(x, y\) \[m\], got 5"),
+        ({"start_xy": ("1", "2")}, r"start_xy must be a point"),
+        ({"start_xy": (10**400, 0)}, r"start_xy must be a point"),
+        ({"start_xy": (0.0, np.nan)}, r"start_xy must be a point"),
+        ({"end": None}, r"end must be anywhere, home or a cell \(row, col\), got None"),
+        ({"end": "nowhere"}, r"end must be anywhere, home or a cell \(row, col\), got nowhere"),
+    ],
+)
+def test_what_is_of_another_kind_is_named(words, said):
+    with pytest.raises(BadConfiguration, match=said):
+        fe.plan(**({"map": fe.load_map(np.ones((3, 3), bool))} | words))
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ({"ants": 8.5}, "ants must be a whole number, got 8.5"),
+        ({"budget_s": "1"}, "budget_s must be a number, got 1"),
+        ({"threads": None}, "threads must be a whole number, got None"),
+        ({"velocities": 4}, "velocities must be a text, got 4"),
+        ({"local_search": "no"}, "local_search must be True or False, got no"),
+    ],
+)
+def test_a_search_s_members_have_their_kinds(words, said):
+    with pytest.raises(BadConfiguration, match=said):
+        fe.Search(**words)
+
+
+def test_numbers_of_numpy_s_are_numbers():
+    search = fe.Search(seed=np.int64(3), budget_s=np.float32(0.05))
+    cells = np.argwhere(np.ones((3, 3), bool))
+    grid = fe.load_map(np.ones((3, 3), bool))
+    planned = fe.plan(grid, start=cells[0], end=cells[-1], search=search)
+    assert planned.cells[[0, -1]].tolist() == [[0, 0], [2, 2]]
+    there = fe.plan(grid, start_xy=np.array([0.4, 0.7]), search=search)
+    assert there.cells[0].tolist() == [2, 1]
+
+
+@pytest.mark.parametrize("source", [None, 5, [[True]], b"office"])
+def test_what_is_no_map_is_named(source):
+    with pytest.raises(MapFileError, match="a map is a file, the name of a built-in one or a"):
+        fe.load_map(source)
+
+
+def test_a_picture_that_cannot_be_written_is_told_by_its_own_name(tmp_path):
+    planned = fe.plan(fe.load_map(np.ones((3, 3), bool)), search=fe.Search(budget_s=0.05))
+    with pytest.raises(FileNotFoundError, match=r"nowhere/walk\.png"):
+        planned.plot(tmp_path / "nowhere" / "walk.png")
