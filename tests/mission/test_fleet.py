@@ -1,7 +1,9 @@
 """Robots that share an area: nothing is left out whatever happens, and little is swept twice."""
 
+import math
 import time
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -20,6 +22,8 @@ from fasaco_edge.mission.fleet.shared import (
     SharedProgress,
     Telling,
 )
+from fasaco_edge.mission.orders.order import Zone
+from fasaco_edge.mission.orders.zones import in_zones
 from tests.mission.fleets import FleetDrive, FleetRobot, flaky
 from tests.mission.world import CONFIG, rectangle, with_policy
 from tests.support.examples import examples
@@ -240,6 +244,23 @@ def test_of_many_robots_those_that_are_gone_and_swept_least_make_room():
     assert shared.hear("new", 1, (), members[8:])
     assert [shared.cells_of(robot) for robot in members[6:9]] == [3, 0, 9]
     assert not shared.hear("newer", 1, (), members)
+
+
+def test_a_zone_swept_again_holds_nobody_up_however_many_have_swept_it():
+    ledger, bits = MissionLedger(0.3, 0.3), b"\xff" * TILE_BYTES
+    angles = np.linspace(0.0, 2.0 * np.pi, 900, endpoint=False)
+    ring = tuple((48.0 + 40.0 * math.cos(angle), 48.0 + 40.0 * math.sin(angle)) for angle in angles)
+    for robot in range(MOST_ROBOTS - 1):
+        ledger.shared.hear(f"m{robot}", 1, [((n // 5, n % 5), bits) for n in range(24)])
+    inside = partial(in_zones, (Zone("ring", ring),))
+    ledger.forget(inside)
+    before = time.thread_time()
+    ledger.forget(partial(in_zones, (Zone("again", tuple(reversed(ring))),)))
+    assert time.thread_time() - before < 0.1
+    whole = Window(0, 0, 320, 320)
+    swept = ledger.shared.swept(whole)
+    assert not swept[inside(whole, 0.3)].any()
+    assert swept[~inside(whole, 0.3)][:1000].all()
 
 
 def test_what_is_disregarded_is_dropped_with_the_cells_and_where_it_is_too_much():

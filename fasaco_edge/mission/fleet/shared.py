@@ -147,7 +147,7 @@ class SharedProgress:
         known, found = self._known
         if window != known:
             found = np.zeros((window.rows, window.cols), np.bool_)
-            self._grown = {place for heard in self._robots.values() for place in heard.tiles}
+            self._grown = self._places()
         elif self._grown:
             found = found.copy()
         for place in self._grown:
@@ -178,17 +178,25 @@ class SharedProgress:
         Args:
             inside: returns which of some cells, rows and columns int64 (n,), bool (n,).
         """
+        for place in self._places():
+            # Once for all robots: what is inside takes longer than their tiles.
+            swept = (heard.tiles[place] for heard in self._robots.values() if place in heard.tiles)
+            at = np.argwhere(_cells(np.bitwise_or.reduce(list(swept))))
+            rows, cols = (at + np.multiply(place, TILE)).T
+            chosen = inside(rows, cols) if len(at) else np.zeros(0, np.bool_)
+            if chosen.any():
+                marked = np.zeros((TILE, TILE), np.bool_)
+                marked[tuple(at[chosen].T)] = True
+                self._disregard(place, np.packbits(marked))
+
+    def _disregard(self, place: Cell, bits: Bits) -> None:
         for heard in self._robots.values():
-            for place, tile in heard.tiles.items():
-                at = np.argwhere(_cells(tile))
-                rows, cols = (at + np.multiply(place, TILE)).T
-                chosen = inside(rows, cols) if len(at) else np.zeros(0, np.bool_)
-                if chosen.any():
-                    marked = np.zeros((TILE, TILE), np.bool_)
-                    marked[tuple(at[chosen].T)] = True
-                    bits = np.packbits(marked)
-                    heard.disregarded[place] = bits | heard.disregarded.get(place, np.uint8(0))
-                    self._note_lost()
+            if place in heard.tiles and (gone := heard.tiles[place] & bits).any():
+                heard.disregarded[place] = gone | heard.disregarded.get(place, np.uint8(0))
+        self._note_lost()
+
+    def _places(self) -> set[Cell]:
+        return {place for heard in self._robots.values() for place in heard.tiles}
 
     def clear(self) -> None:
         """Forget all that was heard: it lies in another frame, or in another building."""
@@ -198,8 +206,7 @@ class SharedProgress:
 
     def snapshot(self, cell_m: float) -> LedgerSnapshot:
         """Return what others have swept as if one robot had."""
-        places = {place for heard in self._robots.values() for place in heard.tiles}
-        tiles = {place: self._swept_of(place).astype(np.uint16) for place in places}
+        tiles = {place: self._swept_of(place).astype(np.uint16) for place in self._places()}
         return LedgerSnapshot(cell_m, "", 0, MappingProxyType(tiles))
 
     def cells_of(self, robot: str) -> int:
