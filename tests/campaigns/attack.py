@@ -196,7 +196,7 @@ def open_rows(folder: Path, only: str) -> list[Row]:
     title = "loopback, no security: 1,000 maps/s of 1 MB"
     if only not in title:
         return []
-    with daemon_process(folder) as daemon, Outsider(daemon.endpoint) as boss:
+    with daemon_process(folder, executed=True) as daemon, Outsider(daemon.endpoint) as boss:
         begin(boss, boss)
         session = open_client(daemon.endpoint)
         row = tried(

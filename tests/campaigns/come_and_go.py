@@ -262,7 +262,7 @@ def run_campaign(
 @contextmanager
 def _daemon(folder: Path, bus: dict[str, Any]) -> Iterator[Daemon]:
     (folder / "daemon").mkdir(exist_ok=True)
-    with daemon_process(folder / "daemon", bus=dict(bus)) as daemon:
+    with daemon_process(folder / "daemon", executed=True, bus=dict(bus)) as daemon:
         yield daemon
 
 

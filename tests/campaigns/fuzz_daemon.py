@@ -107,7 +107,10 @@ def main() -> None:
     parser.add_argument("--samples", type=int, default=10_000)
     parser.add_argument("--seed", type=int, default=0)
     args = parser.parse_args()
-    with tempfile.TemporaryDirectory() as folder, daemon_process(Path(folder)) as daemon:
+    with (
+        tempfile.TemporaryDirectory() as folder,
+        daemon_process(Path(folder), executed=True) as daemon,
+    ):
         print(json.dumps(run_campaign(daemon, args.samples, args.seed), indent=1))
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -15,6 +16,13 @@ IDLE_MB = 60.0
 
 
 @pytest.fixture(scope="module")
+def daemon(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Daemon]:
+    """One whose memory is its own."""
+    with daemon_process(tmp_path_factory.mktemp("daemon"), executed=True) as running:
+        yield running
+
+
+@pytest.fixture(scope="module")
 def waiting(daemon: Daemon) -> Daemon:
     """A daemon that has said who it is, and has heard no map."""
     with Outsider(daemon.endpoint) as outsider:
@@ -24,7 +32,10 @@ def waiting(daemon: Daemon) -> Daemon:
 
 def test_it_is_ready_when_its_token_stands(tmp_path):
     started = time.monotonic()
-    with daemon_process(tmp_path) as running, Outsider(running.endpoint) as outsider:
+    with (
+        daemon_process(tmp_path, executed=True) as running,
+        Outsider(running.endpoint) as outsider,
+    ):
         print(f"ready {1e3 * (time.monotonic() - started):.0f} ms after its start")
         assert "ready after" in running.log_text()
         running.stop()

@@ -283,7 +283,10 @@ def test_one_that_waits_holds_no_more_than_its_maps(tmp_path):
     maps = {"max_pixels": side * side, "max_lattice_cells": 50_000}
     flood = Flood("updates", side, 0.05, 20.0)
     config = {"map": maps, "robot": {"tool_width_m": 1.0, "radius_m": 0.5}}
-    with daemon_process(tmp_path, **config) as running, Outsider(running.endpoint) as outsider:
+    with (
+        daemon_process(tmp_path, executed=True, **config) as running,
+        Outsider(running.endpoint) as outsider,
+    ):
         claim = f"{PREFIX}/claim/0/plans"
         token = outsider.session.liveliness().declare_token(claim)
         outsider.wait_status(lambda status: status["state"] == "blocked")

@@ -46,10 +46,10 @@ def ros2(naming: Naming, **keys):
 
 
 @contextmanager
-def ros_graph(folder, naming):
+def ros_graph(folder, naming, executed=False):
     """Run a daemon with ROS keys; yield it and a robot, once the daemon is ready."""
     with (
-        daemon_process(folder, ros2=ros2(naming)) as running,
+        daemon_process(folder, executed=executed, ros2=ros2(naming)) as running,
         ros_robot(running.endpoint, naming) as robot,
         Outsider(running.endpoint),
     ):
@@ -283,7 +283,10 @@ def test_nodes_that_are_peers_of_a_router_are_served_by_its_client(tmp_path):
 
 
 def test_it_is_small_with_ros(tmp_path):
-    with ros_graph(tmp_path, RMW) as (running, robot), Outsider(running.endpoint) as native:
+    with (
+        ros_graph(tmp_path, RMW, executed=True) as (running, robot),
+        Outsider(running.endpoint) as native,
+    ):
         native.wait_status(lambda status: status["state"] == "waiting for map")
         for _ in range(50):
             robot.put_tf("odom", "base_link", Pose2D(1.0, 1.0))

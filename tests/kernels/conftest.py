@@ -6,24 +6,17 @@ from pathlib import Path
 
 import pytest
 
-from tests.kernels.forked import start_server
 from tests.kernels.installations import Installation
 
 
-@pytest.fixture(scope="session")
-def _forking() -> None:
-    """A server before any test moves the folder of temporary files."""
-    start_server()
-
-
 @pytest.fixture
-def installed(_forking: None, tmp_path: Path) -> Installation:
+def installed(tmp_path: Path) -> Installation:
     """One that has compiled nothing yet."""
     return Installation(tmp_path / "root", tmp_path / "cache")
 
 
 @pytest.fixture(scope="session")
-def _compiled_once(_forking: None, tmp_path_factory: pytest.TempPathFactory) -> Installation:
+def _compiled_once(tmp_path_factory: pytest.TempPathFactory) -> Installation:
     folder = tmp_path_factory.mktemp("compiled")
     installed = Installation(folder / "root", folder / "cache")
     assert installed.tell().compiled == 2

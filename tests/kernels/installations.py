@@ -14,8 +14,8 @@ from fasaco_edge.host import durable, files
 from fasaco_edge.kernels import cache, jit, release, sealed
 from fasaco_edge.kernels.cache import note_complete
 from fasaco_edge.kernels.release import KERNEL_SUFFIX
-from tests.kernels.forked import Task, run_forked
 from tests.kernels.harm import kernel_files
+from tests.support.forked import run_forked
 
 KERNELS = """
 import json
@@ -95,8 +95,8 @@ class Installation:
         if process or (env and "LD_PRELOAD" in env):
             return told_by(self.start(code, env=env, umask=umask, **process))
         program = f"from fasaco_edge.kernels import seven\n{code}"
-        task = Task(program, str(self.root), self._environment(env), umask)
-        return told(*run_forked(task, PATIENCE_S))
+        environment = self._environment(env)
+        return told(*run_forked(("-c", program), environment, PATIENCE_S, str(self.root), umask))
 
     def start(
         self,

@@ -17,6 +17,7 @@ from typing import Any
 import yaml
 
 import fasaco_edge as package
+from tests.support.forked import Forked, run_forked
 
 # What a daemon may take from SIGTERM to its end on a machine that is busy with much else [s]; on
 # a quiet one it is two seconds at most.
@@ -37,7 +38,7 @@ def free_endpoint() -> str:
 class Daemon:
     """A running daemon."""
 
-    process: subprocess.Popen[bytes]
+    process: subprocess.Popen[bytes] | Forked
     endpoint: str
     log: Path
 
@@ -75,12 +76,14 @@ def daemon_process(
     *words: str,
     env: dict[str, str] | None = None,
     state: bool = True,
+    executed: bool = False,
     **sections: Any,
 ) -> Iterator[Daemon]:
     """Run a daemon with these sections of configuration; end it, and check how it ended.
 
     Its progress is kept in the folder ``state`` of ``folder``, if words and configuration do not
-    say where (``state=False``): the next one there goes on with it.
+    say where (``state=False``): the next one there goes on with it. It is forked, but for one with
+    an environment of its own, or ``executed``, as what is measured has to be.
     """
     # The robots of most tests stand still, and say so once.
     sections.setdefault("mission", {}).setdefault("lost_pose_s", 0.0)
@@ -93,11 +96,16 @@ def daemon_process(
     number = len(list(folder.glob("daemon*.yaml")))
     config, log = folder / f"daemon{number}.yaml", folder / f"daemon{number}.log"
     config.write_text(yaml.safe_dump(sections))
-    with log.open("wb") as stderr:
-        command = [*PROGRAM, "run", "--config", str(config), *words]
-        if state and "--state" not in words:
-            command += ["--state", str(folder / "state")]
-        process = subprocess.Popen(command, stderr=stderr, env=ENVIRONMENT | (env or {}))
+    command = [*PROGRAM, "run", "--config", str(config), *words]
+    if state and "--state" not in words:
+        command += ["--state", str(folder / "state")]
+    log.touch()
+    process: subprocess.Popen[bytes] | Forked
+    if env is None and not executed:
+        process = Forked(tuple(command[1:]), ENVIRONMENT, os.devnull, log)
+    else:
+        with log.open("wb") as stderr:
+            process = subprocess.Popen(command, stderr=stderr, env=ENVIRONMENT | (env or {}))
     daemon = Daemon(process, endpoint, log)
     try:
         yield daemon
@@ -141,10 +149,8 @@ class Ended:
 
 
 def fasaco_edge(*words: object) -> Ended:
-    """Run a command to its end; a traceback is never right."""
-    command = [*PROGRAM, *(str(word) for word in words)]
-    ended = subprocess.run(
-        command, check=False, capture_output=True, text=True, timeout=COMMAND_S, env=ENVIRONMENT
-    )
-    assert "Traceback" not in ended.stderr, ended.stderr
-    return Ended(ended.returncode, ended.stdout, ended.stderr)
+    """Run a command to its end, in a forked process; a traceback is never right."""
+    command = (*PROGRAM[1:], *(str(word) for word in words))
+    ended = Ended(*run_forked(command, ENVIRONMENT, COMMAND_S))
+    assert "Traceback" not in ended.err, ended.err
+    return ended

@@ -1,0 +1,236 @@
+"""Interpreters forked off a server that has numba: half a second of processor time less each.
+
+They have imported nothing of the package before their program runs: which kernels, cache and
+settings they have is up to that, as in an interpreter that was started. What it costs to start one,
+and what one has in memory, such a process cannot tell.
+
+``python FILE DESCRIPTOR`` is the server: for each task that comes it forks a process, and tells
+by the pipe that came along its process id, and how it ended.
+"""
+
+from __future__ import annotations
+
+import atexit
+import contextlib
+import functools
+import os
+import pickle
+import runpy
+import select
+import signal
+import socket
+import struct
+import subprocess
+import sys
+import tempfile
+import threading
+import traceback
+from collections.abc import Mapping
+from importlib import import_module
+from pathlib import Path
+from typing import NoReturn
+
+PRELOADED = ("numba", "llvmlite.binding", "msgspec", "yaml")
+NUMBER = struct.Struct("i")
+# Of a task, which holds words and an environment.
+MOST_BYTES = 1 << 20
+
+
+class Forked:
+    """A forked process, with what tests use of ``subprocess.Popen``.
+
+    Args:
+        words: a command line, as ``python`` takes it: "-c" and code, or "-m", a module and words.
+        environment: all of its environment.
+        out, err: files that its outputs are written to.
+        folder: its working folder; without one, this process's.
+        umask: -1 leaves it as it is.
+    """
+
+    def __init__(
+        self,
+        words: tuple[str, ...],
+        environment: Mapping[str, str],
+        out: str | Path,
+        err: str | Path,
+        folder: str | None = None,
+        umask: int = -1,
+    ) -> None:
+        outputs = str(out), str(err)
+        task = pickle.dumps((words, dict(environment), outputs, folder or os.getcwd(), umask))
+        assert len(task) < MOST_BYTES
+        self._news, theirs = os.pipe()
+        try:
+            socket.send_fds(_server(), [task], [theirs])
+        finally:
+            os.close(theirs)
+        self.pid = self._told()
+        self.returncode: int | None = None
+        self._lock = threading.Lock()
+
+    def poll(self) -> int | None:
+        """Return its exit code, of a signal its number, negative; or None while it runs."""
+        with self._lock:
+            if self.returncode is None and select.select([self._news], [], [], 0.0)[0]:
+                self.returncode = self._told()
+                os.close(self._news)
+            return self.returncode
+
+    def wait(self, timeout: float | None = None) -> int:
+        """Wait for its end; return its exit code."""
+        if self.poll() is None:
+            select.select([self._news], [], [], timeout)
+        if (code := self.poll()) is None:
+            raise subprocess.TimeoutExpired(str(self.pid), timeout or 0.0)
+        return code
+
+    def send_signal(self, number: int) -> None:
+        """Send it a signal, unless it has ended."""
+        if self.poll() is None:
+            os.kill(self.pid, number)
+
+    def terminate(self) -> None:
+        """Ask it to end."""
+        self.send_signal(signal.SIGTERM)
+
+    def kill(self) -> None:
+        """End it."""
+        self.send_signal(signal.SIGKILL)
+
+    def _told(self) -> int:
+        said = os.read(self._news, NUMBER.size)
+        assert said, "the server of forked processes has ended"
+        number: int = NUMBER.unpack(said)[0]
+        return number
+
+
+def run_forked(
+    words: tuple[str, ...],
+    environment: Mapping[str, str],
+    timeout_s: float,
+    folder: str | None = None,
+    umask: int = -1,
+) -> tuple[int, str, str]:
+    """Run a program to its end; return its exit code, and what it said on both outputs."""
+    with tempfile.TemporaryDirectory() as outputs:
+        out, err = Path(outputs, "out"), Path(outputs, "err")
+        process = Forked(words, environment, out, err, folder, umask)
+        try:
+            code = process.wait(timeout_s)
+        finally:
+            process.kill()
+            process.wait()
+        return code, out.read_text(), err.read_text()
+
+
+@functools.cache
+def _server() -> socket.socket:
+    """Return a way to the server, which ends with this process."""
+    ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    ours.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, MOST_BYTES)
+    with theirs:
+        descriptor = theirs.fileno()
+        command = [sys.executable, __file__, str(descriptor)]
+        process = subprocess.Popen(command, pass_fds=(descriptor,), stdin=subprocess.DEVNULL)
+
+    def end() -> None:
+        ours.close()
+        process.wait()
+
+    atexit.register(end)
+    return ours
+
+
+def _serve(tasks: socket.socket) -> None:
+    """Fork a process for each task, until nobody sends any."""
+    for name in PRELOADED:
+        import_module(name)
+    woken, wakes = socket.socketpair()
+    wakes.setblocking(False)
+    before = signal.signal(signal.SIGCHLD, lambda *_: None)
+    signal.set_wakeup_fd(wakes.fileno(), warn_on_full_buffer=False)
+    running: dict[int, int] = {}
+    while True:
+        ready, _, _ = select.select([tasks, woken], [], [])
+        if woken in ready:
+            woken.recv(4096)
+            for process in list(running):
+                ended, status = os.waitpid(process, os.WNOHANG)
+                if ended:
+                    _tell(running.pop(process), os.waitstatus_to_exitcode(status), is_last=True)
+        if tasks not in ready:
+            continue
+        task, news, _, _ = socket.recv_fds(tasks, MOST_BYTES, 1)
+        if not task:
+            return
+        if (process := os.fork()) == 0:
+            signal.set_wakeup_fd(-1)
+            signal.signal(signal.SIGCHLD, before)
+            for end in (tasks, woken, wakes):
+                end.close()
+            for descriptor in (*news, *running.values()):
+                os.close(descriptor)
+            _run(*pickle.loads(task))
+        running[process] = news[0]
+        _tell(news[0], process)
+
+
+def _tell(news: int, number: int, *, is_last: bool = False) -> None:
+    with contextlib.suppress(BrokenPipeError):
+        os.write(news, NUMBER.pack(number))
+    if is_last:
+        os.close(news)
+
+
+def _run(
+    words: tuple[str, ...],
+    environment: dict[str, str],
+    outputs: tuple[str, str],
+    folder: str,
+    umask: int,
+) -> NoReturn:
+    """Become what ``python`` would be with those words, in that folder and environment."""
+    for descriptor, file in enumerate(outputs, start=1):
+        opened = os.open(file, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o600)
+        os.dup2(opened, descriptor)
+        os.close(opened)
+    os.chdir(folder)
+    if umask >= 0:
+        os.umask(umask)
+    os.environ.clear()
+    os.environ.update(environment)
+    tempfile.tempdir = None
+    told = [entry for entry in environment.get("PYTHONPATH", "").split(os.pathsep) if entry]
+    sys.path[:] = ["", *told, *sys.path]
+    sys.modules["numba"].core.config.reload_config()
+    os._exit(_ended(words))
+
+
+def _ended(words: tuple[str, ...]) -> int:
+    """Run a program up to the interpreter's end; return its exit code."""
+    code: object = 0
+    try:
+        match words:
+            case ("-c", program):
+                exec(program, {"__name__": "__main__"})
+            case ("-m", module, *rest):
+                sys.argv = ["", *rest]
+                runpy.run_module(module, run_name="__main__", alter_sys=True)
+    except SystemExit as ended:
+        code = ended.code or 0
+    except BaseException:
+        traceback.print_exc()
+        code = 1
+    threading._shutdown()
+    # A process that ends so does not do it by itself.
+    atexit._run_exitfuncs()
+    sys.stdout.flush()
+    sys.stderr.flush()
+    return code if isinstance(code, int) else 1
+
+
+if __name__ == "__main__":
+    # Neither this file's folder nor what the tests import is on the path of a program.
+    ours = {str(Path(__file__).parent), *os.environ.get("PYTHONPATH", "").split(os.pathsep)}
+    sys.path[:] = [entry for entry in sys.path if entry not in ours]
+    _serve(socket.socket(fileno=int(sys.argv[1])))
