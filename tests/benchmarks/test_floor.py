@@ -7,11 +7,11 @@ from fasaco_edge.grid.occupancy import OccupancyGrid
 from maps.map_writer import write_map
 from tests.benchmarks.__main__ import main
 from tests.benchmarks.floor import CASES, CENTRES, ONLINE, THOROUGH
-from tests.support.rooms import RESOLUTION_M, WALL, fill, two_rooms
+from tests.support.rooms import RESOLUTION_M, WALL, fill, room
 
 
 def test_a_line_sweeps_more_than_the_centres_and_touches_nothing(capsys, tmp_path):
-    file, pixels = tmp_path / "rooms.yaml", fill(two_rooms(door=True), 1.2, 1.6, 1.8, 2.1, WALL)
+    file, pixels = tmp_path / "rooms.yaml", fill(room(2.4, 2.1), 1.1, 0.8, 1.5, 1.1, WALL)
     write_map(
         OccupancyGrid(GridGeometry(*pixels.shape, RESOLUTION_M, Pose2D(0.0, 0.0)), pixels), file
     )

@@ -13,6 +13,7 @@ from fasaco_edge.grid.lattice import CoverageLattice
 from fasaco_edge.mission.core.events import MapReceived, PatchReceived
 from fasaco_edge.planners.grids import NamedGrid
 from tests.benchmarks.__main__ import main
+from tests.benchmarks.online import buildings
 from tests.benchmarks.online.buildings import BUILDING, MAZE, BuildingChoice, maze, of_grid
 from tests.benchmarks.online.cases import CASES
 from tests.benchmarks.online.figures import Summary, goals
@@ -369,7 +370,8 @@ def test_goals_are_those_of_what_was_measured():
     assert list(limits(0.0, with_turns=True).values()) == [1.05]
 
 
-def test_figures(capsys, tmp_path):
+def test_figures(capsys, monkeypatch, tmp_path):
+    monkeypatch.setattr(buildings, "maze", lambda _, random: maze(5, random))
     file = tmp_path / "rooms.npy"
     np.save(file, free_of(*TWO_ROOMS))
     words = ["--grids", str(file), "--starts", "2", "--ranges", "1", "--mazes", "1"]

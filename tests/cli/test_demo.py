@@ -25,8 +25,8 @@ CELL_M, RADIUS_M = 0.3, 0.18
 @pytest.fixture
 def building(tmp_path):
     """A map file of two rooms, a door between them and a crate in one."""
-    closed = fill(room(5.1, 3.6), 2.4, 0.0, 2.5, 3.6, WALL)
-    pixels = fill(fill(closed, 2.4, 1.2, 2.5, 2.1, FREE), 3.6, 1.2, 4.2, 1.7, WALL)
+    closed = fill(room(3.9, 2.7), 1.8, 0.0, 1.9, 2.7, WALL)
+    pixels = fill(fill(closed, 1.8, 0.9, 1.9, 1.8, FREE), 2.8, 1.1, 3.1, 1.4, WALL)
     geometry = GridGeometry(*pixels.shape, RESOLUTION_M, Pose2D(-1.0, -0.4))
     write_map(OccupancyGrid(geometry, pixels), tmp_path / "rooms.yaml")
     return tmp_path / "rooms.yaml"
@@ -51,7 +51,7 @@ def test_a_demo_covers_every_cell_that_can_be_reached(tmp_path, building):
     # The line leaves out what is not worth the way, and takes in what lies beside the middles.
     assert len(reachable - visited_cells(trail)) < 0.05 * len(reachable)
     assert summary["reachable_cells"] == summary["covered_cells"] > len(reachable)
-    assert summary["reachable_m2"] == pytest.approx(16.26, abs=0.05)
+    assert summary["reachable_m2"] == pytest.approx(9.1, abs=0.1)
     assert summary["swept_m2"] / summary["reachable_m2"] > 0.93
     driven = sum(math.dist(a, b) for a, b in pairwise(trail))
     assert summary["driven_m"] == pytest.approx(driven, abs=0.1)
