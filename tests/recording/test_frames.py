@@ -126,22 +126,23 @@ def deflated_zeros(megabytes):
     return b"\x78\xda" + megabytes * block + packer.flush() + checksum
 
 
+# Made where they are read: each process of the suite collects this file.
 LIES = {
-    "a payload of 2 GB": lane(length=2 * 10**9),
-    "many payloads of 60 MB": lane(length=60_000_000, numbers=[1] * 9, at_ns=[1] * 9),
-    "a million samples": lane(numbers=[1] * 10**6, at_ns=[1] * 10**6, ahead_ns=[1] * 10**6),
-    "runs of 4 GB": lane(
+    "a payload of 2 GB": lambda: lane(length=2 * 10**9),
+    "many payloads of 60 MB": lambda: lane(length=60_000_000, numbers=[1] * 9, at_ns=[1] * 9),
+    "a million samples": lambda: lane(numbers=[1] * 10**6, at_ns=[1] * 10**6, ahead_ns=[1] * 10**6),
+    "runs of 4 GB": lambda: lane(
         body=struct.pack("<I", 2)
         + np.array([0, 2**32 - 1], "<u4").view("u1").reshape(2, 4).T.tobytes()
     ),
-    "a gigabyte of zeros, deflated": _HEAD.pack(1, 5, 0) + deflated_zeros(1000),
+    "a gigabyte of zeros, deflated": lambda: _HEAD.pack(1, 5, 0) + deflated_zeros(1000),
 }
 
 
 @pytest.fixture(scope="module")
 def refused_lies(tmp_path_factory):
-    files = {lie: recorded(tmp_path_factory.mktemp("lie"), batch) for lie, batch in LIES.items()}
-    return limited(files)
+    folder = tmp_path_factory.mktemp
+    return limited({lie: recorded(folder("lie"), batch()) for lie, batch in LIES.items()})
 
 
 @pytest.mark.parametrize("lie", LIES)
@@ -192,29 +193,30 @@ def batch_of(entity, **columns):
 
 WALL = pa.array([BEGAN_NS], pa.timestamp("ns"))
 ZEROS = batch_of("log/x", wall=WALL, x=pa.array([bytes(10**6)]))
+
+
+def of_nothings():
+    """Return a chunk of a list of two thousand million nothings."""
+    nothings = pa.ListArray.from_arrays(pa.array([0, 2**31 - 1], pa.int32()), pa.nulls(2**31 - 1))
+    return chunk_of(batch_of(entities.MISSION_LOG, wall=WALL, **{"TextLog:text": nothings}))
+
+
 LYING_CHUNKS = {
-    "unpacks to 60 GB": (chunk_of(ZEROS, claimed=60 * 10**9), "hold at most"),
-    "unpacks to more than there is": (chunk_of(ZEROS, claimed=MOST_CHUNK_BYTES), "hold at most"),
+    "unpacks to 60 GB": (lambda: chunk_of(ZEROS, claimed=60 * 10**9), "hold at most"),
+    "unpacks to more than there is": (
+        lambda: chunk_of(ZEROS, claimed=MOST_CHUNK_BYTES),
+        "hold at most",
+    ),
     "columns that are packed, too": (
-        chunk_of(ZEROS, options=pa.ipc.IpcWriteOptions(compression="zstd")),
+        lambda: chunk_of(ZEROS, options=pa.ipc.IpcWriteOptions(compression="zstd")),
         "columns that are compressed",
     ),
     "a list of two thousand million nothings": (
-        chunk_of(
-            batch_of(
-                entities.MISSION_LOG,
-                wall=WALL,
-                **{
-                    "TextLog:text": pa.ListArray.from_arrays(
-                        pa.array([0, 2**31 - 1], pa.int32()), pa.nulls(2**31 - 1)
-                    )
-                },
-            )
-        ),
+        of_nothings,
         "has to be list<item: string> without nulls",
     ),
-    "no times": (chunk_of(batch_of("metrics/x", y=WALL)), "without the timeline wall"),
-    "no Protobuf": (b"\xff" * 40, "frame 3"),
+    "no times": (lambda: chunk_of(batch_of("metrics/x", y=WALL)), "without the timeline wall"),
+    "no Protobuf": (lambda: b"\xff" * 40, "frame 3"),
 }
 
 
@@ -222,7 +224,7 @@ LYING_CHUNKS = {
 def named_chunks(recording, tmp_path_factory):
     return limited(
         {
-            lie: repacked(recording, tmp_path_factory.mktemp("chunk"), lambda _, body=body: body)
+            lie: repacked(recording, tmp_path_factory.mktemp("chunk"), lambda _, body=body: body())
             for lie, (body, _) in LYING_CHUNKS.items()
         }
     )
