@@ -213,7 +213,7 @@ class PlannerConfig(Section, frozen=True):
     budget_s: Annotated[float, Meta(gt=0, le=3600)] = 0.1
     spare_share: Annotated[float, Meta(ge=0, le=1)] = 0.05
     line: Literal["cells", "quick", "thorough"] = "thorough"
-    align: Literal["walls", "axes"] | Annotated[float, Meta(ge=-45, le=45)] = "axes"
+    align: Literal["walls", "axes"] | Annotated[float, Meta(ge=-45, le=45)] = "walls"
 
     def colony(self) -> ColonyConfig:
         """Return these as a colony.

@@ -90,11 +90,11 @@ class RecordedRun:
         Raises:
             BadConfiguration: it is of a release whose settings this one does not know.
         """
-        # Before there were lines, cells were driven.
+        # Before there were lines, cells were driven, and before they turned, along the axes.
         planner = self.config.get("planner", {})
         config = dict(self.config)
         if isinstance(planner, Mapping):
-            config["planner"] = {"line": "cells", **planner}
+            config["planner"] = {"line": "cells", "align": "axes", **planner}
         try:
             return msgspec.convert(config, DaemonConfig)
         except msgspec.ValidationError as error:

@@ -57,7 +57,10 @@ def test_a_recording_of_another_search_is_repeated_as_far_as_it_is_the_same(reco
 def test_samples_lead_to_the_same_paths(recording):
     """By the times of the samples alone, and with the same work for each plan."""
     samples = RecordedSamples([Path(recording)])
-    replay = Replay(read_run(samples).daemon_config(), work=100)
+    config = read_run(samples).daemon_config()
+    # What there was no setting for is as it was.
+    assert (config.planner.line, config.planner.align) == ("cells", "axes")
+    replay = Replay(config, work=100)
     paths = [step.decision.path for step in replay.steps(samples) if step.decision.path is not None]
     digests = [digest(path.cells.astype("<i4").tobytes()).hex() for path in paths]
     assert digest_of(digests) == (31, "7f698298e2a11d45")

@@ -83,6 +83,20 @@ def test_every_decision_is_as_it_was(which, request):
     assert replay.mission.coverage().covered == recording.status["coverage"]["covered"]
 
 
+def test_cells_along_askew_walls_are_found_once_more(tmp_path):
+    """The angle follows from the maps and poses that a recording has."""
+    recording = record_mission(tmp_path, line="thorough", yaw_deg=25.0)
+    assert recording.status["map"]["lattice_deg"] == pytest.approx(25.0, abs=1.0)
+    samples = list(RecordedSamples(recording.paths))
+    replay, record, steps = played(samples)
+    assert (record.gap, replay.difference, replay.lacking) == ("", None, [])
+    assert replay.mission.turn.deg == pytest.approx(
+        recording.status["map"]["lattice_deg"], abs=1e-3
+    )
+    assert all(step.as_recorded for step in steps if step.decision.path is not None)
+    assert replay.mission.coverage().covered == recording.status["coverage"]["covered"]
+
+
 def test_what_is_said_on_the_bus_is_that_of_the_contract(samples):
     for place in places(samples, TURNS):
         check("turns.json", json.loads(samples[place].sample.payload))

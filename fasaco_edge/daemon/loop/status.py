@@ -209,7 +209,7 @@ def _map(mission: Mission | None) -> MapReport | None:
         revision=mission.map_revision,
         stamp_ns=mission.grid.stamp_ns,
         frame=mission.grid.frame,
-        lattice_deg=round(mission.turn.deg, 1),
+        lattice_deg=round(mission.turn.deg, 3),
     )
 
 
