@@ -6,8 +6,8 @@ TARGET_PYTHON ?= 3.11
 VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
-# Most tests wait for processes and their timers: two a core, but of many cores no more than eight.
-WORKERS ?= $(shell n=$$(nproc); echo $$((n < 4 ? 2 * n : 8)))
+# Most tests wait for processes and their timers: three a core, but of many cores no more than eight.
+WORKERS ?= $(shell n=$$(nproc); echo $$((n < 3 ? 3 * n : 8)))
 # As images for containers set it, each of some hundred processes would compile all sources anew.
 unexport PYTHONDONTWRITEBYTECODE
 
