@@ -157,7 +157,7 @@ def _ask(args: argparse.Namespace) -> None:
     """Ask for what was not given, where there is somebody to ask.
 
     Raises:
-        BadConfiguration: there is nobody, or an answer is no number.
+        BadConfiguration: there is nobody, an answer is no number, or there is none.
     """
     needed = ("robot_radius", "tool_width", "map_by")
     missing = [name for name in needed if getattr(args, name) is None]
@@ -193,7 +193,10 @@ def _number(question: str, default: float) -> float:
 def _answer(question: str, default: str) -> str:
     # Past standard output, which may be JSON for somebody else.
     err().print(f"{question} [{default or 'none'}]: ", end="", markup=False, soft_wrap=True)
-    return sys.stdin.readline().strip() or default
+    line = sys.stdin.readline()
+    if not line:  # Ctrl-D: what nobody has answered is not written
+        raise BadConfiguration(f"no answer to: {question}", hint="give the options, see --help")
+    return line.strip() or default
 
 
 def _checked(text: str) -> DaemonConfig:

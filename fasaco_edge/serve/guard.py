@@ -20,6 +20,7 @@ from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.host.addresses import Address
 from fasaco_edge.host.durable import write_through
 from fasaco_edge.host.files import read_own
+from fasaco_edge.host.outputs import whole
 from fasaco_edge.serve.messages import Role
 
 MOST_BYTES = 4096
@@ -110,7 +111,8 @@ def read_tokens(file: Path) -> tuple[tuple[Role, str], ...]:
     try:
         if not file.exists():
             made = "".join(f"{role}: {secrets.token_urlsafe(24)}\n" for role in ROLES)
-            write_through(file, made.encode(), mode=0o600)
+            with whole(file) as new:
+                write_through(new, made.encode(), mode=0o600)
         open_to = stat.S_IMODE(file.stat().st_mode) & 0o077
         text = read_own(file, MOST_BYTES).decode()
     except (OSError, UnicodeDecodeError) as error:

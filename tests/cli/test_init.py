@@ -73,20 +73,38 @@ def test_a_file_that_is_there_is_kept(tmp_path, capsys):
     assert file.read_text() == "robot: {name: mine}\n"
 
 
-def test_at_a_terminal_it_asks(tmp_path, capsys, monkeypatch):
+@pytest.fixture
+def typed(monkeypatch):
+    """A terminal at which somebody types a text, and then Ctrl-D."""
+
     class Terminal(io.StringIO):
         def isatty(self):
             return True
 
-    console = terminal.err()
-    monkeypatch.setattr("sys.stdin", Terminal("0.25\n\nbridge\n\n"))
-    monkeypatch.setattr("fasaco_edge.cli.init.err", lambda: console)
-    monkeypatch.setattr(type(console), "is_terminal", property(lambda _: True))
+    def type_in(text):
+        console = terminal.err()
+        monkeypatch.setattr("sys.stdin", Terminal(text))
+        monkeypatch.setattr("fasaco_edge.cli.init.err", lambda: console)
+        monkeypatch.setattr(type(console), "is_terminal", property(lambda _: True))
+
+    return type_in
+
+
+def test_at_a_terminal_it_asks(tmp_path, typed):
+    typed("0.25\n\nbridge\n\n")
     file = tmp_path / "robot.yaml"
     assert init(file) == 0
     config = load_config(file)
     assert (config.robot.radius_m, config.robot.tool_width_m) == (0.25, 0.3)
     assert (config.ros2.kind, config.bus.mode) == ("bridge", "peer")
+
+
+def test_what_nobody_answers_is_not_written(tmp_path, typed, capsys):
+    typed("0.25\n")
+    file = tmp_path / "robot.yaml"
+    assert init(file) == 78
+    assert "no answer to: Width of its tool [m]" in capsys.readouterr().err
+    assert not file.exists()
 
 
 def test_it_tells_which_maps_it_heard(tmp_path, capsys):

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import errno
 import json
+import stat
 import struct
 import zlib
 
 import numpy as np
 import pytest
 
+from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D
 from fasaco_edge.serve import marks
-from fasaco_edge.serve.guard import Guard, is_same_origin
+from fasaco_edge.serve.guard import Guard, is_same_origin, read_tokens
 from fasaco_edge.serve.messages import told
 from fasaco_edge.serve.pace import Way
 from fasaco_edge.wire.documents.settings import MapSettings, RobotSettings
@@ -101,6 +104,21 @@ def test_a_guard_knows_its_names_and_tokens():
     assert not is_same_origin(["null"], "hall.local")
     assert not is_same_origin(["evil://hall.local"], "hall.local")
     assert not is_same_origin(["http://hall.local", "http://evil.example"], "hall.local")
+
+
+def test_tokens_that_cannot_be_written_leave_no_file(tmp_path, monkeypatch):
+    """An empty one would be refused at the next start."""
+
+    def full(_: int) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr("os.fsync", full)
+    with pytest.raises(BadConfiguration, match="tokens: No space left on device"):
+        read_tokens(tmp_path / "tokens")
+    assert list(tmp_path.iterdir()) == []
+    monkeypatch.undo()
+    assert [role for role, _ in read_tokens(tmp_path / "tokens")] == ["viewer", "operator"]
+    assert stat.S_IMODE((tmp_path / "tokens").stat().st_mode) == 0o600
 
 
 def test_all_text_in_a_message_is_cleaned():
