@@ -338,6 +338,18 @@ def test_more_robots_than_there_is_room_for_do_not_push_each_other_out():
     assert not ours.tell(*later, after=GONE_S + 1.0).faults
 
 
+def test_one_that_comes_and_goes_does_not_change_the_path_of_others_each_time():
+    fleet = FleetDrive(HALL, TWO)
+    ours, other = fleet.robots.values()
+    report, plans = other.report(), ours.mission.route.plans
+    for second in range(40):
+        state = "covering" if second % 2 else "blocked"
+        ours.tell(replace(report, state=state, x=1.0 + 0.1 * (second % 3)), after=0.0)
+        ours.tick()
+    assert 2 <= ours.mission.fleet.number <= 9
+    assert ours.mission.route.plans - plans <= 9
+
+
 def test_a_robot_without_a_part_does_not_divide_again_and_again():
     fleet = FleetDrive(HALL, TWO)
     ours, other = fleet.robots.values()

@@ -52,6 +52,7 @@ class Member:
         left_out: why it cannot be of this fleet; "" where it can.
         place: where it is, to STANDING_M, x, y [m].
         moved_at: since when [s].
+        left_at: when it last left a division that had hardly begun [s].
     """
 
     told: MemberHeard
@@ -59,6 +60,7 @@ class Member:
     left_out: str
     place: tuple[float, float]
     moved_at: float
+    left_at: float = float("-inf")
 
     def has_moved(self, told: MemberHeard) -> bool:
         """Tell whether it is elsewhere by now, or has begun to work."""
@@ -127,7 +129,8 @@ class FleetLayer:
             self._make_room(event.robot, now)
         elif not before.has_moved(event):
             place, moved_at = before.place, before.moved_at
-        member = Member(event, now, left_out, place, moved_at)
+        left_at = float("-inf") if before is None else before.left_at
+        member = Member(event, now, left_out, place, moved_at, left_at)
         self.members[event.robot] = member
         if left_out:
             return ""
@@ -227,14 +230,24 @@ class FleetLayer:
         if len(names) == 1 and division is None:
             return ""
         if gone := sorted(known - names):
+            self._note_left(gone, now)
             return f"{', '.join(gone)} no longer at work"
         if now - self._divided_at < HOLDS_S and not at_once:
             return ""
-        if more := sorted(names - known - {self._robot}):
+        # Of one that comes and goes each time would change everybody's path.
+        new = names - known - {self._robot}
+        if more := sorted(name for name in new if now - self.members[name].left_at >= EVEN_S):
             return f"shared with {', '.join(more)}"
-        assert division is not None
+        if division is None:
+            return ""
         is_later = self._newest_heard() > self.number
         return LATER if is_later else self._why_by_parts(division, area, left, now)
+
+    def _note_left(self, names: list[str], now: float) -> None:
+        """Note who is at work no longer, soon after what is left was divided."""
+        if now - self._divided_at < EVEN_S:
+            for name in self.members.keys() & set(names):
+                self.members[name].left_at = now
 
     def _why_by_parts(
         self, division: Division, area: ReachableArea, left: NDArray[np.bool_], now: float
