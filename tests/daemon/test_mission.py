@@ -184,6 +184,7 @@ def test_the_status_says_all_there_is_to_know(path, pixels, outsider, daemon):
         "revision": 1,
         "stamp_ns": 12_000_000_034,
         "frame": "map",
+        "lattice_deg": 0.0,
     }
     assert status["pose"] == {"x": START[0], "y": START[1], "yaw": 0.0}
     assert status["coverage"] == {
