@@ -20,7 +20,7 @@ from fasaco_edge.doctor.finding import CheckContext, Level
 from fasaco_edge.host.processes import peak_mb
 from tests.campaigns.memory import Flood, map_payload, update_payload
 from tests.support.outsider import Ear, Outsider
-from tests.support.processes import daemon_process, free_endpoint
+from tests.support.processes import daemon_process, free_endpoint, slowness
 from tests.support.rooms import map_bytes, pose_bytes, room
 from tests.support.router import router_process
 
@@ -264,12 +264,15 @@ def test_a_flood_of_claims_is_survived(tmp_path, robot_at):
         robot, flood = robot_at(endpoint), robot_at(endpoint)
         robot.wait_claims(1)
         robot.wait_path()
-        tokens = [
-            flood.session.liveliness().declare_token(f"{PREFIX}/claim/{number:x}/plans")
-            for number in range(1, 3001)
-        ]
+        tokens, slow = [], [slowness()]
+        for number in range(1, 3001):
+            token = flood.session.liveliness().declare_token(f"{PREFIX}/claim/{number:x}/plans")
+            tokens.append(token)
+            if number % 500 == 0:
+                slow.append(slowness())
         blocked = robot.statuses.wait(lambda heard: heard.json()["state"] == "blocked").json()
-        assert blocked["loop_ms"]["max"] < 1000.0
+        # A second of a whole core, of which a busy machine gives a share.
+        assert blocked["loop_ms"]["max"] < 1000.0 * max(slow), slow
         assert len(tokens) == 3000
         heard = len(robot.paths.heard)
         flood.session.close()

@@ -136,6 +136,14 @@ def is_running(pid: int) -> bool:
         return False
 
 
+def slowness(work_s: float = 0.03) -> float:
+    """Return how long work takes here, now, in its processor time; 1 on a quiet machine."""
+    began, worked = time.monotonic(), time.thread_time()
+    while time.thread_time() - worked < work_s:
+        pass
+    return max((time.monotonic() - began) / work_s, 1.0)
+
+
 COMMAND_S = 1500.0
 
 
