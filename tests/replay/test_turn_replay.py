@@ -32,7 +32,7 @@ def folder(tmp_path_factory):
 @pytest.fixture(scope="module")
 def half(folder):
     """A mission that was ended half-way."""
-    return record_mission(folder, "half", lambda s: (s["coverage"] or {}).get("covered", 0) > 20)
+    return record_mission(folder, "half", lambda s: (s["coverage"] or {}).get("covered", 0) > 6)
 
 
 @pytest.fixture(scope="module")

@@ -19,7 +19,6 @@ from fasaco_edge.bus.settings import BusSettings
 from fasaco_edge.errors import BusUnavailable
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D, Window
 from fasaco_edge.grid.occupancy import MapPatch, OccupancyGrid
-from fasaco_edge.grid.turning import turned_geometry, turned_pose
 from fasaco_edge.planners.warmup import warm_up
 from fasaco_edge.simulation.robot import SimulationConfig
 from fasaco_edge.simulation.world import World
@@ -71,17 +70,11 @@ def is_done(status: dict) -> bool:
 
 
 def record_mission(
-    folder: Path,
-    name: str = "runs",
-    ends=is_done,
-    *,
-    broken_poses: int = 0,
-    line: str = "cells",
-    yaw_deg: float = 0.0,
+    folder: Path, name: str = "runs", ends=is_done, *, broken_poses: int = 0, line: str = "cells"
 ) -> Recording:
     """Record a mission from its first map until a status ends it; some poses may be none.
 
-    ``line`` is the daemon's ``planner.line``; the room lies at ``yaw_deg`` in the map frame.
+    ``line`` is the daemon's ``planner.line``.
     """
     runs = folder / name
     planner = {"budget_s": 0.05, "line": line}
@@ -92,7 +85,7 @@ def record_mission(
             assert time.monotonic() < deadline, daemon.log_text()
             time.sleep(0.05)
         with bus:
-            robot = MappingRobot(bus, broken_poses, yaw_deg)
+            robot = MappingRobot(bus, broken_poses)
             robot.wait(lambda status: (status["recorder"] or {}).get("state") == "recording")
             robot.drive(ends)
         # With the recorder's last words it may take a while on a busy machine.
@@ -113,15 +106,14 @@ def _joined(endpoint: str) -> Bus | None:
 class MappingRobot:
     """A robot on the bus, and the newest status of the daemon."""
 
-    def __init__(self, bus: Bus, broken_poses: int = 0, yaw_deg: float = 0.0) -> None:
+    def __init__(self, bus: Bus, broken_poses: int = 0) -> None:
         self._bus, self._keys = bus, Keys()
         self._broken_poses, self._broken_sent = broken_poses, 0
         keys = self._keys
         self._commands = list(COMMANDS)
         pixels = fill(room(*SIZE_M), 1.5, 0.0, 1.6, 1.2, WALL)
         geometry = GridGeometry(*pixels.shape, RESOLUTION_M, Pose2D(0.0, 0.0))
-        geometry, start = turned_geometry(geometry, yaw_deg), turned_pose(START, yaw_deg)
-        self._world = World(OccupancyGrid(geometry, pixels), start, SIMULATION)
+        self._world = World(OccupancyGrid(geometry, pixels), START, SIMULATION)
         self._maps = Sender(bus, topics.MAP)
         self._updates = Sender(bus, topics.MAP_UPDATE)
         self._poses = Sender(bus, topics.POSE)
@@ -144,12 +136,6 @@ class MappingRobot:
         """Drive until the daemon says that all is covered, or what else ends it."""
         deadline = time.monotonic() + TIMEOUT_S
         tick_s = SIMULATION.tick_s / SPEED
-        self._publish()
-        # Its clock stands until it has a path, however long the daemon loads: what it believes for
-        # a while, it believes while it drives.
-        while not self.notes:
-            assert time.monotonic() < deadline, f"no path; the last was {self.status}"
-            time.sleep(0.02)
         due = time.monotonic()
         while not ends(self.status):
             assert time.monotonic() < deadline, f"never done; the last was {self.status}"
