@@ -19,6 +19,7 @@ from fasaco_edge.bus.settings import BusSettings
 from fasaco_edge.errors import BusUnavailable
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D, Window
 from fasaco_edge.grid.occupancy import MapPatch, OccupancyGrid
+from fasaco_edge.grid.turning import turned_geometry, turned_pose
 from fasaco_edge.planners.warmup import warm_up
 from fasaco_edge.simulation.robot import SimulationConfig
 from fasaco_edge.simulation.world import World
@@ -70,11 +71,17 @@ def is_done(status: dict) -> bool:
 
 
 def record_mission(
-    folder: Path, name: str = "runs", ends=is_done, *, broken_poses: int = 0, line: str = "cells"
+    folder: Path,
+    name: str = "runs",
+    ends=is_done,
+    *,
+    broken_poses: int = 0,
+    line: str = "cells",
+    yaw_deg: float = 0.0,
 ) -> Recording:
     """Record a mission from its first map until a status ends it; some poses may be none.
 
-    ``line`` is the daemon's ``planner.line``.
+    ``line`` is the daemon's ``planner.line``; the room lies at ``yaw_deg`` in the map frame.
     """
     runs = folder / name
     planner = {"budget_s": 0.05, "line": line}
@@ -85,7 +92,7 @@ def record_mission(
             assert time.monotonic() < deadline, daemon.log_text()
             time.sleep(0.05)
         with bus:
-            robot = MappingRobot(bus, broken_poses)
+            robot = MappingRobot(bus, broken_poses, yaw_deg)
             robot.wait(lambda status: (status["recorder"] or {}).get("state") == "recording")
             robot.drive(ends)
         # With the recorder's last words it may take a while on a busy machine.
@@ -106,14 +113,15 @@ def _joined(endpoint: str) -> Bus | None:
 class MappingRobot:
     """A robot on the bus, and the newest status of the daemon."""
 
-    def __init__(self, bus: Bus, broken_poses: int = 0) -> None:
+    def __init__(self, bus: Bus, broken_poses: int = 0, yaw_deg: float = 0.0) -> None:
         self._bus, self._keys = bus, Keys()
         self._broken_poses, self._broken_sent = broken_poses, 0
         keys = self._keys
         self._commands = list(COMMANDS)
         pixels = fill(room(*SIZE_M), 1.5, 0.0, 1.6, 1.2, WALL)
         geometry = GridGeometry(*pixels.shape, RESOLUTION_M, Pose2D(0.0, 0.0))
-        self._world = World(OccupancyGrid(geometry, pixels), START, SIMULATION)
+        geometry, start = turned_geometry(geometry, yaw_deg), turned_pose(START, yaw_deg)
+        self._world = World(OccupancyGrid(geometry, pixels), start, SIMULATION)
         self._maps = Sender(bus, topics.MAP)
         self._updates = Sender(bus, topics.MAP_UPDATE)
         self._poses = Sender(bus, topics.POSE)
