@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+import signal
 import time
 
 import numpy as np
@@ -18,7 +19,12 @@ from fasaco_edge.review.review import read_review
 from fasaco_edge.wire import topics
 from fasaco_edge.wire.documents.json_text import encode_json
 from fasaco_edge.wire.messages.paths import encode_path
-from tests.support.recordings import bus_on_free_port, recorder_process
+from tests.support.recordings import (
+    TIMEOUT_S,
+    begun_parts,
+    bus_on_free_port,
+    recorder_process,
+)
 from tests.support.reviews import document
 from tests.support.rooms import map_bytes, pose_bytes, room
 from tests.support.senders import Sender
@@ -71,13 +77,26 @@ def run_told(folder, *, faults, silent=0, killed=False):
                 put("status", _status("covering", "path 1", faults | {"late": 1}))
             recorder.written(sent)
             if killed:
-                # What came is written once a second.
-                time.sleep(1.5)
-                recorder.process.kill()
+                kill_within_a_part(recorder, folder, faults)
             else:
                 recorder.process.terminate()
             recorder.process.wait(120)
     return sorted(folder.glob("*.rrd"))
+
+
+def kill_within_a_part(recorder, folder, faults):
+    """Kill it once all faults are on the disk, and the newest part with anything in it is open.
+
+    What came is written once a second, and as often a part of so small a run ends.
+    """
+    deadline, told = time.monotonic() + TIMEOUT_S, {"files": [], "faults_by_code": {}}
+    while not faults.items() <= told["faults_by_code"].items() or told["files"][-1]["ended"]:
+        assert time.monotonic() < deadline, (told["files"][-1:], told["faults_by_code"])
+        recorder.process.send_signal(signal.SIGCONT)
+        time.sleep(0.1)
+        recorder.process.send_signal(signal.SIGSTOP)
+        told = document(read_review(begun_parts(folder)))
+    recorder.process.kill()
 
 
 def _status(state, reason, faults):
