@@ -293,6 +293,6 @@ def test_a_computer_without_memory_or_threads_is_told(monkeypatch, capsys, error
     def fail(*_: object) -> None:
         raise error
 
-    monkeypatch.setattr("fasaco_edge.config.loading.load_config", fail)
+    monkeypatch.setattr("fasaco_edge.daemon.reload.load_config", fail)
     assert main(["run"]) == 1
     assert "out of memory or threads\n  hint: end other programs" in capsys.readouterr().err
