@@ -118,9 +118,11 @@ def test_a_viewer_sees_the_mission(covering, page):
         assert (grid["rows"], grid["cols"], grid["pixel"]) == (rows, cols, 0.05)
         marks = np.frombuffer(grid["body"], np.uint8).reshape(rows, cols)
         assert (marks == np.where(HALL == 100, 2, 1)).all()
-        state = looker.wait("state", lambda state: state.get("state") == "covering")
+        # Status and path come each on its own.
+        state = looker.wait(
+            "state", lambda state: state.get("state") == "covering" and state["to_go_s"] > 10
+        )
         assert state["absent"] == ""
-        assert state["to_go_s"] > 10
         path = looker.wait("path")
         points = array("f", path["body"])
         x, y = lanes(1)[0]

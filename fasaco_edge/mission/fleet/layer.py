@@ -247,7 +247,7 @@ class FleetLayer:
         """Note who is at work no longer, soon after what is left was divided."""
         if now - self._divided_at < EVEN_S:
             for name in self.members.keys() & set(names):
-                self.members[name].left_at = now
+                self.members[name] = replace(self.members[name], left_at=now)
 
     def _why_by_parts(
         self, division: Division, area: ReachableArea, left: NDArray[np.bool_], now: float
