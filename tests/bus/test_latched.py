@@ -210,22 +210,28 @@ def test_what_an_answer_has_overtaken_is_not_heard(bus, endpoint, numbered):
     client.close()
 
 
-@pytest.mark.parametrize("arrive", [True, False])
-def test_an_answer_waits_for_what_it_has_overtaken(bus, endpoint, monkeypatch, arrive):
-    """On a busy computer it came before three cohorts, which were dropped as older."""
-    if arrive:
-        monkeypatch.setattr(latched, "UNDER_WAY_S", 1000.0)
-    samples, under_way, answers = Queue(), Queue(), Queue()
-    hear, take = latched.LatchedSubscription._on_sample, latched.LatchedSubscription._take
-    monkeypatch.setattr(
-        latched.LatchedSubscription, "_on_sample", lambda _, sample: under_way.put(sample)
-    )
+def held_under_way(monkeypatch):
+    """Hold back what is published; return what hears a sample, those held, and answers taken."""
+    under_way, answers = Queue(), Queue()
+    subscription = latched.LatchedSubscription
+    hear, take = subscription._on_sample, subscription._take
 
     def answer(self, sample, *, again):
         take(self, sample, again=again)
         answers.put(sample.payload)
 
-    monkeypatch.setattr(latched.LatchedSubscription, "_take", answer)
+    monkeypatch.setattr(subscription, "_on_sample", lambda _, sample: under_way.put(sample))
+    monkeypatch.setattr(subscription, "_take", answer)
+    return hear, under_way, answers
+
+
+@pytest.mark.parametrize("arrive", [True, False])
+def test_an_answer_waits_for_what_it_has_overtaken(bus, endpoint, monkeypatch, arrive):
+    """On a busy computer it came before three cohorts, which were dropped as older."""
+    if arrive:
+        monkeypatch.setattr(latched, "UNDER_WAY_S", 1000.0)
+    samples = Queue()
+    hear, under_way, answers = held_under_way(monkeypatch)
     with publishing(endpoint) as publisher:
         subscription = bus.subscribe(KEY, samples.put, latched=True)
         publisher.put(b"0")
@@ -258,17 +264,8 @@ def test_where_several_count_an_answer_waits_for_what_is_before_it(
 ):
     """A publisher keeps three; what it published before them is under way, or lost."""
     monkeypatch.setattr(latched, "UNDER_WAY_S", 1000.0 if arrive else 0.2)
-    samples, under_way, answers = Queue(), Queue(), Queue()
-    hear, take = latched.LatchedSubscription._on_sample, latched.LatchedSubscription._take
-    monkeypatch.setattr(
-        latched.LatchedSubscription, "_on_sample", lambda _, sample: under_way.put(sample)
-    )
-
-    def answer(self, sample, *, again):
-        take(self, sample, again=again)
-        answers.put(sample.payload)
-
-    monkeypatch.setattr(latched.LatchedSubscription, "_take", answer)
+    samples = Queue()
+    hear, under_way, answers = held_under_way(monkeypatch)
     with publishing(endpoint, cache=3) as publisher:
         publisher.put(b"0")
         subscription = bus.subscribe(KEY, samples.put, latched=True, history=100)
