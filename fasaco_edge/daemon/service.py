@@ -29,7 +29,13 @@ from fasaco_edge.daemon.reload import Reload
 from fasaco_edge.daemon.ros_bridge import RosBridge
 from fasaco_edge.daemon.supervisor import RecorderSupervisor
 from fasaco_edge.errors import BusUnavailable
-from fasaco_edge.host.processes import call_on, end_within, memory_limit, return_soon
+from fasaco_edge.host.processes import (
+    call_on,
+    end_within,
+    memory_limit,
+    release_unused,
+    return_soon,
+)
 from fasaco_edge.wire import topics
 
 if TYPE_CHECKING:
@@ -212,6 +218,7 @@ def _serve(
         LOG.info("ready after %.2f s on %s", seconds, keys.prefix, extra={"event": "ready"})
         if not stop.is_set():
             manager.ready()
+        release_unused()
         loop.run(stop)
     finally:
         manager.stopping()

@@ -17,6 +17,7 @@ from fasaco_edge.follow.follower import RATE_HZ, Follower
 from fasaco_edge.follow.inputs import Inputs, patience_of
 from fasaco_edge.follow.settings import FollowSettings
 from fasaco_edge.follow.supervision import State
+from fasaco_edge.host.processes import release_unused
 from fasaco_edge.wire import topics
 from fasaco_edge.wire.messages.twists import Velocity, encode_velocity
 from fasaco_edge.wire.schemas import TWIST_STAMPED
@@ -65,6 +66,7 @@ def run_follower(
         return
     with bus:
         node = node_of(bus, settings, report)
+        release_unused()
         try:
             _take_turns(node, 1.0 / (RATE_HZ * settings.pace), stop)
         finally:

@@ -19,6 +19,8 @@ from functools import lru_cache
 from pathlib import Path, PurePath
 from types import FrameType
 
+from fasaco_edge.host.libraries import unmap_unread
+
 
 def python_program(module: str, *words: str) -> list[str]:
     """Return the command line that runs a module with this interpreter.
@@ -39,6 +41,14 @@ _ARENA_MAX = (-8, 2)
 def resident_mb(pid: int | str = "self") -> float:
     """Return the resident memory of a process now [MB]; without ``pid`` of this one."""
     return _field_mb(pid, "VmRSS")
+
+
+def own_mb(pid: int | str = "self") -> float:
+    """Return how much of a process's resident memory is its own [MB]: no pages of files.
+
+    How much of its libraries is in memory is up to the system, which shares it and takes it back.
+    """
+    return _field_mb(pid, "RssAnon")
 
 
 def peak_mb(pid: int) -> float:
@@ -138,13 +148,15 @@ def _own_status() -> int:
 
 
 def release_unused() -> None:
-    """Give memory that was freed back to the system, where the C library can (glibc).
+    """Give back to the system what starting, or loading kernels, took and left behind.
 
-    Loading kernels leaves some behind, in the arena of the thread that loaded them.
+    That is memory which was freed, in the arena of the thread that loaded them, where the C library
+    can (glibc), and pages of libraries (``fasaco_edge.host.libraries``).
     """
     trim = getattr(ctypes.CDLL(None), "malloc_trim", None)
     if trim is not None:
         trim(0)
+    unmap_unread()
 
 
 def return_soon() -> None:

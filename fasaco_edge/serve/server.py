@@ -17,6 +17,7 @@ from websockets.http11 import Request, Response
 
 from fasaco_edge.bus.queries import Reply
 from fasaco_edge.host.addresses import Address
+from fasaco_edge.host.processes import release_unused
 from fasaco_edge.serve.guard import Guard, is_same_origin
 from fasaco_edge.serve.messages import Role
 from fasaco_edge.serve.page import load_page
@@ -96,6 +97,7 @@ class Server:
             max_queue=4,
             write_limit=WAITING_BYTES,
         ):
+            release_unused()
             hearing = asyncio.create_task(asyncio.to_thread(self._hear))
             # Where it fails the server ends, too: a page must not show for ever what was last.
             hearing.add_done_callback(lambda _: stop.set())

@@ -41,7 +41,7 @@ from tests.support.processes import (
 from tests.support.rooms import HALL, begin, lanes, map_bytes, pose_bytes, update_bytes
 
 # What it may be resident with [MB]; half of it is Zenoh's and Python's code, shared with a daemon.
-SERVE_MB = 60.0
+SERVE_MB = 46.0
 ROOM = {"name": "by the door", "polygon": [[0.5, 0.5], [3.0, 0.5], [3.0, 3.0], [0.5, 3.0]]}
 
 

@@ -123,16 +123,6 @@ def resident_mb(pid: int) -> float:
     return pages * os.sysconf("SC_PAGE_SIZE") / 1e6
 
 
-def own_mb(pid: int) -> float:
-    """Return the resident memory of a process without pages of files [MB].
-
-    How much of its libraries is in memory is up to the system, which shares it and takes it back.
-    """
-    status = Path(f"/proc/{pid}/status").read_text()
-    kilobytes = next(line.split()[1] for line in status.splitlines() if line[:8] == "RssAnon:")
-    return int(kilobytes) * 1.024e-3
-
-
 def mapped_files(pid: int) -> str:
     """Return the names of all files a process has mapped."""
     return Path(f"/proc/{pid}/maps").read_text()

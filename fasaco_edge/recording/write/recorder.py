@@ -20,7 +20,13 @@ from fasaco_edge.bus.session import Bus, open_bus
 from fasaco_edge.bus.settings import BusSettings
 from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.errors import BadConfiguration, FasacoError, MalformedMessage
-from fasaco_edge.host.processes import memory_limit, resident_mb, return_soon, stop_event
+from fasaco_edge.host.processes import (
+    memory_limit,
+    release_unused,
+    resident_mb,
+    return_soon,
+    stop_event,
+)
 from fasaco_edge.mission.orders.order import read_command
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.read.repair import repair_folder
@@ -81,6 +87,7 @@ def run_recorder(
         for line in repairs:
             recorder.note(line)
         recorder.listen()
+        release_unused()
         while not stop.is_set():
             recorder.step(TAKE_TIMEOUT_S)
         code = 0 if recorder.end() else EXIT_STALLED
