@@ -13,11 +13,12 @@ from msgspec import Meta
 
 from fasaco_edge.bus import DEFAULT_ENDPOINT
 from fasaco_edge.bus.settings import BusSettings
+from fasaco_edge.config.endpoints import from_here
 from fasaco_edge.config.footprint import FootprintConfig
 from fasaco_edge.config.metrics import MetricsConfig
 from fasaco_edge.config.reading import Section
 from fasaco_edge.config.ros import RosConfig
-from fasaco_edge.config.security import SecurityConfig, from_here
+from fasaco_edge.config.security import SecurityConfig
 from fasaco_edge.errors import BadConfiguration, OrderError
 from fasaco_edge.kernels.floor.turning import (
     Turning,

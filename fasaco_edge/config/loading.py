@@ -11,6 +11,7 @@ import msgspec
 from msgspec import structs
 
 from fasaco_edge.config.config import DaemonConfig
+from fasaco_edge.config.endpoints import endpoint_faults
 from fasaco_edge.config.reading import Fault, read_text, section_faults, with_credentials
 from fasaco_edge.config.security import security_faults
 from fasaco_edge.errors import BadConfiguration
@@ -118,6 +119,8 @@ def _misfits(config: DaemonConfig) -> Iterator[BadConfiguration]:
     bus = config.bus
     if not (bus.listen or bus.connect):
         yield BadConfiguration("bus.listen and bus.connect must not both be empty")
+    yield from endpoint_faults("bus.listen", bus.listen)
+    yield from endpoint_faults("bus.connect", bus.connect)
     yield from security_faults(
         bus.security, bus.listen, bus.connect, open_to_everyone=bus.open_to_everyone
     )

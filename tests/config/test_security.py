@@ -7,9 +7,9 @@ import subprocess
 import pytest
 import yaml
 
+from fasaco_edge.config.endpoints import from_here, is_local
 from fasaco_edge.config.loading import load_config
 from fasaco_edge.config.ros import RosConfig
-from fasaco_edge.config.security import from_here, is_local
 from fasaco_edge.errors import BadConfiguration, OpenToEveryone
 from tests.support.processes import PROGRAM
 
@@ -58,13 +58,10 @@ def test_endpoints_of_this_computer(tmp_path, endpoint):
         "tcp/127.0.0.1@10.0.0.1:7447",
         "tcp/0:7447",
         "tcp/127.1:7447",
-        "tcp/:7447",
         "tcp/*:7447",
         "tcp/10.0.0.1:7447#127.0.0.1:7447",
         "serial//dev/ttyUSB0",
         "vsock/-1:1234",
-        "127.0.0.1:7447",
-        "",
     ],
 )
 def test_endpoints_beyond_this_computer(tmp_path, endpoint):
@@ -76,6 +73,32 @@ def test_endpoints_beyond_this_computer(tmp_path, endpoint):
     assert "bus.open_to_everyone: true" in refused.value.hint
     opened = load(tmp_path, listen=[endpoint], open_to_everyone=True)
     assert opened.bus.open_to_everyone
+
+
+@pytest.mark.parametrize(
+    ("endpoint", "why"),
+    [
+        ("hello", "no protocol before the address"),
+        ("", "no protocol before the address"),
+        ("127.0.0.1:7447", "no protocol before the address"),
+        ("http/robot:80", "the protocol must be one of tcp, udp, tls, quic, ws"),
+        ("tcp/", "no address after tcp/"),
+        ("tcp/my robot:7447", "a space in the address"),
+        ("tcp/robot", "the address must be <host>:<port>"),
+        ("tcp/:7447", "the address must be <host>:<port>"),
+        ("tcp/robot:door", "the port must be a number of at most 65535, got 'door'"),
+        ("tcp/robot:65536", "the port must be a number of at most 65535"),
+        ("tcp/::1:7447", r"an IPv6 address stands in brackets, as [::1]:7447"),
+    ],
+)
+@pytest.mark.parametrize("key", ["listen", "connect"])
+def test_what_is_no_endpoint_is_named_before_anything_is_opened(tmp_path, key, endpoint, why):
+    """Zenoh would try for ever to connect there, or refuse to listen without saying why."""
+    with pytest.raises(BadConfiguration) as refused:
+        load(tmp_path, **{"open_to_everyone": True, key: ["tcp/127.0.0.1:7447", endpoint]})
+    assert f"bus.{key}: {endpoint!r}: " in str(refused.value)
+    assert why in str(refused.value)
+    assert "as tcp/192.168.1.5:7447" in refused.value.hint
 
 
 def test_to_connect_anywhere_opens_nothing(tmp_path):

@@ -184,8 +184,8 @@ def robot_on_bus(args: argparse.Namespace) -> RobotOnBus:
     the defaults, in this order.
 
     Raises:
-        BadConfiguration: a name is none, or the configuration or what shows who this is cannot be
-            read.
+        BadConfiguration: a name or an endpoint is none, or the configuration or what shows who
+            this is cannot be read.
     """
     from fasaco_edge.wire.keys import Keys
 
@@ -197,17 +197,22 @@ def robot_on_bus(args: argparse.Namespace) -> RobotOnBus:
         keys = Keys(args.robot or config.robot.name, args.base or config.bus.base)
         bus = config.bus.of_client()
         if args.connect or args.security:
-            bus = _client(tuple(args.connect or bus.connect), args.security)
+            bus = _client("--connect", tuple(args.connect or bus.connect), args.security)
         return RobotOnBus(keys, bus, config)
     keys = Keys(args.robot or os.environ.get(ROBOT) or "robot", args.base or "fasaco")
     told = [one.strip() for one in os.environ.get(CONNECT, "").split(",") if one.strip()]
     connect = tuple(args.connect or told or (DEFAULT_ENDPOINT,))
-    return RobotOnBus(keys, _client(connect, args.security))
+    name = "--connect" if args.connect else f"${CONNECT}"
+    return RobotOnBus(keys, _client(name, connect, args.security))
 
 
-def _client(connect: tuple[str, ...], security_file: str | None) -> BusSettings:
+def _client(name: str, connect: tuple[str, ...], security_file: str | None) -> BusSettings:
+    """Return the settings of a client; ``name`` is that of the option that has the endpoints."""
     from fasaco_edge.bus.settings import BusSettings
+    from fasaco_edge.config.endpoints import endpoint_faults
 
+    for fault in endpoint_faults(name, connect):
+        raise fault
     if security_file is None:
         return BusSettings("client", connect)
     from fasaco_edge.config.security import read_client_security

@@ -1,0 +1,103 @@
+"""Endpoints of the bus: what is wrong with one, and who can reach it.
+
+An endpoint is ``<protocol>/<address>[?<metadata>][#<configuration>]``.
+"""
+
+from __future__ import annotations
+
+import ipaddress
+import re
+from collections.abc import Iterator, Sequence
+
+from fasaco_edge.errors import BadConfiguration
+
+# Sockets in the file system: who may write there, may connect.
+UNIX = ("unixsock-stream", "unixpipe")
+IP = ("tcp", "udp", "tls", "quic", "ws")
+
+
+def protocol_of(endpoint: str) -> str:
+    """Return the protocol, "" where there is none."""
+    return endpoint.partition("/")[0] if "/" in endpoint else ""
+
+
+def host_of(endpoint: str) -> str:
+    """Return the host of an IP endpoint, without brackets; "" where none can be made out."""
+    address = re.split(r"[?#]", endpoint.partition("/")[2])[0]
+    host = address.rpartition(":")[0]
+    return host[1:-1] if host.startswith("[") and host.endswith("]") else host
+
+
+def is_local(endpoint: str) -> bool:
+    """Tell whether only this computer can reach an endpoint; False where that is not certain.
+
+    Names are not resolved: any but ``localhost`` may stand for any address.
+    """
+    protocol = protocol_of(endpoint)
+    if protocol in UNIX:
+        return True
+    if protocol not in IP:
+        return False
+    host = host_of(endpoint)
+    if host.lower() == "localhost":
+        return True
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return False
+
+
+def from_here(endpoint: str) -> str:
+    """Return the endpoint at which this computer reaches what listens at ``endpoint``."""
+    host = host_of(endpoint)
+    try:
+        anywhere = ipaddress.ip_address(host).is_unspecified
+    except ValueError:
+        return endpoint
+    if not anywhere:
+        return endpoint
+    # By a name, which a certificate may hold.
+    shown = f"[{host}]" if ":" in host else host
+    return endpoint.replace(f"/{shown}:", "/localhost:", 1)
+
+
+# What Zenoh knows beside these; who builds it with them may use them.
+DEVICES = ("serial", "vsock")
+
+
+def endpoint_faults(name: str, endpoints: Sequence[str]) -> Iterator[BadConfiguration]:
+    """Yield what is wrong with endpoints, of which Zenoh would say nothing but that none answers.
+
+    Args:
+        name: of the key or option that has them.
+        endpoints: as they were given.
+    """
+    for endpoint in endpoints:
+        if why := _why_none(endpoint):
+            yield BadConfiguration(
+                f"{name}: {endpoint!r}: {why}",
+                hint="an endpoint is <protocol>/<address>, as tcp/192.168.1.5:7447",
+            )
+
+
+def _why_none(endpoint: str) -> str:
+    """Return why a text is no endpoint; "" where it is one."""
+    protocol, address = protocol_of(endpoint), re.split(r"[?#]", endpoint.partition("/")[2])[0]
+    known = (*IP, *UNIX, *DEVICES)
+    if protocol not in known:
+        of_these = f"the protocol must be one of {', '.join(known)}"
+        return f"{of_these}, got {protocol!r}" if protocol else "no protocol before the address"
+    if not address or re.search(r"\s", address):
+        return "a space in the address" if address else f"no address after {protocol}/"
+    return _why_no_socket(address) if protocol in IP else ""
+
+
+def _why_no_socket(address: str) -> str:
+    host, _, port = address.rpartition(":")
+    if not host:
+        return "the address must be <host>:<port>"
+    if not re.fullmatch(r"\d{1,5}", port) or int(port) >= 1 << 16:
+        return f"the port must be a number of at most 65535, got {port!r}"
+    if ":" in host and not (host.startswith("[") and host.endswith("]")):
+        return f"an IPv6 address stands in brackets, as [{host}]:{port}"
+    return ""
