@@ -1,5 +1,18 @@
-"""``python -m fasaco_edge``."""
+"""The program: ``fasaco-edge``, or ``python -m fasaco_edge``."""
 
-from fasaco_edge.cli import program
+import sys
+from typing import NoReturn
 
-program()
+
+def program() -> NoReturn:
+    """Run the command line; Ctrl-C while that is still being imported ends it like any other."""
+    try:
+        from fasaco_edge.cli import program as run  # noqa: PLC0415
+
+        run()
+    except KeyboardInterrupt:
+        sys.exit(130)
+
+
+if __name__ == "__main__":
+    program()

@@ -243,6 +243,25 @@ def ctrl_c_asks(ask: Callable[[], None]) -> Iterator[None]:
         restore()
 
 
+@contextmanager
+def ctrl_c_waits() -> Iterator[None]:
+    """Raise a KeyboardInterrupt that comes during the block only after it.
+
+    In a function that C calls back it would be lost, and with it what the function returns.
+    """
+    if signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
+        yield
+        return
+    came = list[bool]()
+    restore = _handle([signal.SIGINT], lambda: came.append(True))
+    try:
+        yield
+    finally:
+        restore()
+    if came:
+        raise KeyboardInterrupt
+
+
 def end_with_parent(parent: int) -> None:
     """Send this process SIGTERM once its parent, process ``parent``, is gone."""
 

@@ -21,6 +21,7 @@ from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar, cast
 
+from fasaco_edge.host.processes import ctrl_c_waits
 from fasaco_edge.kernels import release
 from fasaco_edge.kernels.cache import note_complete, own_folder
 from fasaco_edge.kernels.release import ANY_PROCESSOR, KERNEL_SUFFIX, KERNELS, kernel_module
@@ -174,6 +175,11 @@ class _KernelLibrary(JITCodeLibrary):  # type: ignore[misc]
         library._set_compiled_object(machine_code)
         library._finalize_final_module()
         return library
+
+    def _finalize_specific(self) -> None:
+        # LLVM calls back for the machine code: interrupted there, it goes on without, or crashes.
+        with ctrl_c_waits():
+            super()._finalize_specific()
 
     @functools.cached_property
     def _parsed(self) -> ModuleRef:

@@ -1,12 +1,14 @@
 """Processes: what a child imports, and the memory limits of control groups."""
 
+import os
+import signal
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 
-from fasaco_edge.host.processes import available_memory, memory_limit
+from fasaco_edge.host.processes import available_memory, ctrl_c_waits, memory_limit
 
 TELL = """\
 import subprocess
@@ -133,3 +135,20 @@ def test_what_is_available_is_no_more_than_the_limit(tmp_path):
         "sys/fs/cgroup/b.service/memory.max": "800000000\n",
     }
     assert available_memory(written(tmp_path / "limited", limited)) == 800_000_000
+
+
+def test_ctrl_c_waits_for_the_end_of_what_must_not_be_interrupted():
+    before, reached = signal.signal(signal.SIGINT, signal.default_int_handler), []
+    try:
+        with pytest.raises(KeyboardInterrupt), ctrl_c_waits():
+            os.kill(os.getpid(), signal.SIGINT)
+            reached.append(True)
+        assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+        with ctrl_c_waits():
+            pass
+        signal.signal(signal.SIGINT, lambda *_: reached.append("handled"))
+        with ctrl_c_waits():
+            os.kill(os.getpid(), signal.SIGINT)
+    finally:
+        signal.signal(signal.SIGINT, before)
+    assert reached == [True, "handled"]

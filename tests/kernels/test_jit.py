@@ -201,3 +201,31 @@ def test_a_file_in_the_working_folder_does_not_set_up_the_compiler(tmp_path: Pat
         words, cwd=tmp_path, env=ENVIRONMENT, capture_output=True, text=True, check=False
     )
     assert done.stdout == "0 3\n", done.stderr
+
+
+INTERRUPTED = """
+import os, signal
+from llvmlite.binding.executionengine import ExecutionEngine as Engine
+import numpy as np
+from fasaco_edge.kernels.lattice.polygons import count_in
+
+def interrupted(callback):
+    def called(*args):
+        os.kill(os.getpid(), signal.SIGINT)
+        return callback(*args)
+    return called
+
+Engine._find_module_ptr = interrupted(Engine._find_module_ptr)
+signal.signal(signal.SIGINT, signal.default_int_handler)
+try:
+    count_in(np.zeros((1, 2), np.uint8), np.zeros(2, np.uint8))
+except KeyboardInterrupt:
+    print("interrupted")
+"""
+
+
+def test_ctrl_c_while_a_kernel_is_loaded_is_an_interrupt_and_no_crash():
+    """LLVM takes what an interrupted callback did not return for a machine code without bytes."""
+    words = [sys.executable, "-c", INTERRUPTED]
+    done = subprocess.run(words, env=ENVIRONMENT, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "interrupted\n", "")
