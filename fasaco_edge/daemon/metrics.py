@@ -1,13 +1,14 @@
 """The server of figures for Prometheus: the newest status, over HTTP, on a thread of its own.
 
-It cannot hold the loop up: the loop hands over a reference and goes on. One connection at a time,
-a second for each, and a pause after it, so that who asks without end gets a few answers a second
-and takes hardly any of the processor.
+It cannot hold the loop up: the loop hands over a reference and goes on. It waits for no connection:
+a request is answered once it is all there, one after the other with a pause in between, so that who
+asks without end gets a few answers a second and takes hardly any of the processor.
 """
 
 from __future__ import annotations
 
 import logging
+import select
 import socket
 import threading
 import time
@@ -19,10 +20,12 @@ from fasaco_edge.wire.documents.status import Status
 LOG = logging.getLogger(__name__)
 
 PATH = "/metrics"
-# Of a request: how much is read of it, and how long it may take with its answer [s].
-MOST_BYTES, LONGEST_S = 8192, 1.0
-# After each connection [s]; so many others may wait meanwhile.
-PAUSE_S, WAITING = 0.05, 8
+# Of a request: how much is read of it, and how long it may take to arrive [s]; how long its answer
+# may take to leave [s].
+MOST_BYTES, LONGEST_S, SEND_S = 8192, 1.0, 0.2
+# Between two answers [s]. So many connections may be open, and as many wait to be taken: of more,
+# the oldest is closed, which has said nothing for the longest.
+PAUSE_S, MOST_OPEN = 0.05, 16
 REASONS = {200: "OK", 404: "Not Found", 405: "Method Not Allowed", 503: "Service Unavailable"}
 
 
@@ -38,7 +41,8 @@ class MetricsServer:
 
     def __init__(self, address: Address) -> None:
         family = socket.AF_INET6 if ":" in address.host else socket.AF_INET
-        self._socket = socket.create_server(address, family=family, backlog=WAITING)
+        self._socket = socket.create_server(address, family=family, backlog=MOST_OPEN)
+        self._socket.setblocking(False)
         self._shown: tuple[Status, float] | None = None
         self._is_closed = threading.Event()
         threading.Thread(target=self._serve, name="metrics", daemon=True).start()
@@ -58,38 +62,47 @@ class MetricsServer:
         self._socket.close()
 
     def _serve(self) -> None:
+        requests: dict[socket.socket, _Request] = {}
         while not self._is_closed.is_set():
             try:
-                connection, _ = self._socket.accept()
-                with connection:
-                    self._answer(connection)
-            except OSError as error:
-                # Who asked is gone or too slow, or there are no descriptors left for now.
-                LOG.debug("metrics: %s", error)
+                wait_s = LONGEST_S if requests else None
+                readable, _, _ = select.select([self._socket, *requests], [], [], wait_s)
+            except (OSError, ValueError) as error:
+                LOG.debug("metrics: %s", error)  # the socket is closed
+                continue
+            if self._socket in readable:
+                self._take(requests)
+            for connection in readable:
+                if connection in requests:
+                    requests[connection].read()
+            self._answer_one(requests)
             self._is_closed.wait(PAUSE_S)
+        for request in requests.values():
+            request.close()
 
-    def _answer(self, connection: socket.socket) -> None:
-        until = time.monotonic() + LONGEST_S
-        head = b""
-        while b"\r\n\r\n" not in head and len(head) < MOST_BYTES:
-            connection.settimeout(_left(until))
-            part = connection.recv(1024)
-            if not part:
-                return
-            head += part
-        method, _, rest = head.split(b"\r\n", 1)[0].decode("latin-1").partition(" ")
-        code, body = self._page(method, rest.partition(" ")[0].partition("?")[0])
-        text = body.encode()
-        lines = (
-            f"HTTP/1.0 {code} {REASONS[code]}",
-            f"Content-Type: {CONTENT_TYPE}",
-            f"Content-Length: {len(text)}",
-            "Connection: close",
-            *(["Allow: GET, HEAD"] if code == 405 else ()),
-        )
-        answer = "\r\n".join((*lines, "", "")).encode()
-        connection.settimeout(_left(until))
-        connection.sendall(answer if method == "HEAD" else answer + text)
+    def _take(self, requests: dict[socket.socket, _Request]) -> None:
+        """Take the connections that wait; close the oldest where there are too many."""
+        for _ in range(MOST_OPEN):
+            try:
+                connection, _ = self._socket.accept()
+            except OSError as error:
+                # No more of them wait; or the socket is closed, or there are no descriptors left.
+                LOG.debug("metrics: %s", error)
+                break
+            requests[connection] = _Request(connection)
+        while len(requests) > MOST_OPEN:
+            requests.pop(next(iter(requests))).close()
+
+    def _answer_one(self, requests: dict[socket.socket, _Request]) -> None:
+        """Answer the oldest request that is all there; close what is over."""
+        now, has_answered = time.monotonic(), False
+        for connection, request in list(requests.items()):
+            if request.is_whole and not has_answered:
+                request.answer(*self._page(*request.words()))
+                has_answered = True
+            elif not (request.is_gone or now > request.until):
+                continue
+            requests.pop(connection).close()
 
     def _page(self, method: str, path: str) -> tuple[int, str]:
         if method not in ("GET", "HEAD"):
@@ -102,12 +115,61 @@ class MetricsServer:
         return 200, exposition(status, time.monotonic() - at)
 
 
-def _left(until: float) -> float:
-    """Return the time left [s]; raise TimeoutError where there is none."""
-    left = until - time.monotonic()
-    if left <= 0.0:
-        raise TimeoutError("too slow")
-    return left
+class _Request:
+    """What has arrived of one request.
+
+    Attributes:
+        until: when it has to be all there, by the steady clock [s].
+        is_gone: nobody is there any more.
+    """
+
+    def __init__(self, connection: socket.socket) -> None:
+        connection.setblocking(False)
+        self._connection, self._head = connection, b""
+        self.until, self.is_gone = time.monotonic() + LONGEST_S, False
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether all has arrived, or as much as is read of it."""
+        return b"\r\n\r\n" in self._head or len(self._head) >= MOST_BYTES
+
+    def read(self) -> None:
+        """Read what is there."""
+        if self.is_whole:
+            return
+        try:
+            part = self._connection.recv(1024)
+        except BlockingIOError:
+            return
+        except OSError:
+            part = b""
+        self._head, self.is_gone = self._head + part, not part
+
+    def words(self) -> tuple[str, str]:
+        """Return method and path."""
+        method, _, rest = self._head.split(b"\r\n", 1)[0].decode("latin-1").partition(" ")
+        return method, rest.partition(" ")[0].partition("?")[0]
+
+    def answer(self, code: int, body: str) -> None:
+        """Send the answer, as far as it is taken at once."""
+        text = body.encode()
+        lines = (
+            f"HTTP/1.0 {code} {REASONS[code]}",
+            f"Content-Type: {CONTENT_TYPE}",
+            f"Content-Length: {len(text)}",
+            "Connection: close",
+            *(["Allow: GET, HEAD"] if code == 405 else ()),
+        )
+        head = "\r\n".join((*lines, "", "")).encode()
+        try:
+            self._connection.settimeout(SEND_S)
+            self._connection.sendall(head if self.words()[0] == "HEAD" else head + text)
+        except OSError as error:
+            LOG.debug("metrics: %s", error)  # who asked is gone, or too slow
+
+    def close(self) -> None:
+        """Close the connection."""
+        self._connection.close()
 
 
 def serve_metrics(address: Address | None) -> MetricsServer | None:

@@ -8,7 +8,7 @@ import threading
 import time
 import urllib.error
 import urllib.request
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 
 import pytest
 from msgspec import structs
@@ -150,6 +150,27 @@ def test_who_says_nothing_or_too_much_holds_up_nobody():
         finally:
             for one in silent:
                 one.close()
+
+
+def test_many_who_say_nothing_hold_up_nobody():
+    with served() as url, ExitStack() as stack:
+        address = "127.0.0.1", int(url.rpartition(":")[2])
+        for _ in range(40):
+            stack.enter_context(socket.create_connection(address, 60))
+        begun = time.monotonic()
+        with OPENER.open(f"{url}/metrics", timeout=60) as answer:
+            assert answer.status == 200
+        assert time.monotonic() - begun < 5.0, "each of them may take a second to say something"
+
+
+def test_who_asks_without_end_gets_a_few_answers_a_second():
+    with served() as url:
+        address, begun, answers = ("127.0.0.1", int(url.rpartition(":")[2])), time.monotonic(), 0
+        while time.monotonic() - begun < 1.0:
+            with socket.create_connection(address, 60) as asking:
+                asking.sendall(b"GET /metrics HTTP/1.0\r\n\r\n")
+                answers += asking.recv(12) == b"HTTP/1.0 200"
+        assert 1 <= answers <= 25
 
 
 def test_a_port_that_is_taken_or_a_server_that_closes_stops_nothing(caplog):

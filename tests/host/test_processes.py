@@ -139,10 +139,15 @@ def test_what_is_available_is_no_more_than_the_limit(tmp_path):
 
 def test_ctrl_c_waits_for_the_end_of_what_must_not_be_interrupted():
     before, reached = signal.signal(signal.SIGINT, signal.default_int_handler), []
-    try:
-        with pytest.raises(KeyboardInterrupt), ctrl_c_waits():
+
+    def interrupted():
+        with ctrl_c_waits():
             os.kill(os.getpid(), signal.SIGINT)
             reached.append(True)
+
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            interrupted()
         assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
         with ctrl_c_waits():
             pass
