@@ -110,7 +110,7 @@ def folder(tmp_path, monkeypatch):
         (f"simulate office --start-xy 999,9 --connect {NOBODY}", 1, "(999, 9) m is not on the map"),
         (f"simulate office --robot a/b --connect {NOBODY}", 78, "got 'a/b'"),
         ("simulate office --trail-out no/trail.csv", 78, "there is no folder no"),
-        ("simulate office --connect office", 1, "office"),
+        ("simulate office --connect office", 78, "'office': no protocol before the address"),
         (f"record --out . --connect {NOBODY}", 1, "Unable to connect to any of"),
         (f"record --out . --base /x --connect {NOBODY}", 78, "base must be chunks"),
         ("demo --map nowhere --out o", 1, "no map 'nowhere'"),

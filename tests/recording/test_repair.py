@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import fcntl
 import io
+import os
 import struct
 from pathlib import Path
 
@@ -58,6 +59,15 @@ def test_zeros_in_place_of_what_was_not_written_are_cut_with_the_frame_they_are_
     assert repair_recording(path) is not None
     solid = len(WHOLE[:size].rstrip(b"\0")) + MOST_ZEROS
     assert path.read_bytes() == content[: max(end for end in ENDS if end <= solid)]
+
+
+def test_a_hole_at_the_end_is_not_read(tmp_path):
+    """It takes no space: of a file that claims a terabyte, hours of zeros would be read."""
+    path = written(tmp_path, WHOLE + bytes(70_000))
+    os.truncate(path, 10**12)
+    repair = repair_recording(path)
+    assert path.read_bytes() == WHOLE
+    assert repair.cut_bytes == 10**12 - len(WHOLE)
 
 
 @pytest.mark.parametrize("kept", [0, 4, 9])
