@@ -1,11 +1,13 @@
 """Interpreters forked off a server that has numba: half a second of processor time less each.
 
 They have imported nothing of the package before their program runs: which kernels, cache and
-settings they have is up to that, as in an interpreter that was started. What it costs to start one,
-and what one has in memory, such a process cannot tell.
+settings they have is up to that, as in an interpreter that was started. A command of the package
+in the tests' own environment is forked off a second server, which has loaded the kernels, too: a
+daemon with a map takes as long for that as for all else. What it costs to start a process, and
+what it has in memory, neither can tell.
 
-``python FILE DESCRIPTOR`` is the server: for each task that comes it forks a process, and tells
-by the pipe that came along its process id, and how it ended.
+``python FILE DESCRIPTOR`` is a server, with ``--kernels`` the second: for each task that comes it
+forks a process, and tells by the pipe that came along its process id, and how it ended.
 """
 
 from __future__ import annotations
@@ -13,6 +15,7 @@ from __future__ import annotations
 import atexit
 import contextlib
 import functools
+import gc
 import os
 import pickle
 import runpy
@@ -30,7 +33,11 @@ from importlib import import_module
 from pathlib import Path
 from typing import NoReturn
 
+# Found from any folder, installed or not.
+ENVIRONMENT = os.environ | {"PYTHONPATH": str(Path(__file__).parents[2])}
 PRELOADED = ("numba", "llvmlite.binding", "msgspec", "yaml")
+# Neither Zenoh nor Rerun: by them a command decides how it ends.
+LOADED = ("fasaco_edge.planners.warmup", "fasaco_edge.daemon.loop.mission_runner")
 NUMBER = struct.Struct("i")
 # Of a task, which holds words and an environment.
 MOST_BYTES = 1 << 20
@@ -61,7 +68,7 @@ class Forked:
         assert len(task) < MOST_BYTES
         self._news, theirs = os.pipe()
         try:
-            socket.send_fds(_server(), [task], [theirs])
+            socket.send_fds(_server(_has_kernels(words, environment)), [task], [theirs])
         finally:
             os.close(theirs)
         self.pid = self._told()
@@ -123,15 +130,29 @@ def run_forked(
         return code, out.read_text(), err.read_text()
 
 
+def _settings(environment: Mapping[str, str]) -> dict[str, str]:
+    """Return what may decide which kernels a process has."""
+    return {name: value for name, value in environment.items() if name[:7] != "FASACO_"}
+
+
+_COMMON_SETTINGS = _settings(ENVIRONMENT)
+
+
+def _has_kernels(words: tuple[str, ...], environment: Mapping[str, str]) -> bool:
+    return words[:2] == ("-m", "fasaco_edge") and _settings(environment) == _COMMON_SETTINGS
+
+
 @functools.cache
-def _server() -> socket.socket:
-    """Return a way to the server, which ends with this process."""
+def _server(has_kernels: bool) -> socket.socket:
+    """Return a way to a server, which ends with this process."""
     ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     ours.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, MOST_BYTES)
     with theirs:
         descriptor = theirs.fileno()
-        command = [sys.executable, __file__, str(descriptor)]
-        process = subprocess.Popen(command, pass_fds=(descriptor,), stdin=subprocess.DEVNULL)
+        command = [sys.executable, __file__, str(descriptor), *["--kernels"] * has_kernels]
+        process = subprocess.Popen(
+            command, pass_fds=(descriptor,), stdin=subprocess.DEVNULL, env=_COMMON_SETTINGS
+        )
 
     def end() -> None:
         ours.close()
@@ -141,10 +162,20 @@ def _server() -> socket.socket:
     return ours
 
 
+def _load_kernels() -> None:
+    """Import what most commands do, and load all kernels, or compile what is missing."""
+    before = sys.path[:]
+    sys.path.insert(0, os.environ["PYTHONPATH"])
+    for name in LOADED:
+        import_module(name)
+    sys.modules[LOADED[0]].warm_up()
+    sys.path[:] = before
+
+
 def _serve(tasks: socket.socket) -> None:
     """Fork a process for each task, until nobody sends any."""
-    for name in PRELOADED:
-        import_module(name)
+    # What is there stays: no process looks it through for garbage, and has a copy of it for that.
+    gc.freeze()
     woken, wakes = socket.socketpair()
     wakes.setblocking(False)
     before = signal.signal(signal.SIGCHLD, lambda *_: None)
@@ -233,4 +264,8 @@ if __name__ == "__main__":
     # Neither this file's folder nor what the tests import is on the path of a program.
     ours = {str(Path(__file__).parent), *os.environ.get("PYTHONPATH", "").split(os.pathsep)}
     sys.path[:] = [entry for entry in sys.path if entry not in ours]
+    for name in PRELOADED:
+        import_module(name)
+    if sys.argv[2:]:
+        _load_kernels()
     _serve(socket.socket(fileno=int(sys.argv[1])))

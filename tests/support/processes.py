@@ -16,15 +16,12 @@ from typing import Any
 
 import yaml
 
-import fasaco_edge as package
-from tests.support.forked import Forked, run_forked
+from tests.support.forked import ENVIRONMENT, Forked, run_forked
 
 # What a daemon may take from SIGTERM to its end on a machine that is busy with much else [s]; on
 # a quiet one it is two seconds at most.
 STOP_S = 30.0
 PROGRAM = (sys.executable, "-m", "fasaco_edge")
-# Found from any folder, installed or not.
-ENVIRONMENT = os.environ | {"PYTHONPATH": str(Path(package.__file__).parents[1])}
 
 
 def free_endpoint() -> str:
