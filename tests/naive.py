@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 
 from fasaco_edge.grid.geometry import GridGeometry, Window
 from fasaco_edge.grid.lattice import TOUCH_TOLERANCE_PX, Footprint
-from fasaco_edge.planners.colony import ColonyConfig
 from fasaco_edge.planners.cost import CoverageCost
+from fasaco_edge.planners.paper.colony import ColonyConfig
 
 UNKNOWN, BLOCKED, COVERABLE = 0, 1, 2
 

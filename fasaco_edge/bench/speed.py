@@ -22,8 +22,8 @@ from fasaco_edge.bench.benchmark import (
 from fasaco_edge.drawing.spread import Spread, document
 
 if TYPE_CHECKING:
-    from fasaco_edge.planners.fasaco import Fasaco
     from fasaco_edge.planners.grids import NamedGrid
+    from fasaco_edge.planners.paper.fasaco import Fasaco
     from fasaco_edge.planners.path import CoveragePath
     from fasaco_edge.planners.problem import CoverageProblem
 
@@ -83,9 +83,9 @@ def _count(args: argparse.Namespace) -> int:
 
 def _measure(args: argparse.Namespace, say: Say) -> Generator[Timing, None, None]:
     # Here, so that to list the benchmarks does not load the compiler.
-    from fasaco_edge.planners.colony import ColonyConfig, parse_velocities  # noqa: PLC0415
-    from fasaco_edge.planners.fasaco import Fasaco  # noqa: PLC0415
     from fasaco_edge.planners.grids import read_grid  # noqa: PLC0415
+    from fasaco_edge.planners.paper.colony import ColonyConfig, parse_velocities  # noqa: PLC0415
+    from fasaco_edge.planners.paper.fasaco import Fasaco  # noqa: PLC0415
     from fasaco_edge.planners.problem import CoverageProblem  # noqa: PLC0415
     from fasaco_edge.planners.warmup import warm_up  # noqa: PLC0415
 

@@ -1,7 +1,7 @@
-"""The command line: ``fasaco-edge`` and its commands, one file each.
+"""The command line: ``fasaco-edge`` and its commands, a file or folder each.
 
-A new command is a file that ends with a ``Command``, and a row of ``COMMANDS``. Only the file of
-the command that is given is imported.
+A new command is a file, or a folder's ``__init__.py``, that ends with a ``Command``, and a row of
+``COMMANDS``. Only the file of the command that is given is imported.
 """
 
 from __future__ import annotations

@@ -29,8 +29,8 @@ from fasaco_edge.kernels.floor.turning import (
 from fasaco_edge.mission.config import BatteryPolicy, MissionPolicy
 from fasaco_edge.mission.orders.mask import INLINE, mask_polygons
 from fasaco_edge.mission.orders.order import OrderDocument, ZoneDocument, order_of
-from fasaco_edge.planners.colony import ColonyConfig, parse_velocities
 from fasaco_edge.planners.cost import CoverageCost
+from fasaco_edge.planners.paper.colony import ColonyConfig, parse_velocities
 from fasaco_edge.planners.registry import PLANNER_NAMES
 from fasaco_edge.wire import schemas
 from fasaco_edge.wire.keys import Keys
@@ -184,7 +184,7 @@ class PoseConfig(Section, frozen=True):
 
 
 class PlannerConfig(Section, frozen=True):
-    """The colony, see ``planners.colony.ColonyConfig``; and the time one plan may take [s].
+    """The colony, see ``planners.paper.colony.ColonyConfig``; and the time one plan may take [s].
 
     While the robot drives, ``spare_share`` of a processor core goes into making the rest of its
     path better; fasaco with local search alone can do that.

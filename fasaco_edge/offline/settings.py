@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields
 from numbers import Integral, Real
 
 from fasaco_edge.errors import BadConfiguration
-from fasaco_edge.planners.colony import ColonyConfig, parse_velocities
+from fasaco_edge.planners.paper.colony import ColonyConfig, parse_velocities
 from fasaco_edge.planners.registry import PLANNERS
 
 # Where a walk ends, other than in a cell.

@@ -1,1 +1,1 @@
-"""Coverage planners: one file per algorithm, one interface, one cost."""
+"""Coverage planners behind one interface, at one cost: the paper's, and the search of missions."""

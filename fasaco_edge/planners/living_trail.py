@@ -9,7 +9,7 @@ this trail has paths, which come one after the other while the map fills:
 
 Deviations: the paper evaporates with each ant, of which there are a thousand to a plan. Here a
 path is one. Delta phi of (8) is the path's distinct cells at a step each over what it costs, about
-1 at best, as in ``planners.fasaco``; a step that a path takes twice is strengthened once.
+1 at best, as in ``planners.paper.fasaco``; a step that a path takes twice is strengthened once.
 
 A trail lies in cells of the map frame: a window follows the lattice's, steps that come begin at
 tau0, steps that go vanish. What an update costs goes with the path or the change. All is float32

@@ -11,7 +11,7 @@ from collections.abc import Callable
 from importlib import import_module
 from typing import NamedTuple, cast
 
-from fasaco_edge.planners.colony import ColonyConfig
+from fasaco_edge.planners.paper.colony import ColonyConfig
 from fasaco_edge.planners.planner import CoveragePlanner
 
 Factory = Callable[[ColonyConfig, int], CoveragePlanner]
@@ -34,11 +34,13 @@ class Entry(NamedTuple):
 
 
 PLANNERS = {
-    "fasaco": Entry("fasaco:Fasaco", "ants", with_local_search="near_optimal:NearOptimal"),
-    "aco": Entry("fasaco:plain_aco", "fasaco at velocity 1"),
-    "stc": Entry("baselines:stc", "spanning-tree coverage"),
-    "spiral-stc": Entry("baselines:spiral_stc", "the paper's baseline"),
-    "zigzag": Entry("baselines:zigzag", "the paper's baseline"),
+    "fasaco": Entry(
+        "paper.fasaco:Fasaco", "ants", with_local_search="search.near_optimal:NearOptimal"
+    ),
+    "aco": Entry("paper.fasaco:plain_aco", "fasaco at velocity 1"),
+    "stc": Entry("paper.baselines:stc", "spanning-tree coverage"),
+    "spiral-stc": Entry("paper.baselines:spiral_stc", "the paper's baseline"),
+    "zigzag": Entry("paper.baselines:zigzag", "the paper's baseline"),
 }
 PLANNER_NAMES = tuple(PLANNERS)
 

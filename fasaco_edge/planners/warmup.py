@@ -27,20 +27,20 @@ from fasaco_edge.kernels.lattice.pixels import count_free_beside
 from fasaco_edge.kernels.lattice.polygons import add_near, count_in, turn_inside
 from fasaco_edge.kernels.lattice.reach import update_reach
 from fasaco_edge.planners.bound import lower_bound_of
-from fasaco_edge.planners.colony import ColonyConfig
 from fasaco_edge.planners.cost import CoverageCost
-from fasaco_edge.planners.effort import effort_for
 from fasaco_edge.planners.fleet.division import divide
 from fasaco_edge.planners.fleet.sharing import Fleet
 from fasaco_edge.planners.line import LineConfig, line_over, memory_for_moves
-from fasaco_edge.planners.near_optimal import NearOptimal
+from fasaco_edge.planners.paper.colony import ColonyConfig
 from fasaco_edge.planners.path import CoveragePath, walk_figures
 from fasaco_edge.planners.planner import SearchProgress, ignore, never
 from fasaco_edge.planners.problem import CoverageProblem, FramedGround
-from fasaco_edge.planners.regions import WalkRegion, regions_of, stream_of
 from fasaco_edge.planners.registry import PLANNER_NAMES, planner_of
-from fasaco_edge.planners.repair import repaired
-from fasaco_edge.planners.windows import WindowSearch
+from fasaco_edge.planners.search.effort import effort_for
+from fasaco_edge.planners.search.near_optimal import NearOptimal
+from fasaco_edge.planners.search.regions import WalkRegion, regions_of, stream_of
+from fasaco_edge.planners.search.repair import repaired
+from fasaco_edge.planners.search.windows import WindowSearch
 
 LATTICE, CHANGES, REACH, AREAS = "lattice", "changes of the map", "reachability", "areas"
 WALKS, BOUND = "shortest walks", "lower bound"

@@ -86,9 +86,9 @@ def plan(building: str, truth: OccupancyGrid, start: tuple[float, float], case: 
     from fasaco_edge.kernels.floor.turning import proportional_turning
     from fasaco_edge.planners.cost import CoverageCost, SearchWork
     from fasaco_edge.planners.line import LINES, line_over
-    from fasaco_edge.planners.near_optimal import NearOptimal
     from fasaco_edge.planners.planner import WorkLimit
     from fasaco_edge.planners.problem import CoverageProblem
+    from fasaco_edge.planners.search.near_optimal import NearOptimal
 
     limit = WorkLimit(SearchWork(proposals=PROPOSALS))
     floor = Floor.around(truth, RobotDiscs(RADIUS_M, TOOL_M), start)
@@ -122,8 +122,8 @@ def drive(building: str, truth: OccupancyGrid, start: tuple[float, float], case:
     from fasaco_edge.mission.core.mission import Mission, MissionConfig
     from fasaco_edge.planners.cost import CoverageCost, SearchWork
     from fasaco_edge.planners.line import LINES
-    from fasaco_edge.planners.near_optimal import NearOptimal
     from fasaco_edge.planners.planner import WorkLimit
+    from fasaco_edge.planners.search.near_optimal import NearOptimal
     from fasaco_edge.simulation.robot import SimulationConfig
     from fasaco_edge.simulation.world import World
 

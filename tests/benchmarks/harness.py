@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 
 from fasaco_edge.errors import BadConfiguration
-from fasaco_edge.planners.colony import ColonyConfig
-from fasaco_edge.planners.near_optimal import NearOptimal
+from fasaco_edge.planners.paper.colony import ColonyConfig
 from fasaco_edge.planners.path import CoveragePath
 from fasaco_edge.planners.problem import CoverageProblem
-from fasaco_edge.planners.search import ANTS
+from fasaco_edge.planners.search.near_optimal import NearOptimal
+from fasaco_edge.planners.search.search import ANTS
 from tests.benchmarks.judge import WalkVerdict, check_walk
 
 

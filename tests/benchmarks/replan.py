@@ -167,7 +167,7 @@ class Robot:
         from fasaco_edge.mission.core.mission import Mission
         from fasaco_edge.planners.cost import CoverageCost
         from fasaco_edge.planners.line import LINES
-        from fasaco_edge.planners.near_optimal import NearOptimal
+        from fasaco_edge.planners.search.near_optimal import NearOptimal
 
         plan = building(cells, seed)
         free = np.kron(plan.lattice.coverable, np.ones((CELL_PX, CELL_PX), np.bool_))
@@ -276,7 +276,7 @@ def measure(
     sizes: Sequence[int], cases: Sequence[str], replans: int, say: Say
 ) -> Generator[Replan, None, None]:
     """Yield each replan of each building and case."""
-    from fasaco_edge.planners.near_optimal import NearOptimal
+    from fasaco_edge.planners.search.near_optimal import NearOptimal
 
     for cells in sizes:
         for case in cases:

@@ -19,9 +19,9 @@ from fasaco_edge.bench.benchmark import (
     positive,
     seconds_above_zero,
 )
-from fasaco_edge.planners.colony import ColonyConfig, parse_velocities
-from fasaco_edge.planners.fasaco import Fasaco
 from fasaco_edge.planners.grids import NamedGrid, read_grid
+from fasaco_edge.planners.paper.colony import ColonyConfig, parse_velocities
+from fasaco_edge.planners.paper.fasaco import Fasaco
 from fasaco_edge.planners.planner import CoveragePlanner, ignore, never
 from fasaco_edge.planners.problem import CoverageProblem
 from fasaco_edge.planners.registry import planner_of

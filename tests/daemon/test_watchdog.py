@@ -15,7 +15,7 @@ from fasaco_edge.grid.geometry import GridGeometry, Pose2D
 from fasaco_edge.grid.lattice import CoverageLattice, Footprint
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.mission.core.events import PlanRequest
-from fasaco_edge.planners.fasaco import Fasaco
+from fasaco_edge.planners.paper.fasaco import Fasaco
 from fasaco_edge.planners.problem import CoverageProblem
 from fasaco_edge.wire.documents.path_documents import PathReport
 from fasaco_edge.wire.documents.replies import CoverageReport, FloorLeft, FloorReport

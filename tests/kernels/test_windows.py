@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 from fasaco_edge.grid.lattice import CoverageLattice
-from fasaco_edge.planners.baselines import first_walks
 from fasaco_edge.planners.bound import THOROUGH, LowerBound
 from fasaco_edge.planners.cost import CoverageCost
+from fasaco_edge.planners.paper.baselines import first_walks
 from fasaco_edge.planners.problem import CoverageProblem, FramedGround, graph_of
-from fasaco_edge.planners.regions import stream_of
-from fasaco_edge.planners.windows import WindowSearch, thinned
+from fasaco_edge.planners.search.regions import stream_of
+from fasaco_edge.planners.search.windows import WindowSearch, thinned
 from tests.benchmarks.judge import check_walk
 from tests.campaigns.turn_bound import drawn_problem, least_cost_us
 

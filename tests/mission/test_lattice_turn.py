@@ -26,8 +26,8 @@ from fasaco_edge.mission.map.wall_watch import WallWatch
 from fasaco_edge.mission.orders.order import read_order
 from fasaco_edge.mission.orders.order_state import OrderState
 from fasaco_edge.planners.cost import SearchWork
-from fasaco_edge.planners.near_optimal import NearOptimal
 from fasaco_edge.planners.planner import WorkLimit
+from fasaco_edge.planners.search.near_optimal import NearOptimal
 from tests.grid.test_floor import room
 from tests.mission.test_line import CELL_M, CONFIG, ROBOT, START, Robot
 from tests.mission.world import with_policy

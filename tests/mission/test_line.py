@@ -33,8 +33,8 @@ from fasaco_edge.mission.line.tally import SweepTally
 from fasaco_edge.mission.orders.order import read_order
 from fasaco_edge.planners.cost import CoverageCost, SearchWork
 from fasaco_edge.planners.line import LINES
-from fasaco_edge.planners.near_optimal import NearOptimal
 from fasaco_edge.planners.planner import WorkLimit
+from fasaco_edge.planners.search.near_optimal import NearOptimal
 from fasaco_edge.wire.documents.replies import FloorReport
 from tests.grid.test_floor import room
 from tests.grid.test_floor_map import part_of

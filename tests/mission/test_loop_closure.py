@@ -13,7 +13,7 @@ from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.mission.core.events import MapReceived
 from fasaco_edge.mission.coverage.ledger import CoverageLedger
 from fasaco_edge.mission.map.loop_closure import Motion, has_moved, moved_cells, uncertain_cells
-from fasaco_edge.planners.near_optimal import NearOptimal
+from fasaco_edge.planners.search.near_optimal import NearOptimal
 from tests.mission.world import Drive, pixels, placed, pose_at
 
 FOOTPRINT = Footprint(0.3, 0.15)

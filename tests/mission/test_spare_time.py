@@ -10,9 +10,9 @@ from fasaco_edge.mission.core.events import MapReceived, PlanReady
 from fasaco_edge.mission.core.spare_time import SKIPPED_S, Attempt
 from fasaco_edge.planners.bound import lower_bound_steps
 from fasaco_edge.planners.cost import CoverageCost, SearchWork
-from fasaco_edge.planners.near_optimal import NearOptimal
 from fasaco_edge.planners.planner import WorkLimit, never
-from fasaco_edge.planners.repair import HELD_CELLS
+from fasaco_edge.planners.search.near_optimal import NearOptimal
+from fasaco_edge.planners.walk_before import HELD_CELLS
 from tests.benchmarks.judge import check_walk
 from tests.mission.world import CONFIG, Drive, building, patch, pose_at
 

@@ -23,8 +23,8 @@ from fasaco_edge.mission.core.events import (
 )
 from fasaco_edge.mission.core.mission import Mission
 from fasaco_edge.mission.orders.order import read_order
-from fasaco_edge.planners.colony import ColonyConfig
-from fasaco_edge.planners.fasaco import Fasaco
+from fasaco_edge.planners.paper.colony import ColonyConfig
+from fasaco_edge.planners.paper.fasaco import Fasaco
 from tests import naive
 
 CELL, PIXELS = 0.25, 2

@@ -4,13 +4,13 @@ import itertools
 
 import numpy as np
 
-from fasaco_edge.planners import regions, search
 from fasaco_edge.planners.bound import lower_bound_steps
-from fasaco_edge.planners.colony import ColonyConfig
 from fasaco_edge.planners.cost import STEPS_ALONE, CoverageCost, SearchWork
-from fasaco_edge.planners.near_optimal import NearOptimal
+from fasaco_edge.planners.paper.colony import ColonyConfig
 from fasaco_edge.planners.planner import WorkLimit, never
 from fasaco_edge.planners.problem import CoverageProblem
+from fasaco_edge.planners.search import regions, search
+from fasaco_edge.planners.search.near_optimal import NearOptimal
 from tests.benchmarks.buildings import building
 from tests.benchmarks.judge import check_walk
 

@@ -7,7 +7,6 @@ import pytest
 
 from fasaco_edge.grid.lattice import CoverageLattice
 from fasaco_edge.grid.map_files import builtin_maps
-from fasaco_edge.planners.baselines import spiral_stc, stc, zigzag
 from fasaco_edge.planners.bound import (
     FEWEST,
     MOST,
@@ -18,6 +17,7 @@ from fasaco_edge.planners.bound import (
 )
 from fasaco_edge.planners.cost import CoverageCost
 from fasaco_edge.planners.grids import read_grid
+from fasaco_edge.planners.paper.baselines import spiral_stc, stc, zigzag
 from fasaco_edge.planners.problem import CoverageProblem
 from tests.support.grids import REFERENCE, lattice, placed, reference
 

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fasaco_edge.errors import BadConfiguration
-from fasaco_edge.planners.colony import ColonyConfig, parse_velocities
+from fasaco_edge.planners.paper.colony import ColonyConfig, parse_velocities
 
 
 @pytest.mark.parametrize(

@@ -8,10 +8,10 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from fasaco_edge.grid.lattice import CoverageLattice
-from fasaco_edge.planners.baselines import spiral_stc, stc, zigzag
-from fasaco_edge.planners.colony import ColonyConfig
 from fasaco_edge.planners.cost import CoverageCost
-from fasaco_edge.planners.fasaco import Fasaco
+from fasaco_edge.planners.paper.baselines import spiral_stc, stc, zigzag
+from fasaco_edge.planners.paper.colony import ColonyConfig
+from fasaco_edge.planners.paper.fasaco import Fasaco
 from fasaco_edge.planners.path import walk_figures
 from fasaco_edge.planners.planner import ignore, never
 from fasaco_edge.planners.problem import CoverageProblem

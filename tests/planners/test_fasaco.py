@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fasaco_edge.planners.colony import ColonyConfig
 from fasaco_edge.planners.cost import CoverageCost, SearchWork
-from fasaco_edge.planners.fasaco import LARGEST_GROUP, Fasaco
+from fasaco_edge.planners.paper.colony import ColonyConfig
+from fasaco_edge.planners.paper.fasaco import LARGEST_GROUP, Fasaco
 from fasaco_edge.planners.path import walk_figures
 from fasaco_edge.planners.planner import SearchProgress, TimeBudget, WorkLimit, never
 from fasaco_edge.planners.problem import CoverageProblem
@@ -110,7 +110,7 @@ def test_a_walk_that_needs_more_room_is_walked_again(monkeypatch):
     problem = CoverageProblem.of(HALL, (3, 5), end=(3, 5))
     config = ColonyConfig(ants=40, seed=3)
     roomy = Fasaco(config).plan(problem)
-    monkeypatch.setattr("fasaco_edge.planners.fasaco.STEPS_PER_CELL", 0)
+    monkeypatch.setattr("fasaco_edge.planners.paper.fasaco.STEPS_PER_CELL", 0)
     assert Fasaco(config).plan(problem).cells.tobytes() == roomy.cells.tobytes()
 
 

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from fasaco_edge.grid.lattice import CoverageLattice
-from fasaco_edge.planners.colony import ColonyConfig
-from fasaco_edge.planners.fasaco import FEWEST_ANTS, Fasaco, ants_for
 from fasaco_edge.planners.living_trail import PAPERS_RULES, LivingTrail
+from fasaco_edge.planners.paper.colony import ColonyConfig
+from fasaco_edge.planners.paper.fasaco import FEWEST_ANTS, Fasaco, ants_for
 from fasaco_edge.planners.problem import CoverageProblem
 from tests.benchmarks.judge import check_walk
 

@@ -15,9 +15,9 @@ from fasaco_edge.grid.map_files import find_map, read_map, suggested_start
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.planners.cost import CoverageCost
 from fasaco_edge.planners.line import LINES, DrivenLine, LineConfig, line_over
-from fasaco_edge.planners.near_optimal import NearOptimal
 from fasaco_edge.planners.planner import ignore
 from fasaco_edge.planners.problem import CoverageProblem
+from fasaco_edge.planners.search.near_optimal import NearOptimal
 
 ROBOT = SweepingRobot(tool_m=0.3, radius_m=0.18)
 CELL_M = 0.276

@@ -11,10 +11,10 @@ import pytest
 
 from fasaco_edge.grid.lattice import CoverageLattice
 from fasaco_edge.grid.map_files import builtin_maps
-from fasaco_edge.planners import regions, search
 from fasaco_edge.planners.cost import STEPS_ALONE, CoverageCost
 from fasaco_edge.planners.grids import read_grid
 from fasaco_edge.planners.problem import CoverageProblem
+from fasaco_edge.planners.search import regions, search
 from tests import naive
 from tests.kernels.test_bound import drawn_task, shortest_walks
 from tests.planners.searches import TURNS, Watched, after, hall, plan

@@ -17,7 +17,7 @@ from fasaco_edge.errors import (
 )
 from fasaco_edge.grid.geometry import Window
 from fasaco_edge.grid.lattice import COVERABLE, UNKNOWN, CoverageLattice
-from fasaco_edge.planners.colony import ColonyConfig
+from fasaco_edge.planners.paper.colony import ColonyConfig
 from fasaco_edge.planners.path import CoveragePath
 from fasaco_edge.planners.planner import ignore, never
 from fasaco_edge.planners.problem import CoverageProblem

@@ -10,13 +10,14 @@ from hypothesis import strategies as st
 from fasaco_edge.grid.lattice import CoverageLattice
 from fasaco_edge.kernels.lattice.reach import reachable_from
 from fasaco_edge.planners.bound import lower_bound_steps
-from fasaco_edge.planners.colony import ColonyConfig
 from fasaco_edge.planners.cost import CoverageCost, SearchWork
-from fasaco_edge.planners.effort import HELD_CELLS, repair_for
-from fasaco_edge.planners.near_optimal import NearOptimal
+from fasaco_edge.planners.paper.colony import ColonyConfig
 from fasaco_edge.planners.planner import WorkLimit, never
 from fasaco_edge.planners.problem import CoverageProblem, FramedGround
-from fasaco_edge.planners.repair import can_repair, completed, repaired
+from fasaco_edge.planners.search.effort import repair_for
+from fasaco_edge.planners.search.near_optimal import NearOptimal
+from fasaco_edge.planners.search.repair import repaired
+from fasaco_edge.planners.walk_before import HELD_CELLS, can_repair, completed
 from tests.benchmarks.judge import check_walk
 from tests.support.examples import examples
 

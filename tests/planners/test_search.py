@@ -10,12 +10,12 @@ from hypothesis import strategies as st
 
 from fasaco_edge.grid.lattice import CoverageLattice
 from fasaco_edge.kernels.local_search.walk_array import FRAME
-from fasaco_edge.planners import regions
-from fasaco_edge.planners.colony import ColonyConfig
 from fasaco_edge.planners.cost import STEPS_ALONE, CoverageCost
-from fasaco_edge.planners.near_optimal import NearOptimal
+from fasaco_edge.planners.paper.colony import ColonyConfig
 from fasaco_edge.planners.planner import AnyOf, GapReached, Interrupt, WorkLimit, never
 from fasaco_edge.planners.problem import CoverageProblem, FramedGround
+from fasaco_edge.planners.search import regions
+from fasaco_edge.planners.search.near_optimal import NearOptimal
 from tests.benchmarks.buildings import building
 from tests.planners.searches import (
     FEW_ANTS,

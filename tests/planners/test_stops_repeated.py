@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from fasaco_edge.grid.lattice import CoverageLattice
-from fasaco_edge.planners.fasaco import Fasaco
-from fasaco_edge.planners.near_optimal import NearOptimal, is_poor
+from fasaco_edge.planners.paper.fasaco import Fasaco
 from fasaco_edge.planners.planner import StopAt, StopRecorder, WorkLimit, never
 from fasaco_edge.planners.problem import CoverageProblem
-from fasaco_edge.planners.repair import repaired
+from fasaco_edge.planners.search.near_optimal import NearOptimal, is_poor
+from fasaco_edge.planners.search.repair import repaired
 
 
 def poor_problem(seed=0, visits=1000):

@@ -6,9 +6,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fasaco_edge.grid.lattice import CoverageLattice
-from fasaco_edge.planners.colony import VISIBILITIES, ColonyConfig
 from fasaco_edge.planners.cost import CoverageCost, SearchWork
-from fasaco_edge.planners.fasaco import Fasaco
+from fasaco_edge.planners.paper.colony import VISIBILITIES, ColonyConfig
+from fasaco_edge.planners.paper.fasaco import Fasaco
 from fasaco_edge.planners.problem import CoverageProblem
 from tests import naive
 from tests.support.examples import examples

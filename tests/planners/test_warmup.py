@@ -15,11 +15,11 @@ from fasaco_edge.mission.config import Sweeping
 from fasaco_edge.mission.core.events import MapReceived, PatchReceived, PlanReady, PoseReceived
 from fasaco_edge.mission.core.mission import Mission, MissionConfig
 from fasaco_edge.planners.cost import CoverageCost, SearchWork
-from fasaco_edge.planners.fasaco import Fasaco
 from fasaco_edge.planners.line import LINES
-from fasaco_edge.planners.near_optimal import NearOptimal
+from fasaco_edge.planners.paper.fasaco import Fasaco
 from fasaco_edge.planners.path import walk_figures
 from fasaco_edge.planners.planner import WorkLimit
+from fasaco_edge.planners.search.near_optimal import NearOptimal
 from fasaco_edge.planners.warmup import STAGES, warm_up
 from fasaco_edge.wire.messages.maps import (
     decode_map_update,

@@ -16,7 +16,7 @@ from fasaco_edge.review.moments import (
     longest_stand,
     spans_of,
 )
-from fasaco_edge.review.panels import curve
+from fasaco_edge.review.output.panels import curve
 from fasaco_edge.review.run_data import PlanLog, RunData, StatusSample, first_counted
 from fasaco_edge.review.wording import clock
 from fasaco_edge.wire.documents.replies import CoverageReport

@@ -7,7 +7,7 @@ import pytest
 
 pytest.importorskip("rerun")
 
-from fasaco_edge.review.panels import covered_share
+from fasaco_edge.review.output.panels import covered_share
 from fasaco_edge.review.review import read_review
 from tests.support.recorded_mission import record_mission
 from tests.support.reviews import document

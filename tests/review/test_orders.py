@@ -13,7 +13,7 @@ from fasaco_edge.review.comparison import compared_rows, differences, setup_word
 from fasaco_edge.review.document import MapSize, ReviewDocument
 from fasaco_edge.review.moments import spans_of
 from fasaco_edge.review.orders import OrderChapter, chapters
-from fasaco_edge.review.rows import verdicts
+from fasaco_edge.review.output.rows import verdicts
 from fasaco_edge.review.run_data import RunData, StatusSample
 from fasaco_edge.wire.documents.replies import CoverageReport
 from fasaco_edge.wire.documents.status import Status

@@ -18,17 +18,17 @@ pytest.importorskip("rerun")
 from pyarrow import parquet
 
 from fasaco_edge.cli import main
-from fasaco_edge.cli.review_screen import print_review
+from fasaco_edge.cli.review.screen import print_review
 from fasaco_edge.drawing import palette
 from fasaco_edge.grid.geometry import FARTHEST_M, Pose2D
 from fasaco_edge.grid.occupancy import OccupancyGrid
-from fasaco_edge.review.export import FORMATS, export
 from fasaco_edge.review.figures import document_of
 from fasaco_edge.review.moments import Span
-from fasaco_edge.review.page import page_of
-from fasaco_edge.review.pictures import SIZE, draw_review
+from fasaco_edge.review.output.export import FORMATS, export
+from fasaco_edge.review.output.page import page_of
+from fasaco_edge.review.output.pictures import SIZE, draw_review
+from fasaco_edge.review.output.rows import charge_rows, screen_rows
 from fasaco_edge.review.review import CoverageCounts, read_review, review_of
-from fasaco_edge.review.rows import charge_rows, screen_rows
 from fasaco_edge.review.run_data import StatusSample
 from fasaco_edge.wire.documents.replies import MissionReport, ZoneReport
 from fasaco_edge.wire.documents.status import BatteryReport, LedgerReport, Status

@@ -17,9 +17,9 @@ from fasaco_edge.cli import main
 from fasaco_edge.drawing import palette
 from fasaco_edge.recording import entities
 from fasaco_edge.review.instant import direction, heading_from, scene_at
-from fasaco_edge.review.page import page_of
+from fasaco_edge.review.output.page import page_of
+from fasaco_edge.review.output.rows import instant_rows
 from fasaco_edge.review.review import read_review
-from fasaco_edge.review.rows import instant_rows
 from fasaco_edge.review.spot import explain, is_inside, spots_left
 from fasaco_edge.wire import topics
 from fasaco_edge.wire.documents.json_text import encode_json

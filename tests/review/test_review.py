@@ -14,9 +14,9 @@ pytest.importorskip("rerun")
 from fasaco_edge.errors import UnreadableRecording
 from fasaco_edge.review.drive import walk_figures
 from fasaco_edge.review.instant import scene_at
-from fasaco_edge.review.page import page_of
-from fasaco_edge.review.panels import TimeAxis, branching_panel, covered_share, saved_panel
-from fasaco_edge.review.pictures import FIELDS, draw_fields
+from fasaco_edge.review.output.page import page_of
+from fasaco_edge.review.output.panels import TimeAxis, branching_panel, covered_share, saved_panel
+from fasaco_edge.review.output.pictures import FIELDS, draw_fields
 from fasaco_edge.review.review import read_review
 from tests.benchmarks.judge import check_walk
 from tests.review.naive import nearest_rank, passed_cells, quarter_turns

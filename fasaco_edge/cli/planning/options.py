@@ -24,7 +24,7 @@ from fasaco_edge.offline.settings import (
     WALLS,
     Search,
 )
-from fasaco_edge.planners.colony import VISIBILITIES
+from fasaco_edge.planners.paper.colony import VISIBILITIES
 from fasaco_edge.planners.registry import PLANNER_NAMES, PLANNERS
 
 EPILOG = """\

@@ -308,9 +308,9 @@ class Loader:
 def mission_config(config: DaemonConfig, chosen: CoveragePlanner) -> MissionConfig:
     """Return the configuration of a daemon's mission that ``chosen`` plans for."""
     from fasaco_edge.grid.lattice import Footprint  # noqa: PLC0415
-    from fasaco_edge.planners.fasaco import Fasaco  # noqa: PLC0415
     from fasaco_edge.planners.living_trail import TrailRules  # noqa: PLC0415
-    from fasaco_edge.planners.near_optimal import NearOptimal  # noqa: PLC0415
+    from fasaco_edge.planners.paper.fasaco import Fasaco  # noqa: PLC0415
+    from fasaco_edge.planners.search.near_optimal import NearOptimal  # noqa: PLC0415
 
     robot, maps, planner, cell_m = config.robot, config.map, config.planner, config.cell_m
     return MissionConfig(

@@ -11,8 +11,8 @@ from fasaco_edge.errors import FasacoError
 from fasaco_edge.mission.coverage.progress import PathProgress
 from fasaco_edge.mission.orders.sequencer import Sequencer
 from fasaco_edge.planners.cost import CoverageCost
-from fasaco_edge.planners.effort import HELD_CELLS
 from fasaco_edge.planners.problem import CoverageProblem
+from fasaco_edge.planners.walk_before import HELD_CELLS
 
 # A path is replaced by a better one only if that saves this many steps, and this share of
 # what is left.

@@ -25,13 +25,13 @@ from numpy.typing import NDArray
 
 from fasaco_edge.grid.lattice import Cell, CoverageLattice
 from fasaco_edge.kernels import EAST, NORTH
-from fasaco_edge.planners.colony import ColonyConfig
 from fasaco_edge.planners.cost import MICROSECONDS, CoverageCost, SearchWork
 from fasaco_edge.planners.fleet.loops import Loop, LoopGround
-from fasaco_edge.planners.near_optimal import NearOptimal
+from fasaco_edge.planners.paper.colony import ColonyConfig
 from fasaco_edge.planners.planner import AnyOf, SearchProgress, StoppingCriterion, WorkLimit
 from fasaco_edge.planners.problem import CoverageProblem
-from fasaco_edge.planners.regions import stream_of
+from fasaco_edge.planners.search.near_optimal import NearOptimal
+from fasaco_edge.planners.search.regions import stream_of
 
 # Proposals for each cell of the walk over all; perturbations of a walk with a free end.
 TOUR_PROPOSALS = 1_000

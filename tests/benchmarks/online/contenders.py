@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import NamedTuple
 
-from fasaco_edge.planners.colony import ColonyConfig
+from fasaco_edge.planners.paper.colony import ColonyConfig
 from fasaco_edge.planners.planner import CoveragePlanner
 from fasaco_edge.planners.registry import planner_of
 from tests.benchmarks.harness import planner_for

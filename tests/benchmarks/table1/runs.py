@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 
 from fasaco_edge.bench.benchmark import Say
 from fasaco_edge.errors import BadConfiguration
-from fasaco_edge.planners.colony import ColonyConfig
 from fasaco_edge.planners.grids import NamedGrid, read_grid
+from fasaco_edge.planners.paper.colony import ColonyConfig
 from fasaco_edge.planners.path import CoveragePath, WalkFigures, walk_figures
 from fasaco_edge.planners.planner import Observer, ignore, never
 from fasaco_edge.planners.problem import CoverageProblem

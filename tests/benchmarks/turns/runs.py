@@ -27,9 +27,9 @@ from fasaco_edge.bench.benchmark import Say
 from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.grid.lattice import CoverageLattice
 from fasaco_edge.kernels import EAST, NORTH, SOUTH, WEST
-from fasaco_edge.planners.baselines import spiral_stc, stc, zigzag
 from fasaco_edge.planners.cost import CoverageCost
 from fasaco_edge.planners.grids import read_grid
+from fasaco_edge.planners.paper.baselines import spiral_stc, stc, zigzag
 from fasaco_edge.planners.planner import SearchProgress
 from fasaco_edge.planners.problem import CoverageProblem
 from fasaco_edge.planners.warmup import warm_up

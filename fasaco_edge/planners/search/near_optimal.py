@@ -1,6 +1,6 @@
 """The planner of missions: FaSACO with local search, and repairs of a walk that there is.
 
-``planners.search`` looks for a walk, ``planners.repair`` mends one.
+``search`` looks for a walk, ``repair`` mends one.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 
 from fasaco_edge.planners.bound import lower_bound_steps
-from fasaco_edge.planners.colony import ColonyConfig
+from fasaco_edge.planners.paper.colony import ColonyConfig
 from fasaco_edge.planners.path import CoveragePath
 from fasaco_edge.planners.planner import (
     Observer,
@@ -18,8 +18,9 @@ from fasaco_edge.planners.planner import (
     never,
 )
 from fasaco_edge.planners.problem import CoverageProblem
-from fasaco_edge.planners.repair import can_repair, repaired
-from fasaco_edge.planners.search import ANTS, Search, SearchSettings
+from fasaco_edge.planners.search.repair import repaired
+from fasaco_edge.planners.search.search import ANTS, Search, SearchSettings
+from fasaco_edge.planners.walk_before import can_repair
 
 # A repaired walk with more steps than this above its bound is not worth keeping, unless
 # a search finds no better one.

@@ -10,7 +10,6 @@ from rich.table import Table
 from rich.text import Text
 
 from fasaco_edge.cli.console import terminal
-from fasaco_edge.review import rows
 from fasaco_edge.review.comparison import (
     compared_rows,
     reason_counts,
@@ -18,7 +17,8 @@ from fasaco_edge.review.comparison import (
     setup_words,
 )
 from fasaco_edge.review.document import ReviewDocument
-from fasaco_edge.review.panels import EIGHTHS, PLAIN_EIGHTHS, covered_share, curve
+from fasaco_edge.review.output import rows
+from fasaco_edge.review.output.panels import EIGHTHS, PLAIN_EIGHTHS, covered_share, curve
 from fasaco_edge.review.spot import spots_left
 from fasaco_edge.review.wording import clock
 from fasaco_edge.text import one_line

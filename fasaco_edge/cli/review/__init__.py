@@ -112,7 +112,7 @@ def run(args: argparse.Namespace) -> int:
             pass
     import msgspec
 
-    from fasaco_edge.cli.review_screen import print_comparison, print_review
+    from fasaco_edge.cli.review.screen import print_comparison, print_review
     from fasaco_edge.review.comparison import side_by_side
     from fasaco_edge.review.figures import document_of
 
@@ -131,17 +131,17 @@ def run(args: argparse.Namespace) -> int:
     else:
         print_review(review, document, full=args.long)
     if args.png:
-        from fasaco_edge.review.pictures import draw_review
+        from fasaco_edge.review.output.pictures import draw_review
 
         with writing(args.png) as file:
             draw_review(review).save(file, "PNG")
     if args.html:
-        from fasaco_edge.review.page import page_of
+        from fasaco_edge.review.output.page import page_of
 
         with writing(args.html) as file:
             file.write_text(page_of(review, other), encoding="utf-8")
     if args.export:
-        from fasaco_edge.review.export import export
+        from fasaco_edge.review.output.export import export
 
         with naming(args.export):
             export(review, args.export, args.export_as)
@@ -156,9 +156,9 @@ def _answer(args: argparse.Namespace, review: Review) -> int:
     """Answer questions about a moment, and about spots."""
     import msgspec
 
-    from fasaco_edge.review import rows
     from fasaco_edge.review.instant import scene_at
-    from fasaco_edge.review.pictures import draw_scene, draw_spots
+    from fasaco_edge.review.output import rows
+    from fasaco_edge.review.output.pictures import draw_scene, draw_spots
     from fasaco_edge.review.spot import explain
     from fasaco_edge.review.wording import clock
 

@@ -14,7 +14,6 @@ from PIL import Image
 
 from fasaco_edge.bench.floor import share_words
 from fasaco_edge.drawing.chart import COLOURS, Panel
-from fasaco_edge.review import rows
 from fasaco_edge.review.comparison import (
     compared_rows,
     reason_counts,
@@ -23,17 +22,18 @@ from fasaco_edge.review.comparison import (
 )
 from fasaco_edge.review.document import ReviewDocument
 from fasaco_edge.review.figures import document_of
-from fasaco_edge.review.panels import (
+from fasaco_edge.review.output import rows
+from fasaco_edge.review.output.panels import (
     branching_panel,
     coverage_panel,
     replan_panel,
     saved_panel,
     state_panel,
 )
-from fasaco_edge.review.pictures import draw_fields, draw_map
+from fasaco_edge.review.output.pictures import draw_fields, draw_map
+from fasaco_edge.review.output.svg import svg_of
 from fasaco_edge.review.review import Review
 from fasaco_edge.review.spot import spots_left
-from fasaco_edge.review.svg import svg_of
 from fasaco_edge.review.wording import amount, clock
 from fasaco_edge.text import Html, element, html
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from fasaco_edge.cli.ask import add_question, ask, show_mission
 from fasaco_edge.cli.console.arguments import Command, Exit, add_common
 from fasaco_edge.cli.console.streams import print_json
-from fasaco_edge.cli.mission_fleet import command_fleet
+from fasaco_edge.cli.mission.fleet import command_fleet
 from fasaco_edge.errors import OrderError
 from fasaco_edge.host.plain_yaml import load, read_bounded
 from fasaco_edge.mission.orders.order import order_document, read_order

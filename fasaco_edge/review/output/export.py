@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from fasaco_edge.host.outputs import whole
 from fasaco_edge.recording.arrow import pa
+from fasaco_edge.review.output.tables import Column, Table, tables_of
 from fasaco_edge.review.review import Review
-from fasaco_edge.review.tables import Column, Table, tables_of
 from fasaco_edge.text import one_line
 
 FORMULA = re.compile(r"[=@]|[+-](?![\d.]+(e[+-]?\d+)?\Z)")
@@ -26,7 +26,7 @@ DESCRIPTION = "columns"
 def export(review: Review, folder: Path, form: str = CSV) -> None:
     """Write all series of a review into ``folder``, which is made if missing.
 
-    A file for each of ``review.tables``; columns.csv, which says what they hold, in what units;
+    A file for each of ``tables``; columns.csv, which says what they hold, in what units;
     and end.npz: map int8 and its origin (x, y, yaw) and resolution_m; visits uint16 and reachable
     bool of the lattice with its first row, column and cell_m.
 

@@ -19,49 +19,20 @@ from numpy.typing import NDArray
 
 from fasaco_edge.errors import NothingToCover
 from fasaco_edge.kernels.local_search.regions import changed_cells
-from fasaco_edge.kernels.local_search.repair import keep_legal, put_in_new
 from fasaco_edge.planners.bound import GLANCE, lower_bound_of
 from fasaco_edge.planners.cost import MICROSECONDS, NO_WORK, SearchWork
-from fasaco_edge.planners.effort import HELD_CELLS, RepairEffort, repair_for
 from fasaco_edge.planners.path import CoveragePath, Saved, common_beginning
 from fasaco_edge.planners.planner import SearchProgress, StoppingCriterion
 from fasaco_edge.planners.problem import CoverageProblem, FramedGround
-from fasaco_edge.planners.regions import Neighbourhood, WalkRegion, neighbourhoods, spot, stream_of
-
-
-def completed(
-    problem: CoverageProblem, framed: FramedGround, before: NDArray[np.int32], held: int = 0
-) -> NDArray[np.int32]:
-    """Return a walk that solves ``problem`` and keeps what is valid of ``before``.
-
-    Args:
-        problem: as it is now.
-        framed: its ground.
-        before: int32 (n, 2), the walk that was still to be driven, cells (row, col).
-        held: number of leading visits that are kept if possible.
-
-    Returns:
-        Framed cells, int32 (m,).
-    """
-    start = int(framed.framed(np.array([problem.flat_start], np.int32))[0])
-    cells = framed_cells(problem, framed, before)
-    kept = np.empty(cells.size + 2 * framed.ground.bound, np.int32)
-    length = keep_legal(framed.ground, cells, start, kept)
-    whole = np.empty(length + 2 * framed.ground.bound, np.int32)
-    size = put_in_new(framed.ground, kept[:length], problem.end is None, held, whole)
-    walk = whole[:size].copy()
-    return framed.framed(problem.led_to_end(framed.unframed(walk)))
-
-
-def framed_cells(
-    problem: CoverageProblem, framed: FramedGround, before: NDArray[np.int32]
-) -> NDArray[np.int32]:
-    """Return the cells of ``before`` that the lattice still spans, as framed ones."""
-    window = problem.lattice.window
-    rows, cols = before[:, 0] - window.row0, before[:, 1] - window.col0
-    inside = (rows >= 0) & (rows < window.rows) & (cols >= 0) & (cols < window.cols)
-    return framed.framed((rows[inside] * window.cols + cols[inside]).astype(np.int32))
-
+from fasaco_edge.planners.search.effort import RepairEffort, repair_for
+from fasaco_edge.planners.search.regions import (
+    Neighbourhood,
+    WalkRegion,
+    neighbourhoods,
+    spot,
+    stream_of,
+)
+from fasaco_edge.planners.walk_before import HELD_CELLS, completed, framed_cells
 
 # Perturbations between two pauses.
 PERTURBATIONS_AT_ONCE = 10
@@ -73,16 +44,6 @@ STRIDE, SPOT_CELLS, PASSES = 997, 400, 4
 # A walk over more cells is repaired without a bound, which would take longer than all else, and
 # once: a second time for the way ahead would take as long again.
 BOUNDED_CELLS = 2_000
-
-
-def can_repair(problem: CoverageProblem) -> bool:
-    """Return whether there is a walk to repair, and that is enough."""
-    return not problem.is_full and has_walk(problem)
-
-
-def has_walk(problem: CoverageProblem) -> bool:
-    """Return whether there is a walk that was still to be driven."""
-    return problem.before is not None and len(problem.before) > 0
 
 
 def repaired(

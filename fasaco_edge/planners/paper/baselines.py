@@ -26,8 +26,8 @@ from numpy.typing import NDArray
 from fasaco_edge.kernels.ants.baselines import spanning_tree_walk, sweep
 from fasaco_edge.kernels.ants.graph import Graph
 from fasaco_edge.kernels.lattice.reach import reachable_from
-from fasaco_edge.planners.colony import ColonyConfig
-from fasaco_edge.planners.fasaco import Colony
+from fasaco_edge.planners.paper.colony import ColonyConfig
+from fasaco_edge.planners.paper.fasaco import Colony
 from fasaco_edge.planners.path import CoveragePath
 from fasaco_edge.planners.planner import Observer, StoppingCriterion, ignore, never
 from fasaco_edge.planners.problem import CoverageProblem, graph_of, scratch_for

@@ -12,9 +12,6 @@ from fasaco_edge.planners.cost import CoverageCost
 # The temperatures of an annealing: from 1.5 down to 0.2.
 LEVELS = tuple(1.5 * (0.2 / 1.5) ** (level / 15) for level in range(16))
 
-# The robot is about to drive these cells: about 5 m at usual tool widths.
-HELD_CELLS = 18
-
 WHOLE_WALK = -1
 EVERY_CELL = 1 << 30
 

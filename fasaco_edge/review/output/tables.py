@@ -15,7 +15,7 @@ from fasaco_edge.mission.orders.order import order_document
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.read.drawn import DrawnField, DrawnLine, drawings
 from fasaco_edge.review.orders import command_words
-from fasaco_edge.review.panels import covered_share
+from fasaco_edge.review.output.panels import covered_share
 from fasaco_edge.review.review import Review
 
 

@@ -1,11 +1,11 @@
 """A search by colony and local search: a walk at once, then better ones until it is stopped.
 
 1. One or more simple walks, the cheapest kept: the first complete walk, within milliseconds
-   (``baselines.first_walks``). A walk that was still to be driven is made complete, and kept if
-   it is as good: then what lies just ahead of the robot changes only where something is gained.
+   (``first_walks``). A walk that was still to be driven is made complete, and kept if it is as
+   good: then what lies just ahead of the robot changes only where something is gained.
 2. Local search improves it, region by region where the ground is large.
 3. Perturbations, each followed by local search, go on from there; where turns cost, windows of
-   the walk are solved anew in between (``planners.windows``), most of the time if turns are dear.
+   the walk are solved anew in between (``windows``), most of the time if turns are dear.
 4. Where perturbations gain nothing any more, the next ants of the colony walk; the
    walk of the best of them goes through 2 and 3, and the trail is strengthened along
    the best walk of all, by equation (8): ants begin where the search has been good.
@@ -24,18 +24,24 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fasaco_edge.planners.baselines import first_walks
 from fasaco_edge.planners.bound import GLANCE, THOROUGH, LowerBound
-from fasaco_edge.planners.colony import ColonyConfig
 from fasaco_edge.planners.cost import MICROSECONDS, SearchWork
-from fasaco_edge.planners.effort import HELD_CELLS, effort_for
-from fasaco_edge.planners.fasaco import Colony, Group, groups_of, snapshot_of
+from fasaco_edge.planners.paper.baselines import first_walks
+from fasaco_edge.planners.paper.colony import ColonyConfig
+from fasaco_edge.planners.paper.fasaco import Colony, Group, groups_of, snapshot_of
 from fasaco_edge.planners.path import CoveragePath, Saved
 from fasaco_edge.planners.planner import Observer, SearchProgress
 from fasaco_edge.planners.problem import CoverageProblem, FramedGround, graph_of
-from fasaco_edge.planners.regions import EDGE, WalkRegion, is_one_region, regions_of, stream_of
-from fasaco_edge.planners.repair import completed, has_walk
-from fasaco_edge.planners.windows import WindowSearch, is_dear, suits
+from fasaco_edge.planners.search.effort import effort_for
+from fasaco_edge.planners.search.regions import (
+    EDGE,
+    WalkRegion,
+    is_one_region,
+    regions_of,
+    stream_of,
+)
+from fasaco_edge.planners.search.windows import WindowSearch, is_dear, suits
+from fasaco_edge.planners.walk_before import HELD_CELLS, completed, has_walk
 
 # Proposals between two pauses: about a millisecond.
 PROPOSALS_AT_ONCE = 30_000

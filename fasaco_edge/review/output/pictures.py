@@ -17,9 +17,9 @@ from fasaco_edge.drawing.plot import MapLayer, Plot, View, bounds_of
 from fasaco_edge.drawing.sheet import KeyEntry, Sheet
 from fasaco_edge.grid.geometry import Window
 from fasaco_edge.review.instant import Scene
-from fasaco_edge.review.panels import coverage_panel, replan_panel, state_panel
+from fasaco_edge.review.output.panels import coverage_panel, replan_panel, state_panel
+from fasaco_edge.review.output.rows import instant_rows, spot_rows
 from fasaco_edge.review.review import Review
-from fasaco_edge.review.rows import instant_rows, spot_rows
 from fasaco_edge.review.spot import Spot
 from fasaco_edge.review.wording import clock
 

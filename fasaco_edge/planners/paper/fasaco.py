@@ -31,10 +31,9 @@ from numpy.typing import NDArray
 
 from fasaco_edge.kernels.ants.colony import ColonyState, Rules, deposit, settle, walk_ants
 from fasaco_edge.kernels.ants.graph import Graph
-from fasaco_edge.planners.colony import VISIBILITIES, ColonyConfig
 from fasaco_edge.planners.cost import MICROSECONDS, SearchWork
-from fasaco_edge.planners.effort import HELD_CELLS
 from fasaco_edge.planners.living_trail import mean_into
+from fasaco_edge.planners.paper.colony import VISIBILITIES, ColonyConfig
 from fasaco_edge.planners.path import CoveragePath, Saved
 from fasaco_edge.planners.planner import (
     ColonySnapshot,
@@ -45,7 +44,7 @@ from fasaco_edge.planners.planner import (
     never,
 )
 from fasaco_edge.planners.problem import CoverageProblem, FramedGround, graph_of, scratch_for
-from fasaco_edge.planners.repair import can_repair, completed
+from fasaco_edge.planners.walk_before import HELD_CELLS, can_repair, completed
 
 # Ants of a group walk at the same time. Larger groups keep more threads busy,
 # smaller ones end the search sooner when it is to stop: a group covers

@@ -1,0 +1,1 @@
+"""The planner of missions: a search by colony and local search, and repair of a walk."""

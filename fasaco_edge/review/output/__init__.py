@@ -1,0 +1,1 @@
+"""What a review is shown and written as: rows, tables, charts, pictures, an HTML page."""
