@@ -38,8 +38,9 @@ from fasaco_edge.planners.problem import CoverageProblem, FramedGround
 from fasaco_edge.planners.registry import PLANNER_NAMES, planner_of
 from fasaco_edge.planners.search.effort import effort_for
 from fasaco_edge.planners.search.near_optimal import NearOptimal
-from fasaco_edge.planners.search.regions import WalkRegion, regions_of, stream_of
+from fasaco_edge.planners.search.regions import regions_of
 from fasaco_edge.planners.search.repair import repaired
+from fasaco_edge.planners.search.walk_region import WalkRegion, stream_of
 from fasaco_edge.planners.search.windows import WindowSearch
 
 LATTICE, CHANGES, REACH, AREAS = "lattice", "changes of the map", "reachability", "areas"

@@ -12,7 +12,7 @@ from fasaco_edge.planners.paper.colony import ColonyConfig
 from fasaco_edge.planners.path import CoveragePath
 from fasaco_edge.planners.problem import CoverageProblem
 from fasaco_edge.planners.search.near_optimal import NearOptimal
-from fasaco_edge.planners.search.search import ANTS
+from fasaco_edge.planners.search.restarts import ANTS
 from tests.benchmarks.judge import WalkVerdict, check_walk
 
 

@@ -8,7 +8,7 @@ from fasaco_edge.planners.bound import THOROUGH, LowerBound
 from fasaco_edge.planners.cost import CoverageCost
 from fasaco_edge.planners.paper.baselines import first_walks
 from fasaco_edge.planners.problem import CoverageProblem, FramedGround, graph_of
-from fasaco_edge.planners.search.regions import stream_of
+from fasaco_edge.planners.search.walk_region import stream_of
 from fasaco_edge.planners.search.windows import WindowSearch, thinned
 from tests.benchmarks.judge import check_walk
 from tests.campaigns.turn_bound import drawn_problem, least_cost_us

@@ -21,7 +21,7 @@ from fasaco_edge.kernels.local_search.walk_array import FRAME
 from fasaco_edge.planners.cost import CoverageCost
 from fasaco_edge.planners.problem import CoverageProblem, FramedGround
 from fasaco_edge.planners.search.effort import effort_for
-from fasaco_edge.planners.search.regions import WalkRegion
+from fasaco_edge.planners.search.walk_region import WalkRegion
 from fasaco_edge.planners.walk_before import completed
 
 # Proposals for each visit of a loop that is improved, and perturbations of it.

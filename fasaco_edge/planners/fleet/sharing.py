@@ -31,7 +31,7 @@ from fasaco_edge.planners.paper.colony import ColonyConfig
 from fasaco_edge.planners.planner import AnyOf, SearchProgress, StoppingCriterion, WorkLimit
 from fasaco_edge.planners.problem import CoverageProblem
 from fasaco_edge.planners.search.near_optimal import NearOptimal
-from fasaco_edge.planners.search.regions import stream_of
+from fasaco_edge.planners.search.walk_region import stream_of
 
 # Proposals for each cell of the walk over all; perturbations of a walk with a free end.
 TOUR_PROPOSALS = 1_000

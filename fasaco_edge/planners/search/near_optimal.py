@@ -19,7 +19,8 @@ from fasaco_edge.planners.planner import (
 )
 from fasaco_edge.planners.problem import CoverageProblem
 from fasaco_edge.planners.search.repair import repaired
-from fasaco_edge.planners.search.search import ANTS, Search, SearchSettings
+from fasaco_edge.planners.search.restarts import ANTS, SearchSettings
+from fasaco_edge.planners.search.search import Search
 from fasaco_edge.planners.walk_before import can_repair
 
 # A repaired walk with more steps than this above its bound is not worth keeping, unless
@@ -41,7 +42,7 @@ class NearOptimal:
     """The colony with local search; ants walk on ``threads`` threads.
 
     Attributes:
-        restarts: one of ``search.RESTARTS``; other values than the default are there to
+        restarts: one of ``restarts.RESTARTS``; other values than the default are there to
             measure what ants and their trail are worth.
     """
 

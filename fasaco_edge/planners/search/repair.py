@@ -25,13 +25,8 @@ from fasaco_edge.planners.path import CoveragePath, Saved, common_beginning
 from fasaco_edge.planners.planner import SearchProgress, StoppingCriterion
 from fasaco_edge.planners.problem import CoverageProblem, FramedGround
 from fasaco_edge.planners.search.effort import RepairEffort, repair_for
-from fasaco_edge.planners.search.regions import (
-    Neighbourhood,
-    WalkRegion,
-    neighbourhoods,
-    spot,
-    stream_of,
-)
+from fasaco_edge.planners.search.regions import Neighbourhood, neighbourhoods, spot
+from fasaco_edge.planners.search.walk_region import WalkRegion, stream_of
 from fasaco_edge.planners.walk_before import HELD_CELLS, completed, framed_cells
 
 # Perturbations between two pauses.

@@ -1,0 +1,152 @@
+"""The walk that a search works on, and the best one so far.
+
+It is worked on in parts: in a region of the ground that is loaded and put back (``walk_region``),
+or in windows of it (``windows``). What comes of a part is accepted here. Walks are framed cells.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fasaco_edge.planners.bound import LowerBound
+from fasaco_edge.planners.cost import SearchWork
+from fasaco_edge.planners.problem import CoverageProblem, FramedGround
+from fasaco_edge.planners.search.regions import EDGE, is_one_region, regions_of
+from fasaco_edge.planners.search.walk_region import WalkRegion
+from fasaco_edge.planners.search.windows import WindowSearch
+
+# Visits of a walk that local search has memory for.
+VISITS_PER_CELL = 4
+
+# How often the walk may cross the rim of a region.
+JUMPS = 8 * EDGE
+
+
+class CurrentWalk:
+    """The current walk of a search, its regions and windows, and the best walk so far.
+
+    Attributes:
+        cost_us: of the current walk [us].
+        best, best_us: the best walk so far, int32 (n,), and its cost [us].
+        is_whole: whether the ground is one region.
+        region: the region that is loaded, or was last.
+        windows: the search in windows; None until it is opened.
+        held: the first so many visits change only where something is gained.
+        since_gain: perturbations since the current walk was last improved.
+    """
+
+    def __init__(self, problem: CoverageProblem, framed: FramedGround) -> None:
+        self._problem, self._framed = problem, framed
+        self.is_whole = is_one_region(framed.rows, framed.cols, problem.cells)
+        self._walk, self.cost_us = np.empty(0, np.int32), 0
+        self.best, self.best_us = self._walk, 0
+        self.held = self.since_gain = 0
+        self.region = WalkRegion(0, 0, 0, 0)
+        self.windows: WindowSearch | None = None
+        # Windows of the walk are being solved, and not put back yet.
+        self._in_windows = False
+        self._passes = 0
+
+    def begin(self, walk: NDArray[np.int32], cost_us: int) -> None:
+        """Begin with a walk of this cost [us], the best so far."""
+        self._walk, self.cost_us = walk, cost_us
+        self.best, self.best_us = walk, cost_us
+
+    def restart(self, walk: NDArray[np.int32], cost_us: int) -> None:
+        """Go on from another walk of this cost [us], which may be worse than the best."""
+        self._walk, self.cost_us = walk, cost_us
+        self.since_gain = self.held = 0
+
+    def _accept(self, walk: NDArray[np.int32], cost_us: int) -> None:
+        """Go on from a walk if it is a gain or costs nothing."""
+        if cost_us < self.cost_us:
+            self.since_gain = 0
+        if cost_us <= self.cost_us:
+            self._walk, self.cost_us = walk, cost_us
+        if cost_us < self.best_us:
+            self.best, self.best_us = walk, cost_us
+
+    @property
+    def is_empty(self) -> bool:
+        """Whether there is no walk yet."""
+        return not self._walk.size
+
+    @property
+    def work(self) -> SearchWork:
+        """The work done in regions and windows; a window counts as a perturbation."""
+        solved = 0 if self.windows is None else self.windows.solved
+        return self.region.work + SearchWork(perturbations=solved)
+
+    @property
+    def least_us(self) -> int:
+        """Cost of the best walk, those in windows among them [us]."""
+        if self.windows is None or not self._in_windows:
+            return self.best_us
+        return min(self.best_us, self.windows.best_us)
+
+    def progress(self) -> tuple[int, int]:
+        """Return cost [us] and steps of the best walk, as far as they are known.
+
+        What a region has gained counts before it is put back; but not where turns cost, as
+        the turns at its rim are known only then.
+        """
+        best_us, steps = self.best_us, self.best.size - 1
+        exact = self.is_whole or not self._framed.prices.quarter_turn_us
+        if self.region.is_loaded and exact:
+            here_us = self.cost_us + self.region.gain_us
+            if here_us < best_us:
+                best_us, steps = here_us, self._walk.size - 1 + self.region.longer_by
+        if self.windows is not None and self._in_windows and self.windows.best_us < best_us:
+            best_us, steps = self.windows.best_us, self.windows.best_steps
+        return best_us, steps
+
+    def put_back(self) -> None:
+        """Put back the region and the windows that are being worked on."""
+        self._unload()
+        self.put_back_windows()
+
+    def allocate_region(self) -> None:
+        """Provide memory for the regions, with the first walk known."""
+        framed, cells = self._framed, self._problem.cells
+        if self.is_whole:
+            # Few cells may lie far apart: then most of the walk is between them.
+            visits = max(VISITS_PER_CELL * cells, 2 * self._walk.size)
+            self.region = WalkRegion(framed.rows, framed.cols, visits, 1)
+        else:
+            self.region = WalkRegion(EDGE, EDGE, VISITS_PER_CELL * EDGE * EDGE, JUMPS)
+
+    def regions(self) -> Iterator[WalkRegion]:
+        """Load each region of the next pass in turn; put it back afterwards."""
+        for box in regions_of(self._framed, self._problem.cells, self._passes):
+            if self.region.load(self._framed, self._walk, box):
+                self.region.hold(self.held)
+                yield self.region
+                self._unload()
+        self._passes += 1
+
+    def _unload(self) -> None:
+        if self.region.is_loaded:
+            walk = self.region.put_back()
+            self._accept(walk, self._problem.cost_us(walk))
+
+    def open_windows(self, bound: LowerBound) -> WindowSearch:
+        """Return the search in windows, from now on, guided by the prices of ``bound``."""
+        self.windows = WindowSearch(self._problem, self._framed, bound)
+        return self.windows
+
+    def load_windows(self) -> bool:
+        """Let windows continue from the walk, or where they were left; return whether they can."""
+        self._in_windows = self.windows is not None and self.windows.load(self._walk)
+        return self._in_windows
+
+    def put_back_windows(self) -> None:
+        """Go on from the best walk of the windows, if it is better."""
+        if self.windows is None or not self._in_windows:
+            return
+        self._in_windows = False
+        cost_us = self.windows.best_us
+        if cost_us < self.cost_us:
+            self._accept(self.windows.walk(), cost_us)
