@@ -12,7 +12,8 @@ import pytest
 import zenoh
 import zenoh.ext
 
-from fasaco_edge.bus import latched
+from fasaco_edge.bus import latched, sample_order
+from fasaco_edge.bus.asked_publishers import ASK_PERIOD_S, MOST_PUBLISHERS
 from fasaco_edge.bus.session import open_bus
 from fasaco_edge.bus.settings import BusSettings
 from fasaco_edge.wire.topics import QOS
@@ -77,7 +78,7 @@ class Spy:
         while len(self.asked()) < begun + wanted and time.monotonic() < deadline:
             time.sleep(0.01)
         began = time.monotonic()
-        time.sleep(rounds * latched.ASK_PERIOD_S)
+        time.sleep(rounds * ASK_PERIOD_S)
         return [selector for at, selector in self.asked() if at >= began]
 
 
@@ -146,7 +147,7 @@ def test_late_publishers_are_heard_once(bus, endpoint, numbered):
             assert taken(samples, 1) == [b"late"]
             early.put(b"after")
             assert taken(samples, 1) == [b"after"]
-        time.sleep(1.5 * latched.ASK_PERIOD_S)
+        time.sleep(1.5 * ASK_PERIOD_S)
     assert samples.empty()
 
 
@@ -181,7 +182,7 @@ def test_what_waits_for_an_answer_has_a_bound(bus, endpoint, monkeypatch):
         time.sleep(0.5)
         bus.subscribe(KEY, samples.put, latched=True, history=100)
         until(lambda: asked)
-        size = latched.HELD_BYTES // 4
+        size = sample_order.HELD_BYTES // 4
         for number in range(6):
             publisher.put(bytes([number]) * size)
         until(lambda: samples.qsize() >= 4)
@@ -214,14 +215,14 @@ def held_under_way(monkeypatch):
     """Hold back what is published; return what hears a sample, those held, and answers taken."""
     under_way, answers = Queue(), Queue()
     subscription = latched.LatchedSubscription
-    hear, take = subscription._on_sample, subscription._take
+    hear, take = subscription._on_sample, subscription._on_answer
 
     def answer(self, sample, *, again):
         take(self, sample, again=again)
         answers.put(sample.payload)
 
     monkeypatch.setattr(subscription, "_on_sample", lambda _, sample: under_way.put(sample))
-    monkeypatch.setattr(subscription, "_take", answer)
+    monkeypatch.setattr(subscription, "_on_answer", answer)
     return hear, under_way, answers
 
 
@@ -229,7 +230,7 @@ def held_under_way(monkeypatch):
 def test_an_answer_waits_for_what_it_has_overtaken(bus, endpoint, monkeypatch, arrive):
     """On a busy computer it came before three cohorts, which were dropped as older."""
     if arrive:
-        monkeypatch.setattr(latched, "UNDER_WAY_S", 1000.0)
+        monkeypatch.setattr(sample_order, "UNDER_WAY_S", 1000.0)
     samples = Queue()
     hear, under_way, answers = held_under_way(monkeypatch)
     with publishing(endpoint) as publisher:
@@ -240,7 +241,7 @@ def test_an_answer_waits_for_what_it_has_overtaken(bus, endpoint, monkeypatch, a
         if not under_way.empty():
             hear(subscription, under_way.get())
         assert taken(samples, 1) == [b"0"]
-        until(lambda: not subscription._open)
+        until(lambda: not subscription._publishers.open_queries)
         for number in range(1, 4):
             publisher.put(b"%d" % number)
         while answers.get(timeout=TIMEOUT_S).to_bytes() != b"3":
@@ -254,7 +255,7 @@ def test_an_answer_waits_for_what_it_has_overtaken(bus, endpoint, monkeypatch, a
         else:
             while taken(samples, 1) != [b"3"]:
                 pass
-        time.sleep(2 * latched.ASK_PERIOD_S)
+        time.sleep(2 * ASK_PERIOD_S)
         assert samples.empty()
 
 
@@ -263,7 +264,7 @@ def test_where_several_count_an_answer_waits_for_what_is_before_it(
     bus, endpoint, monkeypatch, arrive
 ):
     """A publisher keeps three; what it published before them is under way, or lost."""
-    monkeypatch.setattr(latched, "UNDER_WAY_S", 1000.0 if arrive else 0.2)
+    monkeypatch.setattr(sample_order, "UNDER_WAY_S", 1000.0 if arrive else 0.2)
     samples = Queue()
     hear, under_way, answers = held_under_way(monkeypatch)
     with publishing(endpoint, cache=3) as publisher:
@@ -274,7 +275,7 @@ def test_where_several_count_an_answer_waits_for_what_is_before_it(
             publisher.put(b"%d" % number)
         while answers.get(timeout=TIMEOUT_S).to_bytes() != b"9":
             pass
-        until(lambda: not subscription._open)
+        until(lambda: not subscription._publishers.open_queries)
         if arrive:
             heard = None
             while heard != b"9":
@@ -284,7 +285,7 @@ def test_where_several_count_an_answer_waits_for_what_is_before_it(
         else:
             while taken(samples, 1) != [b"9"]:
                 pass
-        time.sleep(2 * latched.ASK_PERIOD_S)
+        time.sleep(2 * ASK_PERIOD_S)
         assert samples.empty()
 
 
@@ -311,7 +312,7 @@ def test_a_publisher_heard_before_it_is_found_is_heard_once(bus, endpoint, numbe
         publisher.put(b"one")
         assert taken(samples, 1) == [b"one"]
         until(lambda: subscription._publishers)
-        time.sleep(1.5 * latched.ASK_PERIOD_S)
+        time.sleep(1.5 * ASK_PERIOD_S)
         assert samples.empty()
 
 
@@ -343,10 +344,10 @@ def test_of_a_flood_of_publishers_no_more_are_asked_than_are_remembered(bus, end
             client.liveliness().declare_token(f"{KEY}/@adv/pub/{number:x}/1/_")
             for number in range(1, 301)
         ]
-        until(lambda: len(subscription._publishers) == latched.MOST_PUBLISHERS)
+        until(lambda: len(subscription._publishers) == MOST_PUBLISHERS)
         questions = spy.in_rounds(2)
-        assert len(questions) <= 3 * latched.MOST_PUBLISHERS
-        assert len(set(questions)) == latched.MOST_PUBLISHERS, "each of them is asked"
+        assert len(questions) <= 3 * MOST_PUBLISHERS
+        assert len(set(questions)) == MOST_PUBLISHERS, "each of them is asked"
         honest.put(b"two")
         assert taken(samples, 1) == [b"two"]
         assert tokens

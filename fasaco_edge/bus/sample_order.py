@@ -1,0 +1,212 @@
+"""The order in which samples of a latched key are delivered: by publisher, none twice.
+
+They come in two ways: as they are published, and as answers to queries. An answer overtakes what is
+under way, as its priority is higher, and samples wait for a thread of their own. So an answer that
+leaves a gap waits a moment for the samples in it.
+"""
+
+from __future__ import annotations
+
+import time
+from collections import OrderedDict
+from collections.abc import Callable
+
+import zenoh
+
+from fasaco_edge.bus.asked_publishers import MOST_PUBLISHERS, AskedPublishers
+
+# So long an answer waits that leaves a gap [s]; where several samples count, since the last one.
+UNDER_WAY_S = 0.5
+# Most publishers whose last sample is remembered.
+MOST_REMEMBERED = 64
+# Most bytes of samples that wait for those before them: a publisher that does not answer must not
+# fill the memory.
+HELD_BYTES = 8_000_000
+_SEQUENCE_NUMBERS = 1 << 32
+
+
+class SampleOrder:
+    """Delivers the last ``depth`` samples of each publisher in order; the caller holds the lock.
+
+    Args:
+        depth: how many samples of a publisher count.
+        deliver: gets the samples.
+        publishers: those that are queried.
+        wake: called when publishers are to be queried, or ``deliver_due`` to be called earlier.
+    """
+
+    def __init__(
+        self,
+        depth: int,
+        deliver: Callable[[zenoh.Sample], None],
+        publishers: AskedPublishers,
+        wake: Callable[[], None],
+    ) -> None:
+        self._depth, self._receive, self._publishers, self._wake = depth, deliver, publishers, wake
+        # By publisher, the sequence number or timestamp of its last sample: its mark.
+        self._last_mark = OrderedDict[str, int]()
+        # When that was published, by the publisher's clock; 0 where it does not tell.
+        self._stamps = OrderedDict[str, int]()
+        # The same of publishers without a token. Used only to drop cached replies that were
+        # received already: a reset of such a clock would go unnoticed.
+        self._unconfirmed = OrderedDict[str, int]()
+        # Of an answer that overtook what is under way: until when it waits [s], publisher, mark.
+        self._ahead: tuple[float, str, int, zenoh.Sample] | None = None
+        # Where several samples count, they wait for those before them, which were asked for.
+        self._held: list[tuple[str, int, zenoh.Sample]] = []
+        self._held_bytes = 0
+        # Until when those of them wait that an answer leaves a gap before [s]; None without any.
+        self._gap_until: float | None = None
+
+    def missing(self, name: str) -> str:
+        """Return what to query a publisher for: what came after the last sample of it."""
+        last = self._last_mark.get(name)
+        if last is None or name.endswith("/uhlc"):
+            return f"_max={self._depth}"
+        return f"_sn={(last + 1) % _SEQUENCE_NUMBERS}.."
+
+    def forget(self, name: str) -> None:
+        """Forget a publisher that is gone: it may come back under its name and count from 0."""
+        self._last_mark.pop(name, None)
+
+    def confirm(self, name: str) -> None:
+        """Note that a publisher has a token: what it was heard of before counts from now on."""
+        if name in self._unconfirmed:
+            _remember(self._last_mark, name, self._unconfirmed.pop(name))
+
+    def take_published(self, sample: zenoh.Sample) -> None:
+        """Take a sample as it was published."""
+        name, mark = _origin(sample)
+        waits = self._depth > 1 and self._publishers.is_asking
+        is_listed = sample.source_info or name in self._last_mark or name in self._publishers
+        if not name or not (is_listed or waits):
+            # Of a publisher that keeps nothing, or of one that is not yet found.
+            if name:
+                _remember(self._unconfirmed, name, mark)
+            self._receive(sample)
+            return
+        last = self._last_mark.get(name)
+        if last and not mark and _ticks(sample) >= self._stamps.get(name, 0):
+            # It was restarted under the same name: what an answer has overtaken is older.
+            del self._last_mark[name]
+            last = None
+        is_gap = name in self._publishers and _leaves_gap(name, mark, last)
+        if waits or (self._depth > 1 and is_gap):
+            self._hold(name, mark, sample)
+        elif _is_newer(mark, last):
+            self._deliver(name, mark, sample)
+            if self._gap_until is not None:
+                self._gap_until = time.monotonic() + UNDER_WAY_S
+
+    def take_answer(self, sample: zenoh.Sample, *, again: bool) -> None:
+        """Take an answer; ``again``: also one that was received, if nothing came after it."""
+        name, mark = _origin(sample)
+        last = self._last_mark.get(name, self._unconfirmed.get(name))
+        if self._depth > 1:
+            self._hold(name, mark, sample)
+        elif not again and _leaves_gap(name, mark, last):
+            self._let_wait(name, mark, sample)
+        elif _is_newer(mark, last) or (again and mark == last):
+            self._deliver(name, mark, sample)
+
+    @property
+    def next_at(self) -> float:
+        """When ``deliver_due`` has something to do [s, monotonic]."""
+        ahead = [self._ahead[0]] if self._ahead is not None else []
+        gaps = [self._gap_until] if self._gap_until is not None else []
+        return min((*ahead, *gaps), default=float("inf"))
+
+    def deliver_due(self, now: float) -> None:
+        """Deliver what has waited long enough for the samples before it."""
+        if self._ahead is not None and now >= self._ahead[0]:
+            self._deliver_ahead()
+        if self._gap_until is not None and now >= self._gap_until:
+            self.deliver_held(over_gaps=True)
+
+    def deliver_held(self, *, over_gaps: bool = False) -> None:
+        """Deliver what waits, but for what an answer leaves a gap before: a cache may hold less.
+
+        That waits until the samples in the gap have come, or have had the time to (``over_gaps``).
+        """
+        held, self._held = sorted(self._held, key=lambda one: one[:2]), []
+        self._held_bytes = 0
+        for name, mark, sample in held:
+            last = self._last_mark.get(name, self._unconfirmed.get(name))
+            if not over_gaps and _leaves_gap(name, mark, last):
+                self._held.append((name, mark, sample))
+                self._held_bytes += len(sample.payload)
+            elif _is_newer(mark, last):
+                self._deliver(name, mark, sample)
+        if not self._held:
+            self._gap_until = None
+        elif self._gap_until is None:
+            self._gap_until = time.monotonic() + UNDER_WAY_S
+            self._wake()
+
+    def _let_wait(self, name: str, mark: int, sample: zenoh.Sample) -> None:
+        """Keep an answer back until what is before it has come, or has had the time to."""
+        self._deliver_ahead()
+        self._ahead = time.monotonic() + UNDER_WAY_S, name, mark, sample
+        if len(sample.payload) > HELD_BYTES:
+            self._deliver_ahead()
+        self._wake()
+
+    def _deliver_ahead(self) -> None:
+        ahead, self._ahead = self._ahead, None
+        if ahead is not None and _is_newer(ahead[2], self._last_mark.get(ahead[1])):
+            self._deliver(*ahead[1:])
+
+    def _hold(self, name: str, mark: int, sample: zenoh.Sample) -> None:
+        self._held.append((name, mark, sample))
+        self._held_bytes += len(sample.payload)
+        is_full = len(self._held) > MOST_PUBLISHERS * self._depth
+        if is_full or self._held_bytes > HELD_BYTES:
+            self.deliver_held(over_gaps=True)
+        elif (
+            not self._publishers.open_queries
+            and self._gap_until is None
+            and name in self._publishers
+        ):
+            self._publishers.ask_soon(name)
+            self._wake()
+
+    def _deliver(self, name: str, mark: int, sample: zenoh.Sample) -> None:
+        self._unconfirmed.pop(name, None)
+        _remember(self._last_mark, name, mark)
+        _remember(self._stamps, name, _ticks(sample))
+        self._receive(sample)
+
+
+def _remember(marks: OrderedDict[str, int], name: str, mark: int) -> None:
+    """Note the last mark of a publisher; those noted the longest ago are forgotten."""
+    marks[name] = mark
+    marks.move_to_end(name)
+    if len(marks) > MOST_REMEMBERED:
+        marks.popitem(last=False)
+
+
+def _origin(sample: zenoh.Sample) -> tuple[str, int]:
+    """Return who published a sample, as in its token, and its sequence number or timestamp."""
+    info, stamp = sample.source_info, sample.timestamp
+    if info is not None:
+        return f"{info.source_id.zid}/{info.source_id.eid}", int(info.source_sn)
+    if stamp is not None:
+        return f"{str(stamp).partition('/')[2]}/uhlc", _ticks(sample)
+    return "", 0
+
+
+def _ticks(sample: zenoh.Sample) -> int:
+    """Return when a sample was published, by the clock of its session; 0 where it does not tell."""
+    return int(str(sample.timestamp).partition("/")[0]) if sample.timestamp is not None else 0
+
+
+def _is_newer(mark: int, last: int | None) -> bool:
+    """Tell whether a sample comes after the last one; sequence numbers wrap at 2^32."""
+    if last is None or last >= _SEQUENCE_NUMBERS:
+        return last is None or mark > last
+    return 0 < (mark - last) % _SEQUENCE_NUMBERS < _SEQUENCE_NUMBERS // 2
+
+
+def _leaves_gap(name: str, mark: int, last: int | None) -> bool:
+    """Tell whether samples before this one are missing."""
+    return last is not None and not name.endswith("/uhlc") and _is_newer(mark, last + 1)
