@@ -28,14 +28,10 @@ from fasaco_edge.mission.line.pieces import (
     Walk,
     kept_pieces,
 )
+from fasaco_edge.mission.line.place_on_line import PlaceOnLine
 from fasaco_edge.mission.line.tally import SweepTally
 from fasaco_edge.planners.path import common_beginning
 
-# The robot is looked for so far ahead on its line [m]: further on, the next lane may lie as near.
-LOOK_AHEAD_M = 0.8
-# So near to the end of its line a robot has arrived [m]; or where it comes no nearer for so many
-# poses, and the tool is over the end: it drives beside its line, maybe.
-ARRIVED_M, STANDING_POSES = 0.05, 10
 # The robot knows all of the line.
 TOLD = 1 << 60
 
@@ -56,18 +52,13 @@ class LineAhead:
         self.cell = 0
         self.untold_from = TOLD
         self._floor = floor
-        # How near the robot came to the end of its line [pixels], and for how many poses no nearer.
-        self._nearest, self._poses_there = math.inf, 0
         self._walk: Walk = np.empty((0, 2), np.int32)
         # Where the walk was cut off: of how many cells the robot is told, 0 where it was stopped.
         # The rest is kept until the next walk comes. None for all.
         self._cut: int | None = None
         # What of maps that came meanwhile was not looked at beyond the cut.
         self._unchecked: Window | None = None
-        # How far the robot is on the way from the first point to the next, a share.
-        self._along = 0.0
-        # Where the robot is.
-        self._here = np.zeros(2)
+        self._place = PlaceOnLine()
 
     def follow_floor(self, floor: FloorMap) -> bool:
         """Follow the floor to another raster; return whether the line had to be dropped."""
@@ -93,7 +84,7 @@ class LineAhead:
         self.tally.exchange(edges[beyond], edges[:0])
         self.tally.move(shape, by)
         self.tally.exchange(edges[:0], moved[beyond])
-        self._here = self._here + np.array(by)
+        self._place.here = self._place.here + np.array(by)
         self._unchecked = self._unchecked and self._unchecked.moved(*by)
 
     def _is_beyond(self, edges: NDArray[np.float64], shape: tuple[int, int]) -> NDArray[np.bool_]:
@@ -181,10 +172,9 @@ class LineAhead:
         is where the robot should be on the line before: from the other place no way would be
         clear, and the line would begin where the first one is, metres away.
         """
-        here = self._here
+        here = self._place.here
         if self.is_followed and not self._is_clear(here, here):
-            a, b = self.line.points[:2]
-            here = a + self._along * (b - a)
+            here = self._place.on(self.line.points)
         return here
 
     @property
@@ -219,10 +209,9 @@ class LineAhead:
     def drive(self, pose: Pose2D) -> None:
         """Note where the robot is; what it has driven is dropped."""
         self._see(pose)
-        at = self._place()
-        if at is None:
+        number = self._place.find(self.line.points, self._tool, self.tally.unit_m)
+        if number is None:
             return
-        number, self._along = at
         if number > 0:
             self.tally.drive(self.line.points[: number + 1])
             edges = _edges(self.line.points[: number + 1])
@@ -232,65 +221,30 @@ class LineAhead:
         # The nearest cell, or the next plan would begin behind the robot. At the last one the robot
         # has arrived, and that is told below.
         first, second = self.line.cells[:2].tolist()
-        nearest = first + int(self._along * (second - first) + 0.5)
+        nearest = first + int(self._place.along * (second - first) + 0.5)
         self.cell = max(self.cell, min(nearest, len(self._walk) - 2))
-        if self._has_arrived():
+        left_m = float(self.lengths()[-1])
+        if self._place.has_arrived(self.line.points, left_m, self._tool, self.tally.unit_m):
             self.cell = len(self._walk) - 1
-
-    def _has_arrived(self) -> bool:
-        """Tell whether the robot is at the end of its line; to be asked once for each pose."""
-        apart = math.hypot(*(self.line.points[-1] - self._here))
-        if len(self.line) == 2 and apart * self.tally.unit_m <= ARRIVED_M:
-            return True
-        if apart > self._tool or self.lengths()[-1] > self._tool * self.tally.unit_m:
-            self._nearest, self._poses_there = math.inf, 0
-        elif apart < self._nearest - 1e-6:
-            self._nearest, self._poses_there = apart, 0
-        else:
-            self._poses_there += 1
-        return self._poses_there >= STANDING_POSES
-
-    def _place(self) -> tuple[int, float] | None:
-        """Return the edge that the robot is nearest to, and how far along; None where on none."""
-        points = self.line.points
-        nearest, at = self._tool, None
-        look = LOOK_AHEAD_M / self.tally.unit_m
-        for number in range(len(points) - 1):
-            edge = points[number + 1] - points[number]
-            length = max(math.hypot(*edge), 1e-9)
-            low = self._along if number == 0 else 0.0
-            high = min(1.0, low + look / length)
-            share = float(np.dot(self._here - points[number], edge)) / length**2
-            share = min(max(share, low), high)
-            apart = math.hypot(*(points[number] + share * edge - self._here))
-            if apart < nearest - 1e-6:
-                nearest, at = apart, (number, share)
-            look -= (high - low) * length
-            if look <= 0.0:
-                break
-        return at
 
     @property
     def is_followed(self) -> bool:
         """Whether the robot is on the line, within half the tool."""
-        if len(self.line) < 2:
-            return False
-        a, b = self.line.points[:2]
-        return math.hypot(*(a + self._along * (b - a) - self._here)) <= self._tool
+        return self._place.is_on(self.line.points, self._tool)
 
     @property
     def _tool(self) -> float:
         return self._floor.discs.tool_m / 2 / self.tally.unit_m
 
     def _see(self, pose: Pose2D) -> None:
-        self._here = np.array(map_to_raster(self._floor.geometry, pose.x, pose.y))
+        self._place.here = np.array(map_to_raster(self._floor.geometry, pose.x, pose.y))
 
     def xy(self) -> Points:
         """Return the line from the robot on, float64 (n, 2): x, y in the map frame [m]."""
         points = self._told()
         if len(points) > 1:
             points = points.copy()
-            points[0] += self._along * (points[1] - points[0])
+            points[0] = self._place.on(points)
         return raster_to_map(self._floor.geometry, points)
 
     def _told(self) -> Points:
@@ -337,7 +291,7 @@ class LineAhead:
     def lengths(self) -> NDArray[np.float64]:
         """Return how far it is from the robot to each point, float64 (n,) [m]; the first is 0."""
         edges = np.hypot(*np.diff(self.line.points, axis=0).T)
-        edges[:1] *= 1.0 - self._along
+        edges[:1] *= 1.0 - self._place.along
         return np.concatenate([[0.0], np.cumsum(edges)]) * self.tally.unit_m
 
     def _take(self, pieces: list[Piece]) -> None:
@@ -349,9 +303,8 @@ class LineAhead:
         old = self.line
         new = pieces[0].line.joined(*(piece.line for piece in pieces[1:])) if pieces else Line()
         if len(old) > 1 and not np.array_equal(old.points[:2], new.points[:2]):
-            a, b = old.points[:2]
-            self.tally.drive(np.stack([a, a + self._along * (b - a)]))
-            self._along = 0.0
+            self.tally.drive(np.stack([old.points[0], self._place.on(old.points)]))
+            self._place.along = 0.0
         goes, comes = np.ones(max(len(old) - 1, 0), bool), np.ones(max(len(new) - 1, 0), bool)
         at = 0
         for piece in pieces:
