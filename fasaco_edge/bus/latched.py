@@ -69,6 +69,7 @@ class LatchedSubscription(Subscription):
         in_order: bool = False,
     ) -> None:
         self._session = session
+        self._receive = receive
         self._depth = depth
         self._asker = asker
         self._key = zenoh.KeyExpr(key)
@@ -76,7 +77,7 @@ class LatchedSubscription(Subscription):
         # Reentrant: a cache of the same session answers on the thread that asks.
         self._lock = threading.RLock()
         self._publishers = AskedPublishers()
-        self._order = SampleOrder(depth, receive, self._publishers, asker.wake)
+        self._order = SampleOrder(depth, self._publishers, asker.wake)
         self._tokens = f"{key}/@adv/pub/**"
         self._query_tokens_at = 0.0
         self._awaits_tokens = False
@@ -94,7 +95,7 @@ class LatchedSubscription(Subscription):
         """Ask, on the asker's thread; return when there is more to ask [s, monotonic]."""
         self._query_tokens(now)
         with self._lock:
-            self._order.deliver_due(now)
+            self._deliver(self._order.take_due(now))
             questions: list[tuple[str, AskedPublisher | None]] = []
             asks_all, again = self._publishers.take_all(now)
             if asks_all:
@@ -117,7 +118,7 @@ class LatchedSubscription(Subscription):
             with self._lock:
                 self._publishers.end_query(publisher)
                 if not self._publishers.open_queries:
-                    self._order.deliver_held()
+                    self._deliver(self._order.take_held())
 
         with contextlib.suppress(zenoh.ZError):  # a session that ends asks nobody
             self._session.get(
@@ -153,12 +154,16 @@ class LatchedSubscription(Subscription):
     def _on_sample(self, sample: zenoh.Sample) -> None:
         """Take what is published, on a Zenoh thread."""
         with self._lock:
-            self._order.take_published(sample)
+            self._deliver(self._order.take_published(sample))
 
     def _on_answer(self, sample: zenoh.Sample, *, again: bool) -> None:
         """Take an answer, on a Zenoh thread."""
         with self._lock:
-            self._order.take_answer(sample, again=again)
+            self._deliver(self._order.take_answer(sample, again=again))
+
+    def _deliver(self, samples: list[zenoh.Sample]) -> None:
+        for sample in samples:
+            self._receive(sample)
 
 
 class Asker:

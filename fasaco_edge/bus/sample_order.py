@@ -26,23 +26,18 @@ _SEQUENCE_NUMBERS = 1 << 32
 
 
 class SampleOrder:
-    """Delivers the last ``depth`` samples of each publisher in order; the caller holds the lock.
+    """Puts the last ``depth`` samples of each publisher in order; the caller holds the lock.
 
     Args:
         depth: how many samples of a publisher count.
-        deliver: gets the samples.
         publishers: those that are queried.
-        wake: called when publishers are to be queried, or ``deliver_due`` to be called earlier.
+        wake: called when publishers are to be queried, or ``take_due`` to be called earlier.
     """
 
-    def __init__(
-        self,
-        depth: int,
-        deliver: Callable[[zenoh.Sample], None],
-        publishers: AskedPublishers,
-        wake: Callable[[], None],
-    ) -> None:
-        self._depth, self._receive, self._publishers, self._wake = depth, deliver, publishers, wake
+    def __init__(self, depth: int, publishers: AskedPublishers, wake: Callable[[], None]) -> None:
+        self._depth, self._publishers, self._wake = depth, publishers, wake
+        # What is to be delivered, in this order.
+        self._ready: list[zenoh.Sample] = []
         # By publisher, the sequence number or timestamp of its last sample: its mark.
         self._last_mark = OrderedDict[str, int]()
         # When that was published, by the publisher's clock; 0 where it does not tell.
@@ -74,8 +69,46 @@ class SampleOrder:
         if name in self._unconfirmed:
             _remember(self._last_mark, name, self._unconfirmed.pop(name))
 
-    def take_published(self, sample: zenoh.Sample) -> None:
-        """Take a sample as it was published."""
+    def take_published(self, sample: zenoh.Sample) -> list[zenoh.Sample]:
+        """Take a sample as it was published; return what is to be delivered now, in order."""
+        self._sort_published(sample)
+        return self._take_ready()
+
+    def take_answer(self, sample: zenoh.Sample, *, again: bool) -> list[zenoh.Sample]:
+        """Take an answer; return what is to be delivered now, in order.
+
+        Args:
+            sample: the answer.
+            again: deliver it also if it was received, if nothing came after it.
+        """
+        self._sort_answer(sample, again=again)
+        return self._take_ready()
+
+    @property
+    def next_at(self) -> float:
+        """When ``take_due`` has something to return [s, monotonic]."""
+        ahead = [self._ahead[0]] if self._ahead is not None else []
+        gaps = [self._gap_until] if self._gap_until is not None else []
+        return min((*ahead, *gaps), default=float("inf"))
+
+    def take_due(self, now: float) -> list[zenoh.Sample]:
+        """Return what has waited long enough for the samples before it, in order."""
+        if self._ahead is not None and now >= self._ahead[0]:
+            self._deliver_ahead()
+        if self._gap_until is not None and now >= self._gap_until:
+            self._deliver_held(over_gaps=True)
+        return self._take_ready()
+
+    def take_held(self) -> list[zenoh.Sample]:
+        """Return what has waited for answers, now that all have come, in order."""
+        self._deliver_held()
+        return self._take_ready()
+
+    def _take_ready(self) -> list[zenoh.Sample]:
+        ready, self._ready = self._ready, []
+        return ready
+
+    def _sort_published(self, sample: zenoh.Sample) -> None:
         name, mark = _origin(sample)
         waits = self._depth > 1 and self._publishers.is_asking
         is_listed = sample.source_info or name in self._last_mark or name in self._publishers
@@ -83,7 +116,7 @@ class SampleOrder:
             # Of a publisher that keeps nothing, or of one that is not yet found.
             if name:
                 _remember(self._unconfirmed, name, mark)
-            self._receive(sample)
+            self._ready.append(sample)
             return
         last = self._last_mark.get(name)
         if last and not mark and _ticks(sample) >= self._stamps.get(name, 0):
@@ -98,8 +131,7 @@ class SampleOrder:
             if self._gap_until is not None:
                 self._gap_until = time.monotonic() + UNDER_WAY_S
 
-    def take_answer(self, sample: zenoh.Sample, *, again: bool) -> None:
-        """Take an answer; ``again``: also one that was received, if nothing came after it."""
+    def _sort_answer(self, sample: zenoh.Sample, *, again: bool) -> None:
         name, mark = _origin(sample)
         last = self._last_mark.get(name, self._unconfirmed.get(name))
         if self._depth > 1:
@@ -109,21 +141,7 @@ class SampleOrder:
         elif _is_newer(mark, last) or (again and mark == last):
             self._deliver(name, mark, sample)
 
-    @property
-    def next_at(self) -> float:
-        """When ``deliver_due`` has something to do [s, monotonic]."""
-        ahead = [self._ahead[0]] if self._ahead is not None else []
-        gaps = [self._gap_until] if self._gap_until is not None else []
-        return min((*ahead, *gaps), default=float("inf"))
-
-    def deliver_due(self, now: float) -> None:
-        """Deliver what has waited long enough for the samples before it."""
-        if self._ahead is not None and now >= self._ahead[0]:
-            self._deliver_ahead()
-        if self._gap_until is not None and now >= self._gap_until:
-            self.deliver_held(over_gaps=True)
-
-    def deliver_held(self, *, over_gaps: bool = False) -> None:
+    def _deliver_held(self, *, over_gaps: bool = False) -> None:
         """Deliver what waits, but for what an answer leaves a gap before: a cache may hold less.
 
         That waits until the samples in the gap have come, or have had the time to (``over_gaps``).
@@ -161,7 +179,7 @@ class SampleOrder:
         self._held_bytes += len(sample.payload)
         is_full = len(self._held) > MOST_PUBLISHERS * self._depth
         if is_full or self._held_bytes > HELD_BYTES:
-            self.deliver_held(over_gaps=True)
+            self._deliver_held(over_gaps=True)
         elif (
             not self._publishers.open_queries
             and self._gap_until is None
@@ -174,7 +192,7 @@ class SampleOrder:
         self._unconfirmed.pop(name, None)
         _remember(self._last_mark, name, mark)
         _remember(self._stamps, name, _ticks(sample))
-        self._receive(sample)
+        self._ready.append(sample)
 
 
 def _remember(marks: OrderedDict[str, int], name: str, mark: int) -> None:
