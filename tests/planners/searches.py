@@ -9,7 +9,7 @@ from fasaco_edge.planners.cost import STEPS_ALONE, CoverageCost, SearchWork
 from fasaco_edge.planners.paper.colony import ColonyConfig
 from fasaco_edge.planners.planner import WorkLimit, never
 from fasaco_edge.planners.problem import CoverageProblem
-from fasaco_edge.planners.search import regions, search
+from fasaco_edge.planners.search import current_walk, regions, search
 from fasaco_edge.planners.search.near_optimal import NearOptimal
 from tests.benchmarks.buildings import building
 from tests.benchmarks.judge import check_walk
@@ -67,7 +67,7 @@ def take_apart(monkeypatch):
     """Let grounds of some hundred cells be taken apart into regions."""
     monkeypatch.setattr(regions, "ONE_REGION", 100)
     monkeypatch.setattr(regions, "EDGE", 16)
-    monkeypatch.setattr(search, "EDGE", 16)
+    monkeypatch.setattr(current_walk, "EDGE", 16)
     ask_often(monkeypatch)
 
 

@@ -14,7 +14,7 @@ from fasaco_edge.grid.map_files import builtin_maps
 from fasaco_edge.planners.cost import STEPS_ALONE, CoverageCost
 from fasaco_edge.planners.grids import read_grid
 from fasaco_edge.planners.problem import CoverageProblem
-from fasaco_edge.planners.search import regions, search
+from fasaco_edge.planners.search import current_walk, regions
 from tests import naive
 from tests.kernels.test_bound import drawn_task, shortest_walks
 from tests.planners.searches import TURNS, Watched, after, hall, plan
@@ -162,7 +162,7 @@ def print_twin_paths():
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(regions, "ONE_REGION", 60)
         patch.setattr(regions, "EDGE", 6)
-        patch.setattr(search, "EDGE", 6)
+        patch.setattr(current_walk, "EDGE", 6)
         for path in twin_paths():
             print(path.work, path.cells.tolist())
 
