@@ -13,6 +13,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from fasaco_edge.errors import MalformedMessage
+from fasaco_edge.follow.goals import Goal, PathDriven
 from fasaco_edge.follow.nav2_requests import AskResult, Cancellations, Request, SendGoal
 from fasaco_edge.follow.pieces import STEP_M, Line, end_of_piece
 from fasaco_edge.follow.supervision import Patience, State, Supervision
@@ -27,20 +28,12 @@ from fasaco_edge.wire.messages.follow_path import (
 from fasaco_edge.wire.messages.path_points import PathPoints
 
 # The next goal is sent so far before the end of the one before [m], and as far as the robot
-# drives in so many seconds; and only if it leads on by so much [m].
+# drives in so many seconds.
 AHEAD_M, AHEAD_S = 0.5, 3.0
-GAIN_M = 0.3
-# Where the path comes back to itself, the next goal begins so far before the end of the one before,
-# and is sent so far before that [m]: what is left out there is less than half of a tool.
-TIP_M, EARLY_M = 0.1, 0.05
+# It is sent so far before the robot is where it begins [m].
+EARLY_M = 0.05
 # Where a path begins further off, it is not driven [m]; how far on it the robot may be by then.
 BEGINNING_M = 1.0
-# Where two paths are as near as this to each other they are the same [m].
-SAME_M = 0.03
-# Along a goal the robot is looked for so far ahead [m].
-LOOK_AHEAD_M = 2.0
-# After its goal was ended it rolls on by no more [m].
-COAST_M = 0.5
 # Nav2 says that a goal is done; so far from its end it is not [m].
 DONE_M = 0.5
 # After an error the next goal is sent so much later [s], twice as long each time, at most so long.
@@ -49,23 +42,6 @@ RETRY_S, MOST_RETRY_S = 1.0, 30.0
 # then the result is asked for again, as it may have been lost, and after longer the goal is given
 # up [s].
 MOVED_M, STANDS_S, ARRIVED_S, GIVE_UP_S = 0.05, 3.0, 1.0, 20.0
-
-
-@dataclass(slots=True)
-class Goal:
-    """A piece that Nav2 was given.
-
-    Attributes:
-        id: of the goal, 16 bytes.
-        start, end: on the line [m].
-        next_start: where the next one may begin, infinite where it has to wait for the end of this
-            one; None as long as nobody looked [m].
-    """
-
-    id: bytes
-    start: float
-    end: float
-    next_start: float | None = None
 
 
 @dataclass(slots=True)
@@ -101,13 +77,9 @@ class Nav2Follower(Supervision):
         self._new_id = new_id
         self._here: Point | None = None
         self._came_at: float | None = None
-        self._line: Line | None = None
+        self._path: PathDriven | None = None
         # What takes its place, once Nav2 has answered what it was sent.
         self._next: Line | None = None
-        # Where the robot is along the line.
-        self._way = 0.0
-        # Where the last goal was done: from there the next one goes on, wherever the robot stopped.
-        self._done = -1.0
         # What Nav2 drives, and what it was sent and has not answered yet.
         self._active: Goal | None = None
         self._pending: Goal | None = None
@@ -200,52 +172,43 @@ class Nav2Follower(Supervision):
     def _drive(self, now: float) -> None:
         self._requests += self._requests_later
         self._requests_later.clear()
-        self._advance()
+        if self._path is not None and (self._pending is None or self._active is not None):
+            assert self._here is not None
+            self._path.advance(self._here, self._active)
         if self._next is not None and self._pending is None and not self._join(self._next, now):
             return
-        assert self._line is not None
-        whole = self._line.length(self._way + 2 * self._ahead)
-        goal = self._pending or self._active
+        assert self._path is not None
+        path, goal = self._path, self._pending or self._active
+        whole = path.line.length(path.way + 2 * self._ahead)
         if goal is None:
-            self._begin(whole, now)
+            self._begin(path, whole, now)
         elif goal is self._active:
-            self._watch(goal, now)
-            if goal.end - self._way <= self._ahead and goal.end < whole:
-                self._send_next(goal)
+            self._watch(path, goal, now)
+            if goal.end - path.way <= self._ahead and goal.end < whole:
+                self._send_next(path, goal)
 
-    def _begin(self, whole: float, now: float) -> None:
+    def _begin(self, path: PathDriven, whole: float, now: float) -> None:
         """Send a goal where Nav2 has none."""
         if self._trouble_of_nav2 is not None:
             self.state, self.detail = self._trouble_of_nav2
-        if whole - self._way <= STEP_M:
+        if whole - path.way <= STEP_M:
             self.state, self.detail = State.DRIVEN, ""
         elif now >= self._retry_at:
-            self._send(self._way)
+            self._send(path, path.way)
 
-    def _send_next(self, goal: Goal) -> None:
+    def _send_next(self, path: PathDriven, goal: Goal) -> None:
         """Send the next goal, once the robot is near enough to where that begins."""
-        assert self._line is not None
         if goal.next_start is None:
-            goal.next_start = self._start_after(goal)
-        if goal.next_start - self._way <= EARLY_M:
-            self._send(max(goal.next_start, self._way))
+            goal.next_start = path.start_after(goal, self._ahead, self._near)
+        if goal.next_start - path.way <= EARLY_M:
+            self._send(path, max(goal.next_start, path.way))
 
-    def _start_after(self, goal: Goal) -> float:
-        """Return how early a piece may begin that leads on from a goal; infinite if none does."""
-        assert self._line is not None
-        for before_m in (self._ahead, TIP_M, 0.0):
-            start = max(goal.end - before_m, goal.start)
-            if end_of_piece(self._line, start, self._near) >= goal.end + GAIN_M:
-                return start
-        return math.inf
-
-    def _send(self, start: float) -> None:
+    def _send(self, path: PathDriven, start: float) -> None:
         """Send the piece that begins there."""
-        assert self._line is not None
-        end = end_of_piece(self._line, start, self._near)
+        end = end_of_piece(path.line, start, self._near)
         goal = self._pending = Goal(self._new_id(), start, end)
         self.tally.goals += 1
-        points = self._line.poses(goal.start, goal.end)
+        points = path.line.poses(goal.start, goal.end)
         self._requests.append(SendGoal(goal.id, points, self._path_frame))
 
     def _join(self, line: Line, now: float) -> bool:
@@ -260,62 +223,32 @@ class Nav2Follower(Supervision):
             self.state, self.detail = State.PATH_ELSEWHERE, f"{far:.2f} m away"
             self._stop()
             return False
-        goal = self._active
-        shift = self._shift(line, way, goal) if goal is not None else 0.0
-        self._line, self._next = line, None
-        self._way, self._done = way, -1.0
+        goal, before = self._active, self._path
+        self._path, self._next = (path := PathDriven(line, way)), None
         self._retry_at, self._retry_s = now, RETRY_S
         self._trouble_of_nav2 = None
         if goal is None:
             return True
+        assert before is not None
+        shift = before.shift_to(line, way, goal)
         if shift is None:
             # Nav2 goes over to it from what it drives.
-            self._send(way)
+            self._send(path, way)
         else:
             goal.start, goal.end = goal.start + shift, goal.end + shift
             # What follows may be another line.
             goal.next_start = None
         return True
 
-    def _shift(self, line: Line, way: float, goal: Goal) -> float | None:
-        """Return how much further what is left of a goal is along a new line; None where the
-        line is another one there."""
-        assert self._line is not None
-        was, far = self._line.nearest(line.at(way), self._way, goal.end)
-        left = goal.end - was
-        if far > SAME_M or line.length(way + left) < way + left - SAME_M:
-            return None
-        same = all(
-            math.dist(self._line.at(was + part), line.at(way + part)) <= SAME_M
-            for part in _parts(left)
-        )
-        return way - was if same else None
-
-    def _advance(self) -> None:
-        """Find the robot along the line: never back, and not beyond what it was given."""
-        goal = self._active
-        if self._line is None or (self._pending is not None and goal is None):
-            return
-        assert self._here is not None
-        if goal is not None:
-            end = min(goal.end, self._way + LOOK_AHEAD_M)
-        elif self._way != self._done:
-            end = self._line.length(self._way + COAST_M)
-            end = min([end, *self._line.corners(self._way + STEP_M, end)])
-        else:
-            return
-        if end > self._way:
-            self._way, _ = self._line.nearest(self._here, self._way, end)
-
-    def _watch(self, goal: Goal, now: float) -> None:
+    def _watch(self, path: PathDriven, goal: Goal, now: float) -> None:
         """Ask again, or give up, where the robot stands."""
         assert self._here is not None
         if self._moved_last is None or math.dist(self._here, self._moved_last[0]) > MOVED_M:
             self._moved_last = (self._here, now)
-        if self._way - goal.start > BEGINNING_M:
+        if path.way - goal.start > BEGINNING_M:
             self._retry_s = RETRY_S
         stands_s = now - self._moved_last[1]
-        longest_s = ARRIVED_S if goal.end - self._way <= DONE_M else STANDS_S
+        longest_s = ARRIVED_S if goal.end - path.way <= DONE_M else STANDS_S
         if stands_s <= longest_s:
             return
         if stands_s > STANDS_S:
@@ -329,13 +262,13 @@ class Nav2Follower(Supervision):
             self._requests.append(AskResult(goal.id))
 
     def _take_done(self, goal: Goal, now: float) -> None:
-        if self._line is None or self._here is None:
+        if self._path is None or self._here is None:
             return
-        far = math.dist(self._here, self._line.at(goal.end))
-        if far > DONE_M and goal.end - self._way > DONE_M:
+        far = math.dist(self._here, self._path.line.at(goal.end))
+        if far > DONE_M and goal.end - self._path.way > DONE_M:
             self._fail(State.GIVEN_UP, f"done, it says, {far:.1f} m before the end", now)
             return
-        self._way = self._done = goal.end
+        self._path.finish(goal)
         self._retry_at, self._retry_s = now, RETRY_S
 
     def _fail(self, state: State, detail: str, now: float) -> None:
@@ -359,18 +292,13 @@ class Nav2Follower(Supervision):
         self._next = Line(points.take)
 
     def _withdraw(self) -> None:
-        self._line = self._next = None
+        self._path = self._next = None
         self._stop()
 
     @property
     def _has_path(self) -> bool:
-        return self._line is not None or self._next is not None
+        return self._path is not None or self._next is not None
 
     @property
     def _pose_at(self) -> float | None:
         return self._came_at
-
-
-def _parts(length: float) -> list[float]:
-    count = max(math.ceil(length / (2 * STEP_M)), 1)
-    return [length * part / count for part in range(count + 1)]

@@ -6,12 +6,12 @@ import math
 import numpy as np
 import pytest
 
+from fasaco_edge.follow.goals import TIP_M
 from fasaco_edge.follow.nav2 import (
     EARLY_M,
     GIVE_UP_S,
     RETRY_S,
     STANDS_S,
-    TIP_M,
     Nav2Follower,
 )
 from fasaco_edge.follow.nav2_requests import MOST_CANCELLED, AskResult, CancelGoal, SendGoal

@@ -4,7 +4,7 @@ import numpy as np
 
 from fasaco_edge.errors import PlanFailed
 from fasaco_edge.mission.core.events import MapReceived, PlanBroken, State
-from fasaco_edge.mission.core.route import BROKEN_S
+from fasaco_edge.mission.core.plan_requests import BROKEN_S
 from tests.mission.world import building, patch, pose_at, started
 
 ROOM = ("......",) * 4

@@ -1,4 +1,4 @@
-"""Route: the path the robot was given, what is kept of it at a stop, and the plan under way."""
+"""Route: the path the robot was given, and what is kept of it at a stop."""
 
 from __future__ import annotations
 
@@ -11,35 +11,30 @@ from numpy.typing import NDArray
 from fasaco_edge.grid.geometry import Window
 from fasaco_edge.grid.lattice import Cell
 from fasaco_edge.mission.core.events import PathUpdate, PlanBroken, PlanReady, PlanRequest
+from fasaco_edge.mission.core.plan_requests import BROKEN_S, PlanRequests
 from fasaco_edge.mission.core.spare_time import Attempt, SpareTime
 from fasaco_edge.mission.coverage.progress import PathProgress
 from fasaco_edge.mission.map.loop_closure import Motion, moved_cells
 from fasaco_edge.mission.map.map_state import MapState
 from fasaco_edge.mission.map.reachable_area import ReachableArea
 from fasaco_edge.mission.orders.sequencer import Sequencer
-from fasaco_edge.planners.problem import CoverageProblem
-
-# After a plan that failed [s].
-BROKEN_S = 30.0
 
 NO_CELLS: NDArray[np.int32] = np.empty((0, 2), np.int32)
 
 
-class Route:
-    """Requests plans, one at a time, and publishes paths from them. All times ``now`` are [s].
+class Route(PlanRequests):
+    """Requests plans, and publishes paths from them. All times ``now`` are [s].
 
     Attributes:
         path: the published path, and how far the robot is on it.
         revision: counts the published paths.
-        plans, attempts: count the plans that came back, and the attempts at better paths.
         unchanged, outdated: count those of the plans that led to no path, because they found
             the same path again, or because they no longer held.
-        wanted: why a new plan is wanted; "" where none is.
-        pending: the plan under way.
         published_at: when a path was last published, or confirmed by a plan.
     """
 
     def __init__(self, spare_share: float, map_state: MapState, orders: Sequencer) -> None:
+        super().__init__()
         self.path = PathProgress(NO_CELLS)
         # What is kept of a path that is not driven now: what lay beyond where a map blocked it, or,
         # of a robot that was stopped, all that was left.
@@ -53,42 +48,19 @@ class Route:
         self.revision = 0
         # Counts the paths whose cells are numbered anew, and those of them over other cells.
         self._numberings = self._walks = 0
-        self.plans = self.attempts = 0
         self.unchanged = self.outdated = 0
-        self.wanted = ""
-        self.pending: PlanRequest | None = None
         self.published_at = 0.0
         self._map = map_state
         self._orders = orders
         self._spare = SpareTime(spare_share)
-        self._attempt: Attempt | None = None
-        # Whether the plan under way is for an order that no longer counts.
-        self._is_abandoned = False
-        # Why a full plan is wanted; "" where none is.
-        self._full = ""
-        # What has changed since the last request, and whether that is why a plan is wanted.
-        self._changed: Window | None = None
-        self._is_by_map = False
         self._checked_on: ReachableArea | None = None
-        # How the last plan failed, and when; "" where it did not.
-        self._failure = "", 0.0
 
     def succeed(self, before: Route) -> None:
         """Go on counting where another route ended; the plan under way there is of no use here."""
         self.revision, self.plans, self.attempts = before.revision, before.plans, before.attempts
         self.unchanged, self.outdated = before.unchanged, before.outdated
         self.pending, self._attempt = before.pending, before._attempt
-        self._is_abandoned = self.pending is not None
-
-    @property
-    def is_planning(self) -> bool:
-        """Whether a plan that is needed is under way."""
-        return self.pending is not None and self._attempt is None
-
-    @property
-    def is_improving(self) -> bool:
-        """Whether the plan under way is only to improve the path."""
-        return self.pending is not None and self._attempt is not None
+        self.discard_pending()
 
     @property
     def path_to_keep(self) -> NDArray[np.int32]:
@@ -104,28 +76,9 @@ class Route:
         """The path, or, of a robot that was stopped, what is kept of the one before."""
         return self.path if len(self.path.cells) else self._kept
 
-    def want(self, reason: str, changed: Window | None = None) -> None:
-        """Want a plan: because the cells in a window have changed, or for another reason."""
-        self.wanted = reason
-        self._changed = Window.around(self._changed, changed)
-        self._is_by_map = changed is not None
-
-    def want_full(self, reason: str) -> int:
-        """Want a plan for which all is searched; return its number among the plans."""
-        self.wanted = self._full = reason
-        self.forget_failure()
-        return self.plans + (1 if self.pending is None or self.is_improving else 2)
-
-    def drop(self) -> None:
-        """Want no plan any more."""
-        self.wanted = self._full = ""
-        self._changed = None
-
     def abandon(self) -> None:
         """Want no plan any more, and discard the one under way: it is for another order."""
-        self.drop()
-        self.forget_failure()
-        self._is_abandoned = self.pending is not None
+        super().abandon()
         self._kept, self._before_motion, self._aside = PathProgress(NO_CELLS), None, None
 
     @property
@@ -149,15 +102,6 @@ class Route:
         self._kept, self._aside = PathProgress(self._aside), None
         self.want(reason)
         return update
-
-    def pause(self) -> None:
-        """Discard the plan under way; what it was for is planned once the robot continues."""
-        self.forget_failure()
-        if self.pending is not None and self.is_planning and not self._is_abandoned:
-            if self.pending.problem.is_full:
-                self._full = self.pending.reason
-            self.want(self.wanted or self.pending.reason, self.pending.changed)
-        self._is_abandoned = self.pending is not None
 
     def resume(self, now: float) -> PathUpdate | None:
         """Publish what is kept of the path before a pause; want a plan where that does not do."""
@@ -187,7 +131,7 @@ class Route:
         before, self._before_motion = self._before_motion, None
         if before is None or motion is None or motion.is_still or not len(before):
             return None
-        self._is_abandoned = self.pending is not None
+        self.discard_pending()
         self.want("map and pose moved")
         assert self._map.lattice is not None
         cells = moved_cells(before, motion, self._map.lattice.cell_m)
@@ -201,51 +145,20 @@ class Route:
         self._kept = PathProgress(cells[drivable:])
         return update
 
-    def request_plan(self, problem: CoverageProblem) -> PlanRequest:
-        """Request the plan that is wanted."""
-        changed = self._changed if self._is_by_map and not self._full else None
-        problem = replace(problem, is_full=bool(self._full))
-        request = self._request(problem, self._full or self.wanted, changed)
-        self.drop()
-        return request
-
     def request_improvement(self, now: float) -> PlanRequest | None:
         """Request a better path; None without spare time, or where too little of it is left."""
         if not self._spare.is_available(now):
             return None
-        self._attempt = Attempt.at(self.path, self._numberings, self._orders, self.attempts + 1)
-        if self._attempt is None:
+        attempt = Attempt.at(self.path, self._numberings, self._orders, self.attempts + 1)
+        if attempt is None:
             self._spare.skip(now)
             return None
-        return self._request(self._attempt.problem, "spare time")
-
-    def _request(
-        self, problem: CoverageProblem, reason: str, changed: Window | None = None
-    ) -> PlanRequest:
-        self.pending = PlanRequest(self.plans + self.attempts + 1, problem, reason, changed)
-        return self.pending
+        return self._request_attempt(attempt)
 
     def fail(self, event: PlanBroken, now: float) -> None:
         """Note that the plan under way failed: the same problem would make it fail again."""
         self._spare.rest(BROKEN_S, now)
-        request, is_improving = self.pending, self.is_improving
-        if request is None or request.number != event.number:
-            return
-        if not self._close_request() and not is_improving:
-            self.outdated += 1
-            self.want(self.wanted or request.reason, request.changed)
-            self._failure = str(event.why), now
-
-    def why_not_yet(self, now: float) -> str:
-        """Return why no plan may be requested yet; "" where one may be."""
-        why, since = self._failure
-        if why and now - since < BROKEN_S:
-            return f"{why}; tried again with the next map, or after {BROKEN_S:g} s"
-        return ""
-
-    def forget_failure(self) -> None:
-        """Allow a request although the last plan failed: the problem is another."""
-        self._failure = "", 0.0
+        self.outdated += self._close_failed(event, now)
 
     def accept(self, event: PlanReady, now: float) -> PathUpdate | None:
         """Publish a plan that was requested, unless it no longer holds."""
@@ -274,14 +187,6 @@ class Route:
             self.published_at = now
             return None
         return self.publish(cells, request.reason, now, event, request.changed)
-
-    def _close_request(self) -> bool:
-        """Count the plan under way as come back; return whether it was abandoned."""
-        self.plans += self._attempt is None
-        self.attempts += self._attempt is not None
-        self.pending = self._attempt = None
-        is_abandoned, self._is_abandoned = self._is_abandoned, False
-        return is_abandoned
 
     def _accept_better(
         self, attempt: Attempt, event: PlanReady, area: ReachableArea, now: float
