@@ -21,7 +21,7 @@ __version__ = "0.1.0"
 _PLACES = {
     "Map": "offline.maps:Map",
     "Plan": "offline.result:Plan",
-    "Robot": "config.config:RobotConfig",
+    "Robot": "config.robot:RobotConfig",
     "Search": "offline.settings:Search",
     "load_map": "offline.maps:load_map",
     "plan": "offline.plan:plan",

@@ -1,4 +1,4 @@
-from fasaco_edge.config.config import RobotConfig as Robot
+from fasaco_edge.config.robot import RobotConfig as Robot
 from fasaco_edge.offline.maps import Map as Map
 from fasaco_edge.offline.maps import load_map as load_map
 from fasaco_edge.offline.plan import plan as plan

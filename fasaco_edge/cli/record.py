@@ -124,13 +124,8 @@ def run(args: argparse.Namespace) -> int:
 
 def config_of_options(args: argparse.Namespace) -> tuple[DaemonConfig, BusSettings]:
     """Return the configuration that the options state, and how to join the bus."""
-    from fasaco_edge.config.config import (
-        BusConfig,
-        DaemonConfig,
-        PoseConfig,
-        RecordingConfig,
-        RobotConfig,
-    )
+    from fasaco_edge.config.config import BusConfig, DaemonConfig, PoseConfig, RecordingConfig
+    from fasaco_edge.config.robot import RobotConfig
 
     keys, bus, _ = robot_on_bus(args)
     config = DaemonConfig(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import os
 from collections.abc import Mapping
 from pathlib import Path
@@ -14,22 +13,15 @@ from msgspec import Meta
 from fasaco_edge.bus import DEFAULT_ENDPOINT
 from fasaco_edge.bus.settings import BusSettings
 from fasaco_edge.config.endpoints import from_here
-from fasaco_edge.config.footprint import FootprintConfig
 from fasaco_edge.config.metrics import MetricsConfig
 from fasaco_edge.config.reading import Section
+from fasaco_edge.config.robot import RobotConfig
 from fasaco_edge.config.ros import RosConfig
 from fasaco_edge.config.security import SecurityConfig
 from fasaco_edge.errors import BadConfiguration, OrderError
-from fasaco_edge.kernels.floor.turning import (
-    Turning,
-    limited_turning,
-    proportional_turning,
-    turn_seconds,
-)
 from fasaco_edge.mission.config import BatteryPolicy, MissionPolicy
 from fasaco_edge.mission.orders.mask import INLINE, mask_polygons
 from fasaco_edge.mission.orders.order import OrderDocument, ZoneDocument, order_of
-from fasaco_edge.planners.cost import CoverageCost
 from fasaco_edge.planners.paper.colony import ColonyConfig, parse_velocities
 from fasaco_edge.planners.registry import PLANNER_NAMES
 from fasaco_edge.wire import schemas
@@ -42,88 +34,7 @@ if TYPE_CHECKING:
 else:
     PlannerName = Literal[PLANNER_NAMES]
 
-Metres = Annotated[float, Meta(gt=0, le=10)]
-DEFAULT_RADIUS_M = 0.18
 Percent = Annotated[int, Meta(ge=0, le=100)]
-
-
-class RobotConfig(Section, frozen=True):
-    """The robot: its name on the bus, its size [m], and what driving takes it.
-
-    ``quarter_turn_s`` is a turn by 90 degrees on the spot [s], braking and starting
-    included; 0 minimises steps, whatever the turns. Where ``turn_deg_s`` is given, the
-    robot's limits count in its place: the rate of turning [deg/s], its acceleration [deg/s2], that
-    of driving [m/s2], and the largest bend that is steered while driving [deg]. ``overlap`` is by
-    what share of the tool's width lanes overlap where a line is driven (``planner.line``).
-    ``footprint`` stands in place of ``radius_m``: the disc around it is planned with.
-    """
-
-    name: str = "robot"
-    radius_m: Metres = DEFAULT_RADIUS_M
-    footprint: FootprintConfig | msgspec.UnsetType = msgspec.UNSET
-    tool_width_m: Metres = 0.3
-    speed_m_s: Annotated[float, Meta(gt=0, le=10)] = 0.25
-    quarter_turn_s: Annotated[float, Meta(ge=0, le=600)] = 1.5
-    turn_deg_s: Annotated[float, Meta(ge=1, le=1000)] | None = None
-    turn_deg_s2: Annotated[float, Meta(ge=1, le=100_000)] = 180.0
-    acceleration_m_s2: Annotated[float, Meta(ge=0.01, le=100)] = 0.5
-    steered_deg: Annotated[float, Meta(ge=0, le=45)] = 1.0
-    overlap: Annotated[float, Meta(ge=0, le=0.5)] = 0.08
-
-    def __post_init__(self) -> None:
-        """Have the radius of the disc around the footprint, where there is one."""
-        if self.footprint and self.radius_m == DEFAULT_RADIUS_M:
-            radius_m = self.footprint.radius() or DEFAULT_RADIUS_M
-            msgspec.structs.force_setattr(self, "radius_m", radius_m)
-
-    @property
-    def assumed(self) -> str:
-        """What is assumed of the robot's shape; "" where it is the disc that was given."""
-        if not self.footprint:
-            return ""
-        return (
-            f"the robot is planned with the disc around its footprint, of radius "
-            f"{self.radius_m:.3g} m: it may turn on the spot anywhere, passages narrower than "
-            f"{2.0 * self.radius_m:.3g} m are left out, and its tool is where it turns about"
-        )
-
-    def cost(self, cell_m: float | None = None) -> CoverageCost:
-        """Return what a step over a cell, by default one as wide as the tool, and a turn cost.
-
-        Raises:
-            BadConfiguration: a step would take less than a millisecond or more than an hour.
-        """
-        step_m = self.tool_width_m if cell_m is None else cell_m
-        quarter_turn_s = turn_seconds(self.turning(), 0.5 * math.pi)
-        return CoverageCost.for_robot(step_m, self.speed_m_s, quarter_turn_s)
-
-    def turning_deg_s(self) -> float:
-        """Return the rate of turning on the spot [deg/s].
-
-        Without ``turn_deg_s`` that by which a quarter-turn takes ``quarter_turn_s``, braking before
-        and starting after it left out.
-        """
-        if self.turn_deg_s is not None:
-            return self.turn_deg_s
-        seconds = self.quarter_turn_s - self.speed_m_s / self.acceleration_m_s2
-        # 90 = rate (seconds - rate / acceleration); where that cannot be, as fast as it goes.
-        half = 0.5 * seconds * self.turn_deg_s2
-        square = half * half - 90.0 * self.turn_deg_s2
-        if seconds <= 0.0 or square <= 0.0:
-            return math.sqrt(90.0 * self.turn_deg_s2)
-        return half - math.sqrt(square)
-
-    def turning(self) -> Turning:
-        """Return what turns on the spot take."""
-        if self.turn_deg_s is None:
-            return proportional_turning(self.quarter_turn_s)
-        return limited_turning(
-            self.turn_deg_s,
-            self.turn_deg_s2,
-            self.speed_m_s,
-            self.acceleration_m_s2,
-            self.steered_deg,
-        )
 
 
 class BusConfig(Section, frozen=True):

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.daemon.reload import read_config
-from fasaco_edge.doctor import machine, security, session
+from fasaco_edge.doctor import installation, machine, security, session
 from fasaco_edge.doctor.finding import Check, CheckContext, Finding, fail, find_unit, ok, warn
 from fasaco_edge.errors import BadConfiguration, FasacoError
 
@@ -18,9 +18,9 @@ CHECKS = (
     Check("C library", machine.c_library, of_machine=True),
     Check("memory", machine.memory, of_machine=True),
     Check("clock", machine.clock, of_machine=True),
-    Check("kernels", machine.kernels, of_machine=True),
-    Check("disk", machine.disk),
-    Check("permissions", machine.permissions),
+    Check("kernels", installation.kernels, of_machine=True),
+    Check("disk", installation.disk),
+    Check("permissions", installation.permissions),
     Check("session", session.session),
     Check("peers", session.peers),
     Check("endpoints", security.endpoints),

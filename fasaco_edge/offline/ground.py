@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.config.config import RobotConfig
+from fasaco_edge.config.robot import RobotConfig
 from fasaco_edge.errors import EndBlocked, MapTooFar, MapTooLarge
 from fasaco_edge.grid.fine_raster import RobotDiscs, map_to_raster
 from fasaco_edge.grid.floor import Floor, StandLattice

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.config.config import RobotConfig
+from fasaco_edge.config.robot import RobotConfig
 from fasaco_edge.errors import MapFileError
 from fasaco_edge.grid.lattice import Cell, CoverageLattice, Footprint
 from fasaco_edge.grid.map_files import find_map, read_bare_image, read_coverage_grid, read_map

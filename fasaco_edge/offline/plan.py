@@ -12,7 +12,7 @@ from types import FunctionType
 import msgspec
 import numpy as np
 
-from fasaco_edge.config.config import RobotConfig
+from fasaco_edge.config.robot import RobotConfig
 from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.grid.lattice import Cell
 from fasaco_edge.offline.ground import Ground

@@ -18,7 +18,7 @@ from fasaco_edge.bench.floor import (
     judge_floor,
     swept_words,
 )
-from fasaco_edge.config.config import RobotConfig
+from fasaco_edge.config.robot import RobotConfig
 from fasaco_edge.drawing.pictures import draw_walk
 from fasaco_edge.drawing.plot import MapLayer
 from fasaco_edge.drawing.trail import draw_trail

@@ -8,8 +8,8 @@ import yaml
 
 import fasaco_edge as fe
 from fasaco_edge.config.config import DaemonConfig
-from fasaco_edge.config.footprint import FootprintConfig
 from fasaco_edge.config.loading import inspect_config
+from fasaco_edge.config.robot import FootprintConfig
 from fasaco_edge.daemon.loop.answers import config_document
 from fasaco_edge.offline.plan import checked
 from tests.support.processes import fasaco_edge

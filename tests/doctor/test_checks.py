@@ -13,9 +13,10 @@ import pytest
 
 from fasaco_edge.bus.session import open_bus
 from fasaco_edge.bus.settings import BusSettings
-from fasaco_edge.config.config import BusConfig, DaemonConfig, MissionSettings, RobotConfig
+from fasaco_edge.config.config import BusConfig, DaemonConfig, MissionSettings
 from fasaco_edge.config.metrics import MetricsConfig
-from fasaco_edge.doctor import machine, report, security, session
+from fasaco_edge.config.robot import RobotConfig
+from fasaco_edge.doctor import installation, machine, report, security, session
 from fasaco_edge.doctor.finding import Check, CheckContext, Finding, Level, Unit, find_unit
 from fasaco_edge.kernels.sealed import write_sealed
 from fasaco_edge.wire import topics
@@ -170,21 +171,21 @@ def test_folders_and_who_may_write_there(tmp_path):
         bus=BusConfig(connect=("tcp/127.0.0.1:1#key=secret",)),
     )
     context = CheckContext(config, file, recordings=tmp_path / "later" / "recordings")
-    disk = machine.disk(context)
+    disk = installation.disk(context)
     assert disk.level is Level.OK
     assert [line.partition(":")[0] for line in disk.details] == [
         "state",
         "kernel cache",
         "recordings",
     ]
-    assert machine.permissions(context).level is Level.WARN
-    assert "secret" not in machine.permissions(context).found
+    assert installation.permissions(context).level is Level.WARN
+    assert "secret" not in installation.permissions(context).found
     file.chmod(0o640)
-    assert machine.permissions(context).level is Level.OK
+    assert installation.permissions(context).level is Level.OK
     state.chmod(0o777)
-    assert machine.permissions(context).to_do == f"chmod o-w {state}"
+    assert installation.permissions(context).to_do == f"chmod o-w {state}"
     file.chmod(0o666)
-    both = machine.permissions(context)
+    both = installation.permissions(context)
     assert both.level is Level.FAIL
     assert len(both.details) == 2
     # Nothing was made.
@@ -201,19 +202,19 @@ def test_a_read_only_disk_is_told(tmp_path):
         ),
         None,
     )
-    assert machine.disk(CheckContext(config)).level is not Level.OK
+    assert installation.disk(CheckContext(config)).level is not Level.OK
     if read_only is None:
         pytest.skip("nothing is mounted read-only here")
     config = DaemonConfig(mission=MissionSettings(state_dir=f"{read_only}/x"))
-    assert "read-only" in machine.disk(CheckContext(config)).found
+    assert "read-only" in installation.disk(CheckContext(config)).found
 
 
 def test_what_lies_in_place_of_the_ledgers_lock(tmp_path):
     config = DaemonConfig(mission=MissionSettings(state_dir=str(tmp_path)))
-    assert machine.disk(CheckContext(config)).level is Level.OK
+    assert installation.disk(CheckContext(config)).level is Level.OK
     lock = tmp_path / "robot.ledger.lock"
     lock.symlink_to("nowhere")
-    found = machine.disk(CheckContext(config))
+    found = installation.disk(CheckContext(config))
     assert found.level is Level.FAIL
     assert found.found == f"no progress is written: a link lies in place of {lock}"
     assert found.to_do == f"remove {lock}"
@@ -222,7 +223,7 @@ def test_what_lies_in_place_of_the_ledgers_lock(tmp_path):
 def test_kernels_that_are_not_there_or_are_somebody_elses(tmp_path, monkeypatch):
     told = {"Environment": f"NUMBA_CACHE_DIR={tmp_path}", "DynamicUser": "yes"}
     context = CheckContext(DaemonConfig(), unit=Unit(told | {"CacheDirectory": "fasaco-edge"}))
-    found = machine.kernels(context)
+    found = installation.kernels(context)
     assert found.level is Level.WARN
     assert found.found.startswith("not compiled for this version")
     # As root it would make a folder that the daemon does not trust.
@@ -235,30 +236,30 @@ def test_kernels_that_are_not_there_or_are_somebody_elses(tmp_path, monkeypatch)
     from fasaco_edge.kernels.cache import cache_folder
 
     folder = cache_folder()
-    assert "never all compiled" in machine.kernels(context).found
+    assert "never all compiled" in installation.kernels(context).found
     folder.chmod(0o770)
-    found = machine.kernels(CheckContext(DaemonConfig()))
+    found = installation.kernels(CheckContext(DaemonConfig()))
     assert found.level is Level.WARN
     assert found.found.startswith(f"{folder} may be written by its group: the daemon takes no")
     folder.chmod(0o700)
     if os.geteuid() != 0:
         return
     os.chown(folder, 4242, 4242)
-    found = machine.kernels(CheckContext(DaemonConfig()))
+    found = installation.kernels(CheckContext(DaemonConfig()))
     assert found.found.startswith(f"{folder} belongs to user 4242: the daemon takes no")
 
 
 def test_kernels_that_are_damaged_or_were_written_by_several(tmp_path, monkeypatch):
     *files, note = fill_with(tmp_path, 3)
-    monkeypatch.setattr(machine, "wanted_folder", lambda environ: note.parent)
-    assert machine.kernels(CheckContext(DaemonConfig())).level is Level.OK
+    monkeypatch.setattr(installation, "wanted_folder", lambda environ: note.parent)
+    assert installation.kernels(CheckContext(DaemonConfig())).level is Level.OK
     # By another process, that compiles at the same time.
     write_sealed(files[1], b"the same, compiled again")
-    assert machine.kernels(CheckContext(DaemonConfig())).level is Level.OK
+    assert installation.kernels(CheckContext(DaemonConfig())).level is Level.OK
     for harm in HARMS.values():
         before = files[1].read_bytes()
         harm(files[1])
-        found = machine.kernels(CheckContext(DaemonConfig()))
+        found = installation.kernels(CheckContext(DaemonConfig()))
         assert found.level is Level.WARN
         assert found.found.startswith(f"{files[1].name} ")
         assert found.to_do == "fasaco-edge warmup"

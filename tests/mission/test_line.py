@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from fasaco_edge.bench.floor import SweepingRobot, judge_floor
-from fasaco_edge.daemon.loop.status import floor_report
+from fasaco_edge.daemon.loop.mission_reports import floor_report
 from fasaco_edge.grid.geometry import Pose2D, StampedPose, Window
 from fasaco_edge.grid.lattice import Footprint
 from fasaco_edge.grid.occupancy import UNKNOWN, OccupancyGrid

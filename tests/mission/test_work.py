@@ -9,7 +9,7 @@ import sys
 import numpy as np
 import pytest
 
-from fasaco_edge.daemon.loop.status import mission_report
+from fasaco_edge.daemon.loop.mission_reports import mission_report
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D, StampedPose
 from fasaco_edge.grid.lattice import Footprint
 from fasaco_edge.grid.occupancy import OccupancyGrid

@@ -18,7 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.bus.session import Bus
-from fasaco_edge.config.config import DaemonConfig, PlannerConfig, RobotConfig
+from fasaco_edge.config.config import DaemonConfig, PlannerConfig
+from fasaco_edge.config.robot import RobotConfig
 from fasaco_edge.daemon.loop.answers import config_document
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D, StampedPose, Window
 from fasaco_edge.grid.occupancy import OccupancyGrid

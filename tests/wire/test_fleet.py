@@ -9,7 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fasaco_edge.bus.arrival import Sample
-from fasaco_edge.config.config import DaemonConfig, FleetConfig, RobotConfig
+from fasaco_edge.config.config import DaemonConfig, FleetConfig
+from fasaco_edge.config.robot import RobotConfig
 from fasaco_edge.daemon.loop.fleet import LEAST_SPACING_S, TILES, FleetEar, FleetVoice
 from fasaco_edge.errors import FleetError, MalformedMessage
 from fasaco_edge.wire.documents.fleet import FleetMember, SweptTile, decode_member

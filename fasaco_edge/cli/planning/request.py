@@ -12,8 +12,9 @@ from typing import Any
 import msgspec
 
 from fasaco_edge.cli.planning.turning import turning_of
-from fasaco_edge.config.config import DaemonConfig, RobotConfig
+from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.config.loading import load_config
+from fasaco_edge.config.robot import RobotConfig
 from fasaco_edge.offline.settings import CELLS, Search, default_line, require
 from fasaco_edge.offline.user_function import load_function
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from fasaco_edge.config.config import RobotConfig
+from fasaco_edge.config.robot import RobotConfig
 from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.offline.settings import require
 

@@ -1,0 +1,143 @@
+"""The robot's section of the configuration: its outline, its size, and what driving takes it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import Annotated
+
+import msgspec
+from msgspec import Meta
+
+from fasaco_edge.config.reading import Section
+from fasaco_edge.errors import BadConfiguration
+from fasaco_edge.kernels.floor.turning import (
+    Turning,
+    limited_turning,
+    proportional_turning,
+    turn_seconds,
+)
+from fasaco_edge.planners.cost import CoverageCost
+
+Metres = Annotated[float, Meta(gt=0, le=10)]
+DEFAULT_RADIUS_M = 0.18
+Length = Annotated[float, Meta(gt=0, le=7)]
+Coordinate = Annotated[float, Meta(ge=-7, le=7)]
+
+
+class FootprintConfig(Section, frozen=True):
+    """The robot's outline about the point that it turns about [m]; x is ahead.
+
+    Either ``width_m`` and ``length_m``, of which ``ahead_m`` lie ahead of that point (half without
+    it), or the corners (x, y) of a ``polygon``. The robot is planned with the disc around it: it
+    can turn on the spot wherever it is, and passages narrower than that disc are left out. The tool
+    is taken to be at the point that the robot turns about.
+    """
+
+    width_m: Length | None = None
+    length_m: Length | None = None
+    ahead_m: Annotated[float, Meta(ge=0, le=7)] | None = None
+    polygon: tuple[tuple[Coordinate, Coordinate], ...] = ()
+
+    def radius(self) -> float:
+        """Return the radius of the disc around it [m]; 0 where too little is said."""
+        corners = self.polygon
+        if self.width_m is not None and self.length_m is not None:
+            ahead = 0.5 * self.length_m if self.ahead_m is None else self.ahead_m
+            corners = tuple((x, 0.5 * self.width_m) for x in (ahead, ahead - self.length_m))
+        return max((math.hypot(x, y) for x, y in corners), default=0.0)
+
+    def faults(self) -> Iterator[BadConfiguration]:
+        """Yield what is missing, there twice, or does not fit together."""
+        lengths = (self.width_m, self.length_m)
+        if self.polygon and any(length is not None for length in (*lengths, self.ahead_m)):
+            yield BadConfiguration("must be a polygon, or width_m and length_m, not both")
+        elif not self.polygon and None in lengths:
+            yield BadConfiguration("must have width_m and length_m, or a polygon")
+        elif self.polygon and len(self.polygon) < 3:
+            yield BadConfiguration(f"polygon must have 3 corners, got {len(self.polygon)}")
+        elif self.polygon and not self.radius():
+            yield BadConfiguration("polygon must have corners apart from each other")
+        elif self.length_m is not None and (self.ahead_m or 0.0) > self.length_m:
+            yield BadConfiguration(
+                f"ahead_m must be at most length_m, {self.length_m:g}, got {self.ahead_m:g}"
+            )
+
+
+class RobotConfig(Section, frozen=True):
+    """The robot: its name on the bus, its size [m], and what driving takes it.
+
+    ``quarter_turn_s`` is a turn by 90 degrees on the spot [s], braking and starting
+    included; 0 minimises steps, whatever the turns. Where ``turn_deg_s`` is given, the
+    robot's limits count in its place: the rate of turning [deg/s], its acceleration [deg/s2], that
+    of driving [m/s2], and the largest bend that is steered while driving [deg]. ``overlap`` is by
+    what share of the tool's width lanes overlap where a line is driven (``planner.line``).
+    ``footprint`` stands in place of ``radius_m``: the disc around it is planned with.
+    """
+
+    name: str = "robot"
+    radius_m: Metres = DEFAULT_RADIUS_M
+    footprint: FootprintConfig | msgspec.UnsetType = msgspec.UNSET
+    tool_width_m: Metres = 0.3
+    speed_m_s: Annotated[float, Meta(gt=0, le=10)] = 0.25
+    quarter_turn_s: Annotated[float, Meta(ge=0, le=600)] = 1.5
+    turn_deg_s: Annotated[float, Meta(ge=1, le=1000)] | None = None
+    turn_deg_s2: Annotated[float, Meta(ge=1, le=100_000)] = 180.0
+    acceleration_m_s2: Annotated[float, Meta(ge=0.01, le=100)] = 0.5
+    steered_deg: Annotated[float, Meta(ge=0, le=45)] = 1.0
+    overlap: Annotated[float, Meta(ge=0, le=0.5)] = 0.08
+
+    def __post_init__(self) -> None:
+        """Have the radius of the disc around the footprint, where there is one."""
+        if self.footprint and self.radius_m == DEFAULT_RADIUS_M:
+            radius_m = self.footprint.radius() or DEFAULT_RADIUS_M
+            msgspec.structs.force_setattr(self, "radius_m", radius_m)
+
+    @property
+    def assumed(self) -> str:
+        """What is assumed of the robot's shape; "" where it is the disc that was given."""
+        if not self.footprint:
+            return ""
+        return (
+            f"the robot is planned with the disc around its footprint, of radius "
+            f"{self.radius_m:.3g} m: it may turn on the spot anywhere, passages narrower than "
+            f"{2.0 * self.radius_m:.3g} m are left out, and its tool is where it turns about"
+        )
+
+    def cost(self, cell_m: float | None = None) -> CoverageCost:
+        """Return what a step over a cell, by default one as wide as the tool, and a turn cost.
+
+        Raises:
+            BadConfiguration: a step would take less than a millisecond or more than an hour.
+        """
+        step_m = self.tool_width_m if cell_m is None else cell_m
+        quarter_turn_s = turn_seconds(self.turning(), 0.5 * math.pi)
+        return CoverageCost.for_robot(step_m, self.speed_m_s, quarter_turn_s)
+
+    def turning_deg_s(self) -> float:
+        """Return the rate of turning on the spot [deg/s].
+
+        Without ``turn_deg_s`` that by which a quarter-turn takes ``quarter_turn_s``, braking before
+        and starting after it left out.
+        """
+        if self.turn_deg_s is not None:
+            return self.turn_deg_s
+        seconds = self.quarter_turn_s - self.speed_m_s / self.acceleration_m_s2
+        # 90 = rate (seconds - rate / acceleration); where that cannot be, as fast as it goes.
+        half = 0.5 * seconds * self.turn_deg_s2
+        square = half * half - 90.0 * self.turn_deg_s2
+        if seconds <= 0.0 or square <= 0.0:
+            return math.sqrt(90.0 * self.turn_deg_s2)
+        return half - math.sqrt(square)
+
+    def turning(self) -> Turning:
+        """Return what turns on the spot take."""
+        if self.turn_deg_s is None:
+            return proportional_turning(self.quarter_turn_s)
+        return limited_turning(
+            self.turn_deg_s,
+            self.turn_deg_s2,
+            self.speed_m_s,
+            self.acceleration_m_s2,
+            self.steered_deg,
+        )

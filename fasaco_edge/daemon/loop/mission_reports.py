@@ -1,0 +1,181 @@
+"""The mission's parts of a status and of an answer: map, pose, coverage, floor, plans, order."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from fasaco_edge.mission.orders.order_state import OrderState
+from fasaco_edge.wire.documents.replies import (
+    CoverageReport,
+    FloorLeft,
+    FloorReport,
+    MissionReport,
+    Point,
+    UnreachedArea,
+    UnreachedReport,
+    ZoneReport,
+)
+from fasaco_edge.wire.documents.status import (
+    BatteryReport,
+    MapReport,
+    PlanCounts,
+    PoseReport,
+)
+
+if TYPE_CHECKING:
+    from fasaco_edge.mission.core.mission import Mission
+
+
+def map_report(mission: Mission | None) -> MapReport | None:
+    """Return the map's part; None before there is a map."""
+    if mission is None or mission.grid is None:
+        return None
+    geometry = mission.grid.geometry
+    return MapReport(
+        rows=geometry.rows,
+        cols=geometry.cols,
+        resolution_m=geometry.resolution,
+        revision=mission.map_revision,
+        stamp_ns=mission.grid.stamp_ns,
+        frame=mission.grid.frame,
+        lattice_deg=round(mission.turn.deg, 3),
+    )
+
+
+def pose_report(mission: Mission | None) -> PoseReport | None:
+    """Return the robot's pose; None before there is one."""
+    if mission is None or mission.pose is None:
+        return None
+    pose = mission.pose.pose
+    return PoseReport(x=round(pose.x, 3), y=round(pose.y, 3), yaw=round(pose.yaw, 4))
+
+
+def battery_report(mission: Mission | None, now: float) -> BatteryReport | None:
+    """Return the battery's part; None where no battery is heard."""
+    if mission is None or not mission.charging.gauge.power:
+        return None
+    charging, gauge = mission.charging, mission.charging.gauge
+    drain = gauge.drain_per_s
+    is_charging = mission.order_state.errand == "charge"
+    return BatteryReport(
+        rounded(gauge.level),
+        gauge.power,
+        round(gauge.silent_s(now), 1),
+        rounded(None if drain is None else 3600.0 * drain),
+        rounded(charging.turns_back_at if charging.policy else None),
+        rounded(charging.goes_on_at if charging.policy and is_charging else None),
+    )
+
+
+def coverage_report(mission: Mission | None) -> CoverageReport | None:
+    """Return what is covered, in cells and square metres; None before there is a map."""
+    coverage = mission.coverage() if mission else None
+    if coverage is None:
+        return None
+    return CoverageReport(
+        coverable=coverage.coverable,
+        covered=coverage.covered,
+        recovered=coverage.recovered,
+        remaining=coverage.remaining,
+        unreachable=coverage.unreachable,
+        covered_m2=round(coverage.covered_m2, 3),
+        to_cover_m2=round(coverage.to_cover_m2, 3),
+        free_out_of_reach_m2=round(coverage.free_out_of_reach_m2, 3),
+        fraction=round(coverage.fraction, 4),
+    )
+
+
+def floor_report(mission: Mission | None) -> FloorReport | None:
+    """Return which floor is swept, and what is left of it; None without a mission."""
+    if mission is None:
+        return None
+    swept_m2, to_sweep = round(mission.floor.swept_m2, 3), mission.floor_to_sweep()
+    if to_sweep is None:
+        return FloorReport(swept_m2)
+    # Before the first path nothing has been weighed.
+    is_planned = mission.route.revision > 0
+    beside = "beside the path, and not worth the way" if is_planned else "not planned yet"
+    left = _largest_first((to_sweep.ahead_m2, "on the path"), (to_sweep.left_m2, beside))
+    beyond = _largest_first(*((m2, reason) for reason, m2 in to_sweep.beyond_m2.items()))
+    return FloorReport(swept_m2, round(to_sweep.asked_m2, 3), left, beyond)
+
+
+def _largest_first(*parts: tuple[float, str]) -> tuple[FloorLeft, ...]:
+    """Return floor left for some reasons [m2], without those that are of none."""
+    told = (FloorLeft(round(m2, 3), reason) for m2, reason in parts)
+    return tuple(sorted((part for part in told if part.m2), key=lambda part: -part.m2))
+
+
+def plan_counts(mission: Mission | None) -> PlanCounts:
+    """Return the counts of plans."""
+    if mission is None:
+        return PlanCounts()
+    route = mission.route
+    counts = (route.plans, route.unchanged, route.outdated, route.attempts)
+    return PlanCounts(*counts, planning=route.is_planning)
+
+
+def rounded(value: float | None) -> float | None:
+    """Return a value as it is reported, to three digits."""
+    return None if value is None else round(value, 3)
+
+
+def mission_report(
+    mission: Mission | None, order_state: OrderState, standing: int = 0
+) -> MissionReport:
+    """Return the order and its progress; ``standing`` is how many keep-out zones hold for all."""
+    order, zone = order_state.order, order_state.current_zone
+    home = mission.home if mission else order_state.home
+    return MissionReport(
+        ordered=None if order is None else ("itself" if order_state.automatic else "command"),
+        stage=None if order is None else str(order_state.stage),
+        paused=order_state.paused,
+        zone=None if zone is None or zone.polygon is None else zone.name,
+        pass_number=None if zone is None else order_state.pass_number,
+        passes=None if zone is None else zone.passes,
+        zones=_zones(mission, order_state),
+        keep_out=(0 if order is None else len(order.keep_out)) + standing,
+        return_home=bool(order and order.return_home),
+        home=None if home is None or mission is None else _place(mission, home),
+        tries=order_state.tries,
+        unreached=_unreached(mission),
+    )
+
+
+def _zones(mission: Mission | None, order_state: OrderState) -> tuple[ZoneReport, ...]:
+    if mission is None:
+        zones = order_state.order.zones if order_state.order else ()
+        return tuple(
+            ZoneReport(zone.name, zone.passes) for zone in zones if zone.polygon is not None
+        )
+    return tuple(
+        ZoneReport(zone.name, zone.passes, zone.begun, zone.cells, zone.covered)
+        for zone in mission.zone_progress()
+    )
+
+
+def _unreached(mission: Mission | None) -> UnreachedReport:
+    if mission is None or mission.lattice is None:
+        return UnreachedReport()
+    found, cell_m = mission.unreached(), mission.lattice.cell_m
+    areas = tuple(
+        UnreachedArea(
+            area.cells,
+            round(area.cells * cell_m**2, 3),
+            *_centre(mission, area.cell, cell_m),
+            reason=area.reason,
+        )
+        for area in found.areas
+    )
+    m2 = round(found.cells * cell_m**2, 3)
+    return UnreachedReport(found.cells, m2, areas, found.areas_left_out)
+
+
+def _place(mission: Mission, cell: tuple[int, int]) -> Point | None:
+    lattice = mission.lattice
+    return None if lattice is None else Point(*_centre(mission, cell, lattice.cell_m))
+
+
+def _centre(mission: Mission, cell: tuple[int, int], cell_m: float) -> tuple[float, float]:
+    x, y = mission.turn.centre(cell, cell_m)
+    return round(x, 3), round(y, 3)
