@@ -42,6 +42,8 @@ CUT_M = 0.002
 PASSED_WITHIN_M = 0.02
 # As a last resort the path is joined anywhere in this much of its beginning [m].
 JOIN_WITHIN_M = 2.0
+# Ways back along the track turn off at each of its last points, further back at every so many.
+BACK_POINTS, BACK_STRIDE = 100, 10
 
 
 @dataclass(frozen=True, slots=True)
@@ -241,7 +243,8 @@ def joined(
     if passed == len(path):
         return path[:0]
     targets = [target for target in (passed, passed - 1) if target >= 0]
-    back = range(1, len(track) + 1)
+    near_points = min(BACK_POINTS, len(track))
+    back = [*range(1, near_points + 1), *range(near_points + BACK_STRIDE, len(track), BACK_STRIDE)]
     ways = [(gone_back, target) for gone_back in back for target in targets]
     way = np.cumsum(np.hypot(*np.diff(path, axis=0).T))
     head = path[: 1 + int(np.searchsorted(way, JOIN_WITHIN_M, side="right"))]

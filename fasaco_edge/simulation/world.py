@@ -33,8 +33,9 @@ from fasaco_edge.simulation.robot import (
 
 # Spacing of the recorded track on straight runs [m]; corners are recorded as they are.
 TRACK_SPACING_M = 0.02
-# About two metres of it show which part of a new path is driven already.
-RECENT_TRACK_POINTS = 100
+# So many metres of it show which part of a new path is driven already: at twenty times the real
+# speed, a path that took a second begins five metres behind the robot.
+RECENT_TRACK_POINTS = 500
 # A base that hears no velocity for so long stops by itself [s].
 DEAF_S = 0.5
 # A way of its own to its path keeps so far from everything where one does [m].

@@ -57,12 +57,13 @@ class Robot:
     mission: Mission
     at: tuple[float, float] = START
     now: float = 0.0
+    clock_speed: float = 0.0
     line: list[tuple[float, float]] = field(default_factory=list)
     trail: list[tuple[float, float]] = field(default_factory=list)
     reasons: list[str] = field(default_factory=list)
 
     def tell(self, *events):
-        pose = StampedPose(Pose2D(*self.at), "map")
+        pose = StampedPose(Pose2D(*self.at), "map", round(1e9 * self.clock_speed * self.now))
         decision = self.mission.step([*events, PoseReceived(pose)], self.now)
         for _ in range(4):
             assert not decision.faults
@@ -410,6 +411,22 @@ def test_a_robot_that_stands_gets_its_line_again():
     assert robot.reasons[told:] == ["robot stands"]
     assert math.dist(robot.line[0], robot.at) < 0.05
     assert robot.line[-1] == line[-1]
+    robot.finish()
+
+
+def test_how_long_a_robot_stands_is_told_by_its_own_clock():
+    robot = Robot(Mission(CONFIG))
+    robot.tell(MapReceived(room(6.0, 3.0)))
+    for _ in range(20):
+        robot.tell()
+    robot.drive(20)
+    told, stood_since = len(robot.reasons), robot.now
+    robot.line, robot.clock_speed = [], 20.0  # it is simulated, at twenty times the real speed
+    while not robot.line and robot.now < stood_since + 40.0:
+        robot.now += 0.1
+        robot.tell()
+    assert robot.reasons[told:] == ["robot stands"]
+    assert robot.now - stood_since < 2.0
     robot.finish()
 
 

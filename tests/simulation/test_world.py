@@ -119,6 +119,23 @@ def test_a_new_path_that_turns_off_behind_is_fetched():
     assert distances_to(world.track, off).max() < 0.03
 
 
+def test_a_path_that_begins_metres_behind_is_taken_up_where_the_robot_is():
+    world = started(building(8, 4), Pose2D(1.0, 1.0))
+    path = np.array([(1.0, 1.0), (3.0, 1.0), (3.0, 2.0), (7.0, 2.0)])
+    world.follow(path)
+    run(world, 1400)
+    x, y = world.pose.x, world.pose.y
+    assert x > 4.5
+    assert y == pytest.approx(2.0, abs=0.01)
+    driven = len(world.track)
+    # It was under way for so long that it begins more than 4 m behind the robot.
+    world.follow(np.vstack((path, [(7.0, 1.0)])))
+    run(world)
+    assert world.track[driven:, 0].min() > x - 0.1, "it does not turn back"
+    assert world.activity is Activity.IDLE
+    assert (world.pose.x, world.pose.y) == pytest.approx((7.0, 1.0), abs=0.01)
+
+
 def test_an_empty_path_halts():
     world = started(building(8, 4), Pose2D(1.0, 1.0))
     world.follow(centres(*[(2, col) for col in range(2, 18)]))

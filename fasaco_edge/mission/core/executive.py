@@ -27,7 +27,9 @@ from fasaco_edge.mission.orders.sequencer import Sequencer
 # more often than this [s]: a flickering pose must not keep the planner busy.
 PATIENCE_S = 1.0
 # A robot that stands for so long on its path gets it again [s]: it may have lost it, or stopped for
-# something that is gone.
+# something that is gone. Not sooner: it may wait for somebody to pass, or be on its way out of a
+# corner, which another path would end. By its own clock, so that one that is simulated at twenty
+# times the real speed does not stand for ten of its minutes.
 STANDING_S, STANDING_M = 30.0, 0.1
 # One that stands beside its path gets another so soon [s]: no straight way may lead it back.
 BESIDE_S = 2.0
@@ -61,9 +63,10 @@ class Executive:
     # The cell the robot is in, and since when.
     _cell: Cell | None = field(default=None, init=False)
     _entered_at: float = field(default=0.0, init=False)
-    # Where the robot has been since when, to STANDING_M.
+    # Where the robot has been, to STANDING_M, and since when it has had its path there: by our
+    # clock [s], and by its own [ns].
     _place: tuple[float, float] = field(default=(math.inf, math.inf), init=False)
-    _came_at: float = field(default=0.0, init=False)
+    _stands_since: tuple[float, int] = field(default=(0.0, 0), init=False)
 
     def status(self) -> tuple[State, str]:
         """Return the state and its reason as they are reported."""
@@ -206,12 +209,19 @@ class Executive:
         return len(self.route.path.ahead) > 1 and stood_s >= STANDING_S
 
     def _stood_s(self) -> float:
-        """Return for how long the robot has been in one place, and has had its path [s]."""
+        """Return for how long the robot has been in one place, and has had its path [s].
+
+        By our clock or its own, whichever says longer: stamps may stand still.
+        """
         assert self.map.pose is not None
-        here = self.map.pose.pose.x, self.map.pose.pose.y
+        stamped, published_at = self.map.pose, self.route.published_at
+        here = stamped.pose.x, stamped.pose.y
         if math.dist(here, self._place) > STANDING_M:
-            self._place, self._came_at = here, self._now
-        return self._now - max(self._came_at, self.route.published_at)
+            self._place, self._stands_since = here, (self._now, stamped.stamp_ns)
+        elif published_at > self._stands_since[0]:
+            self._stands_since = published_at, stamped.stamp_ns
+        since, since_ns = self._stands_since
+        return max(self._now - since, (stamped.stamp_ns - since_ns) * 1e-9)
 
     def _request(self, cell: Cell, update: PathUpdate | None) -> Decision:
         """Request the plan that is wanted; where nothing is to be covered, go on."""
