@@ -1,4 +1,4 @@
-"""The one place that speaks to Zenoh: sessions, publishers, subscriptions, the mailbox."""
+"""The only package that imports Zenoh: sessions, publishers, subscriptions, the mailbox."""
 
 from __future__ import annotations
 

@@ -1,15 +1,16 @@
-"""Access rules, limits of size and rates for Zenoh, made from roles and the table of topics.
+"""Access rules, size limits and rate limits for Zenoh, derived from roles and the topic table.
 
-All of it is configuration of the session that listens (or of a router): Zenoh refuses what is not
-allowed before it reaches this program. Roles are named by what the *other* side does, as
-``protocol/README.md`` lists them.
+They are configuration of the session that listens (or of a router): Zenoh refuses forbidden
+messages before they reach this program. A role is named after what the *other* side does, as
+listed in ``protocol/README.md``.
 
-* Everything is denied that is not named. ``**`` does not match a chunk that begins with ``@``, so
-  every key is named, and beside it what Zenoh's advanced publishers and subscribers use to serve
+* Whatever is not named is denied. ``**`` does not match a chunk that begins with ``@``, so
+  every key is named, and also the key that Zenoh's advanced publishers and subscribers use to serve
   late joiners: ``<key>/@adv/**``.
-* A role that speaks on a key may publish, answer queries and declare a liveliness token there; one
+* A role that speaks on a key may publish, reply to queries and declare a liveliness token there;
+one
   that listens may subscribe, query and look for tokens. Neither may delete.
-* Rules hold in both directions: what a role may not receive is not sent to it either.
+* Rules hold in both directions: a message that a role may not receive is not sent to it.
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ from fasaco_edge.wire.topics import QUERIES, RPC_NAMES, TOPICS
 SPEAK = ("put", "reply", "declare_queryable", "liveliness_token")
 LISTEN = ("declare_subscriber", "query", "declare_liveliness_subscriber", "liveliness_query")
 
-# Beside its cells a map holds some numbers and the name of a frame, a path's attachment less still.
+# Bytes of a map beside its cells: some numbers and a frame name. A path's attachment is smaller.
 HEADER_BYTES = 1024
 # The largest pose is a nav_msgs/Odometry with two covariances and two names.
 POSE_BYTES = 4096
@@ -42,15 +43,15 @@ TOKENS = tuple(entry.suffix for entry in ENTRIES if entry.size_class == "token")
 
 @dataclass(frozen=True, slots=True)
 class Role:
-    """What the other side may do, by topics: what its keys end with.
+    """Rights of the other side, by topic (the last part of a key).
 
     Attributes:
-        description: the same for people.
-        speaks: topics it may publish and answer for.
-        listens: topics it may subscribe to and ask.
-        asked: topics that it is told of who listens to, by key expressions for all robots too: else
+        description: the rights in words, for people.
+        speaks: topics it may publish, and on which it may reply to queries.
+        listens: topics it may subscribe to and query.
+        asked: topics whose subscribers it learns of, also those of all robots: otherwise
             it would not publish its own.
-        includes: another role whose rights it has too; "" for none.
+        includes: another role whose rights it also has; "" for none.
     """
 
     description: str
@@ -82,7 +83,7 @@ ROLES: Mapping[str, Role] = {
         "publishes maps, updates, poses and battery on ROS 2 topics, sees path, coverage and "
         "diagnostics, commands by services"
     ),
-    # A daemon connects to it: what others may do there, the router itself has to restrict.
+    # A daemon connects to it; the router itself must restrict the other clients.
     "router": Role("forwards everything, both ways", speaks=EVERYTHING, listens=EVERYTHING),
     "fleet": replace(
         _role("fleet", "another robot of the fleet, beside its own role"), asked=("fleet",)
@@ -94,15 +95,15 @@ ROLES: Mapping[str, Role] = {
 
 @dataclass(frozen=True, slots=True)
 class Grant:
-    """A role given to names, for one robot or all.
+    """A role granted to names, for one robot or all.
 
     Attributes:
         role: one of ROLES.
         names: common names of certificates, or user names; one may have several roles.
-        prefix: what the keys begin with: ``fasaco/@v1/robot``, ``fasaco/@v1/*`` for all robots;
+        prefix: first part of the keys: ``fasaco/@v1/robot``, ``fasaco/@v1/*`` for all robots;
             "" where topics are whole keys.
         of: distinguishes grants of one role with several prefixes; "" where there is one.
-        rights: what the role may do; None for what ROLES says.
+        rights: rights of the role; None for those in ROLES.
     """
 
     role: str
@@ -113,15 +114,15 @@ class Grant:
 
     @property
     def title(self) -> str:
-        """What it is called in Zenoh's configuration."""
+        """Its name in Zenoh's configuration."""
         return f"{self.role} of {self.of}" if self.of else self.role
 
 
 class Limits(msgspec.Struct, frozen=True):
-    """Largest size [bytes] and rate [1/s] of what each sender may send.
+    """Largest size [bytes] and rate [1/s] of the messages of each sender.
 
-    Zenoh drops what is larger; of what is more frequent it passes the first of each period and
-    drops the others. Map updates have no rate: a lost one would spoil the map unnoticed.
+    Zenoh drops larger messages; above the rate it passes the first message of each period and
+    drops the others. Map updates have no rate limit: a lost one would corrupt the map unnoticed.
     """
 
     map_bytes: Annotated[int, Meta(ge=HEADER_BYTES)] = MAX_GRID_CELLS + HEADER_BYTES
@@ -131,10 +132,10 @@ class Limits(msgspec.Struct, frozen=True):
 
 
 def access_control(grants: Sequence[Grant], attribute: str) -> dict[str, Any]:
-    """Return Zenoh's ``access_control``: everything is denied but what is granted.
+    """Return Zenoh's ``access_control``: whatever is not granted is denied.
 
     Args:
-        grants: the roles given. One without a name is left out: to Zenoh, no name is everybody.
+        grants: the roles granted. A grant without names is skipped: Zenoh reads it as everybody.
         attribute: kind of the names: "cert_common_names" or "usernames".
     """
     rules: dict[str, dict[str, Any]] = {}
@@ -157,12 +158,12 @@ def access_control(grants: Sequence[Grant], attribute: str) -> dict[str, Any]:
 
 
 def limits(prefix: str, most: Limits) -> dict[str, Any]:
-    """Return Zenoh's ``low_pass_filter`` and ``downsampling`` for what comes in."""
+    """Return Zenoh's ``low_pass_filter`` and ``downsampling`` for incoming messages."""
     published = ["put", "reply"]
     classes: dict[str, list[str]] = {}
     for entry in ENTRIES:
         classes.setdefault(entry.size_class, []).append(entry.suffix)
-    # These answer queries with their last sample, as a storage would.
+    # These reply to queries with their last sample, as a storage would.
     answered = [topic.suffix for topic in TOPICS if topic.name in RPC_NAMES]
     sizes = (
         ("grids and paths", published, classes["large"], most.map_bytes),
@@ -201,7 +202,7 @@ def limits(prefix: str, most: Limits) -> dict[str, Any]:
 
 
 def ros_rights(heard: Sequence[str], said: Sequence[str], graph: Sequence[str]) -> Role:
-    """Return what the other side may do in a ROS 2 graph.
+    """Return the rights of the other side in a ROS 2 graph.
 
     Args:
         heard, said: keys the daemon subscribes to, and publishes on.
@@ -266,7 +267,7 @@ def _rules(grant: Grant) -> Iterator[dict[str, Any]]:
 
 
 def _keys(prefix: str, topics: Sequence[str]) -> list[str]:
-    """Return the keys of topics, and of what serves their late joiners."""
+    """Return the keys of topics and the keys that serve their late joiners."""
     begin = f"{prefix}/" if prefix else ""
     published = [topic for topic in topics if topic not in TOKENS and topic[0] != "@"]
     return [begin + topic for topic in topics] + [f"{begin}{one}/@adv/**" for one in published]

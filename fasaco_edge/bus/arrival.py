@@ -1,4 +1,4 @@
-"""Samples from the bus, and when they arrived."""
+"""Samples from the bus, and their times of arrival."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ if TYPE_CHECKING:
 class Sample:
     """A message from the bus.
 
-    Payload and attachment stay in Zenoh's buffers until they are read: a message that a newer one
-    replaces before is never copied.
+    Payload and attachment stay in Zenoh's buffers until they are read: a message that is replaced
+    by a newer one before that is never copied.
 
     Attributes:
         key: its key.
@@ -38,7 +38,7 @@ class Sample:
 
     @classmethod
     def of(cls, sample: zenoh.Sample) -> Sample:
-        """Return what Zenoh has delivered."""
+        """Return a sample delivered by Zenoh."""
         attachment = b"" if sample.attachment is None else sample.attachment
         return cls(str(sample.key_expr), sample.payload, schema_of(sample.encoding), attachment)
 
@@ -51,7 +51,7 @@ class Sample:
 
     @property
     def attachment(self) -> bytes:
-        """What came beside it."""
+        """The attachment of the message."""
         if not isinstance(self._attachment, bytes):
             self._attachment = self._attachment.to_bytes()
         return self._attachment
@@ -74,19 +74,19 @@ class Sample:
 
 
 def schema_of(encoding: zenoh.Encoding) -> str:
-    """Return the type that an encoding names, "" for none."""
+    """Return the message type named by an encoding, "" for none."""
     return str(encoding).partition(";")[2]
 
 
 @dataclass(frozen=True, slots=True)
 class Arrival:
-    """A sample, its topic, and when it came.
+    """A sample, its topic and its time of arrival.
 
     Attributes:
         topic: name of its row in ``wire.topics``: "map", "pose" ...
         sample: the sample.
-        at_ns: when, by a clock that never steps [ns].
-        wall_ns: when, since the epoch [ns].
+        at_ns: time of arrival by the monotonic clock [ns].
+        wall_ns: time of arrival since the epoch [ns].
     """
 
     topic: str

@@ -1,14 +1,13 @@
-"""Subscriber of a latched key: gets the kept samples on joining, and a lost last one afterwards.
+"""Subscriber of a latched key: receives the cached samples on joining, recovers a lost last one.
 
-Zenoh's advanced subscriber (1.10) does that, too, but once a second, for as long as the session
-lives, it queries every publisher that there ever was, even for subscribers that were undeclared.
-This one queries the publishers that exist, which it knows by their liveliness tokens: each at most
-once a second, and a bounded number of them. So open queries and memory are bounded, whatever
-publishers come and go: ``asked_publishers`` says which are queried when, ``sample_order`` in what
-order samples and answers are delivered.
+Zenoh's advanced subscriber (1.10) does the same, but as long as the session lives it queries, once
+a second, every publisher that ever existed, even for subscribers that were undeclared. This one
+queries only publishers that exist, known by their liveliness tokens: each at most once a second,
+and a bounded number of them. So open queries and memory stay bounded however many publishers come
+and go. ``asked_publishers`` schedules the queries; ``sample_order`` orders samples and replies.
 
-For the same reason it queries the tokens and does not subscribe to them: each key that a subscriber
-has ever received stays in the memory of its session, and of the router before it.
+For the same reason it queries tokens and does not subscribe to them: each key that a subscriber
+has ever received stays in the memory of its session and of its router.
 """
 
 from __future__ import annotations
@@ -25,9 +24,9 @@ from fasaco_edge.bus.asked_publishers import ASK_PERIOD_S, AskedPublisher, Asked
 from fasaco_edge.bus.queries import ask_for_tokens
 from fasaco_edge.bus.sample_order import SampleOrder
 
-# Timeout of an answer [s]: a large map on a slow link takes long. No query is repeated meanwhile.
+# Timeout of a reply [s]: a large map on a slow link takes long. No query is repeated meanwhile.
 ANSWER_S = 10.0
-# Most tokens that are looked at.
+# Most tokens that are read.
 MOST_TOKENS = 1024
 
 Receive = Callable[[zenoh.Sample], None]
@@ -40,22 +39,22 @@ class Subscription:
         self._subscriber = subscriber
 
     def ask(self) -> None:
-        """Query the samples kept for late joiners: none here."""
+        """Query the samples cached for late joiners: none here."""
 
     def end(self) -> None:
-        """Receive no more; it only has to be released then."""
+        """Stop receiving; afterwards it only has to be released."""
         subscriber: Any = self._subscriber  # undeclare() has no annotation
         subscriber.undeclare()
 
     def release(self) -> None:
-        """Release the objects of Zenoh: a subscriber with a callback receives all the same."""
+        """Release the Zenoh objects: a subscriber with a callback goes on receiving otherwise."""
         del self._subscriber
 
 
 class LatchedSubscription(Subscription):
     """A subscriber that receives the last ``depth`` samples of each publisher, also of later ones.
 
-    Samples of one publisher come in order, none twice, unless ``ask`` queries them again.
+    Samples of one publisher are delivered in order and once, unless ``ask`` queries them again.
     """
 
     def __init__(
@@ -74,7 +73,7 @@ class LatchedSubscription(Subscription):
         self._asker = asker
         self._key = zenoh.KeyExpr(key)
         self._caches = f"{key}/@adv/**"
-        # Reentrant: a cache of the same session answers on the thread that asks.
+        # Reentrant: a cache of the same session replies on the querying thread.
         self._lock = threading.RLock()
         self._publishers = AskedPublishers()
         self._order = SampleOrder(depth, self._publishers, asker.wake)
@@ -86,13 +85,13 @@ class LatchedSubscription(Subscription):
         asker.add(self)
 
     def ask(self) -> None:
-        """Ask every publisher for its last samples, those heard already among them."""
+        """Query every publisher for its last samples, also those received already."""
         with self._lock:
             self._publishers.ask_all()
         self._asker.wake()
 
     def ask_who_is_due(self, now: float) -> float:
-        """Ask, on the asker's thread; return when there is more to ask [s, monotonic]."""
+        """Send due queries, on the asker's thread; return when the next is due [s, monotonic]."""
         self._query_tokens(now)
         with self._lock:
             self._deliver(self._order.take_due(now))
@@ -101,7 +100,7 @@ class LatchedSubscription(Subscription):
             if asks_all:
                 questions.append((f"{self._caches}?_max={self._depth}", None))
             for publisher in self._publishers.take_due(now):
-                # One key for all where it can be: of each Zenoh remembers something.
+                # One key for all where possible: Zenoh remembers each key.
                 key = self._caches if len(self._publishers) == 1 else publisher.key
                 questions.append((f"{key}?{self._order.missing(publisher.name)}", publisher))
             next_at = min(self._query_tokens_at, self._publishers.next_at, self._order.next_at)
@@ -120,7 +119,7 @@ class LatchedSubscription(Subscription):
                 if not self._publishers.open_queries:
                     self._deliver(self._order.take_held())
 
-        with contextlib.suppress(zenoh.ZError):  # a session that ends asks nobody
+        with contextlib.suppress(zenoh.ZError):  # a session that ends sends no queries
             self._session.get(
                 selector,
                 zenoh.handlers.Callback(take, end, indirect=False),
@@ -130,7 +129,7 @@ class LatchedSubscription(Subscription):
             )
 
     def _query_tokens(self, now: float) -> None:
-        """Ask for the tokens of the publishers that are there."""
+        """Query the tokens of the existing publishers."""
         with self._lock:
             if now < self._query_tokens_at or self._awaits_tokens:
                 return
@@ -152,12 +151,12 @@ class LatchedSubscription(Subscription):
             self._asker.wake()
 
     def _on_sample(self, sample: zenoh.Sample) -> None:
-        """Take what is published, on a Zenoh thread."""
+        """Take a published sample, on a Zenoh thread."""
         with self._lock:
             self._deliver(self._order.take_published(sample))
 
     def _on_answer(self, sample: zenoh.Sample, *, again: bool) -> None:
-        """Take an answer, on a Zenoh thread."""
+        """Take a reply, on a Zenoh thread."""
         with self._lock:
             self._deliver(self._order.take_answer(sample, again=again))
 
@@ -167,7 +166,7 @@ class LatchedSubscription(Subscription):
 
 
 class Asker:
-    """The thread a session's latched subscriptions ask on: Zenoh's own must not call Zenoh."""
+    """Thread that sends queries of latched subscriptions: Zenoh's own must not call Zenoh."""
 
     def __init__(self) -> None:
         self._changed = threading.Condition()
@@ -177,7 +176,7 @@ class Asker:
         self._thread: threading.Thread | None = None
 
     def add(self, subscription: LatchedSubscription) -> None:
-        """Let a subscription ask; the first starts the thread."""
+        """Add a subscription; the first one starts the thread."""
         with self._changed:
             self._subscriptions.append(subscription)
             if self._thread is None:
@@ -186,12 +185,12 @@ class Asker:
         self.wake()
 
     def remove(self, subscription: Subscription) -> None:
-        """Let a subscription ask no more; one that never did is left out."""
+        """Remove a subscription, if it was added."""
         with self._changed:
             self._subscriptions = [one for one in self._subscriptions if one is not subscription]
 
     def wake(self) -> None:
-        """Look at once who is to be asked; safe from any thread."""
+        """Check at once which queries are due; safe from any thread."""
         with self._changed:
             self._is_woken = True
             self._changed.notify()
@@ -211,7 +210,7 @@ class Asker:
             with self._changed:
                 if not (self._is_woken or self._is_ending):
                     waits_s = next_at - time.monotonic()
-                    # A moment more gathers what is due then: one wake-up for all.
+                    # A short delay gathers queries that are due soon: one wake-up for all.
                     self._changed.wait(None if waits_s == float("inf") else max(waits_s, 0.05))
                 if self._is_ending:
                     return

@@ -1,7 +1,7 @@
 """Mailbox and slot between Zenoh's threads and a loop: a post costs O(1) and never blocks.
 
-A newer item replaces the older of its kind, except where each item counts: a map update changes
-the map before it, each pose adds to what the tool has passed over. Those are queued in order.
+A newer item replaces the older one of its kind. Kinds of which each item counts are queued in
+order: a map update changes the map before it, each pose adds to the swept floor.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ class LatestSlot(Generic[Item]):
         self._value: Item | None = None
 
     def put(self, value: Item) -> None:
-        """Replace whatever was there."""
+        """Replace the value."""
         with self._filled:
             self._value = value
             self._filled.notify()
@@ -41,12 +41,12 @@ class LatestSlot(Generic[Item]):
 
 @dataclass(frozen=True, slots=True)
 class Spacing:
-    """Least time between two takes of a kind, so that a flood of it costs no more than that.
+    """Rate limit of a kind: least time between two takes, to bound the cost of a flood.
 
     Attributes:
-        kind: what is held back, the newest kept; a queued kind.
-        seconds: from one take of it to the next, at least [s].
-        followers: kinds that depend on it, and wait where it waits.
+        kind: the queued kind that is held back; its newest item is kept.
+        seconds: least time from one take of it to the next [s].
+        followers: kinds that depend on it, and wait while it waits.
     """
 
     kind: str
@@ -60,10 +60,10 @@ class Queue:
 
     Attributes:
         length: items at most.
-        size: of all together at most [bytes]; one alone may be larger.
-        at_once: items that one take hands out at most; the others wait for the next.
-        after: a queued kind that this one must not overtake: an item waits for those of that kind
-            that were posted before it.
+        size: most bytes of all items together; a single item may be larger.
+        at_once: most items that one take returns; the others wait for the next take.
+        after: a queued kind that this one must not overtake: an item waits for the items of that
+        kind that were posted before it.
     """
 
     length: int
@@ -75,9 +75,9 @@ class Queue:
 class Mailbox(Generic[Item]):
     """Collects items of several kinds until the loop takes them all.
 
-    Of a kind only the newest is kept, unless it has a queue in ``queued``; ``size_of`` returns
-    the size of an item [bytes]. ``on_lost`` is called with each item that a full queue drops, on
-    the thread that has posted too many.
+    Only the newest item of a kind is kept, unless it has a queue in ``queued``; ``size_of``
+    returns the size of an item [bytes]. ``on_lost`` is called with each item that a full queue
+    drops, on the posting thread.
     """
 
     def __init__(
@@ -95,19 +95,20 @@ class Mailbox(Generic[Item]):
         self._size_of = size_of
         self._on_lost = on_lost
         self._lost = dict.fromkeys(queued, 0)
-        # How many of a kind have left their queue, and for which of another kind each item waits.
+        # How many items of a kind have left their queue, and which item of another kind each waits
+        # for.
         self._gone = dict.fromkeys(queued, 0)
         self._waits = {kind: deque[int]() for kind, bounds in queued.items() if bounds.after}
         self._spacing = spacing
         self._free_at = float("-inf")
 
     def post(self, kind: str, item: Item) -> None:
-        """Leave an item; safe from any thread."""
+        """Add an item; safe from any thread."""
         for lost in self._post(kind, item):
             self._on_lost(lost)
 
     def _post(self, kind: str, item: Item) -> list[Item]:
-        """Leave an item; return those that its queue drops."""
+        """Add an item; return those that its queue drops."""
         dropped: list[Item] = []
         with self._changed:
             if kind not in self._queued:
@@ -115,7 +116,7 @@ class Mailbox(Generic[Item]):
                 self._changed.notify()
                 return dropped
             queue = self._queued[kind]
-            # The first item that is held back wakes a waiting reader; the others need not.
+            # The first item that is held back wakes a waiting reader; the others do not.
             if not queue or kind not in self._held(time.monotonic()):
                 self._changed.notify()
             queue.append(item)
@@ -132,10 +133,10 @@ class Mailbox(Generic[Item]):
         return dropped
 
     def take(self, timeout_s: float) -> list[tuple[str, Item]]:
-        """Return what there is as (kind, item); wait up to ``timeout_s`` [s] for it.
+        """Return the available items as (kind, item); wait up to ``timeout_s`` [s] for one.
 
-        Newest-only kinds come first. What is spaced stays until its time has come, and what is
-        more than a queue hands out at once until the next take.
+        Newest-only kinds come first. A rate-limited kind stays until its time has come; items
+        beyond ``at_once`` of a queue stay until the next take.
         """
         deadline = time.monotonic() + timeout_s
         with self._changed:
@@ -148,7 +149,7 @@ class Mailbox(Generic[Item]):
                 self._changed.wait((min(deadline, self._free_at) if held else deadline) - now)
             items = list(self._newest.items())
             self._newest = {}
-            # What waits for another kind comes after it.
+            # An item that waits for another kind comes after it.
             for kind in sorted(ready, key=self._waits.__contains__):
                 most = min(len(self._queued[kind]), self._bounds[kind].at_once)
                 while most > 0 and not self._has_to_wait(kind):
@@ -159,12 +160,12 @@ class Mailbox(Generic[Item]):
             return items
 
     def hold(self) -> None:
-        """Keep what is spaced, and what depends on it, until ``let_go``."""
+        """Keep rate-limited kinds and their followers until ``let_go``."""
         with self._changed:
             self._free_at = math.inf
 
     def let_go(self) -> None:
-        """Hand out again what ``hold`` has kept."""
+        """Return the kinds kept by ``hold`` again."""
         with self._changed:
             self._free_at = -math.inf
             self._changed.notify()
@@ -176,7 +177,7 @@ class Mailbox(Generic[Item]):
             return lost
 
     def _pop(self, kind: str) -> Item:
-        """Return the oldest item of a queued kind, which leaves its queue."""
+        """Remove and return the oldest item of a queued kind."""
         item = self._queued[kind].popleft()
         self._sizes[kind] -= self._size_of(item)
         self._gone[kind] += 1
@@ -185,7 +186,7 @@ class Mailbox(Generic[Item]):
         return item
 
     def _has_to_wait(self, kind: str) -> bool:
-        """Tell whether the oldest item of a kind must not overtake another that is still there."""
+        """Tell whether the oldest item of a kind waits for an item of another kind."""
         return kind in self._waits and self._waits[kind][0] > self._gone[self._bounds[kind].after]
 
     def _held(self, now: float) -> tuple[str, ...]:
@@ -193,7 +194,7 @@ class Mailbox(Generic[Item]):
         spacing = self._spacing
         if spacing is None or now >= self._free_at:
             return ()
-        # Alone, what depends on it is free between two of it.
+        # Followers alone are free between two items of the kind.
         if not self._queued[spacing.kind] and self._free_at < math.inf:
             return ()
         return (spacing.kind, *spacing.followers)

@@ -1,4 +1,4 @@
-"""Publishers: one on a native key with encoding and quality of service, one of a ROS 2 topic."""
+"""Publishers: one for a native key with encoding and QoS, one for a ROS 2 topic."""
 
 from __future__ import annotations
 
@@ -28,8 +28,8 @@ class Publisher:
         session: of Zenoh.
         key: where.
         schema: CDR type; "" for JSON.
-        qos: quality of service. Zenoh lets the sender decide what becomes of a sample where a
-            link is busy.
+        qos: quality of service. In Zenoh the sender decides whether a sample is dropped on
+        congestion.
     """
 
     def __init__(self, session: zenoh.Session, key: str, schema: str, qos: Qos) -> None:
@@ -40,17 +40,17 @@ class Publisher:
             "priority": getattr(zenoh.Priority, qos.priority.upper()),
             "express": qos.express,
         }
-        # An advanced publisher cannot tell whether it has subscribers, a plain one beside it can.
+        # An advanced publisher cannot tell whether it has subscribers; a plain one on its key can.
         self._plain = session.declare_publisher(key, **options)
         self._latched = partial(_latched, session, key, options, qos.cache) if qos.latched else None
         self._publisher: Any = self._latched() if self._latched else self._plain
 
     def forget(self) -> None:
-        """Drop the samples that are kept for late joiners."""
+        """Drop the samples cached for late joiners."""
         if self._latched is not None:
             # Released and not undeclared: undeclare() of an advanced publisher (zenoh-python 1.10)
-            # waits for locks of Zenoh's while it holds the interpreter's, and a callback that
-            # holds the former and waits for the latter stops the process for good.
+            # waits for Zenoh's locks while it holds the interpreter lock; with a callback that
+            # holds the former and waits for the latter, the process deadlocks.
             self._publisher = None
             self._publisher = self._latched()
 
@@ -74,7 +74,7 @@ def _latched(session: zenoh.Session, key: str, options: dict[str, Any], samples:
         key,
         **options,
         cache=zenoh.ext.CacheConfig(max_samples=samples),
-        # Numbered samples let a subscriber that misses one ask for it. Heartbeats are of no use:
+        # Sequence numbers let a subscriber query a sample that it missed. Heartbeats are of no use:
         # zenoh-ext 1.10 cannot read those of a key with an "@" chunk.
         sample_miss_detection=zenoh.ext.MissDetectionConfig(
             heartbeat=None, sporadic_heartbeat=None
@@ -84,7 +84,7 @@ def _latched(session: zenoh.Session, key: str, options: dict[str, Any], samples:
 
 
 class RosPublisher:
-    """Publishes one ROS 2 topic; with ``gid``, what rmw_zenoh demands goes with each sample."""
+    """Publishes one ROS 2 topic; with ``gid``, each sample has rmw_zenoh's attachment."""
 
     def __init__(self, publisher: Publisher, gid: bytes = b"") -> None:
         self._publisher = publisher
@@ -92,7 +92,7 @@ class RosPublisher:
         self._count = 0
 
     def forget(self) -> None:
-        """Drop the sample kept for late joiners."""
+        """Drop the sample cached for late joiners."""
         self._publisher.forget()
 
     def put(self, payload: bytes | zenoh.ZBytes) -> None:

@@ -1,8 +1,8 @@
 """Queries, their replies, and the list of liveliness tokens.
 
-Tokens are queried and not subscribed to. A subscriber of Zenoh's (1.10) keeps each key that it has
-ever received; after a flood it keeps tokens that no longer exist; and beside a subscriber, the
-answer to a query may be empty.
+Tokens are queried and not subscribed to. A Zenoh subscriber (1.10) keeps each key that it has ever
+received; after a flood it keeps tokens that no longer exist; and while a token subscriber exists,
+a query may return nothing.
 """
 
 from __future__ import annotations
@@ -19,22 +19,22 @@ import zenoh
 from fasaco_edge.bus.arrival import schema_of
 from fasaco_edge.bus.publisher import encoding_of
 
-# Of a flood of tokens no more are remembered.
+# Most tokens that are remembered, in case of a flood.
 MOST_TOKENS = 16_384
-# So long routers may take to answer [s]. What does not come in time changes nothing, and a
-# question that is not even ended by then is asked again after twice as long [s].
+# Timeout of replies from routers [s]. A late reply changes nothing. A query that has not even
+# ended by then is sent again after twice as long [s].
 ANSWER_S = 2.0
 LOST_S = 2 * ANSWER_S
-# What Zenoh itself says as an error where somebody was asked and did not answer in time.
+# Zenoh's own error for a queryable that did not reply in time.
 TIMEOUT = b"Timeout"
 
 
 def ask_for_tokens(
     session: zenoh.Session, key: str, most: int, end: Callable[[list[str], bool], None]
 ) -> bool:
-    """Ask for the tokens that match a key; return whether the session, which may end, could ask.
+    """Query the tokens that match a key; return whether the query was sent: the session may end.
 
-    ``end`` is called with their keys, ``most`` at most, and whether all answers were good, on a
+    ``end`` is called with their keys, ``most`` at most, and whether all replies were good, on a
     Zenoh thread, within ``ANSWER_S``.
     """
     found, wrong = dict[str, None](), list[zenoh.Reply]()
@@ -58,7 +58,7 @@ class Roll:
     """The tokens that match a key.
 
     Attributes:
-        version: counts the answers; 0 before the first.
+        version: counts the replies; 0 before the first.
     """
 
     def __init__(self, session: zenoh.Session, key: str) -> None:
@@ -71,11 +71,11 @@ class Roll:
         self._is_asking = False
 
     def there(self) -> frozenset[str]:
-        """Return the keys of the tokens that existed at the last answer."""
+        """Return the keys of the tokens that existed at the last reply."""
         return self._there
 
     def ask(self, period_s: float) -> None:
-        """Ask who is there, if that was asked so long ago [s]; the roll follows the answer."""
+        """Query the tokens if the last query is this long ago [s]; the reply updates the roll."""
         now = time.monotonic()
         with self._lock:
             if now - self._asked_at < (LOST_S if self._is_asking else period_s):
@@ -88,8 +88,8 @@ class Roll:
     def _take(self, found: list[str], is_whole: bool) -> None:
         with self._lock:
             self._is_asking = False
-            # What an answer in part names is there; what it lacks may be, too. The first counts as
-            # it is: waiting for a frozen one may never end.
+            # A partial reply names tokens that exist; others may exist, too. The first reply counts
+            # as it is: waiting for a frozen peer may never end.
             there = frozenset(found)
             if not is_whole and len(there | self._there) <= MOST_TOKENS:
                 there |= self._there
@@ -100,7 +100,7 @@ class Roll:
 
 @dataclass(frozen=True, slots=True)
 class Reply:
-    """An answer to a query: a payload with its schema ("" for JSON), or an error."""
+    """A reply to a query: a payload with its schema ("" for JSON), or an error."""
 
     payload: bytes
     schema: str = ""
@@ -110,9 +110,9 @@ class Reply:
 
 @dataclass(frozen=True, slots=True)
 class Shared:
-    """A message that is published and kept for queries: its payload lies in Zenoh's memory, once.
+    """A message that is published and kept for queries: its payload is in Zenoh's memory once.
 
-    A path of half a million poses has 40 MB; each put of bytes would copy them.
+    A path of half a million poses has 40 MB; each put of bytes would copy it.
     """
 
     payload: zenoh.ZBytes
@@ -121,7 +121,7 @@ class Shared:
 
     @classmethod
     def of(cls, payload: bytes, schema: str = "", attachment: bytes = b"") -> Shared:
-        """Return the message; its payload is copied here and not again."""
+        """Return the message; this is the only copy of its payload."""
         return cls(zenoh.ZBytes(payload), schema, attachment)
 
 
@@ -130,10 +130,10 @@ class Request:
     """Content of a query.
 
     Attributes:
-        key: the key expression asked for; it may have wildcards.
-        parameters: those behind ``?``, without Zenoh's own, which begin with ``_``.
+        key: the key expression of the query; it may have wildcards.
+        parameters: those after ``?``, without Zenoh's own, which begin with ``_``.
         payload: of the query, b"" for none.
-        attachment: what came beside it, b"" for nothing.
+        attachment: of the query, b"" for none.
     """
 
     key: str
@@ -143,7 +143,7 @@ class Request:
 
 
 class Question:
-    """A query that waits for its answer; to be answered once, on any thread.
+    """A query that waits for its reply; to be answered once, on any thread.
 
     Attributes:
         key: key of the queryable.
@@ -156,7 +156,7 @@ class Question:
         self._query = query
 
     def answer(self, reply: Reply, key: str = "") -> None:
-        """Answer, on the queryable's key or another; the other side may be gone by now."""
+        """Reply on the queryable's key or another; the other side may be gone by now."""
         with contextlib.suppress(zenoh.ZError):
             send(self._query, key or self.key, reply)
         query: Any = self._query  # drop() has no annotation
@@ -170,9 +170,9 @@ def ask_for_answers(
     timeout_s: float,
     end: Callable[[list[Reply]], None],
 ) -> None:
-    """Ask all queryables that match a key, with a payload and what comes beside it.
+    """Query all queryables that match a key, with a payload and an attachment.
 
-    ``end`` is called with their answers on a Zenoh thread, at once where the session has ended.
+    ``end`` is called with their replies on a Zenoh thread, at once if the session has ended.
     """
     replies = list[Reply]()
     payload, beside = message
@@ -195,7 +195,7 @@ def ask_for_answers(
 
 
 def matches(key: str, other: str) -> bool:
-    """Tell whether any key matches both of two key expressions."""
+    """Tell whether two key expressions intersect."""
     return bool(zenoh.KeyExpr(key).intersects(zenoh.KeyExpr(other)))
 
 
@@ -216,7 +216,7 @@ def size_of(query: zenoh.Query) -> int:
 
 
 def send(query: zenoh.Query, key: str, reply: Reply | Shared) -> None:
-    """Answer a query on ``key``; Zenoh gives the answer the quality of service of the query."""
+    """Reply to a query on ``key``; Zenoh gives the reply the QoS of the query."""
     encoding = encoding_of(reply.schema)
     if isinstance(reply, Reply) and reply.is_error:
         query.reply_err(reply.payload, encoding=encoding)
@@ -226,7 +226,7 @@ def send(query: zenoh.Query, key: str, reply: Reply | Shared) -> None:
 
 
 def reply_of(reply: zenoh.Reply) -> Reply:
-    """Return an answer that Zenoh received."""
+    """Return a reply received by Zenoh."""
     if reply.ok is not None:
         sample = reply.ok
         attachment = sample.attachment.to_bytes() if sample.attachment is not None else b""

@@ -1,8 +1,8 @@
-"""The order in which samples of a latched key are delivered: by publisher, none twice.
+"""Delivery order of the samples of a latched key: in order for each publisher, none twice.
 
-They come in two ways: as they are published, and as answers to queries. An answer overtakes what is
-under way, as its priority is higher, and samples wait for a thread of their own. So an answer that
-leaves a gap waits a moment for the samples in it.
+Samples arrive as they are published, and as replies to queries. A reply may overtake published
+samples: it has a higher priority, and samples are delivered by another thread. So a reply that
+leaves a gap waits a moment for the missing samples.
 """
 
 from __future__ import annotations
@@ -15,12 +15,12 @@ import zenoh
 
 from fasaco_edge.bus.asked_publishers import MOST_PUBLISHERS, AskedPublishers
 
-# So long an answer waits that leaves a gap [s]; where several samples count, since the last one.
+# Time that a reply with a gap before it waits [s]; where several samples count, since the last.
 UNDER_WAY_S = 0.5
 # Most publishers whose last sample is remembered.
 MOST_REMEMBERED = 64
-# Most bytes of samples that wait for those before them: a publisher that does not answer must not
-# fill the memory.
+# Most bytes of samples that wait for earlier ones: a publisher that does not reply must not fill
+# the memory.
 HELD_BYTES = 8_000_000
 _SEQUENCE_NUMBERS = 1 << 32
 
@@ -30,69 +30,69 @@ class SampleOrder:
 
     Args:
         depth: how many samples of a publisher count.
-        publishers: those that are queried.
-        wake: called when publishers are to be queried, or ``take_due`` to be called earlier.
+        publishers: the publishers that are queried.
+        wake: called when publishers are to be queried, or ``take_due`` is due earlier.
     """
 
     def __init__(self, depth: int, publishers: AskedPublishers, wake: Callable[[], None]) -> None:
         self._depth, self._publishers, self._wake = depth, publishers, wake
-        # What is to be delivered, in this order.
+        # Samples to deliver, in this order.
         self._ready: list[zenoh.Sample] = []
         # By publisher, the sequence number or timestamp of its last sample: its mark.
         self._last_mark = OrderedDict[str, int]()
-        # When that was published, by the publisher's clock; 0 where it does not tell.
+        # When that was published, by the publisher's clock; 0 if unknown.
         self._stamps = OrderedDict[str, int]()
         # The same of publishers without a token. Used only to drop cached replies that were
         # received already: a reset of such a clock would go unnoticed.
         self._unconfirmed = OrderedDict[str, int]()
-        # Of an answer that overtook what is under way: until when it waits [s], publisher, mark.
+        # A reply that overtook published samples: until when it waits [s], publisher, mark.
         self._ahead: tuple[float, str, int, zenoh.Sample] | None = None
-        # Where several samples count, they wait for those before them, which were asked for.
+        # Where several samples count, they wait for earlier ones, which were queried.
         self._held: list[tuple[str, int, zenoh.Sample]] = []
         self._held_bytes = 0
-        # Until when those of them wait that an answer leaves a gap before [s]; None without any.
+        # Until when samples wait after a reply with a gap [s]; None without any.
         self._gap_until: float | None = None
 
     def missing(self, name: str) -> str:
-        """Return what to query a publisher for: what came after the last sample of it."""
+        """Return the query for the samples after the last one of a publisher."""
         last = self._last_mark.get(name)
         if last is None or name.endswith("/uhlc"):
             return f"_max={self._depth}"
         return f"_sn={(last + 1) % _SEQUENCE_NUMBERS}.."
 
     def forget(self, name: str) -> None:
-        """Forget a publisher that is gone: it may come back under its name and count from 0."""
+        """Forget a publisher that is gone: it may return under the same name and count from 0."""
         self._last_mark.pop(name, None)
 
     def confirm(self, name: str) -> None:
-        """Note that a publisher has a token: what it was heard of before counts from now on."""
+        """Note that a publisher has a token: marks of its earlier samples count from now on."""
         if name in self._unconfirmed:
             _remember(self._last_mark, name, self._unconfirmed.pop(name))
 
     def take_published(self, sample: zenoh.Sample) -> list[zenoh.Sample]:
-        """Take a sample as it was published; return what is to be delivered now, in order."""
+        """Take a published sample; return the samples to deliver now, in order."""
         self._sort_published(sample)
         return self._take_ready()
 
     def take_answer(self, sample: zenoh.Sample, *, again: bool) -> list[zenoh.Sample]:
-        """Take an answer; return what is to be delivered now, in order.
+        """Take a reply; return the samples to deliver now, in order.
 
         Args:
-            sample: the answer.
-            again: deliver it also if it was received, if nothing came after it.
+            sample: the reply.
+            again: deliver it again if it was received already and is the last.
         """
         self._sort_answer(sample, again=again)
         return self._take_ready()
 
     @property
     def next_at(self) -> float:
-        """When ``take_due`` has something to return [s, monotonic]."""
+        """Time when ``take_due`` has samples to return [s, monotonic]."""
         ahead = [self._ahead[0]] if self._ahead is not None else []
         gaps = [self._gap_until] if self._gap_until is not None else []
         return min((*ahead, *gaps), default=float("inf"))
 
     def take_due(self, now: float) -> list[zenoh.Sample]:
-        """Return what has waited long enough for the samples before it, in order."""
+        """Return the samples that have waited long enough for earlier ones, in order."""
         if self._ahead is not None and now >= self._ahead[0]:
             self._deliver_ahead()
         if self._gap_until is not None and now >= self._gap_until:
@@ -100,7 +100,7 @@ class SampleOrder:
         return self._take_ready()
 
     def take_held(self) -> list[zenoh.Sample]:
-        """Return what has waited for answers, now that all have come, in order."""
+        """Return the samples that waited for replies, now that all have come, in order."""
         self._deliver_held()
         return self._take_ready()
 
@@ -113,14 +113,14 @@ class SampleOrder:
         waits = self._depth > 1 and self._publishers.is_asking
         is_listed = sample.source_info or name in self._last_mark or name in self._publishers
         if not name or not (is_listed or waits):
-            # Of a publisher that keeps nothing, or of one that is not yet found.
+            # From a publisher without a cache, or one that is not yet found.
             if name:
                 _remember(self._unconfirmed, name, mark)
             self._ready.append(sample)
             return
         last = self._last_mark.get(name)
         if last and not mark and _ticks(sample) >= self._stamps.get(name, 0):
-            # It was restarted under the same name: what an answer has overtaken is older.
+            # It was restarted under the same name: samples that a reply has overtaken are older.
             del self._last_mark[name]
             last = None
         is_gap = name in self._publishers and _leaves_gap(name, mark, last)
@@ -142,9 +142,9 @@ class SampleOrder:
             self._deliver(name, mark, sample)
 
     def _deliver_held(self, *, over_gaps: bool = False) -> None:
-        """Deliver what waits, but for what an answer leaves a gap before: a cache may hold less.
+        """Deliver waiting samples, except after a reply with a gap: a cache may hold fewer.
 
-        That waits until the samples in the gap have come, or have had the time to (``over_gaps``).
+        Those wait until the missing samples have come, or their time is over (``over_gaps``).
         """
         held, self._held = sorted(self._held, key=lambda one: one[:2]), []
         self._held_bytes = 0
@@ -162,7 +162,7 @@ class SampleOrder:
             self._wake()
 
     def _let_wait(self, name: str, mark: int, sample: zenoh.Sample) -> None:
-        """Keep an answer back until what is before it has come, or has had the time to."""
+        """Hold a reply until the samples before it have come, or their time is over."""
         self._deliver_ahead()
         self._ahead = time.monotonic() + UNDER_WAY_S, name, mark, sample
         if len(sample.payload) > HELD_BYTES:
@@ -196,7 +196,7 @@ class SampleOrder:
 
 
 def _remember(marks: OrderedDict[str, int], name: str, mark: int) -> None:
-    """Note the last mark of a publisher; those noted the longest ago are forgotten."""
+    """Note the last mark of a publisher; the oldest notes are dropped."""
     marks[name] = mark
     marks.move_to_end(name)
     if len(marks) > MOST_REMEMBERED:
@@ -204,7 +204,7 @@ def _remember(marks: OrderedDict[str, int], name: str, mark: int) -> None:
 
 
 def _origin(sample: zenoh.Sample) -> tuple[str, int]:
-    """Return who published a sample, as in its token, and its sequence number or timestamp."""
+    """Return the publisher of a sample, as in its token, and its sequence number or timestamp."""
     info, stamp = sample.source_info, sample.timestamp
     if info is not None:
         return f"{info.source_id.zid}/{info.source_id.eid}", int(info.source_sn)
@@ -214,7 +214,7 @@ def _origin(sample: zenoh.Sample) -> tuple[str, int]:
 
 
 def _ticks(sample: zenoh.Sample) -> int:
-    """Return when a sample was published, by the clock of its session; 0 where it does not tell."""
+    """Return when a sample was published, by the clock of its session; 0 if unknown."""
     return int(str(sample.timestamp).partition("/")[0]) if sample.timestamp is not None else 0
 
 

@@ -1,8 +1,8 @@
 """Session on the Zenoh bus: publishers, subscribers, queryables, queries.
 
 Latched topics have advanced publishers with a cache of one sample, so that a late joiner has the
-newest path at once (ROS calls this transient local). Callbacks run on Zenoh's threads and only hand
-the sample on.
+newest path at once (ROS calls this transient local). Callbacks run on Zenoh's threads and only
+pass the sample on.
 """
 
 from __future__ import annotations
@@ -40,18 +40,18 @@ from fasaco_edge.wire.topics import IN_ORDER
 
 LOG = logging.getLogger(__name__)
 
-# A port at which nobody has listened for so long [s] is taken: one that is only restarted gets its
-# own again. And so long until the next try, where another process was first [s].
+# A port without a listener for this long [s] is taken over: a process that only restarts gets its
+# port back. And the time until the next try, where another process was first [s].
 ABSENT_S, RETRY_S = 2.0, 1.0
 
-# Longest wait for the end of a session [s]: before a listener that no longer reads, Zenoh tries for
-# ten seconds to get rid of what is queued, and fails then.
+# Timeout for closing a session [s]: if a peer no longer reads, Zenoh tries for ten seconds to flush
+# its queue, and then fails.
 CLOSE_S = 1.2
 
 
 @dataclass(slots=True)
 class _Served:
-    """What answers queries on a key."""
+    """A queryable: replies to queries on a key."""
 
     key: str
     receive: Callable[[zenoh.Query], None]
@@ -60,7 +60,7 @@ class _Served:
 
 
 class Bus:
-    """A session, with everything declared on it; close it on every way out."""
+    """A session with everything declared on it; close it on every exit."""
 
     def __init__(
         self, session: zenoh.Session, listens: bool = False, stand_in: StandIn | None = None
@@ -70,7 +70,7 @@ class Bus:
         self._listens = listens
         self._declared: list[Any] = []
         self._served: list[_Served] = []
-        # Callers hold these, too. No object of Zenoh may be left to the last garbage collection, in
+        # Callers hold these, too. No Zenoh object may be left to the last garbage collection, in
         # which its threads and the interpreter may deadlock.
         self._lent: list[Publisher | Subscription] = []
         self._asker = Asker()
@@ -119,12 +119,13 @@ class Bus:
     ) -> Subscription:
         """Call ``callback`` with each sample on ``key``, on a Zenoh thread.
 
-        A latched subscription receives the newest sample of latched publishers
-        first, or of those of each as many as ``history``, also of those that come later.
+        A latched subscription first receives the newest sample of each latched publisher, or the
+        newest ``history`` samples, also of publishers that appear later.
 
-        By default each subscription has a thread of its own: of two, what was sent first may come
-        last. What comes ``in_order`` comes as it was sent, among all such subscriptions, on the
-        thread that reads the link; its callback must not call Zenoh, and return soon.
+        By default each subscription has a thread of its own: samples of two subscriptions may be
+        reordered. Subscriptions with ``in_order`` receive samples in the order of sending, across
+        all of them, on the thread that reads the link; the callback must not call Zenoh, and must
+        return soon.
         """
 
         def receive(sample: zenoh.Sample) -> None:
@@ -142,7 +143,7 @@ class Bus:
         return subscription
 
     def unsubscribe(self, subscription: Subscription) -> None:
-        """End a subscription; what is on its way may still come."""
+        """End a subscription; samples under way may still arrive."""
         self._asker.remove(subscription)
         self._lent.remove(subscription)
         subscription.end()
@@ -151,9 +152,9 @@ class Bus:
     def serve(
         self, key: str, answer: Callable[[Request], Reply | Shared | None], complete: bool = True
     ) -> None:
-        """Answer queries on ``key``, on a Zenoh thread; None leaves one to other queryables.
+        """Reply to queries on ``key``, on a Zenoh thread; None leaves a query to other queryables.
 
-        ``complete``: no other queryable has to be asked.
+        ``complete``: no other queryable has to be queried.
         """
 
         def receive(query: zenoh.Query) -> None:
@@ -168,8 +169,8 @@ class Bus:
     ) -> None:
         """Call ``receive`` with each query on ``key``, on a Zenoh thread; to be answered later.
 
-        One of more than ``most_bytes`` is answered with ``too_long`` at once, because a query is
-        held in memory until then.
+        A query of more than ``most_bytes`` gets ``too_long`` as its reply at once, because a query
+        is held in memory until its reply.
         """
 
         def take(query: zenoh.Query) -> None:
@@ -185,7 +186,7 @@ class Bus:
         self._served.append(_Served(key, receive, complete, declared))
 
     def let_others_answer(self, yes: bool) -> None:
-        """Answer only queries to all, while another session serves the same keys; or any query."""
+        """Reply only to queries for all while another session serves the same keys; or to any."""
         for served in self._served:
             if served.complete:
                 served.declared.undeclare()
@@ -194,14 +195,14 @@ class Bus:
                 )
 
     def get(self, selector: str, timeout_s: float = 2.0, payload: bytes = b"") -> list[Reply]:
-        """Ask ``selector`` (a key, parameters behind ``?``) and return all answers.
+        """Query ``selector`` (a key, parameters after ``?``) and return all replies.
 
-        Who does not answer in time has given none.
+        A reply that is late is missing.
 
         Args:
-            selector: what to ask.
-            timeout_s: how long to wait for answers [s].
-            payload: JSON that goes with the question, b"" for none.
+            selector: the selector.
+            timeout_s: how long to wait for replies [s].
+            payload: JSON payload of the query, b"" for none.
         """
         encoding = JSON if payload else None
         replies = self._session.get(
@@ -218,10 +219,10 @@ class Bus:
         timeout_s: float,
         end: Callable[[list[Reply]], None],
     ) -> None:
-        """Ask all that answer on ``key`` for something, as clients of ROS 2 services do.
+        """Query all queryables on ``key``, as clients of ROS 2 services do.
 
-        ``end`` is called with the answers, on a Zenoh thread: when all have come, or none is there
-        to answer, or ``timeout_s`` is over (an error is among them then).
+        ``end`` is called with the replies, on a Zenoh thread: when all have come, or there is no
+        queryable, or after ``timeout_s`` (an error is among them then).
         """
         ask_for_answers(self._session, key, (payload, beside), timeout_s, end)
 
@@ -232,13 +233,13 @@ class Bus:
         return token
 
     def withdraw(self, token: object) -> None:
-        """Take a token back."""
+        """Undeclare a token."""
         declared: Any = token
         self._declared.remove(declared)
         declared.undeclare()
 
     def roll(self, key: str) -> Roll:
-        """Keep account of the liveliness tokens that match ``key``."""
+        """Return the roll of the liveliness tokens that match ``key``."""
         return Roll(self._session, key)
 
     def is_in_touch(self) -> bool:
@@ -247,8 +248,9 @@ class Bus:
         return self._listens or bool(info.routers_zid() or info.peers_zid())
 
     def keep_in_touch(self, now: float) -> bool:
-        """Tell whether samples can arrive; where the process that was joined is gone, listen in its
-        place before long. To be called again and again, ``now`` is steady [s]."""
+        """Tell whether samples can arrive; replace the listener that was joined if that is gone.
+
+        To be polled; ``now`` is monotonic [s]."""
         in_touch = self.is_in_touch()
         if self._stand_in is not None:
             self._stand_in.poll(now, is_alone=not in_touch)
@@ -271,7 +273,7 @@ class Bus:
         )
 
     def close(self) -> None:
-        """End the session, within ``CLOSE_S``; a process that does not may hang at its exit."""
+        """End the session within ``CLOSE_S``; without this call, a process may hang at exit."""
         self._asker.close()
         self._declared.clear()
         self._served.clear()
@@ -316,10 +318,11 @@ def open_bus(settings: BusSettings) -> Bus:
 
 
 class StandIn:
-    """Listens in place of a process that was joined, and is gone.
+    """Listener in place of a process that was joined and is gone.
 
-    A session that finds its port taken is a client of whom has it. Once that one is gone, nobody
-    else could reach this process: so it listens there itself, by a session that the first finds.
+    A session that finds its port taken connects as a client to the process that holds it. Once that
+    process is gone, nobody could reach this one: so it listens there itself, with a second session
+    that the first one finds.
 
     Args:
         config: of a session that listens there.
@@ -331,7 +334,7 @@ class StandIn:
         self._try_at: float | None = None
 
     def poll(self, now: float, *, is_alone: bool) -> None:
-        """Listen once the first session has been alone for ``ABSENT_S``; ``now`` is steady [s]."""
+        """Listen once the first session has been alone for ``ABSENT_S``; ``now``: monotonic [s]."""
         if not is_alone or self._session is not None:
             self._try_at = None
         elif self._try_at is None:

@@ -1,10 +1,10 @@
-"""Settings of a session on the Zenoh bus, and the configuration that Zenoh gets of them.
+"""Settings of a session on the Zenoh bus, and the Zenoh configuration made from them.
 
-The same for every process, and why:
+The same for every process, with reasons:
 
 * no multicast scouting and no shared memory: only what is configured can be reached, and the idle
   session stays small;
-* each topic has its quality of service, see ``wire.topics``: what a planner publishes is dropped on
+* each topic has its QoS, see ``wire.topics``: samples that a planner publishes are dropped on
   congestion, so that a frozen subscriber never blocks it.
 """
 
@@ -24,9 +24,9 @@ if TYPE_CHECKING:
 
 # Timeout of the handshake of an incoming connection [ms], and how many may be pending.
 ACCEPT_TIMEOUT_MS, ACCEPT_PENDING = 3000, 1000
-# A map or a path is many packets of 64 kB. Where two of them fill the queue, as by default, a
-# computer that is busy for 50 ms drops the map, and the last of the cohorts that come at once;
-# these take a megabyte, and only when there is one.
+# A map or a path is many packets of 64 kB. By default two of them fill the queue: a computer that
+# is busy for 50 ms drops the map, and the last of the cohorts that come at once. These queues take
+# a megabyte, only while it is needed.
 QUEUED_BATCHES = dict.fromkeys(
     ("interactive_high", "data_high", "data", "data_low", "background"), 16
 )
@@ -57,7 +57,7 @@ def check_settings(settings: BusSettings) -> None:
     Raises:
         BusUnavailable: Zenoh does not take it.
     """
-    # Who only reads a configuration does without it.
+    # Not needed by a process that only reads a configuration.
     import zenoh  # noqa: PLC0415
 
     try:
@@ -67,7 +67,7 @@ def check_settings(settings: BusSettings) -> None:
 
 
 def session_config(settings: BusSettings) -> zenoh.Config:
-    """Return Zenoh's configuration of a session: what all have in common, and what secures one.
+    """Return Zenoh's configuration of a session: the common part, and its security.
 
     Raises:
         zenoh.ZError: it has unknown keys or impossible values.
@@ -90,8 +90,8 @@ def session_config(settings: BusSettings) -> zenoh.Config:
         "timestamping": {"enabled": True},
         "transport": {
             "shared_memory": {"enabled": False},
-            # Connections without a handshake must not keep others out: by default a hundred of
-            # them do, for twelve seconds.
+            # Connections without a handshake must not block others: by default a hundred of them
+            # do, for twelve seconds.
             "unicast": {"accept_timeout": ACCEPT_TIMEOUT_MS, "accept_pending": ACCEPT_PENDING},
             "link": {
                 "rx": {"max_message_size": MAX_MESSAGE_BYTES},
@@ -103,7 +103,7 @@ def session_config(settings: BusSettings) -> zenoh.Config:
 
 
 def _merged(own: Mapping[str, Any], more: Mapping[str, Any]) -> dict[str, Any]:
-    """Return both; where both have a mapping, that of both."""
+    """Return both configurations merged, mappings recursively."""
     merged = dict(own)
     for key, value in more.items():
         before = own.get(key)
@@ -115,5 +115,5 @@ def _merged(own: Mapping[str, Any], more: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def first_line(error: Exception) -> str:
-    """Return what Zenoh says is wrong, without the place in its sources."""
+    """Return Zenoh's error message without the location in its sources."""
     return str(error).partition(" at /")[0].strip()

@@ -1,1 +1,1 @@
-"""The machine around the mission: configuration, loop, service notification."""
+"""The process around the mission: startup, loop, ledger, reload, service notification."""

@@ -1,9 +1,9 @@
-"""The claim on a robot's name: of the daemons that share it, one plans.
+"""The claim on a robot's name: of several daemons with one name, only one plans.
 
 Each shows a liveliness token ``claim/<its Zenoh id>/<waits, yields or plans>``. A daemon that
-finds another planning waits until that one is gone. Which of several waiting daemons is next, and
-which one continues if both plan (they could not see each other), depends on their ids
-alone: both sides come to the same result, whatever their clocks say.
+finds another planning waits until that one is gone. The id alone decides which of several waiting
+daemons is next, and which of two active daemons continues after a network partition: so both
+agree, whatever their clocks say.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ LOG = logging.getLogger(__name__)
 
 # Time within which two that start together see each other's tokens [s].
 SETTLE_S = 0.2
-# How often to ask for tokens while one daemon plans [s]; otherwise in each cycle.
+# Period of token queries while one daemon plans [s]; otherwise every cycle.
 ASK_PERIOD_S = 1.0
 # Time that the others need to reconnect to a restarted router [s].
 REJOIN_S = 3.0
@@ -35,9 +35,10 @@ _ID = re.compile(r"[0-9a-f]{1,32}")
 
 
 class ClaimState(StrEnum):
-    """What a daemon does with its claim; all but the first are chunks of tokens.
+    """State of a daemon's claim; all but the first are chunks of tokens.
 
-    One that ``yields`` waits, and planned before: its last path was empty, to stop the robot.
+    A daemon that ``yields`` waits now and planned before: it published an empty path to stop the
+    robot.
     """
 
     LOOKS = "looks"
@@ -55,12 +56,12 @@ _SHOWN = (ClaimState.WAITS, ClaimState.YIELDS, ClaimState.PLANS)
 
 
 class Claim:
-    """Which daemon of a name plans: a pure function of what was seen, and when.
+    """The decision which daemon of a name plans: a pure function of observations and times.
 
     Attributes:
         state: of this daemon.
-        rival: id of the daemon it waits for, or waited for last; "" for none.
-        rival_yielded: whether this one plans, and another that planned, too, has just yielded.
+        rival: id of the daemon it waits for, or last waited for; "" for none.
+        rival_yielded: whether this one plans, and another active one has just yielded.
     """
 
     def __init__(self, own: str) -> None:
@@ -78,7 +79,7 @@ class Claim:
     def is_uncertain(self, now: float) -> bool:
         """Tell whether another may plan unseen by now: publish nothing until that is known.
 
-        So it is after a pause in which the others may have taken this daemon for dead.
+        This is so after a pause in which the others may have taken this daemon for dead.
         """
         return self.state is ClaimState.PLANS and now < self._uncertain_until
 
@@ -89,8 +90,8 @@ class Claim:
 
         Args:
             others: the other daemons by id.
-            now: time of any steady clock [s].
-            in_touch: whether others can be seen at all; while not, nothing changes.
+            now: time of any monotonic clock [s].
+            in_touch: whether others are visible; otherwise nothing changes.
         """
         self.rival_yielded = False
         self._notice_absence(now, in_touch=in_touch)
@@ -110,7 +111,7 @@ class Claim:
         self._yielding = yielding
 
     def _notice_absence(self, now: float, *, in_touch: bool) -> None:
-        """Be uncertain for a while after a time in which the others could not be seen."""
+        """Be uncertain for a while after the others were not visible."""
         paused_s = 0.0 if self._decided_at is None else now - self._decided_at
         self._decided_at = now
         if paused_s > LEASE_S or (in_touch and not self._was_in_touch):
@@ -119,7 +120,7 @@ class Claim:
         self._was_in_touch = in_touch
 
     def _wait_for_calm(self, first: str, now: float) -> None:
-        """Plan once none has planned for a while, and no other id is smaller."""
+        """Plan once no other has planned for a while, and no other id is smaller."""
         if self._calm_since is None:
             self._calm_since = now
         is_calm_for_s = now - self._calm_since - self._calm_s
@@ -157,13 +158,13 @@ class NameClaim(Claim):
 
     @property
     def reason(self) -> str:
-        """Why it waits."""
+        """The reason to wait."""
         return f"another daemon of this name plans: Zenoh id {self.rival}"
 
     def update(self, now: float) -> bool:
         """Query the others; return whether the state of this daemon has changed.
 
-        The token follows with ``announce``, once the former path is withdrawn.
+        The token follows with ``announce``, once the previous path is withdrawn.
         """
         before = self.state
         in_touch = self._bus.keep_in_touch(now)

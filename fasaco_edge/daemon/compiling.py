@@ -1,8 +1,8 @@
 """The kernel compiler: a process that compiles missing kernels before a service is ready.
 
-A first map must not wait a minute for them. They are loaded with that map, to keep an idle daemon
-small: so a process of its own does this, and ends. Kernels that are damaged, or that others could
-have written, count as missing; where none can be kept, they are compiled when they are needed.
+A first map must not wait a minute for them. An idle daemon stays small and loads kernels with the
+first map: so a separate process compiles them, and ends. Kernels that are damaged, or that others
+could have written, count as missing; without a cache they are compiled on demand.
 """
 
 from __future__ import annotations
@@ -24,10 +24,10 @@ from fasaco_edge.kernels.cache import cache_folder, missing_from
 LOG = logging.getLogger(__name__)
 
 MODULE = "fasaco_edge.daemon.compiling"
-# Longer than any stage takes on a small computer; requested for each stage [s].
+# Startup time requested for each stage; longer than any takes on a small computer [s].
 STAGE_S = 600.0
 LOOK_S = 0.02
-# A stage may add 250 MB to this, within what the unit may have in all (MemoryHigh=).
+# A stage may add 250 MB to this, within the unit's limit (MemoryHigh=).
 MOST_MB = 220.0
 # Lines that the process prints: one of these words, a tab and a text.
 REASON, STAGE, WARNING = "reason", "stage", "warning"
@@ -77,7 +77,7 @@ class KernelCompiler:
             LOG.info("kernels compiled in %.0f s", time.monotonic() - self._started)
 
     def close(self) -> None:
-        """End the process; what it has cached so far is whole."""
+        """End the process; kernels cached so far are complete."""
         if self._process is not None:
             self._process.kill()
             self._process.wait()
@@ -106,7 +106,7 @@ def _ended(code: int) -> str:
 
 
 def main() -> None:
-    """Compile missing kernels and say why; say nothing if none is missing."""
+    """Compile missing kernels and print why; print nothing if none is missing."""
     logging.basicConfig(level=logging.WARNING, handlers=[_ToDaemon()])
     folder = cache_folder()
     if folder is None:
@@ -138,7 +138,7 @@ def _begin_stage(stage: str) -> None:
     from fasaco_edge.kernels.jit import FAULTS  # noqa: PLC0415
 
     if FAULTS.failure:
-        # What this process compiles is lost with it: the daemon does that, with its first map.
+        # Kernels compiled here would be lost: the daemon compiles them with its first map.
         sys.exit(0)
     _say(STAGE, stage)
     if resident_mb() > MOST_MB and sys.argv[1:] != [stage]:

@@ -1,4 +1,4 @@
-"""A status as text for Prometheus: text format 0.0.4, base units, one table of all figures."""
+"""Metrics of a status for Prometheus: text format 0.0.4, base units, one table of all metrics."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ Sample = tuple[Labels, float | UnsetType | None]
 
 
 class Figure(NamedTuple):
-    """A figure: name, type ("gauge" or "counter"), what it is, and its samples of a status.
+    """A metric: name, type ("gauge" or "counter"), help text, and its samples from a status.
 
     A sample whose value is None or unset is left out.
     """
@@ -36,7 +36,7 @@ def _one(value: Callable[[Status], float | None]) -> Callable[[Status], list[Sam
 
 
 def _member(part: str, name: str, unit: float = 1.0) -> Callable[[Status], list[Sample]]:
-    """Return what samples a member of a part of the status that may be null, in base units."""
+    """Return the sampler of a member of a status part that may be null, in base units."""
 
     def samples(status: Status) -> list[Sample]:
         value = getattr(getattr(status, part), name, None)
@@ -133,7 +133,7 @@ FIGURES = (
 
 
 def exposition(status: Status, age_s: float) -> str:
-    """Return all figures of a status that is so old [s]."""
+    """Return all metrics of a status of this age [s]."""
     age = Figure(
         "status_age_seconds",
         "gauge",
@@ -161,5 +161,5 @@ def _lines(figure: Figure, status: Status) -> Iterator[str]:
 
 
 def _escaped(text: str) -> str:
-    r"""Return a label's value; what is no letter to see is shown, as ``\x1b``."""
+    r"""Return a label's value; unprintable characters are escaped, as ``\x1b``."""
     return one_line(text).replace("\\", "\\\\").replace('"', '\\"')

@@ -1,4 +1,4 @@
-"""Figures of the loop: faults by code, durations of cycles and plans."""
+"""Metrics of the loop: faults by code, durations of cycles and plans."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ LOG = logging.getLogger(__name__)
 
 # Cycles longer than this are late [s].
 LATE_S = 0.1
-# Durations are counted to within 10 %, in logarithmic buckets, the last for all beyond 18 minutes:
-# so the figures of a year take as much memory as those of a minute.
+# Durations are counted to within 10 %, in logarithmic buckets, the last one beyond 18 minutes: so
+# memory does not grow with uptime.
 LEAST_S, PER_DOUBLING, BUCKETS = 1e-6, 8, 8 * 30
 
 
@@ -28,7 +28,7 @@ def log_fault(log: logging.Logger, fault: FasacoError) -> str:
 
 
 def fault_text(fault: FasacoError) -> str:
-    """Return a fault with what to do."""
+    """Return a fault with its hint."""
     return f"{fault}: {fault.hint}" if fault.hint else str(fault)
 
 
@@ -40,7 +40,7 @@ class Faults:
         self._last = ""
 
     def count(self, faults: Sequence[FasacoError], *, is_logged: bool = False) -> None:
-        """Count faults, and log them if that is not done already."""
+        """Count faults, and log them if they are not logged already."""
         for fault in faults:
             if not is_logged:
                 log_fault(LOG, fault)
@@ -77,7 +77,7 @@ class CycleTimes:
         return LoopTimes(self._turns, self._late, *within_ms)
 
     def _within(self, share: float) -> float:
-        """Return the duration that this share of the cycles did not exceed [s]."""
+        """Return the quantile of the durations for this share of the cycles [s]."""
         missing = math.ceil(share * self._turns)
         for bucket, count in enumerate(self._counts[:-1]):
             missing -= count
@@ -88,7 +88,7 @@ class CycleTimes:
 
 
 class MapLatency:
-    """Time from the arrival of a map that calls for a plan to that plan's path.
+    """Latency from the arrival of a map that needs a plan to that plan's path.
 
     Attributes:
         arrived: when the newest map of this cycle arrived [s, monotonic]; None without one.
@@ -96,8 +96,8 @@ class MapLatency:
 
     def __init__(self) -> None:
         self.arrived: float | None = None
-        # Arrival of the oldest map that no plan was asked for yet, and of the one
-        # that the plan under way was asked for.
+        # Arrival of the oldest map without a plan request, and of the map of the plan under
+        # way.
         self._unanswered: float | None = None
         self._asked: float | None = None
 
@@ -110,5 +110,5 @@ class MapLatency:
         self._asked, self._unanswered = self._unanswered, None
 
     def answer(self) -> float | None:
-        """Return how long it took until now [s]; None where no map had called for the plan."""
+        """Return the latency until now [s]; None for a plan that no map needed."""
         return None if self._asked is None else time.monotonic() - self._asked

@@ -5,33 +5,32 @@ A daemon whose maps have at most P pixels, on a lattice of at most C cells, take
     BASE_BYTES + MAPS * P + CELL_BYTES * C
 
 and, where it lays a line over the floor, ``FLOOR_BYTES * P + STAND_BYTES * C`` more: its fine
-raster has no more pixels than a map may have (``grid.fine_raster``). That holds whatever comes in,
-how often, and at what resolution; ``MemoryHigh=`` of its unit is that for the default
-configuration, ``MemoryMax=`` a tenth more, and under another limit the daemon takes no larger maps
-than that affords (``afforded``). A test holds the units to this file, and one measures.
+raster has no more pixels than a map may have (``grid.fine_raster``). This holds for any input at
+any rate and resolution. ``MemoryHigh=`` of the unit is this sum for the default configuration,
+``MemoryMax=`` a tenth more; under another limit the daemon limits the map size to fit
+(``afforded``). One test checks the systemd units against these constants, another measures memory.
 
-A pixel is a byte, held in up to ten copies where updates are as large as the map:
+A pixel is a byte, held in up to ten copies if updates are as large as the map:
 
 * 3 in Zenoh: a message being assembled, one being handed over, one on its way to a recorder;
 * 2 in the mailbox: the map queue and the update queue hold at most one largest message each;
 * 3 in the cycle: a map and an update being decoded, and Zenoh's buffer of the last one;
 * 2 in the mission: its map, and the one it is compared with or patched to.
 
-A keep-out mask is read where no map is decoded, and may take what two of the cycle's copies do
+A keep-out mask is read while no map is decoded, and may take as much as two of the cycle's copies
 (``mask_bytes``).
 
 Larger messages are dropped on arrival, by their size alone. Nothing else grows with the
-pixels: kernels look at a map tile by tile, and a tile has a bound, see ``grid.lattice``. Of a
-lattice's cells it is the path that takes most: some 80 bytes a pose, twice while it is sent. The
-living trail takes 16 bytes a cell, as much again while a copy is planned on or written, and 8 in
-the ledger's file. Else the ledger takes 4 bytes a cell, with the copy that is being written; of
-swept floor a bit a pixel of 2.5 cm, 18 bytes a cell of 0.3 m, and as much again where it changed
-since that copy. Whatever cells there are it has a bound of its own: 34 MB of cells and twice 13 MB
-of floor, where jumping poses fill it.
+pixels: kernels read a map tile by tile, and a tile is bounded, see ``grid.lattice``. Of the memory
+per cell the path takes most: some 80 bytes a pose, twice while it is sent. The living trail takes
+16 bytes a cell, as much again while a copy is planned on or written, and 8 in the ledger's file.
+The rest of the ledger takes 4 bytes a cell, with the copy being written; swept floor takes a bit a
+pixel of 2.5 cm, 18 bytes a cell of 0.3 m, and as much again where it changed since that copy. The
+ledger is bounded on its own: 34 MB of cells and twice 13 MB of floor, if jumping poses fill it.
 
 Measured (``python -m tests.campaigns.memory``, x86-64): a mission on a small map 195 MB, a path of
-440,000 cells 127 MB more, maps of 25 million pixels at 20 Hz 75 MB more, each followed by an
-update of all of it 240 MB, and 50 MB more where a recorder listens.
+440,000 cells 127 MB more, maps of 25 million pixels at 20 Hz 75 MB more, each followed by a map
+update of full size 240 MB, and 50 MB more with a recorder.
 """
 
 from __future__ import annotations
@@ -46,25 +45,25 @@ from fasaco_edge.wire.topics import QUEUE_LENGTHS
 
 MB = 1_000_000
 MIB = 1 << 20
-# Interpreter, numpy, Zenoh, compiler and kernels, and what a plan takes for itself.
+# Interpreter, numpy, Zenoh, compiler, kernels, and the fixed part of a plan.
 BASE_BYTES = 210 * MB
 MAPS = 10
 CELL_BYTES = 370
-# Of a pixel of floor: 3 for what is to be swept and how often the line does, 2 more while they move
-# with a map that grows; a bit each for what is blocked and where places are, twice where an order
-# has keep-out zones, and once more while a map is taken in; some bits a block of 64; and a tenth of
+# Bytes of a pixel of floor: 3 for the floor to sweep and the line's passes over it, 2 more while
+# they move with a growing map; a bit each for blocked pixels and poses, twice if an order has
+# keep-out zones, and once more while a map is taken in; some bits a block of 64; and a tenth of all
 # that for the frame around the map. Counted, not measured.
 FLOOR_BYTES = 7
-# Pixels of a frame that every map may have: small ones have the widest for their size.
+# Pixels of a frame that every map may have: relative to size, small maps have the widest.
 FRAME_PIXELS = 100_000
-# Of a cell with stand and bends: 32, as much again with keep-out zones, once more while a map is
-# taken in; and of the line 26 a point. Counted, too.
+# Bytes of a cell with stand and bends: 32, as much again with keep-out zones, once more while a map
+# is taken in; and 26 a point of the line. Counted, too.
 STAND_BYTES = 128
-# MemoryMax= above MemoryHigh=, beyond which the system only slows a service down.
+# MemoryMax= relative to MemoryHigh=, above which the system only throttles a service.
 SPARE = 1.1
 
-# Of the copies of a pixel, those that a keep-out mask may take while it is read; what reads it; and
-# the least for a mask, of which the base has some to spare.
+# Copies of a pixel that reading a keep-out mask may use; the memory of the reader; and the least
+# for a mask, of which the base has some to spare.
 MASK_COPIES = 2
 PILLOW_BYTES = 6 * MB
 LEAST_MASK_BYTES = 10 * MB
@@ -72,7 +71,7 @@ LEAST_MASK_BYTES = 10 * MB
 # The smallest limits ever applied: a small flat.
 LEAST_PIXELS, LEAST_CELLS = 250_000, 10_000
 
-# Limit of what waits of these kinds [bytes].
+# Queue limit of these kinds [bytes].
 QUEUED_BYTES = 8 * MAX_POSE_BYTES
 
 
@@ -96,14 +95,14 @@ def queues(max_pixels: int) -> dict[str, Queue]:
 
 
 def needed_bytes(config: DaemonConfig) -> int:
-    """Return the most memory that a daemon of this configuration takes [bytes]."""
+    """Return the largest memory of a daemon with this configuration [bytes]."""
     maps = config.map
     pixel_bytes, cell_bytes = unit_bytes(config)
     return BASE_BYTES + pixel_bytes * maps.max_pixels + cell_bytes * maps.max_lattice_cells
 
 
 def unit_bytes(config: DaemonConfig) -> tuple[int, int]:
-    """Return what a pixel and a cell take [bytes]."""
+    """Return the memory of a pixel and of a cell [bytes]."""
     if config.planner.line == "cells":
         return MAPS, CELL_BYTES
     return MAPS + FLOOR_BYTES, CELL_BYTES + STAND_BYTES
@@ -112,23 +111,23 @@ def unit_bytes(config: DaemonConfig) -> tuple[int, int]:
 def floor_pixels(max_pixels: int) -> int:
     """Return how many pixels the raster of floor may have for maps of ``max_pixels``.
 
-    As many as the map, and a frame around it: it has to fit every map that is taken.
+    As many as the map, and a frame around it: it must fit every accepted map.
     """
     return max_pixels + max_pixels // 10 + FRAME_PIXELS
 
 
 def mask_bytes(config: DaemonConfig, limit: int | None) -> int:
-    """Return what it may take to read a keep-out mask under a memory limit [bytes].
+    """Return the memory for reading a keep-out mask under a memory limit [bytes].
 
-    As much as the map and the update that are decoded in a cycle: while the configuration is read
-    again none is. A small picture is always read.
+    As much as decoding a map and an update in a cycle: none is decoded while the configuration is
+    reloaded. A small picture is always read.
     """
     share = MASK_COPIES * afforded(config, limit).map.max_pixels
     return max(share - PILLOW_BYTES, LEAST_MASK_BYTES)
 
 
 def limits_mib(config: DaemonConfig) -> tuple[int, int]:
-    """Return what ``MemoryHigh=`` and ``MemoryMax=`` of its unit should be [MiB].
+    """Return the values for ``MemoryHigh=`` and ``MemoryMax=`` of its unit [MiB].
 
     Both are rounded up to multiples of 16.
     """
@@ -138,7 +137,7 @@ def limits_mib(config: DaemonConfig) -> tuple[int, int]:
 
 
 def afforded(config: DaemonConfig, limit: int | None) -> DaemonConfig:
-    """Return the configuration with maps and lattices no larger than ``limit`` [bytes] affords.
+    """Return the configuration with map and lattice sizes limited to fit ``limit`` [bytes].
 
     None is no limit. Both shrink alike; a small flat is always tried.
     """
@@ -151,7 +150,7 @@ def afforded(config: DaemonConfig, limit: int | None) -> DaemonConfig:
     share = max(spare, 0) / (needed_bytes(config) - BASE_BYTES)
     cells = max(int(share * maps.max_lattice_cells), least_cells)
     pixels = max(min((spare - cell_bytes * cells) // pixel_bytes, maps.max_pixels), least_pixels)
-    # Where the pixels cannot shrink alike, the cells have to make up for that.
+    # If the pixels cannot shrink alike, the cells shrink more.
     cells = max(min((spare - pixel_bytes * pixels) // cell_bytes, cells), least_cells)
     smaller = structs.replace(maps, max_pixels=pixels, max_lattice_cells=cells)
     return structs.replace(config, map=smaller)

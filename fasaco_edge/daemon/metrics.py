@@ -1,8 +1,8 @@
-"""The server of figures for Prometheus: the newest status, over HTTP, on a thread of its own.
+"""The metrics server for Prometheus: the newest status, over HTTP, on a thread of its own.
 
-It cannot hold the loop up: the loop hands over a reference and goes on. It waits for no connection:
-a request is answered once it is all there, one after the other with a pause in between, so that who
-asks without end gets a few answers a second and takes hardly any of the processor.
+It never blocks the loop: the loop only passes a reference. It never blocks on a connection:
+complete requests are answered one at a time, rate-limited, so a client that polls in a tight loop
+costs little CPU.
 """
 
 from __future__ import annotations
@@ -20,17 +20,16 @@ from fasaco_edge.wire.documents.status import Status
 LOG = logging.getLogger(__name__)
 
 PATH = "/metrics"
-# Of a request: how much is read of it, and how long it may take to arrive [s]; how long its answer
-# may take to leave [s].
+# Of a request: most bytes read, timeout of its arrival [s], timeout of sending the answer [s].
 MOST_BYTES, LONGEST_S, SEND_S = 8192, 1.0, 0.2
-# Between two answers [s]. So many connections may be open, and as many wait to be taken: of more,
-# the oldest is closed, which has said nothing for the longest.
+# Pause between two answers [s]. Most open connections, and most that wait to be accepted: beyond
+# that the oldest, silent for the longest, is closed.
 PAUSE_S, MOST_OPEN = 0.05, 16
 REASONS = {200: "OK", 404: "Not Found", 405: "Method Not Allowed", 503: "Service Unavailable"}
 
 
 class MetricsServer:
-    """Serves the newest status that it was shown.
+    """Serves the newest status it was given.
 
     Args:
         address: where to listen.
@@ -54,7 +53,7 @@ class MetricsServer:
     def close(self) -> None:
         """Stop listening; a connection that is open ends with the process, or within a second."""
         self._is_closed.set()
-        # To close the socket alone does not wake who waits at it.
+        # Closing the socket alone does not wake the thread waiting on it.
         try:
             self._socket.shutdown(socket.SHUT_RDWR)
         except OSError:
@@ -81,12 +80,12 @@ class MetricsServer:
             request.close()
 
     def _take(self, requests: dict[socket.socket, _Request]) -> None:
-        """Take the connections that wait; close the oldest where there are too many."""
+        """Accept waiting connections; close the oldest if there are too many."""
         for _ in range(MOST_OPEN):
             try:
                 connection, _ = self._socket.accept()
             except OSError as error:
-                # No more of them wait; or the socket is closed, or there are no descriptors left.
+                # No more wait, or the socket is closed, or there are no descriptors left.
                 LOG.debug("metrics: %s", error)
                 break
             requests[connection] = _Request(connection)
@@ -94,7 +93,7 @@ class MetricsServer:
             requests.pop(next(iter(requests))).close()
 
     def _answer_one(self, requests: dict[socket.socket, _Request]) -> None:
-        """Answer the oldest request that is all there; close what is over."""
+        """Answer the oldest complete request; close expired connections."""
         now, has_answered = time.monotonic(), False
         for connection, request in list(requests.items()):
             if request.is_whole and not has_answered:
@@ -116,11 +115,11 @@ class MetricsServer:
 
 
 class _Request:
-    """What has arrived of one request.
+    """The received part of one request.
 
     Attributes:
-        until: when it has to be all there, by the steady clock [s].
-        is_gone: nobody is there any more.
+        until: deadline of its arrival, monotonic [s].
+        is_gone: the client is gone.
     """
 
     def __init__(self, connection: socket.socket) -> None:
@@ -130,11 +129,11 @@ class _Request:
 
     @property
     def is_whole(self) -> bool:
-        """Whether all has arrived, or as much as is read of it."""
+        """Whether it is complete, or the size limit is reached."""
         return b"\r\n\r\n" in self._head or len(self._head) >= MOST_BYTES
 
     def read(self) -> None:
-        """Read what is there."""
+        """Read the available bytes."""
         if self.is_whole:
             return
         try:
@@ -151,7 +150,7 @@ class _Request:
         return method, rest.partition(" ")[0].partition("?")[0]
 
     def answer(self, code: int, body: str) -> None:
-        """Send the answer, as far as it is taken at once."""
+        """Send as much of the answer as the socket takes at once."""
         text = body.encode()
         lines = (
             f"HTTP/1.0 {code} {REASONS[code]}",
@@ -165,7 +164,7 @@ class _Request:
             self._connection.settimeout(SEND_S)
             self._connection.sendall(head if self.words()[0] == "HEAD" else head + text)
         except OSError as error:
-            LOG.debug("metrics: %s", error)  # who asked is gone, or too slow
+            LOG.debug("metrics: %s", error)  # the client is gone, or too slow
 
     def close(self) -> None:
         """Close the connection."""
@@ -173,10 +172,10 @@ class _Request:
 
 
 def serve_metrics(address: Address | None) -> MetricsServer | None:
-    """Return a server; None where none is asked for, or it cannot listen: a robot drives without.
+    """Return a server; None if none is configured or it cannot listen: a robot drives without.
 
     Args:
-        address: where to listen; None for nowhere.
+        address: where to listen; None for no server.
     """
     if address is None:
         return None

@@ -19,12 +19,12 @@ if TYPE_CHECKING:
 
 LOG = logging.getLogger(__name__)
 
-# How long to wait for a busy manager, as at boot, with messages sent only once [s]; no other
-# message may delay the loop.
+# Timeout for a busy manager, as at boot, for messages sent only once [s]; no other message may
+# delay the loop.
 PATIENCE_S = 1.0
 # `systemctl status` shows one line [characters].
 MOST_SAID = 500
-# Share of the longest allowed silence: a cycle may be late, and a message may get lost.
+# Period as a share of the watchdog's timeout: a cycle may be late, and a message may get lost.
 SHARE = 0.25
 
 
@@ -35,7 +35,7 @@ class ServiceManager:
 
     Attributes:
         is_there: whether there is one.
-        watchdog_s: silence after which it considers this process hung [s]; 0 for no limit.
+        watchdog_s: timeout after which it considers this process hung [s]; 0 for none.
     """
 
     def __init__(self, environ: MutableMapping[str, str] = os.environ) -> None:
@@ -46,7 +46,7 @@ class ServiceManager:
         # "@" stands for the NUL of a name in the abstract namespace.
         self._address = f"\0{address[1:]}" if address.startswith("@") else address
         self.is_there = bool(address)
-        # Open all the time: a process that is out of files still has to feed the watchdog.
+        # Kept open: a process without free descriptors still has to feed the watchdog.
         self._out = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) if address else None
         if self._out is not None:
             weakref.finalize(self, self._out.close)
@@ -80,7 +80,7 @@ class ServiceManager:
         self._send("STOPPING=1")
 
     def _send(self, text: str, patience_s: float = 0.0) -> bool:
-        """Send a datagram; tell whether it was taken."""
+        """Send a datagram; tell whether it was accepted."""
         if self._out is None:
             return True
         try:
@@ -94,9 +94,9 @@ class ServiceManager:
 
 
 class Watchdog:
-    """Notifies the service manager's watchdog, from the loop and only while planning progresses.
+    """Feeds the service manager's watchdog, from the loop and only while planning progresses.
 
-    A thread of its own would keep feeding it beside a loop that hangs.
+    A thread of its own would go on feeding it while the loop hangs.
 
     Attributes:
         remark: added to the status line of the service; "" for nothing.
@@ -111,7 +111,7 @@ class Watchdog:
         self._state = ""
 
     def beat(self, worker: PlanningWorker | None, now: float) -> None:
-        """Notify the watchdog if that is due, and the worker, if any, has made progress."""
+        """Feed the watchdog if due, and if the worker, if any, has made progress."""
         if not self._period_s or now - self._notified_at < self._period_s:
             return
         if worker is not None:
@@ -122,7 +122,7 @@ class Watchdog:
         self._manager.alive()
 
     def tell(self, status: Status) -> None:
-        """Show a status as the service's status line; log it when the state changes."""
+        """Set a status as the service's status line; log it when the state changes."""
         if status.state != self._state:
             self._state = status.state
             LOG.info("%s", _doing(status), extra={"event": "state", "state": self._state})
@@ -131,10 +131,10 @@ class Watchdog:
 
 
 def status_line(status: Status) -> str:
-    """Return a status as a line: its state and why, how much is covered, what is wrong."""
+    """Return a status as a line: state and reason, share covered, faults."""
     parts = [_doing(status)]
     if coverage := status.coverage:
-        # Never 100 % before all are.
+        # Never 100 % before all cells are covered.
         parts.append(f"{math.floor(100 * coverage.fraction)} % of cells covered")
     if floor := status.floor:
         areas = f"{floor.swept_m2:.0f}"

@@ -1,4 +1,4 @@
-"""Reload of the configuration on SIGHUP; a wrong one is refused as a whole."""
+"""Reload of the configuration on SIGHUP; an invalid one is refused as a whole."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ from fasaco_edge.host.processes import memory_limit
 
 LOG = logging.getLogger(__name__)
 
-# Sections and keys that can change in a running daemon; not those that session, ledger or another
-# process were opened with.
+# Sections and keys that can change in a running daemon; not those with which session, ledger or
+# another process were opened.
 CHANGEABLE = frozenset(
     {
         "planner",
@@ -43,22 +43,22 @@ CHANGEABLE = frozenset(
         "mission.dock",
     }
 )
-# Of a section that can change: the ledger's cells follow from it.
+# Exceptions in a section that can change: they determine the ledger's cells.
 FIXED = frozenset({"planner.line"})
 
 
 def read_config(path: Path | None) -> DaemonConfig:
-    """Return a configuration as a daemon reads it, what it takes of other files included.
+    """Return a configuration as a daemon reads it, with the content of other files.
 
     Raises:
-        BadConfiguration: it is wrong, or its keep-out mask cannot be read in the memory there is.
+        BadConfiguration: it is invalid, or its keep-out mask does not fit the memory.
     """
     config = load_config(path)
     return with_mask(config, path, mask_bytes(config, memory_limit()))
 
 
 class Reload:
-    """Reads the configuration again on request, on a thread of its own: a mask may take seconds.
+    """Reads the configuration again on request, on its own thread: a mask may take seconds.
 
     Attributes:
         asked: set by the signal.
@@ -72,16 +72,16 @@ class Reload:
 
     @property
     def is_reading(self) -> bool:
-        """Whether it has begun to read, and what it has read was not taken yet."""
+        """Whether it is reading, or its result was not taken yet."""
         return self._reading is not None
 
     @property
     def is_read(self) -> bool:
-        """Whether there is something to take."""
+        """Whether there is a result to take."""
         return self._reading is not None and self._reading.done()
 
     def begin(self, ended: Callable[[], None]) -> None:
-        """Begin to read; ``ended`` is called once that is done, on the thread that has read."""
+        """Begin to read; ``ended`` is called afterwards, on the reading thread."""
         self.asked.clear()
         self._manager.reloading()
         reading = self._reading = Future()
@@ -96,10 +96,10 @@ class Reload:
         threading.Thread(target=run, name="reload", daemon=True).start()
 
     def take(self, running: DaemonConfig) -> DaemonConfig:
-        """Return the running configuration with those changes in the file that can be taken.
+        """Return the running configuration with the changeable values of the file.
 
         Raises:
-            BadConfiguration: the file is wrong.
+            BadConfiguration: the file is invalid.
         """
         assert self._reading is not None
         reading, self._reading = self._reading, None
@@ -148,7 +148,7 @@ def with_changeable(running: DaemonConfig, written: DaemonConfig) -> DaemonConfi
 
 
 def _flat(config: DaemonConfig) -> dict[str, object]:
-    """Return the values by ``section.key``; a section that may be left out counts as one value."""
+    """Return the values by ``section.key``; an optional section counts as one value."""
     sections = structs.asdict(config)
     left_out = ("fleet", "battery", "ros2")
     flat: dict[str, object] = {name: sections.pop(name) for name in left_out}

@@ -1,8 +1,8 @@
 """The ROS 2 bridge: the daemon's samples under the keys of a ROS 2 graph, without ROS.
 
-What comes in goes into the mailbox with what comes by the native keys, and is decoded there;
-what goes out is encoded once. Whether rmw_zenoh or zenoh-bridge-ros2dds is on the other side
-changes keys, attachments and tokens alone.
+Incoming samples go into the mailbox with those of the native keys, and are decoded there;
+outgoing samples are encoded once. rmw_zenoh and zenoh-bridge-ros2dds differ only in keys,
+attachments and tokens.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ class RosBridge:
     """The subscribers and publishers of the daemon under ROS 2.
 
     Attributes:
-        map: the map's subscription, to ask where the map is lacking.
+        map: the map's subscription, to query a missing map.
         path, coverage, diagnostics: where to publish them.
         commands: the commands of services, by the keys of these.
     """
@@ -63,7 +63,7 @@ class RosBridge:
         take = poster(self._mailbox, kind, self._max_pixels)
 
         def post(sample: Sample) -> None:
-            take(sample.as_type(topic.schema))  # ROS names no type beside a sample
+            take(sample.as_type(topic.schema))  # ROS sends no type with a sample
 
         key = self._config.input_key(topic)
         in_order = kind in topics.IN_ORDER
@@ -77,7 +77,7 @@ class RosBridge:
         self.diagnostics.put(payload)
 
     def _serve(self, service: RosTopic) -> str:
-        """Take the requests of a service; return its key, whatever hash a client puts behind."""
+        """Take the requests of a service; return its key, with any type hash a client appends."""
         key = self._config.input_key(service)
         post = partial(self._mailbox.post, "command")
         too_long = Reply(b"the request is too long", is_error=True)

@@ -44,19 +44,19 @@ if TYPE_CHECKING:
 LOG = logging.getLogger(__name__)
 
 # SIGTERM to exit takes at most two seconds; the recorder's footer comes first. A recorder that
-# still works, on a slow computer, gets what ``TimeoutStopSec=`` of the unit leaves.
+# still works, on a slow computer, gets the rest of ``TimeoutStopSec=`` of the unit.
 RECORDER_STOP_S, RECORDER_LONGEST_S = 1.2, 6.0
 WORKER_STOP_S = 0.4
-# The ledger is written meanwhile: its disk gets this long in all, and at least the second figure
-# once they have ended.
+# The ledger is written meanwhile: timeout for its disk in all, and the least time after the other
+# processes have ended.
 LEDGER_STOP_S, LEDGER_LEAST_S = 0.5, 0.2
-# Whatever still holds the process then is not waited for [s]: the unit's ``TimeoutStopSec=`` is 10,
-# and its SIGKILL would leave no trace of what it was.
+# Then the process exits whatever still blocks it [s]: the unit's ``TimeoutStopSec=`` is 10, and
+# its SIGKILL would leave no trace of the cause.
 END_S = 9.0
-# So soon a thread that runs lets another one run [s]. Zenoh's threads call back with each sample;
-# at 5 ms, as Python has it, the loop waits for them several times a cycle.
+# Thread switch interval of the interpreter [s]. Zenoh's threads call back with each sample; at
+# Python's default of 5 ms the loop waits for them several times a cycle.
 SWITCH_S = 0.0005
-# A client tries so often whether its router is there [s].
+# Period of a client's retries to reach its router [s].
 ROUTER_RETRY_S = 1.0
 
 
@@ -75,7 +75,7 @@ def run_daemon(
         record_to: folder for recordings; without it there are none.
         state: folder of the coverage ledger, in place of the configuration's.
         fresh: set the ledger aside, and cover everything again.
-        read: reads the configuration again, when a service manager sends SIGHUP.
+        read: reads the configuration again on SIGHUP from a service manager.
 
     Raises:
         BusUnavailable: no session could be opened.
@@ -85,12 +85,12 @@ def run_daemon(
     """
     started = time.monotonic()
     sys.setswitchinterval(SWITCH_S)
-    # Otherwise every thread keeps what its largest map took: 430 MB resident in place of 250.
+    # Otherwise every thread keeps the memory of its largest map: 430 MB resident, not 250.
     return_soon()
     stop = threading.Event()
 
     def end() -> None:
-        if not stop.is_set():  # each call would begin the time anew
+        if not stop.is_set():  # each call would restart the timeout
             end_within(END_S)
         stop.set()
 
@@ -98,7 +98,7 @@ def run_daemon(
     manager = ServiceManager()
     reload = Reload(read or (lambda: config), manager)
     if manager.is_there:
-        # Without one it is the signal of a closed terminal, which ends the process.
+        # Without a service manager, SIGHUP comes from a closed terminal and ends the process.
         call_on(signal.SIGHUP, call=reload.asked.set)
     config = _afforded(config)
     compiler = KernelCompiler(manager) if manager.is_there else None
@@ -121,7 +121,7 @@ def run_daemon(
 
 
 def _joined(settings: BusSettings, stop: threading.Event, manager: ServiceManager) -> Bus | None:
-    """Open a session; a client waits for its router. None where it has to stop before.
+    """Open a session; a client waits for its router. None if stopped before.
 
     Raises:
         BusUnavailable: no session can be opened, and waiting does not help.
@@ -131,13 +131,14 @@ def _joined(settings: BusSettings, stop: threading.Event, manager: ServiceManage
         try:
             return open_bus(settings)
         except BusUnavailable as error:
-            # What is wrong with its own addresses or credentials does not mend itself.
+            # Wrong addresses or credentials of its own cannot be fixed by waiting.
             if settings.mode != "client" or settings.secured:
                 raise
             if not is_waiting:
                 there = ", ".join(settings.connect)
                 LOG.warning("waiting for a router at %s: %s", there, error, extra={"event": "bus"})
-                # A service that has not come up is ended after a while; it has, as far as it can.
+                # A service that is never ready is ended after a while; this one is as ready as it
+                # can be.
                 manager.ready()
                 manager.status(f"waiting for a router at {there}")
                 is_waiting = True
@@ -147,7 +148,7 @@ def _joined(settings: BusSettings, stop: threading.Event, manager: ServiceManage
 
 
 def _afforded(config: DaemonConfig) -> DaemonConfig:
-    """Return the configuration, with smaller maps where memory is limited; log that."""
+    """Return the configuration, with smaller maps if memory is limited; log that."""
     limit = memory_limit()
     smaller = afforded(config, limit)
     if limit is not None and smaller is not config:

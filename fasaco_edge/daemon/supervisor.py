@@ -25,12 +25,12 @@ LOG = logging.getLogger(__name__)
 
 FIRST_PAUSE_S = 1.0
 LONGEST_PAUSE_S = 30.0
-# A running recorder without a report for this long is considered hung; one that a slow computer
-# holds up is not.
+# Timeout after which a running recorder without a report counts as hung; one that is only slow does
+# not.
 SILENT_AFTER_S = 30.0
-# Its first report may take longer: slow computers load its libraries for half a minute.
+# Timeout of its first report: slow computers load its libraries for half a minute.
 START_WITHIN_S = 120.0
-# One that hangs at its end uses less processor time than this, each time that is waited for it [s].
+# A recorder that uses less processor time than this in each wait hangs at its end [s].
 WORKS_S = 0.01
 
 
@@ -54,7 +54,7 @@ class RecorderSupervisor:
         self._launch()
 
     def poll(self, now: float) -> SupervisedRecorder:
-        """Restart the process where needed; return its state for the daemon's status."""
+        """Restart the process if needed; return its state for the daemon's status."""
         self._take_report(now)
         code = self._process.poll() if self._process is not None else None
         if self._process is not None and code is None:
@@ -73,9 +73,9 @@ class RecorderSupervisor:
         return SupervisedRecorder("restarting", self._restarts, self._death)
 
     def _launch(self) -> None:
-        """Start the process, which a computer out of memory or processes may refuse."""
+        """Start the process; this may fail without memory or process ids."""
         try:
-            # In memory and not in a pipe, which would have to be written while it is read.
+            # In memory and not in a pipe, which would need concurrent writing and reading.
             with open(os.memfd_create("configuration"), "w+b") as document:
                 document.write(self._config)
                 document.seek(0)
@@ -84,10 +84,10 @@ class RecorderSupervisor:
             self._process, self._death = None, f"could not be started: {error.strerror}"
 
     def close(self, timeout_s: float, longest_s: float) -> None:
-        """End the recorder; kill it where its footer is not written in ``timeout_s`` [s].
+        """End the recorder; kill it if its footer is not written in ``timeout_s`` [s].
 
-        One that works, on a slow or busy computer, gets up to ``longest_s`` [s]: what it heard
-        last is written then.
+        One that still works, on a slow or busy computer, gets up to ``longest_s`` [s] to write its
+        last samples.
         """
         if self._process is None or self._process.poll() is not None:
             return
@@ -122,7 +122,7 @@ class RecorderSupervisor:
     def _running(self, now: float) -> SupervisedRecorder:
         patience_s = SILENT_AFTER_S if self._report else START_WITHIN_S
         if now - self._reported_at > patience_s:
-            # What follows is the same as for a recorder that died.
+            # The rest is the same as for a recorder that died.
             assert self._process is not None
             self._process.kill()
             reason = f"no status for {patience_s:.0f} s"

@@ -1,7 +1,7 @@
 """A ledger as bytes: checksummed as a whole, versioned, the same on every machine.
 
-The envelope is that of every version, so that a file of another version can be distinguished from a
-broken one. Little endian:
+All versions share the envelope, so that a file of another version can be told from a broken one.
+Little endian:
 
     magic      8 bytes
     version    uint32
@@ -27,10 +27,10 @@ broken one. Little endian:
     fleet      what other robots have swept, JSON (``mission.fleet.shared``)
     note       UTF-8, up to the end: JSON of the order, with a version of its own; may be empty
 
-Versions before are read, too. Version 4, which is written where cells lie along the map frame's
-axes, lacks ``angle``. Version 3, which is written of such a robot without a fleet, lacks
-``fleet`` and its count, too. Version 2 knows no trail: its counts, ``corner`` and ``trail`` are
-not in it. Version 1 knows no floor, either: nor are the fourth count, ``floor`` and ``swept``.
+Earlier versions are read, too. Version 4, written if the cells lie along the axes of the map
+frame, lacks ``angle``. Version 3, written if there is also no fleet, lacks ``fleet`` and its count,
+too. Version 2 also lacks the trail: its counts, ``corner`` and ``trail``. Version 1 also lacks the
+floor: the fourth count, ``floor`` and ``swept``.
 """
 
 from __future__ import annotations
@@ -60,9 +60,9 @@ _CHECKED = struct.Struct("<IQ")
 _COUNTS = {1: "3I", 2: "4I", 3: "6I", 4: "7I", 5: "7Id"}
 _HEADS = {version: struct.Struct(f"<dQ{counts}") for version, counts in _COUNTS.items()}
 _PLACE_BYTES, _TILE_BYTES, _FLOOR_BYTES = 16, 2 * TILE * TILE, FLOOR_TILE * ROW_BYTES
-# Of a cell: two for each direction.
+# Bytes of a cell: two for each direction.
 _TRAIL_BYTES = 8
-# What a ledger holds beside its tiles is small: frame, cells under the tool, the order, the fleet.
+# Everything but the tiles is small: frame, cells under the tool, the order, the fleet.
 MOST_BYTES = (
     MOST_TILES * (_TILE_BYTES + _PLACE_BYTES)
     + MOST_FLOOR_TILES * (_FLOOR_BYTES + _PLACE_BYTES)
@@ -72,14 +72,14 @@ MOST_BYTES = (
 """Of a body, and of a file, which is smaller; longer ones are not read."""
 # Cells look alike after a quarter-turn [deg].
 MOST_LATTICE_DEG = 90.0
-# Number of values of pheromone that are rounded at a time.
+# Pheromone values rounded at a time.
 _AT_ONCE = 1 << 18
 # Mostly zeros and ones: the fastest level takes a hundredth of the size.
 _LEVEL = 1
 
 
 def encode_ledger(snapshot: LedgerSnapshot) -> bytes:
-    """Return a ledger as the bytes of a file."""
+    """Return a ledger encoded as a file."""
     # Part by part: a large ledger is not copied in memory as a whole.
     deflater = zlib.compressobj(_LEVEL)
     body = b"".join([*map(deflater.compress, _parts(snapshot)), deflater.flush()])
@@ -96,7 +96,7 @@ def _version_of(snapshot: LedgerSnapshot) -> int:
 def _parts(snapshot: LedgerSnapshot) -> Iterator[bytes]:
     frame, floor = snapshot.frame.encode(), snapshot.floor.tiles
     counts = (len(frame), len(snapshot.under_tool), len(snapshot.tiles), len(floor))
-    # One larger than what is read would make the ledger unreadable.
+    # A larger one would make the ledger unreadable.
     trail = snapshot.trail if snapshot.trail.tau.size <= 4 * MAX_LATTICE_CELLS else NO_TRAIL
     version = _version_of(snapshot)
     more = (*trail.tau.shape[:2], len(snapshot.fleet), snapshot.lattice_deg)[: version - 1]
@@ -119,11 +119,11 @@ def _parts(snapshot: LedgerSnapshot) -> Iterator[bytes]:
 
 
 def decode_ledger(payload: bytes, cell_m: float | None) -> LedgerSnapshot:
-    """Return the ledger in the bytes of a file; ``cell_m``: edge its cells have to have, or None.
+    """Return the ledger in a file's bytes; ``cell_m``: required edge of its cells, or None.
 
     Raises:
-        LedgerFileError: they are not what was once written.
-        LedgerMismatchError: they are of another version, or the cells are not ``cell_m`` wide.
+        LedgerFileError: the bytes are damaged.
+        LedgerMismatchError: it is of another version, or its cells are not ``cell_m`` wide.
     """
     if len(payload) < _ENVELOPE.size:
         raise LedgerFileError(f"torn: {len(payload)} bytes")
@@ -188,7 +188,7 @@ def _decode_body(plain: bytes, version: int) -> LedgerSnapshot:
         )
     if not (math.isfinite(cell_m) and cell_m > 0):
         raise ValueError(f"cells of {cell_m} m")
-    # A negated comparison, so that NaN is caught too.
+    # A negated comparison also catches NaN.
     if not abs(lattice_deg) <= MOST_LATTICE_DEG:
         raise ValueError(f"cells at {lattice_deg} degrees")
     tiles = _tiles(plain, cells_end, tile_count, np.dtype("<u2"), (TILE, TILE))

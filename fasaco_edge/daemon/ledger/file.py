@@ -1,10 +1,10 @@
-"""A robot's ledger on disk: two generations, each whole or not there at all.
+"""A robot's ledger on disk: two generations, each complete or absent.
 
 ``<robot>.ledger`` is the newest, ``<robot>.ledger.previous`` the one before. A new one is
-written to ``<robot>.ledger.new`` and on to the disk itself; only then the names move on: at
-every moment a whole ledger stands under one of them, and ``load`` finds the newest. Files
-that cannot be used are set aside under a name that says why: of each kind the newest few and the
-largest, unless they have no covered cell and no swept floor.
+written to ``<robot>.ledger.new``, fsynced, and then the files are renamed: at every moment one of
+them is a complete ledger, and ``load`` finds the newest. Unusable files are set aside under a name
+that tells the reason: the newest few and the largest of each kind are kept, unless they have no
+covered cell and no swept floor.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ KEPT_ASIDE = 3
 
 @dataclass(frozen=True, slots=True)
 class LoadedLedger:
-    """What was on disk: a ledger or none; and the fault, if any."""
+    """Result of reading the disk: a ledger or none, and the fault, if any."""
 
     ledger: LedgerSnapshot | None = None
     fault: FasacoError | None = None
@@ -42,9 +42,9 @@ def lock_file(folder: Path, robot: str) -> Path:
 
 
 def why_no_lock(name: Path) -> str:
-    """Return what lies in place of a lock file, "" where one can be.
+    """Return what blocks the path of the lock file, "" for nothing.
 
-    It is left alone: set aside, a link of another user's would be followed by a ledger of ours.
+    It is not set aside: a link made by another user would then get a ledger of ours.
     """
     kind = "a link" if name.is_symlink() else "a folder" if name.is_dir() else ""
     return f"{kind} lies in place of {name}" if kind else ""
@@ -64,27 +64,27 @@ class LedgerFile:
         self._generations = (self._new, self.path, self._previous)
         self._lock: int | None = None
         self._exclusive = False
-        # Files to be renamed before anything is written; why is in their new names.
+        # Files to rename before the next write; the new names tell the reason.
         self._unwanted: list[tuple[Path, str]] = []
-        # Whether the new generation is whole, but still under its own name.
+        # Whether the new generation is complete, but not yet renamed.
         self._moving = False
 
     def lock(self) -> None:
-        """Keep other processes from writing this ledger, until this one ends.
+        """Lock this ledger against other processes until this one ends.
 
         Raises:
-            LedgerFileError: another process has it.
+            LedgerFileError: another process holds the lock.
         """
         self._exclusive = True
-        # If there is no folder yet, the lock is taken before the first write.
+        # Without a folder, the lock is taken before the first write.
         with contextlib.suppress(OSError):
             self._take_lock()
 
     def load(self, cell_m: float) -> LoadedLedger:
-        """Return the newest whole ledger, and finish a write that was cut short.
+        """Return the newest complete ledger, and finish an interrupted write.
 
         Args:
-            cell_m: edge of the cells it has to have [m].
+            cell_m: required edge of its cells [m].
         """
         broken: dict[Path, str] = {}
         for path in self._generations:
@@ -96,8 +96,8 @@ class LedgerFile:
                 fault = self._after_aside(error, self._generations, "mismatch")
                 return LoadedLedger(fault=fault)
             except (OSError, LedgerFileError) as error:
-                # A write that was cut short is no fault: what was there before still is. One that
-                # the disk does not give may be whole.
+                # An interrupted write is no fault: the previous ledger is intact. A file that the
+                # disk fails to read may be complete.
                 if path != self._new or (isinstance(error, OSError) and os.path.lexists(path)):
                     broken[path] = reason_of(error)
                 continue
@@ -108,34 +108,35 @@ class LedgerFile:
                 hint="everything has to be covered again; check the disk",
             )
             return LoadedLedger(fault=self._after_aside(lost, broken, "broken"))
-        # A file that appears later, on a disk mounted late, was not read and is not overwritten.
+        # A file that appears later (on a disk mounted late) was not read and is not overwritten.
         self._unwanted = [(path, "unread") for path in (self.path, self._previous)]
         return LoadedLedger()
 
     def write(self, ledger: LedgerSnapshot) -> list[str]:
-        """Write a ledger so that it outlives a loss of power from the moment this returns.
+        """Write a ledger; once this returns, it survives a power failure.
 
-        Returns the names under which files that were in its way are kept.
+        Returns the new names of files that were in its place.
 
         Raises:
-            LedgerFileError: another process has it, which ``lock`` could not find out.
-            OSError: that failed; what was there before still is.
+            LedgerFileError: another process holds the lock, unknown to ``lock``.
+            OSError: the write failed; the previous ledger is intact.
         """
         payload = encode_ledger(ledger)
         make_folder(self.path.parent)
         if self._lock is not None and not os.fstat(self._lock).st_nlink:
-            # Somebody deleted it, perhaps with its folder: another process could take a new one.
+            # The lock file was deleted, perhaps with its folder: another process could make a new
+            # one.
             os.close(self._lock)
             self._lock = None
         if self._exclusive and self._lock is None:
             self._take_lock()
         kept = self._rename_unwanted()
         if self._moving and self._new.exists():
-            self._move_on()  # it may be the only whole one beside its predecessor
+            self._move_on()  # it may be the only complete one beside its predecessor
         try:
             write_through(self._new, payload)
         except OSError:
-            # Half a file only takes space, on a disk that may be full.
+            # A partial file only takes space on a disk that may be full.
             self._new.unlink(missing_ok=True)
             raise
         self._moving = True
@@ -148,16 +149,16 @@ class LedgerFile:
         Args:
             why: a word for the new names.
 
-        Raises:
-            OSError: it could not be renamed yet; that is done before the next write.
+            Raises:
+                OSError: renaming failed; it is retried before the next write.
         """
         self._unwanted = [(path, why) for path in self._generations]
         return self._rename_unwanted()
 
     def _take_lock(self) -> None:
         make_folder(self.path.parent)
-        # Not open for writing: that would keep the disk from turning read-only.
-        # Whatever lies under its name: to open a pipe would wait for somebody who writes to it.
+        # Not opened for writing: that would keep the disk from turning read-only.
+        # Non-blocking: if its name is a pipe, opening it would wait for a writer.
         name = lock_file(self.path.parent, self.path.stem)
         try:
             lock = open_own(name, os.O_RDONLY | os.O_NONBLOCK)
@@ -178,7 +179,7 @@ class LedgerFile:
         self._lock = lock
 
     def _taken(self, path: Path, broken: dict[Path, str]) -> FasacoError | None:
-        """Make the ledger that was read the newest; return what was wrong before."""
+        """Make the ledger that was read the newest; return the earlier fault."""
         if path == self._new:
             self._moving = True
             try:
@@ -194,7 +195,7 @@ class LedgerFile:
         return self._after_aside(fault, broken, "broken")
 
     def _after_aside(self, fault: FasacoError, paths: Iterable[Path], why: str) -> FasacoError:
-        """Return ``fault`` with where the files were kept."""
+        """Return ``fault`` with the new names of the files."""
         self._unwanted = [(path, why) for path in paths]
         try:
             kept = self._rename_unwanted()
@@ -205,7 +206,7 @@ class LedgerFile:
         return type(fault)(f"{fault}; kept as {', '.join(kept)}", hint=fault.hint)
 
     def _rename_unwanted(self) -> list[str]:
-        """Rename what is not to be overwritten; return the new names."""
+        """Rename files that must not be overwritten; return the new names."""
         kept = []
         while self._unwanted:
             path, why = self._unwanted[-1]
@@ -218,12 +219,12 @@ class LedgerFile:
                 _prune(path, why, aside)
             self._unwanted.pop()
         if kept:
-            # Else they may be back under their old names after a loss of power.
+            # Otherwise they may have their old names after a power failure.
             sync_folder(self.path.parent)
         return kept[::-1]
 
     def _move_on(self) -> None:
-        """Make the new generation the newest, and that the one before; in this order.
+        """Rename the newest generation to the previous, then the new one to the newest.
 
         After a crash in between, the new one is found under its own name.
         """
@@ -246,14 +247,14 @@ def _read(path: Path) -> bytes:
 
 
 def _is_empty(path: Path) -> bool:
-    """Tell whether a ledger can be read, and nothing is covered or swept."""
+    """Tell whether a ledger is readable, and has nothing covered or swept."""
     with contextlib.suppress(OSError, FasacoError):
         return decode_ledger(_read(path), None).is_empty
     return False
 
 
 def _prune(path: Path, why: str, newest: Path) -> None:
-    """Delete what was kept of the same kind, but the newest few and the largest."""
+    """Delete kept files of the same kind, except the newest few and the largest."""
     older = [other for other in _aside(path, why).values() if other != newest]
     largest = max([*older, newest], key=lambda other: other.stat().st_size)
     for other in older[: 1 - KEPT_ASIDE]:
@@ -262,14 +263,14 @@ def _prune(path: Path, why: str, newest: Path) -> None:
 
 
 def _free_name(path: Path, why: str) -> Path:
-    """Return a name that tells when, and by its number after which others, whatever the clock."""
+    """Return a name with the time, and a number that gives the order whatever the clock."""
     moment = time.strftime("%Y%m%dT%H%M%SZ", time.gmtime())
     number = max((number for number, _, _ in _aside(path, why)), default=0) + 1
     return path.with_name(f"{path.name}.{why}-{moment}" + (f"-{number}" if number > 1 else ""))
 
 
 def _aside(path: Path, why: str) -> dict[tuple[int, str, str], Path]:
-    """Return what was kept of one kind by number, time and name, the oldest first."""
+    """Return the kept files of one kind by number, time and name, oldest first."""
     form = re.compile(re.escape(f"{path.name}.{why}-") + r"(\w+Z)(?:-(\d+))?")
     found = {
         (int(match[2] or 1), match[1], other.name): other
@@ -280,5 +281,5 @@ def _aside(path: Path, why: str) -> dict[tuple[int, str, str], Path]:
 
 
 def reason_of(error: Exception) -> str:
-    """Return what went wrong, without the path, which the message names anyway."""
+    """Return the reason of a failure without the path, which the message names anyway."""
     return (error.strerror or str(error)) if isinstance(error, OSError) else str(error)

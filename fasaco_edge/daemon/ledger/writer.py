@@ -1,6 +1,6 @@
 """The ledger's writer: a thread, so that a slow or full disk does not delay the mission.
 
-What cannot be written stays in memory and is tried again; the status says so meanwhile.
+A ledger that cannot be written stays in memory and is retried; meanwhile the status says so.
 """
 
 from __future__ import annotations
@@ -25,22 +25,22 @@ if TYPE_CHECKING:
 
 LOG = logging.getLogger(__name__)
 
-# Period of writes, so that coverage is on disk within a second, although a cycle takes up to 0.1 s
-# and a memory card some tenths more.
+# Period of writes: coverage is on disk within a second, though a cycle takes up to 0.1 s and a
+# memory card some tenths more.
 PERIOD_S = 0.5
-# Period if only floor and trail changed: they do with every pose or path, and memory cards wear
-# out.
+# Period if only floor and trail changed: they change with every pose or path, and memory cards
+# wear out.
 FLOOR_PERIOD_S = 1.0
-# Time between tries after a failure [s].
+# Time before a retry after a failure [s].
 RETRY_S = 2.0
-# How long the answer to a command waits for a slow disk [s].
+# Timeout of a command's reply on a slow disk [s].
 MOST_WAIT_S = 1.0
-# A disk that has not taken a ledger for so long hangs [s]; memory cards pause for some.
+# A disk that has not taken a ledger for this long hangs [s]; memory cards pause for some.
 HANGS_S = 10.0
 
 
 class _Kept(NamedTuple):
-    """The state last handed over: visits, changes of floor, trail and fleet, the order."""
+    """The state last passed to the writer: visits, changes of floor, trail and fleet, the order."""
 
     visits: int
     floor_changes: int
@@ -49,7 +49,7 @@ class _Kept(NamedTuple):
     order_state: OrderState
 
     def may_wait_s(self, before: _Kept) -> float:
-        """Return how long this may wait after the former one [s]."""
+        """Return how long this may wait after the previous one [s]."""
         if self.order_state != before.order_state:
             return 0.0
         return PERIOD_S if self.visits != before.visits else FLOOR_PERIOD_S
@@ -59,7 +59,7 @@ class LedgerKeeper:
     """Keeps coverage and order in the ledger; also before there is a mission.
 
     Attributes:
-        order_state: the order to begin with: the one that was under way, if any.
+        order_state: the initial order: the one that was under way, if any.
     """
 
     def __init__(self, writer: LedgerWriter, cell_m: float, *, autostart: bool) -> None:
@@ -71,7 +71,7 @@ class LedgerKeeper:
         self._kept_at = float("-inf")
 
     def restore(self, mission: Mission) -> None:
-        """Let a mission continue where the former one ended."""
+        """Let a mission continue where the previous one ended."""
         if not self._before.is_empty:
             mission.restore_ledger(self._before)
         mission.restore_order(self.order_state)
@@ -97,7 +97,7 @@ class LedgerKeeper:
             self._writer.put(self._before)
 
     def is_kept(self, now: float) -> bool:
-        """Tell whether the changes are on disk, or the disk has been waited for long enough."""
+        """Tell whether the changes are on disk, or the timeout is over."""
         return not self._writer.is_behind() or now - self._kept_at > MOST_WAIT_S
 
     def report(self, now: float) -> LedgerReport:
@@ -105,18 +105,18 @@ class LedgerKeeper:
         return self._writer.report(now)
 
     def take_faults(self) -> list[FasacoError]:
-        """Return what went wrong since the last call; it is logged already."""
+        """Return the faults since the last call; they are logged already."""
         faults, self._faults = self._faults, []
         return faults + self._writer.take_faults()
 
     def note_faults(self, faults: tuple[FasacoError, ...]) -> None:
-        """Set the files aside where the mission found that they are of another building."""
+        """Set the files aside if the mission found them to be of another building."""
         for fault in faults:
             if isinstance(fault, LedgerMismatchError):
                 self._begin_anew(fault, "mismatch")
 
     def forget(self) -> None:
-        """Set the files aside: everything is to be covered again."""
+        """Set the files aside: everything has to be covered again."""
         self._begin_anew(None, "reset")
         self._before = LedgerSnapshot(self._before.cell_m, "", 0, {})
 
@@ -125,7 +125,7 @@ class LedgerKeeper:
         self._kept, self._kept_at = _Kept(-1, -1, -1, -1, OrderState()), float("-inf")
 
     def _first_order_state(self, autostart: bool) -> OrderState:
-        """Return the order that was under way, or the one to begin with."""
+        """Return the order that was under way, or the initial one."""
         kept = OrderState.idle(NO_ORDER)
         try:
             if self._before.note:
@@ -142,10 +142,10 @@ class LedgerKeeper:
 
 
 def open_ledger(folder: Path, robot: str, cell_m: float, *, fresh: bool = False) -> LedgerWriter:
-    """Load a robot's ledger and start the thread that writes it.
+    """Load a robot's ledger and start its writer thread.
 
     Args:
-        folder: where it is kept.
+        folder: its folder.
         robot: the robot's name.
         cell_m: edge of a cell [m].
         fresh: set the existing ledger aside, and start over.
@@ -167,7 +167,7 @@ def open_ledger(folder: Path, robot: str, cell_m: float, *, fresh: bool = False)
 
 
 class LedgerWriter:
-    """Writes the newest of the ledgers it is given.
+    """Writes the newest ledger it was given.
 
     Attributes:
         restored: the ledger to continue with, if any.
@@ -180,9 +180,9 @@ class LedgerWriter:
         self._file = file
         self._written_at: float | None = None
         self._faults = deque[FasacoError]()
-        # Why it cannot write now; what was wrong with the files at the start.
+        # The present reason not to write; the faults of the files at the start.
         self._trouble, self._finding = "", ""
-        # Since when it writes; whether it was said that this hangs.
+        # Start of the present write; whether its hanging was reported.
         self._writes_since: float | None = None
         self._is_hang_told = False
         if found.fault is not None:
@@ -196,18 +196,18 @@ class LedgerWriter:
         self._thread.start()
 
     def put(self, ledger: LedgerSnapshot) -> None:
-        """Write this ledger next, in place of one that still waits."""
+        """Write this ledger next; it replaces a waiting one."""
         with self._changed:
             self._waiting = ledger
             self._changed.notify()
 
     def is_behind(self) -> bool:
-        """Tell whether something is still to be written, and nothing keeps it from that."""
+        """Tell whether a write is still due and not prevented."""
         with self._changed:
             return self._has_work() and not self._trouble
 
     def begin_anew(self, fault: FasacoError | None, why: str) -> None:
-        """Set the files aside, with the word ``why`` in their names: another ledger follows.
+        """Set the files aside, with ``why`` in their names: a new ledger follows.
 
         ``fault`` is for the status; None for a reset by command.
         """
@@ -219,7 +219,7 @@ class LedgerWriter:
             self._changed.notify()
 
     def take_faults(self) -> list[FasacoError]:
-        """Return what went wrong since the last call; trouble that lasts is returned once."""
+        """Return the faults since the last call; a lasting fault is returned once."""
         return [self._faults.popleft() for _ in range(len(self._faults))]
 
     def report(self, now: float) -> LedgerReport:
@@ -234,7 +234,7 @@ class LedgerWriter:
         )
 
     def _hang(self, now: float) -> str:
-        """Return that the disk does not take a ledger, "" where it does; count that once."""
+        """Return the fault of a hanging disk, "" for none; count it once."""
         since = self._writes_since
         if since is None or now - since < HANGS_S:
             self._is_hang_told = False
@@ -247,7 +247,7 @@ class LedgerWriter:
         return fault_text(fault)
 
     def close(self, timeout_s: float) -> None:
-        """Write what is left and end the thread, within ``timeout_s`` [s]."""
+        """Write pending changes and end the thread, within ``timeout_s`` [s]."""
         with self._changed:
             self._stopping = True
             self._changed.notify()
@@ -275,7 +275,7 @@ class LedgerWriter:
         return self._waiting is not None or bool(self._unwanted)
 
     def _work(self, ledger: LedgerSnapshot | None, unwanted: list[str]) -> bool:
-        """Write a ledger, and set files aside; tell whether that went well."""
+        """Write a ledger, and set files aside; tell whether that succeeded."""
         try:
             kept = [name for why in unwanted for name in self._file.set_aside(why)]
             if ledger is not None:

@@ -1,7 +1,7 @@
-"""Answers to queries for configuration, versions and commands, and what all answers share.
+"""Replies to queries for configuration, versions and commands, and their common functions.
 
-Configuration and versions are answered on Zenoh's thread, without waiting for the loop; commands
-are answered once the mission has decided.
+Queries for configuration and versions get their reply on Zenoh's thread, without the loop; commands
+get it once the mission has decided.
 """
 
 from __future__ import annotations
@@ -42,20 +42,20 @@ from fasaco_edge.wire.messages.ros_services import (
     response_attachment,
 )
 
-# Least period of replans by request: a path that keeps changing is hard to follow [s].
+# Rate limit of replans by request: a path that keeps changing is hard to follow [s].
 REPLAN_PERIOD_S = 1.0
-# A document of JSON, and its question.
+# A JSON document, and its query.
 QUERY_BYTES = MAX_JSON_BYTES + 4096
 Said = Reply | Shared
 
 
 def error_reply(error: FasacoError) -> Reply:
-    """Return an error as an answer."""
+    """Return an error as a reply."""
     return Reply(encode_error(error), is_error=True)
 
 
 def answering(answer: Callable[[Request], Said]) -> Callable[[Request], Said]:
-    """Return ``answer`` such that an error it raises is the answer."""
+    """Wrap ``answer`` so that an error it raises becomes the reply."""
 
     def answered(request: Request) -> Said:
         try:
@@ -67,10 +67,10 @@ def answering(answer: Callable[[Request], Said]) -> Callable[[Request], Said]:
 
 
 def check(request: Request, *parameters: str, payload: bool = False) -> None:
-    """Check that a query has no other parameters, and a payload only where it takes one.
+    """Check that a query has no other parameters, and a payload only if it takes one.
 
     Raises:
-        BadQuery: it has, by name.
+        BadQuery: it has; the error names them.
     """
     name = request.key.rpartition("/")[2]
     takes = ", ".join(parameters) or "none"
@@ -86,7 +86,7 @@ LEFT_OUT = "(left out)"
 
 
 def serve_about(bus: Bus, keys: Keys, config: Callable[[], DaemonConfig]) -> None:
-    """Serve ``config``, as it is then, and ``version``; answer other queries with what there is."""
+    """Serve the current ``config`` and ``version``; reply to other queries with a list of all."""
     version = Version(__version__, VERSION.removeprefix("@"), metadata.version("eclipse-zenoh"))
     documents: dict[str, Callable[[], object]] = {
         "config": lambda: config_document(config()),
@@ -98,10 +98,10 @@ def serve_about(bus: Bus, keys: Keys, config: Callable[[], DaemonConfig]) -> Non
 
 
 def config_document(config: DaemonConfig) -> Settings:
-    """Return the configuration in force as it may be shown to anybody: without secrets.
+    """Return the configuration in force without secrets.
 
-    An endpoint may carry any setting of Zenoh's behind its ``#``, keys and passwords among
-    them: all that is left out.
+    An endpoint may carry any Zenoh setting after its ``#``, also keys and passwords: that part
+    is left out.
     """
     return cast(Settings, _shown(msgspec.to_builtins(config)))
 
@@ -125,7 +125,7 @@ def _tell(document: Callable[[], object], request: Request) -> Reply:
 
 
 def _unknown(keys: Keys, request: Request) -> Reply | None:
-    """Answer what no other queryable answers: this one gets every query."""
+    """Reply to queries that no other queryable serves: this one gets every query."""
     if any(matches(request.key, keys.rpc(name)) for name in topics.RPC_NAMES):
         return None
     name = request.key.rpartition("/")[2]
@@ -135,10 +135,10 @@ def _unknown(keys: Keys, request: Request) -> Reply | None:
 
 
 class Commands:
-    """Serves ``@rpc/mission`` and ``@rpc/replan``; a query waits until the loop answers.
+    """Serves ``@rpc/mission`` and ``@rpc/replan``; a query waits until the loop replies.
 
-    ``services`` are the commands of ROS 2 services, by the keys of these: their requests come into
-    the mailbox, too.
+    ``services`` maps keys of ROS 2 services to commands: their requests come into the mailbox,
+    too.
     """
 
     def __init__(
@@ -150,7 +150,7 @@ class Commands:
     ) -> None:
         self._count = 0
         self._services = services or {}
-        # Queries that the mission decides on, by number, and those for the status alone.
+        # Queries with a command, by number, and queries for the status alone.
         self._open: dict[int, Question] = {}
         self._status_questions: list[Question] = []
         self._decided: list[Answer] = []
@@ -162,7 +162,7 @@ class Commands:
             bus.take_questions(keys.rpc(name), post, QUERY_BYTES, too_long)
 
     def take(self, questions: Sequence[Question], now: float) -> list[CommandReceived]:
-        """Return the commands in ``questions``; one that is none is answered at once."""
+        """Return the commands in ``questions``; an invalid one gets an error reply at once."""
         commands = []
         for question in questions:
             try:
@@ -188,7 +188,7 @@ class Commands:
         if question.key == self._replan_key:
             check(request)
             if request.key.endswith("*"):
-                # A wildcard query means to change nothing.
+                # A wildcard query must change nothing.
                 raise BadQuery("replan has to be asked for by its name")
             command: tuple[CommandName, MissionOrder] = ("replan", EVERYTHING_ONCE)
         else:
@@ -205,17 +205,17 @@ class Commands:
 
     @property
     def are_asked(self) -> bool:
-        """Whether a query waits for an answer."""
+        """Whether a query waits for its reply."""
         return bool(self._open or self._status_questions)
 
     def note(self, answers: Sequence[Answer], now: float) -> None:
-        """Note what the mission has decided."""
+        """Note the mission's decisions."""
         self._decided.extend(answers)
         if any(answer.plan is not None for answer in answers):
             self._replanned_at = now
 
     def answer(self, report: replies.Reply, *, is_kept: bool) -> None:
-        """Answer questions for the status; and commands, once the ledger has them on disk."""
+        """Reply to queries for the status; and to commands, once the ledger has them on disk."""
         payload = encode_json(report)
         for question in self._status_questions:
             question.answer(Reply(payload))
@@ -244,7 +244,7 @@ class Commands:
             question.answer(error_reply(error))
 
     def _respond(self, question: Question, message: str, *, success: bool) -> None:
-        """Answer the request of a service, under the very key that it came by."""
+        """Reply to the request of a service, on the key of the request."""
         request = question.request
         beside = response_attachment(request.attachment, time.time_ns())
         payload = encode_response(message, success=success)

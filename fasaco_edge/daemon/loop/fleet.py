@@ -1,6 +1,6 @@
-"""The fleet on the bus: what this robot says to the others, and what they say as events.
+"""Fleet messages: this robot's message to the others, and theirs as events.
 
-Without a block ``fleet`` in the configuration nothing here is made.
+Unused without a block ``fleet`` in the configuration.
 """
 
 from __future__ import annotations
@@ -25,16 +25,16 @@ if TYPE_CHECKING:
     from fasaco_edge.mission.core.mission import Mission
 
 PERIOD_S, LEAST_PERIOD_S = 1.0, 0.25
-# Of one robot no more is taken than one message in this time [s], of no more than so many robots.
+# Rate limit of the messages of a robot [s], and the most robots that are heard.
 LEAST_SPACING_S, MOST_ROBOTS = 0.2, 64
-# One that was not heard for so long makes room for another [s].
+# A robot silent for this long makes room for another [s].
 FORGOTTEN_S = 60.0
-# Tiles in a message that comes once a second, and in one on change: 12 kB a second in all.
+# Tiles in a message sent once a second, and in one on change: 12 kB a second in all.
 TILES, FEW_TILES = MAX_FLEET_TILES // 2, 2
 
 
 class FleetEar:
-    """Hears the other robots of a fleet.
+    """Receiver of the messages of a fleet's other robots.
 
     Args:
         config: with a block ``fleet``.
@@ -47,7 +47,7 @@ class FleetEar:
         self._heard_at: dict[str, float] = {}
 
     def listen(self, bus: Bus, post: Callable[[Sample], None]) -> None:
-        """Hand on what others say, as far as they keep to their rate."""
+        """Pass on the messages of others within their rate limit."""
 
         def post_due(sample: Sample) -> None:
             if self._is_due(sample.key, time.monotonic()):
@@ -56,10 +56,10 @@ class FleetEar:
         bus.subscribe(self._keys.of_all(FLEET), post_due)
 
     def event(self, sample: Sample) -> MemberHeard | None:
-        """Return what a robot says; None of one of another fleet, and of this one.
+        """Return a robot's message as an event; None from another fleet or from this robot.
 
         Raises:
-            MalformedMessage: it is not what it should be.
+            MalformedMessage: it is malformed.
         """
         robot = self._keys.robot_of(sample.key)
         if robot in ("", self._keys.robot):
@@ -98,7 +98,7 @@ class FleetEar:
         """Tell whether a message on a key may be taken now; on a Zenoh thread."""
         if now - self._heard_at.get(key, float("-inf")) < LEAST_SPACING_S:
             return False
-        # Whoever was heard longest ago is first.
+        # The robot heard longest ago is first.
         if len(self._heard_at) >= MOST_ROBOTS and key not in self._heard_at:
             longest = next(iter(self._heard_at))
             if now - self._heard_at[longest] < FORGOTTEN_S:
@@ -110,7 +110,7 @@ class FleetEar:
 
 
 class FleetVoice:
-    """Tells the others of this robot: once a second, and when state or division have changed.
+    """Publisher of this robot's message: once a second, and when state or division have changed.
 
     Args:
         publisher: of the robot's own key.
@@ -126,7 +126,7 @@ class FleetVoice:
         self._said_at = float("-inf")
 
     def publish(self, mission: Mission, now: float) -> None:
-        """Say what is due; the caller guards that."""
+        """Publish a message if due; the caller catches failures."""
         stamped = mission.pose
         if stamped is None or not mission.ledger.frame:
             return
@@ -138,7 +138,7 @@ class FleetVoice:
         self._said, self._said_at = key, now
         most = FEW_TILES if is_news else TILES
         if mission.shared.epoch != self._epoch:
-            # What was told is forgotten.
+            # Published changes are forgotten.
             self._epoch, self._telling, most = mission.shared.epoch, Telling(), TILES
         swept = self._telling.next(mission.ledger.snapshot().tiles, most)
         member = FleetMember(

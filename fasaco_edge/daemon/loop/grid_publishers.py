@@ -14,19 +14,20 @@ if TYPE_CHECKING:
     from fasaco_edge.daemon.loop.outbox import Outbox
     from fasaco_edge.mission.core.mission import Mission
 
-# The coverage is published no more often than this [s].
+# Least period of the coverage [s].
 COVERAGE_PERIOD_S = 0.5
-# Neither is the swept floor; in so many squares at most, which are larger where it is large.
+# Least period of the swept floor [s], and the most squares of it: a large floor gets larger
+# squares.
 FLOOR_PERIOD_S = 2.0
 MOST_SQUARES = 1_000_000
-# The trail is shown no more often than this [s], and a large one, which takes the loop some
-# milliseconds per 100,000 cells, less often.
+# Least period of the trail [s]; a large one, which takes the loop some milliseconds per 100,000
+# cells, is published less often.
 PERIOD_S = 0.5
 CELLS_PER_S = 200_000
 
 
 class CoveragePublisher:
-    """Publishes the coverage grid when it has changed, but no more than twice a second."""
+    """Publishes the coverage grid on change, at most twice a second."""
 
     def __init__(self, outbox: Outbox) -> None:
         self._outbox = outbox
@@ -39,7 +40,7 @@ class CoveragePublisher:
 
     def publish(self, mission: Mission, now: float) -> None:
         """Publish the coverage if that is due."""
-        # An order may forget what was covered, and keep the robot out of cells.
+        # An order may reset the coverage, and add keep-out cells.
         key = (mission.covered.version, mission.map_revision, mission.order_state)
         if key == self._key or now - self._published_at < COVERAGE_PERIOD_S:
             return
@@ -53,7 +54,7 @@ class CoveragePublisher:
 
 
 class FloorPublisher:
-    """Publishes the swept floor when it has changed and someone listens, every two seconds."""
+    """Publishes the swept floor on change if it has subscribers, every two seconds."""
 
     def __init__(self, outbox: Outbox) -> None:
         self._outbox = outbox
@@ -77,20 +78,20 @@ class FloorPublisher:
 
 
 class TrailPublisher:
-    """Shows the trail when it has changed, twice a second at most.
+    """Publishes the trail on change, at most twice a second.
 
-    It is published while someone listens, and kept for who asks.
+    It is published while it has subscribers, and kept for queries.
     """
 
     def __init__(self, outbox: Outbox) -> None:
         self._outbox = outbox
         self._due = float("-inf")
-        # What was kept last, and what was published last.
+        # The trail kept last, and the trail published last.
         self._kept: tuple[object, ...] = ()
         self._published: tuple[object, ...] = ()
 
     def publish(self, mission: Mission, now: float) -> None:
-        """Show the trail if that is due."""
+        """Publish or keep the trail if due."""
         is_heard = self._outbox.shows_pheromone
         if not is_heard:
             self._published = ()  # the next listener has not received it

@@ -1,4 +1,4 @@
-"""The inbox: subscriptions to what the mission needs, its samples by cycle, decoded into events."""
+"""The inbox: the mission's subscriptions, their samples by cycle, decoded into events."""
 
 from __future__ import annotations
 
@@ -39,11 +39,10 @@ if TYPE_CHECKING:
 MAPS = ("map", "map_update")
 # Least period of queries for the map: updates without their map come in bursts [s].
 ASK_FOR_MAP_S = 2.0
-# Least time between two maps that are taken [s]: a flood of maps must not take a core. No mapper
-# is that fast.
+# Rate limit of maps [s]: a flood of maps must not take a core. No mapper is that fast.
 MAP_SPACING_S = 0.05
-# Most poses of a cycle: other samples must not wait for a thousand. A command waits for those that
-# came before it: what was swept before a reset must not count after it.
+# Most poses of a cycle: other samples must not wait for a thousand. A command waits for the poses
+# before it: floor swept before a reset must not count after it.
 MOST_POSES = 32
 # Most commands of a cycle: an order of a hundred zones takes as long as a map.
 MOST_COMMANDS = 1
@@ -51,7 +50,7 @@ MOST_COMMANDS = 1
 
 @dataclass(frozen=True, slots=True)
 class Received:
-    """A sample, what kind it is (a queue of the mailbox), and when it arrived [s, monotonic]."""
+    """A sample, its kind (a queue of the mailbox), and its time of arrival [s, monotonic]."""
 
     kind: str
     sample: Sample
@@ -69,7 +68,7 @@ class Oversized:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PlanSnapshot:
-    """What plan ``plan`` shows of its search."""
+    """A snapshot of the search of plan ``plan``."""
 
     plan: int
     snapshot: ColonySnapshot
@@ -77,15 +76,15 @@ class PlanSnapshot:
 
 @dataclass(slots=True)
 class Batch:
-    """What one cycle takes in.
+    """The input of one cycle.
 
     Attributes:
         samples: in order of arrival for each kind.
         oversized: samples dropped by their size alone.
-        questions: commands that wait for an answer.
+        questions: commands that wait for a reply.
         plans: results of the planning thread, good or not.
-        snapshots: what the planning thread shows of its search.
-        updates_lost: map updates that the full queue has dropped.
+        snapshots: snapshots of the search from the planning thread.
+        updates_lost: map updates dropped by the full queue.
     """
 
     samples: list[Received] = field(default_factory=list)
@@ -97,10 +96,10 @@ class Batch:
 
 
 def take_batch(mailbox: Mailbox[object], timeout_s: float) -> Batch:
-    """Wait up to ``timeout_s`` [s] for something to arrive, and take all there is.
+    """Wait up to ``timeout_s`` [s] for an arrival, and take all arrivals.
 
     Raises:
-        BaseException: what a thread has posted because it failed.
+        BaseException: posted by a thread that failed.
     """
     batch = Batch()
     for _, item in mailbox.take(timeout_s):
@@ -124,11 +123,11 @@ def take_batch(mailbox: Mailbox[object], timeout_s: float) -> Batch:
 def make_mailbox(
     max_pixels: int, map_spacing_s: float = MAP_SPACING_S, most_poses: float = MOST_POSES
 ) -> Mailbox[object]:
-    """Return the mailbox of a daemon; a replay, whose clock is another, holds nothing back.
+    """Return the mailbox of a daemon; in a replay, with another clock, there are no rate limits.
 
-    Poses are queued, because each adds to what the tool has passed over; some seconds of them
-    are enough. A map does not clear the one before it, because it may be broken. An update
-    changes the map before it, so it waits with that map.
+    Poses are queued, because each adds to the swept floor; some seconds of them are enough. A
+    map does not replace the one before it, because it may be malformed. An update changes the
+    map before it, so it waits with that map.
     """
     spacing = Spacing("map", map_spacing_s, followers=("map_update",))
     bounds = queues(max_pixels)
@@ -138,7 +137,7 @@ def make_mailbox(
 
 
 def _refuse(lost: object) -> None:
-    """Answer a command that too many others have pushed out; who waits must not take it as done."""
+    """Reject a command dropped by a full queue; its client must not take it as done."""
     if isinstance(lost, Question):
         error = CommandError("too many commands at once: not carried out", hint="ask again")
         lost.answer(Reply(encode_error(error), is_error=True))
@@ -149,7 +148,7 @@ def _size_of(item: object) -> int:
 
 
 def poster(mailbox: Mailbox[object], kind: str, max_pixels: int) -> Callable[[Sample], None]:
-    """Return what posts samples of a kind, on a Zenoh thread; one too long is dropped."""
+    """Return a callback that posts a kind of samples, on a Zenoh thread; drops oversized ones."""
     most = most_bytes(kind, max_pixels)
 
     def post(sample: Sample) -> None:
@@ -162,7 +161,7 @@ def poster(mailbox: Mailbox[object], kind: str, max_pixels: int) -> Callable[[Sa
 
 
 class Inbox:
-    """Subscribes to what the mission needs, and decodes it.
+    """Subscribes to the mission's inputs, and decodes them.
 
     Args:
         bus, keys: where to subscribe to the native keys.
@@ -170,7 +169,7 @@ class Inbox:
         poses: decodes poses.
         max_pixels: of a map or an update.
         maps: further subscriptions that deliver maps.
-        fleet: hears the other robots of a fleet; None without one.
+        fleet: receives messages of a fleet's other robots; None without one.
     """
 
     def __init__(
@@ -197,7 +196,7 @@ class Inbox:
             fleet.listen(bus, poster(mailbox, topics.FLEET.name, max_pixels))
 
     def ask_for_map(self, now: float) -> None:
-        """Ask the publishers of the map for their newest one, unless that was done lately."""
+        """Query the publishers of the map for their newest one, with a rate limit."""
         if now - self._asked_for_map_at < ASK_FOR_MAP_S:
             return
         self._asked_for_map_at = now
@@ -205,10 +204,10 @@ class Inbox:
             subscription.ask()
 
     def decode(self, batch: Batch) -> tuple[list[Event], list[FasacoError]]:
-        """Return the events in a batch, and the faults; a malformed sample costs itself alone.
+        """Return the events in a batch, and the faults; a malformed sample affects no other.
 
-        Of each frame the newest readable map counts. It replaces the updates of that frame that
-        arrived before it, those that were lost included.
+        For each frame the newest readable map counts. It replaces earlier updates of that frame,
+        lost ones included.
         """
         maps, faults = self._newest_maps(batch.samples)
         events = list[Event](MapReceived(grid) for grid, _ in maps.values())
@@ -241,7 +240,7 @@ class Inbox:
     ) -> tuple[dict[str, tuple[OccupancyGrid, float]], list[FasacoError]]:
         """Return the newest readable map of each frame with its time of arrival, oldest first.
 
-        Which frame counts is for the mission to decide, and a map may come only once.
+        The mission decides which frame counts, and a map may come only once.
         """
         maps: dict[str, tuple[OccupancyGrid, float]] = {}
         faults: list[FasacoError] = []
@@ -257,7 +256,7 @@ class Inbox:
         return dict(reversed(maps.items())), faults
 
     def _event(self, received: Received) -> Event | None:
-        """Return the event in a sample; None for transforms that give no new pose, and others."""
+        """Return the event in a sample; None for transforms without a new pose, and others."""
         kind, sample = received.kind, received.sample
         if kind == topics.FLEET.name:
             return self._fleet.event(sample) if self._fleet else None
@@ -274,7 +273,8 @@ class Inbox:
 def _bare(error: FasacoError) -> FasacoError:
     """Return the error without its traceback.
 
-    That would hold the payload until garbage is collected: gigabytes in a flood of broken maps.
+    The traceback would hold the payload until garbage collection: gigabytes in a flood of
+    malformed maps.
     """
     return error.with_traceback(None)
 

@@ -1,4 +1,4 @@
-"""The last samples: what was published last on some topics, for whoever asks for it later."""
+"""The last samples published on some topics, kept for queries."""
 
 from __future__ import annotations
 
@@ -35,15 +35,15 @@ NEWEST = "newest"
 
 
 class LastSamples:
-    """Keeps what was said last on some topics, and answers with it.
+    """Keeps the last sample of some topics, and replies with it.
 
-    The answer is the same on the topic itself, as a storage would give it.
+    A query on the topic itself gets the same reply, as from a storage.
     """
 
     def __init__(self, bus: Bus, keys: Keys) -> None:
         self._lock = threading.Lock()
         self._last: dict[str, Said] = {}
-        # Of the newest full plan: by cohort, and the newest; and the number of its request.
+        # Fields of the newest full plan: by cohort, and the newest; and the number of its request.
         self._trails: dict[str, Said] = {}
         self._plan = 0
         self._living: ShownTrail | None = None
@@ -55,7 +55,7 @@ class LastSamples:
             bus.serve(key, answering(self._trail))
 
     def keep(self, topic: str, reply: Said) -> None:
-        """Keep what was said on ``topic``."""
+        """Keep a sample of ``topic``."""
         with self._lock:
             self._last[topic] = reply
 
@@ -111,14 +111,14 @@ class LastSamples:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ShownTrail:
-    """The living trail at a moment; becomes messages on any thread.
+    """The living trail at a moment; encoded on any thread.
 
     Attributes:
         held: the trail.
         cell_m: edge of a cell [m].
         frame: of the map.
         revision: of the path in force.
-        steps: of it, still to be driven.
+        steps: steps of the path still to drive.
         stamp_ns: of the moment [ns].
         lattice_deg: the angle of the cells to the map frame [deg].
     """
@@ -145,7 +145,7 @@ class ShownTrail:
         return payload, encode_json(about)
 
     def directions(self) -> bytes:
-        """Return where it points to as a payload."""
+        """Return its directions as a payload."""
         plain = GridGeometry.of_cells(self.held.window, self.cell_m)
         geometry = turned_geometry(plain, self.lattice_deg)
         values = direction_values(*directions(self.held.tau))

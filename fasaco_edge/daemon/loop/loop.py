@@ -55,7 +55,7 @@ SOON_S = 60.0
 
 @dataclass(frozen=True, slots=True)
 class BusPorts:
-    """What the loop has on the bus: where messages arrive, and where they leave."""
+    """The loop's ports on the bus: for incoming and outgoing messages."""
 
     mailbox: Mailbox[object]
     inbox: Inbox
@@ -68,7 +68,7 @@ class BusPorts:
 
 @dataclass(frozen=True, slots=True)
 class Host:
-    """What the loop has to do with its computer; None for what is not asked for."""
+    """The loop's services on its computer; None for those not requested."""
 
     watchdog: Watchdog
     reload: Reload
@@ -77,7 +77,7 @@ class Host:
 
 
 class Loop:
-    """Joins the bus to the mission; everything but planning happens on its thread."""
+    """Connects bus and mission; everything but planning runs on its thread."""
 
     def __init__(
         self, config: DaemonConfig, bus: BusPorts, keeper: LedgerKeeper, host: Host
@@ -134,16 +134,16 @@ class Loop:
         self._status.turns.note(ended - taken)
 
     def announce(self) -> None:
-        """Publish a first status, so that one can be asked for from the start."""
+        """Publish a first status, so that queries for it have a reply from the start."""
         self._publish_status(time.monotonic())
 
     def close(self, timeout_s: float) -> None:
-        """Hand over what turn log and ledger hold, and end the planning thread."""
+        """Flush turn log and ledger, and end the planning thread."""
         self._guard.attempt("turns", self._bus.turns.publish)
         self._keeper.keep(self._runner.mission, float("inf"))
         self._runner.close(timeout_s)
 
-    # Before the step: who plans, which configuration is in force, what is only to be noted.
+    # Before the step: claim, configuration, and samples that are only noted.
 
     def _follow_claim(self, now: float) -> bool:
         """Wait while another daemon of this name plans; tell whether to run a cycle."""
@@ -158,16 +158,16 @@ class Loop:
                     self._restart(claim.reason)
             claim.announce()
         elif claim.rival_yielded and mission is not None:
-            # The robot may have got the other's last path after ours: an empty one.
+            # The robot may have received the other's last, empty path after ours.
             self._restart("another daemon planned, too")
         elif self._status.yield_reason:
             self._status.yield_reason = claim.reason
         return not claim.is_uncertain(now)
 
     def _begin_reload(self) -> None:
-        """Have the configuration read again, if that is asked for.
+        """Start to read the configuration again, if requested.
 
-        Maps wait meanwhile: a keep-out mask is read in the memory that they are decoded in.
+        Maps wait meanwhile: reading a keep-out mask uses their share of the memory.
         """
         reload, mailbox = self._host.reload, self._bus.mailbox
         if reload.asked.is_set() and not reload.is_reading and not self._runner.loading:
@@ -175,7 +175,7 @@ class Loop:
             reload.begin(partial(mailbox.post, "reloaded", None))
 
     def _reload_config(self, batch: Batch) -> None:
-        """Take the configuration that was read again; restart the mission if it has changed."""
+        """Apply the configuration that was read; restart the mission if it has changed."""
         reload, watchdog = self._host.reload, self._host.watchdog
         self._bus.mailbox.let_go()
         try:
@@ -187,7 +187,7 @@ class Loop:
             watchdog.remark = ""
             if config != self.config:
                 self._restart("the configuration has changed", config)
-                batch.plans.clear()  # they are the former mission's
+                batch.plans.clear()  # they are the previous mission's
         reload.done()
 
     def _restart(
@@ -199,9 +199,9 @@ class Loop:
         """Let another mission continue from the ledger, as after a restart of the daemon.
 
         Args:
-            why: for the turn log, which ends.
+            why: reason for the turn log, which ends.
             config: the new configuration, if it changed.
-            held: the events to begin with; None for the map and pose there are.
+            held: the first events; None for the present map and pose.
         """
         self._bus.turns.end(why)
         if config is not None:
@@ -211,13 +211,13 @@ class Loop:
         self._coverage.forget()
 
     def _count_faults(self, faults: Sequence[FasacoError]) -> None:
-        """Count faults; ask for the map that updates lack."""
+        """Count faults; query the map that updates lack."""
         self._status.faults.count(faults)
         if any(isinstance(fault, PatchWithoutBase) for fault in faults):
             self._bus.inbox.ask_for_map(time.monotonic())
 
     def _note(self, batch: Batch) -> None:
-        """Take what is not the mission's: snapshots of the search, and times."""
+        """Take data that is not the mission's: snapshots of the search, and times."""
         mission = self._runner.mission
         frame = mission.grid.frame if mission and mission.grid else "map"
         for seen in batch.snapshots:
@@ -240,8 +240,8 @@ class Loop:
             return Decision(answers=self._runner.answer(commands, self._status.yield_reason))
         self._status.waits = "no map yet"
         if not self._has_begun:
-            # Modules and kernels stay: to look through them for garbage holds the loop up by 80 ms;
-            # so does what comes with the first plan.
+            # Modules and kernels stay: scanning them for garbage would delay the loop by 80 ms;
+            # so would objects of the first plan.
             gc.freeze()
             self._has_begun = True
         maps = mission.map_revision
@@ -254,7 +254,7 @@ class Loop:
             if decision.plan is not None or mission.route.wanted:
                 self._latency.call_for_plan()
         if mission.route.wanted and mission.route.is_improving:
-            self._runner.interrupt()  # what is needed comes before what is only better
+            self._runner.interrupt()  # a needed plan comes before one that only improves
         self._perform(mission, decision)
         self._guard.attempt("coverage", partial(self._coverage.publish, mission, now))
         self._guard.attempt("floor", partial(self._floor.publish, mission, now))
@@ -273,7 +273,7 @@ class Loop:
             self._runner.submit(decision.plan)
         if decision.path is not None:
             if decision.plan is None and decision.path.plan is None:
-                self._runner.interrupt()  # the robot had to stop: its plan is for another map
+                self._runner.interrupt()  # the robot had to stop: the plan is for another map
             self._publish_path(mission, decision.path)
 
     def _recover(
@@ -281,8 +281,8 @@ class Loop:
     ) -> Decision:
         """Stop the robot, and let another mission continue from the ledger.
 
-        To end the daemon would not help: a latched map comes again after a restart. The map gets
-        a second chance; a mission that fails again soon continues with the next map.
+        Exiting would not help: a latched map comes again after a restart. The map gets a second
+        chance; a mission that fails again soon continues with the next map.
         """
         LOG.exception("mission", extra={"event": "mission_broke"})
         fault = MissionBroke(f"the mission failed: {type(error).__name__}: {error}")
@@ -296,7 +296,7 @@ class Loop:
         return Decision(answers=tuple(Answer(asked.number, fault) for asked in commands))
 
     def _withdraw_path(self, mission: Mission, reason: str) -> None:
-        """Publish an empty path in place of that of a mission which ends."""
+        """Replace the path of a mission that ends by an empty one."""
         if (
             mission.grid is not None
             and mission.lattice is not None
@@ -305,7 +305,7 @@ class Loop:
             stop = PathUpdate(mission.route.revision + 1, mission.route.path.cells[:0], reason)
             self._publish_path(mission, stop)
 
-    # What leaves for the bus.
+    # Publishing.
 
     def _publish_path(self, mission: Mission, update: PathUpdate) -> None:
         self._bus.outbox.path(mission, update)
@@ -322,7 +322,7 @@ class Loop:
             turns.end("a batch could not be published")
 
     def _answer(self, answers: Sequence[Answer], now: float) -> None:
-        """Answer questions; commands once the ledger has what they changed."""
+        """Reply to queries; to commands once the ledger has their changes."""
         commands, runner = self._bus.commands, self._runner
         commands.note(answers, now)
         if commands.are_asked:

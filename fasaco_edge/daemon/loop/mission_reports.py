@@ -1,4 +1,4 @@
-"""The mission's parts of a status and of an answer: map, pose, coverage, floor, plans, order."""
+"""The mission's parts of a status and of a reply: map, pose, coverage, floor, plans, order."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def pose_report(mission: Mission | None) -> PoseReport | None:
 
 
 def battery_report(mission: Mission | None, now: float) -> BatteryReport | None:
-    """Return the battery's part; None where no battery is heard."""
+    """Return the battery's part; None without a battery topic."""
     if mission is None or not mission.charging.gauge.power:
         return None
     charging, gauge = mission.charging, mission.charging.gauge
@@ -68,7 +68,7 @@ def battery_report(mission: Mission | None, now: float) -> BatteryReport | None:
 
 
 def coverage_report(mission: Mission | None) -> CoverageReport | None:
-    """Return what is covered, in cells and square metres; None before there is a map."""
+    """Return the coverage in cells and square metres; None before there is a map."""
     coverage = mission.coverage() if mission else None
     if coverage is None:
         return None
@@ -86,13 +86,13 @@ def coverage_report(mission: Mission | None) -> CoverageReport | None:
 
 
 def floor_report(mission: Mission | None) -> FloorReport | None:
-    """Return which floor is swept, and what is left of it; None without a mission."""
+    """Return the swept floor and the floor left; None without a mission."""
     if mission is None:
         return None
     swept_m2, to_sweep = round(mission.floor.swept_m2, 3), mission.floor_to_sweep()
     if to_sweep is None:
         return FloorReport(swept_m2)
-    # Before the first path nothing has been weighed.
+    # Before the first path no floor has been judged.
     is_planned = mission.route.revision > 0
     beside = "beside the path, and not worth the way" if is_planned else "not planned yet"
     left = _largest_first((to_sweep.ahead_m2, "on the path"), (to_sweep.left_m2, beside))
@@ -101,7 +101,7 @@ def floor_report(mission: Mission | None) -> FloorReport | None:
 
 
 def _largest_first(*parts: tuple[float, str]) -> tuple[FloorLeft, ...]:
-    """Return floor left for some reasons [m2], without those that are of none."""
+    """Return the floor left by reason [m2], without empty reasons."""
     told = (FloorLeft(round(m2, 3), reason) for m2, reason in parts)
     return tuple(sorted((part for part in told if part.m2), key=lambda part: -part.m2))
 
@@ -123,7 +123,7 @@ def rounded(value: float | None) -> float | None:
 def mission_report(
     mission: Mission | None, order_state: OrderState, standing: int = 0
 ) -> MissionReport:
-    """Return the order and its progress; ``standing`` is how many keep-out zones hold for all."""
+    """Return the order and its progress; ``standing``: keep-out zones in force for all orders."""
     order, zone = order_state.order, order_state.current_zone
     home = mission.home if mission else order_state.home
     return MissionReport(

@@ -1,8 +1,8 @@
 """The mission runner: owner of the mission and its planning thread, from startup to replacement.
 
 The first map starts the loading of kernels; until then the daemon is small. Importing numba costs
-60 MB, and compiling on a new machine takes many seconds: a thread of its own does both, so that
-the loop keeps answering. What arrives meanwhile is held.
+60 MB, and compiling on a new machine takes many seconds: a separate thread does both, so that
+the loop keeps replying. Events that arrive meanwhile are held.
 """
 
 from __future__ import annotations
@@ -46,11 +46,11 @@ _LOST = (PatchesLost, "")
 
 
 class HeldEvents:
-    """The events that a mission begins with; however long it takes to load, they do not grow.
+    """The first events of a mission; bounded, however long loading takes.
 
-    Held are the newest map, with its updates applied, and the newest pose of each of the newest
-    two frames: which frame counts is for the mission to decide. That updates were lost stays
-    until the next map.
+    Holds the newest map, with its updates applied, and the newest pose of each of the newest
+    two frames: the mission decides which frame counts. A loss of updates is noted until the next
+    map.
     """
 
     def __init__(self, events: Sequence[Event] = ()) -> None:
@@ -70,7 +70,7 @@ class HeldEvents:
         return any(kind is MapReceived for kind, _ in self._held)
 
     def take(self, events: Sequence[Event]) -> list[FasacoError]:
-        """Hold events; return why some are of no use."""
+        """Hold events; return the faults of unusable ones."""
         faults: list[FasacoError] = []
         for event in in_runs(events):
             match event:
@@ -88,7 +88,7 @@ class HeldEvents:
         return faults
 
     def _hold(self, event: Event) -> None:
-        """Hold an event in place of those of its type, but for the newest in another frame."""
+        """Hold an event; it replaces those of its type, except the newest in another frame."""
         frame = _frame(event)
         before = [other for kind, other in self._held if kind is type(event)]
         kept = [other for other in before if other not in ("", frame)][-1:]
@@ -98,7 +98,7 @@ class HeldEvents:
         self._held[type(event), frame] = event
 
     def _apply(self, patches: Sequence[MapPatch]) -> list[FasacoError]:
-        """Apply updates to the maps held; return why some cannot be."""
+        """Apply updates to the held maps; return the faults of those that cannot be applied."""
         maps = {
             held.grid.frame: held.grid
             for held in self._held.values()
@@ -109,7 +109,7 @@ class HeldEvents:
         faults: list[FasacoError] = []
         newest = next(reversed(maps))
         for frame, grid in maps.items():
-            # An update of neither frame is a misfit of the newest map.
+            # An update of neither frame is a mismatch with the newest map.
             theirs = [p for p in patches if (p.frame if p.frame in maps else newest) == frame]
             updated = grid.with_updates(theirs)
             self._held[MapReceived, frame] = MapReceived(updated.grid)
@@ -153,12 +153,12 @@ class MissionRunner:
 
     @property
     def order_state(self) -> OrderState:
-        """What the mission does, or will do."""
+        """The present or future order of the mission."""
         return self.mission.order_state if self.mission else self._keeper.order_state
 
     @property
     def loading(self) -> str:
-        """What startup is loading; "" for nothing."""
+        """The stage that startup is loading; "" for none."""
         return self._loader.stage if self._loader else ""
 
     def mission_for(
@@ -166,8 +166,8 @@ class MissionRunner:
     ) -> tuple[Mission | None, list[Event], list[FasacoError]]:
         """Return the mission, once it is loaded and this daemon plans, and the events for it.
 
-        Until then events are held; a new mission gets all of those. The faults are of events
-        that are of no use.
+        Until then events are held; a new mission gets all of them. The faults are of unusable
+        events.
         """
         if self.mission is not None:
             return self.mission, events, []
@@ -180,20 +180,20 @@ class MissionRunner:
             self.mission, self.worker = loaded
             self._keeper.restore(self.mission)
             if self.config.fleet:
-                # No ledger that was set aside had this one.
+                # No ledger that was set aside has this order.
                 self.mission.shared.begin(time.time_ns() // 1_000_000)
             self._held = HeldEvents()
         return self.mission, held, faults
 
     def answer(self, commands: Sequence[CommandReceived], rival: str = "") -> tuple[Answer, ...]:
-        """Take commands during startup as the mission would, and return the answers.
+        """Take commands during startup as the mission would, and return the replies.
 
-        ``rival`` says why another daemon is to be commanded; "" for none.
+        ``rival`` is the reason to command another daemon; "" for none.
         """
         return tuple(Answer(asked.number, self._carry_out(asked, rival)) for asked in commands)
 
     def _carry_out(self, asked: CommandReceived, rival: str) -> FasacoError | None:
-        """Carry a command out on the order that is kept; return why it is refused, if it is."""
+        """Apply a command to the stored order; return the reason of a refusal, if any."""
         try:
             if rival:
                 raise CommandError(rival, hint="command the one that plans")
@@ -232,7 +232,7 @@ class MissionRunner:
         self._held = HeldEvents(held)
 
     def submit(self, request: PlanRequest) -> None:
-        """Have a plan made."""
+        """Submit a plan request."""
         assert self.worker is not None
         self.worker.submit(request)
 
@@ -251,7 +251,7 @@ class Loader:
     """Imports the planner, warms its kernels up, and makes mission and worker, in a thread.
 
     Attributes:
-        stage: what is being loaded; "" once that has ended, well or not.
+        stage: the stage being loaded; "" once loading has ended, successful or not.
     """
 
     def __init__(self, config: DaemonConfig, mailbox: Mailbox[object]) -> None:
@@ -264,13 +264,13 @@ class Loader:
         threading.Thread(target=self._run, name="loader", daemon=True).start()
 
     def poll(self) -> tuple[Mission, PlanningWorker] | None:
-        """Return what was loaded, None until then; raise what went wrong."""
+        """Return the loaded mission and worker, None until then; raise the error of a failure."""
         if self._error is not None:
             raise self._error
         return self._loaded
 
     def drop(self) -> None:
-        """End the worker, now or once it is loaded: nobody will ask for it."""
+        """End the worker, now or once it is loaded: it is not needed."""
         self._is_dropped = True
         if self._loaded is not None:
             self._loaded[1].disown()

@@ -1,6 +1,6 @@
 """The outbox: publishers of path, coverage, pheromone, status and commands.
 
-What was published last is kept (``daemon.loop.last_samples``), to answer who asks for it.
+The last samples are kept for queries (``daemon.loop.last_samples``).
 """
 
 from __future__ import annotations
@@ -41,17 +41,17 @@ if TYPE_CHECKING:
 
 LOG = logging.getLogger(__name__)
 
-# Of what fails again and again one is logged in so long [s].
+# Rate limit of log lines for repeated failures [s].
 LOG_PERIOD_S = 10.0
-# So many failures wait to be counted at most.
+# Most failures that wait to be counted.
 MOST_FAULTS = 100
 
 
 class Outbox:
-    """The publishers of a daemon; the last sample of each is kept to answer queries.
+    """The publishers of a daemon; the last sample of each is kept for queries.
 
     Attributes:
-        guard: publishes all of it.
+        guard: publishes all messages.
     """
 
     def __init__(self, bus: Bus, keys: Keys, ros: RosBridge | None = None) -> None:
@@ -69,7 +69,7 @@ class Outbox:
     def path(self, mission: Mission, update: PathUpdate) -> None:
         """Publish the line to drive, or a path through centres of cells, facing along the way.
 
-        Where that fails an empty one is published: the robot must not follow the former path.
+        On failure an empty path is published: the robot must not follow the previous path.
         """
         assert mission.grid is not None
         assert mission.lattice is not None
@@ -99,7 +99,7 @@ class Outbox:
             self._ros.path.put(path.payload)
 
     def forget(self) -> None:
-        """Drop what is cached for late joiners: another daemon publishes it."""
+        """Drop samples cached for late joiners: another daemon publishes them."""
         for publisher in (self._path, self._coverage, self._pheromone, self._directions):
             publisher.forget()
         if self._ros is not None:
@@ -118,7 +118,7 @@ class Outbox:
             self._ros.diagnose(status)
 
     def commands(self, commands: Sequence[CommandReceived], answers: Sequence[Answer]) -> None:
-        """Publish the commands that were taken, for all who did not see the query."""
+        """Publish the accepted commands, for clients that did not see the query."""
         refused = {answer.number for answer in answers if answer.error is not None}
         for asked in commands:
             if asked.number not in refused:
@@ -128,7 +128,7 @@ class Outbox:
         self._command.put(encode_json(command_document(asked.command, asked.order)))
 
     def coverage(self, grid: OccupancyGrid) -> None:
-        """Publish the coverage, a grid on the lattice; the caller guards that."""
+        """Publish the coverage, a grid on the lattice; the caller catches failures."""
         coverage = Shared.of(encode_occupancy_grid(grid), schemas.OCCUPANCY_GRID)
         self._last.keep("coverage", coverage)
         self._coverage.put(coverage.payload)
@@ -137,29 +137,29 @@ class Outbox:
 
     @property
     def shows_floor(self) -> bool:
-        """Whether someone listens to the swept floor."""
+        """Whether the swept floor has subscribers."""
         return self._floor.has_listeners()
 
     def floor(self, grid: OccupancyGrid) -> None:
-        """Publish the swept floor; the caller guards that."""
+        """Publish the swept floor; the caller catches failures."""
         self._floor.put(encode_occupancy_grid(grid))
 
     @property
     def shows_pheromone(self) -> bool:
-        """Whether someone listens to the pheromone field, or to where it points to."""
+        """Whether the pheromone field or its directions have subscribers."""
         return self._pheromone.has_listeners() or self._directions.has_listeners()
 
     def trail(self, shown: ShownTrail) -> None:
-        """Publish the living trail, and where it points to; the caller guards that."""
+        """Publish the living trail and its directions; the caller catches failures."""
         self._pheromone.put(*shown.field())
         self._directions.put(shown.directions())
 
     def keep_trail(self, shown: ShownTrail) -> None:
-        """Keep the living trail for who asks for it."""
+        """Keep the living trail for queries."""
         self._last.keep_living(shown)
 
     def pheromone(self, seen: PlanSnapshot, frame: str, lattice_deg: float) -> None:
-        """Keep the pheromone field, and publish it if anyone listens."""
+        """Keep the pheromone field, and publish it if it has subscribers."""
         self.guard.attempt("pheromone", lambda: self._say_pheromone(seen, frame, lattice_deg))
 
     def _say_pheromone(self, seen: PlanSnapshot, frame: str, lattice_deg: float) -> None:
@@ -180,7 +180,7 @@ def headings(xy: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def path_attachment(mission: Mission, update: PathUpdate) -> PathAttachment:
-    """Return what is sent with a path."""
+    """Return the attachment of a path."""
     assert mission.grid is not None
     assert mission.lattice is not None
     return replace(
@@ -196,7 +196,7 @@ def path_attachment(mission: Mission, update: PathUpdate) -> PathAttachment:
 
 
 def rectangle(window: Window | None, mission: Mission) -> Rectangle | None:
-    """Return what is around a window of the lattice in the map's frame [m]; None without one."""
+    """Return the rectangle around a window of the lattice, in the map frame [m]; None if none."""
     if window is None or mission.lattice is None:
         return None
     bounds = mission.turn.cells(window, mission.lattice.cell_m).bounds()
@@ -204,9 +204,9 @@ def rectangle(window: Window | None, mission: Mission) -> Rectangle | None:
 
 
 class PublishGuard:
-    """Publishes what the loop sends: a failure costs that message alone.
+    """Publishes the loop's messages: a failure affects that message alone.
 
-    All failures are counted; of each topic one in ``LOG_PERIOD_S`` is logged.
+    All failures are counted; one per topic in ``LOG_PERIOD_S`` is logged.
     """
 
     def __init__(self) -> None:
@@ -214,7 +214,7 @@ class PublishGuard:
         self._logged_at: dict[str, float] = {}
 
     def attempt(self, topic: str, publish: Callable[[], None]) -> bool:
-        """Make and send a message; tell whether that went well."""
+        """Make and send a message; tell whether that succeeded."""
         try:
             publish()
         except Exception as error:
@@ -234,6 +234,6 @@ class PublishGuard:
         return True
 
     def take_faults(self) -> list[FasacoError]:
-        """Return what was not published since the last call; it is logged already."""
+        """Return the failures since the last call; they are logged already."""
         faults, self._faults = self._faults, []
         return faults

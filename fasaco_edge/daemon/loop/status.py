@@ -51,11 +51,11 @@ LEAST_INTERVAL_S = 0.05
 
 
 class StatusBoard:
-    """Collects what a status holds, and knows when one is due.
+    """Collects the content of a status, and decides when one is due.
 
     Attributes:
-        claim: who this daemon is, and whether it plans, as the status has it.
-        yield_reason: why another daemon plans, and this one does not; "" where it does.
+        claim: id of this daemon and whether it plans, as in the status.
+        yield_reason: reason why another daemon plans instead; "" if this one plans.
     """
 
     def __init__(self, config: DaemonConfig) -> None:
@@ -85,7 +85,7 @@ class StatusBoard:
     def due(self, runner: MissionRunner, now: float) -> Status | None:
         """Return the status if it changed or a second has passed, else None.
 
-        A daemon that waits for another one leaves the heartbeat to that one.
+        A daemon that waits for another one leaves the heartbeat to it.
         """
         mission, order_state = runner.mission, runner.order_state
         state, reason = self._state(runner)
@@ -93,7 +93,7 @@ class StatusBoard:
         revision = self.path and self.path.revision
         claim = self.claim.stand
         key = (state, reason, revision, recorder, self.ledger.fault, order_state, claim)
-        # Many small faults are not worth a message each: the heartbeat counts them.
+        # Many small faults do not get a message each: the heartbeat has their count.
         heartbeat_s = float("inf") if self.yield_reason else HEARTBEAT_S
         wait = LEAST_INTERVAL_S if key != self._sent_key else heartbeat_s
         if now - self._sent_at < wait:
@@ -128,7 +128,7 @@ class StatusBoard:
         )
 
     def reply(self, runner: MissionRunner) -> Reply:
-        """Return the answer to a command."""
+        """Return the reply to a command."""
         state, reason = self._state(runner)
         return Reply(
             robot=self._config.robot.name,

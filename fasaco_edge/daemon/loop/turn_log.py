@@ -1,8 +1,8 @@
-"""The turn log: what each cycle of the loop took in and decided, published for the recorder.
+"""The turn log: inputs and decisions of each cycle of the loop, published for the recorder.
 
-It is complete from the first cycle or not published at all: a replay cannot make up for a
-missing start. Samples that arrived before anybody listened are part of the log itself. A replay
-compares its own decisions in the same form (``DecisionFilter``).
+It is complete from the first cycle or not published at all: a replay cannot do without the start.
+Samples that arrived before there was a subscriber are embedded in the log. A replay compares its
+own decisions in the same form (``DecisionFilter``).
 """
 
 from __future__ import annotations
@@ -48,18 +48,18 @@ if TYPE_CHECKING:
 LOG = logging.getLogger(__name__)
 
 PERIOD_S = 0.5
-# A recorder needs some seconds to start; the log waits for it no longer than this many cycles.
+# The log waits for a recorder, which takes some seconds to start, at most this many cycles.
 WAITING_TURNS = 2048
-# Earlier samples go into the log itself, deflated, up to this size; more would delay the loop.
+# Earlier samples are embedded in the log, deflated, up to this size; more would delay the loop.
 EMBEDDED_BYTES, DEFLATED_BYTES = 8_000_000, 500_000
-# Longer poses and batteries are only named; the log waits for a recorder no longer than this many
-# bytes of them.
+# Longer poses and batteries are only named; the log waits for a recorder up to this many bytes of
+# them.
 POSE_BYTES, POSES_BYTES = 1024, 500_000
-# A busy link drops maps, too. Larger ones are only named: to copy them costs the loop time.
+# A busy link drops maps, too. Larger ones are only named: copying them costs the loop time.
 MAP_BYTES = 100_000
 # A batch of this size is published at once.
 FULL_BYTES = 4_000_000
-# Time until a new listener surely gets all samples itself [s].
+# Time until a new subscriber surely receives all samples itself [s].
 MARGIN_S = 0.2
 POSE = "pose"
 TOLD = (POSE, "battery")
@@ -68,7 +68,7 @@ NOBODY = "nobody listens to it"
 
 @dataclass(frozen=True, slots=True)
 class TurnNote:
-    """A cycle: when it was [s, monotonic], what the loop took in, and what was decided."""
+    """A cycle: its time [s, monotonic], inputs and decisions."""
 
     now: float
     batch: Batch
@@ -98,7 +98,7 @@ class TurnLog:
         self._turns: list[Cycle] = []
         self._embed_room, self._deflated_room = EMBEDDED_BYTES, DEFLATED_BYTES
         self._samples = SampleEncoder(run=0)
-        # What is kept of the time before the mission: when, which cycle, what came.
+        # Cycles before the mission: time, number, inputs.
         self._early: list[tuple[float, Cycle, Sequence[Received]]] = []
         self._news = DecisionFilter()
         self._has_begun = self._kernels_named = False
@@ -113,7 +113,7 @@ class TurnLog:
         if any(isinstance(plan, PlanBroken) for plan in batch.plans):
             self.end("a plan broke, which no replay repeats")
             return
-        # What a fleet says before there is a mission is lost on it.
+        # Fleet messages before there is a mission have no effect.
         samples = [
             self._taken(received)
             for received in batch.samples
@@ -148,7 +148,7 @@ class TurnLog:
             self.publish()
 
     def publish(self) -> None:
-        """Publish the batch, if somebody listens."""
+        """Publish the batch, if there is a subscriber."""
         if not self._is_open or not self._times:
             return
         if self._is_waiting:
@@ -177,11 +177,11 @@ class TurnLog:
 
     @property
     def _is_waiting(self) -> bool:
-        """Whether nobody has listened yet."""
+        """Whether there was no subscriber yet."""
         return self._embed_until == float("inf")
 
     def end(self, why: str) -> None:
-        """End the log: what follows could not be replayed."""
+        """End the log: later cycles could not be replayed."""
         if not self._is_open:
             return
         LOG.info("the turn log ends: %s", why)
@@ -201,7 +201,7 @@ class TurnLog:
         return TakenSample(kind, zlib.crc32(sample.payload), at if kind in MAPS else 0.0, told)
 
     def _embedded(self, sample: Sample) -> EarlySample | None:
-        """Return the sample itself, deflated; None where there is no room for it."""
+        """Return the sample itself, deflated; None without room for it."""
         if len(sample.payload) > self._embed_room:
             return None
         self._embed_room -= len(sample.payload)
@@ -212,7 +212,7 @@ class TurnLog:
         return EarlySample(sample.key, sample.schema, deflated)
 
     def _forget_early(self, received: Sequence[Received]) -> None:
-        """Keep only the newest pose and charge as long as there is nothing else."""
+        """Keep only the newest pose and charge while nothing else has arrived."""
         if not self._is_waiting or self._has_begun or not all(map(_is_told, self._turns)):
             self._early = []
             return
@@ -251,7 +251,7 @@ def _is_told(turn: Cycle) -> bool:
 
 
 class DecisionFilter:
-    """Picks the cycles in which something was decided, or the state has changed."""
+    """Selects the cycles with a decision or a change of state."""
 
     def __init__(self) -> None:
         self._state = ("", "")
@@ -266,7 +266,7 @@ class DecisionFilter:
 
 
 def decided_of(decision: Decision, state: str, reason: str) -> Decided:
-    """Return a decision as the log has it."""
+    """Return a decision in the form of the log."""
     plan, path = decision.plan, decision.path
     return Decided(
         state=state,
@@ -287,5 +287,5 @@ def cells_checksum(cells: NDArray[np.int32]) -> int:
 
 
 def kernels_name() -> str:
-    """Return the name of the kernels in use, by what they compute."""
+    """Return the name of the kernels in use; equal names compute the same."""
     return f"kernels-{sources_digest()}"

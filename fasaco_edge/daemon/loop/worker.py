@@ -1,4 +1,4 @@
-"""The planning thread. Its kernels run without the interpreter lock, so the loop keeps running."""
+"""The planning thread; its kernels release the interpreter lock, so the loop keeps running."""
 
 from __future__ import annotations
 
@@ -32,8 +32,8 @@ class PlanningWorker:
     """Plans one request at a time and posts the result.
 
     Attributes:
-        progress: counts what the thread has done: questions of a search, whether it is to stop,
-            and waits for a request. It stands still only where the thread hangs.
+        progress: counts the thread's actions: stop checks of a search and waits for a request.
+            It stands still only if the thread hangs.
     """
 
     def __init__(
@@ -57,7 +57,7 @@ class PlanningWorker:
         self._requests.put(request)
 
     def interrupt(self) -> None:
-        """End the current search with its best walk: there is a newer request."""
+        """End the current search with its best walk: a newer request waits."""
         self._interrupt.set()
 
     def disown(self) -> None:
@@ -88,7 +88,7 @@ class PlanningWorker:
         budget_s = SPARE_S if request.problem.only_better else self._budget_s
         stop = StopRecorder(AnyOf(self._count, TimeBudget(budget_s), Interrupt(self._interrupt)))
         try:
-            # Costs some percent of a full plan, nothing for a repair.
+            # This takes some percent of a full plan, nothing for a repair.
             path = self._planner.plan(request.problem, stop, partial(self._observe, request.number))
         except Exception as error:
             # The same map comes again after a restart: exiting would not help.
