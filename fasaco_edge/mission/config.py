@@ -1,4 +1,4 @@
-"""Mission configuration."""
+"""Configuration of a mission."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from fasaco_edge.planners.cost import STEPS_ALONE, CoverageCost
 from fasaco_edge.planners.living_trail import PAPERS_RULES, TrailRules
 
 if TYPE_CHECKING:
-    # It loads the compiler; the configuration takes only the policy from here.
+    # Importing it at run time would load numba; the configuration needs only the policy from here.
     from fasaco_edge.grid.lattice import Footprint
     from fasaco_edge.planners.line import LineConfig
 
@@ -24,7 +24,7 @@ Coordinate = Annotated[float, Meta(ge=-FARTHEST_M, le=FARTHEST_M)]
 
 
 class Place(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Where a robot stands [m] in the map frame, and where it looks to [deg]."""
+    """A robot pose in the map frame: position [m] and heading [deg]."""
 
     x_m: Coordinate
     y_m: Coordinate
@@ -37,31 +37,31 @@ class Place(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
 
 
 class Dock(Place, frozen=True):
-    """The pose of a robot in its dock; it comes to stand ``approach_m`` [m] before that."""
+    """The robot's pose in its dock; paths end ``approach_m`` [m] in front of it."""
 
     approach_m: Annotated[float, Meta(ge=0, le=10)] = 0.5
 
     @property
     def stand(self) -> Pose2D:
-        """The pose before the dock, from which it is straight ahead."""
+        """The pose in front of the dock, from which the robot drives straight in."""
         yaw, back = math.radians(self.yaw_deg), self.approach_m
         return Pose2D(self.x_m - back * math.cos(yaw), self.y_m - back * math.sin(yaw), yaw)
 
 
 class MissionPolicy(msgspec.Struct, frozen=True, kw_only=True):
-    """Whether a mission starts without an order, its timeouts, and what holds for every order.
+    """Autostart, timeouts, retries, zones and places that hold for every order.
 
     Attributes:
-        autostart: whether everything is covered once without an order.
+        autostart: whether a mission without an order covers everything once.
         retries: how often cells that were blocked or left over are tried again at the end.
         retry_s: pause before each retry [s].
         lost_pose_s: the pose is lost after this time without one [s]; 0 for never.
         stale_map_s: the map is stale after this time without a map or an update [s]; 0 for never.
-        zones: which orders use by their names.
+        zones: named zones that orders refer to.
         keep_out: polygons (x, y) [m] in the map frame that the robot never touches.
-        keep_out_mask: file of a mask of more, see ``orders.mask``; "" for none.
+        keep_out_mask: file of a mask with further keep-out areas, see ``orders.mask``; "" for none.
         home: where the robot returns to; None for the dock, or else where an order began.
-        dock: where it charges.
+        dock: where it charges; None where it does not.
     """
 
     autostart: bool = True
@@ -76,18 +76,18 @@ class MissionPolicy(msgspec.Struct, frozen=True, kw_only=True):
     dock: Dock | None = None
 
     def place(self, errand: Errand) -> Place | None:
-        """Return where an errand leads to; None for where an order began."""
+        """Return the destination of an errand; None for the place where the order began."""
         return self.dock or self.home if errand == "charge" else self.home or self.dock
 
 
 class BatteryPolicy(msgspec.Struct, frozen=True, kw_only=True):
-    """When a robot goes to charge, and when it goes on; levels are shares of a full battery.
+    """When a robot goes to charge and when it resumes; levels are shares of a full battery.
 
     Attributes:
-        low: it goes to charge at this level, or above it where the way back needs more.
-        reserve: what is to be left when it comes there.
-        enough: it goes on at this level, or below it where the rest of the order needs less.
-        silent_s: how long no charge may come before that is told [s].
+        low: level at which it goes to charge; higher where the path back needs more.
+        reserve: level to be left on arrival at the dock.
+        enough: level at which it resumes; lower where the rest of the order needs less.
+        silent_s: timeout for battery messages, after which their absence is reported [s].
     """
 
     low: Annotated[float, Meta(ge=0.01, le=0.8)] = 0.2
@@ -101,12 +101,12 @@ NO_PATIENCE = MissionPolicy(retries=0, lost_pose_s=0.0)
 
 @dataclass(frozen=True, slots=True)
 class Sweeping:
-    """What is swept, and what that is worth.
+    """How floor is swept, and at what prices.
 
     Attributes:
         tool_m: width of the tool [m]; cells may be narrower, so that lanes overlap.
-        most_pixels: the most pixels of the fine raster of a map's floor.
-        line: prices of the line.
+        most_pixels: limit on the pixels of the fine raster.
+        line: prices for polishing the line.
     """
 
     tool_m: float
@@ -116,18 +116,18 @@ class Sweeping:
 
 @dataclass(frozen=True, slots=True)
 class MissionConfig:
-    """Robot, cost, limits and policy of a mission; by default it tries nothing again.
+    """Robot, cost, limits and policy of a mission; by default without retries.
 
     Attributes:
         footprint: of robot and tool.
-        max_lattice_cells: the most cells of a lattice it plans on.
+        max_lattice_cells: limit on the cells of the coverage lattice.
         cost: of paths.
-        policy: retries and patience.
+        policy: retries and timeouts.
         spare_share: share of a processor core for improving a path that need not change; 0 for
             none.
         sweeping: how floor is swept; None to drive through the centres of cells.
         trail: rules of the living trail.
-        plans_on_trail: whether the planner's ants walk on it.
+        plans_on_trail: whether the planner's ants start from the living trail.
         robot: its name in a fleet that shares the work; "" without one.
         battery: when to charge; None for never.
         lattice_deg: the angle of the cells' rows to the x axis of the map frame [deg]; None for

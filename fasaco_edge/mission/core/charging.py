@@ -1,8 +1,9 @@
-"""Charging: what is believed of the battery, what driving drains, and when to charge how much.
+"""Charging: the accepted battery level, the drain per second of driving, and when to charge.
 
-A charge is believed once it has come for a while: one wrong message must not send the robot to its
-dock, nor away from it. The drain is the median over the last pieces of driving, so that neither a
-steep first percent nor a jump of the gauge counts.
+A level that jumps is accepted only after it has been reported consistently for ``HOLD_S``: one
+wrong message must not send the robot to its dock, nor away from it. The drain is the median over
+the last stretches of driving, so outliers (a steep first percent, a jump of the gauge) do not
+count.
 """
 
 from __future__ import annotations
@@ -18,30 +19,30 @@ from fasaco_edge.mission.map.map_state import MapState
 from fasaco_edge.mission.orders.order_state import AT_HOME, NO_ORDER
 from fasaco_edge.mission.orders.sequencer import Sequencer
 
-# A charge further from the last one than this counts once it has come for so long [s].
+# A level that differs from the last accepted one by more than JUMP must be repeated for HOLD_S [s].
 JUMP, HOLD_S = 0.05, 5.0
-# The first one counts once another came after so long that is no further from it.
+# The first level is accepted once a second one, HOLD_S later, differs by no more than this.
 COARSE = 0.2
-# A piece of driving shows a drain once it took so much, and so long [s].
+# A stretch of driving yields a drain once it has used this much charge and time [s].
 STEP, LEAST_S = 0.01, 10.0
-# So many of the last pieces count, and no fewer than these.
+# The drain is the median over the NEWEST stretches; at least FEWEST are needed.
 NEWEST, FEWEST = 15, 3
-# The way back is looked for this often [s].
+# Period of updating the path back to the dock [s].
 WAY_EVERY_S = 5.0
-# Between the level at which it turns back and that at which it goes on; of the rest's time more
-# than is planned, as lines are longer than walks over cells.
+# Least difference between the levels of turning back and of resuming; factor on the time planned
+# for the rest, as lines are longer than walks over cells.
 BETWEEN, SPARE = 0.1, 1.2
-# A charge that has risen by less than this for so long [s] is all that this battery takes.
+# The battery counts as full once its level has risen by less than RISE for this long [s].
 RISE, ALL_AFTER_S = 0.005, 1800.0
 
 
 class BatteryGauge:
-    """Believes some of what the battery says.
+    """Filter over battery messages: accepts levels, rejects outliers, measures the drain.
 
     Attributes:
-        level: charge from 0 to 1; None before one is believed.
-        power: what the supply does, as its message says; "" before there was one.
-        heard_at: when the last charge came, believed or not [s].
+        level: accepted charge from 0 to 1; None before one is accepted.
+        power: state of the power supply, as in the message; "" before the first one.
+        heard_at: when the last level arrived, accepted or not [s].
     """
 
     def __init__(self) -> None:
@@ -49,34 +50,35 @@ class BatteryGauge:
         self.power = ""
         self.heard_at = float("-inf")
         self._told_at = 0.0
-        # A charge that is to come for some time, and since when.
+        # A level that is not accepted yet, and since when it has been reported.
         self._claim: tuple[float, float] | None = None
-        # Time and charge where the current piece of driving began.
+        # Time and level where the current stretch of driving began.
         self._since: tuple[float, float] | None = None
         self._drains: deque[float] = deque(maxlen=NEWEST)
 
     @property
     def drain_per_s(self) -> float | None:
-        """What driving takes a second; None before enough was seen."""
+        """Charge used per second of driving; None before enough was measured."""
         return median(self._drains) if len(self._drains) >= FEWEST else None
 
     def silent_s(self, now: float) -> float:
-        """Return how long no charge has come that is believed, or since the beginning none [s]."""
+        """Return the time since a level was last accepted, or since the beginning [s]."""
         return now - self._told_at
 
     def begin(self, now: float) -> None:
-        """Wait for the first charge from ``now`` [s] on."""
+        """Start the timeout for the first level at ``now`` [s]."""
         self._told_at = now
 
     def note(self, event: BatteryReceived, now: float, *, drives: bool) -> None:
-        """Take a message at ``now`` [s] of a robot that drives, or does not."""
+        """Take in a message at ``now`` [s]; ``drives``: whether the robot is driving."""
         self.power = event.power
         if event.level is None:
             return
         self.heard_at = now
         if self.level is None or abs(event.level - self.level) > JUMP:
             claim, level = self._claim, self.level
-            # It may drain on meanwhile, or come in coarse steps: what counts is to which side.
+            # The level may drain meanwhile, or come in coarse steps: only the direction of the jump
+            # counts.
             is_new = claim is None or (
                 abs(event.level - claim[0]) > COARSE
                 if level is None
@@ -87,7 +89,7 @@ class BatteryGauge:
                 return
             self._since = None
         self._claim, self.level, self._told_at = None, event.level, now
-        # By its own clock, as robots drive by it: that of a simulation may be faster.
+        # Stamps, not ``now``: under simulated time the robot drives by that clock.
         at_s = 1e-9 * event.stamp_ns if event.stamp_ns else now
         self._measure(event.level, at_s, drives=drives and event.power != "charging")
 
@@ -102,18 +104,18 @@ class BatteryGauge:
 
 @dataclass(slots=True, eq=False)
 class Charging:
-    """Decides when the robot has to charge, and when it has enough; times ``now`` are [s]."""
+    """Decides when the robot has to charge and when it may resume; times ``now`` are [s]."""
 
     config: MissionConfig
     map: MapState
     orders: Sequencer
     route: Route
     gauge: BatteryGauge = field(default_factory=BatteryGauge)
-    # The way back, and what is still to be driven where that is known [s]; as of when.
+    # Time to the dock, time for the rest of the order where known [s], and when both were computed.
     _way_s: float = field(default=0.0, init=False)
     _rest_s: float | None = field(default=None, init=False)
     _looked_at: float | None = field(default=None, init=False)
-    # The highest charge since the robot is in its dock, and since when; None elsewhere.
+    # The highest level since the robot is in its dock, and since when; None elsewhere.
     _best: tuple[float, float] | None = field(default=None, init=False)
 
     @property
@@ -122,7 +124,7 @@ class Charging:
         return self.config.battery
 
     def look(self, now: float) -> None:
-        """Look how far it is, now and then; to be called with each decision."""
+        """Update the time to the dock at intervals; to be called with each decision."""
         if self.policy is None:
             return
         if self._looked_at is None:
@@ -135,7 +137,7 @@ class Charging:
         self._way_s = 0.0 if is_charging else self._seconds_to_dock()
 
     def silence(self, now: float) -> str:
-        """Return why it is not known when to charge; "" where it is, or need not be."""
+        """Return why the battery level is unknown; "" where it is known or not needed."""
         if self.policy is None:
             return ""
         if self.gauge.silent_s(now) <= self.policy.silent_s:
@@ -147,7 +149,7 @@ class Charging:
     def is_due(self, now: float) -> bool:
         """Tell whether the robot has to go and charge now.
 
-        One that was told to stop, by a cancelled order too, drives nowhere by itself.
+        A robot that was told to stop, also by a cancelled order, does not drive by itself.
         """
         order, level = self.orders.order_state, self.gauge.level
         if self.policy is None or level is None or self.silence(now):
@@ -162,7 +164,7 @@ class Charging:
 
     @property
     def turns_back_at(self) -> float:
-        """The level at which the robot goes to charge: what the way back takes counts."""
+        """The level at which the robot goes to charge; includes the charge for the path back."""
         assert self.policy is not None
         low, drain = self.policy.low, self.gauge.drain_per_s
         if drain is None:
@@ -172,7 +174,7 @@ class Charging:
 
     @property
     def goes_on_at(self) -> float:
-        """The level at which it goes on: what the rest of the order needs, if that is less."""
+        """The level at which it resumes: ``enough``, or less if the rest of the order needs less."""
         assert self.policy is not None
         policy, drain = self.policy, self.gauge.drain_per_s
         if drain is None or self._rest_s is None:
@@ -181,7 +183,7 @@ class Charging:
         return min(policy.enough, max(needed, policy.low + BETWEEN))
 
     def is_enough(self, now: float, *, docked: bool) -> bool:
-        """Tell whether the robot, which is in its dock or on the way there, has enough."""
+        """Tell whether the battery of a robot in its dock, or on its way there, is charged enough."""
         level = self.gauge.level
         if self.policy is None:
             return True  # the configuration has changed
@@ -190,13 +192,13 @@ class Charging:
             return level is not None and not self.silence(now) and level >= self.goes_on_at
         if self._best is None or level > self._best[0] + RISE:
             self._best = level, now
-        # Some say that they are full, others only rise no further.
+        # Some batteries report full, others only stop rising.
         power, waited_s = self.gauge.power, now - self._best[1]
         is_all = power == "full" or (power != "discharging" and waited_s >= ALL_AFTER_S)
         return level >= self.goes_on_at or (is_all and level >= self.policy.low + BETWEEN)
 
     def why(self, now: float) -> str:
-        """Return what the robot in its dock waits for."""
+        """Return what a robot in its dock waits for."""
         if why := self.silence(now):
             return f"{why}: waits for one"
         if self.gauge.level is None:
@@ -211,7 +213,7 @@ class Charging:
         return self.config.cost.of_walk(area.shortest_path(cell, goal))
 
     def _seconds_left(self) -> float | None:
-        """Return what the rest of the order takes from the dock and back; None if not known."""
+        """Return the time for the rest of the order, from the dock and back; None if unknown."""
         state, cells, area = self.orders.order_state, self.route.aside, self.map.area
         goal = self.orders.goal("charge")
         is_last = state.is_open and state.next_pass() is state and not self.orders.is_exploring

@@ -1,4 +1,4 @@
-"""Event handler: what each event changes in the mission's state, before anything is decided."""
+"""Event handler: applies each event to the mission's state, before anything is decided."""
 
 from __future__ import annotations
 
@@ -54,24 +54,24 @@ class EventHandler:
     fleet: FleetLayer
     battery: BatteryGauge
     policy: MissionPolicy
-    # Of the cells' rows to the x axis of the map frame [deg].
+    # Angle of the cells' rows to the x axis of the map frame [deg].
     lattice_deg: float = 0.0
     _now: float = field(default=0.0, init=False)
-    # What the events of a step lead to.
+    # Results of the events of one step.
     _path: PathUpdate | None = field(default=None, init=False)
     _faults: list[FasacoError] = field(default_factory=list, init=False)
     _answers: list[Answer] = field(default_factory=list, init=False)
     _is_forgotten: bool = field(default=False, init=False)
-    # Polygons that the robot keeps out of, whatever the order.
+    # Polygons to keep out of under every order.
     _standing: tuple[Polygon, ...] = field(default=(), init=False)
 
     def __post_init__(self) -> None:
         self._standing = self.policy.keep_out + mask_polygons(self.policy.keep_out_mask)
 
     def handle(self, events: Iterable[Event], now: float) -> Decision:
-        """Apply events at ``now`` [s]; return what they lead to at once.
+        """Apply events at ``now`` [s]; return their immediate results.
 
-        One that cannot be used is a fault and changes nothing.
+        An event that cannot be used is reported as a fault and changes nothing.
         """
         self._now, self._path, self._is_forgotten = now, None, False
         self._faults, self._answers = [], []
@@ -89,14 +89,14 @@ class EventHandler:
         )
 
     def begin_order(self, order: OrderState) -> None:
-        """Begin with another order, or with none; ``update_area`` has to follow."""
+        """Begin another order, or none; ``update_area`` must be called next."""
         self.route.abandon()
         self.map.keep_out(self._standing + (order.order.keep_out if order.order else ()))
         self.line.note_map()
         self.orders.start(order)
 
     def update_area(self) -> None:
-        """Find out what can be reached now; want a new plan if that changed."""
+        """Update the reachable area; want a new plan if it changed."""
         before, route = self.map.area, self.route
         self.map.update_area()
         area = self.map.area
@@ -139,7 +139,7 @@ class EventHandler:
                     self.route.want(reason)
 
     def _map_changed(self) -> None:
-        """Follow a new map; raise LedgerMismatchError where it shows another building."""
+        """Follow a new map; raise LedgerMismatchError if it shows another building."""
         assert self.map.free is not None
         assert self.map.grid is not None
         self.monitor.note_map(self._now)
@@ -154,7 +154,7 @@ class EventHandler:
         self._go_on(self.ledger.check(self.map.free, self.map.grid.frame))
 
     def _go_on(self, misfit: LedgerMismatchError | None) -> None:
-        """Update what can be reached; begin anew where the ledger is of another place."""
+        """Update the reachable area; start over if the ledger belongs to another place."""
         if misfit is not None:
             self.trail.begin_anew()
             self.begin_order(self.orders.order_state.in_other_building(str(misfit)))
@@ -164,7 +164,7 @@ class EventHandler:
             raise misfit
 
     def _enter_frame(self, frame: str) -> None:
-        """Make a frame the active one; raise LedgerMismatchError for progress in another."""
+        """Activate a frame; raise LedgerMismatchError for progress in another frame."""
         is_other_map = self.map.switch_frame()
         before = self.ledger.current.frame
         misfit = self.ledger.move_to(frame)
@@ -181,7 +181,7 @@ class EventHandler:
         self._go_on(misfit)
 
     def _leave_map(self, why: str) -> None:
-        """Stop the robot: its path leads through another map."""
+        """Stop the robot: its path belongs to another map."""
         self._path = self.route.stop(why, self._now) or self._path
         self.route.abandon()
         self.monitor.forget_pose()
@@ -214,7 +214,7 @@ class EventHandler:
         self.trail.note_drive()
 
     def _record(self) -> None:
-        """Count what lies under the tool; a pose far outside the map is no drive."""
+        """Record what is under the tool; a pose far outside the map is ignored."""
         lattice, stamped = self.map.lattice, self.map.pose
         if lattice is None or stamped is None:
             return
@@ -231,7 +231,7 @@ class EventHandler:
             self.monitor.note_plan(request.number)
 
     def _obey(self, event: CommandReceived) -> None:
-        """Carry out a command; what is wrong with it is its answer."""
+        """Carry out a command; an error becomes its answer."""
         before = self.orders.order_state
         try:
             order = turned_order(located(event.order, self.policy.zones), -self.lattice_deg)
@@ -262,7 +262,7 @@ class EventHandler:
         return None
 
     def _reset(self) -> None:
-        """Forget what is covered but where the tool is now, and which frame is active."""
+        """Forget all coverage except under the tool, and deselect the active frame."""
         self._is_forgotten = True
         self.map.frames.reset()
         if self.map.switch_frame():
@@ -275,7 +275,7 @@ class EventHandler:
         self._record()
 
     def _replan(self) -> int:
-        """Want a full new plan, and return its number; CommandError where there is none to make."""
+        """Want a full new plan; return its number, or raise CommandError if none can be made."""
         if self.map.lattice is None:
             raise CommandError("nothing to plan: there is no map yet")
         if self.map.pose is None:

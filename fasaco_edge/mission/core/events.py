@@ -17,7 +17,7 @@ from fasaco_edge.grid.occupancy import MapPatch, OccupancyGrid
 from fasaco_edge.mission.orders.order import EVERYTHING_ONCE, CommandName, MissionOrder
 
 if TYPE_CHECKING:
-    # For types only: the daemon receives events before it has loaded the planners.
+    # For types only: the daemon receives events before the planners are loaded.
     from fasaco_edge.planners.path import CoveragePath
     from fasaco_edge.planners.problem import CoverageProblem
 
@@ -52,12 +52,12 @@ class PoseReceived:
 
 @dataclass(frozen=True, slots=True)
 class BatteryReceived:
-    """What the battery says.
+    """A battery message.
 
     Attributes:
-        level: its charge from 0 to 1; None where that is not known.
-        power: what the supply does, as ``wire.messages.battery.POWERS`` has it.
-        stamp_ns: when that was measured [ns]; 0 where that is not known.
+        level: charge from 0 to 1; None where unknown.
+        power: state of the power supply, one of ``wire.messages.battery.POWERS``.
+        stamp_ns: time of measurement [ns]; 0 where unknown.
     """
 
     level: float | None
@@ -72,8 +72,8 @@ class PlanReady:
     Attributes:
         number: of the request.
         path: the plan.
-        seconds: how long planning took [s].
-        stops: where it was stopped, see ``planners.planner.StopRecorder``.
+        seconds: planning time [s].
+        stops: where the search was stopped, see ``planners.planner.StopRecorder``.
     """
 
     number: int
@@ -84,7 +84,7 @@ class PlanReady:
 
 @dataclass(frozen=True, slots=True)
 class PlanBroken:
-    """The planner failed on request ``number`` by ``why``."""
+    """The planner failed on request ``number``; ``why`` is the reason."""
 
     number: int
     why: PlanFailed
@@ -101,19 +101,19 @@ class CommandReceived:
 
 @dataclass(frozen=True, slots=True)
 class MemberHeard:
-    """What another robot of the fleet says of itself.
+    """State of another robot of the fleet.
 
     Attributes:
         robot: its name.
-        misfit: why it cannot be of this fleet; "" where it can.
-        frame: of its map.
-        state: of its mission.
-        x, y: where it is [m].
-        step_s: what sweeping a cell takes it [s].
-        epoch: of its cells, see ``fleet.shared``.
-        division: number of its newest division of what is left.
-        open_cells: how many cells it knows that are still to be swept.
-        tiles: places and bits of what it has swept; of all tiles only some.
+        misfit: why it cannot belong to this fleet; "" where it can.
+        frame: its map frame.
+        state: state of its mission.
+        x, y: its position [m].
+        step_s: its time to sweep one cell [s].
+        epoch: epoch number of its tiles, see ``fleet.shared``.
+        division: number of its newest division.
+        open_cells: number of cells still to be swept, as it knows.
+        tiles: places and bits of the cells it has swept; a subset of its tiles.
     """
 
     robot: str
@@ -144,13 +144,13 @@ Event = (
 
 @dataclass(frozen=True, slots=True)
 class PatchRun:
-    """Consecutive map updates: laid over the map together, at one copy of it."""
+    """Consecutive map updates, applied together so that the map is copied once."""
 
     patches: tuple[MapPatch, ...]
 
 
 def in_runs(events: Iterable[Event]) -> Iterator[Event | PatchRun]:
-    """Yield events in order, consecutive updates of the map as one."""
+    """Yield events in order, with consecutive map updates merged into one run."""
     for kind, run in groupby(events, type):
         if kind is PatchReceived:
             patches = (event.patch for event in run if isinstance(event, PatchReceived))
@@ -166,9 +166,9 @@ class PlanRequest:
     Attributes:
         number: counts the requests, from 1; ``PlanReady`` or ``PlanBroken`` returns it.
         problem: what to plan.
-        reason: why.
-        changed: window of the cells that have changed since the plan before; None where that is
-            not the reason.
+        reason: why it is wanted.
+        changed: window of the cells that changed since the previous plan; None where that is not
+            the reason.
     """
 
     number: int
@@ -179,17 +179,17 @@ class PlanRequest:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PathUpdate:
-    """A path to publish; it replaces the one before.
+    """A path to publish; it replaces the previous one.
 
     Attributes:
         revision: counts the published paths, from 1.
         cells: int32 (n, 2), the cells (row, col) still to be driven; n = 0 stops the robot.
-        reason: why it replaces the one before.
-        plan: the plan it comes from; None where none was needed.
-        plan_s: how long planning took [s].
+        reason: why it replaces the previous one.
+        plan: the plan that it comes from; None where none was needed.
+        plan_s: planning time [s].
         changed: window of the cells whose change is the reason; None where that is not the reason.
         xy: float64 (m, 2), x, y [m]: the line to drive; None for the centres of the cells.
-        end_yaw: heading at its end [rad]; None for that of the way there.
+        end_yaw: heading at the end [rad]; None for the heading of the last segment.
     """
 
     revision: int
@@ -209,7 +209,7 @@ class Answer:
     Attributes:
         number: of the command.
         error: why it was refused; None where it was carried out.
-        plan: for ``replan`` the number that the new plan will have among the plans made.
+        plan: for ``replan`` the number of the coming plan.
     """
 
     number: int
@@ -219,13 +219,13 @@ class Answer:
 
 @dataclass(frozen=True, slots=True)
 class Decision:
-    """What is to be done after a step.
+    """The result of a step: what the daemon has to do.
 
     Attributes:
-        plan: a plan to make; there is never more than one under way.
-        path: a path to publish; of several in one step only the last.
-        faults: why events were refused, and faults that occurred with others.
-        answers: to the commands among the events, in order.
+        plan: a plan to make; at most one is pending at a time.
+        path: a path to publish; the last one of the step.
+        faults: why events were refused, and other faults.
+        answers: answers to the commands among the events, in order.
         forgotten: whether the ledger on disk is to be deleted, too.
     """
 

@@ -1,4 +1,4 @@
-"""Executive: decides what the robot does now, and why."""
+"""Executive: decides what the robot does next, and why."""
 
 from __future__ import annotations
 
@@ -23,20 +23,21 @@ from fasaco_edge.mission.orders.order import Errand
 from fasaco_edge.mission.orders.order_state import Stage
 from fasaco_edge.mission.orders.sequencer import Sequencer
 
-# A robot that left its path, or stands still at its end, gets a new one, but not
-# more often than this [s]: a flickering pose must not keep the planner busy.
+# Minimum time between new plans for a robot that left its path or stands still at its end [s]: a
+# flickering pose must not keep the planner busy.
 PATIENCE_S = 1.0
-# A robot that stands for so long on its path gets it again [s]: it may have lost it, or stopped for
-# something that is gone. Not sooner: it may wait for somebody to pass, or be on its way out of a
-# corner, which another path would end. By its own clock, so that one that is simulated at twenty
-# times the real speed does not stand for ten of its minutes.
+# A robot that stands for so long on its path gets the path again [s]: the follower may have lost
+# it, or stopped for an obstacle that is gone. Not sooner: it may be waiting for somebody to pass, or
+# be driving out of a corner, which another path would end. By the robot's clock, as a simulation may
+# run at twenty times the real speed.
 STANDING_S, STANDING_M = 30.0, 0.1
-# One that stands beside its path gets another so soon [s]: no straight way may lead it back.
+# A robot that stands beside its path gets a new one after this time [s]: an obstacle may separate
+# it from the path.
 BESIDE_S = 2.0
-# An errand ends once the robot was so long in the last cell of its way [s]: its path leads to the
-# middle of it, and turns it there.
+# An errand ends once the robot was in the last cell for this long [s]: its path leads to the centre
+# and ends with a turn.
 ARRIVAL_S = 2.0
-# A robot in its dock is so near to the dock's pose, or to where it was led to [m].
+# Tolerances to the dock's pose, and to the pose in front of the dock [m].
 DOCKED_M, NEAR_M = 0.1, 0.5
 PLACES: dict[Errand, str] = {"home": "home", "charge": "to the dock"}
 
@@ -46,7 +47,7 @@ DRIVING = (State.PLANNING, State.COVERING, State.RETURNING)
 
 @dataclass(slots=True, eq=False)
 class Executive:
-    """Decides by what map, ledger, monitor, orders and route say; owns the mission's state."""
+    """Decides from map, ledger, monitor, orders and route; owns the mission's state."""
 
     map: MapState
     ledger: MissionLedger
@@ -60,16 +61,16 @@ class Executive:
     _state: State = field(default=State.WAITING_FOR_MAP, init=False)
     _reason: str = field(default="no map yet", init=False)
     _now: float = field(default=0.0, init=False)
-    # The cell the robot is in, and since when.
+    # The robot's cell, and when it entered it.
     _cell: Cell | None = field(default=None, init=False)
     _entered_at: float = field(default=0.0, init=False)
-    # Where the robot has been, to STANDING_M, and since when it has had its path there: by our
-    # clock [s], and by its own [ns].
+    # The robot's position, to STANDING_M, and since when it has had its path there: by our clock
+    # [s], and by the robot's [ns].
     _place: tuple[float, float] = field(default=(math.inf, math.inf), init=False)
     _stands_since: tuple[float, int] = field(default=(0.0, 0), init=False)
 
     def status(self) -> tuple[State, str]:
-        """Return the state and its reason as they are reported."""
+        """Return the reported state and its reason."""
         trouble = self.monitor.trouble(self._now)
         if trouble and self._state in DRIVING:
             lost = self.monitor.is_pose_lost(self._now)
@@ -92,14 +93,14 @@ class Executive:
         if cell != self._cell:
             self._cell, self._entered_at = cell, now
         if not len(route.path.cells):
-            self.monitor.clear_doubt()  # there is no path the robot could be off
+            self.monitor.clear_doubt()  # without a path the robot cannot be off it
         update = route.truncate(now)
         if self.orders.order_state.errand:
             return self._run_errand(cell, update)
         return self._carry_on(cell, route.take_up("goes on", now) or update)
 
     def _carry_on(self, cell: Cell, update: PathUpdate | None) -> Decision:
-        """Carry the order out."""
+        """Continue with the order."""
         route, orders, now = self.route, self.orders, self._now
         self._check_deviation(cell)
         if reason := orders.begin(cell, now):
@@ -109,7 +110,7 @@ class Executive:
         if route.wanted and route.pending is None:
             if why := route.why_not_yet(now):
                 return self._rest(State.BLOCKED, why)
-            # A robot that had to stop waits a moment.
+            # Wait a moment after the robot was stopped.
             is_too_soon = self._state is State.BLOCKED and not self._has_waited()
             return Decision(path=update) if is_too_soon else self._request(cell, update)
         if orders.order_state.stage is Stage.RETURNING and cell == orders.goal():
@@ -125,7 +126,7 @@ class Executive:
         return Decision(path=update, plan=route.request_improvement(now) if is_free else None)
 
     def _why_resting(self) -> tuple[State, str] | None:
-        """Return the state and reason of a robot with nothing to decide on; None where there is."""
+        """Return state and reason where there is nothing to decide; else None."""
         order = self.orders.order_state
         if order.paused:
             return State.PAUSED, order.why_paused
@@ -141,12 +142,12 @@ class Executive:
         return None
 
     def _rest(self, state: State, reason: str) -> Decision:
-        """Do nothing; a robot that drives stops."""
+        """Rest in a state; a driving robot is stopped."""
         self._state, self._reason = state, reason
         return Decision(path=self.route.stop(reason, self._now))
 
     def _settle(self, update: PathUpdate | None) -> Decision:
-        """Stop, because all is done, or until the next try of what is not."""
+        """Stop: all is covered, or the rest waits for a retry."""
         orders = self.orders
         if orders.is_waiting:
             rest = self._rest(State.BLOCKED, orders.waiting_reason())
@@ -155,7 +156,7 @@ class Executive:
         return replace(rest, path=rest.path or update)
 
     def _report_driving(self) -> None:
-        """Set the state of a robot that has something to do."""
+        """Set the state of a robot that has work to do."""
         route = self.route
         if route.pending is not None and not len(route.path.cells):
             self._state, self._reason = State.PLANNING, route.pending.reason
@@ -166,7 +167,7 @@ class Executive:
         return self._now - self.route.published_at >= PATIENCE_S
 
     def _check_deviation(self, cell: Cell) -> None:
-        """Want a new plan for a robot that is off its path, or at the end of it."""
+        """Want a new plan for a robot that is off its path or at its end."""
         route, monitor, path = self.route, self.monitor, self.route.path
         waited = self._has_waited()
         if route.pending is not None or route.wanted or self._state not in DRIVING:
@@ -190,28 +191,29 @@ class Executive:
             route.want("robot left the path")
 
     def _stands_beside(self, cell: Cell) -> bool:
-        """Tell whether the robot stands in a cell that is not where it is on its path."""
+        """Tell whether the robot stands in another cell than its index on the path."""
         ahead = self.route.path.ahead
         return len(ahead) > 1 and cell != tuple(ahead[0].tolist()) and self._stood_s() >= BESIDE_S
 
     def _stands_at(self, last: Cell | None) -> bool:
-        """Tell whether the robot stands in the last cell of a path it did not drive all along.
+        """Tell whether the robot stands in the last cell of a path that it did not drive
+        completely.
 
-        It missed a cell: by the count of cells it is still before that one.
+        It missed a cell, so its index on the path is before the last.
         """
         if self._cell != last or last == tuple(self.route.path.ahead[0].tolist()):
             return False
         return self._has_waited() and self._now - self._entered_at >= PATIENCE_S
 
     def _stands_on_path(self) -> bool:
-        """Tell whether the robot has long been in one place, with a path to drive."""
+        """Tell whether the robot has stood in one place for long, with a path to drive."""
         stood_s = self._stood_s()
         return len(self.route.path.ahead) > 1 and stood_s >= STANDING_S
 
     def _stood_s(self) -> float:
-        """Return for how long the robot has been in one place, and has had its path [s].
+        """Return how long the robot has stood in one place with its present path [s].
 
-        By our clock or its own, whichever says longer: stamps may stand still.
+        By our clock or the robot's, whichever says longer: stamps may stand still.
         """
         assert self.map.pose is not None
         stamped, published_at = self.map.pose, self.route.published_at
@@ -224,7 +226,7 @@ class Executive:
         return max(self._now - since, (stamped.stamp_ns - since_ns) * 1e-9)
 
     def _request(self, cell: Cell, update: PathUpdate | None) -> Decision:
-        """Request the plan that is wanted; where nothing is to be covered, go on."""
+        """Request the wanted plan; if nothing is left to cover, continue with the order."""
         route, orders = self.route, self.orders
         orders.reopen()
         self._share(cell, at_once=True)
@@ -250,7 +252,7 @@ class Executive:
         return self._return_home(cell, update)
 
     def _share(self, cell: Cell, *, at_once: bool = False) -> str:
-        """Divide what is left among the fleet where that is due; return why a plan is wanted."""
+        """Divide the rest among the fleet if due; return why a plan is wanted, or ""."""
         if self.orders.order_state.stage is Stage.RETURNING:
             return ""
         return self.fleet.share(self.orders.open_cells, cell, self._now, at_once=at_once)
@@ -272,13 +274,13 @@ class Executive:
         return Decision(path=self._lead(path, "returning home", "home"))
 
     def _lead(self, path: NDArray[np.int32], reason: str, errand: Errand) -> PathUpdate:
-        """Publish the way to where an errand leads, with the robot's heading there."""
+        """Publish a path to the destination of an errand, with the heading there."""
         place = self.policy.place(errand)
         yaw = None if place is None else place.stand.yaw
         return self.route.publish(path, reason, self._now, end_yaw=yaw)
 
     def _run_errand(self, cell: Cell, update: PathUpdate | None) -> Decision:
-        """Drive where the errand leads, by the shortest way; what is planned waits."""
+        """Drive to the destination of an errand by the shortest path; coverage waits."""
         route, orders, area, path = self.route, self.orders, self.map.area, self.route.path
         errand = orders.order_state.errand
         is_new = route.set_aside()
@@ -300,7 +302,7 @@ class Executive:
         return Decision(path=update)
 
     def _consider_charging(self) -> None:
-        """Begin to charge where that is due, and end it where it is enough."""
+        """Begin to charge if due, and end charging if it is enough."""
         orders, charging = self.orders, self.charging
         charging.look(self._now)
         errand = orders.order_state.errand
@@ -311,9 +313,9 @@ class Executive:
             orders.set_state(replace(orders.order_state, errand="charge"))
 
     def _why_in_dock(self) -> tuple[State, str] | None:
-        """Return the state and reason of a robot that is, or may be, in its dock; else None.
+        """Return state and reason of a robot that is, or may be, in its dock; else None.
 
-        It may be there after a restart, until the battery was heard: no path may lead it out.
+        After a restart it may be there until the first battery message: no path may lead it out.
         """
         if self._is_docked():
             return State.CHARGING, self.charging.why(self._now)
@@ -322,9 +324,9 @@ class Executive:
         return None
 
     def _is_docked(self) -> bool:
-        """Tell whether the robot is where it charges, moved by its base from before the dock, too.
+        """Tell whether the robot is in its dock, including where its base moved it into the dock.
 
-        There no cell need be coverable.
+        The cell there need not be coverable.
         """
         place, stamped = self.policy.dock or self.policy.home, self.map.pose
         if place is None or stamped is None:
@@ -335,7 +337,7 @@ class Executive:
         return charges and self._is_near_dock()
 
     def _is_near_dock(self) -> bool:
-        """Tell whether the robot may be where its base moves it from before the dock."""
+        """Tell whether the robot is near enough to the dock to have been moved in by its base."""
         place, stamped = self.policy.dock or self.policy.home, self.map.pose
         if place is None or stamped is None:
             return False
@@ -344,7 +346,7 @@ class Executive:
         return math.hypot(pose.x - stand.x, pose.y - stand.y) <= reach_m
 
     def _arrive(self) -> Decision:
-        """End the way of an errand."""
+        """End an errand on arrival."""
         orders = self.orders
         orders.set_state(orders.order_state.arrived())
         resting = self._why_resting()

@@ -1,4 +1,4 @@
-"""Requests for plans: why one is wanted, which one is under way, and how the last one failed."""
+"""Plan requests: why a plan is wanted, which one is pending, and how the last one failed."""
 
 from __future__ import annotations
 
@@ -9,30 +9,30 @@ from fasaco_edge.mission.core.events import PlanBroken, PlanRequest
 from fasaco_edge.mission.core.spare_time import Attempt
 from fasaco_edge.planners.problem import CoverageProblem
 
-# After a plan that failed [s].
+# Retry period after a failed plan [s].
 BROKEN_S = 30.0
 
 
 class PlanRequests:
-    """Requests plans, one at a time: those that are needed, and attempts at better paths.
+    """Requests plans, one at a time: needed plans, and attempts at better paths.
 
     Attributes:
-        plans, attempts: count the plans that came back, and the attempts at better paths.
+        plans, attempts: count the returned plans, and the attempts at better paths.
         wanted: why a new plan is wanted; "" where none is.
-        pending: the plan under way.
+        pending: the request under way.
     """
 
     def __init__(self) -> None:
         self.plans = self.attempts = 0
         self.wanted = ""
         self.pending: PlanRequest | None = None
-        # Of the plan under way, if that is only to improve the path.
+        # The attempt that the pending plan belongs to; None for a needed plan.
         self._attempt: Attempt | None = None
-        # Whether the plan under way is for an order that no longer counts.
+        # Whether the pending plan is for an order that no longer counts.
         self._is_abandoned = False
         # Why a full plan is wanted; "" where none is.
         self._full = ""
-        # What has changed since the last request, and whether that is why a plan is wanted.
+        # What changed since the last request; and whether that change is the reason for the plan.
         self._changed: Window | None = None
         self._is_by_map = False
         # How the last plan failed, and when; "" where it did not.
@@ -40,12 +40,12 @@ class PlanRequests:
 
     @property
     def is_planning(self) -> bool:
-        """Whether a plan that is needed is under way."""
+        """Whether a needed plan is pending."""
         return self.pending is not None and self._attempt is None
 
     @property
     def is_improving(self) -> bool:
-        """Whether the plan under way is only to improve the path."""
+        """Whether the pending plan is only an attempt at a better path."""
         return self.pending is not None and self._attempt is not None
 
     def want(self, reason: str, changed: Window | None = None) -> None:
@@ -55,28 +55,28 @@ class PlanRequests:
         self._is_by_map = changed is not None
 
     def want_full(self, reason: str) -> int:
-        """Want a plan for which all is searched; return its number among the plans."""
+        """Want a full search; return its number among the plans."""
         self.wanted = self._full = reason
         self.forget_failure()
         return self.plans + (1 if self.pending is None or self.is_improving else 2)
 
     def drop(self) -> None:
-        """Want no plan any more."""
+        """Want no plan."""
         self.wanted = self._full = ""
         self._changed = None
 
     def discard_pending(self) -> None:
-        """Discard the plan under way, if any, once it comes."""
+        """Discard the result of the pending plan, if any."""
         self._is_abandoned = self.pending is not None
 
     def abandon(self) -> None:
-        """Want no plan any more, and discard the one under way: it is for another order."""
+        """Want no plan, and discard the pending one: it is for another order."""
         self.drop()
         self.forget_failure()
         self.discard_pending()
 
     def pause(self) -> None:
-        """Discard the plan under way; what it was for is planned once the robot continues."""
+        """Discard the pending plan; its reason is planned for again once the robot continues."""
         self.forget_failure()
         if self.pending is not None and self.is_planning and not self._is_abandoned:
             if self.pending.problem.is_full:
@@ -85,7 +85,7 @@ class PlanRequests:
         self.discard_pending()
 
     def request_plan(self, problem: CoverageProblem) -> PlanRequest:
-        """Request the plan that is wanted."""
+        """Request the wanted plan."""
         changed = self._changed if self._is_by_map and not self._full else None
         problem = replace(problem, is_full=bool(self._full))
         request = self._request(problem, self._full or self.wanted, changed)
@@ -103,7 +103,7 @@ class PlanRequests:
         return self.pending
 
     def _close_request(self) -> bool:
-        """Count the plan under way as come back; return whether it was abandoned."""
+        """Count the pending plan as returned; return whether it was abandoned."""
         self.plans += self._attempt is None
         self.attempts += self._attempt is not None
         self.pending = self._attempt = None
@@ -111,9 +111,9 @@ class PlanRequests:
         return is_abandoned
 
     def _close_failed(self, event: PlanBroken, now: float) -> bool:
-        """Close the plan under way as failed, at ``now`` [s]; return whether it was needed.
+        """Close the pending plan as failed at ``now`` [s]; return whether it was needed.
 
-        The same problem would make it fail again: it is not requested again at once.
+        The same problem would fail again, so it is not requested again at once.
         """
         request, is_improving = self.pending, self.is_improving
         if request is None or request.number != event.number:
@@ -125,12 +125,12 @@ class PlanRequests:
         return True
 
     def why_not_yet(self, now: float) -> str:
-        """Return why no plan may be requested yet; "" where one may be."""
+        """Return why no plan may be requested yet; "" if one may be."""
         why, since = self._failure
         if why and now - since < BROKEN_S:
             return f"{why}; tried again with the next map, or after {BROKEN_S:g} s"
         return ""
 
     def forget_failure(self) -> None:
-        """Allow a request although the last plan failed: the problem is another."""
+        """Allow a request after a failed plan: the problem has changed."""
         self._failure = "", 0.0

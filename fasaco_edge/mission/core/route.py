@@ -1,4 +1,4 @@
-"""Route: the path the robot was given, and what is kept of it at a stop."""
+"""Route: the published path, and the part of it that is kept while the robot is stopped."""
 
 from __future__ import annotations
 
@@ -26,27 +26,27 @@ class Route(PlanRequests):
     """Requests plans, and publishes paths from them. All times ``now`` are [s].
 
     Attributes:
-        path: the published path, and how far the robot is on it.
+        path: the published path, and the robot's progress on it.
         revision: counts the published paths.
-        unchanged, outdated: count those of the plans that led to no path, because they found
-            the same path again, or because they no longer held.
-        published_at: when a path was last published, or confirmed by a plan.
+        unchanged, outdated: count the plans that were not published because they equal the current
+            path, or because they no longer hold.
+        published_at: when a path was last published or confirmed by a plan.
     """
 
     def __init__(self, spare_share: float, map_state: MapState, orders: Sequencer) -> None:
         super().__init__()
         self.path = PathProgress(NO_CELLS)
-        # What is kept of a path that is not driven now: what lay beyond where a map blocked it, or,
-        # of a robot that was stopped, all that was left.
+        # The part of a path that is kept for later: beyond a block, or the whole rest after a stop.
         self._kept = PathProgress(NO_CELLS)
-        # What was left of the path before an errand, for after it; None without one.
+        # The rest of the path at the start of an errand; None without one.
         self._aside: NDArray[np.int32] | None = None
-        # The heading of the robot at the end of its path [rad]; None for the way's.
+        # Heading at the end of the path [rad]; None for that of the last segment.
         self._end_yaw: float | None = None
-        # The path over a map that has moved since, until a pose tells where to.
+        # The path over a map that has moved, until the first pose on the moved map shows the
+        # motion.
         self._before_motion: NDArray[np.int32] | None = None
         self.revision = 0
-        # Counts the paths whose cells are numbered anew, and those of them over other cells.
+        # Count the numberings of cells, and the walks: paths over other cells.
         self._numberings = self._walks = 0
         self.unchanged = self.outdated = 0
         self.published_at = 0.0
@@ -56,7 +56,7 @@ class Route(PlanRequests):
         self._checked_on: ReachableArea | None = None
 
     def succeed(self, before: Route) -> None:
-        """Go on counting where another route ended; the plan under way there is of no use here."""
+        """Continue the counts of another route; a plan pending there is dropped."""
         self.revision, self.plans, self.attempts = before.revision, before.plans, before.attempts
         self.unchanged, self.outdated = before.unchanged, before.outdated
         self.pending, self._attempt = before.pending, before._attempt
@@ -64,30 +64,30 @@ class Route(PlanRequests):
 
     @property
     def path_to_keep(self) -> NDArray[np.int32]:
-        """What of the path the next plan is to keep where it can, int32 (n, 2).
+        """The part of the path that the next plan should keep, int32 (n, 2).
 
-        Also what a map cut off, or what a robot had before it that was stopped: most of that still
-        holds.
+        It includes what a block cut off, and what was left when the robot was stopped: most of that
+        still holds.
         """
         return np.concatenate((self.path.ahead, self._kept.ahead))
 
     @property
     def held(self) -> PathProgress:
-        """The path, or, of a robot that was stopped, what is kept of the one before."""
+        """The path; for a stopped robot the kept part of the last one."""
         return self.path if len(self.path.cells) else self._kept
 
     def abandon(self) -> None:
-        """Want no plan any more, and discard the one under way: it is for another order."""
+        """Want no plan, and discard the pending one: it is for another order."""
         super().abandon()
         self._kept, self._before_motion, self._aside = PathProgress(NO_CELLS), None, None
 
     @property
     def aside(self) -> NDArray[np.int32] | None:
-        """What was left of the path before an errand, int32 (n, 2); None without one."""
+        """The rest of the path at the start of an errand, int32 (n, 2); None without one."""
         return self._aside
 
     def set_aside(self) -> bool:
-        """Keep the path for after an errand, unless that was done; return whether it was now."""
+        """Keep the path for after an errand; return whether it was not kept before."""
         if self._aside is not None:
             return False
         self.pause()
@@ -95,7 +95,7 @@ class Route(PlanRequests):
         return True
 
     def take_up(self, reason: str, now: float) -> PathUpdate | None:
-        """Go on after an errand with what was set aside, once a plan leads there."""
+        """Resume the kept path after an errand, once a plan connects to it."""
         if self._aside is None:
             return None
         update = self.publish(NO_CELLS, reason, now) if len(self.path.cells) else None
@@ -104,7 +104,7 @@ class Route(PlanRequests):
         return update
 
     def resume(self, now: float) -> PathUpdate | None:
-        """Publish what is kept of the path before a pause; want a plan where that does not do."""
+        """Publish the kept path after a pause; want a plan if it does not hold."""
         area, cell, cells = self._map.area, self._map.robot_cell(), self._kept.ahead
         holds = (
             not self.wanted
@@ -119,14 +119,14 @@ class Route(PlanRequests):
         return None
 
     def note_map_motion(self) -> None:
-        """Note that the newest map has moved; ``note_motion`` tells where to."""
+        """Note that the newest map has moved; ``note_motion`` tells how."""
         if self._before_motion is None:
             self._before_motion = self.path_to_keep
 
     def note_motion(self, motion: Motion | None, now: float) -> PathUpdate | None:
-        """Take the path to where the map has moved, and want a plan that mends it.
+        """Move the path with the map, and want a plan that repairs it.
 
-        What of it can be driven is published at once: the robot must not follow the old place.
+        Its drivable part is published at once: the robot must not follow the old position.
         """
         before, self._before_motion = self._before_motion, None
         if before is None or motion is None or motion.is_still or not len(before):
@@ -146,7 +146,7 @@ class Route(PlanRequests):
         return update
 
     def request_improvement(self, now: float) -> PlanRequest | None:
-        """Request a better path; None without spare time, or where too little of it is left."""
+        """Request a better path; None without spare time, or if too little of the path is left."""
         if not self._spare.is_available(now):
             return None
         attempt = Attempt.at(self.path, self._numberings, self._orders, self.attempts + 1)
@@ -156,12 +156,12 @@ class Route(PlanRequests):
         return self._request_attempt(attempt)
 
     def fail(self, event: PlanBroken, now: float) -> None:
-        """Note that the plan under way failed: the same problem would make it fail again."""
+        """Note that the pending plan failed: the same problem would fail again."""
         self._spare.rest(BROKEN_S, now)
         self.outdated += self._close_failed(event, now)
 
     def accept(self, event: PlanReady, now: float) -> PathUpdate | None:
-        """Publish a plan that was requested, unless it no longer holds."""
+        """Publish a requested plan, unless it no longer holds."""
         if self.is_improving:
             self._spare.spend(event.seconds, now, self._walks)
         request, attempt, area = self.pending, self._attempt, self._map.area
@@ -191,7 +191,7 @@ class Route(PlanRequests):
     def _accept_better(
         self, attempt: Attempt, event: PlanReady, area: ReachableArea, now: float
     ) -> PathUpdate | None:
-        """Publish the path with a better rest; None where that saves too little."""
+        """Publish the path with a better rest; None if that saves too little."""
         if attempt.numbering != self._numberings:
             return None
         cells = attempt.joined(self.path, event.path.cells)
@@ -202,10 +202,10 @@ class Route(PlanRequests):
     def _from_here(
         self, cells: NDArray[np.int32], here: Cell, area: ReachableArea
     ) -> NDArray[np.int32]:
-        """Return a new plan without what was covered while it was made.
+        """Return a new plan without the cells that were covered while it was made.
 
-        The robot drove on meanwhile: it joins the plan at the first cell that still needs a
-        visit. Empty where no path leads there: the robot was carried elsewhere.
+        The robot drove on meanwhile, so it joins the plan at the first cell that still needs a
+        visit. Empty if no path leads there: the robot was carried elsewhere.
         """
         window = area.lattice.window
         still_open = window.values_at(self._orders.open_cells(window), cells, True)
@@ -222,7 +222,7 @@ class Route(PlanRequests):
         changed: Window | None = None,
         end_yaw: float | None = None,
     ) -> PathUpdate:
-        """Publish a path in place of the one before."""
+        """Publish a path that replaces the current one."""
         self.revision += 1
         self._numberings += 1
         self._walks += not np.array_equal(cells, self.path.ahead)
@@ -235,7 +235,7 @@ class Route(PlanRequests):
         )
 
     def publish_line(self, reason: str, now: float) -> PathUpdate:
-        """Publish another line along the same cells; an attempt at better ones still holds."""
+        """Publish a new line along the same cells; a pending attempt still holds."""
         self.revision += 1
         self.published_at = now
         return PathUpdate(self.revision, self.path.ahead, reason, end_yaw=self._end_yaw)
@@ -245,7 +245,7 @@ class Route(PlanRequests):
         self._hold(self.held.driven_to(cell, has_visited))
 
     def follow_line(self, index: int) -> None:
-        """Note that the robot is, by its line, at a cell of the path."""
+        """Note the robot's index on the path, as its line shows."""
         held = self.held
         if held.index < index < len(held.cells):
             self._hold(replace(held, index=index))
@@ -257,7 +257,7 @@ class Route(PlanRequests):
             self._kept = held
 
     def stop(self, reason: str, now: float) -> PathUpdate | None:
-        """Publish an empty path, keep the one before; None where the robot has none to drive."""
+        """Publish an empty path and keep the current one; None if there was none to drive."""
         if not len(self.path.cells):
             return None
         kept = self.path_to_keep
@@ -267,9 +267,9 @@ class Route(PlanRequests):
         return update
 
     def truncate(self, now: float) -> PathUpdate | None:
-        """Cut a path that a new map blocks before the block, at once; a new plan follows.
+        """Cut the path before a block that a new map shows; want a new plan.
 
-        Nothing is left of it where the robot's own cell is blocked or no longer on the map.
+        The path becomes empty if the robot's own cell is blocked or off the map.
         """
         area = self._map.area
         if area is None or area is self._checked_on:

@@ -1,4 +1,4 @@
-"""Spare time: attempts at a better path while the one there is need not change."""
+"""Spare time: limits attempts at a better path while the current one holds."""
 
 from __future__ import annotations
 
@@ -14,30 +14,29 @@ from fasaco_edge.planners.cost import CoverageCost
 from fasaco_edge.planners.problem import CoverageProblem
 from fasaco_edge.planners.walk_before import HELD_CELLS
 
-# A path is replaced by a better one only if that saves this many steps, and this share of
-# what is left.
+# A path is replaced only if that saves this many steps and this share of what is left.
 LEAST_STEPS, LEAST_SHARE = 2, 0.002
-# The share of time is halved at most this often.
+# The share of time is halved at most this many times.
 MOST_VAIN = 4
-# Where there is nothing to improve, the next look is this much later [s]: it takes a search of
-# the whole lattice, and the answer rarely changes from one pose to the next.
+# Pause after an attempt that found nothing to improve [s]: it takes a search of the whole lattice,
+# and the answer rarely changes between poses.
 SKIPPED_S = 1.0
 
 
 class SpareTime:
-    """Limits attempts at better paths to a share of a processor core; a share of 0 is none.
+    """Limits attempts at better paths to a share of a processor core; 0 for none.
 
-    While attempts at one path come to nothing, fewer and fewer are made.
+    The share is halved with each attempt at the same walk that brings nothing.
     """
 
     def __init__(self, share: float) -> None:
         self._share = share
         self._resting_until = 0.0
-        # The walk of the last attempt, and how many attempts at it came to nothing.
+        # The walk of the last attempt, and how many attempts at it brought nothing.
         self._walk = self._vain = 0
 
     def is_available(self, now: float) -> bool:
-        """Tell whether another attempt may begin at ``now`` [s]."""
+        """Tell whether another attempt may start at ``now`` [s]."""
         return self._share > 0.0 and now >= self._resting_until
 
     def spend(self, seconds: float, now: float, walk: int) -> None:
@@ -48,7 +47,7 @@ class SpareTime:
         self._resting_until = now + seconds * (1.0 / share - 1.0)
 
     def rest(self, seconds: float, now: float) -> None:
-        """Make no attempt for some seconds from ``now`` [s] on: a plan failed."""
+        """Make no attempt for ``seconds`` from ``now`` [s]: a plan failed."""
         self._resting_until = max(self._resting_until, now + seconds)
 
     def skip(self, now: float) -> None:
@@ -58,13 +57,13 @@ class SpareTime:
 
 @dataclass(frozen=True, slots=True)
 class Attempt:
-    """An attempt at a better path from one of its cells on.
+    """An attempt to improve the path from one of its cells on.
 
     Attributes:
-        numbering: of the path's cells, which ``index`` and ``joint`` count by.
-        index: where on it the robot is.
-        joint: index of that cell.
-        problem: that the rest of the path solves, the end of the one that is left.
+        numbering: numbering of the path's cells that ``index`` and ``joint`` refer to.
+        index: the robot's index on the path.
+        joint: index of the cell where the improved rest begins.
+        problem: the problem that the rest of the path solves.
     """
 
     numbering: int
@@ -76,8 +75,8 @@ class Attempt:
     def at(
         cls, path: PathProgress, numbering: int, orders: Sequencer, number: int
     ) -> Attempt | None:
-        """Return attempt ``number`` at a path; None where too little of it is left."""
-        # The next cells ahead of the robot stay as they are; a shorter rest is not worth a search.
+        """Return attempt ``number`` at a path; None if too little of it is left."""
+        # The next cells ahead of the robot stay fixed; a shorter rest is not worth a search.
         joint = path.index + HELD_CELLS
         if joint + HELD_CELLS > len(path.cells):
             return None
@@ -89,7 +88,7 @@ class Attempt:
         return cls(numbering, path.index, joint, problem)
 
     def joined(self, path: PathProgress, better: NDArray[np.int32]) -> NDArray[np.int32] | None:
-        """Return the cells ahead on a better path, int32 (n, 2); None if it saves too little."""
+        """Return the improved cells ahead, int32 (n, 2); None if they save too little."""
         if path.index > self.joint:
             return None
         ahead = better[path.index - self.index :]

@@ -1,4 +1,4 @@
-"""Trail layer: keeps the living trail up with map, paths and robot."""
+"""Trail layer: updates the living trail with maps, paths and driving."""
 
 from __future__ import annotations
 
@@ -19,17 +19,18 @@ from fasaco_edge.planners.problem import CoverageProblem
 
 
 class TrailLayer:
-    """Owns the trail; all that happens to map and route is passed on to it."""
+    """Owns the living trail and passes changes of map and route on to it."""
 
     def __init__(self, config: MissionConfig, map_state: MapState, route: Route) -> None:
         self._config = config
         self._map, self._route = map_state, route
         self._trail = LivingTrail(config.trail)
-        # The lattice that the trail follows.
+        # The lattice that the trail lies on.
         self._lattice: CoverageLattice | None = None
-        # The path that the robot was last seen on, and where on it.
+        # The path that the robot was last seen on, and its index there.
         self._path, self._index = NO_CELLS, 0
-        # The trail on a map that has moved since, until a pose tells where to.
+        # The trail before a motion of the map, until the first pose on the moved map shows the
+        # motion.
         self._before_motion: TrailSnapshot | None = None
 
     @property
@@ -43,25 +44,25 @@ class TrailLayer:
         return self._trail.snapshot()
 
     def posed(self, problem: CoverageProblem) -> CoverageProblem:
-        """Return a problem with the trail, where the planner's ants walk on it."""
+        """Return a problem with the trail, if the planner's ants start from it."""
         return replace(problem, trail=self.snapshot()) if self._config.plans_on_trail else problem
 
     def resume(self, before: TrailSnapshot) -> None:
-        """Go on with the trail from before a restart."""
+        """Continue with the trail from before a restart."""
         self._trail, self._lattice = LivingTrail(self._config.trail, before), None
 
     def begin_anew(self) -> None:
-        """Forget the trail: it is of another place."""
+        """Clear the trail: it belongs to another place."""
         self._trail, self._lattice = LivingTrail(self._config.trail), None
         self._before_motion = None
 
     def note_map_motion(self) -> None:
-        """Note that the newest map has moved; ``note_motion`` tells where to."""
+        """Note that the newest map has moved; ``note_motion`` tells how."""
         if self._before_motion is None:
             self._before_motion = self._trail.snapshot()
 
     def note_motion(self, motion: Motion | None) -> None:
-        """Take the trail to where the map has moved; None where it has not."""
+        """Move the trail with the map; None if the map has not moved."""
         before, self._before_motion = self._before_motion, None
         if before is None or motion is None or motion.is_still:
             return
@@ -73,7 +74,7 @@ class TrailLayer:
         )
 
     def note_drive(self) -> None:
-        """Let what the robot has driven of its path fade."""
+        """Fade the trail along the driven part of the path."""
         self._follow_map()
         path = self._route.path
         begun = self._index if path.cells is self._path else 0
@@ -82,7 +83,7 @@ class TrailLayer:
         self._path, self._index = path.cells, path.index
 
     def finish(self, update: PathUpdate | None) -> None:
-        """Follow what a step has decided: a planned path strengthens the trail."""
+        """Take in the result of a step: a planned path strengthens the trail."""
         self._follow_map()
         if update is not None and update.plan is not None:
             cells, cost = update.cells, self._config.cost
