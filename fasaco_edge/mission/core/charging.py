@@ -174,7 +174,7 @@ class Charging:
 
     @property
     def goes_on_at(self) -> float:
-        """The level at which it resumes: ``enough``, or less if the rest of the order needs less."""
+        """The level at which it resumes: ``enough``, or less if the rest needs less."""
         assert self.policy is not None
         policy, drain = self.policy, self.gauge.drain_per_s
         if drain is None or self._rest_s is None:
@@ -183,7 +183,7 @@ class Charging:
         return min(policy.enough, max(needed, policy.low + BETWEEN))
 
     def is_enough(self, now: float, *, docked: bool) -> bool:
-        """Tell whether the battery of a robot in its dock, or on its way there, is charged enough."""
+        """Tell whether the battery of a robot in its dock, or on its way there, suffices."""
         level = self.gauge.level
         if self.policy is None:
             return True  # the configuration has changed

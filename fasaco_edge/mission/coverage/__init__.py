@@ -1,1 +1,1 @@
-"""What has been covered, how far it is, and what stays uncovered."""
+"""Coverage: what has been covered, progress, and what stays uncovered."""

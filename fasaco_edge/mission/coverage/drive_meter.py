@@ -1,9 +1,9 @@
-"""Drive meter: how fast the robot drives, and what its turns take, as its poses show.
+"""Drive meter: the robot's speed and turn durations, measured from its poses.
 
-A turn takes what passes from ``BESIDE_S`` before it to as long after it, less what the way between
-would take at full speed: so braking and starting count, as in ``robot.quarter_turn_s``. Only turns
-with straight driving on both sides count, and no rate below ``TURNS_RAD_S``. Medians are reported:
-a robot that waits for somebody at a turn changes them little. Times are those of the poses' stamps.
+Turn duration = time from ``BESIDE_S`` before to ``BESIDE_S`` after the turn, minus the travel time
+of that distance at full speed: braking and starting count, as in ``robot.quarter_turn_s``. Only
+turns between two straight stretches count, and no rate below ``TURNS_RAD_S``. Medians are reported,
+so a robot that waits at a turn changes them little. Times are those of the poses' stamps.
 """
 
 from __future__ import annotations
@@ -17,32 +17,32 @@ from typing import NamedTuple
 
 from fasaco_edge.grid.geometry import StampedPose
 
-# Straight driving before and behind a turn that shows what the turn takes [s].
+# Straight driving required before and after a turn [s].
 BESIDE_S = 1.5
-# From this rate on the robot turns [rad/s], measured over so long [s]: headings scatter.
+# Threshold of the turning rate [rad/s], measured over this time, as headings are noisy [s].
 TURNS_RAD_S, OVER_S = 0.12, 0.5
-# Poses further apart than this show nothing of what was between, nearer ones no more [s].
+# A larger gap between poses breaks the track; poses closer in time are ignored [s].
 GAP_S, LEAST_S = 1.0, 0.05
-# Poses are kept for so long [s]: who takes longer to turn waits, or is lost.
+# Poses are kept for this long [s]: a robot that takes longer to turn is waiting, or lost.
 KEPT_S = 40.0
-# Straight driving is even: a pose may be off by this share of the way of ``BESIDE_S``. The poses of
-# a robot that stands scatter, and lead nowhere.
+# Greatest deviation from straight driving at constant speed, as a share of the distance of
+# ``BESIDE_S``. The poses of a standing robot are noise and exceed it.
 UNEVEN = 0.2
-# What counts as a quarter-turn and as a half turn [rad].
+# Ranges of a quarter-turn and of a half turn [rad].
 QUARTER = math.radians(70.0), math.radians(110.0)
 HALF = math.radians(150.0), math.radians(180.0)
-# So many of the last ones count, and no fewer than these.
+# Medians are over the NEWEST values; at least FEWEST are needed.
 NEWEST, FEWEST = 31, 5
 
 
 @dataclass(frozen=True, slots=True)
 class DriveTimes:
-    """What driving takes the robot; None of what too little was seen.
+    """Measured drive times; None before enough was measured.
 
     Attributes:
-        speed_m_s: in straight driving [m/s].
-        quarter_turn_s, half_turn_s: turns on the spot, braking and starting included [s].
-        turns: how many turns were measured.
+        speed_m_s: speed in straight driving [m/s].
+        quarter_turn_s, half_turn_s: duration of turns on the spot, with braking and starting [s].
+        turns: number of turns measured.
     """
 
     speed_m_s: float | None = None
@@ -52,7 +52,7 @@ class DriveTimes:
 
 
 class _Seen(NamedTuple):
-    """A pose at a time [s], and whether the robot was turning."""
+    """A pose with its time [s], and whether the robot was turning."""
 
     at: float
     x: float
@@ -62,7 +62,7 @@ class _Seen(NamedTuple):
 
 
 class DriveMeter:
-    """Measures on the newest poses."""
+    """Measures speed and turns from the newest poses."""
 
     def __init__(self) -> None:
         self._seen: deque[_Seen] = deque()
@@ -70,26 +70,26 @@ class DriveMeter:
         self._quarters: deque[float] = deque(maxlen=NEWEST)
         self._halves: deque[float] = deque(maxlen=NEWEST)
         self._turns = 0
-        # Up to when was measured [s].
+        # Time up to which the poses have been measured [s].
         self._measured_until = -math.inf
 
     @property
     def times(self) -> DriveTimes:
-        """What was measured so far."""
+        """The medians so far."""
         return DriveTimes(
             _median(self._speeds), _median(self._quarters), _median(self._halves), self._turns
         )
 
     def break_track(self) -> None:
-        """Note that the way of the robot to its next pose is unknown."""
+        """Note that the robot's track to its next pose is unknown."""
         self._seen.clear()
         self._measured_until = -math.inf
 
     def note(self, stamped: StampedPose) -> None:
-        """Take in the next pose; one whose stamp is not a little newer shows nothing."""
+        """Take in the next pose; one that is hardly newer is ignored."""
         at, pose, seen = stamped.stamp_ns * 1e-9, stamped.pose, self._seen
         if seen and 0.0 <= at - seen[-1].at < LEAST_S:
-            return  # with each map the newest pose comes again
+            return  # the newest pose is repeated with each map
         if seen and not 0.0 < at - seen[-1].at <= GAP_S:
             self.break_track()
         before = next((old for old in reversed(seen) if at - old.at >= OVER_S), None)
@@ -102,7 +102,7 @@ class DriveMeter:
             self._measure(list(seen))
 
     def _measure(self, seen: list[_Seen]) -> None:
-        """Measure the last turn, or a piece without one, once enough straight driving follows."""
+        """Measure the last turn or straight stretch, once enough straight driving follows."""
         after = _before(seen, len(seen) - 1, BESIDE_S)
         if after is None or any(old.turns for old in seen[after + 1 :]):
             return
@@ -114,7 +114,7 @@ class DriveMeter:
             self._measure_speed(seen, after)
 
     def _measure_speed(self, seen: list[_Seen], after: int) -> None:
-        """Measure straight driving: so long after the last turn, and before the next one."""
+        """Measure the speed of a straight stretch that is far enough from both turns."""
         middle = _before(seen, after, BESIDE_S)
         if middle is None or seen[middle].at < self._measured_until:
             return
@@ -146,13 +146,13 @@ class DriveMeter:
 
 
 def _before(seen: list[_Seen], index: int, seconds: float) -> int | None:
-    """Return the last pose that is so much older than another one; None where none is."""
+    """Return the last pose at least ``seconds`` older than pose ``index``; None if none is."""
     at = seen[index].at - seconds
     return next((i for i in range(index - 1, -1, -1) if seen[i].at <= at), None)
 
 
 def _is_even(seen: list[_Seen]) -> bool:
-    """Tell whether poses lie where a robot is that drives straight at one speed."""
+    """Tell whether poses fit straight driving at constant speed."""
     a, b = seen[0], seen[-1]
     most_m, way_s = UNEVEN * _apart(a, b), b.at - a.at
     return all(
@@ -166,7 +166,7 @@ def _is_even(seen: list[_Seen]) -> bool:
 
 
 def _apart(a: _Seen, b: _Seen) -> float:
-    # Straight: along all poses between, their scatter would add up.
+    # Straight distance: along all poses their noise would add up.
     return math.hypot(b.x - a.x, b.y - a.y)
 
 

@@ -1,4 +1,4 @@
-"""Tiles of floor: a bit for each pixel, and how other rasters look them up.
+"""Tiles of floor: one bit per pixel, and lookup from other rasters.
 
 The pixels lie fixed in the map frame, whatever a map's origin, yaw and resolution: pixel (row, col)
 begins at y = row * PIXEL_M, x = col * PIXEL_M.
@@ -18,32 +18,33 @@ from numpy.typing import NDArray
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D, Window
 from fasaco_edge.grid.occupancy import OccupancyGrid
 
-# Edge of a pixel [m]: what a tool leaves at a wall is a few of them.
+# Edge of a pixel [m]: the strip that a tool leaves along a wall is a few pixels wide.
 PIXEL_M = 0.025
 # Edge of a tile [pixels]: 3.2 m; a multiple of 8.
 FLOOR_TILE = 128
 # Bytes in a row of a tile.
 ROW_BYTES = FLOOR_TILE // 8
 
-# A centre of another raster that is so near to the border of two pixels lies on the farther one:
-# which it is must not depend on the window that is looked at [pixels].
+# A centre of another raster this close to the border of two pixels is assigned to the farther one,
+# so that the result does not depend on the queried window [pixels].
 TIE = 1e-6
 
-# Edges of the squares in which floor is shown [pixels]: whole bytes, and parts of a tile.
+# Edges of the squares in which swept floor is published [pixels]: whole bytes, and fractions of a
+# tile.
 SQUARES = (1, 8, 16, 32, 64, FLOOR_TILE)
 
 _BITS = np.array([bin(byte).count("1") for byte in range(256)], np.uint8)
 
 Place = tuple[int, int]
-"""Of a tile: (i, j) has the pixels from (FLOOR_TILE * i, FLOOR_TILE * j) on."""
+"""Index of a tile: (i, j) begins at pixel (FLOOR_TILE * i, FLOOR_TILE * j)."""
 Bits = NDArray[np.uint8]
-"""Eight pixels of a row each, the first in the highest bit; a tile is (FLOOR_TILE, ROW_BYTES)."""
+"""Eight pixels of a row per byte, the first highest; a tile is (FLOOR_TILE, ROW_BYTES)."""
 Tiles = Mapping[Place, Bits]
 Mask = NDArray[np.bool_]
 
 
 class Similarity(NamedTuple):
-    """Where the pixels of another raster lie on this one [pixels].
+    """Placement of another raster's pixels on this one [pixels].
 
     The centre of pixel (row, col) lies at column ``col0 + right * (col + 0.5) - up * (row + 0.5)``
     and at row ``row0 + up * (col + 0.5) + right * (row + 0.5)``.
@@ -56,17 +57,17 @@ class Similarity(NamedTuple):
 
     @classmethod
     def of(cls, geometry: GridGeometry) -> Similarity:
-        """Return where the pixels of a grid lie."""
+        """Return the placement of a grid's pixels."""
         origin, scale = geometry.origin, geometry.resolution / PIXEL_M
         right, up = scale * math.cos(origin.yaw), scale * math.sin(origin.yaw)
         return cls(origin.y / PIXEL_M, origin.x / PIXEL_M, right, up)
 
     def bounds(self, window: Window) -> Window:
-        """Return the pixels of this raster that those of ``window`` lie on."""
+        """Return the window of this raster that contains ``window`` of the other."""
         corners = [(r, c) for r in (window.row0, window.row1) for c in (window.col0, window.col1)]
         rows = [self.row0 + self.up * col + self.right * row for row, col in corners]
         cols = [self.col0 + self.right * col - self.up * row for row, col in corners]
-        # One beyond: a centre's position is rounded.
+        # One pixel of margin: a centre's position is rounded.
         low, high = (min(rows), min(cols)), (max(rows), max(cols))
         return Window(
             *(math.floor(least) - 1 for least in low), *(math.floor(most) + 2 for most in high)
@@ -74,7 +75,7 @@ class Similarity(NamedTuple):
 
 
 def pixels_under(window: Window, geometry: GridGeometry) -> Window:
-    """Return the pixels of a grid whose centres may lie in a window of floor, also beyond it."""
+    """Return a window of a grid that contains all its centres in a window of floor."""
     rows, cols = (window.row0, window.row1), (window.col0, window.col1)
     corners = [geometry.to_pixels(col * PIXEL_M, row * PIXEL_M) for row in rows for col in cols]
     x, y = zip(*corners, strict=True)
@@ -85,11 +86,11 @@ def pixels_under(window: Window, geometry: GridGeometry) -> Window:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FloorSnapshot:
-    """The swept floor at a moment; shares nothing that will change.
+    """An immutable copy of the swept floor.
 
     Attributes:
-        tiles: those with a swept pixel, read-only.
-        changes: goes up with each change of what is swept.
+        tiles: the tiles with a swept pixel, read-only.
+        changes: counter, incremented with each change.
     """
 
     tiles: Tiles = field(default_factory=lambda: MappingProxyType({}))
@@ -97,12 +98,12 @@ class FloorSnapshot:
 
     @property
     def pixels(self) -> int:
-        """How many pixels were swept."""
+        """Number of swept pixels."""
         return sum(count_bits(tile) for tile in self.tiles.values())
 
     @property
     def swept_m2(self) -> float:
-        """How much floor was swept [m2]."""
+        """Area of the swept floor [m2]."""
         return self.pixels * PIXEL_M * PIXEL_M
 
     def swept_in(self, window: Window) -> Mask:
@@ -110,10 +111,10 @@ class FloorSnapshot:
         return swept_in(self.tiles, window)
 
     def shown(self, most: int, frame: str, stamp_ns: int) -> OccupancyGrid | None:
-        """Return how much of each square is swept, in percent, rounded down, as a grid.
+        """Return the swept share of each square as a grid, in percent, rounded down.
 
-        The squares are pixels, or as much larger as it takes to have no more than ``most`` of
-        them. None where the widest are still too many.
+        The squares are pixels, or the smallest ones that give at most ``most`` squares. None if
+        even the largest are too many.
         """
         rows, cols = zip(*(self.tiles or ((0, 0),)), strict=True)
         low, high = (min(rows), min(cols)), (max(rows) + 1, max(cols) + 1)
@@ -136,7 +137,7 @@ NO_FLOOR = FloorSnapshot()
 
 
 def _percent(tiles: Tiles, side: int) -> Iterator[tuple[Place, NDArray[np.int8]]]:
-    """Yield how much of each square of a tile is marked [%], int8 (n, n)."""
+    """Yield the marked share of each square of each tile [%], int8 (n, n)."""
     edge = FLOOR_TILE // side
     for place, tile in tiles.items():
         if side == 1:
@@ -149,12 +150,12 @@ def _percent(tiles: Tiles, side: int) -> Iterator[tuple[Place, NDArray[np.int8]]
 
 
 def count_bits(bits: Bits) -> int:
-    """Return how many pixels are marked."""
+    """Return the number of marked pixels."""
     return int.from_bytes(bits.tobytes()).bit_count()
 
 
 def window_of(place: Place) -> Window:
-    """Return the pixels of a tile."""
+    """Return the window of pixels of a tile."""
     row, col = FLOOR_TILE * place[0], FLOOR_TILE * place[1]
     return Window(row, col, row + FLOOR_TILE, col + FLOOR_TILE)
 
@@ -181,12 +182,12 @@ def swept_in(tiles: Tiles, window: Window) -> Mask:
 
 
 def swept_on(swept_in: Callable[[Window], Mask], place: Similarity, window: Window) -> Mask:
-    """Return which pixels of another raster have a marked centre, bool (rows, cols).
+    """Return which pixels of another raster have their centre on a marked pixel, bool (rows, cols).
 
     Args:
         swept_in: returns which pixels of a window are marked.
-        place: where that raster lies.
-        window: of its pixels.
+        place: placement of the other raster.
+        window: window of its pixels.
     """
     under = place.bounds(window)
     swept = swept_in(under)
@@ -194,7 +195,7 @@ def swept_on(swept_in: Callable[[Window], Mask], place: Similarity, window: Wind
         return np.zeros((window.rows, window.cols), np.bool_)
     rows = (np.arange(window.row0, window.row1) + 0.5)[:, np.newaxis]
     cols = np.arange(window.col0, window.col1) + 0.5
-    # From the corner of ``under`` on all is above 0, and cut off where it is rounded down.
+    # Relative to the corner of ``under`` all is positive, so truncation rounds down.
     row0, col0, right, up = place
     i = ((right * rows + (row0 - under.row0 + TIE)) + up * cols).astype(np.int32)
     j = (((col0 - under.col0 + TIE) - up * rows) + right * cols).astype(np.int32)

@@ -1,4 +1,4 @@
-"""Coverage ledger: which cells the tool has passed over, by cell and never by path index."""
+"""Coverage ledger: the visits of the tool to each cell, independent of any path."""
 
 from __future__ import annotations
 
@@ -17,21 +17,21 @@ from fasaco_edge.mission.coverage.shared_tiles import SharedTiles
 from fasaco_edge.planners.living_trail import NO_TRAIL, TrailSnapshot
 
 if TYPE_CHECKING:
-    # For types only: a daemon reads its ledger before it has loaded the kernels.
+    # For types only: a daemon reads its ledger before the kernels are loaded.
     from fasaco_edge.grid.lattice import Cell
 
-# Two poses further apart than this many cells are a jump, not a drive: what lay under the tool in
-# between is unknown.
+# Two poses farther apart than this many cells are a jump: what was under the tool in between is
+# unknown.
 JUMP_CELLS = 2.0
 
 TILE = 64
-# Cells are looked up together in squares of so many tiles by so many.
+# Lookups go by districts of DISTRICT x DISTRICT tiles.
 DISTRICT = 16
 
-# The most tiles a ledger holds, 8 million cells, more than any path: each takes 8 kB, and as much
-# again in the copy that was written last. ``protocol/limits.yaml`` has the same number.
+# Limit on the tiles of a ledger, 8 million cells, more than any path: each takes 8 kB, and as much
+# again in the copy last written. ``protocol/limits.yaml`` has the same number.
 MOST_TILES = 2048
-# Beyond that the farthest are dropped, this many at once.
+# At the limit this many are dropped at once, the farthest first.
 DROPPED_TILES = MOST_TILES // 16
 
 Tiles = Mapping["Cell", NDArray[np.uint16]]
@@ -41,23 +41,23 @@ Cells = NDArray[np.int64]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LedgerSnapshot:
-    """What a ledger held at a moment; shares nothing that will change.
+    """An immutable copy of a ledger.
 
-    With all of a mission that outlives a restart: the swept floor, the order, and the trail.
+    It holds everything of a mission that is kept over a restart: also swept floor, order and trail.
 
     Attributes:
         cell_m: edge of a cell [m].
-        frame: name of the frame the cells lie in; "" as long as none is known.
-        total: all visits.
+        frame: name of the cells' frame; "" while unknown.
+        total: number of all visits.
         tiles: the visits, uint16 (TILE, TILE), read-only; tile (i, j) has the cells from
             (TILE * i, TILE * j) on.
-        under_tool: the cells that lay under the tool: still there, it does not visit them again.
-        floor: what of the floor was swept, pixel by pixel.
-        note: the order and how far it is, as JSON, see ``orders.order_state``; "" for none.
-        trail: the pheromone.
-        fleet: what other robots have swept, see ``fleet.shared``; b"" for nothing.
-        lattice_deg: the angle of the cells' rows to the x axis of the map frame [deg]. Cells, floor
-            and trail lie along them, about the frame's origin; the order is of the map frame.
+        under_tool: cells under the tool at that moment; staying there adds no visit.
+        floor: the swept floor.
+        note: order and progress as JSON, see ``orders.order_state``; "" for none.
+        trail: the living trail.
+        fleet: cells swept by other robots, see ``fleet.shared``; b"" for none.
+        lattice_deg: angle of the cells' rows to the x axis of the map frame [deg], about its
+            origin. Cells, floor and trail are in the rotated frame; the order is in the map frame.
     """
 
     cell_m: float
@@ -73,7 +73,7 @@ class LedgerSnapshot:
 
     @property
     def cells(self) -> int:
-        """How many cells were visited."""
+        """Number of visited cells."""
         return sum(int(np.count_nonzero(tile)) for tile in self.tiles.values())
 
     @property
@@ -89,11 +89,10 @@ class LedgerSnapshot:
 class CoverageLedger:
     """Visits of the tool to each cell.
 
-    A cell is visited when the tool, a disc as wide as a cell, passes over its
-    centre. Coming back after having left counts as another visit; ``total`` counts
-    all of them. ``frame`` names the frame of the poses, "" as long as none is known.
-    ``dropped`` counts the tiles that were dropped to hold no more than ``MOST_TILES``: those
-    farthest from the robot at that moment.
+    A cell is visited when the tool, a disc as wide as a cell, passes over its centre. Coming back
+    after having left counts as another visit; ``total`` counts all visits. ``frame`` names the
+    frame of the poses, "" while unknown. ``dropped`` counts the tiles dropped at the limit
+    ``MOST_TILES``: those farthest from the robot at that moment.
     """
 
     def __init__(self, cell_m: float, frame: str = "") -> None:
@@ -107,7 +106,7 @@ class CoverageLedger:
 
     @classmethod
     def restored(cls, snapshot: LedgerSnapshot) -> Self:
-        """Return the ledger as it was, without the last pose: the way from it is unknown."""
+        """Return a restored ledger, without the last pose: the track since then is unknown."""
         ledger = cls(snapshot.cell_m, snapshot.frame)
         ledger.total = snapshot.total
         ledger._tiles.update(snapshot.tiles)
@@ -115,23 +114,23 @@ class CoverageLedger:
         return ledger
 
     def snapshot(self) -> LedgerSnapshot:
-        """Return what it holds now; a tile is copied once it changes."""
+        """Return a copy; tiles are copied on write."""
         tiles = self._tiles.snapshot()
         return LedgerSnapshot(self._cell_m, self.frame, self.total, tiles, self._under_tool)
 
     def move_to(self, frame: str) -> None:
-        """Take the cells to lie in ``frame`` from now on."""
+        """Assign the cells to ``frame`` from now on."""
         self.frame = frame
 
     def record(
         self, pose: Pose2D, place_of: Callable[[Cell], Point | None] | None = None
     ) -> frozenset[Cell]:
-        """Note that the robot drove on to ``pose``; return the cells newly visited.
+        """Record driving to ``pose``; return the newly visited cells.
 
         Args:
-            pose: where it is.
-            place_of: returns the place of a cell, x, y [m], that the tool has to pass over; None
-                where there is none. By default that is the cell's centre.
+            pose: the robot's pose.
+            place_of: returns the point of a cell, x, y [m], that the tool has to pass over; None
+                for none. By default the cell's centre.
         """
         last = self._last or pose
         if math.hypot(pose.x - last.x, pose.y - last.y) > JUMP_CELLS * self._cell_m:
@@ -145,20 +144,19 @@ class CoverageLedger:
         return entered
 
     def break_track(self) -> None:
-        """Note that the robot's way to its next pose is unknown."""
+        """Note that the robot's track to its next pose is unknown."""
         self._last = None
 
     def lift_tool(self) -> None:
-        """Note that the map moved under the robot: what lies under the tool is unknown, too."""
+        """Note that the map moved under the robot: the cells under the tool are unknown, too."""
         self.break_track()
         self._under_tool = frozenset()
 
     def forget(self, inside: Callable[[Cells, Cells], NDArray[np.bool_]]) -> None:
-        """Forget all visits to some cells, but the one to what lies under the tool now.
+        """Forget all visits to some cells, except the one to the cells under the tool now.
 
         Args:
-            inside: returns which of some cells, by their rows and columns, int64 (n,) both, bool
-                (n,). They lie near each other.
+            inside: mask function: rows and columns of nearby cells, int64 (n,) both, to bool (n,).
         """
         for places in self._districts():
             visited = [np.argwhere(self._tiles[place]) for place in places]
@@ -175,7 +173,7 @@ class CoverageLedger:
                 self._visit(cell)
 
     def _districts(self) -> list[list[Cell]]:
-        """Return the tiles, those near each other together."""
+        """Return the tiles, grouped by district."""
         found: dict[Cell, list[Cell]] = {}
         for row, col in self._tiles:
             found.setdefault((row // DISTRICT, col // DISTRICT), []).append((row, col))
@@ -192,7 +190,7 @@ class CoverageLedger:
         return tile is not None and bool(tile[row % TILE, col % TILE])
 
     def credit(self, cell: Cell) -> None:
-        """Count a visit to a cell whose floor is swept, though the robot did not come to it."""
+        """Count a visit to a cell whose floor is swept, though the robot missed its point."""
         self._visit(cell)
 
     def _visit(self, cell: Cell) -> None:
@@ -209,7 +207,7 @@ class CoverageLedger:
     def _near(
         self, start: Pose2D, end: Pose2D, place_of: Callable[[Cell], Point | None]
     ) -> dict[Cell, Point]:
-        """Return the cells that reach within half a cell of the segment, with their places."""
+        """Return the cells that reach within half a cell of the segment, with their points."""
         cell_m, half = self._cell_m, 0.5 * self._cell_m
         rows = _span(min(start.y, end.y) - half, max(start.y, end.y) + half, cell_m)
         cols = _span(min(start.x, end.x) - half, max(start.x, end.x) + half, cell_m)
@@ -222,7 +220,7 @@ class CoverageLedger:
         return near
 
     def _swept(self, start: Pose2D, end: Pose2D, near: dict[Cell, Point]) -> frozenset[Cell]:
-        """Return the cells, of those near, whose place is within half a cell of the segment."""
+        """Return those of ``near`` whose point is within half a cell of the segment."""
         half = 0.5 * self._cell_m
         dx, dy = end.x - start.x, end.y - start.y
         length2 = dx * dx + dy * dy
@@ -239,7 +237,7 @@ def _visits(tiles: Tiles, window: Window) -> NDArray[np.uint16]:
     result = np.zeros((window.rows, window.cols), np.uint16)
     rows = range(window.row0 // TILE, -(-window.row1 // TILE))
     cols = range(window.col0 // TILE, -(-window.col1 // TILE))
-    # Of a window far wider than what is covered, only the tiles that there are.
+    # For a window far larger than what is covered, iterate over the tiles instead.
     many = len(rows) * len(cols) > len(tiles)
     for tile_row, tile_col in tiles if many else product(rows, cols):
         row, col = tile_row * TILE, tile_col * TILE

@@ -1,24 +1,22 @@
-"""Mission ledger: the covered cells and the swept floor, as long as no map contradicts them.
+"""Mission ledger: the covered cells and swept floor, while no map contradicts them.
 
-A ledger from before a restart may be of another building than the map now shows. A map of
-another building knows nothing of the ledger: its obstacles lie on covered cells as often as
-anywhere around them. In the same building they hardly ever do. So of the covered cells that the
-map knows, those blocked are counted, and compared with how many would be by chance: by the share
-of blocked cells among the others that the map knows around them. The ledger is of another
-building if there are more than OTHER_FROM times as many, and not so few that some new furniture
-explains them; or if MANY_BLOCKED of the known ones are blocked, whatever is around.
+A ledger from before a restart may belong to another building than the map now shows. On the map of
+another building, obstacles are as frequent on covered cells as around them; in the same building
+they are rare there. So the number of blocked covered cells is compared with the number expected by
+chance: the obstacle density among the other known cells around them. Above ``OTHER_FROM`` times
+that, and too many to be new furniture, the ledger belongs to another building; also if
+``MANY_BLOCKED`` of the known covered cells are blocked, whatever is around them.
 
-Unknown is no contradiction, nor is what lies outside of the map: a mapper that was restarted has
-seen next to nothing. Until a map knows enough to decide, the ledger holds, and the next map is
-compared; a map that knows half of the covered cells and does not contradict has confirmed them
-for good.
+Unknown cells, and cells outside of the map, are no contradiction: a restarted mapper has seen next
+to nothing. Until a map knows enough to decide, the ledger holds, and the next map is compared; a
+map that knows half of the covered cells without contradiction confirms them for good.
 
-Measured on 13 buildings, 10 to 100 % of them covered, all robots starting at the same place of
-the frame. Taken for another building: of the complete maps of another one 66 % (of the rest
-most overlap too little), of single scans there of 3.5 m and 8 m 32 % and 47 % at once, more
-as the map grows. Of the same building none, also with the map moved by 0.1 m; moved by
-0.22 m and a degree 2 %; with obstacles on 3 and 10 % of what is covered none and 8 %. Moved by
-more than a cell, the ledger is as wrong as in another building, and may be judged so.
+Measured on 13 buildings, 10 to 100 % of them covered, all robots starting at the same place of the
+frame. Rejected by complete maps of another building: 66 % (most of the rest overlap too little); by
+single scans there of 3.5 m and 8 m: 32 % and 47 % at once, more as the map grows. Rejected by maps
+of the same building: none, also with the map moved by 0.1 m; moved by 0.22 m and a degree 2 %; with
+obstacles on 3 and 10 % of the covered cells none and 8 %. Moved by more than a cell, the ledger is
+as wrong as in another building, and may be rejected.
 """
 
 from __future__ import annotations
@@ -52,20 +50,20 @@ from fasaco_edge.mission.map.loop_closure import Motion, certain_floor, uncertai
 
 PlaceOf = Callable[[Cell], Point | None]
 
-# Unless this many covered cells are blocked, or would be by chance, nothing is decided.
+# Nothing is decided unless this many covered cells are blocked, or expected to be by chance.
 LEAST_CELLS = 10
-# Times as often as by chance: up to the first the ledger is of this building, beyond the
-# second it is of another; in between the next map may tell.
+# Ratio of blocked covered cells to those expected by chance: up to the first the ledger belongs
+# to this building, above the second to another; in between the next map decides.
 SAME_UP_TO, OTHER_FROM = 0.3, 0.6
-# Share of the known covered cells: with fewer blocked it may be this building still, with
-# more it cannot be.
+# Share of blocked among the known covered cells: below the first it may be this building, above the
+# second it cannot be.
 LEAST_BLOCKED, MANY_BLOCKED = 0.05, 1 / 3
-# How far around the covered cells the map is compared [cells]: to the walls beside them.
+# Margin around the covered cells in which the map is compared [cells]: includes the walls.
 AROUND_CELLS = 2
 
 
 class Verdict(Enum):
-    """What a map says about a ledger."""
+    """Result of comparing a ledger with a map."""
 
     SAME = auto()
     OTHER = auto()
@@ -74,13 +72,13 @@ class Verdict(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Fit:
-    """How the covered cells lie on a map.
+    """Counts of covered cells on a map.
 
     Attributes:
-        covered: covered cells in all.
-        known: those that the map knows, blocked or coverable.
-        blocked: those of them that are blocked.
-        chance: share of blocked cells among those not covered that it knows around them.
+        covered: number of covered cells.
+        known: number of those that the map knows, blocked or coverable.
+        blocked: number of those that are blocked.
+        chance: share of blocked cells among the known ones around that are not covered.
     """
 
     covered: int
@@ -108,7 +106,7 @@ class Fit:
 
     @property
     def verdict(self) -> Verdict:
-        """What follows from it."""
+        """The verdict from these counts."""
         expected = self.chance * self.known
         if self.blocked >= max(LEAST_CELLS, MANY_BLOCKED * self.known):
             return Verdict.OTHER
@@ -126,13 +124,13 @@ def _near(indices: NDArray[np.intp]) -> slice:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Covered:
-    """What one drive has covered: cells and floor."""
+    """What has been covered since one starting point: cells and floor."""
 
     cells: CoverageLedger
     floor: SweptFloor
 
     def record(self, pose: Pose2D, place_of: PlaceOf | None) -> LedgerFullError | None:
-        """Note that the robot drove on to ``pose``; return a fault where tiles were dropped."""
+        """Record driving to ``pose``; return a fault if tiles were dropped."""
         cells, floor = self.cells, self.floor
         before = cells.dropped, floor.dropped
         cells.record(pose, place_of)
@@ -156,47 +154,47 @@ def _full(most: int, size: str, dropped: int) -> LedgerFullError:
 
 
 class MissionLedger:
-    """Keeps the ledger; one from before a restart only as long as no map contradicts it.
+    """Owns the ledger; one from before a restart holds until a map contradicts it.
 
     Attributes:
-        first_plan_reason: why the first plan is wanted.
-        shared: which cells other robots have swept.
+        first_plan_reason: reason of the first plan.
+        shared: cells swept by other robots.
     """
 
     def __init__(self, cell_m: float, tool_m: float) -> None:
-        """Begin with nothing; ``cell_m``: edge of a cell, ``tool_m``: width of the tool [m]."""
+        """Start empty; ``cell_m``: edge of a cell, ``tool_m``: width of the tool [m]."""
         self._cell_m, self._tool_m = cell_m, tool_m
         self._covered = self._nothing("")
         self.first_plan_reason = "first plan"
         self.shared = SharedProgress()
-        # A ledger from before a restart that no map has confirmed yet, and what was covered since:
-        # that is true in any building.
+        # The ledger from before a restart while no map has confirmed it, and what was covered
+        # since, which is true in any building.
         self._resumed: tuple[LedgerSnapshot, _Covered] | None = None
-        # The robot's last pose on a map that has moved since.
+        # The robot's last pose before the map moved.
         self._pose_before_motion: Pose2D | None = None
 
     @property
     def current(self) -> CoverageLedger:
-        """Which cells are covered."""
+        """The covered cells."""
         return self._covered.cells
 
     @property
     def version(self) -> tuple[int, int]:
-        """Another one whenever more cells are covered."""
+        """Changes whenever more cells are covered."""
         return self.current.total, self.shared.version
 
     def visits(self, window: Window) -> NDArray[np.uint16]:
-        """Return the visits to cells, uint16 (rows, cols); one where another robot swept alone."""
+        """Return the visits to cells, uint16 (rows, cols); 1 where only another robot swept."""
         own = self.current.visits(window)
         return np.maximum(own, self.shared.swept(window)) if self.shared.version else own
 
     @property
     def floor(self) -> SweptFloor:
-        """Which floor is swept."""
+        """The swept floor."""
         return self._covered.floor
 
     def snapshot(self) -> LedgerSnapshot:
-        """Return what is covered now."""
+        """Return a copy of the present coverage."""
         return replace(self._covered.snapshot(), fleet=self.shared.encode())
 
     @property
@@ -208,11 +206,11 @@ class MissionLedger:
 
     @property
     def is_confirmed(self) -> bool:
-        """Whether no map may contradict it any more."""
+        """Whether no map can contradict it any more."""
         return self._resumed is None
 
     def resume(self, before: LedgerSnapshot, *, is_confirmed: bool = False) -> None:
-        """Go on with the ledger from before a restart; ``is_confirmed``: see the property."""
+        """Continue the ledger from before a restart; ``is_confirmed``: see the property."""
         self._resumed = None if is_confirmed else (before, self._nothing(""))
         floor = SweptFloor.restored(before.floor, self._tool_m)
         self._covered = _Covered(CoverageLedger.restored(before), floor)
@@ -221,7 +219,7 @@ class MissionLedger:
             self.first_plan_reason = f"first plan, {cells} cells were covered before"
 
     def record(self, pose: Pose2D, place_of: PlaceOf | None = None) -> LedgerFullError | None:
-        """Note that the robot drove on to ``pose``; return a fault where tiles were dropped.
+        """Record driving to ``pose``; return a fault if tiles were dropped.
 
         ``place_of``: see ``CoverageLedger.record``.
         """
@@ -229,30 +227,30 @@ class MissionLedger:
         return faults[0]
 
     def credit(self, cell: Cell) -> None:
-        """Count a visit to a cell whose floor is swept, though the robot did not come to it."""
+        """Count a visit to a cell whose floor is swept, though the robot missed its point."""
         for covered in self._all:
             covered.cells.credit(cell)
 
     def break_track(self) -> None:
-        """Note that the robot's way to its next pose is unknown."""
+        """Note that the robot's track to its next pose is unknown."""
         for covered in self._all:
             covered.cells.break_track()
             covered.floor.break_track()
 
     def note_map_motion(self, pose: Pose2D) -> None:
-        """Note that the map has moved under a robot at ``pose``; the next pose tells where to."""
+        """Note that the map has moved under a robot at ``pose``; the next pose shows how."""
         self._pose_before_motion = pose
         for covered in self._all:
             covered.cells.lift_tool()
             covered.floor.break_track()
 
     def map_motion(self, pose: Pose2D) -> Motion | None:
-        """Return how the map moved, as the first pose after that tells; None where it did not."""
+        """Return the map's motion, from the first pose after it; None if it did not move."""
         start = self._pose_before_motion
         return None if start is None else Motion(start, pose)
 
     def forget_uncertain(self, pose: Pose2D) -> int:
-        """Forget what is uncertain after a motion of the map; return how many cells that are."""
+        """Forget what is uncertain after a motion of the map; return the number of such cells."""
         motion, self._pose_before_motion = self.map_motion(pose), None
         if motion is None or motion.is_still:
             return 0
@@ -261,17 +259,17 @@ class MissionLedger:
         for covered in self._all:
             covered.cells.forget(cells)
             covered.floor.leave(floor)
-        # Where others were is as uncertain: they know it on maps of their own.
+        # Other robots' cells are as uncertain here: they track them on maps of their own.
         self.shared.disregard(uncertain_cells(self.shared.snapshot(self._cell_m), motion))
         self.shared.note_forgotten()
         return before.cells - self.current.snapshot().cells
 
     def forget(self, inside: Callable[[Window, float], NDArray[np.bool_]]) -> None:
-        """Forget some cells and the floor there, but what lies under the tool now.
+        """Forget some cells and their floor, except under the tool now.
 
         Args:
-            inside: returns for a window, and the edge [m] of the squares it is of, which of these
-                have their centre inside, bool (rows, cols).
+            inside: mask function: a window and the edge of its squares [m], to which squares have
+                their centre inside, bool (rows, cols).
         """
 
         def cells_inside(rows: Cells, cols: Cells) -> NDArray[np.bool_]:
@@ -286,7 +284,7 @@ class MissionLedger:
         self.shared.note_forgotten()
 
     def move_to(self, frame: str) -> LedgerMismatchError | None:
-        """Move to ``frame``; start over, and report it, if another holds covered cells."""
+        """Move to ``frame``; start over and report it if the ledger has cells in another frame."""
         was = self.current.frame
         if was in ("", frame):
             self.current.move_to(frame)
@@ -307,7 +305,7 @@ class MissionLedger:
         self.first_plan_reason = "first plan"
 
     def check(self, lattice: CoverageLattice, frame: str) -> LedgerMismatchError | None:
-        """Start over, and report it, where a map shows the ledger to be of another building."""
+        """Start over and report it if a map shows that the ledger belongs to another building."""
         if self._resumed is None:
             return None
         before, since = self._resumed

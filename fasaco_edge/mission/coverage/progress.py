@@ -17,21 +17,20 @@ from fasaco_edge.mission.map.reachable_area import ReachableArea
 from fasaco_edge.mission.orders.order_state import OrderState, Stage
 from fasaco_edge.mission.orders.zones import counts_in
 
-# The robot is looked for this many cells ahead on its path; further on, the
-# path may come back to the same cell for another reason.
+# The robot is searched for this many cells ahead; farther on the path may revisit the same cell.
 LOOK_AHEAD = 16
 FAR_CELLS = 4
 
 
 @dataclass(frozen=True, slots=True)
 class Coverage:
-    """Counts of cells; ``coverable`` counts what the robot can reach.
+    """Counts of cells.
 
     Attributes:
-        coverable: cells that are coverable and reachable.
+        coverable: coverable and reachable cells.
         covered: those of them that the tool has passed over.
         recovered: those it has passed over at least twice.
-        unreachable: cells where the robot would fit, but that it cannot get to.
+        unreachable: coverable cells that the robot cannot reach.
         cell_m2: area of a cell [m2].
         free_out_of_reach_m2: area known to be free, but in no reachable cell [m2].
     """
@@ -86,11 +85,11 @@ class Coverage:
 
 
 class FreeArea:
-    """Measures the free area out of reach, again only where map or reach have changed."""
+    """Free area out of reach, recomputed only when map or reachable cells change."""
 
     def __init__(self, free_at_most: int) -> None:
         self._free_at_most = free_at_most
-        # The revision, not the map itself, which would then be kept in memory.
+        # The revision instead of the map, which would stay in memory.
         self._counted: tuple[int, NDArray[np.bool_] | None] = (-1, None)
         self._area_m2 = 0.0
 
@@ -105,9 +104,9 @@ class FreeArea:
 
         Args:
             grid: the map.
-            revision: which map it is.
+            revision: revision of the map.
             lattice: the lattice over it.
-            reachable: bool (rows, cols) on the lattice; None where the robot has no place yet.
+            reachable: bool (rows, cols) on the lattice; None while the robot's cell is unknown.
         """
         counted, known = self._counted
         if revision != counted or reachable is not known:
@@ -132,7 +131,7 @@ class PathProgress:
 
     Attributes:
         cells: int32 (n, 2).
-        index: the cell of the path the robot was last seen in.
+        index: index of the cell that the robot was last seen in.
     """
 
     cells: NDArray[np.int32]
@@ -140,7 +139,7 @@ class PathProgress:
 
     @property
     def ahead(self) -> NDArray[np.int32]:
-        """The cells from the robot's on, int32 (m, 2)."""
+        """The cells from the robot on, int32 (m, 2)."""
         return self.cells[self.index :]
 
     @property
@@ -151,8 +150,8 @@ class PathProgress:
     def driven_to(self, cell: Cell, has_visited: Callable[[Cell], bool]) -> PathProgress:
         """Return the path with the robot in ``cell``, if it drove there along the path.
 
-        The path may come back beside itself: a pose that flickers into the next lane must not
-        skip what lies between.
+        Neighbouring lanes are close: a pose that flickers into the next lane must not skip what
+        lies between.
         """
         near: list[Cell] = [
             (row, col) for row, col in self.cells[self.index : self.index + LOOK_AHEAD].tolist()
@@ -165,7 +164,7 @@ class PathProgress:
         return replace(self, index=self.index + ahead)
 
     def is_far(self, cell: Cell) -> bool:
-        """Tell whether ``cell`` is too far from the robot's place on the path."""
+        """Tell whether ``cell`` is too far from the robot's cell on the path."""
         if not len(self.cells):
             return False
         row, col = self.cells[self.index]
@@ -174,13 +173,13 @@ class PathProgress:
 
 @dataclass(frozen=True, slots=True)
 class ZoneProgress:
-    """How far a zone is.
+    """Progress of a zone.
 
     Attributes:
-        name: of the zone.
-        passes: how often it is to be covered.
-        begun: the number of its newest pass; 0 before the first.
-        cells: of it that the robot can reach.
+        name: name of the zone.
+        passes: number of passes ordered.
+        begun: number of its newest pass; 0 before the first.
+        cells: its reachable cells.
         covered: those of them that are covered in that pass.
     """
 
@@ -194,7 +193,7 @@ class ZoneProgress:
 def zone_progress(
     order_state: OrderState, ground: ReachableArea | None, ledger: MissionLedger
 ) -> list[ZoneProgress]:
-    """Return how far each zone is, in order; none of an order for everything."""
+    """Return the progress of each zone, in order; empty for an order for everything."""
     order = order_state.order
     if order is None:
         return []
@@ -206,7 +205,7 @@ def zone_progress(
         cells = counts_in(polygons, lattice.window, lattice.cell_m, reachable)
         covered = counts_in(polygons, lattice.window, lattice.cell_m, visited)
     found = []
-    # Either all zones have polygons, or there is but one, without: for everything.
+    # Either all zones have polygons, or there is only one, without polygon: everything.
     for index, counted in enumerate(zip(cells, covered, strict=True)):
         zone = order.zones[index]
         if order_state.stage is not Stage.COVERING or index < order_state.zone:

@@ -1,4 +1,4 @@
-"""Tiles of a raster without bounds: copied once they change, and never more than so many."""
+"""Tiles of an unbounded raster: copied on write, limited in number."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ Scalar = TypeVar("Scalar", bound=np.generic)
 
 
 class SharedTiles(dict[Place, NDArray[Scalar]]):
-    """Tiles by place (row, col), which snapshots share until they change.
+    """Tiles by place (row, col), shared with snapshots until they change.
 
-    By tile, so that a map that jumps far away costs nothing in between.
+    Only tiles with content are stored, so a map that jumps far away costs nothing in between.
 
     Args:
-        most: how many there may be.
-        dropped: how many are dropped at once where there is no room for another.
-        blank: a tile of nothing.
-        tiles: to begin with.
+        most: limit on the number of tiles.
+        dropped: number of tiles dropped at once at the limit.
+        blank: an empty tile.
+        tiles: initial tiles.
     """
 
     def __init__(
@@ -34,11 +34,11 @@ class SharedTiles(dict[Place, NDArray[Scalar]]):
     ) -> None:
         super().__init__(tiles)
         self._most, self._dropped, self._blank = most, dropped, blank
-        # The tiles that no snapshot shares.
+        # Tiles that no snapshot shares.
         self._own: set[Place] = set()
 
     def snapshot(self) -> Mapping[Place, NDArray[Scalar]]:
-        """Return what there is now; a tile is copied once it changes."""
+        """Return the present tiles; a tile is copied once it changes."""
         for place in self._own:
             self[place].flags.writeable = False
         self._own.clear()
@@ -56,17 +56,17 @@ class SharedTiles(dict[Place, NDArray[Scalar]]):
         return [self.drop(far) for far in farthest]
 
     def writable(self, place: Place) -> NDArray[Scalar]:
-        """Return the tile at a place, made where there is none; no snapshot shares it."""
+        """Return the tile at a place, created if missing; no snapshot shares it."""
         if place not in self._own:
             self.put(place, self.get(place, self._blank).copy())
         return self[place]
 
     def put(self, place: Place, tile: NDArray[Scalar]) -> None:
-        """Take over a tile that nobody else has."""
+        """Take ownership of a tile."""
         self[place] = tile
         self._own.add(place)
 
     def drop(self, place: Place) -> NDArray[Scalar]:
-        """Forget a tile; return it."""
+        """Remove a tile and return it."""
         self._own.discard(place)
         return self.pop(place)

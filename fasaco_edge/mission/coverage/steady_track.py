@@ -1,16 +1,15 @@
-"""A steady track: where the robot was, from poses that scatter.
+"""Steady track: filtered robot positions from noisy poses.
 
-A place is the mean of the poses around it: of as many as it takes to be right to a quarter of a
-pixel, as many before as after it, and no farther away than the tool reaches. So exact poses are
-taken as they are, and at once. Where poses scatter, places come some poses later.
+A place is the mean of a window of poses: wide enough for an error of a quarter of a pixel,
+symmetric, and no wider than the tool reaches. Exact poses are taken as they are, without delay;
+noisy ones give places some poses later.
 
-How far poses scatter is estimated from three in a row. A robot drives smoothly: in a tenth of a
-second no drive takes it off the straight way between the pose before and the pose after by more
-than some millimetres. What a pose is off that way, across it, is an error of localisation; along
-it, it would be one of the poses' times. Three errors of standard deviation s across the way make
-one of sqrt(1 + 1/4 + 1/4) s, whose median size is 0.674 times that. The median of the last ones is
-taken: corners between poses far apart are few of them. What does not change from pose to pose, a
-drift, is not seen.
+The noise is estimated from three consecutive poses. A robot drives smoothly: within a tenth of a
+second it leaves the straight line between the pose before and the pose after by only some
+millimetres. The lateral deviation from that line is localisation noise; a longitudinal one would be
+timestamp error. Three lateral errors of standard deviation s give a deviation of sqrt(1 + 1/4 +
+1/4) s, whose median size is 0.674 times that. Corners are rare, so the median over the last ones
+ignores them. A drift, constant from pose to pose, is not seen.
 """
 
 from __future__ import annotations
@@ -23,14 +22,14 @@ from typing import NamedTuple
 from fasaco_edge.grid.geometry import Pose2D
 from fasaco_edge.mission.coverage.floor_tiles import PIXEL_M
 
-# So many poses tell, and no fewer than these.
+# The median is over the last POSES; at least FEWEST are needed.
 POSES, FEWEST = 31, 5
-# Median size of what a pose is off the way between its neighbours, for errors of 1.
+# Median size of the deviation from the line between the neighbours, for errors of 1.
 _MEDIAN_OFF = 0.6745 * math.sqrt(1.5)
 
 
 class PoseScatter:
-    """Estimates the errors of the newest poses.
+    """Estimates the noise of the newest poses.
 
     Attributes:
         sigma_m: standard deviation of an error along one axis [m]; 0 before enough poses have come.
@@ -54,20 +53,20 @@ class PoseScatter:
         self._before = (*self._before[-1:], pose)
 
     def break_track(self) -> None:
-        """Note that the robot's way to its next pose is unknown."""
+        """Note that the robot's track to its next pose is unknown."""
         self._before = ()
 
 
-# Standard deviations within which a pose is taken to be right: 95 % are.
+# Half-width of the confidence interval in standard deviations: 95 %.
 SURE = 2.0
-# A place that is so right needs no more poses [m].
+# A place with this error needs no wider window [m].
 RIGHT_M = PIXEL_M / 4
-# The most poses before and after a place.
+# Limit on the poses before and after a place.
 MOST_BESIDE = 15
 
 
 class Place(NamedTuple):
-    """Where the robot was: x, y [m], and within which distance of that, to each side [m]."""
+    """A filtered position: x, y [m], and its error bound to each side [m]."""
 
     x: float
     y: float
@@ -75,18 +74,18 @@ class Place(NamedTuple):
 
 
 class SteadyTrack:
-    """Turns poses into places."""
+    """Filters poses into places."""
 
     def __init__(self, tool_m: float) -> None:
-        """Begin without a pose; ``tool_m``: width of the tool [m]."""
+        """Start without a pose; ``tool_m``: width of the tool [m]."""
         self._reach_m = 0.5 * tool_m
         self._scatter = PoseScatter()
-        # The poses that still matter, and how many of them have become places.
+        # The poses in the window, and how many of them have become places.
         self._poses: list[Pose2D] = []
         self._done = 0
 
     def add(self, pose: Pose2D) -> list[Place]:
-        """Take in the next pose; return the places that are certain now."""
+        """Take in the next pose; return the places that are final now."""
         self._scatter.note(pose)
         self._poses.append(pose)
         places = self._places(len(self._poses) - self._beside)
@@ -97,24 +96,24 @@ class SteadyTrack:
 
     @property
     def is_behind(self) -> bool:
-        """Whether the places of some poses are still to come."""
+        """Whether some poses have no final place yet."""
         return self._done < len(self._poses)
 
     def ahead(self) -> list[Place]:
-        """Return the places of the newest poses, as they seem now."""
+        """Return the preliminary places of the newest poses."""
         return [self._place(index) for index in range(self._done, len(self._poses))]
 
     def box_ahead(self) -> tuple[float, float, float, float] | None:
-        """Return a box that these places lie in: least x and y, most x and y [m]; None for none."""
+        """Return the bounding box of these places: least x, y, greatest x, y [m]; None for none."""
         if not self.is_behind:
             return None
-        # Each is a mean of poses.
+        # Places are means of poses, so the poses bound them.
         around = self._poses[max(self._done - self._beside, 0) :]
         xs, ys = [pose.x for pose in around], [pose.y for pose in around]
         return min(xs), min(ys), max(xs), max(ys)
 
     def end(self) -> list[Place]:
-        """Return the last places: the way of the robot to its next pose is unknown."""
+        """Return the last places: the robot's track to its next pose is unknown."""
         places = self._places(len(self._poses))
         self._poses, self._done = [], 0
         self._scatter.break_track()
@@ -122,7 +121,7 @@ class SteadyTrack:
 
     @property
     def _beside(self) -> int:
-        """How many poses before and after a place are taken."""
+        """Number of poses before and after a place in its window."""
         needed = (self._scatter.sigma_m / RIGHT_M) ** 2
         return min(max(math.ceil((needed - 1) / 2), 0), MOST_BESIDE)
 

@@ -1,13 +1,12 @@
-"""Swept floor: what the tool has passed over, pixel by pixel in the map frame.
+"""Swept floor: the pixels of the map frame that the tool has passed over.
 
-A pixel is swept where its centre came under the tool, a disc, on the straight way from one pose to
-the next.
+A pixel is swept if its centre was under the tool, a disc, on the straight segment between two
+consecutive poses.
 
-A pose is not where the robot is. Where poses scatter, the tool seems to reach now to this side and
-now to that of where it was, and all of that together is wider than what it swept. So the disc goes
-along a steady track, and is narrowed by what that may err: with exact poses not at all, and never
-to less than half of the tool. What was swept along the newest poses is seen at once; it is kept,
-and counted, as soon as the track is certain there.
+With noisy poses, the union of tool discs is wider than the strip really swept. So the disc moves
+along the steady track and shrinks by the track's error bound: not at all with exact poses, and
+never to less than half of the tool. Sweeps along the newest poses are visible at once; they are
+stored, and counted, as soon as the track there is final.
 """
 
 from __future__ import annotations
@@ -40,28 +39,28 @@ from fasaco_edge.mission.coverage.floor_tiles import Place as TilePlace
 from fasaco_edge.mission.coverage.shared_tiles import SharedTiles
 from fasaco_edge.mission.coverage.steady_track import Place, SteadyTrack
 
-# Two poses further apart than so many times the tool are a jump, not a drive.
+# Two poses farther apart than this many tool widths are a jump.
 JUMP_TOOLS = 2.0
-# The most tiles of a floor, 100 million pixels, as many as a floor is planned on: each takes 2 kB,
-# and as much again where it has changed since the copy that is being written.
-# ``protocol/limits.yaml`` has the same number.
+# Limit on the tiles of a floor, 100 million pixels, the same as for planning: each takes 2 kB, and
+# as much again if it has changed since the copy that is being written. ``protocol/limits.yaml`` has
+# the same number.
 MOST_FLOOR_TILES = 6144
-# Beyond that the farthest are dropped, this many at once.
+# At the limit this many are dropped at once, the farthest first.
 DROPPED_FLOOR_TILES = MOST_FLOOR_TILES // 16
 NOWHERE = Window(0, 0, 0, 0)
-# The most pixels around what is not kept yet.
+# Limit on the pixels around the preliminary part of the track.
 MOST_AHEAD = 1 << 22
-# Ways and pixels that are looked at in one go; with more of them arrays would take much memory.
+# Limit on segments times pixels in one array operation, which bounds memory.
 MOST_TOGETHER = 1 << 16
-# So many of the last changes are remembered by where they were.
+# Number of changes whose windows are remembered.
 REMEMBERED = 64
 ANYWHERE = Window(-(2**40), -(2**40), 2**40, 2**40)
-# Rounding must not decide whether a pixel just reached is swept [m].
+# Tolerance, so that rounding does not decide whether a pixel at the rim is swept [m].
 TOUCH_M = 1e-9
-# Grids are looked up in blocks of so many of these pixels by so many, of coarser ones in smaller.
+# Grids are looked up in blocks of BLOCK x BLOCK of these pixels; coarser grids in smaller blocks.
 BLOCK = 256
 
-# From one place to the next.
+# A segment from one place to the next.
 Way = tuple[Place, Place]
 
 
@@ -69,11 +68,11 @@ class SweptFloor:
     """The floor that the tool has passed over.
 
     Attributes:
-        changes: goes up with each change of what is swept; of this floor, another one has its own.
-        pixels: how many are swept.
-        forgotten: how often some were forgotten.
-        dropped: tiles that were dropped to hold no more than ``MOST_FLOOR_TILES``: those farthest
-            from the robot at that moment.
+        changes: counter of changes; each object has its own.
+        pixels: number of swept pixels.
+        forgotten: how often pixels were forgotten.
+        dropped: number of tiles dropped at the limit ``MOST_FLOOR_TILES``: those farthest from the
+            robot at that moment.
     """
 
     def __init__(self, tool_m: float) -> None:
@@ -83,32 +82,32 @@ class SweptFloor:
         self.dropped = 0
         self._tool_m = tool_m
         self._track = SteadyTrack(tool_m)
-        # The newest pose, and the place up to which all is kept.
+        # The newest pose, and the place up to which sweeps are stored.
         self._last: Pose2D | None = None
         self._kept_to: Place | None = None
-        # What was swept beyond that, not made yet after another pose; and where that is at most.
+        # Preliminary sweeps beyond that, None until computed; and a window that contains them.
         self._ahead: tuple[Window, Mask] | None = None
         self._around_ahead: Window | None = None
         blank = np.zeros((FLOOR_TILE, ROW_BYTES), np.uint8)
         self._tiles = SharedTiles(MOST_FLOOR_TILES, DROPPED_FLOOR_TILES, blank)
-        # The number of the last changes, and where they were.
+        # The numbers of the last changes, with their windows.
         self._news: deque[tuple[int, Window]] = deque(maxlen=REMEMBERED)
 
     @classmethod
     def restored(cls, snapshot: FloorSnapshot, tool_m: float) -> Self:
-        """Return the floor as it was, without the last pose: the way from it is unknown."""
+        """Return a restored floor, without the last pose: the track since then is unknown."""
         floor = cls(tool_m)
         floor.changes, floor.pixels = snapshot.changes, snapshot.pixels
         floor._tiles.update(snapshot.tiles)
         return floor
 
     def snapshot(self) -> FloorSnapshot:
-        """Return what it holds now; a tile is copied once it changes."""
+        """Return a copy; tiles are copied on write."""
         return FloorSnapshot(self._tiles.snapshot(), self.changes)
 
     @property
     def swept_m2(self) -> float:
-        """How much floor is swept [m2]."""
+        """Area of the swept floor [m2]."""
         return self.pixels * PIXEL_M * PIXEL_M
 
     def swept_in(self, window: Window) -> Mask:
@@ -120,11 +119,11 @@ class SweptFloor:
         return swept
 
     def swept_on(self, geometry: GridGeometry, window: Window | None = None) -> Mask:
-        """Return which pixels of a grid have a centre that is swept, bool (rows, cols).
+        """Return which pixels of a grid have a swept centre, bool (rows, cols).
 
         Args:
-            geometry: of the grid, which may lie askew.
-            window: of its pixels; None for all.
+            geometry: placement of the grid, at any yaw.
+            window: window of its pixels; None for all.
         """
         whole = window or Window(0, 0, geometry.rows, geometry.cols)
         found = np.zeros((whole.rows, whole.cols), np.bool_)
@@ -137,23 +136,23 @@ class SweptFloor:
         return found
 
     def record(self, pose: Pose2D) -> None:
-        """Note that the robot drove on to ``pose``."""
+        """Record driving to ``pose``."""
         last, self._last = self._last, pose
         if last is not None and (apart := _apart(last, pose)) <= JUMP_TOOLS * self._tool_m:
             if not apart:
-                return  # a repeated pose, as with each map, is no evidence of scatter
+                return  # a pose repeated with each map says nothing about noise
         else:
             self._end_track()
         before = self._around_ahead
         self._keep(self._track.add(pose))
         self._begin_ahead()
-        # What is not kept yet has changed, too.
+        # The preliminary part has changed, too.
         self._note(Window.around(before, self._around_ahead))
 
     def changed_since(self, changes: int) -> Window | None:
-        """Return where pixels may have changed since there were so many changes; None for none.
+        """Return the window that may have changed since change number ``changes``; None for none.
 
-        ``ANYWHERE`` where that is no longer known.
+        ``ANYWHERE`` if that is no longer known.
         """
         if changes == self.changes:
             return None
@@ -163,15 +162,15 @@ class SweptFloor:
         return Window.around(*news)
 
     def break_track(self) -> None:
-        """Note that the robot's way to its next pose is unknown."""
+        """Note that the robot's track to its next pose is unknown."""
         self._end_track()
         self._last = None
 
     def forget(self, inside: Callable[[Window], Mask]) -> None:
-        """Forget some pixels, but those that lie under the tool now.
+        """Forget some pixels, except those under the tool now.
 
         Args:
-            inside: returns for a window which of its pixels, bool (rows, cols).
+            inside: mask function: a window to bool (rows, cols).
         """
         self.leave(
             lambda tiles: [
@@ -182,10 +181,10 @@ class SweptFloor:
         )
 
     def leave(self, left_of: Callable[[Tiles], Iterable[tuple[TilePlace, Bits]]]) -> None:
-        """Forget pixels of all tiles at once, but those that lie under the tool now.
+        """Forget pixels of all tiles at once, except those under the tool now.
 
         Args:
-            left_of: returns what is left of those tiles of which anything is forgotten.
+            left_of: returns the remaining pixels of those tiles that lose some.
         """
         self._end_track()
         before = self.pixels
@@ -204,7 +203,7 @@ class SweptFloor:
             self._begin_ahead()
 
     def _end_track(self) -> None:
-        """Keep what was swept up to the newest pose."""
+        """Store the sweeps up to the newest pose."""
         before = self._around_ahead
         self._keep(self._track.end())
         self._kept_to = None
@@ -225,7 +224,7 @@ class SweptFloor:
             self._kept_to = place
 
     def _begin_ahead(self) -> None:
-        """Find where what is swept beyond what is kept may lie; what it is is seen when asked."""
+        """Set the window of the preliminary sweeps; they are computed on demand."""
         self._ahead, self._around_ahead = None, None
         box = self._track.box_ahead()
         if box is not None:
@@ -243,14 +242,14 @@ class SweptFloor:
             self._around_ahead = Window(rows[0], cols[0], rows[1], cols[1])
 
     def _swept_ahead(self) -> tuple[Window, Mask]:
-        """Return what seems to be swept beyond what is kept, and where."""
+        """Return the preliminary sweeps and their window."""
         if self._ahead is None:
             places = self._track.ahead()
             ways = list(pairwise([self._kept_to or places[0], *places])) if places else []
             windows = [self._around(way) for way in ways]
             whole = Window.around(*windows) or NOWHERE
             if whole.rows * whole.cols > MOST_AHEAD:
-                # Poses that scatter so widely are no drive, and a mask would take much memory.
+                # Poses that noisy are no drive, and a mask would take much memory.
                 whole, ways = NOWHERE, []
             if len(ways) * whole.rows * whole.cols <= MOST_TOGETHER:
                 ahead = self._under(ways, whole)
@@ -262,7 +261,7 @@ class SweptFloor:
         return self._ahead
 
     def _around(self, way: Way) -> Window:
-        """Return the window, whose columns are whole bytes, of what comes under the tool."""
+        """Return a window around a segment's sweep whose columns are whole bytes."""
         start, end = way
         reach = self._reach(end)
         row0, row1 = _span(start.y, end.y, reach, 1)
@@ -270,14 +269,14 @@ class SweptFloor:
         return Window(row0, col0, row1, col1)
 
     def _reach(self, end: Place) -> float:
-        """Return how far from its middle the tool swept for sure [m]."""
+        """Return the radius around a place that the tool swept with certainty [m]."""
         return max(0.5 * self._tool_m - end.error_m, 0.25 * self._tool_m)
 
     def _under(self, ways: Sequence[Way], window: Window) -> Mask:
-        """Return which pixels of a window have a centre that came under the tool for sure."""
+        """Return which pixel centres of a window the tool passed with certainty."""
         values = []
         for start, end in ways:
-            # Relative to each start: far from 0 rounding would swamp differences.
+            # Relative to each start: far from the origin rounding would swamp differences.
             far_y, far_x = end.y - start.y, end.x - start.x
             length2 = far_x * far_x + far_y * far_y or 1.0
             reach2 = (self._reach(end) + TOUCH_M) ** 2
@@ -291,7 +290,7 @@ class SweptFloor:
         return under
 
     def _mark(self, window: Window, bits: Bits) -> None:
-        """Mark pixels of a window whose columns begin and end with whole bytes."""
+        """Mark pixels of a window whose columns are whole bytes."""
         has_changed = False
         for place in places_of(window):
             part = window_of(place)
@@ -311,7 +310,7 @@ class SweptFloor:
             self._note(window)
 
     def _make_room(self, place: TilePlace) -> None:
-        """Drop the tiles farthest from ``place`` where there is no room for another."""
+        """Drop the tiles farthest from ``place`` if there is no room for another."""
         if dropped := self._tiles.make_room(place):
             self.pixels -= sum(map(count_bits, dropped))
             self.dropped += len(dropped)
@@ -324,7 +323,7 @@ def _apart(one: Pose2D, other: Pose2D) -> float:
 
 
 def _span(one: float, other: float, reach: float, whole: int) -> tuple[int, int]:
-    """Return from where to where pixels lie within reach, rounded outward to ``whole`` ones."""
+    """Return the range of pixels within reach, rounded outward to multiples of ``whole``."""
     low = math.floor((min(one, other) - reach) / PIXEL_M)
     high = math.floor((max(one, other) + reach) / PIXEL_M) + 1
     return low // whole * whole, -(-high // whole) * whole

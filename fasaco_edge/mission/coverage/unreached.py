@@ -1,4 +1,4 @@
-"""Unreached areas: what of an order stays uncovered, why, and where to look at it again."""
+"""Unreached areas: cells of an order that stay uncovered, why, and viewpoints to check again."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ from fasaco_edge.mission.orders.order import MissionOrder
 from fasaco_edge.mission.orders.order_state import OrderState, Stage
 from fasaco_edge.mission.orders.zones import in_zones
 
-# This many areas are listed, the largest first; the others are counted.
+# Limit on the areas listed, the largest first; the others are counted.
 MOST_AREAS = 20
-# Most areas that a robot drives to when it tries again.
+# Limit on the areas visited in a retry.
 MOST_VIEWPOINTS = 256
 
 
@@ -49,9 +49,9 @@ class UnreachedArea:
     """Connected cells that stay uncovered for one reason.
 
     Attributes:
-        cells: how many.
+        cells: number of cells.
         cell: one of them, (row, col) on the lattice.
-        reason: why.
+        reason: why they stay uncovered.
     """
 
     cells: int
@@ -61,12 +61,12 @@ class UnreachedArea:
 
 @dataclass(frozen=True, slots=True)
 class Unreached:
-    """What stays uncovered.
+    """The uncovered cells of an order.
 
     Attributes:
-        areas: the largest of them, the largest first; at most MOST_AREAS.
-        cells: how many cells all areas have.
-        areas_left_out: how many more areas there are.
+        areas: the areas, the largest first; at most MOST_AREAS.
+        cells: number of cells in all areas.
+        areas_left_out: number of areas that are not listed.
     """
 
     areas: tuple[UnreachedArea, ...] = ()
@@ -75,10 +75,10 @@ class Unreached:
 
 
 def viewpoints(closed: NDArray[np.bool_], reachable: NDArray[np.bool_]) -> list[Cell]:
-    """Return a cell beside each closed area to look at it from; indices of the arrays.
+    """Return a reachable cell beside each closed area, to look at it; array indices.
 
-    An area without a square of two by two cells is left out: rows of cells along the walls
-    come and go with a map's noise. Of very many the largest are taken.
+    An area without a square of two by two cells is left out: rows of cells along walls come and go
+    with the map's noise. At most MOST_VIEWPOINTS, for the largest areas.
     """
     areas = find_areas(closed.view(np.uint8))
     beside = cells_beside(areas, reachable)
@@ -88,7 +88,7 @@ def viewpoints(closed: NDArray[np.bool_], reachable: NDArray[np.bool_]) -> list[
 
 
 class UnreachedFinder:
-    """Finds what of an order is not covered; remembers what could be reached since it began.
+    """Finds the uncovered cells of an order; remembers which cells were reachable since it began.
 
     Masks are bool (rows, cols) on the lattice of the area.
     """
@@ -96,20 +96,20 @@ class UnreachedFinder:
     def __init__(self, map_state: MapState, ledger: MissionLedger) -> None:
         self._map = map_state
         self._ledger = ledger
-        # Paths after which cells were left over.
+        # Number of paths that left cells over.
         self._failures = 0
-        # The newest area, and which cells of its lattice could be reached at some time.
+        # The newest area, and which cells of its lattice have ever been reachable.
         self._newest: ReachableArea | None = None
         self._once_reachable: NDArray[np.bool_] | None = None
         self._found: tuple[object, Unreached] = (None, Unreached())
 
     def restart(self) -> None:
-        """Begin with another order."""
+        """Begin another order."""
         self._failures, self._newest, self._once_reachable = 0, None, None
         self.note_area()
 
     def note_area(self) -> None:
-        """Remember what can be reached now."""
+        """Remember the cells that are reachable now."""
         area = self._map.area
         if area is not None and area is not self._newest:
             self._once_reachable = self._reached_on(area) | area.reachable
@@ -120,7 +120,7 @@ class UnreachedFinder:
         self._failures += 1
 
     def unreached(self, state: OrderState) -> Unreached:
-        """Return what is not reached; the last answer while the robot is on no coverable cell."""
+        """Return what stays uncovered; the last result while the robot is on no coverable cell."""
         area = self._map.area
         if state.order is None:
             return Unreached()
@@ -130,7 +130,7 @@ class UnreachedFinder:
         return self._found[1]
 
     def viewpoints(self, order: MissionOrder, area: ReachableArea) -> set[Cell]:
-        """Return the cells (row, col) to look at areas from that were closed."""
+        """Return the cells (row, col) from which to look at areas that were closed."""
         assert self._map.free is not None
         window = area.lattice.window
         kept_out = self._map.free.coverable & ~area.lattice.coverable
@@ -158,7 +158,7 @@ class UnreachedFinder:
         assert free is not None
         causes = np.zeros(lattice.states.shape, np.uint8)
         if order.zones[0].polygon is not None:
-            # In an order for everything unknown cells are not to be covered.
+            # An order for everything does not ask for unknown cells.
             causes[lattice.states == UNKNOWN] = Cause.UNKNOWN
         causes[self._reached_on(area) & ~lattice.coverable] = Cause.CLOSED
         causes[lattice.coverable & ~reachable] = Cause.BEHIND_OBSTACLES
@@ -170,13 +170,13 @@ class UnreachedFinder:
             without_zones = ReachableArea.around(free, cell).reachable
             causes[without_zones & lattice.coverable & ~reachable] = Cause.BEHIND_KEEP_OUT
         if stage is not Stage.COVERING:
-            # Before that they are still ahead.
+            # In earlier stages they are still to come.
             causes[reachable] = Cause.LEFT_OVER
         causes[~self._uncovered(order, area)] = 0
         return causes
 
     def _uncovered(self, order: MissionOrder, area: ReachableArea) -> NDArray[np.bool_]:
-        """Return the cells that were to be covered and are not."""
+        """Return the cells that are asked for and not covered."""
         window = area.lattice.window
         uncovered: NDArray[np.bool_] = in_zones(order.zones, window, area.lattice.cell_m) & (
             self._ledger.visits(window) == 0
@@ -184,7 +184,7 @@ class UnreachedFinder:
         return uncovered
 
     def _reached_on(self, area: ReachableArea) -> NDArray[np.bool_]:
-        """Return the cells that could be reached at some time."""
+        """Return the cells that have ever been reachable."""
         if self._newest is None or self._once_reachable is None:
             return area.reachable
         return carried(self._once_reachable, self._newest.lattice.window, area.lattice.window)
