@@ -1,1 +1,1 @@
-"""Coverage planners behind one interface, at one cost: the paper's, and the search of missions."""
+"""Coverage planners with one interface and one cost: the paper's, and the search of missions."""

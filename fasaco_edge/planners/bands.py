@@ -1,4 +1,4 @@
-"""Bands that a ground is cut into, and the closer bound they give (``kernels.bound.bands``)."""
+"""Bands of rows that a ground is cut into, and their tighter bound (``kernels.bound.bands``)."""
 
 from __future__ import annotations
 
@@ -11,26 +11,26 @@ from fasaco_edge.kernels.bound.bands import Bands, begin_bands, end_bands, solve
 from fasaco_edge.kernels.bound.lines import Lines, StepPrices
 from fasaco_edge.kernels.bound.ways import INCOMING, OUTGOING, PATTERNS, BandMemory
 
-# Rows of a band at most: a row more gives states three times as many.
+# Limit on the rows of a band: each extra row triples the number of states.
 WIDEST = 5
-# How far a price moves at first, in shares of a quarter-turn's cost, and how that falls.
+# Initial step size of a price, as a share of a quarter-turn's cost; its factor per iteration.
 PACE, FALLS = 0.5, 0.9
 MOST_ITERATIONS = 40
-# States of one band that there is memory for, in all and for each of its cells.
+# Memory limits on the states of one band: in all, and per cell.
 MOST_STATES, STATES_A_CELL = 400_000, 300
 
-# Masks of sides with rows for columns.
+# Masks of sides with rows and columns exchanged.
 _EXCHANGED = np.array([(mask & 5) << 1 | (mask & 10) >> 1 for mask in range(16)], np.uint8)
 
 
 class BandBound:
-    """The closer bound of one ground, by bands along rows or along columns.
+    """The tighter bound of a ground, by bands along rows or along columns.
 
     Args:
         lines: the cells, two or more.
-        prices: to begin with: those of the best bound so far; not changed.
+        prices: initial prices: those of the best bound so far; not changed.
         row, col: of each cell, int (m,).
-        step, turn: what they cost [half us].
+        step, turn: their costs [half us].
     """
 
     def __init__(
@@ -49,15 +49,15 @@ class BandBound:
         across = turned, _copied(prices.best[::-1]), bands_of(turned, col[order], row[order])
         self._options = [(*each, band_memory(each[2], step + turn)) for each in (along, across)]
         self._bounds = [0, 0]
-        # Iterations that are over; whether one is under way.
+        # Number of finished iterations; whether one is under way.
         self._done = 0
         self._is_begun = False
 
     def improve(self, cells: int) -> int:
-        """Solve the next bands, of so many cells; return the bound [half us], or 0.
+        """Solve the next bands, about ``cells`` cells; return the bound [half us], or 0.
 
-        There is a bound with the last band of each iteration. The first two iterations try both
-        directions; the rest goes on with the better one.
+        The last band of an iteration gives the bound. The first two iterations try both directions;
+        the better one continues.
         """
         which = self._done if self._done < 2 else int(self._bounds[1] > self._bounds[0])
         lines, prices, bands, memory = self._options[which]
@@ -76,14 +76,14 @@ class BandBound:
 
     @property
     def is_done(self) -> bool:
-        """Return whether further iterations would find next to nothing."""
+        """Return whether further iterations would gain next to nothing."""
         return self._done >= MOST_ITERATIONS
 
 
 def transposed(lines: Lines) -> Lines:
-    """Return the same ground with rows for columns."""
+    """Return the ground with rows and columns exchanged."""
     order = np.argsort(lines.rank).astype(np.int32)
-    # East and north change places, and so do west and south.
+    # East and north are exchanged, and so are west and south.
     sides = _EXCHANGED[lines.sides[order]]
     start = int(lines.rank[lines.start])
     end = int(lines.rank[lines.end]) if lines.end >= 0 else -1
@@ -92,20 +92,20 @@ def transposed(lines: Lines) -> Lines:
 
 
 def _copied(price: NDArray[np.int64]) -> StepPrices:
-    """Return prices in memory of their own."""
+    """Return a copy of prices."""
     price = np.array(price, order="C")
     return StepPrices(price, price.copy(), *(np.zeros_like(price) for _ in range(3)))
 
 
 def bands_of(lines: Lines, row: NDArray[np.int64], col: NDArray[np.int64]) -> Bands:
-    """Cut a ground along its rows into bands with as few steps between them as can be.
+    """Cut a ground along its rows into bands, with the fewest possible steps between bands.
 
     Args:
         lines: its cells.
         row, col: of each cell, int (m,).
     """
     height = int(row.max()) + 1
-    # Steps from each row to the next one.
+    # Number of steps from each row to the next one.
     down = np.bincount(row, weights=lines.sides >> 1 & 1, minlength=height).astype(np.int64)
     cuts = _cuts(down)
     band = np.searchsorted(cuts, row, side="right")
@@ -114,7 +114,7 @@ def bands_of(lines: Lines, row: NDArray[np.int64], col: NDArray[np.int64]) -> Ba
     order = np.lexsort((row, col, band)).astype(np.int32)
     last = np.concatenate((cuts, [height]))[band] - 1
     inner = lines.sides & ~((row == last) * np.uint8(2)) & ~((place == 0) * np.uint8(8))
-    # No step leads from a column of a band to the next one: what follows is a band of its own.
+    # No step leads from a column of a band to the next one: the rest is another band.
     column = (band * (int(col.max()) + 2) + col)[order]
     leads_on = np.bincount(column, weights=lines.sides[order] & 1) > 0
     begins = np.diff(column, prepend=-1) > 0
@@ -124,13 +124,13 @@ def bands_of(lines: Lines, row: NDArray[np.int64], col: NDArray[np.int64]) -> Ba
 
 
 def _cuts(down: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Return the rows that bands begin with, but for the first one."""
+    """Return the first row of each band, except the first band."""
     height = down.size
-    # Steps cut above each row, at best, and where the band before begins.
+    # Least number of steps cut above each row, and the first row of the band before.
     least, before = [0] * (height + 1), [0] * (height + 1)
     for row in range(1, height + 1):
         cut = int(down[row - 1]) if row < height else 0
-        # Of those alike the widest one.
+        # The widest one among equals.
         options = range(max(row - WIDEST, 0), row)
         before[row] = min(options, key=lambda top: least[top])
         least[row] = least[before[row]] + cut
@@ -143,7 +143,7 @@ def _cuts(down: NDArray[np.int64]) -> NDArray[np.int64]:
 
 
 def band_memory(bands: Bands, corner: int) -> BandMemory:
-    """Return working memory; ``corner`` is what a step and a quarter-turn cost [half us]."""
+    """Return working memory; ``corner``: cost of a step and a quarter-turn [half us]."""
     count, most = bands.first.size - 1, int(np.diff(bands.first).max())
     states = min(MOST_STATES, STATES_A_CELL * most + 1)
     return BandMemory(
@@ -168,7 +168,7 @@ def band_memory(bands: Bands, corner: int) -> BandMemory:
 
 
 def _codes() -> tuple[NDArray[np.int16], NDArray[np.int32]]:
-    """Return by mask of sides all ways to use these 0, 1 or 2 times, and how many these are."""
+    """Return, by mask of sides, all uses of these 0, 1 or 2 times, and their number."""
     codes, counts = np.zeros((16, 81), np.int16), np.zeros(16, np.int32)
     for mask in range(16):
         digits = [range(3) if mask >> side & 1 else range(1) for side in range(3, -1, -1)]

@@ -1,8 +1,8 @@
-"""Lower bounds of a problem: steps, and seconds, that no walk can do without.
+"""Lower bounds of a problem: steps and seconds of any walk that solves it.
 
-The proofs are in ``kernels.bound``: ``covering`` counts steps alone, ``turns`` prices turns, too.
-The bound with turns is a search of its own: the longer it works, the closer it comes to what its
-relaxation can give. Work is counted, so the same calls give the same bounds.
+The proofs are in ``kernels.bound``: ``covering`` counts steps alone, ``turns`` also prices turns.
+The bound with turns is itself a search: with more work it approaches the optimum of its relaxation.
+Work is counted, so the same calls give the same bounds.
 """
 
 from __future__ import annotations
@@ -21,38 +21,38 @@ from fasaco_edge.planners.bands import BandBound
 from fasaco_edge.planners.cost import MICROSECONDS
 from fasaco_edge.planners.problem import CoverageProblem
 
-# Work is counted in cells times iterations: a million takes about 50 ms. A glance for repairs
-# and first walks, a thorough look for what is searched on.
+# Units of work: cells times iterations; a million takes about 50 ms. GLANCE is for repairs and
+# first walks, THOROUGH for searches.
 GLANCE, THOROUGH = 80_000, 400_000
 FEWEST, MOST = 8, 300
 
-# On larger lattices turns are left out: their prices take about 100 bytes a cell.
+# On larger lattices turns are left out of the bound: prices take about 100 bytes per cell.
 MOST_CELLS = 250_000
 
-# How far a price moves at first, in shares of a quarter-turn's cost; by a later call; and by which
-# power of e that falls.
+# Initial step size of a price, as a share of a quarter-turn's cost: of the first call, of later
+# ones; and the exponent of its decay.
 FIRST_PACE, LATER_PACE, FALLS = 1.0, 0.5, 4
 
 
 def lower_bound_steps(problem: CoverageProblem) -> int:
-    """Return a number of steps that no walk which solves ``problem`` can beat, turns aside."""
+    """Return a lower bound on the steps of any walk that solves ``problem``, ignoring turns."""
     required = problem.to_cover.astype(np.uint8)
     return covering_bound(problem.lattice.steps, required, problem.flat_start, problem.flat_end)
 
 
 class LowerBound:
-    """What no walk that solves a problem can beat.
+    """Lower bounds on all walks that solve a problem.
 
     Attributes:
-        steps: no walk has fewer steps.
-        cost_us: none costs less [us].
+        steps: lower bound on the number of steps.
+        cost_us: lower bound on the cost [us].
     """
 
     def __init__(self, problem: CoverageProblem) -> None:
         self._cost = problem.cost
         self.steps = lower_bound_steps(problem)
         self.cost_us = self.steps * self._cost.step_us
-        # Without a step there is no turn.
+        # A walk without steps has no turns.
         is_small = problem.lattice.states.size <= MOST_CELLS
         self._turns = is_small and self.steps > 0 and self._cost.quarter_turn_us > 0
         if not self._turns:
@@ -70,11 +70,11 @@ class LowerBound:
 
     @property
     def cost_s(self) -> float:
-        """What no walk costs less than [s]."""
+        """Lower bound on the cost [s]."""
         return self.cost_us / MICROSECONDS
 
     def tighten(self, work: int) -> None:
-        """Raise ``cost_us`` if so much work can: in cells times iterations."""
+        """Raise ``cost_us`` if this much work can: cells times iterations."""
         if not self._turns or not work:
             return
         step, turn = 2 * self._cost.step_us, 2 * self._cost.quarter_turn_us
@@ -84,9 +84,9 @@ class LowerBound:
         self._raise(ascend(self._lines, self._prices, step, turn, pace, FALLS, times))
 
     def tighten_in_bands(self, cells: int) -> None:
-        """Raise ``cost_us`` if bands of cells can: solve so many cells' more, some 10 us each.
+        """Raise ``cost_us`` by bands, if solving ``cells`` more cells can, at some 10 us each.
 
-        Each iteration over all cells is a bound; the first one begins with the best prices so far.
+        Each iteration over all cells gives a bound; the first starts from the best prices so far.
         """
         if not self._turns or (self._bands is not None and self._bands.is_done):
             return
@@ -97,17 +97,18 @@ class LowerBound:
         self._raise(self._bands.improve(cells))
 
     def _raise(self, doubled: int) -> None:
-        # A walk's cost is a whole number of microseconds, and of what divides both prices.
+        # A cost is a whole number of microseconds, and a multiple of the common divisor of both
+        # prices.
         unit = math.gcd(self._cost.step_us, self._cost.quarter_turn_us)
         self.cost_us = max(self.cost_us, -(-doubled // (2 * unit)) * unit)
 
     def side_prices(self) -> tuple[NDArray[np.int32], NDArray[np.int64], NDArray[np.bool_]]:
-        """Return the prices of the best bound of cost, where turns cost.
+        """Return the prices of the best bound on cost, where turns cost.
 
         Returns:
-            The cells that can be reached, int32 (m,) flat; what each pays for its sides by
-            direction, int64 (m, 4) [half us], 0 where there is none; bool (m,), whether its
-            passage is to be paid.
+            The reachable cells, int32 (m,) flat; their prices for sides by direction,
+            int64 (m, 4) [half us], 0 for no step; whether the passage of each cell is paid,
+            bool (m,).
         """
         lines, best = self._lines, self._prices.best
         prices = np.zeros((lines.sides.size, 4), np.int64)
@@ -121,7 +122,7 @@ class LowerBound:
 
 
 def lower_bound_of(problem: CoverageProblem, work: int = THOROUGH) -> LowerBound:
-    """Return the bounds of a problem after so much work."""
+    """Return the bounds of a problem after this much work."""
     bound = LowerBound(problem)
     bound.tighten(work)
     return bound

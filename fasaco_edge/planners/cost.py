@@ -1,4 +1,4 @@
-"""What a walk costs, in seconds for steps and quarter-turns, and what work a search for it was."""
+"""Cost of a walk, in seconds for steps and quarter-turns; and counts of a search's work."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ if TYPE_CHECKING:
     from typing import Self
 
 MICROSECONDS = 1_000_000
-# A step below a millisecond would be rounded away in part; and the cost of a walk of 10^8
+# A step below a millisecond would lose precision in whole microseconds; the cost of a walk of 10^8
 # steps of an hour each still fits into 64 bits of microseconds.
 SHORTEST_STEP_S, LONGEST_S = 1e-3, 3600.0
 
 
 class Turns(NamedTuple):
-    """How often a walk changes its direction: to a side, and straight back."""
+    """Counts of a walk's changes of direction: quarter-turns, and reversals."""
 
     quarter: int
     half: int
@@ -30,9 +30,8 @@ class Turns(NamedTuple):
 class CoverageCost:
     """Seconds a robot needs for a step and for a quarter-turn; a half turn is two of these.
 
-    Searches compare whole microseconds: sums of them are exact, in whatever order they
-    are added, so the same search always finds the same walk. With the default a walk
-    costs its steps, and turns are free.
+    Searches compare whole microseconds, whose sums are exact in any order, so the same search
+    always finds the same walk. By default only steps cost.
 
     Attributes:
         step_s: a step to a neighbouring cell [s].
@@ -48,7 +47,7 @@ class CoverageCost:
 
     @classmethod
     def for_robot(cls, cell_m: float, speed_m_s: float, quarter_turn_s: float) -> Self:
-        """Return the cost for a robot on cells of ``cell_m`` [m] that drives ``speed_m_s`` [m/s].
+        """Return the cost for cells of ``cell_m`` [m] and a speed of ``speed_m_s`` [m/s].
 
         Raises:
             BadConfiguration: a value is not finite or impossible, or a step would take less
@@ -62,31 +61,31 @@ class CoverageCost:
 
     @property
     def step_us(self) -> int:
-        """A step in whole microseconds."""
+        """Cost of a step in whole microseconds."""
         return round(self.step_s * MICROSECONDS)
 
     @property
     def quarter_turn_us(self) -> int:
-        """A quarter-turn in whole microseconds."""
+        """Cost of a quarter-turn in whole microseconds."""
         return round(self.quarter_turn_s * MICROSECONDS)
 
     def quality(self, cells: int, cost_us: int) -> float:
-        """Return delta phi of equation (8): a step for each of so many cells over the cost [us]."""
-        # Whole numbers divided once: for steps alone it is cells / steps to the last bit.
+        """Return delta phi of equation (8): the cost of one step per cell over the cost [us]."""
+        # One division of whole numbers: for steps alone it equals cells / steps bit for bit.
         return cells * self.step_us / max(cost_us, self.step_us)
 
     def of_walk(self, cells: NDArray[np.int32]) -> float:
-        """Return what a walk costs [s].
+        """Return the cost of a walk [s].
 
-        The robot is taken to stand in the direction of the first step.
+        The robot is assumed to face the direction of the first step.
 
         Args:
-            cells: int32 (n, 2), cells (row, col), each a step from the one before.
+            cells: int32 (n, 2), cells (row, col), each a step from the previous one.
         """
         return self.of_walk_us(cells) / MICROSECONDS
 
     def of_walk_us(self, cells: NDArray[np.int32]) -> int:
-        """Return what a walk costs in whole microseconds, see ``of_walk``."""
+        """Return the cost of a walk in whole microseconds, see ``of_walk``."""
         turns = count_turns(cells)
         steps = max(len(cells) - 1, 0)
         quarters = turns.quarter + 2 * turns.half
@@ -94,7 +93,7 @@ class CoverageCost:
 
 
 def count_turns(cells: NDArray[np.int32]) -> Turns:
-    """Count the turns of a walk, int32 (n, 2), cells (row, col) each a step from the last."""
+    """Count the turns of a walk, int32 (n, 2), cells (row, col) joined by steps."""
     moves = np.diff(cells, axis=0)
     along = (moves[1:] * moves[:-1]).sum(axis=1)
     return Turns(int(np.count_nonzero(along == 0)), int(np.count_nonzero(along < 0)))
@@ -108,14 +107,14 @@ def _require(name: str, value: float, least: float, most: float, unit: str) -> N
 
 @dataclass(frozen=True, slots=True)
 class SearchWork:
-    """Work of a search in counts; with problem, planner and seed they repeat its path.
+    """Work of a search as counts; with problem, planner and seed they reproduce its path.
 
     The wire contract calls perturbations ``kicks``.
 
     Attributes:
-        ants: ants that walked, and the sweeps that a search begins with.
+        ants: number of ants that walked, and of sweeps that a search begins with.
         perturbations: changes by which a local search left a local optimum, and windows that
-            were solved anew.
+            were solved again.
         proposals: moves that a local search tried.
     """
 
@@ -140,9 +139,9 @@ class SearchWork:
 
 
 def gap_to(lower_bound_s: float, cost_s: float) -> float | None:
-    """Return ``cost_s / lower_bound_s - 1``; None where the bound is 0, not known.
+    """Return the optimality gap ``cost_s / lower_bound_s - 1``; None for an unknown bound, 0.
 
-    One division of whole microseconds: 115 s over a bound of 100 s are 0.15 to the last bit.
+    One division of whole microseconds: 115 s over a bound of 100 s give 0.15 bit for bit.
     """
     least, cost = round(lower_bound_s * MICROSECONDS), round(cost_s * MICROSECONDS)
     return (cost - least) / least if least > 0 else None

@@ -1,4 +1,4 @@
-"""The grids that planners run on, by name or file; where a walk or a simulated robot starts."""
+"""Input grids of planners, by name or file; start cells of walks and of simulated robots."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from fasaco_edge.kernels.lattice.reach import reachable_from
 
 
 def start_cell(lattice: CoverageLattice, map_file: Path) -> Cell:
-    """Return the start of a plan for which none is given.
+    """Return the default start of a plan.
 
-    A built-in map names its own; else it is the cell nearest to the map frame's
-    origin within the largest connected area.
+    A built-in map has its own; otherwise it is the cell of the largest connected area that is
+    nearest to the map frame's origin.
 
     Raises:
         NothingToCover: no cell is coverable.
@@ -48,9 +48,9 @@ def start_cell(lattice: CoverageLattice, map_file: Path) -> Cell:
 
 
 def start_point(map_file: Path, truth: OccupancyGrid, radius_m: float) -> tuple[float, float]:
-    """Return a built-in map's start (x, y) [m], and the map frame's origin for any other map.
+    """Return a built-in map's start (x, y) [m], or the map frame's origin for any other map.
 
-    Where that is not on the map, as in UTM, it is the place in the largest area nearest to it.
+    If the origin is not on the map, as in UTM, the nearest place in the largest area is returned.
 
     Raises:
         NothingToCover: a robot of this radius [m] fits nowhere.
@@ -66,13 +66,13 @@ def start_point(map_file: Path, truth: OccupancyGrid, radius_m: float) -> tuple[
     return (col + 0.5) * lattice.cell_m, (row + 0.5) * lattice.cell_m
 
 
-# Of the robot the built-in maps were drawn for.
+# Footprint of the robot that the built-in maps were drawn for.
 MAP_FOOTPRINT = Footprint(cell_m=0.3, robot_radius_m=0.18)
 
 
 @dataclass(frozen=True, slots=True)
 class NamedGrid:
-    """A lattice with the cell to start in, and the name or file it was asked for by."""
+    """A lattice with its start cell, and the name or file it was requested by."""
 
     name: str
     lattice: CoverageLattice
@@ -80,13 +80,13 @@ class NamedGrid:
 
 
 def read_grid(name_or_path: str | Path) -> NamedGrid:
-    """Read a coverage grid (.npy), a map_server YAML or a built-in map by its name.
+    """Read a coverage grid (.npy), a map_server YAML or a built-in map.
 
-    Beside ``grid.npy`` a file ``grid.json`` may name the start: ``{"start": [row, col]}``.
-    Maps become lattices of 0.3 m for a robot of 0.18 m radius.
+    Beside ``grid.npy`` a file ``grid.json`` may give the start: ``{"start": [row, col]}``. Maps
+    become lattices of 0.3 m for a robot of 0.18 m radius.
 
     Raises:
-        MapFileError: there is no such file, or it is none of these.
+        MapFileError: there is no such file, or it has none of these formats.
         NothingToCover: the grid has no free cell.
     """
     file = find_map(name_or_path)

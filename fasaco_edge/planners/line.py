@@ -1,7 +1,7 @@
-"""The driven line: a walk over stands, polished against the floor that it sweeps.
+"""Driven line: a walk over stands, polished for swept floor.
 
-What is minimised is seconds to drive plus a price for each reachable square metre that is left
-unswept. Lengths count at the robot's speed, turns at what their angle takes it.
+The objective is driving time plus a price for each reachable square metre that stays unswept.
+Distances are timed at the robot's speed, turns by their angle.
 """
 
 from __future__ import annotations
@@ -29,18 +29,18 @@ from fasaco_edge.kernels.floor.sweeps import (
 )
 from fasaco_edge.kernels.floor.turning import Turning, proportional_turning
 
-# What is left further from an edge is no reason for a detour of that edge [m].
+# Floor farther from an edge than this causes no detour of that edge [m].
 FARTHEST_M = 1.0
-# What is left in one place counts as a patch from here on [m2].
+# Least connected unswept area that counts as a patch [m2].
 PATCH_M2 = 0.04
-# Of all moves, those that only descend come first: far ones that gain much. Patches have moves of
-# their own, a share of all others.
+# Shares of all moves: descent comes first, with long moves that gain much; patches have moves of
+# their own.
 DESCENT_SHARE, PATCH_SHARE = 0.08, 0.12
-# So many moves for each point that the walk has are enough, however much floor there is.
+# Limit on the moves per point of the walk, however much floor there is.
 MOST_A_POINT = 2000
-# From the hottest temperature to none.
+# From the highest temperature to zero.
 COOLED = (1.0, 0.0)
-# What turns take, where nobody says.
+# Default turn durations.
 TURNING = proportional_turning(1.5)
 # Seed of the random moves.
 SEED = 0x9E3779B97F4A7C15
@@ -48,14 +48,14 @@ SEED = 0x9E3779B97F4A7C15
 
 @dataclass(frozen=True, slots=True)
 class LineConfig:
-    """How a line is polished.
+    """Parameters of polishing a line.
 
     Attributes:
-        price_s_m2: what sweeping a square metre is worth [s/m2]; 0 for no polish.
-        speed_m_s: of the robot [m/s].
-        turning: what turns on the spot take.
-        moves_m2: at most so many moves are tried for each reachable square metre.
-        patch_s: a patch is swept at the end where that takes no longer than this [s].
+        price_s_m2: value of sweeping a square metre [s/m2]; 0 for no polish.
+        speed_m_s: speed of the robot [m/s].
+        turning: durations of turns on the spot.
+        moves_m2: limit on the moves tried per reachable square metre.
+        patch_s: at the end, patches are swept that take no longer than this [s].
     """
 
     price_s_m2: float = 200.0
@@ -78,12 +78,12 @@ LINES = {"quick": LineConfig(price_s_m2=45.0, patch_s=0.0), "thorough": LineConf
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DrivenLine:
-    """A line to be driven, straight between its points.
+    """A line to drive: straight segments between points.
 
     Attributes:
         xy: float64 (n, 2), read-only: x, y in the map frame [m].
-        swept_m2, reachable_m2: of the reachable floor [m2], counted in pixels of its raster.
-        tried: moves that were tried.
+        swept_m2, reachable_m2: swept and total reachable floor [m2], by pixels of its raster.
+        tried: number of moves tried.
     """
 
     xy: NDArray[np.float64]
@@ -106,11 +106,11 @@ def line_over(
     """Return the polished line along a walk.
 
     Args:
-        walk: int32 (n, 2), cells (row, col), each a step from the one before.
-        stands: the lattice that it walks on.
-        floor: what is to be swept.
+        walk: int32 (n, 2), cells (row, col), each a step from the previous one.
+        stands: the lattice of the walk.
+        floor: the floor to sweep.
         config: prices.
-        is_end_fixed: whether the line has to end where the walk does.
+        is_end_fixed: whether the line must end where the walk does.
     """
     points = stands.points(walk)
     sweeps = _sweeps(floor)
@@ -149,20 +149,20 @@ def _sweeps(floor: Floor) -> Sweeps:
 
 
 def blocks_of(shape: tuple[int, int]) -> tuple[int, int]:
-    """Return how many blocks (rows, cols) there are on a raster of a shape."""
+    """Return the number of blocks (rows, cols) of a raster of a shape."""
     rows, cols = shape
     return (rows - 1 >> BLOCK) + 1, (cols - 1 >> BLOCK) + 1
 
 
 def count_blocks(sweeps: Sweeps, part: Window) -> None:
-    """Count what is left in the blocks of a part of the pixels again."""
+    """Recount the unswept pixels in the blocks of a window."""
     count_left(sweeps, part.row0, part.col0, part.row1, part.col1)
 
 
 def linked(
     points: NDArray[np.float64], blocks: tuple[int, ...], *, is_end_fixed: bool
 ) -> kernel.Line:
-    """Return points, float64 (n, 2), as a line of the kernels, on so many blocks (rows, cols)."""
+    """Return points, float64 (n, 2), as a kernel line, with blocks (rows, cols)."""
     count = len(points)
     capacity = 3 * count + 4096
     room = np.zeros((capacity, 2))
@@ -177,7 +177,7 @@ def linked(
 
 
 def numbers_along(line: kernel.Line) -> list[int]:
-    """Return the numbers of a line's points in order."""
+    """Return the indices of a line's points in order."""
     numbers = [0]
     while (number := int(line.next[numbers[-1]])) != kernel.NONE:
         numbers.append(number)
@@ -185,7 +185,7 @@ def numbers_along(line: kernel.Line) -> list[int]:
 
 
 def memory_for_moves() -> kernel.Memory:
-    """Return what the kernels compare in."""
+    """Return working memory of the kernels."""
 
     def points(count: int) -> NDArray[np.float64]:
         return np.zeros((count, 2))

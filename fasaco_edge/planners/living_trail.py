@@ -1,19 +1,19 @@
-"""The living trail: pheromone on every step of the lattice, for as long as a mission lasts.
+"""Living trail: pheromone on every step of the lattice, kept during a whole mission.
 
-The equations are those of Carr and Wang 2022 (``kernels.ants.colony``). Where they speak of ants,
-this trail has paths, which come one after the other while the map fills:
+The equations are those of Carr and Wang 2022 (``kernels.ants.colony``), with the mission's
+successive paths in place of ants:
 
-* equation (8), global update: each planned path that is published strengthens the steps it takes;
-* equation (7), local update: what the path's cells have beside those steps fades, and so does what
-  the map has changed; a step that was driven loses half at once.
+* equation (8), global update: each published plan strengthens the steps of its path;
+* equation (7), local update: the other steps at the path's cells fade, and so do steps that the map
+  has changed; a driven step loses half at once.
 
-Deviations: the paper evaporates with each ant, of which there are a thousand to a plan. Here a
-path is one. Delta phi of (8) is the path's distinct cells at a step each over what it costs, about
-1 at best, as in ``planners.paper.fasaco``; a step that a path takes twice is strengthened once.
+Deviations: the paper evaporates per ant (about 1000 per plan); here each published path counts as
+one ant. Delta phi = (distinct cells x step cost) / path cost, about 1 at best, as in
+``planners.paper.fasaco``; a step that a path takes twice is strengthened once.
 
-A trail lies in cells of the map frame: a window follows the lattice's, steps that come begin at
-tau0, steps that go vanish. What an update costs goes with the path or the change. All is float32
-and done value by value: the same on every machine. Free of the compiler: the ledger holds a trail.
+A trail spans a window of cells of the map frame that follows the lattice's; new steps begin at
+tau0, removed steps vanish. The cost of an update depends on the path or the change. All is float32,
+value by value, so it is equal on every machine. Imports no numba, as the ledger holds a trail.
 """
 
 from __future__ import annotations
@@ -27,13 +27,13 @@ from numpy.typing import NDArray
 
 from fasaco_edge.grid.geometry import Window
 
-# A step that was driven is pulled so far towards tau0: by (7) as about seven ants would.
+# Pull of a driven step towards tau0: by (7) that of about seven ants.
 DRIVEN = 0.5
-# Directions are within reach of the strongest from this share of the way from the weakest to it
-# on: lambda of the mean branching factor (Gambardella and Dorigo 1995).
+# A direction is within reach of the strongest if its pheromone is at least this share of the range
+# above the weakest: lambda of the mean branching factor (Gambardella and Dorigo 1995).
 LAMBDA = 0.05
 
-# Direction of a step by 3 * rows + columns + 4.
+# Direction of a step by index 3 * rows + columns + 4.
 _DIRECTION = np.array([0, 3, 0, 2, 0, 0, 0, 1, 0])
 _BITS = np.array([1, 2, 4, 8], np.uint8)
 
@@ -42,7 +42,7 @@ Tau = NDArray[np.float32]
 Back = Callable[
     [NDArray[np.float64], NDArray[np.float64]], tuple[NDArray[np.float64], NDArray[np.float64]]
 ]
-"""Returns where points x, y [m] were before the map moved."""
+"""Returns points x, y [m] before a motion of the map."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,8 +50,8 @@ class TrailRules:
     """Constants of the equations.
 
     Attributes:
-        alpha: weight of what is new, equations (7) and (8).
-        tau0: pheromone that every step begins with.
+        alpha: weight of the new value, equations (7) and (8).
+        tau0: initial pheromone of every step.
     """
 
     alpha: float = 0.1
@@ -63,10 +63,10 @@ PAPERS_RULES = TrailRules()
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TrailSnapshot:
-    """A trail at a moment; shares nothing that will change.
+    """An immutable copy of a trail.
 
     Attributes:
-        window: the cells it spans.
+        window: its window of cells.
         tau: see ``Tau``; read-only.
     """
 
@@ -77,7 +77,7 @@ class TrailSnapshot:
         self.tau.flags.writeable = False
 
     def on(self, window: Window) -> Tau:
-        """Return the trail on another window, 0 beyond this one."""
+        """Return the trail on another window, 0 outside of its own."""
         return _carried(self.tau, self.window, window)
 
 
@@ -89,30 +89,29 @@ class LivingTrail:
     """The trail of a mission.
 
     Attributes:
-        changes: goes up with each change.
+        changes: counter of changes.
     """
 
     def __init__(self, rules: TrailRules, before: TrailSnapshot = NO_TRAIL) -> None:
-        """Begin with what was ``before``."""
+        """Start with the trail ``before``."""
         self.changes = 0
         self._rules = rules
         self._window, self._tau = before.window, before.tau
 
     def snapshot(self) -> TrailSnapshot:
-        """Return the trail as it is now; it is copied once it changes."""
+        """Return a copy; the trail is copied on write."""
         return TrailSnapshot(self._window, self._tau)
 
     def follow(
         self, window: Window, steps: NDArray[np.uint8], changed: NDArray[np.int32] | None
     ) -> None:
-        """Follow the lattice: what it no longer has vanishes, what is new begins at tau0.
+        """Follow the lattice: removed steps vanish, new ones start at tau0.
 
         Args:
-            window: of the lattice.
+            window: window of the lattice.
             steps: step masks, (rows, cols).
-            changed: int32 (n, 2), cells (row, col) that have changed since the lattice before;
-                there the rest of the trail fades by equation (7). None where that is not known:
-                steps are compared.
+            changed: int32 (n, 2), cells (row, col) changed since the last lattice; there the rest
+                of the trail fades by equation (7). None if unknown: steps are compared.
         """
         if window != self._window:
             self._tau = _carried(self._tau, self._window, window)
@@ -120,7 +119,7 @@ class LivingTrail:
             self.changes += 1
         if changed is None:
             made = (self._tau > 0) != _legal(steps)
-            # The four directions of a cell at once.
+            # The four directions of a cell as one word.
             places = np.flatnonzero(made.view(np.uint32))
         else:
             at = changed[_inside(changed, window)].astype(np.intp)
@@ -134,11 +133,11 @@ class LivingTrail:
         flat[places] = after
 
     def strengthen(self, cells: NDArray[np.int32], amount: float) -> None:
-        """Strengthen the steps of a path by equation (8); beside them its cells fade by (7).
+        """Strengthen a path's steps by equation (8); the other steps at its cells fade by (7).
 
         Args:
-            cells: int32 (n, 2), the path's cells (row, col); what lies beyond the lattice, and
-                what is no step there, is left out.
+            cells: int32 (n, 2), the path's cells (row, col); those off the lattice, and moves that
+                are no legal step, are skipped.
             amount: delta phi.
         """
         moves = self._moves(cells)
@@ -156,23 +155,23 @@ class LivingTrail:
         flat.ravel()[moves] = kept * then + alpha * np.float32(amount)
 
     def fade(self, cells: NDArray[np.int32]) -> None:
-        """Let the steps between cells that were driven, int32 (n, 2), lose half."""
+        """Halve the pheromone on driven steps between cells, int32 (n, 2)."""
         moves = self._moves(cells)
         if len(moves):
             flat = self._writable().ravel()
             flat[moves] = self._faded(flat[moves], DRIVEN)
 
     def move(self, before: TrailSnapshot, back: Back, turns: int, cell_m: float) -> None:
-        """Take the trail from before the map moved, cell by cell from where each was.
+        """Move the trail with the map, cell by cell.
 
         Args:
-            before: the trail on the map as it was.
-            back: where a place was.
-            turns: quarter-turns, counter-clockwise, that the map has made.
+            before: the trail before the motion.
+            back: returns points before the motion.
+            turns: counter-clockwise rotation of the map in quarter-turns.
             cell_m: edge of a cell [m].
         """
         window = self._window
-        # Only cells that have steps; the four directions of a cell at once.
+        # Only cells that have steps; the four directions of a cell as one word.
         places = np.flatnonzero((self._tau > 0).view(np.uint32))
         if not len(places):
             return
@@ -217,8 +216,8 @@ def _legal(steps: NDArray[np.uint8]) -> NDArray[np.bool_]:
     return (steps[..., np.newaxis] & _BITS).astype(np.bool_)
 
 
-# By direction: from where its moves lead, and to where. One array at a time is several times as
-# fast as all four directions at once.
+# Slices by direction: origins of its moves, and their destinations. One direction at a time is
+# several times as fast as all four at once.
 _AHEAD, _BEHIND = np.s_[1:], np.s_[:-1]
 _MOVES: tuple[tuple[Any, Any], ...] = (
     (np.s_[:, _BEHIND], np.s_[:, _AHEAD]),
@@ -232,13 +231,13 @@ def mean_into(tau: NDArray[np.floating]) -> NDArray[np.float32]:
     """Return the mean pheromone on the steps into each cell, float32 (rows, cols); 0 for none.
 
     Args:
-        tau: (rows, cols, 4), 0 for no step; a step is legal both ways or not at all.
+        tau: (rows, cols, 4), 0 for no step; steps are legal both ways or not at all.
     """
     shape = tau.shape[:2]
     into, moves = np.zeros(shape), np.zeros(shape, np.uint8)
     for direction, (here, there) in enumerate(_MOVES):
         into[there] += tau[..., direction][here]
-        # Moves in are as many as moves out.
+        # There are as many moves into a cell as out of it.
         moves += tau[..., direction] > 0
     return np.divide(into, moves, out=into, where=moves > 0).astype(np.float32)
 
@@ -252,12 +251,12 @@ def strongest_into(tau: Tau) -> NDArray[np.float32]:
 
 
 def directions(tau: Tau) -> tuple[NDArray[np.int8], NDArray[np.float32]]:
-    """Return where the trail points to, and how decided it is, cell by cell.
+    """Return the direction of the trail in each cell, and how dominant it is.
 
     Returns:
-        The direction of the strongest step out of each cell, int8 (rows, cols), of equals the
-        first; -1 where there is no step. And its share of the pheromone on all steps out of the
-        cell, float32 (rows, cols), 0 where there is none.
+        The direction of the strongest step out of each cell, int8 (rows, cols), the first of
+        equals, -1 for no step; and its share of the pheromone on all steps out of the cell,
+        float32 (rows, cols), 0 for no step.
     """
     shape = tau.shape[:2]
     strongest, total = np.zeros(shape, np.float32), np.zeros(shape, np.float32)
@@ -273,7 +272,7 @@ def directions(tau: Tau) -> tuple[NDArray[np.int8], NDArray[np.float32]]:
 def branching(tau: Tau) -> float:
     """Return the mean lambda-branching factor: directions within reach of the strongest.
 
-    1 where every cell has one direction that stands out; 0 where there is no step.
+    It is 1 if one direction dominates in every cell; 0 without steps.
     """
     ways = [tau[..., direction] for direction in range(4)]
     strongest = np.maximum(np.maximum(ways[0], ways[1]), np.maximum(ways[2], ways[3]))

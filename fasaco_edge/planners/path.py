@@ -1,4 +1,4 @@
-"""A coverage path and the figures it is judged by."""
+"""A coverage path and its figures of merit."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from fasaco_edge.planners.cost import NO_WORK, SearchWork, count_turns, gap_to
 
 
 class Saved(NamedTuple):
-    """What a search took off the cost of the walk that it began with [s].
+    """Savings of a search against the walk that it began with [s].
 
     Attributes:
-        ants: by walks of ants, and by what local search made of these.
-        local_search: by local search on the first walk, or on the one that was still to be driven.
+        ants: by walks of ants, including local search on these.
+        local_search: by local search on the first walk, or on the walk left from before.
     """
 
     ants: float = 0.0
@@ -35,14 +35,15 @@ class CoveragePath:
     Attributes:
         cells: int32 (n, 2), read-only: cells (row, col) in order, the start first.
         planner: name of the planner.
-        seed: seed it was run with.
-        work: what was done for it; with planner, seed and problem this repeats the path.
-        cost_s: what it costs by the problem's cost [s].
-        lower_bound_steps: no walk that solves the problem has fewer steps; 0 where no
-            bound is known.
-        lower_bound_cost_s: none costs less by the problem's cost [s]; 0 where no bound is known.
-        saved: what ants and local search each saved of the walk that the search began with.
-        first_walk_s: how long the search took to its first complete walk [s]: measured,
+        seed: seed of the planner.
+        work: work of the search; with planner, seed and problem it reproduces the path.
+        cost_s: cost by the problem's prices [s].
+        lower_bound_steps: lower bound on the steps of any walk that solves the problem; 0 if
+            unknown.
+        lower_bound_cost_s: lower bound on the cost [s]; 0 if unknown.
+        saved: savings of ants and of local search against the first walk.
+        first_walk_s: time to the first complete walk [s]: measured, so the only value that is
+            not reproduced.
             so the one thing here that a repetition does not repeat.
     """
 
@@ -66,24 +67,24 @@ class CoveragePath:
 
     @property
     def gap(self) -> float | None:
-        """How far its cost is above the bound (``cost / bound - 1``); None without a bound."""
+        """Optimality gap (``cost / bound - 1``); None without a bound."""
         return gap_to(self.lower_bound_cost_s, self.cost_s)
 
 
 @dataclass(frozen=True, slots=True)
 class WalkFigures:
-    """How good a walk is.
+    """Figures of merit of a walk.
 
     Attributes:
         cells: distinct cells on the walk.
         steps: steps, each to a neighbouring cell.
         revisits: ``steps + 1 - cells``, visits beyond each cell's first.
-        recovered_cells: distinct cells visited at least twice (what the paper's text defines).
-        n_r_paper: revisits of the walk closed by the shortest way home, the nearest to
-            what Table I counts (entries less distinct cells, start to start); for
-            comparison with that table only.
+        recovered_cells: distinct cells visited at least twice (the definition in the paper's text).
+        n_r_paper: revisits of the walk closed by the shortest path home, nearest to the count of
+            Table I (entries less distinct cells, start to start); for comparison with that table
+            only.
         turns_90: quarter-turns between two steps.
-        turns_180: steps straight back.
+        turns_180: reversals.
     """
 
     cells: int
@@ -100,7 +101,7 @@ def walk_figures(lattice: CoverageLattice, cells: NDArray[np.int32]) -> WalkFigu
     visits = np.unique(cells, axis=0, return_counts=True)[1]
     steps = len(cells) - 1
     turns = count_turns(cells)
-    # Plain integers, or the kernel is compiled a second time for numpy's.
+    # Plain integers: numpy's would compile a second variant of the kernel.
     (first_row, first_col), (last_row, last_col) = cells[0].tolist(), cells[-1].tolist()
     last, first = lattice.local((last_row, last_col)), lattice.local((first_row, first_col))
     way_home = len(shortest_walk(lattice.steps, last, first)) - 1
@@ -117,7 +118,7 @@ def walk_figures(lattice: CoverageLattice, cells: NDArray[np.int32]) -> WalkFigu
 
 
 def common_beginning(first: NDArray[np.generic], second: NDArray[np.generic]) -> int:
-    """Return how many rows two arrays (n, 2) and (m, 2) have in common at their beginning."""
+    """Return the length of the common prefix of two arrays (n, 2) and (m, 2), in rows."""
     count = min(len(first), len(second))
     differ = (first[:count] != second[:count]).any(axis=1)
     return int(np.argmax(differ)) if differ.any() else count

@@ -1,7 +1,7 @@
-"""The interface of all planners: what a search reports, and what ends it: time, work, quality.
+"""Interface of all planners: progress of a search, and stopping criteria: time, work, quality.
 
-Work is counted, so that the same work can be done again. Free of the compiler, for those who
-only handle what a search showed.
+Work is counted, so it can be repeated. Imports no numba, so that code that only reads search
+results stays light.
 """
 
 from __future__ import annotations
@@ -25,13 +25,13 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class SearchProgress:
-    """State of a running search, as a stopping criterion sees it.
+    """State of a running search, as seen by a stopping criterion.
 
     Attributes:
-        work: what it has done so far.
+        work: work so far.
         cost_s: cost of the best walk so far [s].
-        steps: its steps.
-        lower_bound_cost_s: no walk costs less [s]; 0 where no bound is known.
+        steps: steps of that walk.
+        lower_bound_cost_s: lower bound on the cost [s]; 0 if unknown.
     """
 
     work: SearchWork
@@ -41,12 +41,12 @@ class SearchProgress:
 
     @property
     def gap(self) -> float | None:
-        """How far above the bound the cost of the best walk is; None without a bound."""
+        """Optimality gap of the best walk; None without a bound."""
         return gap_to(self.lower_bound_cost_s, self.cost_s)
 
 
-# Called again and again while a search runs; True ends it with the best walk it has. There
-# always is one.
+# Called repeatedly while a search runs; True ends it with the best walk so far, which always
+# exists.
 StoppingCriterion = Callable[[SearchProgress], bool]
 
 
@@ -57,7 +57,7 @@ def never(progress: SearchProgress) -> bool:
 
 @dataclass(slots=True)
 class TimeBudget:
-    """Stop after some seconds of wall time, counted from the creation of this object."""
+    """Stops after some seconds of wall time, counted from the creation of this object."""
 
     seconds: float
     started: float = field(default_factory=time.monotonic)
@@ -68,7 +68,7 @@ class TimeBudget:
 
 @dataclass(frozen=True, slots=True)
 class WorkLimit:
-    """Stop after as much work as an earlier search did: this repeats its path."""
+    """Stops after the work of an earlier search, which reproduces its path."""
 
     work: SearchWork
 
@@ -78,7 +78,7 @@ class WorkLimit:
 
 @dataclass(frozen=True, slots=True)
 class GapReached:
-    """Stop when the walk is proven to cost at most ``target`` more than the best: 0.01, 1 %.
+    """Stops when the optimality gap is at most ``target``: 0.01 is 1 %.
 
     Without a bound this never stops a search.
     """
@@ -92,7 +92,7 @@ class GapReached:
 
 @dataclass(frozen=True, slots=True)
 class Interrupt:
-    """Stop when another thread sets ``asked``."""
+    """Stops when another thread sets ``asked``."""
 
     asked: threading.Event = field(default_factory=threading.Event)
 
@@ -102,13 +102,13 @@ class Interrupt:
 
 @dataclass(slots=True)
 class StopRecorder:
-    """Stop when another criterion does, and record at which calls: ``StopAt`` repeats it exactly.
+    """Stops with another criterion, and records at which calls; ``StopAt`` reproduces that.
 
-    The work of the path alone would not: a repair that was stopped and gained little is
-    followed by a search, of which this keeps the stops, too.
+    The work of the path would not suffice: a stopped repair with little gain is followed by a
+    search, whose stops are recorded, too.
 
     Attributes:
-        criterion: the other one.
+        criterion: the other criterion.
         stops: numbers of the calls that returned True, from 1.
     """
 
@@ -126,7 +126,7 @@ class StopRecorder:
 
 @dataclass(slots=True)
 class StopAt:
-    """Stop at the calls that a ``StopRecorder`` recorded: this repeats its path."""
+    """Stops at the calls that a ``StopRecorder`` recorded, which reproduces its path."""
 
     stops: Sequence[int]
     _calls: int = 0
@@ -137,7 +137,7 @@ class StopAt:
 
 
 class AnyOf:
-    """Stop when one of several criteria is met; with none, never."""
+    """Stops when one of several criteria is met; with none, never."""
 
     __slots__ = ("criteria",)
 
@@ -153,16 +153,16 @@ class ColonySnapshot:
     """The colony after a cohort, or where local search restarts.
 
     Attributes:
-        window: which cells of the lattice ``trail`` spans.
+        window: window of the lattice that ``trail`` spans.
         cell_m: edge of a cell [m].
-        trail: float32 (rows, cols): pheromone on the moves into a cell, the mean of them after a
-            cohort, the strongest of a living trail; 0 where the cell is not coverable.
-        cohort: index of the cohort that walked last, from 0.
+        trail: float32 (rows, cols): pheromone on the moves into a cell: their mean after a cohort,
+            the strongest for a living trail; 0 if the cell is not coverable.
+        cohort: index of the last cohort, from 0.
         velocity: its velocity [cells/move].
-        ants: how many ants have walked so far.
+        ants: number of ants so far.
         best_steps: steps of the best walk so far.
         tau: float32 (rows, cols, 4): pheromone on the step out of each cell in each direction, 0
-            for no step; None where only ``trail`` is known.
+            for no step; None if only ``trail`` is known.
     """
 
     window: Window
@@ -183,7 +183,7 @@ def ignore(snapshot: ColonySnapshot) -> None:
 
 
 class CoveragePlanner(Protocol):
-    """Plans a walk that covers a problem's cells."""
+    """Plans a walk that covers the cells of a problem."""
 
     def plan(
         self, problem: CoverageProblem, stop: StoppingCriterion, observe: Observer
@@ -192,7 +192,7 @@ class CoveragePlanner(Protocol):
 
         Args:
             problem: what to cover, from where.
-            stop: when to end early; the work done until then travels with the path.
-            observe: is called with a snapshot after each cohort.
+            stop: stopping criterion; the path holds the work done until then.
+            observe: called with a snapshot after each cohort.
         """
         ...

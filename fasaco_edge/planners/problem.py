@@ -1,7 +1,7 @@
-"""The coverage problem: which cells to cover, from where, at what cost; its arrays for the kernels.
+"""Coverage problem: cells to cover, start, cost; and its arrays for the kernels.
 
-In these a cell is a flat index. Ants walk on ``Graph``, the lattice as it is; local search
-on ``FramedGround``, the lattice with a frame around it.
+In these arrays a cell is a flat index. Ants walk on ``Graph``, the plain lattice; local search
+works on ``FramedGround``, the lattice with a border of one cell.
 """
 
 from __future__ import annotations
@@ -33,22 +33,24 @@ class CoverageProblem:
     """Cover every cell of ``to_cover`` by a walk over the lattice that begins at ``start``.
 
     Attributes:
-        lattice: where the robot can be, and which steps it can make.
+        lattice: the cells where the robot fits, and their legal steps.
         start: the cell (row, col) the walk begins in.
-        to_cover: bool (rows, cols), read-only: coverable cells that are reachable from
-            the start and still to be covered.
-        unreachable: bool (rows, cols), read-only: coverable cells that are asked for but
-            cannot be reached; reported, never attempted.
-        end: the cell (row, col) the walk ends in, which need not be one to cover; the
-            start itself for a walk back home; None for anywhere.
-        cost: what a walk is to minimise.
-        before: int32 (n, 2), the walk that was still to be driven when the problem changed
-            to this one; a planner that repairs keeps what is still valid of it. None for none.
-        is_full: whether all is to be searched, beginning with ``before``, and not only repaired.
-        attempt: where all of ``before`` is valid and is only to be improved, the number of the
-            attempt, from 1: each looks elsewhere. 0 for a plan that is needed.
-        trail: the mission's living trail, for a planner whose ants walk on it; None for none.
+        to_cover: bool (rows, cols), read-only: coverable cells, reachable from the start, that
+            still need a visit.
+        unreachable: bool (rows, cols), read-only: coverable cells that are asked for but not
+            reachable; reported, never attempted.
+        end: the cell (row, col) where the walk ends, which need not be one to cover; the start
+            for a closed walk; None for anywhere.
+        cost: the cost to minimise.
+        before: int32 (n, 2), the undriven rest of the previous walk; a repair keeps its valid
+            parts. None for none.
+        is_full: whether to search everything, starting from ``before``, not only to repair.
+        attempt: number of an attempt to improve a valid ``before``, from 1: each looks at other
+            places. 0 for a needed plan.
+        trail: the mission's living trail, for a planner whose ants start from it; None for none.
         whole: the problem that this one is the end of, see ``after``: a path that solves this
+            one begins with the lead, and its figures are those of the whole. None for a problem
+            that is whole itself.
             one begins with what comes before, and its figures are those of the whole. None for
             a problem that is whole itself.
     """
@@ -78,22 +80,22 @@ class CoverageProblem:
         attempt: int = 0,
         reachable: NDArray[np.bool_] | None = None,
     ) -> CoverageProblem:
-        """Pose the problem of covering what is reachable and not yet ``covered``.
+        """Pose the problem of covering the reachable cells that are not yet ``covered``.
 
         Args:
             lattice: the planning grid.
             start: cell (row, col).
             covered: bool (rows, cols), cells that need no visit; None for none.
-            end: cell (row, col) to end in; the start for home, None for anywhere.
-            cost: of steps and turns; by default of steps alone.
-            before: int32 (n, 2), the walk that was still to be driven; None for none.
+            end: cell (row, col) of the end; the start for home, None for anywhere.
+            cost: prices of steps and turns; by default of steps alone.
+            before: int32 (n, 2), the undriven rest of the previous walk; None for none.
             attempt: see above.
-            reachable: bool (rows, cols), the cells that can be reached from the start, where
-                they are known; None to search for them.
+            reachable: bool (rows, cols), the cells reachable from the start, if known; None to
+                search for them.
 
         Raises:
-            StartOutsideMap, EndOutsideMap: the lattice does not span the start, or the end.
-            StartBlocked, EndBlocked: the robot does not fit there, or the place is unknown.
+            StartOutsideMap, EndOutsideMap: start or end is off the lattice.
+            StartBlocked, EndBlocked: the robot does not fit there, or the cell is unknown.
             EndUnreachable: no walk leads from the start to the end.
             NothingToCover: no cell is left to cover.
         """
@@ -112,10 +114,10 @@ class CoverageProblem:
         return cls(lattice, start, to_cover, unreachable, end, cost, before, attempt)
 
     def after(self, driven: int) -> CoverageProblem:
-        """Return what remains after so many steps of the walk ``before``.
+        """Return the problem that remains after some steps of the walk ``before``.
 
         Raises:
-            NothingToCover: all is covered on the way.
+            NothingToCover: these steps cover everything.
         """
         assert self.before is not None
         lead, rest = self.before[:driven], self.before[driven:]
@@ -130,7 +132,7 @@ class CoverageProblem:
 
     @property
     def lead(self) -> NDArray[np.int32]:
-        """The walk before this problem begins, int32 (n, 2)."""
+        """The part of the whole walk before this problem begins, int32 (n, 2)."""
         nothing = np.empty((0, 2), np.int32)
         if self.whole is None or self.whole.before is None or self.before is None:
             return nothing
@@ -138,7 +140,7 @@ class CoverageProblem:
 
     @property
     def only_better(self) -> bool:
-        """Whether there is a valid walk already, and a better one is looked for."""
+        """Whether a valid walk exists already, and a better one is wanted."""
         return self.attempt > 0
 
     @property
@@ -148,17 +150,17 @@ class CoverageProblem:
 
     @property
     def closed(self) -> bool:
-        """Whether the walk ends where it begins."""
+        """Whether the walk is closed."""
         return self.end == self.start
 
     @property
     def flat_start(self) -> int:
-        """The start as an index ``row * cols + col`` of the lattice's arrays, flattened."""
+        """The start as a flat index ``row * cols + col``."""
         return self._flat(self.start)
 
     @property
     def flat_end(self) -> int:
-        """The end as such an index, -1 for anywhere."""
+        """The end as a flat index, -1 for anywhere."""
         return -1 if self.end is None else self._flat(self.end)
 
     def _flat(self, cell: Cell) -> int:
@@ -172,15 +174,15 @@ class CoverageProblem:
         return np.column_stack((rows + window.row0, cols + window.col0)).astype(np.int32)
 
     def cost_us(self, walk: NDArray[np.int32]) -> int:
-        """Return what a walk of flat or framed indices, int32 (n,), costs [us]."""
+        """Return the cost of a walk of flat or framed indices, int32 (n,) [us]."""
         return int(walk_cost(walk, self.cost.step_us, self.cost.quarter_turn_us))
 
     def led_to_end(self, walk: NDArray[np.int32]) -> NDArray[np.int32]:
-        """Return a walk of flat indices, int32 (n,), led on to the end by a shortest way."""
+        """Return a walk of flat indices, int32 (n,), extended to the end by a shortest path."""
         if self.end is None:
             return walk
         cols = self.lattice.window.cols
-        # Plain integers, or the kernel is compiled a second time for numpy's.
+        # Plain integers: numpy's would compile a second variant of the kernel.
         here, end = divmod(int(walk[-1]), cols), self.lattice.local(self.end)
         way = shortest_walk(self.lattice.steps, here, end)
         return np.concatenate((walk, way[1:, 0] * np.int32(cols) + way[1:, 1]))
@@ -235,12 +237,12 @@ def scratch_for(graph: Graph) -> Scratch:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FramedGround:
-    """The problem's steps and cells to cover, framed, and conversion of flat indices.
+    """The problem's steps and cells to cover with a border, and conversion of flat indices.
 
     Attributes:
-        rows, cols: shape of the lattice, without the frame.
+        rows, cols: shape of the lattice, without the border.
         ground: cells as flat indices of the framed lattice.
-        prices: of the problem's walks.
+        prices: prices of walks.
     """
 
     rows: int
@@ -250,7 +252,7 @@ class FramedGround:
 
     @classmethod
     def of(cls, problem: CoverageProblem) -> FramedGround:
-        """Frame a problem's lattice."""
+        """Add a border to a problem's lattice."""
         rows, cols = problem.to_cover.shape
         steps = np.pad(problem.lattice.steps, FRAME)
         needed = np.pad(problem.to_cover.astype(np.int32), FRAME)
@@ -263,15 +265,15 @@ class FramedGround:
 
     @property
     def width(self) -> int:
-        """Cells from one row to the next."""
+        """Offset between the flat indices of neighbouring rows."""
         return self.cols + 2 * FRAME
 
     def framed(self, walk: NDArray[np.int32]) -> NDArray[np.int32]:
-        """Return flat cells of the lattice, int32 (n,), as those of the framed one."""
+        """Convert flat indices of the lattice, int32 (n,), to those of the framed one."""
         row, col = np.divmod(walk, np.int32(self.cols))
         return ((row + FRAME) * self.width + col + FRAME).astype(np.int32)
 
     def unframed(self, walk: NDArray[np.int32]) -> NDArray[np.int32]:
-        """Return flat cells of the framed lattice, int32 (n,), as those of the lattice."""
+        """Convert flat indices of the framed lattice, int32 (n,), to those of the lattice."""
         row, col = np.divmod(walk, np.int32(self.width))
         return ((row - FRAME) * self.cols + col - FRAME).astype(np.int32)

@@ -1,8 +1,8 @@
-"""The registry of planners, the only list of their names.
+"""Registry of planners, the only list of their names.
 
 A new planner is a factory in a module here, a row of ``PLANNERS`` and a test; configuration and
-command line take the names from here. Factories are imported when a planner is made: to read
-the names does not load the compiler.
+command line take the names from here. Factories are imported on use, so that reading the names does
+not load numba.
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ class Entry(NamedTuple):
     Each takes the colony's configuration and a number of threads.
 
     Attributes:
-        factory: the planner as its source has it.
-        about: what it is, for the command line's help.
-        with_local_search: the planner with local search; "" where there is none.
+        factory: the planner as published.
+        about: description for the command line's help.
+        with_local_search: the planner with local search; "" for none.
     """
 
     factory: str
@@ -48,7 +48,7 @@ PLANNER_NAMES = tuple(PLANNERS)
 def planner_of(
     name: str, colony: ColonyConfig, threads: int = 1, local_search: bool = False
 ) -> CoveragePlanner:
-    """Return the planner ``name``; with local search where that is asked for and there is one."""
+    """Return the planner ``name``; with local search if requested and available."""
     entry = PLANNERS[name]
     place = (local_search and entry.with_local_search) or entry.factory
     module, _, factory = place.partition(":")

@@ -1,6 +1,6 @@
-"""The walk that was still to be driven, made to solve the problem as it is now.
+"""Walk from before: the undriven rest of a walk, completed to solve the present problem.
 
-What is valid of it stays as it is, cell by cell: the planners go on from there.
+Its valid parts stay as they are, cell by cell; planners start from the result.
 """
 
 from __future__ import annotations
@@ -11,30 +11,30 @@ from numpy.typing import NDArray
 from fasaco_edge.kernels.local_search.repair import keep_legal, put_in_new
 from fasaco_edge.planners.problem import CoverageProblem, FramedGround
 
-# The robot is about to drive these cells: about 5 m at usual tool widths.
+# Number of cells just ahead of the robot: about 5 m at usual tool widths.
 HELD_CELLS = 18
 
 
 def has_walk(problem: CoverageProblem) -> bool:
-    """Return whether there is a walk that was still to be driven."""
+    """Return whether there is a walk from before."""
     return problem.before is not None and len(problem.before) > 0
 
 
 def can_repair(problem: CoverageProblem) -> bool:
-    """Return whether there is a walk to repair, and that is enough."""
+    """Return whether there is a walk from before, and repairing it suffices."""
     return not problem.is_full and has_walk(problem)
 
 
 def completed(
     problem: CoverageProblem, framed: FramedGround, before: NDArray[np.int32], held: int = 0
 ) -> NDArray[np.int32]:
-    """Return a walk that solves ``problem`` and keeps what is valid of ``before``.
+    """Return a walk that solves ``problem`` and keeps the valid parts of ``before``.
 
     Args:
-        problem: as it is now.
+        problem: the present problem.
         framed: its ground.
-        before: int32 (n, 2), the walk that was still to be driven, cells (row, col).
-        held: number of leading visits that are kept if possible.
+        before: int32 (n, 2), the walk from before, cells (row, col).
+        held: number of leading visits to keep if possible.
 
     Returns:
         Framed cells, int32 (m,).
@@ -52,7 +52,7 @@ def completed(
 def framed_cells(
     problem: CoverageProblem, framed: FramedGround, before: NDArray[np.int32]
 ) -> NDArray[np.int32]:
-    """Return the cells of ``before`` that the lattice still spans, as framed ones."""
+    """Return the cells of ``before`` that are still on the lattice, as framed ones."""
     window = problem.lattice.window
     rows, cols = before[:, 0] - window.row0, before[:, 1] - window.col0
     inside = (rows >= 0) & (rows < window.rows) & (cols >= 0) & (cols < window.cols)

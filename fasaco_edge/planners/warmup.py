@@ -1,4 +1,4 @@
-"""Warm-up: compile, or load from the cache, every kernel that a mission uses."""
+"""Warm-up: compiles all kernels of a mission, or loads them from the cache."""
 
 from __future__ import annotations
 
@@ -53,9 +53,9 @@ def warm_up(report: Callable[[str], None] | None = None, *, backward: bool = Fal
     """Run every kernel once on a tiny map.
 
     Args:
-        report: gets each stage's name before it begins.
-        backward: the last stage first. Of two processes that compile into one cache from both
-            ends, each loads what the other one has compiled by then.
+        report: called with each stage's name before it begins.
+        backward: whether to run the stages in reverse order. Of two processes that fill one
+            cache from both ends, each loads what the other one has already compiled.
     """
     room = _TinyRoom()
     for name in reversed(STAGES) if backward else STAGES:
@@ -66,10 +66,10 @@ def warm_up(report: Callable[[str], None] | None = None, *, backward: bool = Fal
 
 
 class _TinyRoom:
-    """Sixteen free cells, and what is planned in them."""
+    """Sixteen free cells, and plans on them."""
 
     def __init__(self) -> None:
-        # Read-only, as maps off the bus are: numba compiles for that apart.
+        # Read-only, as maps from the bus are: numba compiles a separate variant for that.
         self.grid = OccupancyGrid(
             GridGeometry(4, 4, 1.0, Pose2D(0.0, 0.0)), np.zeros((4, 4), np.int8)
         )
@@ -93,7 +93,7 @@ class _TinyRoom:
         return search.plan(self.costly, _perturbed, ignore)
 
     def framed(self) -> tuple[FramedGround, NDArray[np.int32]]:
-        """Return the ground with a frame, and the walk as its indices."""
+        """Return the framed ground, and the walk as its indices."""
         framed = FramedGround.of(self.costly)
         cells = (self.path.cells @ (self.lattice.window.cols, 1)).astype(np.int32)
         return framed, framed.framed(cells)
@@ -122,7 +122,7 @@ def _take_areas(room: _TinyRoom) -> None:
 
 
 def _take_local_search(room: _TinyRoom) -> None:
-    """Improve and perturb a walk even if it is proven that none is better, as no search does."""
+    """Improve and perturb a walk even if it is proven optimal, which no search does."""
     framed, walk = room.framed()
     region = WalkRegion(framed.rows, framed.cols, 4 * walk.size, 1)
     (box,) = regions_of(framed, room.costly.cells, 0)

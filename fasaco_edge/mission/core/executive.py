@@ -27,9 +27,9 @@ from fasaco_edge.mission.orders.sequencer import Sequencer
 # flickering pose must not keep the planner busy.
 PATIENCE_S = 1.0
 # A robot that stands for so long on its path gets the path again [s]: the follower may have lost
-# it, or stopped for an obstacle that is gone. Not sooner: it may be waiting for somebody to pass, or
-# be driving out of a corner, which another path would end. By the robot's clock, as a simulation may
-# run at twenty times the real speed.
+# it, or stopped for an obstacle that is gone. Not sooner: it may be waiting for somebody to pass,
+# or be driving out of a corner, which another path would end. By the robot's clock, as a
+# simulation may run at twenty times the real speed.
 STANDING_S, STANDING_M = 30.0, 0.1
 # A robot that stands beside its path gets a new one after this time [s]: an obstacle may separate
 # it from the path.

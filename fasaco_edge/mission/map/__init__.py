@@ -1,1 +1,1 @@
-"""The map side of a mission: frames, the newest map, the reachable area."""
+"""Map side of a mission: frames, the newest map, the reachable area."""

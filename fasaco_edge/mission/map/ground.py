@@ -1,7 +1,7 @@
-"""The ground: the lattice over the newest map, with the keep-out zones and without.
+"""Ground: the lattice over the newest map, with and without keep-out zones.
 
-A robot that sweeps floor plans on a lattice of stands, see ``grid.floor_map``; one that counts
-cells, as the planners were published, on the centres of cells.
+If floor is swept, the lattice is one of stands, see ``grid.floor_map``; if cells are counted, as in
+the published planners, one of cell centres.
 """
 
 from __future__ import annotations
@@ -22,14 +22,14 @@ Maps = tuple[OccupancyGrid, OccupancyGrid]
 
 
 class Ground:
-    """Follows the newest map.
+    """Lattices and floor, updated with each map.
 
     Attributes:
-        free: the lattice over it.
-        lattice: the same without the cells the robot must keep out of.
-        change: how ``lattice`` came from the one before; None before there is one.
-        floor: the floor of ``lattice``; None for one of centres.
-        free_floor: that of ``free``.
+        free: the lattice without keep-out zones.
+        lattice: the lattice with the cells of keep-out zones removed.
+        change: change from the previous ``lattice``; None before there is one.
+        floor: the floor under ``lattice``; None where cells are counted.
+        free_floor: the floor under ``free``.
     """
 
     def __init__(self, config: MissionConfig) -> None:
@@ -40,11 +40,11 @@ class Ground:
         self.free_floor: FloorMap | None = None
         self._config = config
         self._keep_out: tuple[Polygon, ...] = ()
-        # Over centres.
+        # The lattice of cell centres.
         self._plain: CoverageLattice | None = None
 
     def begin(self, grid: OccupancyGrid) -> LatticeChange:
-        """Take the first map; return what it shows, of centres.
+        """Take the first map; return its lattice of cell centres.
 
         Raises:
             MapTooLarge, MapTooFar: see ``LatticeChange.first`` and ``FloorMap``.
@@ -56,11 +56,11 @@ class Ground:
         return change
 
     def follow(self, maps: Maps, within: Window | None) -> LatticeChange:
-        """Follow from one map to the next; return what has changed, of centres.
+        """Update to the next map; return the change of the lattice of cell centres.
 
         Args:
-            maps: the map before and the new one.
-            within: which pixels may differ, see ``LatticeChange.between``.
+            maps: the previous map and the new one.
+            within: window of the pixels that may differ, see ``LatticeChange.between``.
 
         Raises:
             MapTooLarge, MapTooFar: see there.
@@ -82,19 +82,18 @@ class Ground:
         return plain
 
     def keep_out(self, polygons: tuple[Polygon, ...], grid: OccupancyGrid | None) -> None:
-        """Keep out of these polygons (x, y) [m] from now on, and of no others."""
+        """Replace the keep-out polygons (x, y) [m]."""
         is_other, self._keep_out = polygons != self._keep_out, polygons
         if grid is not None and (is_other or self.free_floor is None):
             self._set_free(None, grid)
 
     def is_decided(self, window: Window) -> NDArray[np.bool_] | None:
-        """Return for which cells of a window the map shows whether the robot fits at the middle.
+        """Return for which cells of a window the map shows whether the robot fits at the centre.
 
-        Where it does not show that yet, the robot's stand is as far as the map is known, and will
-        be elsewhere soon.
+        For the others the stand lies at the border of the known map, and will soon be elsewhere.
 
         Returns:
-            bool (rows, cols); None where cells are counted, or another window is known.
+            bool (rows, cols); None where cells are counted, or for another window.
         """
         plain = self._plain
         if self.floor is None or plain is None or plain.window != window:
@@ -103,7 +102,7 @@ class Ground:
         return decided
 
     def place_of(self, cell: Cell) -> Point | None:
-        """Return where the robot should be in a cell, x, y [m]; None for nowhere."""
+        """Return the robot's position for a cell, x, y [m]; None if it cannot stand there."""
         floor = self.floor
         if floor is None:
             cell_m = self._config.footprint.cell_m
@@ -111,9 +110,9 @@ class Ground:
         return floor.stand_xy(cell)
 
     def _set_free(self, change: LatticeChange | None, grid: OccupancyGrid) -> None:
-        """Take the lattice from the change of a plain one, or from a floor seen for the first time.
+        """Take over the changed lattice of cell centres, or the lattice of a new floor.
 
-        A lattice without the same cells as before has changed in no others.
+        If the lattice object is new but its cells are equal, no cell counts as changed.
         """
         before, free = self.lattice, self.free_floor
         if free is None:

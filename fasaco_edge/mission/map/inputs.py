@@ -1,10 +1,10 @@
-"""Incoming maps and poses: which frame is active, whether they keep coming, and jumps of the pose.
+"""Incoming maps and poses: selection of the active frame, timeouts, and jumps of the pose.
 
-Map and pose decide the frame together, never the one that came first: a frame becomes active as
-soon as a map and a pose have come in it. From then on maps and poses in others are refused, but
-the newest map of another one is held: where map and poses come in that for ``PATIENCE_S``, and no
-pose in the active one, it takes its place. The frame of a ledger from before a restart is active
-from the start. So a single message in a wrong frame changes nothing, whenever it comes.
+A frame becomes active once a map and a pose have arrived in it; neither decides alone. From then on
+maps and poses in other frames are refused, but the newest map in another frame is kept. If map and
+poses arrive in that frame for ``PATIENCE_S``, and no pose arrives in the active one, that frame
+becomes active. The frame of a ledger from before a restart is active from the start. So a single
+message in a wrong frame changes nothing, whenever it arrives.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from fasaco_edge.mission.coverage.ledger import JUMP_CELLS
 
 # Time for which map and poses must arrive in another frame alone before it becomes active [s].
 PATIENCE_S = 10.0
-# Poses with gaps longer than this are no stream [s].
+# Longer gaps between poses restart that time [s].
 GAP_S = 3.0
 
 
@@ -28,7 +28,7 @@ class FrameSelector:
     """Selects the active frame; holds the newest map and pose of two frames at most.
 
     Attributes:
-        active: name of the frame; "" as long as there is none.
+        active: name of the active frame; "" for none.
     """
 
     def __init__(self) -> None:
@@ -38,7 +38,7 @@ class FrameSelector:
         self._poses: dict[str, tuple[StampedPose, float]] = {}
         # The other frame in which map and poses arrive, and since when.
         self._rival, self._rival_since = "", 0.0
-        # Whether a reset has left the decision to what comes next.
+        # Whether a reset has left the decision to the next map and pose.
         self._is_open = False
 
     def activate(self, frame: str) -> None:
@@ -56,10 +56,9 @@ class FrameSelector:
         return True
 
     def note_patches(self, patches: Sequence[MapPatch]) -> tuple[list[MapPatch], list[FasacoError]]:
-        """Lay updates over the map of a frame that is not active.
+        """Apply updates to the map of a frame that is not active.
 
-        Returns:
-            Those of the active frame; and why the others are refused.
+        Returns: The updates of the active frame; and the faults of the others.
         """
         others = [frame for frame in self._maps if self.active not in ("", frame)]
         faults: list[FasacoError] = []
@@ -91,13 +90,13 @@ class FrameSelector:
 
     @property
     def _may_change(self) -> bool:
-        """Whether the next map and pose in another frame decide at once."""
+        """Whether the next map and pose in another frame activate it at once."""
         return self._is_open or not self.active
 
     def reset(self) -> None:
-        """Let the next map and pose decide; what was received counts until then.
+        """Let the next map and pose select the frame; the present ones count until then.
 
-        Neither need come again: a latched map does not, nor the pose of a robot that stands.
+        A latched map is not repeated, nor is the pose of a standing robot.
         """
         self._rival, self._is_open = "", True
         agreed = [frame for frame in self._poses if frame in self._maps]
@@ -107,7 +106,7 @@ class FrameSelector:
 
     @property
     def newest_map(self) -> OccupancyGrid | None:
-        """The map in the active frame; the newest of all as long as none is active."""
+        """The map in the active frame; the newest of all while none is active."""
         if self.active:
             return self._maps.get(self.active)
         return next(reversed(self._maps.values()), None)
@@ -133,7 +132,7 @@ class FrameSelector:
         )
 
     def why_no_pose(self, map_frame: str) -> str:
-        """Return why there is no pose, or none any more, in the frame of the map."""
+        """Return why there is no pose, or no current one, in the frame of the map."""
         frame = self.last_pose_frame
         if frame in ("", map_frame):
             return "no pose yet"
@@ -156,11 +155,11 @@ class FrameSelector:
 
 
 class InputMonitor:
-    """Watches when maps and poses come, and how far poses lie apart. All times are [s].
+    """Timeouts of maps and poses, and jumps between poses. All times are [s].
 
     Attributes:
-        doubt: why the robot may be elsewhere than its path says; "" where it is not. Stays until
-            a plan was made from there, or the robot turned out to be on its path.
+        doubt: why the robot may not be where its path says; "" for none. It is cleared when a plan
+            from the new position arrives, or the robot is on its path after all.
         doubt_since: when that began.
     """
 
@@ -171,7 +170,7 @@ class InputMonitor:
         self._pose: Pose2D | None = None
         self._pose_at = 0.0
         self._map_at = 0.0
-        # The plan requested from the doubtful pose.
+        # Number of the plan requested from the doubtful pose.
         self._answered_by = -1
 
     def note_map(self, now: float) -> None:
@@ -179,13 +178,13 @@ class InputMonitor:
         self._map_at = now
 
     def note_pose(self, pose: Pose2D, now: float) -> bool:
-        """Note a pose; return whether the way to it from the last one is unknown."""
+        """Note a pose; return whether the track from the last one is unknown."""
         last, lost = self._pose, self.is_pose_lost(now)
         self._pose, self._pose_at = pose, now
         if last is None:
             return False
         distance = math.hypot(pose.x - last.x, pose.y - last.y)
-        # Poses close in time may be some cells apart; after a loss half a cell is a gap.
+        # Consecutive poses may be some cells apart; after a timeout half a cell is a gap.
         jumped = distance > (0.5 if lost else JUMP_CELLS) * self._config.footprint.cell_m
         if jumped:
             how = f"came back {distance:.2f} m from where it was lost"
@@ -203,16 +202,16 @@ class InputMonitor:
         self.doubt = ""
 
     def note_request(self, number: int) -> None:
-        """Note that plan ``number`` is made from where the robot is now."""
+        """Note that plan ``number`` starts at the robot's present position."""
         self._answered_by = number
 
     def note_plan(self, number: int) -> None:
-        """Note that plan ``number`` is there."""
+        """Note that plan ``number`` has arrived."""
         if number == self._answered_by:
             self.doubt = ""
 
     def is_pose_lost(self, now: float) -> bool:
-        """Tell whether poses have stopped coming."""
+        """Tell whether poses have timed out."""
         limit = self._config.policy.lost_pose_s
         return self._pose is not None and 0 < limit < now - self._pose_at
 

@@ -1,8 +1,8 @@
-"""Loop closures: the mapper corrects the whole map, and moves map and pose at once.
+"""Loop closures: SLAM corrects the whole map, and moves map and pose at once.
 
-The ledger's cells are places in the map's frame: after such a jump it is unknown which of them
-the tool passed over, only that the map was somewhere between its old place and the new one, as
-far as it moved at all. What still counts is what was covered wherever in between it lay.
+The ledger's cells are places in the map frame. After such a jump it is unknown which of them the
+tool passed over, only that the map was somewhere between its old position and the new one. Only
+cells that were covered under every possible intermediate map position still count.
 """
 
 from __future__ import annotations
@@ -31,22 +31,23 @@ from fasaco_edge.mission.coverage.floor_tiles import (
 )
 from fasaco_edge.mission.coverage.ledger import Cells, LedgerSnapshot
 
-# This many cells change between free and blocked in one map, and this share of those that were
-# known: doors and passers-by change less.
+# Threshold on the cells that change between free and blocked with one map: number, and share of
+# those known before. Doors and passers-by change fewer.
 LEAST_CELLS, LEAST_SHARE = 20, 0.1
 # Smaller motions are ignored: [m], [rad].
 STILL_M, STILL_RAD = 0.02, math.radians(0.2)
-# How far a cell's centre may lie from the middle of four [cells] to be one with the nearest.
+# A point this close to a cell's centre [cells] belongs to that cell alone, not to its four
+# neighbours.
 NEAR = 0.1
-# Where the map may have lain, as shares of its motion.
+# Intermediate map positions that are tested, as shares of the motion.
 BETWEEN = (0.25, 0.5, 0.75, 1.0)
-# Of pixels, at every pixel on their way, up to so many places: what is left of motions of more than
-# 0.4 m, which are rare, is looked at more coarsely.
+# For swept floor one position per pixel of the motion is tested, up to this many: motions of more
+# than 0.4 m, which are rare, are tested more coarsely.
 MOST_BETWEEN = 16
 
 
 def has_moved(change: LatticeChange) -> bool:
-    """Tell whether a map shows walls elsewhere all over."""
+    """Tell whether a map shows the walls at other places all over."""
     if change.before is None or len(change.cells) < LEAST_CELLS:
         return False
     then, now = (
@@ -54,7 +55,7 @@ def has_moved(change: LatticeChange) -> bool:
         for lattice in (change.before, change.after)
     )
     changed = int(np.count_nonzero((then != UNKNOWN) & (now != UNKNOWN) & (then != now)))
-    # The whole lattice is counted only if necessary: this runs at every map.
+    # The whole lattice is counted only if necessary: this runs with every map.
     return changed >= LEAST_CELLS and changed >= LEAST_SHARE * int(
         np.count_nonzero(change.before.states != UNKNOWN)
     )
@@ -62,13 +63,13 @@ def has_moved(change: LatticeChange) -> bool:
 
 @dataclass(frozen=True, slots=True)
 class Motion:
-    """How a rigid map moved, by the robot's pose before (``start``) and after (``end``)."""
+    """A rigid motion of the map, by the robot's pose before (``start``) and after (``end``)."""
 
     start: Pose2D
     end: Pose2D
 
     def undone(self, share: float) -> Similarity:
-        """Return where pixels of the swept floor were before such a share of the motion."""
+        """Return the placement of swept pixels before a share of the motion."""
         x, y = self.back(share, np.zeros(1), np.zeros(1))
         turn = -share * math.remainder(self.end.yaw - self.start.yaw, math.tau)
         return Similarity(
@@ -77,7 +78,7 @@ class Motion:
 
     @property
     def is_still(self) -> bool:
-        """Whether it did not move."""
+        """Whether there was no motion."""
         start, end = self.start, self.end
         distance = math.hypot(end.x - start.x, end.y - start.y)
         turn = math.remainder(end.yaw - start.yaw, math.tau)
@@ -86,13 +87,13 @@ class Motion:
     def forward(
         self, x: NDArray[np.float64], y: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return where points [m] are after the motion."""
+        """Return points [m] after the motion."""
         return Motion(self.end, self.start).back(1.0, x, y)
 
     def back(
         self, share: float, x: NDArray[np.float64], y: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return where points [m] were before such a share of the motion."""
+        """Return points [m] before a share of the motion."""
         start, end = self.start, self.end
         turn = -share * math.remainder(end.yaw - start.yaw, math.tau)
         dx = x - start.x - share * (end.x - start.x)
@@ -102,10 +103,10 @@ class Motion:
 
 
 def moved_cells(cells: NDArray[np.int32], motion: Motion, cell_m: float) -> NDArray[np.int32]:
-    """Return where the middles of a path's cells, int32 (n, 2), have moved to, int32 (m, 2).
+    """Return the centres of a path's cells, int32 (n, 2), after the motion, int32 (m, 2).
 
-    Successive centres in the same cell count once; where the map has turned,
-    the next cell may lie beside a corner.
+    Successive centres in the same cell count once; after a rotation, successive cells may touch
+    only at a corner.
     """
     y, x = ((cells.astype(np.float64) + 0.5) * cell_m).T
     x, y = motion.forward(x, y)
@@ -118,14 +119,14 @@ def moved_cells(cells: NDArray[np.int32], motion: Motion, cell_m: float) -> NDAr
 def uncertain_cells(
     before: LedgerSnapshot, motion: Motion
 ) -> Callable[[Cells, Cells], NDArray[np.bool_]]:
-    """Return a function of cells, rows and columns: which, bool (n,), may not have been covered."""
+    """Return a mask function of rows and columns: cells perhaps not covered, bool (n,)."""
 
     def inside(rows: Cells, cols: Cells) -> NDArray[np.bool_]:
         x, y = ((each.astype(np.float64) + 0.5) * before.cell_m for each in (cols, rows))
         doubt = np.zeros(rows.shape, bool)
         for share in BETWEEN:
             doubt |= ~_covered(before, *motion.back(share, x, y))
-        # A round tool that was in the middle of each cell may have missed what is far from it.
+        # A round tool in the centre of each cell may have missed points far from a centre.
         x, y = motion.back(1.0, x, y)
         row, col = y / before.cell_m - 0.5, x / before.cell_m - 0.5
         between: NDArray[np.bool_] = np.hypot(row - np.rint(row), col - np.rint(col)) >= 0.5
@@ -137,7 +138,7 @@ def uncertain_cells(
 def certain_floor(
     before: FloorSnapshot, motion: Motion
 ) -> Callable[[Tiles], list[tuple[Place, Bits]]]:
-    """Return a function of tiles: what is left of those that have pixels that may not be swept."""
+    """Return a function of tiles: the certain rest of those with pixels that may not be swept."""
     known = _stacked(before.tiles)
 
     def left_of(tiles: Tiles) -> list[tuple[Place, Bits]]:
@@ -151,7 +152,7 @@ def certain_floor(
             between[count - 1, :count] = places
         left = kernels.certain_floor(known, asked, Whereabouts(between, counts))
         is_less = (left != asked.bits).any(axis=(1, 2))
-        # Each for itself: a view would keep all of them in memory.
+        # Copies: a view would keep all of them in memory.
         return [
             ((row, col), bits.copy())
             for (row, col), bits in zip(asked.places[is_less].tolist(), left[is_less], strict=True)
@@ -170,7 +171,7 @@ def _stacked(tiles: Tiles) -> FloorTiles:
 
 
 def _places_between(tiles: NDArray[np.int64], motion: Motion) -> NDArray[np.int64]:
-    """Return at how many places of a motion the pixels of tiles, int64 (n, 2), are looked up."""
+    """Return the number of map positions to test for the pixels of tiles, int64 (n, 2)."""
     corners = np.array([(0, 0), (1, 1), (1, 0), (0, 1)])
     y, x = np.moveaxis((tiles[:, np.newaxis] + corners) * FLOOR_TILE * PIXEL_M, 2, 0)
     was_x, was_y = motion.back(1.0, x, y)
@@ -181,7 +182,7 @@ def _places_between(tiles: NDArray[np.int64], motion: Motion) -> NDArray[np.int6
 def _covered(
     before: LedgerSnapshot, x: NDArray[np.float64], y: NDArray[np.float64]
 ) -> NDArray[np.bool_]:
-    """Tell for points [m] whether all cells were covered whose centres they lie between."""
+    """Tell for points [m] whether all cells around them were covered."""
     row, col = y / before.cell_m - 0.5, x / before.cell_m - 0.5
     low_row, high_row = np.floor(row + NEAR).astype(int), np.ceil(row - NEAR).astype(int)
     low_col, high_col = np.floor(col + NEAR).astype(int), np.ceil(col - NEAR).astype(int)

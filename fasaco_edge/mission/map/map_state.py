@@ -1,4 +1,4 @@
-"""Map state: the newest map, its lattice, the robot's place in it, and what it can reach."""
+"""Map state: the newest map, its lattice, the robot's cell, and the reachable area."""
 
 from __future__ import annotations
 
@@ -31,23 +31,23 @@ from fasaco_edge.mission.map.loop_closure import has_moved
 from fasaco_edge.mission.map.reachable_area import ReachableArea, anchor_cell
 from fasaco_edge.mission.orders.order import MissionOrder
 
-# A robot so near to its dock's pose is in it [m].
+# A robot this close to its dock's pose is in the dock [m].
 IN_DOCK_M = 0.5
 
 
 class MapState:
-    """Takes maps and poses in.
+    """Takes in maps and poses.
 
     Attributes:
         grid: the newest map, with all updates; None before there is one.
-        map_revision: goes up by one with each new state of the map: a whole map, updates taken in
-            together, the map of another frame; 0 before there is one.
-        pose: the newest pose in the map's frame; before there is a map in any frame.
-        has_moved: whether the newest map shows the walls elsewhere: a loop closure.
-        area: what can be reached, as of the last ``update_area``; None where the robot's pose is
-            on no coverable cell.
-        frames: which frame is active, and what came in another.
-        path_cell: the cell of the path that the robot is at, where it is on its line; else None.
+        map_revision: counter of map states: full maps, batches of updates, changes of frame; 0
+            before the first.
+        pose: the newest pose in the map's frame; before the first map, in any frame.
+        has_moved: whether the newest map shows the walls at other places: a loop closure.
+        area: the reachable area as of the last ``update_area``; None while the robot's pose is on
+            no coverable cell.
+        frames: selects the active frame; keeps the inputs of another.
+        path_cell: the robot's cell by its place on the line; None off the line.
     """
 
     def __init__(self, config: MissionConfig) -> None:
@@ -61,12 +61,12 @@ class MapState:
         self.path_cell: Cell | None = None
         self._ground = Ground(config)
         self._patches_lost = False
-        # Why the newest map was refused; "" where it was not.
+        # Why the newest map was refused; "" if it was not.
         self._refused = ""
         self._free_area = FreeArea(config.footprint.free_at_most)
 
     def take_map(self, grid: OccupancyGrid) -> bool:
-        """Take a full map in; return whether that makes its frame active.
+        """Take in a full map; return whether that makes its frame active.
 
         Raises:
             WrongFrame: another frame is active.
@@ -75,7 +75,7 @@ class MapState:
         """
         is_active_now = False
         if self.frames.active not in ("", grid.frame):
-            # It may be needed later, if it is acceptable at all.
+            # It may be needed later, if its size is acceptable.
             lattice_window(
                 grid.geometry, self._config.footprint.cell_m, self._config.max_lattice_cells
             )
@@ -91,7 +91,7 @@ class MapState:
         return self.frames.note_map(grid) or is_active_now
 
     def switch_frame(self) -> bool:
-        """Continue with map and pose of the active frame; return whether the map is another one."""
+        """Switch to map and pose of the active frame; return whether the map is another one."""
         grid = self.frames.newest_map
         is_other = grid is not None and (self.grid is None or self.grid.frame != grid.frame)
         if grid is not None and is_other:
@@ -102,10 +102,9 @@ class MapState:
         return is_other
 
     def take_patches(self, patches: Sequence[MapPatch]) -> tuple[bool, list[FasacoError]]:
-        """Take consecutive map updates in as one: the map is copied and classified once.
+        """Take in consecutive map updates as one: the map is copied and classified once.
 
-        Returns:
-            Whether the map is another now; why some could not be laid over it.
+        Returns: Whether the map has changed; and the faults of updates that could not be applied.
         """
         own, faults = self.frames.note_patches(patches)
         if self.grid is None or self._patches_lost:
@@ -117,7 +116,7 @@ class MapState:
         return bool(updated.windows), faults + updated.faults
 
     def lose_patches(self, count: int) -> None:
-        """Note that updates were lost; always raises PatchWithoutBase, which says so."""
+        """Note that updates were lost; always raises PatchWithoutBase to report it."""
         self._patches_lost = True
         raise PatchWithoutBase(f"{count} map updates were lost")
 
@@ -134,32 +133,32 @@ class MapState:
             self.pose = self.frames.pose_in(grid.frame)
 
     def keep_out(self, polygons: tuple[Polygon, ...]) -> None:
-        """Keep out of these polygons (x, y) [m] from now on, and of no others."""
+        """Replace the keep-out polygons (x, y) [m]."""
         self._ground.keep_out(polygons, self.grid)
 
     @property
     def free(self) -> CoverageLattice | None:
-        """The lattice over the newest map; None before there is one."""
+        """The lattice without keep-out zones; None before there is a map."""
         return self._ground.free
 
     @property
     def lattice(self) -> CoverageLattice | None:
-        """The same without the cells the robot must keep out of."""
+        """The lattice with the cells of keep-out zones removed."""
         return self._ground.lattice
 
     @property
     def change(self) -> LatticeChange | None:
-        """How ``lattice`` came from one before it; None where that is not known."""
+        """Change from the previous ``lattice``; None where unknown."""
         return self._ground.change
 
     @property
     def floor(self) -> FloorMap | None:
-        """The floor under the lattice; None before there is one, and where cells are counted."""
+        """The floor under ``lattice``; None before there is a map, and where cells are counted."""
         return self._ground.floor
 
     @property
     def free_floor(self) -> FloorMap | None:
-        """The same with no zone kept out."""
+        """The floor without keep-out zones."""
         return self._ground.free_floor
 
     def is_decided(self, window: Window) -> NDArray[np.bool_] | None:
@@ -167,11 +166,11 @@ class MapState:
         return self._ground.is_decided(window)
 
     def place_of(self, cell: Cell) -> Point | None:
-        """Return where the robot should be in a cell, x, y [m]; None for nowhere."""
+        """Return the robot's position for a cell, x, y [m]; None if it cannot stand there."""
         return self._ground.place_of(cell)
 
     def take_pose(self, pose: StampedPose) -> None:
-        """Take a pose in.
+        """Take in a pose.
 
         Raises:
             WrongFrame: it is not in the map's frame, or not in the active one.
@@ -183,28 +182,28 @@ class MapState:
         self.pose = pose
 
     def update_area(self) -> None:
-        """Determine what can be reached from the robot's position."""
+        """Compute the area reachable from the robot's cell."""
         cell, before, self.area = self.robot_cell(), self.area, None
         if cell is None or self.lattice is None:
             return
         change = self._ground.change
         if before is not None and before.lattice is self.lattice and before.contains(cell):
-            self.area = before  # as after each jump of a pose: steps lead there and back
+            self.area = before  # as with every pose: steps lead there and back
         elif before is None or change is None or change.after is not self.lattice:
             self.area = ReachableArea.around(self.lattice, cell)
         else:
             self.area = before.updated(change, cell)
 
     def forget_area(self) -> None:
-        """Forget what can be reached, until the robot is on coverable ground again."""
+        """Clear the reachable area until the robot is on coverable ground again."""
         self.area = None
 
     def robot_cell(self) -> Cell | None:
-        """Return the coverable cell the robot is in, or next to; in its dock that before it."""
+        """Return the coverable cell at the robot; for a robot in its dock, in front of the dock."""
         lattice, cell = self.lattice, self.path_cell
         if lattice is None or self.pose is None:
             return None
-        # A line that was polished leads beside its cells.
+        # A polished line runs beside its cells.
         if (
             cell is not None
             and lattice.contains(cell)
@@ -215,12 +214,12 @@ class MapState:
         own = anchor_cell(lattice, pose)
         if own is not None or dock is None:
             return own
-        # A dock may lie where no path leads: from there the way begins before it.
+        # No path may lead to the dock itself: paths start in front of it.
         is_docked = math.hypot(pose.x - dock.x_m, pose.y - dock.y_m) <= IN_DOCK_M
         return anchor_cell(lattice, dock.stand) if is_docked else None
 
     def follow_path(self, cell: Cell | None) -> None:
-        """Note at which cell of its path the robot is; None where it is not on its line."""
+        """Note the robot's cell on its path; None while it is off its line."""
         self.path_cell = cell
 
     def why_no_map(self) -> str:
@@ -229,16 +228,16 @@ class MapState:
         return f"{why}: the last one was refused: {self._refused}" if self._refused else why
 
     def why_no_pose(self) -> str:
-        """Return why there is no pose, or none any more."""
+        """Return why there is no pose, or no current one."""
         return self.frames.why_no_pose(self.grid.frame) if self.grid is not None else "no pose yet"
 
     def why_other_frame(self) -> str:
-        """Return that poses come in another frame than the map, to be appended; "" if not."""
+        """Return a suffix saying that poses arrive in another frame than the map; "" if not."""
         other = self.grid is not None and self.frames.last_pose_frame not in ("", self.grid.frame)
         return f"; {self.why_no_pose()}" if other else ""
 
     def why_misplaced(self) -> str:
-        """Return why the robot's position is invalid, and what it waits for."""
+        """Return why the robot's position is unusable, and what it waits for."""
         assert self.free is not None
         assert self.lattice is not None
         assert self.pose is not None
@@ -256,7 +255,7 @@ class MapState:
     def check_zones(self, order: MissionOrder) -> None:
         """Check that part of each zone lies on the map; without a map nothing is checked.
 
-        In the map frame, as zones are given and told of.
+        Zones, and the error, are in the map frame.
 
         Raises:
             OrderError: a zone lies outside.
@@ -274,7 +273,7 @@ class MapState:
                 )
 
     def coverage(self, ledger: MissionLedger) -> Coverage | None:
-        """Return how much is covered; None before there is a map."""
+        """Return the counts of coverage; None before there is a map."""
         if self.lattice is None or self.grid is None:
             return None
         reachable = self.area.reachable if self.area else None

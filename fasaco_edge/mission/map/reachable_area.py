@@ -1,4 +1,4 @@
-"""Reachable area: the part of the lattice the robot can reach, updated at the cost of a change."""
+"""Reachable area: the cells the robot can reach, updated incrementally."""
 
 from __future__ import annotations
 
@@ -15,19 +15,19 @@ from fasaco_edge.grid.lattice import COVERABLE, Cell, CoverageLattice
 from fasaco_edge.kernels import COL_STEP, ROW_STEP
 from fasaco_edge.kernels.lattice.reach import reachable_from, shortest_walk, update_reach
 
-# A robot a little off, or whose cell was just closed by a noisy scan, goes on from the nearest
-# coverable cell this close.
+# If the robot's own cell is not coverable (a small offset, a noisy scan), the nearest coverable
+# cell within this distance is taken.
 ANCHOR_CELLS = 1.5
 
-# If more of the lattice has changed, a full search is as fast.
+# Above this changed share of the lattice, a full search is as fast.
 LOCAL_SHARE = 0.01
 
 
 @dataclass(frozen=True, slots=True)
 class AreaChange:
-    """How many reachable cells were gained, lost, or have other steps than before.
+    """Counts of reachable cells that were gained, lost, or have other steps than before.
 
-    ``window`` is the smallest around all of them; None where there are none.
+    ``window`` is the smallest window around all of them; None for none.
     """
 
     gained: int
@@ -58,14 +58,14 @@ class ReachableArea:
 
     @classmethod
     def around(cls, lattice: CoverageLattice, cell: Cell) -> Self:
-        """Return the area that can be reached from a coverable ``cell``."""
+        """Return the area that is reachable from a coverable ``cell``."""
         reachable = reachable_from(lattice.steps, *lattice.local(cell)).astype(bool)
         return cls(lattice, reachable)
 
     def updated(self, change: LatticeChange, cell: Cell) -> ReachableArea:
-        """Return the area that can be reached from ``cell`` after the lattice has changed.
+        """Return the area that is reachable from ``cell`` after a change of the lattice.
 
-        The same as ``around`` finds, at the cost of what changed where that is possible.
+        Equals ``around``, incrementally where possible.
         """
         lattice = change.after
         if lattice is self.lattice and self.contains(cell):
@@ -88,7 +88,7 @@ class ReachableArea:
         return self.lattice.contains(cell) and bool(self.reachable[self.lattice.local(cell)])
 
     def change_since(self, before: ReachableArea) -> AreaChange:
-        """Compare with the area before; cells outside an array are not reachable."""
+        """Compare with the previous area; cells outside an array are not reachable."""
         if before is self:
             return AreaChange(0, 0, 0)  # as after each jump of a pose
         mine, theirs = self.lattice.window, before.lattice.window
@@ -109,7 +109,7 @@ class ReachableArea:
         )
         if not change:
             return change
-        # Reachable in one of the two alone, also where only one of them has cells.
+        # Reachable in exactly one of the two, also where only one of them has cells.
         came, went = self.reachable.copy(), before.reachable.copy()
         came[here] &= ~then
         went[there] &= ~now
@@ -119,7 +119,7 @@ class ReachableArea:
     def drivable_prefix(self, cells: NDArray[np.int32]) -> int:
         """Return how many leading cells of a path, int32 (n, 2), can be driven.
 
-        0 where the first one is not coverable.
+        0 if the first is not coverable.
         """
         if not len(cells):
             return 0
@@ -127,7 +127,7 @@ class ReachableArea:
         if not lattice.contains(first) or lattice.states[lattice.local(first)] != COVERABLE:
             return 0
         allowed = lattice.window.values_at(lattice.steps, cells[:-1], 0)
-        # Column by column: this runs at every pose, over tens of thousands of cells.
+        # Column by column: this runs with every pose, over tens of thousands of cells.
         row_moves, col_moves = np.diff(cells[:, 0]), np.diff(cells[:, 1])
         legal = np.zeros(len(allowed), bool)
         for direction, (row_step, col_step) in enumerate(zip(ROW_STEP, COL_STEP, strict=True)):
@@ -136,7 +136,7 @@ class ReachableArea:
         return 1 + int(np.argmin(legal)) if not legal.all() else len(cells)
 
     def shortest_path(self, start: Cell, goal: Cell) -> NDArray[np.int32]:
-        """Return a shortest path, int32 (n, 2); empty where there is none."""
+        """Return a shortest path, int32 (n, 2); empty for none."""
         lattice = self.lattice
         if not (lattice.contains(start) and lattice.contains(goal)):
             return np.empty((0, 2), np.int32)
@@ -152,7 +152,7 @@ def _around(marked: NDArray[np.bool_], window: Window) -> Window | None:
 
 
 def anchor_cell(lattice: CoverageLattice, pose: Pose2D) -> Cell | None:
-    """Return the coverable cell a robot at ``pose`` is in, or is next to; else None."""
+    """Return the coverable cell at ``pose``, or the nearest one beside it; else None."""
     row, col = lattice.cell_at(pose.x, pose.y)
     best, best_distance = None, ANCHOR_CELLS * lattice.cell_m
     for cell in ((row + i, col + j) for i in (0, -1, 1) for j in (0, -1, 1)):

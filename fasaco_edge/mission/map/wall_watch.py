@@ -1,9 +1,9 @@
-"""The wall watch: finds once along which angle a building's cells are to lie, and says it once.
+"""Wall watch: estimates the wall direction once and then fixes the lattice's rotation.
 
-A map frame's axes are where a robot first looked to; a building's walls are not along them. How
-these lie shows after some metres. In six buildings turned by 30 degrees, LEAST_WALL_M of walls that
-point the same way were seen after 1 to 14 m, and told the angle to 0.6 degrees. What is decided
-then holds: cells that turn with each map would never be swept.
+The map frame's axes come from the robot's initial heading, so walls are rotated against them. In
+six buildings rotated by 30 degrees, LEAST_WALL_M of parallel walls were seen after 1 to 14 m, and
+gave the angle to 0.6 degrees. The decision is final: a lattice re-rotated with each map would lose
+coverage.
 """
 
 from __future__ import annotations
@@ -14,48 +14,48 @@ from fasaco_edge.grid.geometry import Pose2D
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.grid.walls import WallDirection, wall_direction
 
-# With less the angle is not certain: length of walls that point the same way [m], share of all.
+# Evidence required: length of parallel walls [m], and their share of all walls.
 LEAST_WALL_M, LEAST_SHARE = 5.0, 0.45
-# Two looks at the map have to agree to that [deg]; of so much wall [m] one will do.
+# Two estimates must agree within the first [deg]; with this length of walls [m] one suffices.
 SAME_DEG, PLENTY_M = 1.5, 15.0
-# A smaller turn is not worth the stop that it costs [deg].
+# A smaller rotation is not worth the stop that it costs [deg].
 LEAST_TURN_DEG = 2.0
-# It looks again after the robot drove so far [m], and gives up after so many looks.
+# Distance driven between estimates [m]; the limit on estimates.
 BETWEEN_M, MOST_LOOKS = 1.0, 40
-# Poses that lie farther apart are no drive [m]; larger maps take too long to look at [pixels].
+# Poses farther apart than the first are a jump [m]; maps with more pixels take too long.
 JUMP_M, MOST_PIXELS = 1.0, 4_000_000
 
 
 class WallWatch:
-    """Watches maps until the direction of the walls is certain."""
+    """Estimates the wall direction on maps until it is certain."""
 
     def __init__(self) -> None:
         self._looks = 0
-        # The way driven, and after which it looks again [m].
+        # Distance driven, and distance at which the next estimate is due [m].
         self._driven_m = self._due_m = 0.0
         self._last: Pose2D | None = None
-        # What the last look told; None where that was too little.
+        # The last estimate; None if the evidence was too little.
         self._seen: WallDirection | None = None
 
     @property
     def is_over(self) -> bool:
-        """Whether it has decided, or given up."""
+        """Whether it has decided or given up."""
         return self._looks >= MOST_LOOKS
 
     def end(self) -> None:
-        """Look no more."""
+        """Stop estimating."""
         self._looks = MOST_LOOKS
 
     def begin(self) -> None:
-        """Look anew, in another building."""
+        """Start again, in another building."""
         self._looks, self._seen, self._due_m = 0, None, self._driven_m
 
     def look(self, grid: OccupancyGrid, pose: Pose2D) -> float | None:
-        """Return the angle for the cells [deg], once it is certain; None before and after that.
+        """Return the lattice rotation [deg] once, when it is certain; else None.
 
         Args:
             grid: the newest map.
-            pose: where the robot is now.
+            pose: the robot's pose.
         """
         last, self._last = self._last, pose
         if last is not None:
@@ -74,16 +74,16 @@ class WallWatch:
 
 
 def _certain(grid: OccupancyGrid) -> WallDirection | None:
-    """Return where walls point on a map that shows enough of them."""
+    """Return the wall direction of a map with enough evidence; else None."""
     walls = wall_direction(grid) if grid.cells.size <= MOST_PIXELS else None
-    # The rim of what is free is where a scan ended, too.
+    # The border of free space may be the end of a scan.
     if walls is None or walls.is_of_rim:
         return None
     return walls if walls.share >= LEAST_SHARE and walls.wall_m >= LEAST_WALL_M else None
 
 
 def _agree(before: WallDirection | None, seen: WallDirection) -> bool:
-    # Cells look alike after a quarter-turn.
+    # Lattices are equal after a quarter-turn.
     return before is not None and (
         abs(math.remainder(before.angle_deg - seen.angle_deg, 90.0)) <= SAME_DEG
     )

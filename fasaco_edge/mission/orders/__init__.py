@@ -1,1 +1,1 @@
-"""Orders: zones, passes, keep-out zones, and what is to be done next."""
+"""Orders: zones, passes, keep-out zones, and the sequence in which they are carried out."""

@@ -1,4 +1,4 @@
-"""Exploration: cells that the robot is sent to only to look, for a way to a zone out of reach."""
+"""Exploration: cells visited only to look around, for a path to an unreachable zone."""
 
 from __future__ import annotations
 
@@ -14,22 +14,22 @@ from fasaco_edge.mission.map.reachable_area import ReachableArea
 from fasaco_edge.mission.orders.order import Zone
 from fasaco_edge.mission.orders.zones import in_zones
 
-# Radius around a cell from which nothing new was seen that is not visited either [cells].
+# Cells this close to one from which nothing new was seen are not visited either [cells].
 SEEN_AROUND = 1
 
 
 def next_frontier(area: ReachableArea, polygon: Polygon, looked: Iterable[Cell]) -> Cell | None:
-    """Return the frontier cell (row, col) nearest to a polygon's corners [m], in a straight line.
+    """Return the frontier cell (row, col) nearest to a corner of the polygon [m], straight line.
 
-    A frontier cell is reachable and beside cells that are unknown to the map.
+    A frontier cell is reachable and has an unknown neighbour.
 
     Args:
-        area: what the robot can reach.
-        polygon: where it has to get.
-        looked: cells it was sent to already; what is close to them is left out.
+        area: the reachable area.
+        polygon: destination.
+        looked: cells already visited for this; their neighbourhoods are left out.
     """
     lattice, window = area.lattice, area.lattice.window
-    # Beyond the lattice nothing is known.
+    # Outside of the lattice all is unknown.
     unknown = np.pad(lattice.states == UNKNOWN, 1, constant_values=True)
     beside = unknown[:-2, 1:-1] | unknown[2:, 1:-1] | unknown[1:-1, :-2] | unknown[1:-1, 2:]
     rows, cols = np.nonzero(area.reachable & beside)
@@ -47,21 +47,21 @@ def next_frontier(area: ReachableArea, polygon: Polygon, looked: Iterable[Cell])
 
 @dataclass(slots=True)
 class Exploration:
-    """Cells the robot is sent to only to look: for a way to a zone, or into closed areas.
+    """Viewpoints: cells to drive to in search of a path to a zone, or to look into closed areas.
 
     Attributes:
-        viewpoints: cells (row, col) to look from, and not yet reached.
-        looked: cells from which a way to the zone was looked for.
+        viewpoints: cells (row, col) to look from, not yet reached.
+        looked: cells already visited in search of the zone.
     """
 
     viewpoints: set[Cell] = field(default_factory=set)
     looked: set[Cell] = field(default_factory=set)
 
     def seek(self, zone: Zone | None, area: ReachableArea | None, cell: Cell) -> str:
-        """Look for a way to a zone out of reach; return why a plan is wanted, or "".
+        """Look for a path to an unreachable zone; return why a plan is wanted, or "".
 
-        From frontier cell to frontier cell, nearest to the zone's corners first, until the zone
-        is in reach or all were looked at.
+        Visits frontier cells, nearest to the zone's corners first, until the zone is reachable or
+        all were visited.
         """
         if zone is None or zone.polygon is None or area is None or is_in_reach(zone, area):
             return ""
@@ -74,16 +74,16 @@ class Exploration:
         return f"looking for a way to zone {zone.name!r}"
 
     def aim_at(self, viewpoints: set[Cell]) -> None:
-        """Look from these cells."""
+        """Set the viewpoints."""
         self.viewpoints = viewpoints
 
     def end_if_reached(self, zone: Zone | None, area: ReachableArea) -> None:
-        """Stop looking for a zone that can be reached now."""
+        """Stop searching for a zone once it is reachable."""
         if zone is not None and self.viewpoints and is_in_reach(zone, area):
             self.viewpoints.clear()
 
     def skip_viewpoint(self) -> bool:
-        """Note that a viewpoint was not reached; tell whether others may show the zone."""
+        """Skip an unreached viewpoint; tell whether others may show the zone."""
         another = bool(self.looked and self.viewpoints)
         if another:
             self.viewpoints.clear()
@@ -97,6 +97,6 @@ class Exploration:
 
 
 def is_in_reach(zone: Zone, area: ReachableArea) -> bool:
-    """Tell whether the robot can reach any cell of a zone."""
+    """Tell whether any cell of a zone is reachable."""
     inside = in_zones((zone,), area.lattice.window, area.lattice.cell_m)
     return bool((inside & area.reachable).any())

@@ -1,7 +1,6 @@
-"""A keep-out mask: pixels of a map_server image that the robot must not touch, as rectangles.
+"""Keep-out mask: rectangles of pixels of a map_server image that the robot must not touch.
 
-Nav2 draws its keep-out zones in the same way (nav2_costmap_2d, KeepoutFilter): what is occupied is
-kept out of; its lesser costs count for nothing here.
+As in Nav2 (nav2_costmap_2d, KeepoutFilter), occupied pixels are kept out; lesser costs are ignored.
 """
 
 from __future__ import annotations
@@ -22,11 +21,11 @@ from fasaco_edge.grid.geometry import GridGeometry, Polygon, Pose2D
 from fasaco_edge.grid.map_files import read_map_rows
 from fasaco_edge.grid.map_images import MAX_PIXELS
 
-# A hand-drawn outline has a rectangle for each step of its stairs.
+# A hand-drawn outline needs one rectangle for each step of its staircase.
 MOST_RECTANGLES = 2_000
-# Some rows of bits are looked at as bytes.
+# Unpacking expands a few rows of bits to bytes at a time.
 MOST_COLS = 100_000
-# An image that was read is kept in the configuration itself: a replay has no file.
+# Prefix of a mask stored in the configuration itself: a replay has no file.
 INLINE = "mask:"
 
 
@@ -36,20 +35,20 @@ class _Inline(msgspec.Struct, frozen=True):
 
 
 def inline_mask(file: Path, occupied_at_least: int, most_bytes: int | None = None) -> str:
-    """Return what ``mask_polygons`` reads, of a map_server YAML file.
+    """Return the inline form of a map_server YAML file, the input of ``mask_polygons``.
 
     Args:
-        file: of the YAML.
-        occupied_at_least: from which value on a pixel is kept out of [percent].
-        most_bytes: what it may take to read it [bytes]; None for anything.
+        file: the YAML file.
+        occupied_at_least: threshold of occupied pixels [percent].
+        most_bytes: memory limit for reading it [bytes]; None for no limit.
 
     Raises:
-        BadConfiguration: it cannot be read, takes more than that, or its outlines are too fine.
+        BadConfiguration: it cannot be read, exceeds the limit, or its outlines are too fine.
     """
     try:
         place, stripes = read_map_rows(file, most_bytes)
         _check_width(place.cols)
-        # A stripe ends with a byte of bits: it has a multiple of 8 rows.
+        # Stripes are packed separately, so each has a multiple of 8 rows.
         packed = [np.packbits(stripe >= occupied_at_least) for stripe in stripes]
     except (MapFileError, ValueError) as error:
         hint = getattr(error, "hint", "")
@@ -70,10 +69,10 @@ def inline_mask(file: Path, occupied_at_least: int, most_bytes: int | None = Non
 
 
 def mask_polygons(inline: str) -> tuple[Polygon, ...]:
-    """Return the rectangles of a mask, by their corners (x, y) [m]; none of "".
+    """Return the rectangles of a mask, by their corners (x, y) [m]; none for "".
 
     Raises:
-        BadConfiguration: it is none that ``inline_mask`` has returned.
+        BadConfiguration: ``inline`` was not made by ``inline_mask``.
     """
     if not inline:
         return ()
@@ -108,7 +107,7 @@ def _check_width(cols: int) -> None:
 
 
 def _rows(bits: NDArray[np.uint8], rows: int, cols: int) -> Iterator[NDArray[np.uint8]]:
-    """Yield the rows of packed pixels, uint8 (cols,) of 0 and 1; 8 of them are whole bytes."""
+    """Yield the rows of packed pixels, uint8 (cols,) of 0 and 1; 8 rows are whole bytes."""
     for row in range(0, rows, 8):
         count = min(rows - row, 8)
         some = np.unpackbits(bits[row // 8 * cols :][:cols], count=count * cols)
@@ -116,20 +115,20 @@ def _rows(bits: NDArray[np.uint8], rows: int, cols: int) -> Iterator[NDArray[np.
 
 
 def _rectangles(bits: NDArray[np.uint8], rows: int, cols: int) -> list[tuple[int, int, int, int]]:
-    """Return row0, col0, row1, col1 of rectangles that are all that is marked.
+    """Return rectangles (row0, col0, row1, col1) that cover exactly the marked pixels.
 
-    Equal stretches of rows that follow each other are one. Of more than ``MOST_RECTANGLES`` not
-    all are returned: a picture that is no mask must hold nobody up.
+    Equal runs in successive rows are merged. Stops after ``MOST_RECTANGLES``, which bounds the time
+    for an image that is no mask.
 
     Args:
-        bits: the pixels, row after row without a gap, packed into uint8.
-        rows, cols: how many there are.
+        bits: the pixels, row by row without gaps, packed into uint8.
+        rows, cols: size of the image.
     """
     found: list[tuple[int, int, int, int]] = []
     open_since: dict[tuple[int, int], int] = {}
     for row, marked in enumerate(chain(_rows(bits, rows, cols), (np.zeros(cols, np.uint8),))):
         borders = np.flatnonzero(np.diff(marked.view(np.int8), prepend=0, append=0))
-        # Each is a rectangle here, or will be one.
+        # Runs of this row; each is a rectangle, or extends one.
         stretches = {
             (int(low), int(high)): None
             for low, high in borders.reshape(-1, 2)[: MOST_RECTANGLES + 1]

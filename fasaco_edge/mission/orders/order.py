@@ -1,6 +1,6 @@
 """Orders and commands: zones, passes, keep-out zones; their JSON or YAML form and its schema.
 
-``protocol/schema/mission.json`` is made from these definitions; a test holds it to them.
+``protocol/schema/mission.json`` is generated from these definitions; a test compares them.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from fasaco_edge.grid.geometry import FARTHEST_M, Polygon
 from fasaco_edge.grid.polygons import polygon_flaw
 from fasaco_edge.grid.turning import turned_polygon
 
-# Limits of an order: it is kept with the ledger, written once a second.
+# Limit on the zones of an order: it is kept with the ledger, which is written once a second.
 MOST_ZONES = 100
 MOST_KEEP_OUT = 100
 MOST_POINTS = 1_000
@@ -33,9 +33,9 @@ class Zone:
 
     Attributes:
         name: unique in its order.
-        polygon: its corners (x, y) [m] in the map frame, the last joined to the first; None for
-            everything the robot can reach; none for a standing zone of that name, see ``located``.
-        passes: how often.
+        polygon: corners (x, y) [m] in the map frame, the last joined to the first; None for
+            everything reachable, or, before ``located``, for a standing zone of that name.
+        passes: number of passes.
     """
 
     name: str
@@ -51,11 +51,12 @@ class MissionOrder:
     """What to cover.
 
     Attributes:
-        zones: one after the other, in this order; at least one.
+        zones: covered one after the other, in this order; at least one.
         keep_out: polygons (x, y) [m] in the map frame that the robot must not touch.
         return_home: whether to drive back to the start at the end.
-        keep_covered: whether cells covered before count in the first pass.
-        given: the same order in the map frame, where the polygons are turned, see ``turned_order``.
+        keep_covered: whether the first pass skips cells that were covered before.
+        given: the order as given, in the map frame, if the polygons are rotated, see
+            ``turned_order``.
     """
 
     zones: tuple[Zone, ...] = (Zone(EVERYTHING, None),)
@@ -66,14 +67,14 @@ class MissionOrder:
 
     @property
     def as_given(self) -> MissionOrder:
-        """The order in the map frame, to the last bit as it was given."""
+        """The order in the map frame, bit for bit as given."""
         return self.given or self
 
 
 EVERYTHING_ONCE = MissionOrder()
 
 CommandName = Literal["start", "pause", "resume", "home", "cancel", "reset", "replan", "status"]
-# What a robot drives for beside its order; "" for nothing.
+# Why a robot drives somewhere outside of its order; "" for none.
 Errand = Literal["", "home", "charge"]
 
 _Passes = Annotated[int, Meta(ge=1, le=MOST_PASSES, description="how often to cover")]
@@ -91,14 +92,14 @@ _Name = Annotated[str, Meta(min_length=1, max_length=LONGEST_NAME)]
 
 
 class StandingZone(_Document, frozen=True):
-    """A zone of the configuration, which orders use by its name."""
+    """A zone of the configuration, referred to by its name."""
 
     name: _Name
     polygon: _Polygon
 
 
 class ZoneDocument(_Document, frozen=True):
-    """An area to cover; without a polygon it is the standing zone of that name."""
+    """An area to cover; without a polygon, the standing zone of that name."""
 
     name: _Name
     polygon: _Polygon | None = None
@@ -126,7 +127,7 @@ _Read = TypeVar("_Read", bound=_Document)
 
 
 def read_order(document: object) -> MissionOrder:
-    """Return the order that a parsed JSON or YAML document holds; None is one for everything.
+    """Return the order in a parsed JSON or YAML document; None is an order for everything.
 
     Raises:
         OrderError: naming the member, what was expected and what came.
@@ -135,7 +136,7 @@ def read_order(document: object) -> MissionOrder:
 
 
 def read_command(document: object) -> tuple[CommandName, MissionOrder]:
-    """Return what a document asks for.
+    """Return the command, and its order, in a parsed document.
 
     Raises:
         OrderError: naming the member, what was expected and what came.
@@ -147,7 +148,7 @@ def read_command(document: object) -> tuple[CommandName, MissionOrder]:
 
 
 def order_document(order: MissionOrder) -> dict[str, object]:
-    """Return ``order`` as ``read_order`` reads it, in the map frame."""
+    """Return the document of an order, in the map frame; ``read_order`` reads it."""
     order = order.as_given
     rest = {
         "keep_out": order.keep_out,
@@ -166,10 +167,9 @@ def order_document(order: MissionOrder) -> dict[str, object]:
 
 
 def located(order: MissionOrder, standing: tuple[StandingZone, ...]) -> MissionOrder:
-    """Return an order with the polygons of the standing zones that it names.
+    """Return an order with its named zones replaced by standing zones.
 
-    Raises:
-        OrderError: there is no zone of a name.
+    Raises: OrderError: there is no zone of that name.
     """
     known = {zone.name: tuple(zone.polygon) for zone in standing}
     for index, zone in enumerate(order.zones):
@@ -188,7 +188,7 @@ def located(order: MissionOrder, standing: tuple[StandingZone, ...]) -> MissionO
 
 
 def turned_order(order: MissionOrder, by_deg: float) -> MissionOrder:
-    """Return an order whose polygons are those given, turned by ``by_deg`` [deg]."""
+    """Return an order whose polygons are the given ones rotated by ``by_deg`` [deg]."""
     given = order.as_given
     if not by_deg:
         return given
@@ -201,14 +201,14 @@ def turned_order(order: MissionOrder, by_deg: float) -> MissionOrder:
 
 
 def command_document(command: CommandName, order: MissionOrder) -> dict[str, object]:
-    """Return a command as ``read_command`` reads it."""
+    """Return the document of a command; ``read_command`` reads it."""
     if command != "start":
         return {"command": command}
     return {"command": command, "order": order_document(order)}
 
 
 def order_of(document: OrderDocument) -> MissionOrder:
-    """Return the order that a document holds.
+    """Return the order in a document.
 
     Raises:
         OrderError: naming the member, what is wrong with it, and what is allowed.
@@ -223,7 +223,7 @@ def order_of(document: OrderDocument) -> MissionOrder:
         document.return_home,
         document.keep_covered,
     )
-    # Checks beyond the types of a document that need no map.
+    # Checks beyond types that need no map.
     names = [zone.name for zone in order.zones]
     for index, name in enumerate(names):
         where = f"zones[{index}].name"

@@ -1,7 +1,6 @@
-"""Order state: an order and how far it is: which zone, which pass, paused or not.
+"""Order state: an order and its progress: zone, pass, paused or not.
 
-It is kept with the ledger. Nothing here needs a map, so that commands are accepted before there
-is one.
+It is kept with the ledger. Nothing here needs a map, so commands are accepted before there is one.
 """
 
 from __future__ import annotations
@@ -24,13 +23,13 @@ from fasaco_edge.mission.orders.order import (
     order_of,
 )
 
-# Why a daemon without autostart is idle.
+# Reason of being idle without autostart.
 NO_ORDER = "no order yet: start a mission"
 AT_HOME = "at home"
 
 
 class Stage(StrEnum):
-    """Which part of an order is being carried out."""
+    """Phase of an order."""
 
     COVERING = "covering"
     RETRYING = "retrying"
@@ -43,18 +42,18 @@ class OrderState:
     """An order and its progress.
 
     Attributes:
-        order: what to do; None for nothing at all.
+        order: what to cover; None for none.
         automatic: whether it began without a command, and continues whenever the map shows more.
-        stage: what is being done: zones covered pass by pass, then what was left over tried
-            again, then the way home.
+        stage: phase: covering zones pass by pass, then retrying what was left over, then driving
+            home.
         zone: index of the zone.
         pass_number: number of the pass over it, from 1.
         begun: whether that pass has begun.
-        tries: how often what was left over was tried again.
-        home: the cell (row, col) the mission began in.
-        paused: whether the robot is to stop.
-        errand: what it drives for before it goes on.
-        why: why there is no order, where there is none; of a paused one where that has led to.
+        tries: number of retries so far.
+        home: the cell (row, col) where the mission began.
+        paused: whether the robot must stand.
+        errand: destination to drive to first.
+        why: why there is no order; for a paused order, what led to the pause.
     """
 
     order: MissionOrder | None = None
@@ -71,24 +70,24 @@ class OrderState:
 
     @classmethod
     def autostart(cls) -> OrderState:
-        """Return the order of a daemon without a command: cover all that is not covered yet."""
+        """Return the order of a daemon with autostart: cover everything not covered yet."""
         return cls(MissionOrder(keep_covered=True), automatic=True)
 
     @classmethod
     def idle(cls, why: str) -> OrderState:
-        """Return the state of a mission that waits for an order."""
+        """Return the state of a mission without an order."""
         return cls(why=why)
 
     @property
     def current_zone(self) -> Zone | None:
-        """The zone being covered; None where none is."""
+        """The zone being covered; None for none."""
         if self.order is None or self.stage is not Stage.COVERING:
             return None
         return self.order.zones[self.zone]
 
     @property
     def title(self) -> str:
-        """The zone and pass in words."""
+        """Zone and pass as text."""
         zone = self.current_zone
         if zone is None:
             return str(self.stage)
@@ -97,11 +96,11 @@ class OrderState:
 
     @property
     def returns_home_next(self) -> bool:
-        """Whether nothing comes after this zone and pass but the way home."""
+        """Whether this is the last zone and pass before returning home."""
         return self.order is not None and self.order.return_home and self.next_pass() is self
 
     def next_pass(self) -> OrderState:
-        """Return the state in its next pass, or the next zone; itself after the last."""
+        """Return the state in the next pass or zone; the same state after the last."""
         if self.order is None or self.stage is not Stage.COVERING:
             return self
         if self.pass_number < self.order.zones[self.zone].passes:
@@ -112,17 +111,17 @@ class OrderState:
 
     @property
     def is_open(self) -> bool:
-        """Whether there is an order with something left to do."""
+        """Whether there is an order with work left."""
         return self.order is not None and (self.stage is not Stage.OVER or self.automatic)
 
     @property
     def why_paused(self) -> str:
-        """Why the robot stands, where it is paused."""
+        """Why the robot stands while paused."""
         at_home = "at home, " if self.order is not None and self.why == AT_HOME else ""
         return at_home + "paused by command"
 
     def arrived(self) -> OrderState:
-        """Return the state of a robot that came home by command: there it stays."""
+        """Return the state of a robot that has come home by command, and stays there."""
         return replace(self, errand="", paused=self.is_open, why=AT_HOME)
 
     def commanded(
@@ -130,8 +129,8 @@ class OrderState:
     ) -> OrderState:
         """Return the state after a command.
 
-        A command may be sent twice: the second time changes nothing. ``start`` replaces another
-        order; the same one goes on, unless it is over. ``has_home``: the configuration has one.
+        A repeated command changes nothing. ``start`` replaces another order; the same order
+        continues, unless it is over. ``has_home``: whether the configuration has a home.
 
         Raises:
             CommandError: there is nothing to pause, to resume or to plan, or no home.
@@ -169,7 +168,7 @@ class OrderState:
         return self
 
     def in_other_building(self, why: str) -> OrderState:
-        """Return the state in another building, where its zones mean nothing."""
+        """Return the state in another building, where its zones are invalid."""
         if self.automatic:
             return replace(OrderState.autostart(), paused=self.paused)
         return self if self.order is None else OrderState.idle(f"{why}: the order was dropped")
@@ -177,7 +176,7 @@ class OrderState:
     def in_other_frame(self, why: str) -> OrderState:
         """Return the state in another frame, before anything was covered.
 
-        An order for everything means the same there; zones do not.
+        An order for everything stays valid there; zones do not.
         """
         has_places = self.order is not None and (
             bool(self.order.keep_out) or any(zone.polygon for zone in self.order.zones)
@@ -205,8 +204,7 @@ class OrderState:
     def from_json(cls, note: str) -> OrderState:
         """Return the state encoded by ``to_json``.
 
-        Raises:
-            OrderError: it is of another version, or not whole.
+        Raises: OrderError: it has another version, or is incomplete.
         """
         try:
             kept = msgspec.json.decode(note, type=_Note)
@@ -230,9 +228,9 @@ class OrderState:
 class _Note(
     msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True, kw_only=True
 ):
-    """An order state as it is kept; its names are those of the files on disk.
+    """An order state as kept on disk; member names are those of the files.
 
-    Without an errand it is as older daemons read it.
+    Without an errand the form is the one that older daemons read.
     """
 
     version: Literal[1]

@@ -1,4 +1,4 @@
-"""Sequencer: carries out an order: its zones pass by pass, then retries, then the way home."""
+"""Sequencer: carries out an order: zones pass by pass, then retries, then the return home."""
 
 from __future__ import annotations
 
@@ -22,21 +22,21 @@ from fasaco_edge.mission.orders.order_state import NO_ORDER, OrderState, Stage
 from fasaco_edge.mission.orders.zones import in_zones
 from fasaco_edge.planners.problem import CoverageProblem
 
-# After this many paths in a row with the same number of cells left, those wait for the retry: the
-# robot may stop short of its path's end, out of the tool's reach of the last cell.
+# After this many paths in a row that leave the same number of cells, those wait for the retry: the
+# robot may stop short of its path's end, with the last cell out of the tool's reach.
 MAX_SAME_LEFTOVERS = 3
 
 
 @dataclass(slots=True)
 class _Run:
-    """State of an order that is lost with the daemon.
+    """State of an order that is not kept over a restart.
 
     Attributes:
-        exploration: where to look from.
-        left_over: how many cells the last path left over; -1 before the first.
-        same_again: how many paths in a row left over that many.
-        retry_at: when what is blocked or left over is tried again [s]; None if nothing waits.
-        ending: how the order came to its end.
+        exploration: the viewpoints.
+        left_over: number of cells the last path left over; -1 before the first.
+        same_again: number of paths in a row that left over that many.
+        retry_at: time of the next retry [s]; None if nothing waits.
+        ending: how the order ended.
     """
 
     exploration: Exploration = field(default_factory=Exploration)
@@ -47,10 +47,10 @@ class _Run:
 
 
 class Sequencer:
-    """Decides what part of an order is next, on the map as it is now. Times are [s].
+    """Decides which part of an order is next, on the present map. Times are [s].
 
     Attributes:
-        order_state: the order, and how far it is.
+        order_state: the order and its progress.
     """
 
     def __init__(
@@ -63,12 +63,12 @@ class Sequencer:
         self._fleet = fleet
         self._run = _Run()
         self._unreached = UnreachedFinder(map_state, ledger)
-        # Whether anything is worth trying again, and as of which map and ledger.
+        # Cached result: whether a retry is worthwhile, for a given map and ledger.
         self._retry_check: tuple[object, bool] = (None, False)
 
     @property
     def is_waiting(self) -> bool:
-        """Whether the robot waits for the time to try again."""
+        """Whether the robot waits for a retry."""
         return self._run.retry_at is not None
 
     @property
@@ -82,7 +82,7 @@ class Sequencer:
         return self._run.ending
 
     def goal(self, errand: Errand = "home") -> Cell | None:
-        """Return the cell (row, col) an errand leads to; None where that is nowhere."""
+        """Return the destination cell (row, col) of an errand; None for none."""
         place, lattice = self._config.policy.place(errand), self._map.lattice
         if place is None or lattice is None:
             return self.order_state.home
@@ -90,7 +90,7 @@ class Sequencer:
         return anchor_cell(lattice, pose) or lattice.cell_at(pose.x, pose.y)
 
     def start(self, state: OrderState) -> None:
-        """Begin with another order, or with none."""
+        """Begin another order, or none."""
         self.order_state, self._run = state, _Run()
         self._retry_check = (None, False)
         self._unreached.restart()
@@ -101,7 +101,7 @@ class Sequencer:
         self.order_state = state
 
     def note_area(self) -> None:
-        """Remember what can be reached now."""
+        """Remember the cells that are reachable now."""
         self._unreached.note_area()
 
     def note_cell(self, cell: Cell) -> None:
@@ -109,7 +109,7 @@ class Sequencer:
         self._run.exploration.viewpoints.discard(cell)
 
     def begin(self, cell: Cell, now: float) -> str:
-        """Start what is due, with the robot in ``cell``; return why a plan is wanted, or ""."""
+        """Begin what is due, from ``cell``; return why a plan is wanted, or ""."""
         run = self._run
         if run.retry_at is not None and not self._is_worth_trying():
             self.advance(now)
@@ -131,15 +131,15 @@ class Sequencer:
     def problem(
         self, cell: Cell, before: NDArray[np.int32], *, attempt: int = 0
     ) -> CoverageProblem:
-        """Return the problem of what is still to be covered now.
+        """Return the planning problem of the cells that are open now.
 
         Args:
-            cell: where the robot is.
-            before: int32 (n, 2), the path from there on.
+            cell: the robot's cell.
+            before: int32 (n, 2), the current path from there on.
             attempt: see ``CoverageProblem``.
 
         Raises:
-            NothingToCover: nothing is.
+            NothingToCover: no cell is open.
         """
         area, state = self._map.area, self.order_state
         assert area is not None
@@ -154,12 +154,12 @@ class Sequencer:
             cost=self._config.cost,
             before=before,
             attempt=attempt,
-            # An attempt begins on the path, which the robot may have left for another area.
+            # An attempt starts on the path, which the robot may have left for another area.
             reachable=area.reachable if area.contains(cell) else None,
         )
 
     def explore(self, cell: Cell) -> str:
-        """Look for a way to a zone out of reach; return why a plan is wanted, or ""."""
+        """Look for a path to an unreachable zone; return why a plan is wanted, or ""."""
         return self._run.exploration.seek(self.order_state.current_zone, self._map.area, cell)
 
     def open_cells(self, window: Window) -> NDArray[np.bool_]:
@@ -177,7 +177,7 @@ class Sequencer:
         return unswept
 
     def _open_to_me(self, area: ReachableArea) -> NDArray[np.bool_]:
-        """Return which cells still need a visit by this robot, as far as a fleet shares them."""
+        """Return the cells that still need a visit by this robot: its part, in a fleet."""
         window = area.lattice.window
         cells = self._fleet.mine(self._unswept(window), area).copy()
         self._run.exploration.mark(cells, window)
@@ -185,7 +185,7 @@ class Sequencer:
 
     @property
     def is_exploring(self) -> bool:
-        """Whether the map does not show of all cells in reach yet where the robot fits."""
+        """Whether for some reachable cells the map does not yet show whether the robot fits."""
         area = self._map.area
         decided = None if area is None else self._map.is_decided(area.lattice.window)
         if area is None or decided is None:
@@ -193,7 +193,7 @@ class Sequencer:
         return bool((area.reachable & ~decided).any())
 
     def asked_for(self, window: Window) -> NDArray[np.bool_]:
-        """Return which cells of ``window`` this robot has to cover now, or had to."""
+        """Return which cells of ``window`` this robot has to cover, covered or not."""
         order, zone = self.order_state.order, self.order_state.current_zone
         zones = () if order is None else order.zones if zone is None else (zone,)
         inside = in_zones(zones, window, self._config.footprint.cell_m)
@@ -201,7 +201,7 @@ class Sequencer:
         return inside & ~shared.swept(window) if shared.version else inside
 
     def note_path_end(self) -> bool:
-        """Note the end of a path; return whether what it left over has to wait."""
+        """Note the end of a path; return whether the cells it left over must wait for a retry."""
         run, cells = self._run, self._left_to_me()
         if cells > 0:
             self._unreached.note_failure()
@@ -209,7 +209,7 @@ class Sequencer:
         run.left_over = cells
         is_given_up = cells > 0 and run.same_again > MAX_SAME_LEFTOVERS
         if is_given_up and self._fleet.has_company:
-            # Others may leave before what they have taken on is swept: that is tried before.
+            # Other robots may leave before they have swept their parts: those come first.
             is_given_up, run.same_again = self._leave_to_others(), 0
         return is_given_up and not run.exploration.skip_viewpoint()
 
@@ -222,7 +222,7 @@ class Sequencer:
         return not self._fleet.mine(unswept, area).any()
 
     def advance(self, now: float) -> None:
-        """Continue with what is next: all that could be done now is done."""
+        """Continue with the next part: nothing more can be done in this one now."""
         state, run = self.order_state, self._run
         run.exploration.viewpoints.clear()
         following = state.next_pass()
@@ -234,7 +234,7 @@ class Sequencer:
         if state.stage is Stage.RETURNING:
             self._end()
             return
-        # What is left is counted over all zones from here on.
+        # From here on the rest is counted over all zones.
         self.order_state = replace(state, stage=Stage.RETRYING)
         if state.tries < self._config.policy.retries and self._is_worth_trying():
             if run.retry_at is None:
@@ -246,12 +246,12 @@ class Sequencer:
             self._end()
 
     def reopen(self) -> None:
-        """Let an automatic order continue: the map has changed since it was over."""
+        """Continue an automatic order: the map has changed since it was over."""
         if self.order_state.automatic and self.order_state.stage is Stage.OVER:
             self.order_state = replace(self.order_state, stage=Stage.COVERING)
 
     def waiting_reason(self) -> str:
-        """Return what the robot waits for before it tries again, as text."""
+        """Return as text what the robot waits for before a retry."""
         cells, policy = self.unreached().cells, self._config.policy
         return (
             f"{cells} {'cell' if cells == 1 else 'cells'} not reached: tried again after "
@@ -259,7 +259,7 @@ class Sequencer:
         )
 
     def unreached(self) -> Unreached:
-        """Return what of the order stays uncovered on the map as it is."""
+        """Return what of the order stays uncovered on the present map."""
         return self._unreached.unreached(self.order_state)
 
     def _begin_retry(self, cell: Cell) -> str:
@@ -283,14 +283,14 @@ class Sequencer:
             run.ending = f"{left} reachable {cells}{zones} {were} left over"
 
     def _is_worth_trying(self) -> bool:
-        """Tell whether there is anything to try again; searched again if anything changed."""
+        """Tell whether a retry is worthwhile; recomputed if anything changed."""
         key = (self._map.area, self._ledger.version)
         if key != self._retry_check[0]:
             self._retry_check = key, bool(self.left() or self._viewpoints())
         return self._retry_check[1]
 
     def left(self) -> int:
-        """Return how many reachable cells still need a visit."""
+        """Return the number of reachable cells that still need a visit."""
         area = self._map.area
         if area is None:
             return 0
@@ -301,6 +301,6 @@ class Sequencer:
         return 0 if area is None else int(np.count_nonzero(self._open_to_me(area) & area.reachable))
 
     def _viewpoints(self) -> set[Cell]:
-        """Return the cells to look at closed areas from."""
+        """Return the cells from which to look at closed areas."""
         order, area = self.order_state.order, self._map.area
         return set() if order is None or area is None else self._unreached.viewpoints(order, area)

@@ -1,4 +1,4 @@
-"""Zones on the lattice: the cells inside them, and those that keep-out zones take away."""
+"""Zones on the lattice: cells inside zones, and cells blocked by keep-out zones."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from fasaco_edge.kernels import EAST, NORTH, SOUTH, WEST
 from fasaco_edge.kernels.lattice.polygons import add_near, count_in, turn_inside
 from fasaco_edge.mission.orders.order import Zone
 
-# A polygon along the border of a cell does not touch it; rounding must not decide [m].
+# Tolerance, so that a polygon along a cell's border does not touch it despite rounding [m].
 TOUCH_TOLERANCE_M = 1e-6
 
 
@@ -41,7 +41,7 @@ def kept_out(
 ) -> NDArray[np.bool_]:
     """Return which cells of ``window`` the robot must keep out of, bool (rows, cols), read-only.
 
-    Those that a polygon touches, or where the robot would touch it.
+    Those that a polygon touches, or where the robot would touch one.
     """
     return cells_near(polygons, window, cell_m, max(0.5 * cell_m, robot_radius_m))
 
@@ -54,7 +54,7 @@ def cells_inside(polygon: Polygon, window: Window, cell_m: float) -> NDArray[np.
 
 
 def _add_inside(polygon: Polygon, window: Window, cell_m: float, cells: NDArray[np.bool_]) -> None:
-    """Mark the cells with their centre inside, too; a small polygon costs what it covers."""
+    """Mark the cells with their centre inside, in place; the cost depends on the polygon's size."""
     x0, y0, x1, y1 = (value / cell_m for value in polygon_bounds(polygon))
     around = Window(math.floor(y0), math.floor(x0), math.ceil(y1), math.ceil(x1))
     if box := around.intersection(window):
@@ -64,7 +64,7 @@ def _add_inside(polygon: Polygon, window: Window, cell_m: float, cells: NDArray[
 
 
 def without(lattice: CoverageLattice, cells: NDArray[np.bool_]) -> CoverageLattice:
-    """Return ``lattice`` with some of its cells, bool (rows, cols), blocked for driving too."""
+    """Return ``lattice`` with some cells, bool (rows, cols), blocked for driving, too."""
     if not cells.any():
         return lattice
     states, steps = lattice.states.copy(), lattice.steps.copy()
@@ -77,7 +77,7 @@ def without(lattice: CoverageLattice, cells: NDArray[np.bool_]) -> CoverageLatti
     return CoverageLattice(lattice.window, lattice.cell_m, states, steps)
 
 
-# A map seldom moves its window; zones and passes ask for the same cells again and again.
+# The window seldom changes, and zones and passes query the same cells repeatedly.
 @lru_cache(maxsize=1)
 def _everything(window: Window) -> NDArray[np.bool_]:
     cells = np.ones((window.rows, window.cols), bool)
@@ -94,7 +94,7 @@ def _inside_any(polygons: tuple[Polygon, ...], window: Window, cell_m: float) ->
     return cells
 
 
-# A bit for each cell: of a hundred zones as much as a dozen masks.
+# One bit per cell: a hundred zones take as much as a dozen masks.
 @lru_cache(maxsize=1)
 def _planes(polygons: tuple[Polygon, ...], window: Window, cell_m: float) -> NDArray[np.uint8]:
     return np.stack([np.packbits(cells_inside(polygon, window, cell_m)) for polygon in polygons])
@@ -104,11 +104,11 @@ def _planes(polygons: tuple[Polygon, ...], window: Window, cell_m: float) -> NDA
 def cells_near(
     polygons: tuple[Polygon, ...], window: Window, cell_m: float, reach_m: float
 ) -> NDArray[np.bool_]:
-    """Return which cells of ``window`` polygons come near, bool (rows, cols), read-only.
+    """Return which cells of ``window`` are near a polygon, bool (rows, cols), read-only.
 
-    Near is where one touches the square around the cell's centre that reaches ``reach_m`` [m] to
-    each side, and all inside. With half a cell or more, a disc of that radius can drive from
-    centre to centre of the other cells, and touches no polygon.
+    A cell is near if a polygon touches the square of half-width ``reach_m`` [m] around its centre,
+    or contains it. With half a cell or more, a disc of that radius can drive between the centres of
+    the other cells without touching a polygon.
     """
     starts = np.zeros((window.rows, window.cols + 1), np.int32)
     inside = np.zeros((window.rows, window.cols), bool)
@@ -125,7 +125,7 @@ def cells_near(
 def with_kept_out(grid: OccupancyGrid, keep_out: tuple[Polygon, ...]) -> OccupancyGrid:
     """Return a map on which the pixels with their centre in a keep-out zone are occupied.
 
-    Cells that the robot must not touch are ``kept_out``, which is stricter.
+    ``kept_out`` is stricter: it gives the cells where the robot would touch one.
     """
     if not keep_out:
         return grid
