@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from fasaco_edge.mission.line.pieces import POLISHED, RAW, Joiner, Line, kept_pieces
+from fasaco_edge.mission.line.pieces import POLISHED, RAW, Joiner, Line, Piece, kept_pieces
 
 
 def cells(*places):
@@ -103,3 +103,37 @@ def test_no_joint_leads_where_it_is_not_clear(seed):
     found = whole(pieces)
     assert (np.hypot(*np.diff(found.points, axis=0).T) >= 0.3).all()
     assert (np.diff(found.cells) >= 0).all()
+
+
+def test_a_stand_is_left_out_only_where_the_way_from_beside_it_is_clear():
+    walk = cells(*lane(0, range(6)), (1, 5), (2, 5))
+    line = polished(walk).part(0, 5)
+    # All but where one stands in the last cell.
+    line.points[4] = stand((0, 4)) + np.array((0.2, 0.0))
+    beside = tuple(line.points[4].tolist())
+    here = polished(walk[:1])
+    blocked = {beside, tuple(stand((0, 5)).tolist())}
+
+    def is_clear(a, b):
+        return {tuple(a.tolist()), tuple(b.tolist())} != blocked
+
+    joiner = Joiner(here, walk, 0, stand, over, is_clear, lambda cell: False)
+    found = whole(joiner.joined([Piece(line, 0)]))
+    ways = pairwise(found.points)
+    assert all(is_clear(a, b) for a, b in ways)
+    assert found.points[-1].tolist() == stand((2, 5)).tolist()
+
+
+def test_where_no_stand_comes_between_the_line_goes_on():
+    walk = cells(*lane(0, range(6)))
+    line = polished(walk)
+
+    def without_corners(part):
+        # Of a straight walk its ends are left.
+        points, numbers = over(part)
+        return points[[0, -1]][1:], numbers[[0, -1]][1:]
+
+    here = polished(walk[:1])
+    joiner = Joiner(here, walk, 0, stand, without_corners, lambda a, b: True, lambda cell: False)
+    pieces = [Piece(line.part(0, 2), 0), Piece(line.part(4, 6), 4)]
+    assert whole(joiner.joined(pieces)).cells.tolist()[:4] == [0, 1, 4, 5]

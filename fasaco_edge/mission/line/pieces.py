@@ -182,15 +182,19 @@ class Joiner:
             if at + 1 < len(self.walk) and (not is_here or self.is_swept(self.walk[at])):
                 starts = [at + 1, at]
             for start in starts:
-                if start >= until or self.is_clear(last, self.stand(self.walk[start])):
-                    self._append(start, until)
+                is_way = start >= until or self.is_clear(last, self.stand(self.walk[start]))
+                if is_way and self._append(start, until):
                     return
             self._drop_last()
 
-    def _append(self, first: int, until: int) -> None:
-        """Append the stands of cells from one to before another."""
+    def _append(self, first: int, until: int) -> bool:
+        """Append the stands of cells from one to before another; return whether they can be driven.
+
+        A stand that the last point is all but at is left out. From the stand the way to the next
+        one is clear, from that point it may be blocked by a hair: nothing is appended then.
+        """
         if first >= until:
-            return
+            return True
         # Whether a stand is a corner is seen from the next one.
         points, cells = self.raw(self.walk[first : until + 1])
         line = Line.raw(points, cells + first)
@@ -201,7 +205,11 @@ class Joiner:
         kept = far if last is not None else np.concatenate([[True], far])
         if not kept.all():
             line = Line(line.points[kept], line.cells[kept], line.state[kept])
+        is_left_out = len(line) > 0 and not far[0]
+        if last is not None and is_left_out and not self.is_clear(last, line.points[0]):
+            return False
         self._done.append(Piece(line, -1))
+        return True
 
     def _last(self) -> Points | None:
         while self._done and not len(self._done[-1].line):
