@@ -1,1 +1,1 @@
-"""One walk for each of several robots that share a ground."""
+"""Planners for fleets: one walk for each of several robots that share a ground."""

@@ -1,4 +1,4 @@
-"""Division of a building among several robots: one walk each; each connected part by itself."""
+"""Division of a building among several robots: one walk each, per connected area."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from fasaco_edge.planners.problem import CoverageProblem
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Division:
-    """A walk for each robot; together they cover all that any of them can reach.
+    """A walk for each robot; together they cover everything reachable.
 
     Attributes:
-        walks: of each robot, int32 (n, 2), n >= 1: cells (row, col), its start first.
-        costs_s: what each costs [s].
-        cells: cells to cover.
-        lower_bound_steps: no division has a shorter longest walk.
-        rounds: rounds of pairs.
+        walks: one per robot, int32 (n, 2), n >= 1: cells (row, col), its start first.
+        costs_s: cost of each walk [s].
+        cells: number of cells to cover.
+        lower_bound_steps: lower bound on the steps of the longest walk.
+        rounds: number of rounds of pairs.
     """
 
     walks: tuple[NDArray[np.int32], ...]
@@ -34,16 +34,16 @@ class Division:
 
 
 def divide(lattice: CoverageLattice, fleet: Fleet, stop: StoppingCriterion) -> Division:
-    """Share all that can be reached out among robots.
+    """Divide everything reachable among robots.
 
     Args:
-        lattice: where they can be; they do not mind each other's places.
+        lattice: the cells where robots fit; starts of other robots are no obstacles.
         fleet: the robots, at least one.
-        stop: when to end early; it sees cost and steps of the longest walk.
+        stop: stopping criterion; it sees cost and steps of the longest walk.
 
     Raises:
-        StartOutsideMap, StartBlocked: a robot cannot stand where it begins; its number, from 1,
-            is in the text.
+        StartOutsideMap, StartBlocked: a robot cannot stand at its start; the text has its number,
+            from 1.
         NothingToCover: no cell is coverable.
     """
     reached = [_reached(lattice, start, number) for number, start in enumerate(fleet.starts, 1)]
@@ -51,7 +51,7 @@ def divide(lattice: CoverageLattice, fleet: Fleet, stop: StoppingCriterion) -> D
     cells = least = rounds = 0
     left = list(range(len(fleet.starts)))
     while left:
-        # Those in one part of the building share it.
+        # Robots in the same connected area share it.
         here = lattice.local(fleet.starts[left[0]])
         together = [robot for robot in left if reached[robot][here]]
         group = replace(fleet, starts=[fleet.starts[robot] for robot in together])

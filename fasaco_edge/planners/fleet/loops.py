@@ -1,7 +1,7 @@
-"""Closed walks over one ground, and what sharing them out needs: merged, improved, split in parts.
+"""Tours over a ground, and operations on them: merging, improving, splitting into parts.
 
-A loop is a closed walk, int32 (n,), n >= 1: flat cells ``row * cols + col`` of the lattice's
-arrays; from the last one a step leads to the first.
+A tour is a closed walk, int32 (n,), n >= 1: flat cells ``row * cols + col`` of the lattice's
+arrays; a step leads from the last cell to the first.
 """
 
 from __future__ import annotations
@@ -24,20 +24,20 @@ from fasaco_edge.planners.search.effort import effort_for
 from fasaco_edge.planners.search.walk_region import WalkRegion
 from fasaco_edge.planners.walk_before import completed
 
-# Proposals for each visit of a loop that is improved, and perturbations of it.
+# Proposals per visit of an improved tour, and perturbations of it.
 PROPOSALS, PERTURBATIONS = 20, 4
 
 Loop = NDArray[np.int32]
 
 
 class LoopGround:
-    """A lattice, what loops on it cost, and where the robots begin that drive them.
+    """A lattice, the cost of tours on it, and the robots' starts.
 
     Attributes:
-        lattice: where they can be.
-        cost: of steps and turns.
+        lattice: the cells where robots fit.
+        cost: prices of steps and turns.
         starts: flat cells.
-        ways: int32 (k, rows * cols): steps from each start to each cell.
+        ways: int32 (k, rows * cols): distance from each start to each cell, in steps.
     """
 
     def __init__(
@@ -50,21 +50,21 @@ class LoopGround:
         self._offsets = np.array([1, self._cols, -1, -self._cols], np.int64)
 
     def loop_of(self, cells: NDArray[np.int32]) -> Loop:
-        """Return the loop of a walk that ends where it began, cells (row, col) int32 (n, 2)."""
+        """Return the tour of a closed walk, cells (row, col) int32 (n, 2)."""
         loop: Loop = self._flat(cells)
         return loop[:-1] if len(loop) > 1 else loop
 
     def walk_of(self, loop: Loop, start: int) -> NDArray[np.int32]:
-        """Return a loop as a walk from ``start`` and back, cells (row, col) int32 (n, 2)."""
+        """Return a tour as a walk from ``start`` and back, cells (row, col) int32 (n, 2)."""
         loop = np.roll(loop, -int(np.argmax(loop == start)))
         return self._cells(np.append(loop, loop[0]) if len(loop) > 1 else loop)
 
     def cost_us(self, loop: Loop) -> int:
-        """Return what a loop costs, its first turn, too [us]."""
+        """Return the cost of a tour, including its first turn [us]."""
         return 0 if len(loop) == 1 else int(self._visit_costs(loop).sum())
 
     def merged(self, first: Loop, second: Loop) -> Loop:
-        """Return one loop from two, joined where they meet, or else are neighbours."""
+        """Return two tours merged into one, at a common cell, or else at neighbours."""
         place = np.full(self._steps.size, -1, np.int64)
         place[second] = np.arange(len(second))
         meets = np.flatnonzero(place[first] >= 0)
@@ -84,7 +84,7 @@ class LoopGround:
         return np.concatenate((way[:-1], second, way[:0:-1], first))
 
     def parted(self, loop: Loop, robots: Sequence[int]) -> dict[int, Loop]:
-        """Split a loop until each robot has a part of it, with the way to it and back."""
+        """Split a tour until each robot has a part, with the shortest path to it and back."""
         loops = {}
         parts = [(loop, np.array(robots))]
         while parts:
@@ -96,12 +96,12 @@ class LoopGround:
         return loops
 
     def improved(self, loop: Loop, wanted: NDArray[np.bool_], random: NDArray[np.uint64]) -> Loop:
-        """Return a loop over ``wanted`` cells, improved by local search.
+        """Return a tour over ``wanted`` cells, improved by local search.
 
         Args:
-            loop: what it was.
-            wanted: bool (rows * cols,), the cells that it has to visit from now on; those that
-                it does not visit are connected to it by others of them.
+            loop: the tour so far.
+            wanted: bool (rows * cols,), the cells to visit from now on; those not on the tour must
+                be connected to it by others of them.
             random: stream, uint64 (1,); advanced.
         """
         problem = self._cut_out(loop, wanted)
@@ -118,7 +118,7 @@ class LoopGround:
         return self.loop_of(problem.cells_of(framed.unframed(walk)))
 
     def beside(self, cell: int) -> list[int]:
-        """Return the flat cells that a step leads to from one."""
+        """Return the neighbours of a flat cell that a step leads to."""
         mask = int(self._steps[divmod(cell, self._cols)])
         offsets = enumerate(self._offsets.tolist())
         return [cell + offset for direction, offset in offsets if mask >> direction & 1]
@@ -134,12 +134,12 @@ class LoopGround:
         return np.column_stack((rows + window.row0, cols + window.col0)).astype(np.int32)
 
     def _way(self, begin: int, end: int) -> NDArray[np.int32]:
-        """Return a shortest way between two flat cells, both among it, int32 (n,)."""
+        """Return a shortest path between two flat cells, with both, int32 (n,)."""
         way = shortest_walk(self._steps, divmod(begin, self._cols), divmod(end, self._cols))
         return (way @ (self._cols, 1)).astype(np.int32)
 
     def _visit_costs(self, loop: Loop) -> NDArray[np.int64]:
-        """Return what each visit costs: the step on from it, and the turn in it [us]."""
+        """Return the cost of each visit: the turn in it and the step out of it [us]."""
         after = np.roll(loop, -1) - loop
         before = np.roll(after, 1)
         quarters = np.where(after == before, 0, np.where(after == -before, 2, 1)).astype(np.int64)
@@ -147,7 +147,7 @@ class LoopGround:
         return costs
 
     def _split(self, loop: Loop, robots: NDArray[np.int64]) -> list[tuple[Loop, NDArray[np.int64]]]:
-        """Split a loop in two, each with some of the robots."""
+        """Split a tour in two, each with some of the robots."""
         found, order = np.zeros(5, np.int64), np.zeros(len(robots), np.int64)
         costs_us = np.concatenate(([0], np.cumsum(np.tile(self._visit_costs(loop), 2))))
         ways, step_us = self.ways[robots], self.cost.step_us
@@ -164,7 +164,7 @@ class LoopGround:
         ]
 
     def _reached(self, robot: int, part: Loop) -> Loop:
-        """Return a part of a loop with the shortest way to it from a robot's start, and back."""
+        """Return a part of a tour with the shortest path to it from a robot's start, and back."""
         part = np.roll(part, -int(np.argmin(self.ways[robot][part])))
         if part[0] == self.starts[robot]:
             return part
@@ -174,13 +174,13 @@ class LoopGround:
         return np.concatenate((way[:-1], part, way[:0:-1]))
 
     def _cut_out(self, loop: Loop, wanted: NDArray[np.bool_]) -> CoverageProblem:
-        """Return the problem of covering ``wanted`` around a loop, its ``before``."""
+        """Return the problem of covering ``wanted`` around a tour, its ``before``."""
         whole = self.lattice.window
         rows, cols = np.divmod(np.concatenate((loop, np.flatnonzero(wanted))), self._cols)
         top, left = int(rows.min()), int(cols.min())
         inside = slice(top, int(rows.max()) + 1), slice(left, int(cols.max()) + 1)
         steps = self._steps[inside].copy()
-        # No step leads out.
+        # No step leaves the window.
         steps[:, -1] &= ~np.uint8(1 << EAST)
         steps[-1] &= ~np.uint8(1 << NORTH)
         steps[:, 0] &= ~np.uint8(1 << WEST)

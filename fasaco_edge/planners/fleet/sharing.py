@@ -1,14 +1,14 @@
-"""A search for walks of several robots that share a connected ground, about equal in cost.
+"""Fleet search: walks of similar cost for several robots that share a connected ground.
 
-1. One closed walk over all that any of them can reach, by the project's search.
-2. It is split in two, for two groups of robots, and each part again, until every robot has one
-   (``kernels.fleet.split``): that costs hardly a step, and balances but for the ways from the
-   starts.
-3. Round by round, pairs of robots whose parts touch put their walks together, improve them by
-   local search, and split them anew; or one leaves some cells to the other. Without a gain the
-   groups grow, and finally everything restarts with another walk.
+1. One tour over everything reachable, by the project's search.
+2. The tour is split in two, for two groups of robots, and each part again, until every robot has
+   one (``kernels.fleet.split``): that adds hardly a step, and balances the parts except for the
+   paths from the starts.
+3. In rounds, pairs of robots with adjacent parts merge their tours, improve the result by local
+   search, and split it again; or one hands some cells to the other. Without a gain the groups grow,
+   and finally everything restarts with another tour.
 
-The longest walk decides when all is done: its cost is the makespan.
+The objective is the makespan: the cost of the longest walk.
 """
 
 from __future__ import annotations
@@ -33,16 +33,16 @@ from fasaco_edge.planners.problem import CoverageProblem
 from fasaco_edge.planners.search.near_optimal import NearOptimal
 from fasaco_edge.planners.search.walk_region import stream_of
 
-# Proposals for each cell of the walk over all; perturbations of a walk with a free end.
+# Proposals per cell of the common tour; perturbations of a walk with a free end.
 TOUR_PROPOSALS = 1_000
 OPEN = SearchWork(perturbations=200)
-# Of two robots so many times only some cells go from one to the other, at least so many in turn.
+# Probability that of a pair only some cells change owner; their number is drawn up to FEW or more.
 SHIFTED, FEW = 0.5, 6
-# After so many rounds without a gain the worst robot shares with one more.
+# After this many rounds without a gain the worst robot's group grows by one.
 GAINLESS_PAIRS = 4
-# After so many it restarts with another walk over all.
+# After this many rounds without a gain a new common tour is planned.
 GAINLESS_ROUNDS = 40
-# A seed is below this.
+# Upper limit of a seed.
 SEEDS = 2**63
 
 
@@ -51,11 +51,11 @@ class Fleet:
     """Robots that share a ground.
 
     Attributes:
-        starts: the cell (row, col) each begins in.
-        returns: whether each ends where it began.
-        cost: of its steps and turns, alike for all.
-        seed: of local search.
-        threads: that pairs are improved on; the walks are the same for any number.
+        starts: start cell (row, col) of each.
+        returns: whether each returns to its start.
+        cost: prices of steps and turns, the same for all.
+        seed: seed of local search.
+        threads: number of threads; the result is the same for any number.
     """
 
     starts: Sequence[Cell]
@@ -66,7 +66,7 @@ class Fleet:
 
 
 class _Best(NamedTuple):
-    """The best division so far: the robots' loops, who covers each cell, the worst cost [us]."""
+    """The best division so far: tours, owner of each cell, greatest cost [us]."""
 
     loops: list[Loop]
     owner: NDArray[np.int32]
@@ -74,7 +74,7 @@ class _Best(NamedTuple):
 
 
 class Sharing:
-    """A running division of one connected part of a lattice; a generator of pauses."""
+    """A running division of one connected area of a lattice, a generator of pauses."""
 
     def __init__(self, lattice: CoverageLattice, fleet: Fleet, reached: NDArray[np.bool_]) -> None:
         self._lattice, self._fleet, self._reached = lattice, fleet, reached
@@ -91,10 +91,10 @@ class Sharing:
 
     @property
     def lower_bound_steps(self) -> int:
-        """No division has a shorter longest walk.
+        """Lower bound on the steps of the longest walk.
 
-        A walk that returns has as many steps as visits, and visits cells of both colours of a
-        chessboard alike often; and one robot has to come to the cell farthest from all starts.
+        A closed walk visits cells of both colours of a chessboard equally often; and one robot must
+        come to the cell farthest from all starts.
         """
         robots, returns = len(self._starts), self._fleet.returns
         rows, cols = np.nonzero(self._reached)
@@ -106,13 +106,13 @@ class Sharing:
         return max(share if self.cells > robots else 0, farthest * (2 if returns else 1))
 
     def progress(self) -> SearchProgress:
-        """Return how far it is: figures of the longest walk of the best division so far."""
+        """Return progress: figures of the longest walk of the best division so far."""
         steps = max(map(len, self._best.loops), default=0)
         work = SearchWork(perturbations=self.rounds)
         return SearchProgress(work, self._best.worst_us / MICROSECONDS, steps)
 
     def run(self, stop: StoppingCriterion) -> Iterator[None]:
-        """Share out, balance and improve, again and again; pause after each piece of work."""
+        """Divide, balance and improve repeatedly; pause after each piece of work."""
         with ThreadPoolExecutor(self._fleet.threads) as pool:
             for attempt in itertools.count():
                 self._begin(stop, attempt)
@@ -122,7 +122,7 @@ class Sharing:
                 while gainless < GAINLESS_ROUNDS:
                     if len(self._starts) == 1 or self._is_proven():
                         return
-                    # Larger groups take turns with pairs.
+                    # Larger groups alternate with pairs.
                     self._balance(2 + self.rounds % 2 * (gainless // GAINLESS_PAIRS), pool)
                     self.rounds += 1
                     worst_us = max(self._costs_us)
@@ -140,7 +140,7 @@ class Sharing:
         return self._best.worst_us <= self._least_us
 
     def _begin(self, stop: StoppingCriterion, attempt: int) -> None:
-        """Plan one walk for all, another one at each attempt, and split it for the robots."""
+        """Plan the common tour, another one at each attempt, and split it for the robots."""
         start = self._fleet.starts[0]
         problem = CoverageProblem.of(
             self._lattice, start, end=start, cost=self._fleet.cost, reachable=self._reached
@@ -155,7 +155,7 @@ class Sharing:
             self._owner[loops[robot]] = robot
 
     def _is_tour_over(self, stop: StoppingCriterion, progress: SearchProgress) -> bool:
-        """Ask ``stop`` of a walk over all, of which each robot will have a share."""
+        """Ask ``stop`` about the common tour, of which each robot gets a share."""
         if progress.work.proposals >= TOUR_PROPOSALS * self.cells:
             return True
         robots = len(self._starts)
@@ -163,16 +163,18 @@ class Sharing:
         return stop(replace(share, lower_bound_cost_s=0.0))
 
     def _balance(self, size: int, pool: ThreadPoolExecutor) -> None:
-        """Redistribute among groups of robots whose parts touch: the worst robot's
-        of ``size``, the others of two."""
+        """Redistribute cells in groups of robots with adjacent parts.
+
+        The worst robot's group has ``size`` members, the others have two.
+        """
         groups = self._groups(size)
-        # All of them before the first is taken, as they read what that changes.
+        # All results before the first is accepted, as accepting changes their input.
         found = list(pool.map(self._shared_anew, groups))
         for robots, loops in zip(groups, found, strict=True):
             self._accept(robots, loops)
 
     def _touching(self) -> NDArray[np.bool_]:
-        """Return whose parts touch, bool (k, k), symmetric."""
+        """Return which robots have adjacent parts, bool (k, k), symmetric."""
         robots = len(self._loops)
         touch = np.zeros((robots, robots), np.bool_)
         steps = self._lattice.steps
@@ -190,21 +192,21 @@ class Sharing:
         return touch
 
     def _groups(self, size: int) -> list[tuple[int, ...]]:
-        """Return groups of robots: the worst one with those beside it, then pairs.
+        """Return groups of robots: the worst one with its neighbours, then pairs.
 
-        Those that differ most come first, by chance where they are alike.
+        Pairs that differ most come first, in random order among equals.
         """
         robots = len(self._loops)
         touch, costs_us = self._touching(), np.array(self._costs_us)
         random = np.random.default_rng((self._fleet.seed, self.rounds))
-        # Every other round all who differ little are alike.
+        # In every other round all small differences count as equal.
         alike_us = 2 * self._fleet.cost.step_us * (1 + 8 * (self.rounds % 2))
         apart = np.abs(costs_us[:, None] - costs_us) + alike_us * random.random((robots, robots))
         apart = np.where(touch, apart + apart.T, -1.0)
         free = np.ones(robots, np.bool_)
         groups: list[tuple[int, ...]] = []
         while (apart := np.where(free[:, None] & free, apart, -1.0)).max() >= 0.0:
-            # The first group is the worst robot's, where it is to be a large one.
+            # The first group is that of the worst robot, which may be larger.
             most = 2 if groups else size
             group = [int(np.argmax(costs_us if most > 2 else apart.max(axis=1)))]
             while len(group) < most and apart[group].max() >= 0.0:
@@ -215,7 +217,7 @@ class Sharing:
         return [group for group in groups if len(group) > 1]
 
     def _shared_anew(self, robots: tuple[int, ...]) -> dict[int, Loop] | None:
-        """Return other walks of these robots, over all that they cover; None for none."""
+        """Return new tours of these robots over all their cells; None for none."""
         random = np.random.default_rng((self._fleet.seed, self.rounds, robots[0]))
         if len(robots) == 2 and random.random() < SHIFTED:
             return self._shifted(robots, random)
@@ -230,7 +232,7 @@ class Sharing:
     def _shifted(
         self, robots: tuple[int, ...], random: np.random.Generator
     ) -> dict[int, Loop] | None:
-        """Return walks of two robots, the dearer of which leaves some cells to the other."""
+        """Return new tours of two robots: the one with the higher cost hands over some cells."""
         giver, taker = sorted(robots, key=lambda robot: -self._costs_us[robot])
         apart_us = self._costs_us[giver] - self._costs_us[taker]
         most = apart_us // self._fleet.cost.step_us // 2
@@ -247,7 +249,7 @@ class Sharing:
         return loops
 
     def _piece(self, giver: int, taker: int, size: int, random: np.random.Generator) -> list[int]:
-        """Return connected cells of one robot that lie beside the other's, about ``size``."""
+        """Return about ``size`` connected cells of one robot adjacent to the other's part."""
         theirs = self._owner
         rim = [
             cell
@@ -268,7 +270,7 @@ class Sharing:
         return found
 
     def _accept(self, robots: tuple[int, ...], loops: dict[int, Loop] | None) -> None:
-        """Take walks in place of those of the same robots, unless they are worse."""
+        """Replace the tours of these robots, unless the new ones are worse."""
         if loops is None:
             return
         before = [self._costs_us[robot] for robot in robots]

@@ -1,1 +1,1 @@
-"""The planners of Carr and Wang 2022: the colony, and the baselines it is compared with."""
+"""Planners of Carr and Wang 2022: the colony, and the baselines it is compared with."""

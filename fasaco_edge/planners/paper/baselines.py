@@ -1,15 +1,15 @@
-"""Walks by fixed rules: the paper's baselines, and the first complete walk of a search.
+"""Walks by fixed rules: the paper's baselines, and the first complete walks of a search.
 
-Spanning-tree coverage, Gabriely and Rimon 2001 (``kernels.ants.baselines`` for any grid), is
-a closed walk. Where it may end anywhere, it ends with the last cell that still needs a visit;
-from there a shortest way leads to an end that is not the start. Read backwards the same walk
-may come out nearer to that end: the cheaper reading is taken.
+Spanning-tree coverage, Gabriely and Rimon 2001 (``kernels.ants.baselines`` for any grid), is a
+closed walk. With no end cell, the walk stops at the last cell to cover. If an end cell other than
+the start is given, a shortest path to it is appended. The reversed walk is tried too; the cheaper
+wins.
 
 Spiral-STC and ZigZag are as the paper's authors ran them. Their Spiral-STC is a backtracking
-spiral: it keeps to the wall on its right, counter-clockwise, until nothing open is beside it,
-and continues from the nearest open cell. Their ZigZag tries the directions in one fixed order at
-every cell and leaves dead ends the same way. Both are given here without the extra steps that
-their code makes at dead ends, which Table I counts too; see ``tests/benchmarks/RESULTS.md``.
+spiral: it follows the wall on its right, counter-clockwise, until no open cell is adjacent, and
+continues from the nearest open cell. Their ZigZag tries the directions in one fixed order at every
+cell and leaves dead ends the same way. Both are given here without the extra steps that their code
+makes at dead ends, which Table I counts too; see ``tests/benchmarks/RESULTS.md``.
 """
 
 from __future__ import annotations
@@ -32,21 +32,20 @@ from fasaco_edge.planners.path import CoveragePath
 from fasaco_edge.planners.planner import Observer, StoppingCriterion, ignore, never
 from fasaco_edge.planners.problem import CoverageProblem, graph_of, scratch_for
 
-# Directions in the order they are tried. From the heading: to the right, straight on, to the
-# left, back.
+# Directions in the order of trying, relative to the heading: right, straight on, left, back.
 RIGHT_HAND = (3, 0, 1, 2)
-# Along the rows first: west, east, south, north.
+# Absolute directions, along the rows first: west, east, south, north.
 ROWS_FIRST = (2, 0, 3, 1)
-# An ant of this velocity goes straight on as long as it can.
+# An ant of this velocity goes straight on for as long as possible.
 STRAIGHT_ON = 64
 
 
 @dataclass(frozen=True, slots=True)
 class FixedRule:
-    """A planner without chance: the one walk that a rule gives.
+    """A deterministic planner: a rule gives its one walk.
 
     Attributes:
-        name: of the planner.
+        name: name of the planner.
         walk: returns the walk over a problem's graph, flat cells int32 (n,).
     """
 
@@ -56,7 +55,7 @@ class FixedRule:
     def plan(
         self, problem: CoverageProblem, stop: StoppingCriterion = never, observe: Observer = ignore
     ) -> CoveragePath:
-        """Return the walk; it takes too little time to be stopped."""
+        """Return the walk; it is too fast to need ``stop``."""
         began = time.perf_counter()
         cells = problem.cells_of(self.walk(problem, graph_of(problem)))
         return CoveragePath(
@@ -69,9 +68,9 @@ class FixedRule:
 
 
 def _around_tree(problem: CoverageProblem, graph: Graph) -> NDArray[np.int32]:
-    """Return the walk once around a tree that spans blocks of 2 x 2 cells."""
+    """Return the walk around a tree that spans blocks of 2 x 2 cells."""
     lattice = problem.lattice
-    # The tree spans covered cells too: those to cover need not be connected.
+    # The tree spans covered cells too: the cells to cover need not be connected.
     reachable = reachable_from(lattice.steps, *lattice.local(problem.start))
     walk = spanning_tree_walk(lattice.steps, reachable, problem.flat_start)
     if problem.end is None:
@@ -83,7 +82,7 @@ def _around_tree(problem: CoverageProblem, graph: Graph) -> NDArray[np.int32]:
 
 
 def _needed_part(problem: CoverageProblem, walk: NDArray[np.int32]) -> NDArray[np.int32]:
-    """Return the walk up to the last cell of those to be covered that it comes to."""
+    """Return the walk up to its last cell to cover."""
     first_visits = np.unique(walk, return_index=True)[1]
     needed = problem.to_cover.ravel()[walk[first_visits]]
     return walk[: int(first_visits[needed].max()) + 1]
@@ -92,7 +91,7 @@ def _needed_part(problem: CoverageProblem, walk: NDArray[np.int32]) -> NDArray[n
 def _sweep(
     order: tuple[int, int, int, int], turns_along: bool, problem: CoverageProblem, graph: Graph
 ) -> NDArray[np.int32]:
-    """Return the walk that tries directions in an order; see ``kernels.ants.baselines``."""
+    """Return a walk by an order of directions; see ``kernels.ants.baselines``."""
     scratch, start, end = scratch_for(graph), problem.flat_start, problem.flat_end
     length = capacity = 2 * problem.cells
     while length >= capacity:
@@ -103,7 +102,7 @@ def _sweep(
 
 
 def stc(*unused: object) -> FixedRule:
-    """Return spanning-tree coverage; it needs no colony and no threads, nor do those below."""
+    """Return spanning-tree coverage; colony and threads are unused, also below."""
     return FixedRule("stc", _around_tree)
 
 
@@ -120,10 +119,9 @@ def zigzag(*unused: object) -> FixedRule:
 def first_walks(problem: CoverageProblem, graph: Graph) -> Iterator[NDArray[np.int32]]:
     """Yield complete walks, flat cells int32 (n,).
 
-    The first is that of an ant which always goes where the fewest open neighbours
-    are left, Warnsdorff's rule. Where turns count, there follow an ant that goes
-    straight on, the spiral, the zigzag and the walk around a spanning tree: each is
-    best on some grids.
+    The first is that of an ant that always takes the cell with the fewest open neighbours,
+    Warnsdorff's rule. Where turns cost, an ant that goes straight on, the spiral, the zigzag and
+    the walk around a spanning tree follow: each is best on some grids.
     """
     yield _ant(problem, graph, velocity=1)
     if problem.cost.quarter_turn_us:
@@ -133,7 +131,7 @@ def first_walks(problem: CoverageProblem, graph: Graph) -> Iterator[NDArray[np.i
 
 
 def _ant(problem: CoverageProblem, graph: Graph, velocity: int) -> NDArray[np.int32]:
-    """Let one ant walk without a trail and without chance."""
+    """Let one ant walk without trail and randomness."""
     config = ColonyConfig(
         ants=1, velocities=(velocity,), q0=1.0, tau0=1.0, visibility="fewest-open", beta=1.0
     )

@@ -1,4 +1,4 @@
-"""What an ant colony is made of: its cohorts and the constants of its equations."""
+"""Configuration of an ant colony: its cohorts and the constants of its equations."""
 
 from __future__ import annotations
 
@@ -22,16 +22,16 @@ class ColonyConfig:
     """A colony; the defaults are the paper's FaSACO: 1,000 ants, cohorts from 8 down to 1.
 
     Attributes:
-        ants: ants in all.
+        ants: number of ants.
         velocities: velocity of each cohort [cells/move], in the order they walk.
         q0: probability of taking the strongest trail, equation (4).
         alpha: weight of new pheromone, equations (7) and (8).
         tau0: pheromone every move starts with, equation (7).
         seed: seed of all random streams.
-        visibility: what eta of equation (5) is 1 over: the distance to the "neighbour",
-            which is 1, as in the paper; the "distance" an ant goes at its velocity; or
-            one more than the neighbour's own open neighbours, "fewest-open".
-        beta: weight of eta, equations (4) and (6); without effect for "neighbour".
+        visibility: eta of equation (5) is 1 over this: the distance to the "neighbour", which is 1,
+            as in the paper; the "distance" an ant goes at its velocity; or one more than the
+            neighbour's own open neighbours, "fewest-open".
+        beta: weight of eta, equations (4) and (6); no effect for "neighbour".
     """
 
     ants: int = 1000
@@ -64,7 +64,7 @@ class ColonyConfig:
         _require(0 <= self.seed < 2**63, "seed", "be in 0..2^63 - 1", self.seed)
 
     def cohorts(self) -> tuple[Cohort, ...]:
-        """Return the cohorts in order; sizes differ by one ant at most."""
+        """Return the cohorts in order; sizes differ by at most one ant."""
         share, extra = divmod(self.ants, len(self.velocities))
         return tuple(
             Cohort(share + (index < extra), velocity)

@@ -1,21 +1,19 @@
-"""FaSACO: Algorithm 1 of Carr and Wang 2022, its colony, and the threads that ants walk on.
+"""FaSACO: Algorithm 1 of Carr and Wang 2022, its colony, and the ants' threads.
 
-Line 1: for each cohort, in the order of ``ColonyConfig.velocities``; lines 2 to
-5: every ant walks until all cells are visited (``kernels.ants.colony.walk_ants``);
-line 7: the best walk so far is strengthened by equation (8); line 9: the
-cheapest walk is returned, which is the shortest where only steps cost. A colony
-whose only velocity is 1 is plain ACO.
+Line 1: for each cohort, in the order of ``ColonyConfig.velocities``; lines 2 to 5: every ant walks
+until all cells are visited (``kernels.ants.colony.walk_ants``); line 7: the best walk so far is
+strengthened by equation (8); line 9: the cheapest walk is returned, which is the shortest if only
+steps cost. A colony whose only velocity is 1 is plain ACO.
 
-Deviations: delta phi of equation (8) is what the cells would cost at a step each
-over what the walk costs. For steps alone that is ``cells / steps``, proportional
-to 1 over the length as the paper has it and about 1 at best on any map, so that
-tau0 needs no tuning to the map's size. A walk may have to end in a given cell:
-ants go there by a shortest way when all is covered.
+Deviations: delta phi of equation (8) is the cost of one step per cell over the cost of the walk.
+For steps alone that is ``cells / steps``, proportional to 1 over the length as in the paper, and
+about 1 at best on any map, so tau0 needs no tuning to the map's size. If a walk must end in a given
+cell, ants go there by a shortest path when all is covered.
 
-Where a mission has a living trail (``planners.living_trail``) and a walk that was still to be
-driven, the search continues instead of restarting: ants walk on that trail, as large a share of
-them as is new of the cells to cover, and the best walk so far is the one before, with what no
-longer holds cut out and what is new put in.
+With a living trail (``planners.living_trail``) and a walk from before, the search continues instead
+of restarting: ants start from that trail, as large a share of them as the share of new cells to
+cover; and the best walk so far is the one from before, with invalid parts cut out and new cells
+inserted.
 """
 
 from __future__ import annotations
@@ -46,17 +44,17 @@ from fasaco_edge.planners.planner import (
 from fasaco_edge.planners.problem import CoverageProblem, FramedGround, graph_of, scratch_for
 from fasaco_edge.planners.walk_before import HELD_CELLS, can_repair, completed
 
-# Ants of a group walk at the same time. Larger groups keep more threads busy,
-# smaller ones end the search sooner when it is to stop: a group covers
-# about this many cells, some ten milliseconds.
+# Limit on the ants of a group, which walk at the same time. Larger groups keep more threads busy,
+# smaller ones respond to ``stop`` sooner: a group covers about this many cells, some ten
+# milliseconds.
 LARGEST_GROUP = 32
 SMALLEST_GROUP = 2
 CELLS_PER_GROUP = 64_000
 
-# So many ants walk where hardly anything is new.
+# Number of ants where hardly any cell is new.
 FEWEST_ANTS = 64
 
-# Initial capacity for a walk; one that needs more is walked again with more.
+# Initial capacity for a walk; a longer one is repeated with more.
 STEPS_PER_CELL = 2
 
 
@@ -82,11 +80,11 @@ class Colony:
         self._walks = np.empty(shape, np.int32)
 
     def walk(self, velocity: int, streams: NDArray[np.int64]) -> tuple[NDArray[np.int32], int]:
-        """Let a group walk and update the trail by equation (7).
+        """Let a group walk, and update the trail by equation (7).
 
         Args:
-            velocity: cells an ant keeps straight on for.
-            streams: the ants' random streams, int64 (ants, 4), of a group at most.
+            velocity: number of cells an ant goes straight on.
+            streams: the ants' random streams, int64 (ants, 4), at most one group.
 
         Returns:
             The group's cheapest walk, flat cells int32 (n,), and its cost [us].
@@ -96,7 +94,7 @@ class Colony:
         before = streams.copy()
         self._walk_on_threads(velocity, streams, lengths)
         while lengths.max() > self._walks.shape[1]:
-            # A walk did not fit: the same ants again, with more memory.
+            # A walk did not fit: the same ants walk again, with more memory.
             self._walks = np.empty((len(self._walks), 2 * int(lengths.max())), np.int32)
             streams[:] = before
             self._walk_on_threads(velocity, streams, lengths)
@@ -106,7 +104,7 @@ class Colony:
         return walk, cost_us
 
     def offer(self, walk: NDArray[np.int32], cost_us: int) -> None:
-        """Let a walk, flat cells int32 (n,), be the best if it is cheaper, or the first."""
+        """Take a walk, flat cells int32 (n,), as the best if it is cheaper, or the first."""
         if not self.best.size or cost_us < self.best_us:
             self.best, self.best_us = walk, cost_us
 
@@ -115,7 +113,7 @@ class Colony:
         deposit(self._state, self._cost.quality(self._cells, self.best_us), self.best)
 
     def progress(self, walked: int) -> SearchProgress:
-        """Return how far the search is after so many ants."""
+        """Return the progress of the search after this many ants."""
         return SearchProgress(
             SearchWork(ants=walked), self.best_us / MICROSECONDS, self.best.size - 1
         )
@@ -142,7 +140,7 @@ class Colony:
 
 
 def _first_trail(config: ColonyConfig, problem: CoverageProblem) -> NDArray[np.float64]:
-    """Return the living trail, or a flat one: pheromone by flat cell and direction, above 0."""
+    """Return the living trail, or a uniform one: pheromone by flat cell and direction, above 0."""
     if problem.trail is None:
         return np.full((problem.to_cover.size, 4), config.tau0)
     trail = problem.trail.on(problem.lattice.window).astype(np.float64).reshape(-1, 4)
@@ -153,10 +151,10 @@ class Group(NamedTuple):
     """Ants that walk at the same time.
 
     Attributes:
-        cohort: number of their cohort.
-        velocity: of theirs [cells/move].
+        cohort: index of their cohort.
+        velocity: their velocity [cells/move].
         streams: a random stream for each, int64 (ants, 4), independent of all others.
-        is_last: whether it is the last group of the cohort.
+        is_last: whether it is the last group of its cohort.
     """
 
     cohort: int
@@ -166,12 +164,12 @@ class Group(NamedTuple):
 
 
 def group_size(cells: int) -> int:
-    """Return how many ants walk at the same time over so many cells."""
+    """Return the number of ants that walk at the same time, for this many cells."""
     return min(max(CELLS_PER_GROUP // cells, SMALLEST_GROUP), LARGEST_GROUP)
 
 
 def groups_of(config: ColonyConfig, cells: int) -> Iterator[Group]:
-    """Yield all ants of a colony over so many cells, group by group."""
+    """Yield all ants of a colony, group by group."""
     size = group_size(cells)
     for number, cohort in enumerate(config.cohorts()):
         words = np.random.SeedSequence((config.seed, number)).generate_state(4 * cohort.ants)
@@ -181,7 +179,7 @@ def groups_of(config: ColonyConfig, cells: int) -> Iterator[Group]:
 
 
 def ants_for(config: ColonyConfig, problem: CoverageProblem) -> int:
-    """Return how many ants walk: all, or beside a walk before as large a share as is new of it."""
+    """Return the number of ants: all, or for a walk from before the share of new cells of it."""
     if problem.trail is None or problem.before is None or not can_repair(problem):
         return config.ants
     window = problem.lattice.window
@@ -193,7 +191,7 @@ def ants_for(config: ColonyConfig, problem: CoverageProblem) -> int:
 
 
 def _walk_before(problem: CoverageProblem) -> NDArray[np.int32] | None:
-    """Return the walk before, made legal and complete, flat cells int32 (n,); None for none."""
+    """Return the walk from before, completed, flat cells int32 (n,); None for none."""
     if problem.trail is None or problem.before is None or not can_repair(problem):
         return None
     framed = FramedGround.of(problem)
@@ -201,7 +199,7 @@ def _walk_before(problem: CoverageProblem) -> NDArray[np.int32] | None:
 
 
 def _rules(config: ColonyConfig, problem: CoverageProblem) -> Rules:
-    # An ant goes as far as it is fast; a cell has three open neighbours at most.
+    # An ant goes as far as its velocity; a cell has at most three open neighbours.
     reach = max(*config.velocities, 4)
     powers = np.array([(1.0 / (index + 1)) ** config.beta for index in range(reach)])
     cost = problem.cost
@@ -226,7 +224,7 @@ def snapshot_of(
     ants: int,
     steps: int,
 ) -> ColonySnapshot:
-    """Return what an observer sees after so many ants; ``trail`` is float64 (n, 4)."""
+    """Return the observer's view after this many ants; ``trail`` is float64 (n, 4)."""
     lattice = problem.lattice
     legal = (lattice.steps[..., np.newaxis] >> np.arange(4, dtype=np.uint8)) & np.uint8(1)
     tau = trail.reshape(legal.shape) * legal
@@ -248,7 +246,7 @@ class Fasaco:
         stop: StoppingCriterion = never,
         observe: Observer = ignore,
     ) -> CoveragePath:
-        """Return the cheapest walk the colony found; see ``CoveragePlanner.plan``."""
+        """Return the cheapest walk of the colony; see ``CoveragePlanner.plan``."""
         began, first_walk_s, walked, first_us = time.perf_counter(), 0.0, 0, 0
         config = replace(self.config, ants=ants_for(self.config, problem))
         with ThreadPoolExecutor(self.threads) as pool:

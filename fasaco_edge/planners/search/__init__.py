@@ -1,1 +1,1 @@
-"""The planner of missions: a search by colony and local search, and repair of a walk."""
+"""Planner of missions: a search by colony and local search, and repair of a walk."""

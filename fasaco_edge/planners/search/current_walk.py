@@ -1,7 +1,7 @@
-"""The walk that a search works on, and the best one so far.
+"""Current walk of a search, and its best walk so far.
 
-It is worked on in parts: in a region of the ground that is loaded and put back (``walk_region``),
-or in windows of it (``windows``). What comes of a part is accepted here. Walks are framed cells.
+Work is done on parts: a region of the ground that is loaded and put back (``walk_region``), or
+windows of it (``windows``). Results of a part are accepted here. Walks are framed cells.
 """
 
 from __future__ import annotations
@@ -18,10 +18,10 @@ from fasaco_edge.planners.search.regions import EDGE, is_one_region, regions_of
 from fasaco_edge.planners.search.walk_region import WalkRegion
 from fasaco_edge.planners.search.windows import WindowSearch
 
-# Visits of a walk that local search has memory for.
+# Memory of local search: visits per cell.
 VISITS_PER_CELL = 4
 
-# How often the walk may cross the rim of a region.
+# Limit on the walk's crossings of a region's border.
 JUMPS = 8 * EDGE
 
 
@@ -31,11 +31,11 @@ class CurrentWalk:
     Attributes:
         cost_us: of the current walk [us].
         best, best_us: the best walk so far, int32 (n,), and its cost [us].
-        is_whole: whether the ground is one region.
-        region: the region that is loaded, or was last.
-        windows: the search in windows; None until it is opened.
-        held: the first so many visits change only where something is gained.
-        since_gain: perturbations since the current walk was last improved.
+        is_whole: whether one region covers the ground.
+        region: the region loaded now, or last.
+        windows: the search in windows; None before ``open_windows``.
+        held: number of leading visits that change only for a gain.
+        since_gain: perturbations since the last gain.
     """
 
     def __init__(self, problem: CoverageProblem, framed: FramedGround) -> None:
@@ -51,17 +51,17 @@ class CurrentWalk:
         self._passes = 0
 
     def begin(self, walk: NDArray[np.int32], cost_us: int) -> None:
-        """Begin with a walk of this cost [us], the best so far."""
+        """Start with a walk of this cost [us], the best so far."""
         self._walk, self.cost_us = walk, cost_us
         self.best, self.best_us = walk, cost_us
 
     def restart(self, walk: NDArray[np.int32], cost_us: int) -> None:
-        """Go on from another walk of this cost [us], which may be worse than the best."""
+        """Continue from another walk of this cost [us], which may be worse than the best."""
         self._walk, self.cost_us = walk, cost_us
         self.since_gain = self.held = 0
 
     def _accept(self, walk: NDArray[np.int32], cost_us: int) -> None:
-        """Go on from a walk if it is a gain or costs nothing."""
+        """Continue from a walk if it costs no more."""
         if cost_us < self.cost_us:
             self.since_gain = 0
         if cost_us <= self.cost_us:
@@ -76,22 +76,22 @@ class CurrentWalk:
 
     @property
     def work(self) -> SearchWork:
-        """The work done in regions and windows; a window counts as a perturbation."""
+        """Work in regions and windows; a window counts as a perturbation."""
         solved = 0 if self.windows is None else self.windows.solved
         return self.region.work + SearchWork(perturbations=solved)
 
     @property
     def least_us(self) -> int:
-        """Cost of the best walk, those in windows among them [us]."""
+        """Cost of the best walk, including those in windows [us]."""
         if self.windows is None or not self._in_windows:
             return self.best_us
         return min(self.best_us, self.windows.best_us)
 
     def progress(self) -> tuple[int, int]:
-        """Return cost [us] and steps of the best walk, as far as they are known.
+        """Return cost [us] and steps of the best walk, as far as known.
 
-        What a region has gained counts before it is put back; but not where turns cost, as
-        the turns at its rim are known only then.
+        A region's gain counts before it is put back; but not where turns cost, as the turns at its
+        border are known only then.
         """
         best_us, steps = self.best_us, self.best.size - 1
         exact = self.is_whole or not self._framed.prices.quarter_turn_us
@@ -109,10 +109,10 @@ class CurrentWalk:
         self.put_back_windows()
 
     def allocate_region(self) -> None:
-        """Provide memory for the regions, with the first walk known."""
+        """Allocate memory for the regions, once the first walk is known."""
         framed, cells = self._framed, self._problem.cells
         if self.is_whole:
-            # Few cells may lie far apart: then most of the walk is between them.
+            # A few cells may lie far apart: then most of the walk is between them.
             visits = max(VISITS_PER_CELL * cells, 2 * self._walk.size)
             self.region = WalkRegion(framed.rows, framed.cols, visits, 1)
         else:
@@ -133,17 +133,17 @@ class CurrentWalk:
             self._accept(walk, self._problem.cost_us(walk))
 
     def open_windows(self, bound: LowerBound) -> WindowSearch:
-        """Return the search in windows, from now on, guided by the prices of ``bound``."""
+        """Return the search in windows, guided by the prices of ``bound``; opened now."""
         self.windows = WindowSearch(self._problem, self._framed, bound)
         return self.windows
 
     def load_windows(self) -> bool:
-        """Let windows continue from the walk, or where they were left; return whether they can."""
+        """Let windows start from the walk, or resume; return whether they can."""
         self._in_windows = self.windows is not None and self.windows.load(self._walk)
         return self._in_windows
 
     def put_back_windows(self) -> None:
-        """Go on from the best walk of the windows, if it is better."""
+        """Continue from the best walk of the windows, if it is better."""
         if self.windows is None or not self._in_windows:
             return
         self._in_windows = False

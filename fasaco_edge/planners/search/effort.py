@@ -1,4 +1,4 @@
-"""Parameters of the local search for a cost, as trials on real grids found them."""
+"""Parameters of the local search for a cost, tuned on real grids."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from fasaco_edge.kernels.local_search.perturbation import PerturbationRules
 from fasaco_edge.planners.cost import CoverageCost
 
-# The temperatures of an annealing: from 1.5 down to 0.2.
+# Temperatures of an annealing: from 1.5 down to 0.2.
 LEVELS = tuple(1.5 * (0.2 / 1.5) ** (level / 15) for level in range(16))
 
 WHOLE_WALK = -1
@@ -22,8 +22,8 @@ class Effort:
 
     Attributes:
         temperatures_us: temperatures of the first improvement, in order [us].
-        proposals: proposals for each visit in it, at all temperatures together.
-        rules: how to perturb.
+        proposals: proposals per visit in it, over all temperatures.
+        rules: rules of perturbations.
         patience: perturbations without gain after which the search restarts.
     """
 
@@ -34,10 +34,10 @@ class Effort:
 
 
 def effort_for(cost: CoverageCost) -> Effort:
-    """Return the parameters of a search for a cost.
+    """Return the search parameters for a cost.
 
-    Where turns are free, proposals at temperature 0 all over the walk work best. Where
-    they are not, the surroundings of a perturbation are annealed.
+    With free turns, proposals at temperature 0 all over the walk work best; otherwise the
+    surroundings of a perturbation are annealed.
     """
     if not cost.quarter_turn_us:
         rules = PerturbationRules(
@@ -49,7 +49,7 @@ def effort_for(cost: CoverageCost) -> Effort:
             loops_of_256=256,
         )
         return Effort((0,), 200, rules, 100)
-    # The trials had turns of 1.5 steps; their temperatures are in steps.
+    # The parameters were tuned at turns of 1.5 steps; their temperatures are in steps.
     unit = (cost.step_us + cost.quarter_turn_us) * 2 // 5
     rules = PerturbationRules(
         limit=300,
@@ -69,11 +69,11 @@ class RepairEffort:
     """Parameters of a repair.
 
     Attributes:
-        rules: how to perturb.
-        perturbations: in each neighbourhood.
-        held: so many of them leave the walk just ahead of the robot as it is.
-        steady_us: a walk that costs so much more, but leaves the robot's next cells as they
-            were, is taken [us].
+        rules: rules of perturbations.
+        perturbations: number of perturbations in each neighbourhood.
+        held: number of these that leave the walk just ahead of the robot as it is.
+        steady_us: a walk that keeps the robot's next cells is preferred up to this extra cost
+            [us].
     """
 
     rules: PerturbationRules
@@ -83,10 +83,9 @@ class RepairEffort:
 
 
 def repair_for(cost: CoverageCost) -> RepairEffort:
-    """Return how to improve a repaired walk: no change is taken that gains nothing.
+    """Return the repair parameters for a cost: only changes with a gain are accepted.
 
-    The neighbourhood of what changed is small enough for proposals all over it where turns
-    are free.
+    With free turns, the neighbourhood of a change is small enough for proposals all over it.
     """
     rules = PerturbationRules(
         limit=100,

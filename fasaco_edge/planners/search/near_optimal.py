@@ -1,6 +1,6 @@
-"""The planner of missions: FaSACO with local search, and repairs of a walk that there is.
+"""Planner of missions: FaSACO with local search, and repair of an existing walk.
 
-``search`` looks for a walk, ``repair`` mends one.
+``search`` finds a walk, ``repair`` repairs one.
 """
 
 from __future__ import annotations
@@ -23,16 +23,15 @@ from fasaco_edge.planners.search.restarts import ANTS, SearchSettings
 from fasaco_edge.planners.search.search import Search
 from fasaco_edge.planners.walk_before import can_repair
 
-# A repaired walk with more steps than this above its bound is not worth keeping, unless
-# a search finds no better one.
+# Optimality gap in steps above which a repaired walk is kept only if a search finds none better.
 POOR_GAP = 0.25
 
 
 def is_poor(problem: CoverageProblem, path: CoveragePath) -> bool:
-    """Return whether a repaired walk is so long that a new one is to be looked for."""
+    """Return whether a repaired walk is so long that a search should follow."""
     most = 1.0 + POOR_GAP
     if path.steps <= most * (problem.cells - 1):
-        return False  # one step a cell is a bound, too
+        return False  # one step per cell is a bound, too
     least = path.lower_bound_steps or lower_bound_steps(problem)
     return least > 0 and path.steps > most * least
 
@@ -42,8 +41,8 @@ class NearOptimal:
     """The colony with local search; ants walk on ``threads`` threads.
 
     Attributes:
-        restarts: one of ``restarts.RESTARTS``; other values than the default are there to
-            measure what ants and their trail are worth.
+        restarts: one of ``restarts.RESTARTS``; non-default values measure the benefit of ants and
+            trail.
     """
 
     config: ColonyConfig = field(default_factory=ColonyConfig)
@@ -59,8 +58,8 @@ class NearOptimal:
     ) -> CoveragePath:
         """Return the cheapest walk found; see ``CoveragePlanner.plan``.
 
-        A walk that was still to be driven (``problem.before``) is repaired; only where
-        that leaves it far above its bound, or all is to be searched, the colony searches on.
+        A walk from before (``problem.before``) is repaired; only if that leaves it far above its
+        bound, or a full search is wanted, the colony continues.
         """
         path = None
         if can_repair(problem):

@@ -1,7 +1,7 @@
-"""Regions for local search: squares over a large ground, neighbourhoods of what changed.
+"""Regions for local search: squares of a large ground, and neighbourhoods of changes.
 
-Each pass shifts the squares, so that what was on a rim is inside. A repair works on neighbourhoods
-of what changed, each small enough to be perturbed as a whole.
+Each pass shifts the squares, so that borders move inside. A repair works on neighbourhoods of the
+changed cells, each small enough to be perturbed as a whole.
 """
 
 from __future__ import annotations
@@ -23,8 +23,7 @@ from fasaco_edge.kernels.local_search.walk_array import (
 from fasaco_edge.planners.problem import FramedGround
 from fasaco_edge.planners.search.walk_region import WalkRegion
 
-# A ground of up to so many cells to cover, on a lattice not too large for them, is one
-# region: the cost of working on it as a whole does not matter yet.
+# A ground with up to this many cells to cover, on a lattice that is not too large, is one region.
 ONE_REGION = 8_000
 LATTICE_OF_ONE = 5 * ONE_REGION
 
@@ -36,12 +35,12 @@ SHIFTS = ((0, 0), (1, 1), (1, 0), (0, 1))
 
 
 def is_one_region(rows: int, cols: int, cells: int) -> bool:
-    """Return whether a lattice with so many cells to cover is searched as a whole."""
+    """Return whether a lattice with this many cells to cover is searched as a whole."""
     return cells <= ONE_REGION and rows * cols <= LATTICE_OF_ONE
 
 
 def regions_of(framed: FramedGround, cells: int, number: int) -> Iterator[Box]:
-    """Yield the regions of pass ``number`` over a ground with so many cells to cover."""
+    """Yield the regions of pass ``number`` over a ground with this many cells to cover."""
     if is_one_region(framed.rows, framed.cols, cells):
         labels = np.zeros(framed.ground.bound, np.int32)
         yield Box(labels, 0, FRAME, FRAME, framed.rows, framed.cols)
@@ -66,30 +65,29 @@ def regions_of(framed: FramedGround, cells: int, number: int) -> Iterator[Box]:
 
 
 def _span(number: int, shift: int, size: int) -> tuple[int, int]:
-    """Return where region ``number`` begins and ends along one axis, inside the frame."""
+    """Return the range of region ``number`` along one axis, inside the frame."""
     first = max(number * EDGE - shift, FRAME)
     return first, min((number + 1) * EDGE - shift, FRAME + size)
 
 
-# Steps from what changed to the rim: in trials 10 and 20 gained nothing more, 3 lost.
+# Radius of a neighbourhood in steps: in trials 10 and 20 gained nothing more, 3 lost.
 RADIUS = 6
-# Changed cells that one neighbourhood begins with at most, and its cells.
+# Limits on a neighbourhood: changed cells it grows from, and all cells.
 MOST_CHANGED, MOST_CELLS = 1_000, 3_000
-# The same where nothing has changed, and a walk is to be made better somewhere.
+# Radius of a spot, where nothing has changed and the walk is to be improved.
 SPOT_RADIUS = 20
 GOLDEN_RATIO = 0.5 * (math.sqrt(5.0) - 1.0)
-# Visits that a walk may become longer by for a while.
+# Spare capacity: visits by which a walk may grow temporarily.
 SPARE_VISITS = 600
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Neighbourhood:
-    """A region of any form.
+    """A region of any shape.
 
     Attributes:
         box: its cells.
-        changed: int32 (n,), those that changed, as cells of the region's own ground.
-        is_first: whether the robot stands in it, with all that is just ahead.
+        changed: int32 (n,), the changed cells, as cells of the region's own ground.
     """
 
     box: Box
@@ -97,7 +95,7 @@ class Neighbourhood:
     is_first: bool
 
     def walk_region(self, walk: NDArray[np.int32]) -> WalkRegion:
-        """Return memory for it, and for the parts of a walk, framed cells, that lie in it."""
+        """Return memory for the region, and for the parts of a walk, framed cells, in it."""
         inside = self.box.labels[walk] == self.box.label
         jumps = int(np.count_nonzero(np.diff(inside))) // 2 + 1
         visits = int(np.count_nonzero(inside)) + 4 * jumps + SPARE_VISITS
@@ -107,11 +105,11 @@ class Neighbourhood:
 def neighbourhoods(
     framed: FramedGround, ahead: NDArray[np.int32], changed: NDArray[np.int32]
 ) -> Iterator[Neighbourhood]:
-    """Yield the neighbourhood of the robot, and then of what changed elsewhere.
+    """Yield the neighbourhood of the robot, and then those of other changes.
 
     Args:
         framed: the ground.
-        ahead: int32 (m,), what lies just ahead of the robot, framed cells.
+        ahead: int32 (m,), the cells just ahead of the robot, framed.
         changed: int32 (n,), framed cells, in the order of the walk.
     """
     yield (first := _around(framed, ahead, changed, is_first=True))
@@ -122,9 +120,9 @@ def neighbourhoods(
 
 
 def spot(framed: FramedGround, walk: NDArray[np.int32], number: int) -> Neighbourhood:
-    """Return a neighbourhood somewhere along a walk, framed cells int32 (n,).
+    """Return a neighbourhood at a spot along a walk, framed cells int32 (n,).
 
-    Those of successive numbers are spread evenly along it, from any first number.
+    Spots of successive numbers are spread evenly along it, from any first number.
     """
     at = int(walk.size * (number * GOLDEN_RATIO % 1.0))
     return _around(framed, walk[:0], walk[at : at + 1], is_first=False, radius=SPOT_RADIUS)

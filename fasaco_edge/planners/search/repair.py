@@ -1,10 +1,10 @@
-"""Repair of the walk that was still to be driven, after the problem changed.
+"""Repair of the walk from before, after the problem has changed.
 
-The walk is made legal and complete, then improved around the changes. What is still
-valid stays as it is, cell by cell: a change is taken only if it gains something, and the
-next ``HELD_CELLS`` cells are left alone at first, except where the map itself changed. So
-the path is stable wherever the map is, and what one search found serves the next. A repair
-costs what changed: apart from a few passes over the walk, all work is local.
+The walk is completed, then improved around the changes. Its valid parts stay as they are, cell by
+cell: a change is accepted only for a gain, and the next ``HELD_CELLS`` cells are left alone at
+first, except where the map changed. So the path is stable wherever the map is, and the result of
+one search serves the next. The cost of a repair depends on the change: apart from a few passes over
+the walk, all work is local.
 """
 
 from __future__ import annotations
@@ -32,24 +32,24 @@ from fasaco_edge.planners.walk_before import HELD_CELLS, completed, framed_cells
 # Perturbations between two pauses.
 PERTURBATIONS_AT_ONCE = 10
 
-# Where there is nothing to repair: difference of the first spots of two attempts, cells of a
-# spot (about), and passes over all spots without gain after which the search ends.
+# With nothing to repair: stride between the first spots of two attempts, approximate cells of a
+# spot, and passes over all spots without gain after which the search ends.
 STRIDE, SPOT_CELLS, PASSES = 997, 400, 4
 
-# A walk over more cells is repaired without a bound, which would take longer than all else, and
-# once: a second time for the way ahead would take as long again.
+# A walk over more cells is repaired without a bound, which would dominate the time, and only once:
+# a second repair for the path ahead would take as long again.
 BOUNDED_CELLS = 2_000
 
 
 def repaired(
     problem: CoverageProblem, name: str, seed: int, stop: StoppingCriterion
 ) -> CoveragePath:
-    """Return a complete walk that keeps what is valid of ``problem.before``.
+    """Return a complete walk that keeps the valid parts of ``problem.before``.
 
     Args:
         problem: with a walk ``before``, see ``can_repair``.
-        name, seed: of the planner.
-        stop: when to end early.
+        name, seed: name and seed of the planner.
+        stop: stopping criterion.
     """
     repair = _Repair(problem, seed, repair_for(problem.cost))
     is_stopped = _run(repair, stop)
@@ -66,7 +66,7 @@ def repaired(
 
 
 def _run(repair: _Repair, stop: StoppingCriterion) -> bool:
-    """Let a repair run; return whether it was stopped."""
+    """Run a repair; return whether it was stopped."""
     return any(stop(repair.progress()) for _ in repair.run())
 
 
@@ -77,12 +77,12 @@ def _steady(
     completed_us: int,
     stop: StoppingCriterion,
 ) -> CoveragePath:
-    """Return a path that begins with ``held`` steps of the walk before, if it is about as good.
+    """Return a path that begins with ``held`` steps of the walk from before, if similarly good.
 
-    A change that gains something is taken wherever it is, though another one further on may gain
-    as much. So where a repair has changed the way ahead, but need not have, the rest of the walk
-    is repaired alone, with few perturbations: more of them keep no more, and are what takes the
-    time. What comes of that costs no more than the completed walk.
+    A gain is accepted wherever it is, though another one farther on may gain as much. So where a
+    repair has changed the path ahead unnecessarily, the rest of the walk is repaired alone, with
+    few perturbations: more keep no more, and dominate the time. The result costs no more than the
+    completed walk.
     """
     assert problem.before is not None
     try:
@@ -106,11 +106,11 @@ def _steady(
 def _with_lead(
     problem: CoverageProblem, whole: CoverageProblem, path: CoveragePath
 ) -> CoveragePath:
-    """Return a path with the walk before it; steps, cost and bound are of the whole problem."""
+    """Return a path with its lead; steps, cost and bound are of the whole problem."""
     assert problem.before is not None
     cells = np.concatenate((problem.lead, path.cells))
     cost_s = whole.cost.of_walk(cells)
-    # A path that is no better is dropped: its bound is not used.
+    # A path that is no better is dropped, so its bound is not needed.
     if np.array_equal(path.cells, problem.before):
         return replace(path, cells=cells, cost_s=cost_s, lower_bound_steps=0, lower_bound_cost_s=0)
     bound = lower_bound_of(whole, GLANCE)
@@ -127,8 +127,8 @@ class _Repair:
     """A running repair, a generator of pauses like ``search.Search``.
 
     Attributes:
-        completed: int32 (n, 2), the walk's next cells before it was improved.
-        completed_us: what that walk cost [us].
+        completed: int32 (n, 2), the walk's next cells before improvement.
+        completed_us: cost of the completed walk [us].
     """
 
     def __init__(
@@ -152,7 +152,7 @@ class _Repair:
         has_bound = problem.only_better or problem.cells <= BOUNDED_CELLS
         self._bound = lower_bound_of(problem, GLANCE) if has_bound else None
         self._random = stream_of(seed, len(self._walk))
-        # Work on the regions before, and the region that is being improved.
+        # Work on earlier regions, and the region that is being improved.
         self._work = work
         self._region: WalkRegion | None = None
 
@@ -166,7 +166,7 @@ class _Repair:
                 self._unload()
 
     def _places(self) -> Iterator[Neighbourhood]:
-        """Yield where to improve: around the changes; or at spots, until nothing is gained."""
+        """Yield the places to improve: around the changes; or spots, until nothing is gained."""
         if not self._problem.only_better:
             yield from neighbourhoods(self._framed, self._walk[:HELD_CELLS], self._changed)
             return
@@ -183,7 +183,8 @@ class _Repair:
     def _improve(self, region: WalkRegion, place: Neighbourhood) -> Iterator[None]:
         """Improve around the changes, then perturb; pause after each piece.
 
-        Moves at no cost shift a walk about: at first not just ahead of the robot.
+        Moves at equal cost shift a walk about: at first they leave the cells just ahead of the
+        robot alone.
         """
         for held in (HELD_CELLS, 0) if place.is_first else (0,):
             region.hold(held)
@@ -197,7 +198,7 @@ class _Repair:
             yield
 
     def _is_proven(self) -> bool:
-        """Return whether no walk can be better."""
+        """Return whether the walk is proven optimal."""
         if self._bound is None:
             return False
         progress = self.progress()
@@ -212,7 +213,7 @@ class _Repair:
         self._region = None
 
     def progress(self) -> SearchProgress:
-        """Return how far it is."""
+        """Return the progress."""
         cost_us, steps, work = self._cost_us, self._walk.size - 1, self._work
         if self._region is not None:
             cost_us += self._region.gain_us
@@ -225,7 +226,7 @@ class _Repair:
         return 0.0 if self._bound is None else self._bound.cost_s
 
     def path(self, name: str, seed: int) -> CoveragePath:
-        """Return the walk as it is now."""
+        """Return the present walk."""
         self._unload()
         progress = self.progress()
         return CoveragePath(
@@ -246,7 +247,7 @@ def _changed(
 ) -> NDArray[np.int32]:
     """Return the walk's cells at steps that one walk takes more often, int32 (n,), in its order.
 
-    The part driven meanwhile is missing from the old walk's beginning; that is no change.
+    The part driven meanwhile is missing at the old walk's beginning; that is no change.
     """
     ground = framed.ground
     listed = np.empty(2 * (before.size + walk.size), np.int32)

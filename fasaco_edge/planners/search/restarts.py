@@ -1,7 +1,7 @@
-"""The ants that a search restarts from where perturbations gain nothing any more.
+"""Restarts: walks of ants from which a search continues when perturbations gain nothing.
 
-They walk on a trail that is strengthened along the best walk so far, by equation (8): so they begin
-where the search has been good.
+The ants' trail is strengthened along the best walk so far, by equation (8), so they start from good
+solutions.
 """
 
 from __future__ import annotations
@@ -18,19 +18,18 @@ from fasaco_edge.planners.paper.fasaco import Colony, groups_of, snapshot_of
 from fasaco_edge.planners.planner import ColonySnapshot
 from fasaco_edge.planners.problem import CoverageProblem
 
-# What a search restarts from: the colony's next ants; the same on a trail that nothing strengthens;
-# or nothing.
+# Sources of restarts: the colony's next ants; ants on a trail that is not strengthened; none.
 ANTS, FLAT, NEVER = RESTARTS = ("ants", "flat", "never")
 
 
 @dataclass(frozen=True, slots=True)
 class SearchSettings:
-    """How ants search, and in whose name.
+    """Settings of the ants, and the planner's name.
 
     Attributes:
-        planner: the name that paths carry.
-        colony: of the ants.
-        threads: that ants walk on.
+        planner: planner name in paths.
+        colony: configuration of the ants.
+        threads: number of threads of the ants.
         restarts: one of ``RESTARTS``.
     """
 
@@ -44,7 +43,7 @@ class Restarts:
     """The colony of a search, whose groups of ants walk one after the other.
 
     Attributes:
-        ants: how many have walked.
+        ants: number of ants so far.
     """
 
     def __init__(
@@ -56,7 +55,7 @@ class Restarts:
     ) -> None:
         self._settings, self._problem, self._graph, self._pool = settings, problem, graph, pool
         self._groups = groups_of(settings.colony, problem.cells)
-        # Its memory is large: it is there once ants walk.
+        # Allocated when the first ants walk, as its memory is large.
         self._colony: Colony | None = None
         self._cohort, self._velocity = 0, settings.colony.velocities[0]
         self.ants = 0
@@ -64,7 +63,7 @@ class Restarts:
     def next_walk(
         self, best: NDArray[np.int32], best_us: int
     ) -> tuple[NDArray[np.int32], int] | None:
-        """Let the next group walk; return its cheapest walk and its cost [us], None without ants.
+        """Let the next group walk; return its cheapest walk and cost [us]; None without ants.
 
         Args:
             best: the best walk so far, flat cells int32 (n,).
@@ -86,7 +85,7 @@ class Restarts:
 
         Args:
             best, best_us: as for ``next_walk``.
-            ants: how many walks the search has seen.
+            ants: number of walks in the search so far.
         """
         colony = self._colony_of_ants()
         colony.offer(best, best_us)

@@ -1,18 +1,18 @@
-"""A search by colony and local search: a walk at once, then better ones until it is stopped.
+"""Search by colony and local search: a complete walk at once, then better ones until stopped.
 
 1. One or more simple walks, the cheapest kept: the first complete walk, within milliseconds
-   (``first_walks``). A walk that was still to be driven is made complete, and kept if it is as
-   good: then what lies just ahead of the robot changes only where something is gained.
-2. Local search improves it, region by region where the ground is large.
-3. Perturbations, each followed by local search, go on from there; where turns cost, windows of
-   the walk are solved anew in between (``windows``), most of the time if turns are dear.
-4. Where perturbations gain nothing any more, the next ants of the colony walk; the
-   walk of the best of them goes through 2 and 3, and the trail is strengthened along
-   the best walk of all, by equation (8): ants begin where the search has been good.
+   (``first_walks``). A walk from before is completed, and kept if it is as good: then the cells
+   just ahead of the robot change only for a gain.
+2. Local search improves it, region by region on a large ground.
+3. Perturbations, each followed by local search, continue from there; where turns cost, windows of
+   the walk are solved again in between (``windows``), most of the time if turns are expensive.
+4. When perturbations gain nothing, the next ants of the colony walk; their best walk goes through
+   2 and 3, and the trail is strengthened along the best walk of all, by equation (8): ants start
+   from good solutions.
 
-The search ends when it is stopped, when the walk meets its lower bound, when all ants
-have walked, or on a large ground, where no ants restart it, when perturbations gain
-nothing any more. Its work is counted; the same counts give the same walk.
+The search ends when it is stopped, when the walk meets its lower bound, when all ants have walked,
+or, on a large ground, which has no restarts, when perturbations gain nothing. Its work is counted;
+the same counts give the same walk.
 """
 
 from __future__ import annotations
@@ -37,27 +37,27 @@ from fasaco_edge.planners.walk_before import HELD_CELLS, completed, has_walk
 # Proposals between two pauses: about a millisecond.
 PROPOSALS_AT_ONCE = 30_000
 
-# Perturbations of a region in a pass, where there are several regions.
+# Perturbations of each region in a pass, with several regions.
 PERTURBATIONS_IN_PASS = 8
 
-# Where there are several regions the search ends after so many passes without gain.
+# With several regions the search ends after this many passes without gain.
 GAINLESS_PASSES = 10
 
-# Perturbations between two looks at the whole walk, where it is one region.
+# Perturbations between two evaluations of the whole walk, with one region.
 PERTURBATIONS_IN_VISIT = 64
 
-# States that windows expand between two pauses: about two milliseconds. Pauses in a round of
-# windows, which follows each visit of perturbations: where turns are dear, and else.
+# States that windows expand between two pauses: about two milliseconds; pauses in a round of
+# windows, which follows each visit of perturbations: with expensive turns, and otherwise.
 EXPANSIONS_AT_ONCE = 30_000
 DEAR_PIECES, PIECES = 50, 5
-# So many windows without gain count as a perturbation.
+# This many windows without gain count as one perturbation.
 WINDOWS_A_PERTURBATION = 10
-# States that the whole ground is solved with at first, where turns are dear: so many over its
-# cells, within a range; some times as many if none leads on.
+# Beam of solving the whole ground, with expensive turns: WHOLE_STATES over its number of cells,
+# within the limits; WIDER times as many if no state is left.
 WHOLE_STATES, LEAST_BEAM, MOST_BEAM, WIDER = 8_000, 8, 100, 4
 
-# Cells that the bound solves in bands for each pause, and at once: some 3 % of the time where
-# turns are dear, 10 to 20 % else.
+# Cells that the bound solves in bands: per pause, and per call: some 3 % of the time with expensive
+# turns, 10 to 20 % otherwise.
 BAND_CELLS, BAND_CELLS_AT_ONCE = 40, 256
 
 # Distinguishes the random stream from those of the ants.
@@ -65,7 +65,7 @@ LOCAL_SEARCH = 1 << 32
 
 
 class Search:
-    """A running search: a generator of pauses, at which it may be abandoned."""
+    """A running search: a generator of pauses; it can be abandoned at each."""
 
     def __init__(
         self,
@@ -84,16 +84,16 @@ class Search:
         self._restarts = Restarts(settings, problem, self._graph, pool)
         self._first_walks = 0
         self._first_walk_s = 0.0
-        # Costs of the first walk, and of the best one when ants walked for the first time.
+        # Cost of the first walk; best cost when ants first walked.
         self._first_us = 0
         self._before_ants_us: int | None = None
         self._bound: LowerBound | None = None
-        # Whether the search has begun in earnest; cells to be solved in bands for the bound.
+        # Whether improvement has begun; number of cells that the bound may solve in bands.
         self._has_begun, self._owed = False, 0
         self._perturbed_in_pass = 0
 
     def run(self) -> Iterator[None]:
-        """Search until nothing is left to do; pause after each piece of work."""
+        """Search to the end; pause after each piece of work."""
         for _ in self._search():
             if self._has_begun and self._bound is not None:
                 self._owed += BAND_CELLS
@@ -113,7 +113,7 @@ class Search:
             before = self._work
             yield from self._perturb()
             yield from self._solve_windows()
-            # The walk is too long for its memory, or in no region: nothing could be perturbed.
+            # The walk exceeds its memory, or lies in no region: nothing can be perturbed.
             stuck = self._work == before
             if not walk.is_whole and walk.since_gain >= GAINLESS_PASSES * self._perturbed_in_pass:
                 return
@@ -124,7 +124,7 @@ class Search:
                 yield from self._improve()
 
     def progress(self) -> SearchProgress:
-        """Return how far the search is."""
+        """Return the progress."""
         best_us, steps = self._walk.progress()
         least_s = 0.0 if self._bound is None else self._bound.cost_s
         return SearchProgress(self._work, best_us / MICROSECONDS, steps, least_s)
@@ -160,7 +160,7 @@ class Search:
         return self._walk.work + SearchWork(ants=self._first_walks + self._restarts.ants)
 
     def _is_proven(self) -> bool:
-        """Return whether no walk can be better."""
+        """Return whether the walk is proven optimal."""
         if self._bound is None:
             return False
         if self._walk.least_us <= self._bound.cost_us:
@@ -169,7 +169,7 @@ class Search:
         return not turns_cost and self.progress().steps == self._bound.steps
 
     def _tighten(self, work: int) -> LowerBound:
-        """Return the lower bound after so much more work on it."""
+        """Return the lower bound after this much more work on it."""
         self._bound = self._bound or LowerBound(self._problem)
         self._bound.tighten(work)
         return self._bound
@@ -189,7 +189,7 @@ class Search:
         self._tighten(GLANCE)
 
     def _offer_walk_before(self) -> None:
-        """Begin with the walk that was still to be driven, if it costs no more than the first."""
+        """Start from the walk from before, if it costs no more than the first."""
         problem, before = self._problem, self._problem.before
         if before is None or not has_walk(problem):
             return
@@ -197,11 +197,11 @@ class Search:
         cost_us = problem.cost_us(walk)
         if cost_us <= self._walk.cost_us:
             self._walk.begin(walk, cost_us)
-            # Only in one region the first visits are those of the walk.
+            # Only with one region the first visits are those of the walk.
             self._walk.held = HELD_CELLS if self._walk.is_whole else 0
 
     def _begin_better(self) -> Iterator[None]:
-        """Improve the first walk by moves; where turns are dear, the ground as one window, too."""
+        """Improve the first walk; with expensive turns, also solve the ground as one window."""
         yield from self._improve()
         windows = self._window_search()
         if windows is None:
@@ -217,7 +217,7 @@ class Search:
             yield from self._solve_windows()
 
     def _improve(self) -> Iterator[None]:
-        """Improve the whole walk, without perturbations; twice where there are several regions."""
+        """Improve the whole walk, without perturbations; twice with several regions."""
         effort = self._effort
         for _ in range(1 if self._walk.is_whole else 2):
             for region in self._walk.regions():
@@ -248,7 +248,7 @@ class Search:
                     return
 
     def _solve_windows(self) -> Iterator[None]:
-        """Solve windows of the walk anew, if turns cost; continue where they were left."""
+        """Solve windows of the walk again, if turns cost; resume the last ones."""
         windows = None if self._is_proven() else self._window_search()
         if windows is None or not self._walk.load_windows():
             return
@@ -262,13 +262,13 @@ class Search:
         self._walk.put_back_windows()
 
     def _window_search(self) -> WindowSearch | None:
-        """Return the search in windows; None where there can be none."""
+        """Return the search in windows; None if the problem does not suit it."""
         if self._walk.windows is None and suits(self._problem):
             return self._walk.open_windows(self._tighten(THOROUGH))
         return self._walk.windows
 
     def _restart(self) -> bool:
-        """Go on from a walk of the next ants; return False where there are no more."""
+        """Continue from a walk of the next ants; return False if none are left."""
         best_us = self._walk.best_us
         found = self._restarts.next_walk(self._framed.unframed(self._walk.best), best_us)
         if found is None:
@@ -280,7 +280,7 @@ class Search:
         return True
 
     def show(self) -> None:
-        """Offer the trail to the observer, strengthened along the best walk; the search is over."""
+        """Show the observer the trail, strengthened along the best walk; the search is over."""
         best, ants = self._framed.unframed(self._walk.best), self._work.ants
         self._observe(self._restarts.snapshot(best, self._walk.best_us, ants))
 

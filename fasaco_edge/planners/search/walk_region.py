@@ -1,7 +1,7 @@
-"""A region of a walk in memory of its own, where local search improves and perturbs it.
+"""Region of a walk in its own memory, where local search improves and perturbs it.
 
-A region is part of the ground, with the parts of the walk that lie there. Its walk stays in
-the processor's cache, and its reversals are short.
+A region is a part of the ground with the parts of the walk in it. Its walk stays in the processor's
+cache, and its reversals are short.
 """
 
 from __future__ import annotations
@@ -45,17 +45,17 @@ from fasaco_edge.planners.problem import FramedGround
 
 EVERYWHERE = np.empty(0, np.int32)
 
-# Loops that one search lists at most.
+# Limit on the loops of a walk that one search lists.
 LOOPS = 4096
 
 
 class WalkRegion:
-    """A region of a walk in memory of its own: up to ``rows`` x ``cols`` cells and the walk there.
+    """A region of a walk in its own memory: up to ``rows`` x ``cols`` cells and the walk there.
 
     Args:
         rows, cols: size of the largest region.
-        visits: visits of the longest walk in it.
-        jumps: how often the walk may leave it and come back.
+        visits: visits of its longest walk.
+        jumps: limit on the times that the walk leaves it and comes back.
     """
 
     def __init__(self, rows: int, cols: int, visits: int, jumps: int) -> None:
@@ -85,16 +85,16 @@ class WalkRegion:
         self._search = Search(ground, walk, Prices(1, 0, False), tally, self._memory)
         self._jumps = Jumps(tally.jump_ends, np.empty((jumps, 2), np.int32), np.zeros(2, np.int64))
         self._loaded_us = self._loaded_length = 0
-        # The whole ground and walk, and the region of them that is loaded.
+        # The whole ground and walk, and the box of the loaded region.
         self._whole: tuple[Ground, NDArray[np.int32], Box] | None = None
 
     def load(self, framed: FramedGround, cells: NDArray[np.int32], box: Box) -> bool:
-        """Cut a region out; return False where the walk does not come there.
+        """Cut a region out; return False if the walk is not in it.
 
         Args:
             framed: the whole ground.
             cells: int32 (n,), the whole walk.
-            box: the region, no larger than this memory.
+            box: the region, not larger than this memory.
         """
         ground, prices = framed.ground, framed.prices
         _, walk, _, tally, _ = self._search
@@ -121,32 +121,32 @@ class WalkRegion:
 
     @property
     def is_loaded(self) -> bool:
-        """Whether a region was cut out and is not put back yet."""
+        """Whether a region is loaded and not put back yet."""
         return self._whole is not None
 
     def hold(self, visits: int) -> None:
-        """Let the first so many visits change only where something is gained, from now on."""
+        """From now on change the first ``visits`` visits only for a gain."""
         prices = self._search.prices._replace(held=visits)
         self._search = self._search._replace(prices=prices)
 
     @property
     def gain_us(self) -> int:
-        """Cost of the best walk here less that of the walk loaded [us], so 0 or less."""
+        """Cost of the best walk here minus that of the loaded walk [us], so 0 or less."""
         return int(self._memory.best_counts[COST]) - self._loaded_us
 
     @property
     def longer_by(self) -> int:
-        """Steps of the best walk here less those of the walk loaded."""
+        """Steps of the best walk here minus those of the loaded walk."""
         return self.best_length - self._loaded_length
 
     @property
     def best_length(self) -> int:
-        """Visits of the best walk here, jumps among them."""
+        """Visits of the best walk here, including jumps."""
         return int(self._memory.best_counts[LENGTH])
 
     @property
     def work(self) -> SearchWork:
-        """What was done here, in this region and those before it."""
+        """Work in this region and those before it."""
         work = self._memory.work
         return SearchWork(perturbations=int(work[PERTURBATIONS]), proposals=int(work[PROPOSALS]))
 
@@ -161,20 +161,20 @@ class WalkRegion:
     def touch_up(
         self, cells: NDArray[np.int32], rules: PerturbationRules, random: NDArray[np.uint64]
     ) -> None:
-        """Improve the walk around cells of the region, int32 (n,), if that gains something."""
+        """Improve the walk around cells of the region, int32 (n,), only for a gain."""
         self._memory.touched[: cells.size] = cells
         touch_up(self._search, rules, cells.size, random)
 
     def perturb(self, rules: PerturbationRules, times: int, random: NDArray[np.uint64]) -> None:
-        """Perturb the walk so many times."""
+        """Perturb the walk ``times`` times."""
         perturb(self._search, rules, times, random)
 
     def go_back(self) -> None:
-        """Go on from the best walk here."""
+        """Continue from the best walk here."""
         recall(self._search)
 
     def put_back(self) -> NDArray[np.int32]:
-        """Return the whole walk, int32 (m,), with the best walk here in it."""
+        """Return the whole walk, int32 (m,), including the best walk here."""
         assert self._whole is not None
         ground, cells, box = self._whole
         self._whole = None

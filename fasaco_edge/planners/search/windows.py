@@ -1,8 +1,8 @@
-"""Windows of a walk solved anew: the search that is strong where turns cost.
+"""Windows of a walk solved again: the strong search where turns cost.
 
-Moves of local search change a walk where it touches itself. Where turns are dear, better lanes
-come of changing many cells at once: ``kernels.windows`` solves a window of some 100 cells anew,
-with all that lies outside as it is, guided by the prices that the lower bound found.
+Moves of local search change a walk where it touches itself. With expensive turns, better lanes need
+many cells changed together: ``kernels.windows`` solves a window of some 100 cells again, with
+everything outside fixed, guided by the prices of the lower bound.
 """
 
 from __future__ import annotations
@@ -34,14 +34,15 @@ from fasaco_edge.planners.bound import LowerBound
 from fasaco_edge.planners.cost import CoverageCost
 from fasaco_edge.planners.problem import CoverageProblem, FramedGround
 
-# Cells of the largest window, and states kept: memory of 2 MB.
+# Limits on the cells of a window, and on the states kept: memory of 2 MB.
 WINDOW_CELLS, MOST_BEAM = 256, 300
-# From so many steps a quarter-turn on windows are large; below a small one is as good, and quicker.
+# Threshold of expensive turns, in steps per quarter-turn: above it windows are large; below it
+# small ones are as good, and faster.
 DEAR_STEPS = 10
-# Grounds on lattices of more cells take too much memory: about 75 bytes a cell.
+# Lattices with more cells take too much memory: about 75 bytes per cell.
 MOST_LATTICE = 250_000
-# A ring beside the first one costs so many quarter-turns where a whole ground is solved: rather
-# any way on than that. Windows that join rings: so many in a piece, and pieces; few states do.
+# Price of a second ring when solving a whole ground, in quarter-turns: any other continuation is
+# preferred. Windows that join rings: number per piece, number of pieces, beam.
 RING_TURNS = 1000
 JOINS_AT_ONCE, JOIN_PIECES, JOIN_BEAM = 8, 40, 20
 NO_SIDE = 1 << 60
@@ -54,7 +55,7 @@ def suits(problem: CoverageProblem) -> bool:
 
 
 def is_dear(cost: CoverageCost) -> bool:
-    """Return whether turns cost so much that little else counts."""
+    """Return whether turns are so expensive that they dominate the cost."""
     return cost.quarter_turn_us >= DEAR_STEPS * cost.step_us
 
 
@@ -62,15 +63,15 @@ class WindowSearch:
     """Windows of a problem's walk, solved one after the other.
 
     Args:
-        problem: with turns at a price.
+        problem: a problem with a price on turns.
         framed: its ground.
-        bound: whose prices guide the search.
+        bound: lower bound whose prices guide the search.
     """
 
     def __init__(self, problem: CoverageProblem, framed: FramedGround, bound: LowerBound) -> None:
         self._problem, self._framed, self._size = problem, framed, framed.ground.bound
         self._terms, reached = _terms(problem, framed, bound)
-        # Other cells are not there: windows hold none that the walk cannot come to.
+        # Unreachable cells are removed: windows contain only cells that the walk can visit.
         steps = np.zeros_like(framed.ground.steps)
         steps[reached] = framed.ground.steps[reached]
         self._ground = framed.ground._replace(steps=steps)
@@ -89,18 +90,18 @@ class WindowSearch:
         self._program = _program(self._size, self._aim.beam, WINDOW_CELLS)
         self._passages, self._best = self._no_passages(), self._no_passages()
         self._tally = np.zeros(4, np.int64)
-        # Steps of the best walk, counted when its cost was that.
+        # Number of steps of the best walk, and the cost at which it was counted.
         self._counted_us, self._steps = -1, 0
-        # The walk that the state continues from.
+        # The walk that the state belongs to.
         self._walk: NDArray[np.int32] | None = None
 
     def _no_passages(self) -> Passages:
         return Passages(np.empty((self._size, SLOTS), np.int8), np.zeros(2, np.int64))
 
     def load(self, walk: NDArray[np.int32]) -> bool:
-        """Begin with a walk, framed cells int32 (n,); return False if that cannot be.
+        """Start from a walk, framed cells int32 (n,); return False if that is impossible.
 
-        With the walk loaded or taken last it continues where it was left.
+        If it is the walk loaded or returned last, the state is resumed.
         """
         if walk is self._walk:
             return True
@@ -117,15 +118,15 @@ class WindowSearch:
         return True
 
     def solve(self, expansions: int, random: NDArray[np.uint64]) -> None:
-        """Solve windows until so many states were expanded."""
+        """Solve windows until this many states were expanded."""
         ground, passages, best = self._ground, self._passages, self._best
         terms, program, aim = self._terms, self._program, self._aim
         solve_windows(ground, passages, best, terms, program, aim, self._tally, expansions, random)
 
     def solve_whole(self, beam: int, random: NDArray[np.uint64]) -> Iterator[None]:
-        """Solve the whole ground as one window, with so many states; pause after each line.
+        """Solve the whole ground as one window, with this beam; pause after each line.
 
-        Its rings are joined; what comes of it is kept where it is better.
+        Its rings are joined; a better result is kept.
         """
         framed, ground, passages, terms = (
             self._framed,
@@ -138,7 +139,7 @@ class WindowSearch:
         price = RING_TURNS * terms.turn
         begin_window(ground, passages, terms, window, program, 0, ANY_PRICE, price, random)
         while advance_window(ground, passages, terms, window, program, beam):
-            # At each pause more is done than at the last.
+            # Work increases from pause to pause.
             self._tally[SOLVED] += 1
             yield
         self._tally[COST] += end_window(ground, passages, terms, window, program)
@@ -167,7 +168,7 @@ class WindowSearch:
 
     @property
     def best_steps(self) -> int:
-        """Steps of the best walk."""
+        """Number of steps of the best walk."""
         if self._counted_us != self.best_us:
             self._counted_us = self.best_us
             self._steps = int(np.count_nonzero(self._best.partner[:, :BEGIN] != NONE)) // 2
@@ -175,12 +176,12 @@ class WindowSearch:
 
     @property
     def solved(self) -> int:
-        """How many windows were solved so far; each line of the whole ground counts as one."""
+        """Number of windows solved so far; each line of the whole ground counts as one."""
         return int(self._tally[SOLVED])
 
     def walk(self) -> NDArray[np.int32]:
         """Return the best walk, framed cells int32 (n,)."""
-        # No step is walked more than twice.
+        # No step is taken more than twice.
         out = np.empty(4 * self._aim.cells.size + 2, np.int32)
         self._walk = out[: walk_of(self._ground, self._best, out)].copy()
         return self._walk
@@ -193,8 +194,8 @@ def _copy(source: Passages, target: Passages) -> None:
 def thinned(walk: NDArray[np.int32]) -> NDArray[np.int32]:
     """Return a walk over the same cells that takes no step three times, int32 (m,).
 
-    Of three times two are in the same direction: the part between them, walked backwards, leads
-    from the first one's begin to the last one's end without both.
+    Of three times two are in the same direction: the part between them, reversed, leads from the
+    start of the first to the end of the second without both.
     """
     while walk.size > 1:
         low, high = np.minimum(walk[:-1], walk[1:]), np.maximum(walk[:-1], walk[1:])
@@ -211,7 +212,7 @@ def thinned(walk: NDArray[np.int32]) -> NDArray[np.int32]:
 def _terms(
     problem: CoverageProblem, framed: FramedGround, bound: LowerBound
 ) -> tuple[Terms, NDArray[np.int32]]:
-    """Return the terms, and the cells that can be reached, framed, in the order of the rows."""
+    """Return the terms, and the reachable cells, framed, in row order."""
     flat, priced, is_wanted = bound.side_prices()
     cells = framed.framed(flat)
     prices = np.zeros((framed.ground.bound, 4), np.int64)
@@ -219,7 +220,7 @@ def _terms(
     step, turn = 2 * problem.cost.step_us, 2 * problem.cost.quarter_turn_us
     masks = framed.ground.steps[cells]
     sides = np.where(masks[:, np.newaxis] >> np.arange(4) & 1, priced, NO_SIDE).min(axis=1)
-    # With these no first or last visit costs less than nothing.
+    # With these no first or last visit has a negative cost.
     ends = is_wanted if problem.end is None else flat == problem.flat_end
     begin_price = -(step // 2 + int(sides[flat == problem.flat_start].min()))
     end_price = -(step // 2 + int(sides[ends].min()))
@@ -227,7 +228,7 @@ def _terms(
 
 
 def _program(size: int, beam: int, cells: int) -> Program:
-    """Return memory for windows of so many cells of a ground of ``size`` framed cells."""
+    """Return memory for windows with this many cells of a ground of ``size`` framed cells."""
     states, slots = 4 * beam, 1 << (16 * beam - 1).bit_length()
     mates = np.full((2, states, MOST_IDS), NO_END, np.int16)
     scratch, base = (np.full(MOST_IDS, NO_END, np.int16) for _ in range(2))
@@ -282,7 +283,7 @@ def _program(size: int, beam: int, cells: int) -> Program:
 
 
 def _pairings() -> NDArray[np.int8]:
-    """Return all ways to pair up 0, 2, 4, 6 and 8 slots, int8 (PAIRINGS, 8)."""
+    """Return all pairings of 0, 2, 4, 6 and 8 slots, int8 (PAIRINGS, 8)."""
     rows: list[list[int]] = []
 
     def pair_up(left: list[int], paired: list[int]) -> None:
