@@ -1,1 +1,1 @@
-"""Value types: geometry, occupancy grids, the coverage lattice, map files."""
+"""Values of grids: geometry, occupancy grids, the coverage lattice, map files."""

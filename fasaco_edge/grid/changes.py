@@ -1,9 +1,9 @@
-"""Lattice changes: what a new map changes of the coverage lattice, at the cost of the change.
+"""Lattice changes: incremental update of the coverage lattice to a new map.
 
-Where the new map lies on the raster of the one before (it was patched, it has grown, or its origin
-has moved by whole pixels), pixels are compared, and only cells near changed pixels are classified
-anew. On another raster (its origin has moved by a fraction of a pixel, or was rotated) all cells
-are. Either way the lattice is, bit for bit, ``CoverageLattice.from_map`` of the new map.
+If the new map lies on the raster of the previous one (it was patched, it has grown, or its origin
+has moved by whole pixels), pixels are compared, and only cells near changed pixels are
+reclassified. On another raster (its origin has moved by a fraction of a pixel, or was rotated) all
+cells are. Either way the lattice equals, bit for bit, ``CoverageLattice.from_map`` of the new map.
 """
 
 from __future__ import annotations
@@ -34,14 +34,14 @@ Scalar = TypeVar("Scalar", bound=np.generic)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LatticeChange:
-    """A lattice over a new map, and which cells are not what they were before.
+    """A lattice over a new map, and the cells that changed from the previous one.
 
     Attributes:
-        before: the lattice before; None for the first.
-        after: the lattice over the new map; that before where no cell has changed.
+        before: the previous lattice; None for the first.
+        after: the lattice over the new map; the previous object if no cell has changed.
         cells: int32 (n, 2), read-only: (row, col) of each cell whose state or steps have
-            changed. Beyond its window a lattice is unknown: a cell that came into the
-            window, or fell out of it, has changed if it is or was known.
+            changed. Outside of its window a lattice is unknown: a cell that entered or left the
+            window has changed if it is or was known.
     """
 
     before: CoverageLattice | None
@@ -57,7 +57,7 @@ class LatticeChange:
 
     @property
     def window(self) -> Window | None:
-        """The smallest window around the changed cells; None where there are none."""
+        """The smallest window around the changed cells; None for none."""
         if not len(self.cells):
             return None
         row0, col0 = self.cells.min(axis=0).tolist()
@@ -72,7 +72,7 @@ class LatticeChange:
 
         Raises:
             MapTooLarge: it would have more than ``max_cells`` cells, or the pixels are too small.
-            MapTooFar: it would reach too far from 0, see ``lattice_window``.
+            MapTooFar: it would reach too far from the origin, see ``lattice_window``.
         """
         lattice = CoverageLattice.from_map(grid, footprint, max_cells)
         return cls(None, lattice, _cells_where(lattice.states != UNKNOWN, lattice.window))
@@ -86,20 +86,20 @@ class LatticeChange:
         max_cells: int = MAX_LATTICE_CELLS,
         within: Window | None = None,
     ) -> Self:
-        """Return what becomes of ``lattice``.
+        """Return the change of ``lattice`` from one map to the next.
 
         Args:
-            grids: the map before and the new one.
-            lattice: over the map before, made for ``footprint``.
-            footprint: what the lattice is made for.
-            max_cells: the most cells that the new lattice may have.
-            within: which pixels (row, col) of a map on its old place may differ, as a patch
-                names them; no others are compared. None for any.
+            grids: the previous map and the new one.
+            lattice: the lattice over the previous map, made for ``footprint``.
+            footprint: footprint of the lattice.
+            max_cells: limit on the cells of the new lattice.
+            within: window of the pixels (row, col) that may differ if the map has not moved, as
+                a patch gives it; only these are compared. None for all.
 
         Raises:
             MapTooLarge: the new lattice would have more than ``max_cells`` cells, or the pixels
                 are too small.
-            MapTooFar: it would reach too far from 0, see ``lattice_window``.
+            MapTooFar: it would reach too far from the origin, see ``lattice_window``.
         """
         window = lattice_window(grids[1].geometry, footprint.cell_m, max_cells)
         placement = placement_of(grids[1].geometry, footprint)
@@ -119,7 +119,7 @@ class LatticeChange:
 
     @classmethod
     def to(cls, before: CoverageLattice, after: CoverageLattice) -> Self:
-        """Compare two lattices; the one before stays where no cell has changed."""
+        """Compare two lattices; the previous object is kept if no cell has changed."""
         old, new = before.window, after.window
         changed = _cells_where(
             (after.states != carried(before.states, old, new))
@@ -140,11 +140,10 @@ def _regions_to_compare(
     placement: Placement,
     within: Window | None,
 ) -> tuple[Window, ...] | None:
-    """Return rectangles of the raster that hold all pixels in which two maps may differ.
+    """Return rectangles of the raster that contain all pixels in which two maps may differ.
 
-    Each is shown by both maps or by one of them alone. Of what the old map showed beyond the
-    new one, only pixels that matter for the cells of ``window`` are of interest. None where the
-    maps do not lie on one raster.
+    Each is shown by both maps, or by only one. Of the part that only the old map shows, only pixels
+    that affect cells of ``window`` are included. None if the maps are on different rasters.
     """
     (old_raster, old), (raster, new) = (grid.geometry.on_raster() for grid in grids)
     if raster != old_raster:
@@ -161,12 +160,12 @@ def _regions_to_compare(
 def carried(array: NDArray[Scalar], old: Window, new: Window, beyond: float = 0) -> NDArray[Scalar]:
     """Return an array (rows, cols, ...) over the old window on the new one.
 
-    That is the array itself where the windows are the same.
+    If the windows are equal, the array itself is returned.
 
     Args:
-        array: of the old window.
+        array: values on the old window.
         old, new: the windows.
-        beyond: what there is beyond the old one.
+        beyond: value outside of the old window.
     """
     if new == old:
         return array
@@ -184,15 +183,15 @@ def cells_near_changes(
     thresholds: Thresholds,
     within: Window | None,
 ) -> NDArray[np.bool_]:
-    """Return near which cells of the new window pixels have changed, bool (rows, cols).
+    """Return which cells of the new window are near changed pixels, bool (rows, cols).
 
-    What lies beyond a map is unknown: where one has grown by unknown pixels, none has changed.
+    Outside of a map all is unknown: growth by unknown pixels is no change.
 
     Args:
-        grids: the map before and the new one.
-        window: of the lattice over the new one.
-        placement: where its cells lie; a pixel matters for a cell as far as ``reach_of`` says.
-        thresholds: what counts as free and as occupied.
+        grids: the previous map and the new one.
+        window: window of the lattice over the new map.
+        placement: position of its cells; ``reach_of`` gives how far away a pixel affects a cell.
+        thresholds: thresholds of free and occupied.
         within: see ``LatticeChange.between``.
     """
     regions = _regions_to_compare(grids, window, placement, within)
@@ -217,16 +216,15 @@ def cells_near_changes(
 def new_cells(old: Window, new: Window) -> NDArray[np.bool_]:
     """Mark the cells of the new window that the old one lacks, bool (rows, cols).
 
-    They are to be classified, too. Nothing need have changed around them: a robot wider than its
-    tool may have been blocked where the old lattice did not reach. Of the others none has a step
-    there, unless pixels have changed near by: what lies beyond a window lies beyond its map, and is
-    unknown.
+    They must be classified even if no pixel near them changed: a robot wider than its tool may have
+    been blocked where the old lattice did not reach. The other cells have no steps into the new
+    ones unless nearby pixels changed: outside of a window is outside of its map, and unknown.
     """
     return ~carried(np.ones((old.rows, old.cols), np.bool_), old, new)
 
 
 def _pixels_around(window: Window, placement: Placement) -> Window:
-    """Return the pixels of the raster that may matter for the cells of a window."""
+    """Return the window of pixels of the raster that may affect the cells of a window."""
     ux, uy, reach = placement.ux, placement.uy, reach_of(placement) + 2.0
     corners = [
         (col * ux - row * uy + placement.x0, col * uy + row * ux + placement.y0)
@@ -243,7 +241,7 @@ def _pixels_around(window: Window, placement: Placement) -> Window:
 
 
 def _cells_where(mask: NDArray[np.bool_], window: Window) -> NDArray[np.int32]:
-    """Return the cells (row, col), int32 (n, 2), at which a mask over ``window`` holds."""
+    """Return the cells (row, col), int32 (n, 2), that are marked in a mask over ``window``."""
     rows, cols = np.divmod(np.flatnonzero(mask), max(window.cols, 1))
     cells = np.stack((rows + window.row0, cols + window.col0), axis=1)
     return cells.astype(np.int32)

@@ -1,7 +1,7 @@
-"""The fine raster of a map, pixels divided with a frame of unknown ones around, and polygons on it.
+"""Fine raster of a map: divided pixels with a border of unknown ones, and polygons on it.
 
-What a tool leaves at a wall is narrower than a pixel of most maps. Pixel (i, j) of the raster is
-the unit square around the point (y = i, x = j).
+The strip that a tool leaves along a wall is narrower than a pixel of most maps. Pixel (i, j) of the
+raster is the unit square around the point (y = i, x = j).
 """
 
 from __future__ import annotations
@@ -20,18 +20,18 @@ from fasaco_edge.kernels.floor.bits import Bits, packed
 from fasaco_edge.kernels.lattice.footprint import Placement
 from fasaco_edge.kernels.lattice.polygons import add_near, turn_inside
 
-# Pixels are divided until they are this fine: what a tool leaves at a wall is a few of them.
+# Pixels are divided to this size or smaller: the strip left along a wall is a few of them wide.
 FINE_M = 0.025
-# So many pixels, about, are looked at together where that takes a byte or more for each.
+# Approximate number of pixels processed at once in arrays of a byte or more per pixel.
 STRIP = 1 << 20
 
 
 @dataclass(frozen=True, slots=True)
 class RobotDiscs:
-    """The robot and its tool, as discs around one point, and what counts as free.
+    """The robot and its tool as concentric discs, and the threshold of free pixels.
 
     Attributes:
-        radius_m: of the robot [m].
+        radius_m: radius of the robot [m].
         tool_m: width of the tool [m].
         free_at_most: occupancy values up to this are free [percent].
     """
@@ -44,12 +44,12 @@ class RobotDiscs:
 def fine_geometry(
     coarse: GridGeometry, discs: RobotDiscs, most_pixels: int
 ) -> tuple[GridGeometry, int]:
-    """Return a fine raster of a map with a frame around it, and into how many parts pixels go.
+    """Return the fine raster of a map with a border, and the number of parts per pixel edge.
 
-    They go into fewer where the raster would have more than ``most_pixels`` of them.
+    The number is reduced if the raster would exceed ``most_pixels``.
 
     Raises:
-        MapTooLarge: it would have more even if pixels stay whole.
+        MapTooLarge: it would exceed the limit even with undivided pixels.
     """
     for parts in range(max(1, math.ceil(coarse.resolution / FINE_M - 1e-3)), 0, -1):
         unit = coarse.resolution / parts
@@ -61,7 +61,7 @@ def fine_geometry(
         raise MapTooLarge(
             f"a raster of {rows} x {cols} pixels of {unit:g} m exceeds {most_pixels} pixels"
         )
-    # Two maps on the same pixels have one raster, however their origins are rounded.
+    # Maps on the same pixels get the same raster, whatever the rounding of their origins.
     x, y = coarse.snapped().to_map(-frame / parts, -frame / parts)
     return GridGeometry(rows, cols, unit, Pose2D(x, y, coarse.origin.yaw)), parts
 
@@ -69,7 +69,7 @@ def fine_geometry(
 def free_pixels(
     grid: OccupancyGrid, geometry: GridGeometry, parts: int, free_at_most: int, first: int, end: int
 ) -> NDArray[np.bool_]:
-    """Return which pixels are known free of rows ``first`` to ``end`` of a map's fine raster."""
+    """Return the known free pixels in rows ``first`` to ``end`` of a map's fine raster."""
     rows, cols = grid.cells.shape
     frame = (geometry.rows - rows * parts) // 2
     free = np.zeros((end - first, geometry.cols), np.bool_)
@@ -91,15 +91,15 @@ def blocked_pixels(
     rows: tuple[int, int],
     keep_out: Callable[[Window], NDArray[np.bool_]] | None = None,
 ) -> Bits:
-    """Return what of some rows of a map's fine raster is not known free, uint64 (rows, words).
+    """Return the pixels not known free in rows of a map's fine raster, uint64 (rows, words).
 
     Args:
         grid: the map.
-        geometry: of the raster.
-        parts: into which pixels of the map are divided.
+        geometry: geometry of the raster.
+        parts: number of parts per pixel edge of the map.
         free_at_most: occupancy values up to this are free [percent].
-        rows: the first one, and the one behind the last.
-        keep_out: returns which pixels of a part are kept out of, bool; None for none.
+        rows: first row, and end of the range.
+        keep_out: returns the kept-out pixels of a window, bool; None for none.
     """
     found = []
     for strip in strips(Window(rows[0], 0, rows[1], geometry.cols)):
@@ -111,7 +111,7 @@ def blocked_pixels(
 
 
 def strips(part: Window) -> Iterator[Window]:
-    """Yield a part of a raster some rows at a time."""
+    """Yield windows of a few rows that together are ``part``."""
     rows = max(STRIP // max(part.cols, 1), 1)
     for row in range(part.row0, part.row1, rows):
         yield Window(row, part.col0, min(row + rows, part.row1), part.col1)
@@ -132,7 +132,7 @@ def map_to_raster(geometry: GridGeometry, x: float, y: float) -> tuple[float, fl
 
 
 def stand_placement(geometry: GridGeometry, cell_m: float, radius_m: float) -> Placement:
-    """Return where the lattice's cells lie, seen from the centre of the raster's first pixel."""
+    """Return the placement of the lattice's cells, relative to the centre of the first pixel."""
     unit, yaw = geometry.resolution, geometry.origin.yaw
     x0, y0 = geometry.to_pixels(0.0, 0.0)
     scale = cell_m / unit
@@ -142,10 +142,10 @@ def stand_placement(geometry: GridGeometry, cell_m: float, radius_m: float) -> P
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PolygonsOnRaster:
-    """Polygons that a robot keeps out of, where they lie on a raster.
+    """Keep-out polygons on a raster.
 
     Attributes:
-        corners: of each float64 (n, 2), column and row.
+        corners: float64 (n, 2) per polygon: column and row.
         boxes: int64 (polygons, 4): row0, col0, row1, col1 of the pixels that each may touch.
     """
 
@@ -154,7 +154,7 @@ class PolygonsOnRaster:
 
     @classmethod
     def of(cls, polygons: Sequence[Polygon], geometry: GridGeometry) -> PolygonsOnRaster:
-        """Return where polygons (x, y) [m], one or more, lie on the raster of a geometry."""
+        """Convert polygons (x, y) [m], one or more, to the raster of a geometry."""
         ends = np.cumsum([len(polygon) for polygon in polygons])
         points = np.array([corner for polygon in polygons for corner in polygon], np.float64)
         cols, rows = geometry.to_pixels(points[:, 0], points[:, 1])
@@ -162,7 +162,7 @@ class PolygonsOnRaster:
         low = [np.floor(np.minimum.reduceat(each, begins)) - 1 for each in (rows, cols)]
         high = [np.ceil(np.maximum.reduceat(each, begins)) + 1 for each in (rows, cols)]
         corners = np.split(np.stack([cols, rows], axis=1), ends[:-1])
-        # With the pixels that a border only touches.
+        # Includes pixels that a border only touches.
         return cls(corners, np.stack([*low, *high], axis=1).astype(np.int64))
 
     def touched(self, part: Window) -> NDArray[np.bool_]:

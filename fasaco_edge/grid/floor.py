@@ -1,8 +1,8 @@
-"""Floor: where on a fine raster of a map a robot may be, and what its tool reaches from there.
+"""Floor: the places of the robot on a fine raster of a map, and what its tool reaches from them.
 
-The reachable floor is all that the tool's disc touches at places where the robot's disc can come
-to from where it stands. The lattice over it has a cell wherever the robot has a place: it stands
-at the one nearest to the cell's middle, and may go round a corner between two cells.
+The reachable floor is everything that the tool's disc touches while the robot's disc is at places
+connected to its start. The lattice over the floor has a cell wherever the robot has a place: its
+stand is the place nearest to the cell's centre, and a step may bend around a corner.
 """
 
 from __future__ import annotations
@@ -35,21 +35,21 @@ from fasaco_edge.kernels.floor.places import (
 )
 from fasaco_edge.kernels.lattice.footprint import Placement
 
-# The most fine pixels, int8 and int32 arrays of which are held.
+# Limit on the fine pixels, of which int8 and int32 arrays are allocated.
 MOST_PIXELS = 100_000_000
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Floor:
-    """The floor that a robot reaches from one place.
+    """The floor that a robot reaches from a start.
 
     Attributes:
-        geometry: of the fine raster, with a frame around the map.
+        geometry: geometry of the fine raster, with a border around the map.
         discs: robot and tool.
         blocked: uint64 (rows, words), see ``kernels.floor.bits``: pixels not known free.
-        places: the same: pixels at whose centre the robot may be, and can come to.
+        places: likewise: pixels whose centre the robot can occupy and reach.
         reachable: bool (rows, cols): pixels whose centre the tool reaches from these.
-        start: y, x of the place nearest to where the robot stands [pixels].
+        start: y, x of the place nearest to the start [pixels].
     """
 
     geometry: GridGeometry
@@ -61,7 +61,7 @@ class Floor:
 
     @classmethod
     def around(cls, grid: OccupancyGrid, discs: RobotDiscs, start: tuple[float, float]) -> Floor:
-        """Return the floor that is reached from the place nearest to ``start``, x, y [m].
+        """Return the floor reachable from the place nearest to ``start``, x, y [m].
 
         Raises:
             StartOutsideMap: the start is not on the map.
@@ -81,7 +81,7 @@ class Floor:
 
     @property
     def reachable_m2(self) -> float:
-        """How much floor the tool reaches [m2]."""
+        """Area that the tool reaches [m2]."""
         return int(np.count_nonzero(self.reachable)) * self.geometry.resolution**2
 
     def to_map(self, pixels: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -91,11 +91,11 @@ class Floor:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StandLattice:
-    """A lattice in whose cells the robot stands where it can, not only in their middles.
+    """A lattice of stands: in each cell the robot stands as near to the centre as it can.
 
     Attributes:
-        lattice: its cells are coverable where they have a place.
-        stands: float64 (rows, cols, 2): y, x of the place [pixels]; NaN where there is none.
+        lattice: the lattice; cells with a stand are coverable.
+        stands: float64 (rows, cols, 2): y, x of the stand [pixels]; NaN for none.
         bends: float32 (rows, cols, 2, 2): y, x of the bend on the step to the east, and to the
             north, a pixel's centre [pixels]; NaN for a straight step.
     """
@@ -110,7 +110,7 @@ class StandLattice:
 
         Raises:
             MapTooLarge: it would have more than ``max_cells``.
-            MapTooFar: it would reach too far from 0.
+            MapTooFar: it would reach too far from the origin.
         """
         window = lattice_window(floor.geometry, cell_m, max_cells)
         placement = stand_placement(floor.geometry, cell_m, floor.discs.radius_m)
@@ -127,16 +127,16 @@ class StandLattice:
         unknown: NDArray[np.bool_] | None = None,
         before: tuple[StandLattice, tuple[int, int], NDArray[np.bool_]] | None = None,
     ) -> StandLattice:
-        """Return the lattice over places.
+        """Return the lattice of stands among places.
 
         Args:
             blocked, places: see ``Floor``.
-            placement: where the cells lie on the raster.
-            window: the cells.
+            placement: position of the cells on the raster.
+            window: window of the cells.
             cell_m: their width [m].
-            unknown: bool (rows, cols): cells that are unknown where they have no place.
-            before: the lattice before, by how many rows and columns pixels have moved since, and
-                the cells to look at again, bool (rows, cols); None to look at all.
+            unknown: bool (rows, cols): cells that are unknown, not blocked, if without stand.
+            before: the previous lattice, the shift of pixels since then in rows and columns, and
+                the cells to recompute, bool (rows, cols); None to compute all.
         """
         shape = window.rows, window.cols
         if before is None:
@@ -158,13 +158,13 @@ class StandLattice:
         return cls(CoverageLattice(window, cell_m, states, steps), stands, bends)
 
     def start_cell(self, floor: Floor) -> tuple[int, int]:
-        """Return the cell whose stand is nearest to where the robot is."""
+        """Return the cell whose stand is nearest to the robot."""
         squares = ((self.stands - np.array(floor.start)) ** 2).sum(axis=2)
         row, col = divmod(int(np.nanargmin(squares)), squares.shape[1])
         return row + self.lattice.window.row0, col + self.lattice.window.col0
 
     def stand(self, cell: NDArray[np.int32]) -> NDArray[np.float64]:
-        """Return where the robot stands in a cell (row, col), int32 (2,): y, x [pixels]."""
+        """Return the stand of a cell (row, col), int32 (2,): y, x [pixels]."""
         row, col = self.lattice.local((int(cell[0]), int(cell[1])))
         at: NDArray[np.float64] = self.stands[row, col]
         return at
@@ -172,20 +172,20 @@ class StandLattice:
     def points(self, walk: NDArray[np.int32]) -> NDArray[np.float64]:
         """Return the line along a walk, cells (row, col), int32 (n, 2): float64 (m, 2), y, x.
 
-        Where it goes straight on it has no points between.
+        Straight runs have no points in between.
         """
         return self.line(walk)[0]
 
     def line(self, walk: NDArray[np.int32]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-        """Return the same, and of which cell of the walk each point is, int64 (m,).
+        """Return that line, and the index in the walk of each point's cell, int64 (m,).
 
-        A bend is of the cell that the step leaves.
+        A bend belongs to the cell that the step leaves.
         """
         window: Window = self.lattice.window
         cells = walk - np.array((window.row0, window.col0), np.int32)
         at = self.stands[cells[:, 0], cells[:, 1]]
         moves = np.diff(cells, axis=0)
-        # A step's bend is kept at its western or southern cell.
+        # A step's bend is stored at its western or southern cell.
         lower = np.minimum(cells[:-1], cells[1:])
         bends = self.bends[lower[:, 0], lower[:, 1], (moves[:, 0] != 0).astype(np.intp)]
         line = np.concatenate([np.stack([at[:-1], bends], axis=1).reshape(-1, 2), at[-1:]])
@@ -197,11 +197,12 @@ class StandLattice:
 
 
 def states_of(stands: NDArray[np.float64], unknown: NDArray[np.bool_] | None) -> NDArray[np.uint8]:
-    """Return the states of cells, uint8 (rows, cols): coverable where the robot can stand.
+    """Return the states of cells, uint8 (rows, cols): coverable where there is a stand.
 
     Args:
         stands: see ``StandLattice``.
-        unknown: bool (rows, cols): others that are unknown, not blocked; None for none.
+        unknown: bool (rows, cols): cells without stand that are unknown, not blocked; None for
+            none.
     """
     states = np.full(stands.shape[:2], BLOCKED, np.uint8)
     if unknown is not None:
@@ -211,13 +212,13 @@ def states_of(stands: NDArray[np.float64], unknown: NDArray[np.bool_] | None) ->
 
 
 def corners(line: NDArray[np.float64]) -> NDArray[np.intp]:
-    """Return the numbers of points that neither repeat the one before nor lie on a straight way.
+    """Return the indices of points that are neither repeated nor on a straight segment.
 
     Args:
         line: float64 (n, 2), n >= 1.
 
     Returns:
-        int (m,), with the first and the last place.
+        int (m,), with the first and the last point.
     """
     new = np.concatenate([[True], (np.abs(np.diff(line, axis=0)) > 1e-9).any(axis=1)])
     numbers = np.flatnonzero(new)
@@ -232,7 +233,7 @@ def corners(line: NDArray[np.float64]) -> NDArray[np.intp]:
 
 
 def straightened(line: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return a line, float64 (n, 2), of its ``corners`` alone."""
+    """Return a line, float64 (n, 2), reduced to its ``corners``."""
     straight: NDArray[np.float64] = line[corners(line)]
     return straight
 

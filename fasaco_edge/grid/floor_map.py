@@ -1,7 +1,7 @@
-"""The floor under a map that changes: places, stands and the lattice over them.
+"""Floor map: places, stands and the lattice over them, for a map that changes.
 
-Where the new map lies on the raster of the one before, only cells near changed pixels are looked
-at, see ``grid.changes``. Either way all is as if it had been found for the new map alone.
+If the new map lies on the raster of the previous one, only cells near changed pixels are
+recomputed, see ``grid.changes``. The result equals that of the new map alone.
 """
 
 from __future__ import annotations
@@ -40,24 +40,24 @@ from fasaco_edge.kernels.floor.places import (
 )
 from fasaco_edge.kernels.lattice.footprint import Placement
 
-# A step may bend over places this far from its two cells' middles; a pixel more for rounding.
+# A step may bend over places this far from the centres of its two cells; one pixel for rounding.
 REACH_CELLS, REACH_PX = 2.5, 2.0
 
 
 class FloorMap:
-    """Where a robot may be on a map, and where it stands in the cells.
+    """Places and stands of a robot on a map.
 
     Attributes:
         discs: robot and tool.
-        geometry: of the fine raster.
+        geometry: geometry of the fine raster.
         blocked: uint64 (rows, words), see ``kernels.floor.bits``: pixels that are not known free,
             or are kept out of.
-        places: the same: pixels at whose centre the robot may be, wherever it comes from.
-        stands: the lattice, and where in its cells the robot stands.
-        revision: goes up with each map.
-        shift: by how many rows and columns pixels have moved on the raster with the newest map;
-            None where it is another raster.
-        touched: the part of the raster that the newest map may have changed; None for nothing.
+        places: likewise: pixels whose centre the robot can occupy, reachable or not.
+        stands: the lattice of stands.
+        revision: incremented with each map.
+        shift: shift of pixels on the raster by the newest map, in rows and columns; None for
+            another raster.
+        touched: window of the raster that the newest map may have changed; None for none.
     """
 
     geometry: GridGeometry
@@ -77,13 +77,13 @@ class FloorMap:
         most_pixels: int,
         keep_out: tuple[Polygon, ...] = (),
     ) -> None:
-        """Look at a first map.
+        """Compute the floor of a first map.
 
         Args:
             grid: the map.
-            plain: the lattice of ``footprint`` over it, whose cells tell what is unknown.
+            plain: the lattice of cell centres over it, which tells the unknown cells.
             footprint, discs: of the robot.
-            most_pixels: the most that the raster may have.
+            most_pixels: limit on the pixels of the raster.
             keep_out: polygons that the robot must not touch.
 
         Raises:
@@ -91,7 +91,7 @@ class FloorMap:
         """
         self.discs = discs
         self._footprint, self._most_pixels, self._keep_out = footprint, most_pixels, keep_out
-        # Where they lie on which raster.
+        # The keep-out polygons on the raster, with the geometry they were converted for.
         self._kept_out: tuple[GridGeometry, PolygonsOnRaster] | None = None
         self._see(grid, plain)
 
@@ -101,12 +101,12 @@ class FloorMap:
         plain: CoverageLattice,
         within: Window | None = None,
     ) -> LatticeChange:
-        """Go on with another map; return what becomes of the lattice.
+        """Update to the next map; return the change of the lattice.
 
         Args:
-            grids: the map before and the new one.
-            plain: the plain lattice over the new one.
-            within: which pixels may differ, see ``LatticeChange.between``.
+            grids: the previous map and the new one.
+            plain: the lattice of cell centres over the new one.
+            within: window of the pixels that may differ, see ``LatticeChange.between``.
 
         Raises:
             MapTooLarge: the raster would have too many pixels; nothing has changed.
@@ -123,7 +123,7 @@ class FloorMap:
         near = cells_near_changes(grids, plain.window, wide, self._footprint.thresholds, within)
         self.revision += 1
         self.shift = (old.row0 - new.row0) * parts, (old.col0 - new.col0) * parts
-        # A map that grows on two sides has new cells all along them, and little new floor.
+        # A map that grows on two sides has new cells all along these, and little new floor.
         self.touched = self._pixels_of(near, plain.window, geometry)
         if self.touched is None and old == new:
             return LatticeChange.to(before, self._with_states(plain))
@@ -140,8 +140,8 @@ class FloorMap:
     ) -> FloorMap:
         """Return the floor of the same map with polygons that the robot must not touch.
 
-        As if it had been found anew; only cells near the polygons are looked at. This one keeps out
-        of none.
+        Equals a new computation, but only cells near the polygons are recomputed. To be called on a
+        floor without keep-out polygons.
         """
         geometry, parts = fine_geometry(grid.geometry, self.discs, self._most_pixels)
         if geometry != self.geometry:
@@ -161,9 +161,9 @@ class FloorMap:
     def _cells_near(
         self, polygons: tuple[Polygon, ...], resolution: float, window: Window
     ) -> NDArray[np.bool_]:
-        """Return the cells, bool (rows, cols), whose stands or steps polygons may change."""
+        """Return the cells, bool (rows, cols), whose stands or steps polygons may affect."""
         cell_m = self._footprint.cell_m
-        # As far as a changed pixel of the map matters, whatever its yaw.
+        # As far as a changed pixel of the map has effects, at any yaw.
         reach_m = self.discs.radius_m + (REACH_CELLS + 1.0) * cell_m + (REACH_PX + 1.0) * resolution
         reach_m *= math.sqrt(2.0)
         near = np.zeros((window.rows, window.cols), np.bool_)
@@ -176,7 +176,7 @@ class FloorMap:
         return near
 
     def stand_xy(self, cell: Cell) -> Point | None:
-        """Return where the robot stands in a cell, x, y [m]; None where it cannot."""
+        """Return the stand of a cell, x, y [m]; None for none."""
         lattice = self.stands.lattice
         if not lattice.contains(cell):
             return None
@@ -184,16 +184,16 @@ class FloorMap:
         return None if math.isnan(y) else self.geometry.to_map(x + 0.5, y + 0.5)
 
     def box_of(self, cell: Cell) -> Window:
-        """Return the smallest box of the raster's pixels around a cell."""
+        """Return the bounding box of a cell on the raster."""
         window = Window(cell[0], cell[1], cell[0] + 1, cell[1] + 1)
         return self._box_around(window, self.geometry, 0) or Window(0, 0, 0, 0)
 
     def reached(self, cells: NDArray[np.bool_], part: Window) -> NDArray[np.bool_]:
-        """Return the pixels of a part of the raster that the tool reaches from places in cells.
+        """Return the pixels in a window of the raster that the tool reaches from places in cells.
 
         Args:
             cells: bool (rows, cols) of the lattice.
-            part: of the raster.
+            part: window of the raster.
 
         Returns:
             bool, (rows, cols) of the part.
@@ -205,7 +205,7 @@ class FloorMap:
             part.row0 - margin, part.col0 - margin, part.row1 + margin, part.col1 + margin
         ).intersection(whole)
         assert around is not None
-        # Whole words: what lies further away does not matter.
+        # Whole words; the pixels farther away do no harm.
         first, end = around.col0 // WORD, -(-around.col1 // WORD)
         found = self.places[around.row0 : around.row1, first:end].copy()
         lattice = self.stands.lattice
@@ -218,7 +218,7 @@ class FloorMap:
         return reached[part.slices_in(words)]
 
     def pixels_of(self, cells: NDArray[np.bool_]) -> Window | None:
-        """Return the pixels around some cells that the tool reaches from there; None without any.
+        """Return a window of the pixels that the tool reaches from some cells; None without any.
 
         Args:
             cells: bool (rows, cols) of the lattice.
@@ -234,7 +234,7 @@ class FloorMap:
         self._settle(plain, np.ones(plain.states.shape, np.bool_))
 
     def _look(self, grid: OccupancyGrid, parts: int, first: int, end: int) -> None:
-        """See what is blocked in rows of the raster, and where the robot's disc fits there."""
+        """Compute blocked pixels in rows of the raster, and the places there."""
         rows = self.geometry.rows
         keep_out = None
         if self._keep_out:
@@ -254,7 +254,7 @@ class FloorMap:
         self.places[first:end] = places[first - low : end - low]
 
     def _compared(self, before: CoverageLattice) -> LatticeChange:
-        """Keep the lattice before where no cell has changed, though a stand may have."""
+        """Keep the previous lattice object if no cell has changed, though a stand may have."""
         change = LatticeChange.to(before, self.stands.lattice)
         self.stands = replace(self.stands, lattice=change.after)
         return change
@@ -263,7 +263,7 @@ class FloorMap:
         return stand_placement(self.geometry, self._footprint.cell_m, self.discs.radius_m)
 
     def _settle(self, plain: CoverageLattice, stale: NDArray[np.bool_]) -> None:
-        """Look at stale cells again; the others are those of the lattice before."""
+        """Recompute stale cells; the others are those of the previous lattice."""
         self.stands = StandLattice.where(
             self.blocked,
             self.places,
@@ -286,7 +286,7 @@ class FloorMap:
     def _pixels_of(
         self, stale: NDArray[np.bool_], window: Window, geometry: GridGeometry
     ) -> Window | None:
-        """Return the pixels around cells, and as far as robot and tool reach; None without any."""
+        """Return a window of pixels around cells that robot and tool reach; None without any."""
         cells = Window.of(stale)
         if cells is None:
             return None
@@ -295,7 +295,7 @@ class FloorMap:
         return self._box_around(cells.moved(window.row0, window.col0), geometry, margin)
 
     def _box_around(self, cells: Window, geometry: GridGeometry, margin: int) -> Window | None:
-        """Return the box of pixels around a window of cells; None where there are none."""
+        """Return the bounding box in pixels of a window of cells; None for none."""
         placement = stand_placement(geometry, self._footprint.cell_m, self.discs.radius_m)
         corners = [
             (

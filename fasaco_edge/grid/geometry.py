@@ -1,6 +1,6 @@
-"""Poses, the placement of a grid in the map frame, and windows of cells.
+"""Geometry: poses, the placement of grids in the map frame, and windows of cells.
 
-Nothing here needs numpy itself: a program that only wants poses stays small.
+Does not import numpy at run time, so that a program that only needs poses stays small.
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ if TYPE_CHECKING:
     _Value = TypeVar("_Value", np.uint8, np.bool_)
     _Coordinate = TypeVar("_Coordinate", float, NDArray[np.float64])
 
-# A raster's corner is rounded to this part of a pixel: a map that grows by whole pixels stays on
-# its raster, also where its origin is rounded to float32.
+# A raster's corner is rounded to this fraction of a pixel: a map that grows by whole pixels stays
+# on its raster, even if its origin is rounded to float32.
 RASTER_STEPS = 2048
 
 # The largest distance of a map, a pose or a path from the frame's origin [m]: UTM northings go up
@@ -27,12 +27,12 @@ FARTHEST_M = 2e7
 # Default limit of a lattice.
 MAX_LATTICE_CELLS = 4_000_000
 
-# Limits of the edge of a pixel [m], as there.
+# Limits of the edge of a pixel [m]; in ``protocol/limits.yaml``, too.
 MIN_RESOLUTION_M, MAX_RESOLUTION_M = 1e-4, 100.0
 
 
 Bounds = tuple[float, float, float, float]
-"""An upright rectangle of the map frame: x_min, y_min, x_max, y_max [m]."""
+"""An axis-aligned rectangle in the map frame: x_min, y_min, x_max, y_max [m]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,7 +64,7 @@ class Window:
         return self.col1 - self.col0
 
     def intersection(self, other: Window) -> Window | None:
-        """Return the common rectangle, or None where there is none."""
+        """Return the common rectangle; None for none."""
         row0, col0 = max(self.row0, other.row0), max(self.col0, other.col0)
         row1, col1 = min(self.row1, other.row1), min(self.col1, other.col1)
         return Window(row0, col0, row1, col1) if row0 < row1 and col0 < col1 else None
@@ -80,7 +80,7 @@ class Window:
 
     @classmethod
     def around(cls, *windows: Window | None) -> Window | None:
-        """Return the smallest rectangle around those with cells in them; None without any."""
+        """Return the smallest rectangle around all non-empty windows; None without any."""
         held = [window for window in windows if window and window.rows > 0 and window.cols > 0]
         if not held:
             return None
@@ -105,7 +105,7 @@ class Window:
         return Window(self.row0 + rows, self.col0 + cols, self.row1 + rows, self.col1 + cols)
 
     def without(self, hole: Window) -> tuple[Window, ...]:
-        """Return up to four rectangles that together are this window less ``hole``."""
+        """Return up to four rectangles that together are this window minus ``hole``."""
         common = self.intersection(hole)
         if common is None:
             return (self,) if self.rows > 0 and self.cols > 0 else ()
@@ -120,9 +120,9 @@ class Window:
     def values_at(
         self, values: NDArray[_Value], cells: NDArray[np.int32], beyond: int
     ) -> NDArray[_Value]:
-        """Return the values, (rows, cols) on this window, of cells (row, col), (n, 2).
+        """Return the values, (rows, cols) on this window, at cells (row, col), (n, 2).
 
-        Those outside have the value ``beyond``.
+        Cells outside have the value ``beyond``.
         """
         rows, cols = cells[:, 0] - self.row0, cells[:, 1] - self.col0
         inside = (rows >= 0) & (rows < self.rows) & (cols >= 0) & (cols < self.cols)
@@ -141,13 +141,13 @@ class Window:
 
 @dataclass(frozen=True, slots=True)
 class Raster:
-    """The unbounded raster of pixels that a map shows a window of.
+    """An unbounded raster of pixels; a map shows a window of it.
 
     Attributes:
         resolution: edge of a pixel [m].
-        yaw: of the raster in the map frame [rad].
-        right, up: where pixel (0, 0) begins, seen from the map frame's origin along the
-            raster's own axes [pixels]; in [0, 1), multiples of 1 / ``RASTER_STEPS``.
+        yaw: yaw of the raster in the map frame [rad].
+        right, up: corner of pixel (0, 0), relative to the map frame's origin, along the raster's
+            axes [pixels]; in [0, 1), multiples of 1 / ``RASTER_STEPS``.
     """
 
     resolution: float
@@ -175,13 +175,13 @@ class GridGeometry:
     def of_cells(cls, window: Window, cell_m: float) -> GridGeometry:
         """Return the placement of a window of the coverage lattice, cells ``cell_m`` [m] wide.
 
-        In the lattice's own frame, which may be turned, see ``grid.turning``.
+        In the lattice's own frame, which may be rotated, see ``grid.turning``.
         """
         corner = Pose2D(window.col0 * cell_m, window.row0 * cell_m)
         return cls(window.rows, window.cols, cell_m, corner)
 
     def to_pixels(self, x: _Coordinate, y: _Coordinate) -> tuple[_Coordinate, _Coordinate]:
-        """Return the pixel coordinates (column, row), not rounded, of a point or of many [m]."""
+        """Return the pixel coordinates (column, row), not rounded, of one or many points [m]."""
         dx, dy = x - self.origin.x, y - self.origin.y
         cos, sin = math.cos(self.origin.yaw), math.sin(self.origin.yaw)
         return (cos * dx + sin * dy) / self.resolution, (cos * dy - sin * dx) / self.resolution
@@ -193,10 +193,10 @@ class GridGeometry:
         return self.origin.x + cos * u - sin * v, self.origin.y + sin * u + cos * v
 
     def on_raster(self) -> tuple[Raster, Window]:
-        """Return the raster this grid lies on, and the window of it that the grid occupies.
+        """Return the raster of this grid, and the grid's window on it.
 
-        Two grids lie on one raster if they differ by whole pixels. The raster is off the
-        grid by up to half a step, 1 / 4096 of a pixel, on either axis.
+        Two grids lie on one raster if they differ by whole pixels. The raster may be off the grid
+        by up to half a step, 1 / 4096 of a pixel, along each axis.
         """
         cos, sin = math.cos(self.origin.yaw), math.sin(self.origin.yaw)
         x, y = self.origin.x / self.resolution, self.origin.y / self.resolution
@@ -207,10 +207,10 @@ class GridGeometry:
         return raster, window
 
     def snapped(self) -> GridGeometry:
-        """Return this grid exactly on its raster, see ``on_raster``.
+        """Return this grid moved exactly onto its raster, see ``on_raster``.
 
-        Of two grids on one raster that lie on the same pixels both are the same then: origins that
-        are rounded now and then, as float32 or by a transform, make no difference.
+        Grids on the same pixels become equal, even if the origin of one was rounded, as float32 or
+        by a transform.
         """
         raster, window = self.on_raster()
         cos, sin = math.cos(raster.yaw), math.sin(raster.yaw)

@@ -1,9 +1,8 @@
-"""The coverage lattice: the planning grid, anchored to the map frame.
+"""Coverage lattice: the planning grid, anchored to the map frame.
 
-Cells are as wide as the tool. Cell (row, col) is the square
-``[col * cell_m, (col + 1) * cell_m) x [row * cell_m, (row + 1) * cell_m)`` of
-the map frame, whatever the origin, size or yaw of the map message: a cell
-keeps its index for the whole mission. Indices may be negative.
+Cells are as wide as the tool. Cell (row, col) is the square ``[col * cell_m, (col + 1) * cell_m) x
+[row * cell_m, (row + 1) * cell_m)`` of the map frame, whatever the origin, size or yaw of the map
+message: a cell keeps its index during the whole mission. Indices may be negative.
 """
 
 from __future__ import annotations
@@ -31,30 +30,30 @@ __all__ = ["BLOCKED", "COVERABLE", "UNKNOWN", "Cell", "CoverageLattice", "Footpr
 
 Cell = tuple[int, int]
 
-# A map that reaches so little into a cell does not reach into it [cells]: coordinates are rounded.
+# A map that extends into a cell by less than this is taken to end before it [cells]: rounding.
 ROUNDING = 1e-6
-# Indices of cells are int32, and sums of two of them, too.
+# Limit of cell indices: they, and sums of two of them, are int32.
 MOST_INDEX = 2**30
 
-# The most pixels that robot and tool may span: beyond that, the tables for classifying a map take
+# Limit on the pixels that robot and tool may span: above it, the tables for classifying a map take
 # more memory than the map itself, see ``kernels.lattice.classification``.
 MOST_REACH_PX = 400
 
-# A robot exactly as wide as a corridor fits; float32 resolutions on the wire
-# must not decide otherwise.
+# A robot exactly as wide as a corridor fits; float32 rounding of resolutions must not decide
+# otherwise.
 TOUCH_TOLERANCE_PX = 1e-3
 
 
 @dataclass(frozen=True, slots=True)
 class Footprint:
-    """Tool, robot and thresholds that a lattice is made for.
+    """Tool, robot and thresholds of a lattice.
 
     Attributes:
         cell_m: edge of a lattice cell, the width of the tool [m].
         robot_radius_m: radius of the robot's disc [m].
         free_at_most: occupancy values up to this are free [percent].
         occupied_at_least: occupancy values from this on are occupied [percent];
-            what lies between the two counts as unknown.
+            values between the two count as unknown.
     """
 
     cell_m: float
@@ -64,16 +63,16 @@ class Footprint:
 
     @property
     def thresholds(self) -> Thresholds:
-        """What counts as free and as occupied."""
+        """Thresholds of free and occupied."""
         return Thresholds(self.free_at_most, self.occupied_at_least)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CoverageLattice:
-    """Which cells can be covered, and the steps between them.
+    """Coverable cells, and the steps between them.
 
     Attributes:
-        window: which cells of the unbounded lattice the arrays span.
+        window: window of the unbounded lattice that the arrays span.
         cell_m: edge of a cell [m].
         states: uint8 (rows, cols), read-only: UNKNOWN, BLOCKED or COVERABLE. A cell
             is coverable if the robot's disc fits at its centre and all it covers is
@@ -99,7 +98,7 @@ class CoverageLattice:
 
         Raises:
             MapTooLarge: it would have more than ``max_cells`` cells, or the pixels are too small.
-            MapTooFar: it would reach too far from 0, see ``lattice_window``.
+            MapTooFar: it would reach too far from the origin, see ``lattice_window``.
         """
         window = lattice_window(grid.geometry, footprint.cell_m, max_cells)
         placement = placement_of(grid.geometry, footprint)
@@ -139,7 +138,7 @@ class CoverageLattice:
         return cell[0] - self.window.row0, cell[1] - self.window.col0
 
     def cell_at(self, x: float, y: float) -> Cell:
-        """Return the cell that holds the point (x, y) [m], inside the arrays or not."""
+        """Return the cell that contains the point (x, y) [m], inside the arrays or not."""
         return math.floor(y / self.cell_m), math.floor(x / self.cell_m)
 
     def centres(self, cells: NDArray[np.int32]) -> NDArray[np.float64]:
@@ -148,13 +147,14 @@ class CoverageLattice:
 
 
 def lattice_window(geometry: GridGeometry, cell_m: float, max_cells: int) -> Window:
-    """Return which cells of the unbounded lattice, ``cell_m`` [m] wide, a map reaches into.
+    """Return the window of the unbounded lattice, cells ``cell_m`` [m] wide, that a map spans.
 
-    Cells have int32 indices, and all that is published of them lies within ``FARTHEST_M`` of 0.
+    Cells have int32 indices, and everything published of them lies within ``FARTHEST_M`` of the
+    origin.
 
     Raises:
-        MapTooLarge: they are more than ``max_cells``.
-        MapTooFar: they reach too far from 0.
+        MapTooLarge: it has more than ``max_cells`` cells.
+        MapTooFar: it reaches too far from the origin.
     """
     x0, y0, x1, y1 = geometry.bounds()
     rows, cols = (y1 - y0) / cell_m + 2, (x1 - x0) / cell_m + 2
@@ -191,10 +191,10 @@ def pixels_of(grid: OccupancyGrid) -> Pixels:
 
 
 def placement_of(geometry: GridGeometry, footprint: Footprint) -> Placement:
-    """Return where the lattice's cells and a robot lie on a map's raster.
+    """Return the placement of the lattice's cells, and of a robot, on a map's raster.
 
     Raises:
-        MapTooLarge: the pixels are too small for so large a robot.
+        MapTooLarge: the pixels are too small for a robot of this size.
     """
     raster, _ = geometry.on_raster()
     placement = placement_on(raster, footprint.cell_m, footprint.robot_radius_m)
@@ -210,9 +210,9 @@ def placement_of(geometry: GridGeometry, footprint: Footprint) -> Placement:
 
 
 def placement_on(raster: Raster, cell_m: float, robot_radius_m: float = 0.0) -> Placement:
-    """Return where the lattice's cells, ``cell_m`` [m] wide, lie on a raster."""
+    """Return the placement of the lattice's cells, ``cell_m`` [m] wide, on a raster."""
     scale = cell_m / raster.resolution
-    # The lattice's x axis, seen from the raster, is turned by -yaw.
+    # The lattice's x axis, seen from the raster, is rotated by -yaw.
     ux, uy = scale * math.cos(raster.yaw), -scale * math.sin(raster.yaw)
     radius = robot_radius_m / raster.resolution - TOUCH_TOLERANCE_PX
     return Placement(-raster.right, -raster.up, ux, uy, max(radius, TOUCH_TOLERANCE_PX))

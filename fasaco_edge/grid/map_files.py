@@ -1,10 +1,9 @@
 """Map files: map_server's YAML and image, coverage grids, and built-in maps.
 
-A map file means here what it means to nav2_map_server (map_io.cpp). Its releases
-differ on transparent pixels in trinary mode: older ones average the alpha channel
-into the brightness, so that opaque black is 75 % occupied (navigation2 issue 4233);
-newer ones take a transparent pixel for unknown, as scale mode always did. Here
-alpha is never a brightness and a transparent pixel is unknown.
+A map file is interpreted as by nav2_map_server (map_io.cpp). Its releases differ on transparent
+pixels in trinary mode: older ones average the alpha channel into the brightness, so that opaque
+black is 75 % occupied (navigation2 issue 4233); newer ones take a transparent pixel for unknown, as
+scale mode always did. Here alpha is never a brightness, and a transparent pixel is unknown.
 """
 
 from __future__ import annotations
@@ -36,7 +35,7 @@ from fasaco_edge.host.resources import folder
 from fasaco_edge.text import shown
 
 IMAGE_SUFFIXES = (".pgm", ".png", ".bmp", ".jpg", ".jpeg")
-# What ROS 1's map_saver writes; grey of 205, which it writes for unknown, is not free by that.
+# Thresholds of ROS 1's map_saver: its grey for unknown, 205, is not free by these.
 FREE_THRESH, OCCUPIED_THRESH = 0.196, 0.65
 
 MODES = ("trinary", "scale", "raw")
@@ -46,8 +45,8 @@ def read_map(path: str | Path) -> OccupancyGrid:
     """Return the map described by a map_server YAML file.
 
     Args:
-        path: the YAML file; its ``image`` is sought from the YAML's own folder. Thresholds that
-            it lacks are ``FREE_THRESH`` and ``OCCUPIED_THRESH``.
+        path: the YAML file; its ``image`` is relative to the YAML's folder. Missing thresholds are
+            ``FREE_THRESH`` and ``OCCUPIED_THRESH``.
 
     Raises:
         MapFileError: a file is missing, is not what it should be or too large; a key is
@@ -59,18 +58,18 @@ def read_map(path: str | Path) -> OccupancyGrid:
 def read_map_rows(
     path: str | Path, most_bytes: int | None = None
 ) -> tuple[GridGeometry, Iterator[NDArray[np.int8]]]:
-    """Return where a map lies, and its rows from the smallest y up, as ``read_map`` reads them.
+    """Return a map's geometry, and its rows from the smallest y up, as ``read_map`` reads them.
 
     Args:
         path: the YAML file.
-        most_bytes: what it may take to read the image [bytes]; None for anything.
+        most_bytes: memory limit for reading the image [bytes]; None for no limit.
 
     Returns:
         The geometry, and stripes of the map, int8 (some, cols): each but the last has a multiple
         of 8 rows.
 
     Raises:
-        MapFileError: as ``read_map``, or the image takes more.
+        MapFileError: as ``read_map``, or the image exceeds the limit.
     """
     path = Path(path)
     if path.suffix.lower() in IMAGE_SUFFIXES:
@@ -94,16 +93,16 @@ def read_map_rows(
 def read_bare_image(path: str | Path, resolution_m: float) -> OccupancyGrid:
     """Return the map in an image without a YAML file.
 
-    Its lower left corner is the origin of the map frame; what is free and occupied is told apart
-    as map_server does where a YAML file says nothing of it: trinary, black is occupied.
+    Its lower left corner is the origin of the map frame; thresholds are map_server's defaults:
+    trinary, black is occupied.
 
     Args:
         path: PGM, PNG, BMP or JPEG.
         resolution_m: edge of a pixel [m].
 
     Raises:
-        MapFileError: the file is missing, no image, damaged or too large, or brings a resolution
-            of its own; the resolution is impossible.
+        MapFileError: the file is missing, no image, damaged or too large, or has a resolution of
+            its own; or ``resolution_m`` is impossible.
     """
     path = Path(path)
     if path.suffix.lower() in (".yaml", ".yml", ".npy"):
@@ -147,10 +146,9 @@ def _grid(geometry: GridGeometry, stripes: Iterator[NDArray[np.int8]]) -> Occupa
 
 
 def map_sources(path: Path) -> list[Path]:
-    """Return the files that a map is read from: itself, and the image that a YAML file names.
+    """Return the files of a map: itself, and the image that a YAML file names.
 
-    Raises:
-        MapFileError: a YAML file is none, or names no image.
+    Raises: MapFileError: it is not a YAML file, or names no image.
     """
     if path.suffix.lower() in (*IMAGE_SUFFIXES, ".npy"):
         return [path]
@@ -166,7 +164,7 @@ def read_coverage_grid(path: str | Path) -> NDArray[np.bool_]:
     """
     try:
         check_plain(path)
-        # Mapped first, so that a header that promises too much costs nothing.
+        # Memory-mapped first: a header that claims a huge array costs nothing.
         array = np.load(path, mmap_mode="r", allow_pickle=False)
     except (OSError, ValueError, EOFError, OverflowError, TypeError) as error:
         raise MapFileError(f"{path}: not readable as a .npy file: {error}") from error
@@ -178,18 +176,18 @@ def read_coverage_grid(path: str | Path) -> NDArray[np.bool_]:
             f"{path}: expected a bool array of two dimensions, got {array.dtype} {array.shape}"
         )
     check_size(path, array.shape[1], array.shape[0])
-    # A bool of another program may be any byte but 0; kernels read its lowest bit alone.
+    # In a file of another program True may be any byte but 0; kernels read only the lowest bit.
     cells: NDArray[np.bool_] = np.ascontiguousarray(array).view(np.uint8) != 0
     return cells
 
 
 def find_map(name_or_path: str | Path) -> Path:
-    """Return the file meant: an existing path, or the name of a built-in map.
+    """Return the path of an existing file, or of a built-in map by its name.
 
     Raises:
         MapFileError: it is neither.
     """
-    # Unlike Path's methods these do not raise on names no file system takes.
+    # Unlike Path's methods these do not raise on names that no file system allows.
     path = Path(os.path.expanduser(name_or_path))
     if os.path.isfile(path):
         return path
@@ -202,7 +200,7 @@ def find_map(name_or_path: str | Path) -> Path:
 
 
 def builtin_maps() -> list[tuple[str, str]]:
-    """Return name and purpose, one line, of every map that comes with the package.
+    """Return name and purpose, one line, of each built-in map.
 
     Raises:
         MapFileError: this installation has no maps.
@@ -211,7 +209,7 @@ def builtin_maps() -> list[tuple[str, str]]:
 
 
 def suggested_start(path: Path) -> tuple[float, float] | None:
-    """Return where (x, y) [m] to start on a built-in map's file; None for any other file.
+    """Return the start (x, y) [m] of a built-in map; None for any other file.
 
     Raises:
         MapFileError: this installation has no maps.
@@ -264,7 +262,7 @@ class _YamlKeys:
         return number
 
     def _finite(self, key: str, value: object, expected: str) -> float:
-        # YAML 1.1 takes 5e-2 for a string, yaml-cpp and with it ROS for a number.
+        # In YAML 1.1 5e-2 is a string, for yaml-cpp, and so for ROS, a number.
         if isinstance(value, bool) or not isinstance(value, int | float | str):
             raise self.error(key, expected)
         try:
@@ -310,7 +308,7 @@ class _YamlKeys:
 def _values(
     mode: str, thresholds: tuple[float, float], white: int, negate: bool
 ) -> NDArray[np.int8]:
-    """Return the cell value, int8 (white + 1,), of every level of brightness."""
+    """Return the cell value, int8 (white + 1,), of each brightness level."""
     brightness = np.arange(white + 1) / white
     if mode == "raw":
         value = np.rint(brightness * 255)

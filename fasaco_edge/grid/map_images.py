@@ -1,7 +1,7 @@
-"""Images of maps, decoded as a whole and looked at a stripe of rows at a time.
+"""Images of maps, decoded at once and processed in stripes of rows.
 
-What Pillow decodes takes a byte a pixel of grey and four of colour. All else that is made of an
-image is made of stripes, so that it takes little beside.
+Pillow's decoded image takes a byte per pixel of grey and four of colour. Everything derived from it
+is made in stripes, which bounds the additional memory.
 """
 
 from __future__ import annotations
@@ -24,17 +24,18 @@ if TYPE_CHECKING:
 
 MAX_PIXELS = 64_000_000
 
-# nav2's three recommended formats, and the one that published maps come in; PPM is Pillow's name
-# for the PGM family. What JPEG does to sharp edges may turn unknown pixels beside walls free.
+# nav2's three recommended formats, and JPEG, in which published maps come; PPM is Pillow's name for
+# the PGM family. JPEG artefacts at sharp edges may turn unknown pixels beside walls free.
 FORMATS = ("PPM", "PNG", "BMP", "JPEG")
-# Of a stripe, a multiple of 8 rows: some pixels, and what each of them takes at most [bytes].
+# Size of a stripe, rounded to 8 rows: pixels, and memory per pixel [bytes].
 STRIPE_PIXELS = 500_000
 STRIPE_BYTES = 16
-# What a pixel takes decoded, by Pillow's mode [bytes]; 4 of any other.
+# Decoded size of a pixel by Pillow's mode [bytes]; 4 for other modes.
 _DECODED = {"1": 1, "L": 1, "P": 1, "I;16": 2, "I;16B": 2}
-# JPEG decoded in several scans keeps the coefficients of all channels, too [bytes a channel].
+# Progressive JPEG also keeps the coefficients of all channels [bytes per channel].
 _COEFFICIENTS = 2
-# Some rare formats Pillow decodes in Python, a microsecond a pixel, on a slow computer ten.
+# Limit for rare formats that Pillow decodes in Python: a microsecond per pixel, on a slow computer
+# ten.
 SLOW_PIXELS = 1_000_000
 
 
@@ -44,8 +45,8 @@ class Stripe:
 
     Attributes:
         levels: uint8 or uint16 (rows, cols), lowest row first: brightness, 0 black to ``white``;
-            the mean over the colour channels, alpha is none of them.
-        transparent: bool (rows, cols), or None where the image has no alpha channel.
+            the mean over the colour channels without alpha.
+        transparent: bool (rows, cols); None for an image without alpha channel.
     """
 
     levels: NDArray[np.uint8] | NDArray[np.uint16]
@@ -58,7 +59,7 @@ class MapImage:
 
     Attributes:
         rows, cols: its size [pixels].
-        white: the brightest level.
+        white: the maximum level.
     """
 
     rows: int
@@ -72,7 +73,7 @@ class MapImage:
         for low in range(0, self.rows, height):
             bottom = self.rows - low
             stripe = self._decoded.crop((0, max(bottom - height, 0), self.cols, bottom))
-            # Images run from the top down, maps from the smallest y up.
+            # Image rows run from the top down, map rows from the smallest y up.
             if self.white == 65535:
                 yield Stripe(np.asarray(stripe)[::-1].astype(np.uint16))
             elif self.white == 255:
@@ -84,7 +85,7 @@ class MapImage:
 
 
 def stripe_rows(cols: int) -> int:
-    """Return how many rows a stripe has, a multiple of 8."""
+    """Return the rows of a stripe, a multiple of 8."""
     return 8 * max(STRIPE_PIXELS // (8 * cols), 1)
 
 
@@ -93,19 +94,19 @@ def read_image(path: Path, most_bytes: int | None = None) -> MapImage:
 
     Args:
         path: the file.
-        most_bytes: what it may take to decode it and to look at it [bytes]; None for anything.
-            With it, images that Pillow decodes slowly have at most ``SLOW_PIXELS``.
+        most_bytes: memory limit for decoding and processing [bytes]; None for no limit. With a
+            limit, images that Pillow decodes slowly have at most ``SLOW_PIXELS``.
 
     Raises:
-        MapFileError: it is missing, no such image, damaged, empty or too large.
+        MapFileError: it is missing, of another format, damaged, empty or too large.
     """
-    # Pillow is loaded with the first image: a daemon that never reads one does without.
+    # Pillow is imported with the first image: a daemon without images does not load it.
     from PIL import Image, UnidentifiedImageError  # noqa: PLC0415
 
     try:
         check_plain(path)
         with warnings.catch_warnings():
-            # check_size has the smaller limit.
+            # check_size has the lower limit.
             warnings.simplefilter("ignore", Image.DecompressionBombWarning)
             image = Image.open(path, formats=FORMATS)
         with image:

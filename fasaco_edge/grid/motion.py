@@ -1,4 +1,4 @@
-"""Rates under limits of acceleration, in equal steps of time."""
+"""Speed limits: rates under limits of acceleration, in equal time steps."""
 
 from __future__ import annotations
 
@@ -6,9 +6,9 @@ import math
 
 
 def stopping_rate(remaining: float, acceleration: float, period: float) -> float:
-    """Return the highest rate from which equal steps down come to rest within ``remaining``.
+    """Return the highest rate that can be ramped down to rest within ``remaining``.
 
-    The sum of v dt, (v - a dt) dt, ... is v^2 / 2a + v dt / 2; below one step, v dt is all.
+    The sum of v dt, (v - a dt) dt, ... is v^2 / 2a + v dt / 2; within one step it is v dt.
     """
     half_step = 0.5 * acceleration * period
     braking = math.sqrt(half_step**2 + 2.0 * acceleration * remaining) - half_step
@@ -16,5 +16,5 @@ def stopping_rate(remaining: float, acceleration: float, period: float) -> float
 
 
 def limited(rate: float, goal: float, step: float) -> float:
-    """Return ``goal``, or what is ``step`` nearer to it than ``rate``."""
+    """Return ``rate`` moved towards ``goal`` by at most ``step``."""
     return min(max(goal, rate - step), rate + step)

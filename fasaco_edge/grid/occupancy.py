@@ -1,4 +1,4 @@
-"""Occupancy grids: equations (1) and (2) of the paper, with ROS's values."""
+"""Occupancy grids: equations (1) and (2) of the paper, with the values of ROS."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ UNKNOWN = -1
 FREE = 0
 OCCUPIED = 100
 
-# So many pixels of a map are looked at together: a mask of all would be another map.
+# Pixels processed at once: a mask over all would take as much memory as the map.
 BLOCK_PIXELS = 1_000_000
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class OccupancyGrid:
-    """A map of what is free, occupied and unknown.
+    """A map of free, occupied and unknown pixels.
 
     Attributes:
-        geometry: size, resolution and place.
+        geometry: size, resolution and placement.
         cells: int8 (rows, cols), read-only; -1 unknown, 0 free .. 100 occupied
             (the probability of equation (2) in percent).
         frame: name of the map frame.
@@ -48,10 +48,10 @@ class OccupancyGrid:
             object.__setattr__(self, "cells", view)
 
     def patched(self, *patches: MapPatch) -> OccupancyGrid:
-        """Return this map with ``patches`` laid over it, one after the other.
+        """Return this map with ``patches`` applied in order.
 
         Raises:
-            PatchWithoutBase: one does not lie inside this map, or is in another frame.
+            PatchWithoutBase: one is not inside this map, or is in another frame.
         """
         result = self.with_updates(patches)
         for fault in result.faults:
@@ -59,7 +59,7 @@ class OccupancyGrid:
         return result.grid
 
     def with_updates(self, patches: Iterable[MapPatch]) -> UpdatedGrid:
-        """Lay those patches over this map that fit, one after the other, at one copy of it."""
+        """Apply the patches that fit, in order; the map is copied once."""
         fit: list[MapPatch] = []
         faults: list[FasacoError] = []
         for patch in patches:
@@ -77,7 +77,7 @@ class OccupancyGrid:
         return UpdatedGrid(grid, tuple(patch.window for patch in fit), faults)
 
     def _misfit(self, patch: MapPatch) -> str:
-        """Return why a patch cannot be laid over this map; "" where it can."""
+        """Return why a patch cannot be applied to this map; "" if it can."""
         window, (rows, cols) = patch.window, self.cells.shape
         if window.intersection(Window(0, 0, rows, cols)) != window:
             return (
@@ -91,11 +91,11 @@ class OccupancyGrid:
 
 @dataclass(frozen=True, slots=True)
 class UpdatedGrid:
-    """A map with updates laid over it.
+    """A map with updates applied.
 
     Attributes:
-        grid: the map; the one before where no update fits.
-        windows: what the updates that fit span, in order.
+        grid: the map; the same object if no update fits.
+        windows: windows of the updates that fit, in order.
         faults: why the others do not fit.
     """
 
@@ -105,7 +105,7 @@ class UpdatedGrid:
 
 
 def without_base(patches: Iterable[MapPatch], *, updates_lost: bool) -> list[FasacoError]:
-    """Return a fault for each update that no map is there for, or whose predecessors were lost."""
+    """Return a fault for each update without a map, or whose predecessors were lost."""
     why = "updates before it were lost" if updates_lost else "there is no map yet"
     return [PatchWithoutBase(f"map update refused: {why}") for _ in patches]
 
@@ -115,7 +115,7 @@ class MapPatch:
     """New values for a window of the last full map (map_msgs/OccupancyGridUpdate).
 
     Attributes:
-        window: which cells of the map.
+        window: window of the map's cells.
         cells: int8 (window.rows, window.cols), values as in ``OccupancyGrid``.
         frame: name of the map frame.
         stamp_ns: time of the update [ns].
@@ -128,7 +128,7 @@ class MapPatch:
 
 
 def known_bounds(grid: OccupancyGrid) -> Bounds | None:
-    """Return the bounds of what is known of a map; None where nothing is."""
+    """Return the bounds of the known pixels of a map; None without any."""
     window = marked_window(grid.cells.shape, lambda rows: grid.cells[rows] >= FREE)
     return grid.geometry.bounds(window) if window else None
 

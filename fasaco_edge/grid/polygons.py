@@ -1,4 +1,4 @@
-"""Polygons in the map frame: what is wrong with one."""
+"""Polygons in the map frame: checks of validity."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from numpy.typing import NDArray
 
 from fasaco_edge.grid.geometry import Point, Polygon
 
-# A smaller polygon is a mistake [m2].
+# A polygon with a smaller area is a mistake [m2].
 LEAST_AREA_M2 = 1e-4
-# Pairs of edges compared at once: more take memory, and no less time.
+# Pairs of edges compared at once: larger blocks take more memory, and no less time.
 MOST_PAIRS = 65536
 
 
 def polygon_flaw(polygon: Polygon) -> str:
-    """Return what keeps ``polygon`` from having a clear inside, "" if nothing does.
+    """Return why ``polygon`` has no well-defined interior; "" if it has.
 
     Its points are finite; the last is joined to the first.
     """
@@ -41,7 +41,7 @@ def _edges(polygon: Polygon) -> Iterator[tuple[Point, Point]]:
 
 
 def _signed_area(polygon: Polygon) -> float:
-    # Relative to a corner: far from the origin the differences would drown in rounding.
+    # Relative to a corner: far from the origin rounding would swamp the differences.
     x0, y0 = polygon[0]
     return 0.5 * math.fsum(
         (ax - x0) * (by - y0) - (bx - x0) * (ay - y0) for (ax, ay), (bx, by) in _edges(polygon)
@@ -49,9 +49,9 @@ def _signed_area(polygon: Polygon) -> float:
 
 
 def _crossing(polygon: Polygon) -> tuple[int, int] | None:
-    """Return two edges, by the number of their first points, that meet where they must not.
+    """Return two edges that touch where they must not, by the indices of their first points.
 
-    Blocks of edges are compared with all edges, exactly only where their boxes meet.
+    Blocks of edges are compared with all edges; the exact test runs only where their boxes overlap.
     """
     start = np.array(polygon)
     end = np.roll(start, -1, axis=0)
@@ -66,7 +66,7 @@ def _crossing(polygon: Polygon) -> tuple[int, int] | None:
         one, other = np.nonzero(overlap)
         one += first
         meet = _meet(start[one], end[one], start[other], end[other])
-        # Neighbours share a corner, and no more: they meet if one turns back onto the other.
+        # Neighbours share only a corner; they overlap if one turns back onto the other.
         next_to = other == one + 1
         after, before = other[next_to], one[next_to]
         meet[next_to] = _turns_back(start[before], end[before], end[after])
@@ -85,7 +85,7 @@ def _meet(
     of_c, of_d = _side(a, b, c), _side(a, b, d)
     of_a, of_b = _side(c, d, a), _side(c, d, b)
     crossing = (of_c * of_d <= 0) & (of_a * of_b <= 0)
-    # On one line they meet only where their boxes do; else the boxes do anyway.
+    # Collinear segments meet only if their boxes do; for others that holds anyway.
     overlap = (np.minimum(c, d) <= np.maximum(a, b)) & (np.maximum(c, d) >= np.minimum(a, b))
     meet: NDArray[np.bool_] = crossing & overlap.all(axis=1)
     return meet
@@ -103,7 +103,7 @@ def _side(
 def _turns_back(
     a: NDArray[np.float64], b: NDArray[np.float64], c: NDArray[np.float64]
 ) -> NDArray[np.bool_]:
-    """Tell whether the way a-b-c turns back onto itself at b."""
+    """Tell whether the path a-b-c turns back onto itself at b."""
     ahead, on = b - a, c - b
     back: NDArray[np.bool_] = (_side(a, b, c) == 0) & ((ahead * on).sum(axis=-1) < 0)
     return back

@@ -1,18 +1,18 @@
-"""The direction of a building's walls on its map.
+"""Wall direction: the angle of a building's walls on its map.
 
-Cells of the coverage lattice lie along the axes of the map frame. Where walls lie askew to these,
-each lane ends askew at a wall. Laid over a map that is turned back by the walls' angle, cells lie
-along the walls.
+Cells of the coverage lattice are aligned with the map frame. If walls are at an angle to it, each
+lane meets them obliquely. Over a map rotated back by the walls' angle, cells are aligned with the
+walls.
 
-Method: a histogram of gradient directions, as O'Gorman and Clowes (1976) find straight edges by.
-Where a free pixel meets an occupied one stands a unit vector across the edge between them.
-Smoothed, these point across the wall; their directions, whole quarter-turns left out, have a peak
-where most walls point. The angle is that of the sum of all vectors around the peak: along a
-straight wall they add up to its normal, however its pixels are stepped. What is summed are
-integers: the same pixels give the same angle on any machine.
+Method: a histogram of gradient directions, used by O'Gorman and Clowes (1976) to find straight
+edges. Each edge between a free and an occupied pixel contributes a unit vector across it. Smoothed,
+these are normal to the wall; their directions modulo a quarter-turn peak at the direction of most
+walls. The angle is that of the sum of all vectors around the peak: along a straight wall they add
+up to its normal, however its pixels are stepped. The sums are of integers, so the same pixels give
+the same angle on any machine.
 
 Source: F. O'Gorman, M. B. Clowes, "Finding picture edges through collinearity of feature points",
-IEEE Transactions on Computers C-25(4), 1976. Deviations: directions alone vote, not lines.
+IEEE Transactions on Computers C-25(4), 1976. Deviation: only directions vote, not lines.
 """
 
 from __future__ import annotations
@@ -31,48 +31,47 @@ from fasaco_edge.kernels.lattice.footprint import Thresholds
 
 THRESHOLDS = Thresholds(free=25, occupied=65)
 
-# Fine pixels are joined until they are about so large: finer ones show a scanner's noise [m].
+# Fine pixels are joined to about this size: finer ones show a scanner's noise [m].
 UNIT_M = 0.05
-# Edge of the squares that are looked at at once [joined pixels].
+# Edge of the tiles that are processed at once [joined pixels].
 TILE = 512
 
-# Smoothing along each axis adds up pixels so far apart: a standard deviation of 2.6 pixels.
+# Smoothing: sums of pixels at these distances along each axis; a standard deviation of 2.6 pixels.
 SHIFTS = (1, 1, 2, 2, 3, 3)
-# The sum of all that one edge of a pixel becomes.
+# The sum of all contributions of one pixel edge.
 EDGE = 2 * 4 ** len(SHIFTS)
-# How far a vector sees [joined pixels].
+# Radius of the smoothing [joined pixels].
 REACH = sum(SHIFTS) + 1
-# The square of the shortest vectors that vote; along a straight wall they reach 0.15 of EDGE.
+# Threshold on the square of a voting vector; along a straight wall vectors reach 0.15 of EDGE.
 LEAST_SQUARE = (EDGE // 128) ** 2
 
-# Bins of the histogram in a quarter-turn; on each side of a peak's middle, what counts for it, and
-# what is added up for the angle: where a wall nearly along the pixels' axes has a step, vectors
-# turn aside by up to 9 degrees.
+# Bins of the histogram per quarter-turn; half-widths in bins: of a peak, and of the sum for the
+# angle. At steps of a wall nearly parallel to the pixels, vectors deviate by up to 9 degrees.
 BINS, PEAK, AROUND = 180, 14, 20
 MOST_ROUNDS = 8
 
-# Less than that is no direction: share of all wall (0.16 where it points everywhere alike), [m].
+# Least evidence of a direction: share of all wall (0.16 if directions are uniform), length [m].
 LEAST_SHARE, LEAST_WALL_M = 0.3, 2.0
-# The axes of the map frame are left for a direction that has so many times their walls.
+# Another direction replaces that of the map frame's axes if it has this many times their walls.
 BETTER = 1.25
-# So near to the axes of the pixels walls lie along them; so near to 45 degrees the angle is 45:
-# maps nearly alike should not turn by 45 and by -45 [deg].
+# Tolerances [deg]: walls this close to the pixels' axes are parallel to them; this close to 45
+# degrees the angle is 45, so that nearly equal maps do not rotate by 45 and by -45.
 NEAR_DEG = 0.3
-# A smaller turn gains nothing. One of 1 degree leaves a seventh of the patches, at the same pace;
-# from 2 degrees on it saves time, too [deg].
+# A smaller rotation gains nothing [deg]. One of 1 degree leaves a seventh of the patches, in the
+# same time; from 2 degrees on it also saves time.
 LEAST_TURN_DEG = 0.5
 
 
 @dataclass(frozen=True, slots=True)
 class WallDirection:
-    """Where most walls of a building point.
+    """The direction of most walls of a building.
 
     Attributes:
-        angle_deg: of the walls to the axes of the map frame, in (-45, 45] [deg].
-        share: of all wall, how much points there, to 7 degrees.
-        wall_m: how much that is [m], each side of a wall by itself; a wall of one pixel that is
-            known free on both sides counts for 0.3 of its length, as their vectors cancel out.
-        is_of_rim: the map marks few walls; what counts is the rim of what is free.
+        angle_deg: angle of the walls to the axes of the map frame, in (-45, 45] [deg].
+        share: share of all wall that is within 7 degrees of it.
+        wall_m: length of that wall [m], each side counted; a wall of one pixel that is known free
+            on both sides counts for 0.3 of its length, as its vectors cancel out.
+        is_of_rim: whether the map marks few walls, and the border of free space was used instead.
     """
 
     angle_deg: float
@@ -82,15 +81,15 @@ class WallDirection:
 
     @property
     def turn_deg(self) -> float:
-        """The angle that cells are to be laid at: 0 where the walls' own gains nothing [deg]."""
+        """The lattice rotation for these walls: 0 if it would gain nothing [deg]."""
         return self.angle_deg if abs(self.angle_deg) >= LEAST_TURN_DEG else 0.0
 
 
 def wall_direction(grid: OccupancyGrid) -> WallDirection | None:
-    """Return where most walls of a map point; None where there are few, or none of them straight.
+    """Return the direction of most walls of a map; None if there are few, or none is straight.
 
-    A wall is where free pixels meet occupied ones. On maps that hardly have these, as some are of
-    what is free alone, it is where free pixels meet any other.
+    A wall is an edge between free and occupied pixels. On maps that hardly have these, as those of
+    free space only, it is any edge of free space.
     """
     votes = _Votes.of(grid)
     if is_of_rim := votes.rim > 4 * votes.edges:
@@ -102,7 +101,7 @@ def wall_direction(grid: OccupancyGrid) -> WallDirection | None:
     wall_m = peak.length / EDGE * grid.geometry.resolution * _parts(grid.geometry)
     if peak.share < LEAST_SHARE or wall_m < LEAST_WALL_M:
         return None
-    # Along its own pixels' axes a turned map has level rows, whatever its yaw.
+    # Along its own pixels' axes a rotated map has level rows, whatever its yaw.
     own_deg = 0.0 if abs(peak.angle_deg) < NEAR_DEG else peak.angle_deg
     angle_deg = _folded(own_deg + yaw_deg)
     if abs(angle_deg) > 45.0 - NEAR_DEG:
@@ -121,12 +120,12 @@ class _Peak:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Votes:
-    """The vectors across the walls of a map, by their direction.
+    """The vectors across the walls of a map, by direction.
 
     Attributes:
-        sums: int64 (3, BINS): of each bin's vectors the lengths, x and y, turned by quarters into
-            the first bin's quarter; its middle is at -45 degrees.
-        edges, rim: how many sides of free pixels a wall is beside, and something unknown.
+        sums: int64 (3, BINS): sums over the vectors of each bin: length, x and y, rotated by
+            quarters into the first quarter, which is centred at -45 degrees.
+        edges, rim: number of free pixels' sides beside a wall, and beside something unknown.
     """
 
     sums: NDArray[np.int64]
@@ -135,7 +134,7 @@ class _Votes:
 
     @classmethod
     def of(cls, grid: OccupancyGrid, *, is_rim_wall: bool = False) -> _Votes:
-        """Return the votes of a map; ``is_rim_wall`` where all that is not free is wall."""
+        """Return the votes of a map; ``is_rim_wall``: whether all that is not free is wall."""
         sums, edges, rim = np.zeros((3, 4 * BINS), np.int64), 0, 0
         for values in _tiles(grid):
             if is_rim_wall:
@@ -154,13 +153,13 @@ class _Votes:
     def peak(self, axes_deg: float) -> _Peak | None:
         """Return the direction of most walls: ``axes_deg`` [deg] or near it, unless one is better.
 
-        None where there is no wall at all.
+        None without walls.
         """
         lengths, x, y = self.sums
         total = int(lengths.sum())
         if not total:
             return None
-        # Below and above them the bins continue, turned by a quarter.
+        # Bins continue below and above, rotated by a quarter.
         length, sum_x, sum_y = (
             _added_up(np.concatenate(parts), half)[BINS : 2 * BINS]
             for parts, half in (
@@ -187,9 +186,9 @@ _TO_UNKNOWN, _TO_WALL = 1, 2
 
 
 def _tiles(grid: OccupancyGrid) -> Iterator[NDArray[np.int8]]:
-    """Yield the kinds of joined pixels, int8, tile by tile; those without a free one are left out.
+    """Yield the kinds of joined pixels, int8, tile by tile; tiles without free pixels are skipped.
 
-    A tile begins REACH before the pixels that are its own.
+    A tile includes a margin of REACH.
     """
     parts = _parts(grid.geometry)
     size, reach = TILE * parts, REACH * parts
@@ -210,21 +209,21 @@ def _tiles(grid: OccupancyGrid) -> Iterator[NDArray[np.int8]]:
 
 
 def _joined(values: NDArray[np.int8], parts: int) -> NDArray[np.int8]:
-    """Return squares of ``parts`` pixels as one: wall where one is, else free where one is."""
+    """Return blocks of ``parts`` pixels joined: wall if one is, else free if one is."""
     # Slice by slice: many times faster than the maximum over two axes of a reshaped array.
     rows = functools.reduce(np.maximum, (values[first::parts] for first in range(parts)))
     return functools.reduce(np.maximum, (rows[:, first::parts] for first in range(parts)))
 
 
 def _across(steps: NDArray[np.int8]) -> NDArray[np.int16]:
-    """Return 1 where a step leads from free to wall, -1 where it leads back, else 0."""
+    """Return 1 where a step leads from free to wall, -1 from wall to free, else 0."""
     signs: NDArray[np.int16] = (steps == _TO_WALL).astype(np.int16)
     signs -= steps == -_TO_WALL
     return signs
 
 
 def _vote(east: NDArray[np.int16], north: NDArray[np.int16], sums: NDArray[np.int64]) -> None:
-    """Add a tile's vectors to ``sums``, int64 (3, 4 * BINS), by their direction in a whole turn."""
+    """Add a tile's vectors to ``sums``, int64 (3, 4 * BINS), by direction in a full circle."""
     # Both at the corners of pixels.
     x = _smoothed(east[1:] + east[:-1])
     y = _smoothed(north[:, 1:] + north[:, :-1])
@@ -232,11 +231,11 @@ def _vote(east: NDArray[np.int16], north: NDArray[np.int16], sums: NDArray[np.in
     kept = np.flatnonzero(squares >= LEAST_SQUARE)
     x, y, squares = x.ravel()[kept], y.ravel()[kept], squares.ravel()[kept]
     # Rounding decides nothing: bins end at odd multiples of a quarter of a degree, whose tangents
-    # are no fractions, and no fraction of numbers so small comes near enough to one.
+    # are irrational, and no fraction of such small numbers is close enough to one.
     degrees = np.degrees(np.arctan2(y, x, dtype=np.float64))
     bins = np.floor((degrees + 45.0) * (BINS / 90) + 0.5).astype(np.intp) % (4 * BINS)
     for kind, values in enumerate((np.rint(np.sqrt(squares)), x, y)):
-        # Sums of whole numbers, which are exact in any order.
+        # Sums of integers, exact in any order.
         sums[kind] += np.bincount(bins, values, 4 * BINS).astype(np.int64)
 
 
@@ -261,10 +260,10 @@ def _bin_at(angle_deg: float) -> int:
 
 
 def _parts(geometry: GridGeometry) -> int:
-    """Return how many pixels are joined along each axis."""
+    """Return the number of pixels joined along each axis."""
     return max(1, round(UNIT_M / geometry.resolution))
 
 
 def _folded(angle_deg: float) -> float:
-    """Return an angle less whole quarter-turns, in (-45, 45]."""
+    """Return an angle modulo quarter-turns, in (-45, 45]."""
     return angle_deg - 90.0 * math.ceil((angle_deg - 45.0) / 90.0)

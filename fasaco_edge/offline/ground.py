@@ -1,7 +1,7 @@
-"""The ground of a plan: cells to walk over, and the floor that a line along the walk sweeps.
+"""Ground of a plan: its cells, and the floor that a line along a walk sweeps.
 
-A line is float64 (n, 2), n >= 1: points (x, y) [m] in the map frame, to be driven straight from
-one to the next: the centres of a walk's cells, or a line over the floor that they stand for.
+A line is float64 (n, 2), n >= 1: points (x, y) [m] in the map frame joined by straight segments:
+the centres of a walk's cells, or a line over their stands.
 """
 
 from __future__ import annotations
@@ -27,14 +27,14 @@ Line = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Ground:
-    """What a walk is planned on.
+    """The cells and floor of a plan.
 
     Attributes:
-        lattice: its cells.
+        lattice: the lattice of cells.
         grid: the map; None for a coverage grid.
-        start: the cell (row, col) it begins in.
-        floor, stands: where the robot stands in the cells; None for their centres.
-        lattice_deg: the angle of the cells' rows to the x axis of the map frame [deg].
+        start: start cell (row, col).
+        floor, stands: the floor and the stands in the cells; None for cell centres.
+        lattice_deg: angle of the cells' rows to the x axis of the map frame [deg].
     """
 
     lattice: CoverageLattice
@@ -52,13 +52,13 @@ class Ground:
         start_xy: tuple[float, float],
         align: str | float,
     ) -> Ground:
-        """Return the ground of a line over the floor that is reached from a point.
+        """Return the ground of a line over the floor reachable from a point.
 
         Args:
             grid: the map.
-            robot: its size, and the overlap of its lanes.
-            start_xy: where it stands [m].
-            align: what the rows of cells lie along: walls, axes, or an angle [deg].
+            robot: size of the robot, and overlap of its lanes.
+            start_xy: start of the robot [m].
+            align: what the rows of cells are parallel to: walls, axes, or an angle [deg].
 
         Raises:
             StartOutsideMap, StartBlocked: the robot cannot stand there.
@@ -71,7 +71,7 @@ class Ground:
         try:
             stands = _stands(floor, cell_m, lattice_deg)
         except (MapTooFar, MapTooLarge):
-            # Askew, a lattice spans up to twice the cells, and may lie farther from 0.
+            # A rotated lattice spans up to twice the cells, and may lie farther from the origin.
             if align != WALLS or not lattice_deg:
                 raise
             lattice_deg = 0.0
@@ -79,14 +79,15 @@ class Ground:
         return cls(stands.lattice, grid, stands.start_cell(floor), floor, stands, lattice_deg)
 
     def end(self, end: str | Cell, tool_m: float) -> Cell | None:
-        """Return the cell to end in, None for anywhere.
+        """Return the end cell; None for anywhere.
 
         Args:
-            end: ANYWHERE, HOME, or a cell as wide as the tool along the axes of the map frame.
+            end: ANYWHERE, HOME, or a cell of a lattice of the tool's width, aligned with the map
+                frame.
             tool_m: width of the tool [m].
 
         Raises:
-            EndBlocked: the robot has no place in the cell that is asked for.
+            EndBlocked: the robot has no place in that cell.
         """
         if isinstance(end, str):
             return self.start if end == HOME else None
@@ -108,8 +109,8 @@ class Ground:
         Args:
             walk: int32 (n, 2), n >= 1.
             name: CELLS, or of ``planners.line.LINES``.
-            robot: how it drives and turns.
-            ends: whether it has to end where the walk does.
+            robot: its driving parameters.
+            ends: whether the line must end where the walk does.
         """
 
         if self.floor is None or self.stands is None:
@@ -119,7 +120,7 @@ class Ground:
 
 
 def _lattice_deg(align: str | float, grid: OccupancyGrid) -> float:
-    """Return the angle that is asked for, or that of the walls [deg]."""
+    """Return the requested angle, or that of the walls [deg]."""
 
     if align == WALLS:
         walls = wall_direction(grid)
@@ -128,8 +129,8 @@ def _lattice_deg(align: str | float, grid: OccupancyGrid) -> float:
 
 
 def _stands(floor: Floor, cell_m: float, lattice_deg: float) -> StandLattice:
-    """Return the stands in cells whose rows lie at an angle to the map frame's x axis."""
-    # To lay cells askew over a map is to turn the map below them. Stands are pixels of it.
+    """Return the stands in cells whose rows are at an angle to the map frame's x axis."""
+    # To rotate the lattice over a map is to rotate the map below it. Stands are pixels of it.
     below = replace(floor, geometry=turned_geometry(floor.geometry, -lattice_deg))
     return StandLattice.over(below, cell_m)
 
@@ -137,7 +138,7 @@ def _stands(floor: Floor, cell_m: float, lattice_deg: float) -> StandLattice:
 def line_through(lattice: CoverageLattice, cells: NDArray[np.int32]) -> Line:
     """Return the line through the centres of a walk's cells, int32 (n, 2), n >= 1.
 
-    Where the walk goes straight on no point is left.
+    Straight runs have no points in between.
     """
     moves = np.diff(cells, axis=0)
     kept = np.ones(len(cells), np.bool_)

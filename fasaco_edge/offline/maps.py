@@ -19,13 +19,13 @@ from fasaco_edge.text import shown
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Map:
-    """What to plan on.
+    """Input map of a plan.
 
     Attributes:
-        name: of the file, or what the array is called.
+        name: file name, or the name given to the array.
         grid: the occupancy grid; None for a coverage grid.
         free: bool (rows, cols), True = coverable, row 0 first; None for an occupancy grid.
-        file: where it was read; None for an array.
+        file: source file; None for an array.
     """
 
     name: str
@@ -34,10 +34,10 @@ class Map:
     file: Path | None = None
 
     def lattice(self, robot: RobotConfig) -> CoverageLattice:
-        """Return the cells as wide as the robot's tool.
+        """Return the lattice of cells as wide as the robot's tool.
 
         Raises:
-            MapTooLarge, MapTooFar: there are too many, or they lie too far from the origin.
+            MapTooLarge, MapTooFar: it has too many cells, or reaches too far from the origin.
         """
         if self.grid is not None:
             footprint = Footprint(robot.tool_width_m, robot.radius_m)
@@ -46,7 +46,7 @@ class Map:
         return CoverageLattice.from_free(self.free, robot.tool_width_m)
 
     def start(self, lattice: CoverageLattice) -> Cell:
-        """Return where to start if nothing is said, see ``planners.grids.start_cell``."""
+        """Return the default start, see ``planners.grids.start_cell``."""
         return start_cell(lattice, self.file or Path(self.name))
 
 
@@ -62,11 +62,11 @@ def load_map(
         source: a map_server YAML file, the name of a built-in map (``fasaco-edge maps``), an image
             alone, a coverage grid in a .npy file, or one as an array, bool (rows, cols), True =
             coverable.
-        resolution_m: edge of a pixel [m] of an image alone; None for all else.
-        unknown_free: take unknown pixels for free ones.
+        resolution_m: edge of a pixel [m] of an image alone; None otherwise.
+        unknown_free: whether unknown pixels count as free.
 
     Raises:
-        MapFileError: it is none of these, or cannot be read; an option is not for such a map.
+        MapFileError: it is none of these, or cannot be read; or an option does not apply to it.
     """
     if isinstance(source, np.ndarray):
         _without_pixels("the array", resolution_m, unknown_free)
@@ -92,7 +92,7 @@ def load_map(
 
 
 def _without_pixels(name: str, resolution_m: float | None, unknown_free: bool) -> None:
-    """Raise MapFileError where what counts for pixels is asked of a coverage grid."""
+    """Raise MapFileError if an option for pixels is given with a coverage grid."""
     if resolution_m is not None or unknown_free:
         option = "--unknown-free" if resolution_m is None else "--resolution"
         raise MapFileError(

@@ -1,4 +1,4 @@
-"""A planner of the user's own: what his function gets, and what it returns, checked."""
+"""Planner of the user's own: the input of its function, and checks of the returned walk."""
 
 from __future__ import annotations
 
@@ -18,25 +18,25 @@ from fasaco_edge.planners.planner import Observer, StoppingCriterion
 from fasaco_edge.planners.problem import CoverageProblem
 from fasaco_edge.text import shown
 
-# Rows and columns from a cell to its neighbours: east, north, west, south.
+# Offsets (row, col) to the neighbours: east, north, west, south.
 MOVES = ((0, 1), (1, 0), (0, -1), (-1, 0))
-# Walks of sound planners take a few steps a cell; one without end would fill the memory.
+# Limit on steps per cell: sound planners take a few; an endless walk would fill the memory.
 MOST_STEPS_PER_CELL = 200
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class GridProblem:
-    """What a planner gets; cells (row, col) are indices of the arrays, row 0 has the smallest y.
+    """Input of a planner; cells (row, col) are array indices, row 0 has the smallest y.
 
     Attributes:
         steps: bool (rows, cols, 4), read-only: whether the robot can go from a cell to its
             neighbour in the east (col + 1), north (row + 1), west, south.
-        to_cover: bool (rows, cols), read-only: the cells to visit, all within reach.
-        start: the cell the walk begins in.
-        end: the cell it has to end in; None for anywhere.
+        to_cover: bool (rows, cols), read-only: the cells to visit, all reachable.
+        start: the start cell.
+        end: the end cell; None for anywhere.
         cell_m: edge of a cell [m].
-        step_s, quarter_turn_s: what a step and a turn by 90 degrees take [s].
-        seed: for what a planner draws.
+        step_s, quarter_turn_s: durations of a step and of a turn by 90 degrees [s].
+        seed: seed for a randomised planner.
     """
 
     steps: NDArray[np.bool_]
@@ -49,7 +49,7 @@ class GridProblem:
     seed: int
 
     def neighbours(self, cell: Cell) -> list[Cell]:
-        """Return the cells that one step leads to, from east counter-clockwise."""
+        """Return the neighbours that one step leads to, counter-clockwise from east."""
         row, col = cell
         ways = zip(MOVES, self.steps[row, col], strict=True)
         return [(row + up, col + right) for (up, right), is_open in ways if is_open]
@@ -61,7 +61,7 @@ class OwnPlanner:
 
     Attributes:
         function: takes a ``GridProblem`` and returns, or yields, cells (row, col) in order.
-        seed: handed on.
+        seed: passed to the function.
     """
 
     function: FunctionType
@@ -74,12 +74,12 @@ class OwnPlanner:
 
         Raises:
             PlannerFailed: the function raised.
-            IllegalWalk: what it returned is no walk that solves the problem.
+            IllegalWalk: the result is not a walk, or does not solve the problem.
         """
         name = name_of(self.function)
         posed, began = _posed(problem, self.seed), time.perf_counter()
         try:
-            # Code of his runs up to here, also in what it returned.
+            # The user's code runs up to here, also inside the returned iterable.
             walk = _in_bounds(self.function(posed), MOST_STEPS_PER_CELL * posed.to_cover.size)
         except RAISED as error:
             raise failure(error, name, self.function.__code__.co_filename) from error
@@ -109,9 +109,9 @@ def _posed(problem: CoverageProblem, seed: int) -> GridProblem:
 
 
 def _in_bounds(walk: Iterable[Cell], most: int) -> list[Cell | str]:
-    """Return what a function returned or yielded, no more than one cell above ``most``.
+    """Return the cells that a function returned or yielded, at most one more than ``most``.
 
-    Each as plain integers; what is no cell as it is to be shown, and what follows it is left out.
+    As plain integers; the first item that is no cell is returned as text, and ends the list.
     """
     found: list[Cell | str] = []
     for _, given in zip(range(most + 1), walk, strict=False):
@@ -126,7 +126,7 @@ def _checked(problem: GridProblem, walk: list[Cell | str], name: str) -> NDArray
     """Return a walk, int32 (n, 2).
 
     Raises:
-        IllegalWalk: it is none, or does not solve the problem; the message names the step.
+        IllegalWalk: it is not a walk, or does not solve the problem; the message names the step.
     """
 
     def no(why: str) -> IllegalWalk:
@@ -160,7 +160,7 @@ def _checked(problem: GridProblem, walk: list[Cell | str], name: str) -> NDArray
 
 
 def _cell(given: object) -> Cell | None:
-    """Return what was given as a cell of plain integers; None where it is none."""
+    """Return an item as a cell of plain integers; None if it is not a cell."""
     if not isinstance(given, Sequence | np.ndarray):
         return None
     try:

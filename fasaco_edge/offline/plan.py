@@ -1,4 +1,4 @@
-"""Planning offline: a walk over the cells of a map, and the line to be driven."""
+"""Offline planning: a walk over the cells of a map, and the line to be driven."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ from fasaco_edge.planners.planner import (
 from fasaco_edge.planners.problem import CoverageProblem
 from fasaco_edge.planners.registry import planner_of
 
-# Rows and columns of the farthest cells there are: arrays of cells are int32.
+# Limit on rows and columns: arrays of cells are int32.
 MOST_INDEX = 2**31 - 1
 
 
@@ -64,35 +64,36 @@ def plan(
     watch: Callable[[SearchProgress], None] = lambda _: None,
     observe: Observer = ignore,
 ) -> Plan:
-    """Plan a walk over all cells of a map that the robot can reach, and the line along it.
+    """Plan a walk over all reachable cells of a map, and the line along it.
 
     The first call on a computer compiles kernels, for two to four minutes.
 
     Args:
         map: what to cover.
-        robot: its size and what driving takes; None for the defaults of the configuration.
-        start: the cell (row, col) to start in, as wide as the tool, along the map frame's axes.
-        start_xy: or the point (x, y) [m]. Without either a built-in map names its own; else it
-            is in the largest area, near the map frame's origin.
+        robot: its size and driving parameters; None for the defaults of the configuration.
+        start: start cell (row, col), as wide as the tool, aligned with the map frame.
+        start_xy: start point (x, y) [m] instead. Without either a built-in map names its own;
+            otherwise the start is in the largest area, near the map frame's origin.
         end: "anywhere", "home", or a cell.
-        line: "cells", through their centres, as the paper's planners do; "quick" or "thorough":
-            over the floor, what a square metre is worth being 60 or 180 s. None for "thorough",
+        line: "cells": through their centres, as the paper's planners do; "quick" or "thorough":
+            over the floor, with 60 or 180 s as the value of a square metre. None for "thorough",
             and for "cells" on a coverage grid or without local search.
-        align: what the rows of cells lie along, with a line over the floor: "walls", "axes" or an
-            angle [deg]; None for walls.
-        search: how to search; None for the defaults.
-        planner: a function of your own in place of a search: takes a ``GridProblem`` and returns
-            the walk's cells (row, col) in order; only ``search.seed`` counts with it.
-        stop: ends the search early.
-        watch: is told how far the search is.
-        observe: is shown what the colony leaves: a ``ColonySnapshot`` after each cohort, or once
+        align: what the rows of cells are parallel to, with a line over the floor: "walls", "axes"
+            or an angle [deg]; None for walls.
+        search: settings of the search; None for the defaults.
+        planner: a function of your own instead of a search: takes a ``GridProblem`` and returns
+            the walk's cells (row, col) in order; of ``search`` it uses only the seed.
+        stop: stopping criterion.
+        watch: called with the progress of the search.
+        observe: called with the colony's pheromone: a ``ColonySnapshot`` after each cohort, or
+            once at the end of a search with local search; not by planners without pheromone.
             the search with local search is over; nothing by planners without pheromone.
 
     Raises:
         BadConfiguration: a value is impossible.
         StartOutsideMap, StartBlocked, EndBlocked: the robot cannot stand there.
-        NothingToCover: there is no cell for it.
-        PlannerFailed, IllegalWalk: of a planner of your own.
+        NothingToCover: no cell is coverable.
+        PlannerFailed, IllegalWalk: raised by a planner of your own.
     """
     if start is not None and start_xy is not None:
         raise BadConfiguration("start and start_xy cannot both be given")
@@ -118,10 +119,10 @@ def plan(
 
 
 def _cell(name: str, given: object, expectation: str) -> Cell:
-    """Return what was given as a cell, two whole numbers that any map may have.
+    """Return an argument as a cell, two whole numbers within the limit.
 
     Raises:
-        BadConfiguration: it is none.
+        BadConfiguration: it is not a cell.
     """
     try:
         row, col = (operator.index(at) for at in given)  # type: ignore[attr-defined]
@@ -133,10 +134,10 @@ def _cell(name: str, given: object, expectation: str) -> Cell:
 
 
 def _point(name: str, given: object) -> tuple[float, float]:
-    """Return what was given as a point.
+    """Return an argument as a point.
 
     Raises:
-        BadConfiguration: it is none.
+        BadConfiguration: it is not a point.
     """
     try:
         x, y = (float(at + 0.0) for at in given)  # type: ignore[attr-defined]
@@ -148,10 +149,10 @@ def _point(name: str, given: object) -> tuple[float, float]:
 
 
 def checked(robot: RobotConfig) -> RobotConfig:
-    """Return a robot whose values are possible.
+    """Return a robot after checking its values.
 
     Raises:
-        BadConfiguration: one is not; the error names it.
+        BadConfiguration: one is impossible; the error names it.
     """
     try:
         members = msgspec.structs.asdict(robot).items()
@@ -208,9 +209,9 @@ def _search(
     watch: Callable[[SearchProgress], None],
     observe: Observer,
 ) -> tuple[CoveragePath, str, float, float]:
-    """Search; return the path, what ended it, and the wall and processor time it took [s].
+    """Search; return the path, what ended the search, and its wall and processor time [s].
 
-    A planner that knows no lower bound is given one, for its path and for the target gap.
+    A planner without a lower bound is given one, for its path and for the target gap.
     """
     planner: CoveragePlanner
     if function is None:

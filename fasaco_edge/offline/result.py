@@ -1,4 +1,4 @@
-"""The result of planning: a walk, the line along it, how good both are, and pictures of them."""
+"""Result of planning: a walk, the line along it, their figures of merit and pictures."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ from fasaco_edge.planners.living_trail import Tau, branching
 from fasaco_edge.planners.path import CoveragePath, walk_figures
 from fasaco_edge.planners.problem import CoverageProblem
 
-# Members of ``RobotConfig``: the limits that bends of the line are counted by.
+# Members of ``RobotConfig``: the limits for timing bends of the line.
 LIMITS = ("turn_deg_s", "turn_deg_s2", "acceleration_m_s2", "steered_deg")
 
 
@@ -40,17 +40,17 @@ class Plan:
     """A walk over a map, and the line along it.
 
     Attributes:
-        map: what it is on.
-        robot: for which.
+        map: the map.
+        robot: the robot.
         line: through the centres of ``cells``, or over the floor, ``quick`` or ``thorough``.
-        search: how the walk was searched.
-        ground: the cells, and where the robot stands in them.
-        problem: what was to be covered, from where.
+        search: settings of the search.
+        ground: the cells and their stands.
+        problem: what to cover, from where.
         path: the walk, with its cost and bound.
-        xy: float64 (n, 2), n >= 1: points (x, y) [m] in the map frame, to be driven straight from
-            one to the next.
+        xy: float64 (n, 2), n >= 1: points (x, y) [m] in the map frame, joined by straight
+            segments.
         ended_by: what ended the search.
-        wall_s, cpu_s: what the search took [s].
+        wall_s, cpu_s: duration of the search [s].
     """
 
     map: Map
@@ -72,17 +72,17 @@ class Plan:
 
     @property
     def steps(self) -> int:
-        """Steps from cell to cell."""
+        """Number of steps."""
         return self.path.steps
 
     @property
     def cost_s(self) -> float:
-        """Seconds that the robot drives and turns along the cells."""
+        """Time to drive and turn along the cells [s]."""
         return self.path.cost_s
 
     @property
     def gap(self) -> float | None:
-        """How far ``cost_s`` may be above the least there can be, a share; None if not known."""
+        """Optimality gap of ``cost_s``, as a share; None if unknown."""
         return self.path.gap
 
     @cached_property
@@ -117,7 +117,7 @@ class Plan:
 def judged_floor(
     grid: OccupancyGrid | None, line_xy: Line, robot: RobotConfig
 ) -> JudgedFloor | None:
-    """Return what a line does to the floor of a map; None for a coverage grid, which has none."""
+    """Return the swept and unswept floor of a line on a map; None for a coverage grid."""
     if grid is None:
         return None
     limits = None
@@ -137,7 +137,7 @@ def judged_floor(
 
 @dataclass(frozen=True, slots=True)
 class PlannedFloor:
-    """The floor that a plan sweeps, as ``--json`` has it; ``FloorFigures`` says what each is."""
+    """The floor that a plan sweeps, as in ``--json``; see ``FloorFigures``."""
 
     reachable_m2: float
     swept_share: float | None
@@ -147,7 +147,7 @@ class PlannedFloor:
     illegal_share: float
 
     def __str__(self) -> str:
-        """What a table and a picture say of it."""
+        """Text for tables and pictures."""
         if self.swept_share is None:
             return "none is reachable"
         swept_m2 = self.swept_share * self.reachable_m2
@@ -176,7 +176,7 @@ class PlannedFloor:
 
 
 def figures_of(plan: Plan) -> dict[str, object]:
-    """Return the figures of a walk, of the search for it, and of the floor under its line."""
+    """Return the figures of a walk, of its search, and of the floor under its line."""
     path, problem, ground, search = plan.path, plan.problem, plan.ground, plan.search
     cell_m = problem.lattice.cell_m
     return {
@@ -195,7 +195,7 @@ def figures_of(plan: Plan) -> dict[str, object]:
         "start": list(problem.start),
         "end": path.cells[-1].tolist(),
         **asdict(walk_figures(problem.lattice, path.cells)),
-        # What there is to cover; the walk may pass over no other cells.
+        # Only cells to cover; the walk may pass over others.
         "cells": problem.cells,
         "length_m": round(path.steps * cell_m, 3),
         "cost_s": path.cost_s,
@@ -216,7 +216,7 @@ def figures_of(plan: Plan) -> dict[str, object]:
 
 
 def driving(robot: RobotConfig) -> dict[str, float | None]:
-    """Return what driving takes a robot; limits are None where turns count by their angle."""
+    """Return a robot's driving parameters; limits are None if turns are timed by angle."""
     has_limits = robot.turn_deg_s is not None
     return {
         "speed_m_s": robot.speed_m_s,
@@ -226,7 +226,7 @@ def driving(robot: RobotConfig) -> dict[str, float | None]:
 
 
 def velocities_of(plan: Plan) -> str | None:
-    """Return the velocities of the ants that walked; None of a planner that has none."""
+    """Return the velocities of the ants; None for a planner without ants."""
     return {"fasaco": plan.search.velocities, "aco": "1"}.get(plan.path.planner)
 
 
@@ -259,11 +259,11 @@ def picture_of(plan: Plan) -> Image.Image:
 
 
 def pheromone_picture_of(plan: Plan, tau: Tau) -> Image.Image:
-    """Return a picture, RGB, of the trail that a plan's colony left."""
+    """Return a picture, RGB, of the trail left by a plan's colony."""
     ground = plan.ground
-    # Ants come nowhere else.
+    # Ants visit no other cells.
     tau = np.where(plan.problem.to_cover[..., np.newaxis], tau, np.float32(0))
-    # Cells askew are drawn upright, without the map that they lie askew on.
+    # Rotated cells are drawn upright, without the map.
     deg = round(ground.lattice_deg, 3)
     askew = f", along rows at {deg:g} degrees to the map, which is not drawn" if deg else ""
     lines = [
@@ -283,7 +283,7 @@ def pheromone_picture_of(plan: Plan, tau: Tau) -> Image.Image:
 
 
 def _colony(plan: Plan) -> str:
-    """Return which ants walked; "" for none."""
+    """Return a description of the ants; "" for none."""
     ants = plan.path.work.ants
     counted = "1 ant" if ants == 1 else f"{ants} ants"
     return f" {velocities_of(plan)}, {counted}, seed {plan.path.seed}" if ants else ""

@@ -1,4 +1,4 @@
-"""Settings of a plan: where it ends, which line it is for, and how to search."""
+"""Settings of a plan: its end, its line, and its search."""
 
 from __future__ import annotations
 
@@ -10,21 +10,21 @@ from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.planners.paper.colony import ColonyConfig, parse_velocities
 from fasaco_edge.planners.registry import PLANNERS
 
-# Where a walk ends, other than in a cell.
+# Ends of a walk other than a cell.
 ANYWHERE, HOME = "anywhere", "home"
-# The line through the cells' centres; the others are in ``planners.line``.
+# The line through cell centres, and the default line over the floor; see ``planners.line``.
 CELLS, THOROUGH = "cells", "thorough"
-# What the cells of a line over the floor lie along; or an angle [deg].
+# What the rows of cells are parallel to, for a line over the floor; or an angle [deg].
 WALLS, AXES = "walls", "axes"
 MOST_ANGLE_DEG = 360.0
-# The search's default budget [s], and the colony's settings that serve local search best. The
-# colony alone is the paper's, and walks to its end.
+# Default time budget of a search [s], and the colony's settings that suit local search best. The
+# colony alone has the paper's settings, and walks to its end.
 BUDGET_S = 1.0
 SEARCH_Q0, PAPER_Q0 = 0.98, 0.7
 SEARCH_VISIBILITY, PAPER_VISIBILITY = "fewest-open", "neighbour"
 
 
-# By annotation: what a member has to be, NumPy's numbers included.
+# Type checks by annotation, including NumPy's numbers.
 _KINDS: dict[str, tuple[type, str]] = {
     "str": (str, "be a text"),
     "bool": (bool, "be True or False"),
@@ -35,20 +35,19 @@ _KINDS: dict[str, tuple[type, str]] = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Search:
-    """How to search for a walk.
+    """Settings of a search.
 
     Attributes:
         planner: one of ``planners.registry``.
-        local_search: whether a planner that can do so improves its walks; the paper's
-            colony alone where False.
+        local_search: whether a planner that has local search uses it; False is the paper's
+            colony alone.
         ants, velocities, beta, alpha, tau0, seed: of the colony, see ``ColonyConfig``; velocities
             as text, like 8:1.
-        q0, visibility: the same; None for what serves best with local search, or without.
-        threads: that ants walk on; the walk is the same for any number.
-        budget_s: time after which the search ends with its best walk [s]; None for 1 s with local
-            search, and no end without.
-        target_gap: end once the walk is proven to be within this share of the optimum; None for
-            never.
+        q0, visibility: likewise; None for the values that suit the search with or without local
+            search.
+        threads: number of threads of the ants; the walk is the same for any number.
+        budget_s: time limit of the search [s]; None for 1 s with local search, no limit without.
+        target_gap: optimality gap at which the search ends; None for never.
 
     Raises:
         BadConfiguration: a value is impossible.
@@ -91,13 +90,13 @@ class Search:
 
     @property
     def most_s(self) -> float | None:
-        """The budget [s]; None for no end."""
+        """The time budget [s]; None for no limit."""
         if self.budget_s is None and self.has_local_search:
             return BUDGET_S
         return self.budget_s
 
     def colony(self) -> ColonyConfig:
-        """Return the colony.
+        """Return the configuration of the colony.
 
         Raises:
             BadConfiguration: a value is impossible.
@@ -118,14 +117,14 @@ class Search:
 
 
 def default_line(search: Search, *, has_floor: bool) -> str:
-    """Return which line is made where none is asked for.
+    """Return the default line.
 
-    The paper's planners drive through the centres of cells, and a coverage grid has no floor.
+    The paper's planners drive through cell centres, and a coverage grid has no floor.
     """
     return THOROUGH if has_floor and search.has_local_search else CELLS
 
 
 def require(condition: bool, name: str, expectation: str, value: object) -> None:
-    """Raise BadConfiguration where a value, of that name, is not as expected."""
+    """Raise BadConfiguration unless the condition on a named value holds."""
     if not condition:
         raise BadConfiguration(f"{name} must {expectation}, got {value}")

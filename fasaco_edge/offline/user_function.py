@@ -1,7 +1,7 @@
-"""A function of the user's own, in a file that the command line names, and what it raises.
+"""User functions: a function in a file that the command line names, and its exceptions.
 
-It is never sought in a configuration or in the working folder, and runs with the user's own rights.
-Free of the compiler.
+It is never looked up in a configuration or in the working folder, and runs with the user's own
+rights. Imports no numba.
 """
 
 from __future__ import annotations
@@ -14,12 +14,12 @@ from types import FunctionType, ModuleType
 from fasaco_edge.errors import BadConfiguration, PlannerFailed
 from fasaco_edge.host.files import check_plain
 
-# What code of his may end with: ``sys.exit()`` there must not look as if a plan had been made.
+# Exceptions of the user's code: ``sys.exit()`` there must not look as if a plan had been made.
 RAISED = (Exception, SystemExit, GeneratorExit)
 
 
 def load_function(place: str) -> FunctionType:
-    """Return the function at a place, ``FILE.py:FUNCTION``; the file is run for it.
+    """Return the function at ``FILE.py:FUNCTION``; the file is executed.
 
     Raises:
         BadConfiguration: there is no such file or function.
@@ -36,7 +36,7 @@ def load_function(place: str) -> FunctionType:
         ) from error
     module = ModuleType("own_planner")
     module.__file__ = str(file)
-    # Where dataclasses look for the module of a class.
+    # Dataclasses look up the module of a class here.
     sys.modules[module.__name__] = module
     try:
         exec(compile(source, str(file), "exec"), module.__dict__)
@@ -52,17 +52,17 @@ def load_function(place: str) -> FunctionType:
 
 
 def name_of(function: FunctionType) -> str:
-    """Return what a planner is called in figures: the name of its file, and its own."""
+    """Return a planner's name in figures: file and function."""
     return f"{Path(function.__code__.co_filename).name}:{function.__name__}"
 
 
 def failure(error: BaseException, name: str, file: str) -> PlannerFailed:
-    """Return what a user is told of an exception: the lines of his own file, the last one first.
+    """Return an exception as text for the user: lines of his own file, the innermost first.
 
     Args:
-        error: as it was raised.
-        name: of the planner.
-        file: the user's.
+        error: the exception.
+        name: name of the planner.
+        file: the user's file.
     """
     if isinstance(error, SyntaxError) and error.filename == file:
         where = [f"{file}:{error.lineno}: {(error.text or '').strip()}"]
@@ -73,8 +73,8 @@ def failure(error: BaseException, name: str, file: str) -> PlannerFailed:
     kind = type(error).__name__
     try:
         said = getattr(error, "msg", None) or str(error)
-    except Exception:  # it is his, too
+    except Exception:  # the user's exception class may itself fail
         said = "says nothing"
-    # A recursion has a thousand lines of the same.
+    # A recursion would give a thousand equal lines.
     lines = "".join(f"\n  {line}" for line in where[:5])
     return PlannerFailed(f"planner {name}: {kind}: {said}{lines}")
