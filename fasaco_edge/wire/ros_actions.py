@@ -41,14 +41,6 @@ def bridge_keys(action: str) -> dict[Call, str]:
     return {call: f"{action.strip('/')}/_action/{call}" for call in CALLS}
 
 
-def rmw_keys(domain: int, action: str) -> dict[Call, str]:
-    """Return the keys that rmw_zenoh gives them, whatever the types' hashes."""
-    return {
-        call: f"{domain}/{action.strip('/')}/_action/{call}/{dds_type(_TYPES[call])}/*"
-        for call in CALLS
-    }
-
-
 def server_tokens(domain: int, action: str) -> str:
     """Return the key expression of the tokens of an action's services."""
     return f"@ros2_lv/{domain}/*/*/*/SS/*/*/*/{mangled(action)}%_action%$*/**"

@@ -9,16 +9,15 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import replace
 
-from fasaco_edge.errors import LedgerMismatchError, MapTooFar, MapTooLarge
 from fasaco_edge.grid.geometry import StampedPose
-from fasaco_edge.grid.lattice import Cell, CoverageLattice, lattice_window
+from fasaco_edge.grid.lattice import Cell, CoverageLattice
 from fasaco_edge.grid.occupancy import OccupancyGrid
-from fasaco_edge.grid.turning import turned_geometry
 from fasaco_edge.mission.config import MissionConfig
 from fasaco_edge.mission.core.charging import BatteryGauge, Charging
 from fasaco_edge.mission.core.event_handler import EventHandler
 from fasaco_edge.mission.core.events import Decision, Event, MapReceived, PathUpdate, PoseReceived
 from fasaco_edge.mission.core.executive import Executive
+from fasaco_edge.mission.core.lattice_angle import LatticeAngle
 from fasaco_edge.mission.core.lattice_turn import LatticeTurn
 from fasaco_edge.mission.core.route import Route
 from fasaco_edge.mission.core.trail_layer import TrailLayer
@@ -34,7 +33,6 @@ from fasaco_edge.mission.fleet.shared import SharedProgress
 from fasaco_edge.mission.line.layer import FloorToSweep, LineLayer
 from fasaco_edge.mission.map.inputs import InputMonitor
 from fasaco_edge.mission.map.map_state import MapState
-from fasaco_edge.mission.map.wall_watch import WallWatch
 from fasaco_edge.mission.orders.order_state import OrderState
 from fasaco_edge.mission.orders.sequencer import Sequencer
 from fasaco_edge.planners.living_trail import LivingTrail
@@ -56,15 +54,13 @@ class Mission:
         """Begin with an order; by default with one for everything that can be reached."""
         self._config = config
         self._drive, self._gauge = DriveMeter(), BatteryGauge()
-        self._walls = WallWatch()
-        if config.lattice_deg is not None:
-            self._walls.end()
-        self._lay_cells(config.lattice_deg or 0.0)
+        self._angle = LatticeAngle(config)
+        self._lay_cells()
         self.restore_order(order or OrderState.autostart())
 
-    def _lay_cells(self, deg: float) -> None:
-        """Begin with a mission over cells at an angle to the map frame [deg]."""
-        self._turn = LatticeTurn(deg)
+    def _lay_cells(self) -> None:
+        """Begin with a mission over cells at the angle that is decided."""
+        self._turn = LatticeTurn(self._angle.deg)
         # By how much the cells are turned against those of the ledger that is restored [deg].
         self._turned_by_deg = 0.0
         config = self._turn.config(self._config)
@@ -93,9 +89,8 @@ class Mission:
         ``coverage.mission_ledger``, is reported as a fault (LedgerMismatchError) with the map that
         shows it; what was covered since the restart still counts then.
         """
-        if self._config.lattice_deg is None and before.lattice_deg:
-            self._lay_cells(before.lattice_deg)
-            self._walls.end()
+        if self._angle.resume(before.lattice_deg):
+            self._lay_cells()
         self._resume(before)
 
     def _resume(self, before: LedgerSnapshot, *, is_confirmed: bool = False) -> None:
@@ -135,48 +130,34 @@ class Mission:
 
     def _along_walls(self, happened: Decision, now: float) -> Decision:
         """Lay the cells along the walls once these are certain; return all that has happened."""
-        walls, pose, grid = self._walls, self.pose, self.grid
-        is_other = any(isinstance(fault, LedgerMismatchError) for fault in happened.faults)
-        if is_other and self._config.lattice_deg is None:
-            walls.begin()
+        self._angle.note_faults(happened.faults)
         # What was set aside for an errand is of the cells there are.
-        if walls.is_over or pose is None or grid is None or self.order_state.errand:
+        if self._angle.is_settled or self.order_state.errand:
             return happened
-        deg = walls.look(grid, pose.pose)
-        # Askew, a lattice spans up to twice the cells; and the map may grow.
-        if deg is None or deg == self._turn.deg or not self._fits(grid, deg, share=0.5):
+        pose, grid = self.pose, self.grid
+        if pose is None or grid is None or not self._angle.turns_along_walls(grid, pose):
             return happened
+        deg = self._angle.deg
         why = f"cells lie along the walls from now on, at {deg:.1f} degrees to the map frame"
-        stop = self._turn_cells(deg, why, now)
+        stop = self._turn_cells(why, now)
         return replace(happened, path=stop or happened.path)
 
     def _make_room(self, events: Iterable[Event], now: float) -> PathUpdate | None:
         """Lay the cells along the map frame's axes again for a map that fits in no other way."""
-        if self._config.lattice_deg is not None or not self._turn.deg:
+        maps = (event.grid for event in events if isinstance(event, MapReceived))
+        if not self._angle.turns_back_for(maps):
             return None
-        maps = [event.grid for event in events if isinstance(event, MapReceived)]
-        if all(self._fits(grid, self._turn.deg) or not self._fits(grid, 0.0) for grid in maps):
-            return None
-        return self._turn_cells(0.0, "the map is too large for cells along the walls", now)
+        return self._turn_cells("the map is too large for cells along the walls", now)
 
-    def _fits(self, grid: OccupancyGrid, deg: float, share: float = 1.0) -> bool:
-        """Tell whether a lattice at an angle [deg] takes no more than a share of its cells."""
-        geometry, most = turned_geometry(grid.geometry, -deg), self._config.max_lattice_cells
-        try:
-            lattice_window(geometry, self._config.footprint.cell_m, int(share * most))
-        except (MapTooLarge, MapTooFar):
-            return False
-        return True
-
-    def _turn_cells(self, deg: float, why: str, now: float) -> PathUpdate | None:
-        """Go on over cells at another angle [deg]; return the path that stops the robot, if any."""
+    def _turn_cells(self, why: str, now: float) -> PathUpdate | None:
+        """Go on over cells at the new angle; return the path that stops the robot, if any."""
         before, order, route = self.snapshot(), self.order_state, self.route
         is_confirmed = self._ledger.is_confirmed
         held: list[Event] = [MapReceived(self.grid)] if self.grid is not None else []
         held += [PoseReceived(self.pose)] if self.pose is not None else []
         # No path may be driven that nobody watches.
         stop = route.stop(why, now)
-        self._lay_cells(deg)
+        self._lay_cells()
         self._resume(before, is_confirmed=is_confirmed)
         self.restore_order(order)
         self.route.succeed(route)
