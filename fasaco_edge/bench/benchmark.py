@@ -49,7 +49,7 @@ class Goal:
             return None
         return self.measured >= self.limit if self.at_least else self.measured <= self.limit
 
-    def document(self) -> dict[str, Any]:
+    def document(self) -> dict[str, object]:
         """Return this as JSON values."""
         return {**asdict(self), "met": self.met}
 
@@ -167,7 +167,7 @@ def grid_names(args: argparse.Namespace, default_maps: tuple[str, ...]) -> tuple
     return (*args.grids, *args.maps) or default_maps
 
 
-def machine() -> dict[str, Any]:
+def machine() -> dict[str, object]:
     """Return processor, cores, load, Python and package version as JSON values."""
     return {
         "processor": _processor(),

@@ -7,7 +7,7 @@ import time
 from collections.abc import Generator, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, TypedDict
 
 from fasaco_edge.bench.benchmark import (
     Benchmark,
@@ -142,8 +142,31 @@ def _report(args: argparse.Namespace, timings: Sequence[Timing]) -> Report:
     )
 
 
-def _figures(timings: Sequence[Timing]) -> dict[str, Any]:
-    """Sum up the runs on one grid as JSON values."""
+class _Parallel(TypedDict):
+    """How much faster several threads are than one."""
+
+    threads: int
+    wall_s: dict[str, float] | None
+    speedup: float
+    same_walk: bool
+
+
+class _Figures(TypedDict):
+    """The runs on one grid summed up, as JSON values."""
+
+    grid: str
+    cells: int
+    steps: int
+    ants: int
+    repeats: int
+    wall_s: dict[str, float]
+    cpu_s: dict[str, float] | None
+    ants_per_s: float
+    parallel: _Parallel | None
+
+
+def _figures(timings: Sequence[Timing]) -> _Figures:
+    """Sum up the runs on one grid."""
     alone = [timing for timing in timings if timing.threads == 1]
     parallel = [timing for timing in timings if timing.threads > 1]
     first = alone[0]
@@ -155,25 +178,25 @@ def _figures(timings: Sequence[Timing]) -> dict[str, Any]:
         "steps": first.steps,
         "ants": first.ants,
         "repeats": len(alone),
-        "wall_s": document(wall),
+        "wall_s": wall.document(),
         "cpu_s": document(Spread.of([timing.cpu_s for timing in alone])),
         "ants_per_s": round(first.ants / wall.median, 1),
         "parallel": _parallel_figures(parallel, wall.median) if parallel else None,
     }
 
 
-def _parallel_figures(parallel: Sequence[Timing], alone_s: float) -> dict[str, Any]:
+def _parallel_figures(parallel: Sequence[Timing], alone_s: float) -> _Parallel:
     wall = Spread.of([timing.wall_s for timing in parallel])
     assert wall is not None
     return {
         "threads": parallel[0].threads,
-        "wall_s": document(wall),
+        "wall_s": wall.document(),
         "speedup": round(alone_s / wall.median, 2),
         "same_walk": all(timing.same_walk for timing in parallel),
     }
 
 
-def _row(figures: dict[str, Any]) -> tuple[str, ...]:
+def _row(figures: _Figures) -> tuple[str, ...]:
     return (
         Path(figures["grid"]).stem,
         str(figures["cells"]),
@@ -184,7 +207,7 @@ def _row(figures: dict[str, Any]) -> tuple[str, ...]:
     )
 
 
-def _speedup(parallel: dict[str, Any] | None) -> str:
+def _speedup(parallel: _Parallel | None) -> str:
     if parallel is None:
         return "-"
     same = "" if parallel["same_walk"] else "\nOTHER WALK"
@@ -198,7 +221,7 @@ def _milliseconds(spread: dict[str, float]) -> str:
     return f"{median:.1f}\n{low:.{digits}f}-{high:.{digits}f}"
 
 
-def _goals(figures: dict[str, Any]) -> Iterator[Goal]:
+def _goals(figures: _Figures) -> Iterator[Goal]:
     name = Path(figures["grid"]).stem
     if figures["cells"] <= GOAL_CELLS and figures["ants"] >= GOAL_ANTS:
         wall_s = figures["wall_s"]["median"] * GOAL_ANTS / figures["ants"]

@@ -170,7 +170,7 @@ def areas(settings: KnownSettings, order: dict[str, Any]) -> Digest:
     return {"zones": standing + ordered, "keep_out": kept_out[:MOST_AREAS]}
 
 
-def _items(value: object, most: int = MOST_AREAS) -> list[Any]:
+def _items(value: object, most: int = MOST_AREAS) -> list[object]:
     return value[:most] if isinstance(value, list) else []
 
 

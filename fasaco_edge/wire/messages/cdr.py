@@ -110,7 +110,7 @@ class CdrReader:
         self._offset = stop
         return layout.unpack_from(self._payload, start)
 
-    def doubles(self, layout: struct.Struct, field: str) -> tuple[Any, ...]:
+    def doubles(self, layout: struct.Struct, field: str) -> tuple[float, ...]:
         """Read 64-bit floats, as many as ``layout`` has; a tuple."""
         return layout.unpack_from(self._payload, self.take(8, layout.size, field))
 
