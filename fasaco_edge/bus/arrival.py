@@ -61,15 +61,15 @@ class Sample:
         return Sample(self.key, self._payload, schema, self._attachment)
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, Sample) and self._told() == other._told()
+        return isinstance(other, Sample) and self._fields() == other._fields()
 
     def __hash__(self) -> int:
-        return hash(self._told())
+        return hash(self._fields())
 
     def __repr__(self) -> str:
         return f"Sample({self.key!r}, {self.size} bytes, {self.schema!r})"
 
-    def _told(self) -> tuple[str, bytes, str, bytes]:
+    def _fields(self) -> tuple[str, bytes, str, bytes]:
         return self.key, self.payload, self.schema, self.attachment
 
 

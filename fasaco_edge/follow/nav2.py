@@ -46,7 +46,7 @@ MOVED_M, STANDS_S, ARRIVED_S, GIVE_UP_S = 0.05, 3.0, 1.0, 20.0
 
 @dataclass(slots=True)
 class Tally:
-    """What was done, to be told.
+    """What was done, to be reported.
 
     Attributes:
         goals: how many were sent.

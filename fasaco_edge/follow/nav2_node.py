@@ -18,7 +18,7 @@ from fasaco_edge.errors import MalformedMessage
 from fasaco_edge.follow.inputs import Inputs, patience_of
 from fasaco_edge.follow.nav2 import Nav2Follower
 from fasaco_edge.follow.nav2_requests import AskResult, CancelGoal, Request, SendGoal
-from fasaco_edge.follow.node import Told
+from fasaco_edge.follow.node import StateLog
 from fasaco_edge.follow.settings import FollowSettings
 from fasaco_edge.wire.messages.follow_path import (
     GOAL_ID_BYTES,
@@ -72,7 +72,7 @@ class Nav2Node:
         speed = settings.speed_m_s
         self._follower = Nav2Follower(nav2["near_m"], speed, new_id, patience_of(settings))
         self._inputs = Inputs(settings, bus)
-        self._told = Told()
+        self._states = StateLog()
         # What Nav2 said, by threads of Zenoh's.
         self._answers = deque[Callable[[], None]]()
         self._sequence = 0
@@ -92,7 +92,7 @@ class Nav2Node:
         self._inputs.feed(self._follower)
         for request in self._follower.step(self._inputs.now()):
             self._ask(request)
-        self._told.tell(self._follower.state, self._follower.detail)
+        self._states.note(self._follower.state, self._follower.detail)
 
     def end(self) -> None:
         """Have the robot stand."""

@@ -126,7 +126,7 @@ class FollowerNode:
             moves=not settings.dry_run,
         )
         self._inputs = Inputs(settings, bus)
-        self._told = Told()
+        self._states = StateLog()
         self._reported_at = -math.inf
 
     def turn(self) -> None:
@@ -136,7 +136,7 @@ class FollowerNode:
         command = follower.step(self._inputs.now())
         if command is not None:
             self._send(command)
-        if self._told.tell(follower.state, follower.detail):
+        if self._states.note(follower.state, follower.detail):
             self._reported_at = -math.inf
         self._say(command)
 
@@ -166,13 +166,13 @@ class FollowerNode:
             self._report(f"{sent.speed:6.3f} m/s {turn:7.1f} deg/s  {state}")
 
 
-class Told:
+class StateLog:
     """Logs what the robot does, where that is new."""
 
     def __init__(self) -> None:
         self._state: State | None = None
 
-    def tell(self, state: State, detail: str) -> bool:
+    def note(self, state: State, detail: str) -> bool:
         """Log a state that is another one than before; return whether it is."""
         if state is self._state:
             return False

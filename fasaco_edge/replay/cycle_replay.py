@@ -16,8 +16,8 @@ from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.daemon.ledger.codec import decode_ledger
 from fasaco_edge.daemon.loop.inbox import Batch, Received
 from fasaco_edge.daemon.loop.turn_log import (
+    EMBEDDED,
     POSE_BYTES,
-    TOLD,
     DecisionFilter,
     cells_checksum,
     kernels_name,
@@ -206,7 +206,7 @@ class CycleReplay:
         # A batch is played when the next has come: its samples are all there by then.
         batch: TurnBatch | None = None
         for arrival in samples:
-            if arrival.topic in TOLD and len(arrival.sample.payload) <= POSE_BYTES:
+            if arrival.topic in EMBEDDED and len(arrival.sample.payload) <= POSE_BYTES:
                 continue  # they are in the log
             if arrival.topic != TURNS.name:
                 self._untaken.add(arrival)

@@ -61,14 +61,14 @@ def from_page(text: str | bytes) -> FromPage:
     return _DECODER.decode(text)
 
 
-def told(kind: str, **members: object) -> str:
+def message_text(kind: str, **members: object) -> str:
     """Return a message as JSON, all text in it cleaned."""
     return msgspec.json.encode({"kind": kind} | _cleaned(members)).decode()
 
 
 def framed(kind: str, head: dict[str, object], body: bytes) -> bytes:
     """Return a message with a body: the length of its head (uint32), its head as JSON, the body."""
-    said = told(kind, **head).encode()
+    said = message_text(kind, **head).encode()
     return _LENGTH.pack(len(said)) + said + body
 
 

@@ -17,7 +17,7 @@ from fasaco_edge.serve.marks import (
     grid_message,
     map_marks,
 )
-from fasaco_edge.serve.messages import framed, told
+from fasaco_edge.serve.messages import framed, message_text
 from fasaco_edge.serve.pace import Way
 from fasaco_edge.watch.robot_state import PathProgress, RobotState
 from fasaco_edge.wire.documents.fleet import decode_member
@@ -68,14 +68,14 @@ class ServedView(RobotState):
         }
         self._makers: dict[str, Callable[[float], str | bytes | None]] = {
             "pose": lambda _: self._pose_message(),
-            "state": lambda now: told("state", **state(self, self._way, now)),
+            "state": lambda now: message_text("state", **state(self, self._way, now)),
             "path": self._path_message,
-            "areas": lambda _: told("areas", **areas(self.settings, self._order)),
-            "events": lambda _: told("events", entries=lately(self.events)),
+            "areas": lambda _: message_text("areas", **areas(self.settings, self._order)),
+            "events": lambda _: message_text("events", entries=lately(self.events)),
             "map": lambda _: self._map_message(),
             "floor": lambda _: self._grid_message("floor", FLOOR_MARKS),
             "field": lambda _: self._grid_message("field", FIELD_MARKS),
-            "others": lambda now: told("others", robots=list(self._near(now))),
+            "others": lambda now: message_text("others", robots=list(self._near(now))),
         }
         self._made_at = dict.fromkeys(self._makers, float("-inf"))
         # What the newest message of a kind was made of.
@@ -169,7 +169,7 @@ class ServedView(RobotState):
         if self.pose is None:
             return None
         x, y, yaw = (round(value, 3) for value in (self.pose.x, self.pose.y, self.pose.yaw))
-        return told("pose", x=x, y=y, yaw=yaw, at=self.walk.at, path=self.walk.revision)
+        return message_text("pose", x=x, y=y, yaw=yaw, at=self.walk.at, path=self.walk.revision)
 
     def _path_message(self, now: float) -> bytes | None:
         if self._path is None:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Protocol
 import msgspec
 
 from fasaco_edge.errors import FasacoError
-from fasaco_edge.serve.messages import Hello, Order, Role, Wants, from_page, told
+from fasaco_edge.serve.messages import Hello, Order, Role, Wants, from_page, message_text
 from fasaco_edge.wire.documents.json_text import decode_tolerant, encode_json
 from fasaco_edge.wire.documents.replies import Error
 from fasaco_edge.wire.documents.replies import Reply as Answer
@@ -64,10 +64,12 @@ class Viewer:
         if role is None:
             # Who tries tokens tries one a second on each connection.
             await asyncio.sleep(REFUSED_S)
-            await self._send(told("denied", asks=isinstance(said, Hello) and not said.token))
+            await self._send(
+                message_text("denied", asks=isinstance(said, Hello) and not said.token)
+            )
             await self._socket.close(DENIED)
             return None
-        await self._send(told("welcome", role=role))
+        await self._send(message_text("welcome", role=role))
         return role
 
     async def serve(self, role: Role) -> None:
@@ -109,7 +111,7 @@ class Viewer:
     async def _carry_out(self, order: Order, role: Role) -> str:
         if role != "operator":
             why = "this page may only look; its server says who may command"
-            return told("answer", id=order.id, ok=False, text=why, hint="")
+            return message_text("answer", id=order.id, ok=False, text=why, hint="")
         asked: dict[str, object] = {"command": order.command}
         if order.command == "start":
             asked["order"] = order.order or {}
@@ -118,15 +120,17 @@ class Viewer:
             found = await asyncio.to_thread(self._source.ask, "mission", payload, ANSWER_S)
             if not found:
                 why = "no answer from the daemon"
-                return told("answer", id=order.id, ok=False, text=why, hint="")
+                return message_text("answer", id=order.id, ok=False, text=why, hint="")
             if found[0].is_error:
                 wrong = decode_tolerant(found[0].payload, Error)
-                return told("answer", id=order.id, ok=False, text=wrong.message, hint=wrong.hint)
+                return message_text(
+                    "answer", id=order.id, ok=False, text=wrong.message, hint=wrong.hint
+                )
             answer = decode_tolerant(found[0].payload, Answer)
         except FasacoError as error:
-            return told("answer", id=order.id, ok=False, text=str(error), hint=error.hint)
+            return message_text("answer", id=order.id, ok=False, text=str(error), hint=error.hint)
         text = f"{answer.state}: {answer.reason}"
-        return told("answer", id=order.id, ok=True, text=text, hint="")
+        return message_text("answer", id=order.id, ok=True, text=text, hint="")
 
 
 @contextlib.asynccontextmanager

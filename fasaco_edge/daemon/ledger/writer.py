@@ -184,7 +184,7 @@ class LedgerWriter:
         self._trouble, self._finding = "", ""
         # Start of the present write; whether its hanging was reported.
         self._writes_since: float | None = None
-        self._is_hang_told = False
+        self._is_hang_reported = False
         if found.fault is not None:
             self._finding = log_fault(LOG, found.fault)
             self._faults.append(found.fault)
@@ -237,11 +237,11 @@ class LedgerWriter:
         """Return the fault of a hanging disk, "" for none; count it once."""
         since = self._writes_since
         if since is None or now - since < HANGS_S:
-            self._is_hang_told = False
+            self._is_hang_reported = False
             return ""
         fault = _cannot_write(self._file, OSError(f"the disk has hung for {HANGS_S:g} s or more"))
-        if not self._is_hang_told:
-            self._is_hang_told = True
+        if not self._is_hang_reported:
+            self._is_hang_reported = True
             self._faults.append(fault)
             log_fault(LOG, fault)
         return fault_text(fault)

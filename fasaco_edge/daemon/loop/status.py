@@ -160,7 +160,7 @@ class StatusBoard:
         members = tuple(
             MemberReport(
                 name,
-                member.told.state,
+                member.newest.state,
                 round(max(now - member.heard_at, 0.0), 1),
                 member.absence(now) or None,
                 mission.shared.cells_of(name),

@@ -62,7 +62,7 @@ FULL_BYTES = 4_000_000
 # Time until a new subscriber surely receives all samples itself [s].
 MARGIN_S = 0.2
 POSE = "pose"
-TOLD = (POSE, "battery")
+EMBEDDED = (POSE, "battery")
 NOBODY = "nobody listens to it"
 
 
@@ -191,14 +191,14 @@ class TurnLog:
 
     def _taken(self, received: Received) -> TakenSample:
         kind, sample, at = received.kind, received.sample, received.at
-        if kind == FLEET.name or (kind in TOLD and len(sample.payload) <= POSE_BYTES):
+        if kind == FLEET.name or (kind in EMBEDDED and len(sample.payload) <= POSE_BYTES):
             self._samples.add(Arrival(kind, sample, 0, 0))
             return TakenSample(kind, 0)
         if kind == "map" and len(sample.payload) <= MAP_BYTES and at >= self._embed_until:
             self._samples.add(Arrival(kind, sample, 0, 0))
             return TakenSample(kind, 0, at)
-        told = self._embedded(sample) if at < self._embed_until else None
-        return TakenSample(kind, zlib.crc32(sample.payload), at if kind in MAPS else 0.0, told)
+        embedded = self._embedded(sample) if at < self._embed_until else None
+        return TakenSample(kind, zlib.crc32(sample.payload), at if kind in MAPS else 0.0, embedded)
 
     def _embedded(self, sample: Sample) -> EarlySample | None:
         """Return the sample itself, deflated; None without room for it."""
@@ -213,7 +213,7 @@ class TurnLog:
 
     def _forget_early(self, received: Sequence[Received]) -> None:
         """Keep only the newest pose and charge while nothing else has arrived."""
-        if not self._is_waiting or self._has_begun or not all(map(_is_told, self._turns)):
+        if not self._is_waiting or self._has_begun or not all(map(_is_embedded, self._turns)):
             self._early = []
             return
         if not self._turns or not received:
@@ -244,9 +244,11 @@ def _plan_taken(ready: PlanReady) -> PlanTaken:
     )
 
 
-def _is_told(turn: Cycle) -> bool:
+def _is_embedded(turn: Cycle) -> bool:
     return (
-        not turn.commands and not turn.patches_lost and all(s.topic in TOLD for s in turn.samples)
+        not turn.commands
+        and not turn.patches_lost
+        and all(s.topic in EMBEDDED for s in turn.samples)
     )
 
 

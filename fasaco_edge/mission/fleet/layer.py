@@ -47,7 +47,7 @@ class Member:
     """Another robot.
 
     Attributes:
-        told: what it said last.
+        newest: what it said last.
         heard_at: when [s].
         left_out: why it cannot be of this fleet; "" where it can.
         place: where it is, to STANDING_M, x, y [m].
@@ -55,17 +55,17 @@ class Member:
         left_at: when it last left a division that had hardly begun [s].
     """
 
-    told: MemberHeard
+    newest: MemberHeard
     heard_at: float
     left_out: str
     place: tuple[float, float]
     moved_at: float
     left_at: float = float("-inf")
 
-    def has_moved(self, told: MemberHeard) -> bool:
+    def has_moved(self, heard: MemberHeard) -> bool:
         """Tell whether it is elsewhere by now, or has begun to work."""
-        has_begun = self.told.state not in AT_WORK and told.state in AT_WORK
-        return has_begun or math.dist(self.place, (told.x, told.y)) > STANDING_M
+        has_begun = self.newest.state not in AT_WORK and heard.state in AT_WORK
+        return has_begun or math.dist(self.place, (heard.x, heard.y)) > STANDING_M
 
     def absence(self, now: float) -> str:
         """Return why it takes no part now; "" where it does."""
@@ -73,8 +73,8 @@ class Member:
             return self.left_out
         if now - self.heard_at > GONE_S:
             return "gone"
-        if self.told.state not in AT_WORK:
-            return self.told.state
+        if self.newest.state not in AT_WORK:
+            return self.newest.state
         return "stands" if now - self.moved_at > HANGING_S else ""
 
 
@@ -134,9 +134,9 @@ class FleetLayer:
         self.members[event.robot] = member
         if left_out:
             return ""
-        told = event.robot, event.epoch, event.tiles
+        swept = event.robot, event.epoch, event.tiles
         try:
-            is_open_again = self._ledger.shared.hear(*told, self.members)
+            is_open_again = self._ledger.shared.hear(*swept, self.members)
         except FleetError as error:
             self.members[event.robot] = replace(member, left_out=str(error))
             raise
@@ -200,18 +200,20 @@ class FleetLayer:
 
     def _newest_heard(self) -> int:
         """Return the number of the newest division that others know, and that can be."""
-        told = [member.told.division for member in self.members.values() if not member.left_out]
-        first = min((number for number in told if number), default=0)
+        numbers = [
+            member.newest.division for member in self.members.values() if not member.left_out
+        ]
+        first = min((number for number in numbers if number), default=0)
         most = (self.number or min(first, MOST_FIRST)) + MOST_AHEAD
-        return max((number for number in told if number <= most), default=0)
+        return max((number for number in numbers if number <= most), default=0)
 
     def _robots(self, area: ReachableArea, cell: Cell, now: float) -> list[Robot]:
         """Return who is at work where this robot can come to."""
         robots = [Robot(self._robot, cell, self.step_s)]
         for name, member in self.members.items():
-            place = anchor_cell(area.lattice, Pose2D(member.told.x, member.told.y))
+            place = anchor_cell(area.lattice, Pose2D(member.newest.x, member.newest.y))
             if not member.absence(now) and place is not None and area.contains(place):
-                robots.append(Robot(name, place, member.told.step_s))
+                robots.append(Robot(name, place, member.newest.step_s))
         return robots
 
     def _why_anew(

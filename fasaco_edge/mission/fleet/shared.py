@@ -128,8 +128,8 @@ class SharedProgress:
                 heard.drop_gone()
             heard.begin(epoch)
             self._note_lost()
-        for place, told in tiles:
-            bits, before = np.frombuffer(told, np.uint8), heard.tiles.get(place)
+        for place, packed in tiles:
+            bits, before = np.frombuffer(packed, np.uint8), heard.tiles.get(place)
             if before is None:
                 self._check_room(robot)
                 without = heard.disregarded.pop(place, np.uint8(0)) & bits
@@ -284,7 +284,7 @@ class Telling:
     """Chooses which of its tiles a robot tells next: what is new first, then all others in turn."""
 
     def __init__(self) -> None:
-        # What was told of each, in the order in which that was.
+        # What each was heard to have swept, in the order in which that came.
         self._told: dict[Cell, NDArray[np.uint16]] = {}
 
     def next(

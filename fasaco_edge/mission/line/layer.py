@@ -135,7 +135,7 @@ class LineLayer:
             reason = "line blocked"
         if touched is not None or self._is_settled is None:
             self._is_settled = not self._orders.is_exploring
-        # What the robot waits for is told first; the rest comes with the next pose.
+        # What the robot waits for is published first; the rest comes with the next pose.
         is_waited_for = update is not None or reason or is_further
         if not is_waited_for:
             self._explain()
@@ -149,7 +149,7 @@ class LineLayer:
             update = self._route.publish_line(reason, now)
         if update is None:
             return None
-        ahead.note_told()
+        ahead.note_published()
         return replace(update, xy=ahead.xy())
 
     @property

@@ -32,8 +32,8 @@ from fasaco_edge.mission.line.place_on_line import PlaceOnLine
 from fasaco_edge.mission.line.tally import SweepTally
 from fasaco_edge.planners.path import common_beginning
 
-# The robot knows all of the line.
-TOLD = 1 << 60
+# All of the line is published.
+ALL_PUBLISHED = 1 << 60
 
 
 class LineAhead:
@@ -43,17 +43,17 @@ class LineAhead:
         line: what is left of it.
         tally: what it sweeps.
         cell: number of the cell of the walk that the robot is at.
-        untold_from: the first point from which on the robot knows another line.
+        unpublished_from: the first point from which on the published line is another one.
     """
 
     def __init__(self, floor: FloorMap) -> None:
         self.line = Line()
         self.tally = SweepTally(floor)
         self.cell = 0
-        self.untold_from = TOLD
+        self.unpublished_from = ALL_PUBLISHED
         self._floor = floor
         self._walk: Walk = np.empty((0, 2), np.int32)
-        # Where the walk was cut off: of how many cells the robot is told, 0 where it was stopped.
+        # Where the walk was cut off: so many cells are published, 0 where it was stopped.
         # The rest is kept until the next walk comes. None for all.
         self._cut: int | None = None
         # What of maps that came meanwhile was not looked at beyond the cut.
@@ -217,9 +217,9 @@ class LineAhead:
             edges = _edges(self.line.points[: number + 1])
             self.tally.exchange(edges, edges[:0])
             self.line = self.line.part(number)
-            self.untold_from = max(self.untold_from - number, 0)
+            self.unpublished_from = max(self.unpublished_from - number, 0)
         # The nearest cell, or the next plan would begin behind the robot. At the last one the robot
-        # has arrived, and that is told below.
+        # has arrived, as is found out below.
         first, second = self.line.cells[:2].tolist()
         nearest = first + int(self._place.along * (second - first) + 0.5)
         self.cell = max(self.cell, min(nearest, len(self._walk) - 2))
@@ -241,14 +241,14 @@ class LineAhead:
 
     def xy(self) -> Points:
         """Return the line from the robot on, float64 (n, 2): x, y in the map frame [m]."""
-        points = self._told()
+        points = self._published()
         if len(points) > 1:
             points = points.copy()
             points[0] = self._place.on(points)
         return raster_to_map(self._floor.geometry, points)
 
-    def _told(self) -> Points:
-        """Return the points that the robot is told; where the walk is cut off it stops."""
+    def _published(self) -> Points:
+        """Return the points to be published: where the walk is cut off the robot stops."""
         points = self.line.points
         if not self._cut:
             return points if self._cut is None else points[:0]
@@ -266,7 +266,7 @@ class LineAhead:
         state = line.state[first:end].min(initial=POLISHED)
         part = Line(points, cells, np.full(len(points), state, np.uint8))
         self.line = line.part(0, first).joined(part, line.part(end))
-        self.untold_from = min(self.untold_from, first)
+        self.unpublished_from = min(self.unpublished_from, first)
 
     def first_below(self, state: int) -> int:
         """Return the first point that is not as far yet as MOVED, or POLISHED, or their number."""
@@ -284,9 +284,9 @@ class LineAhead:
         states[first:end] = np.maximum(states[first:end], state)
         self.line = Line(line.points, line.cells, states)
 
-    def note_told(self) -> None:
-        """Note that the robot knows all of the line."""
-        self.untold_from = TOLD
+    def note_published(self) -> None:
+        """Note that all of the line is published."""
+        self.unpublished_from = ALL_PUBLISHED
 
     def lengths(self) -> NDArray[np.float64]:
         """Return how far it is from the robot to each point, float64 (n,) [m]; the first is 0."""

@@ -37,8 +37,8 @@ ANNEALED_M, ANNEALED_PIECE_M, ANNEALED_PIECES = 2.0, 4.0, 2
 # Moves for each of them, and the share of the temperature that the farthest is annealed at, where
 # the map is known.
 ANNEAL_MOVES, HOTTEST = 300, 0.3
-# The robot is told of what is polished further on once it is so near to it [m].
-TOLD_M = 1.5
+# What is polished further on is published once the robot is so near to it [m].
+PUBLISHED_M = 1.5
 # Most moves before the loop continues.
 MOST_MOVES = 3000
 # Moves of points alone: no detour leads so far.
@@ -56,9 +56,9 @@ class Polisher:
         self._at = 0
 
     def polish(self, ahead: LineAhead, floor: FloorMap, *, is_settled: bool) -> bool:
-        """Polish what is due of the line; return whether the robot is to be told.
+        """Polish what is due of the line; return whether it is to be published.
 
-        It is told once all points are moved, and of what changed later when it comes near. On a map
+        That is once all points are moved; what changed later, when the robot comes near. On a map
         that still grows (``is_settled`` is False) random moves are taken as well, but only those
         that lose nothing: what a detour or a lane was there for may be swept by another lane since.
         """
@@ -89,9 +89,9 @@ class Polisher:
         return self._is_due(ahead)
 
     def _is_due(self, ahead: LineAhead) -> bool:
-        """Tell whether the robot is so near to what it does not know that it is to be told."""
-        lengths, untold = ahead.lengths(), ahead.untold_from
-        return untold < len(lengths) and bool(lengths[untold] < TOLD_M)
+        """Tell whether the robot is near what is not published yet."""
+        lengths, unpublished = ahead.lengths(), ahead.unpublished_from
+        return unpublished < len(lengths) and bool(lengths[unpublished] < PUBLISHED_M)
 
     def _anneal(
         self, ahead: LineAhead, floor: FloorMap, lengths: NDArray[np.float64], hottest: float
