@@ -15,7 +15,7 @@ from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D
 from fasaco_edge.serve import marks
 from fasaco_edge.serve.guard import Guard, is_same_origin, read_tokens
-from fasaco_edge.serve.messages import told
+from fasaco_edge.serve.messages import message_text
 from fasaco_edge.serve.pace import Way
 from fasaco_edge.wire.documents.settings import MapSettings, RobotSettings
 from fasaco_edge.wire.documents.status import DriveReport
@@ -122,7 +122,7 @@ def test_tokens_that_cannot_be_written_leave_no_file(tmp_path, monkeypatch):
 
 
 def test_all_text_in_a_message_is_cleaned():
-    message = told("state", name="\x1b[2J\u202e", inner=[{"\x07": "a\nb"}])
+    message = message_text("state", name="\x1b[2J\u202e", inner=[{"\x07": "a\nb"}])
     assert json.loads(message) == {
         "kind": "state",
         "name": "\\x1b[2J\\u202e",
