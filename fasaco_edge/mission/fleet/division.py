@@ -1,4 +1,4 @@
-"""Division of what is left among robots that have come some way: a seed and a handicap for each.
+"""Division of the cells left among robots under way: a seed and a handicap for each robot.
 
 A cell belongs to the robot whose seed is nearest by the way there, in seconds and with the
 handicap added. So each part is connected, and cells that a map shows later have an owner, too.

@@ -1,9 +1,9 @@
-"""Shared progress: which cells the other robots of a fleet have swept, as each of them says itself.
+"""Shared progress: which cells the other robots of a fleet have swept, as each of them reports.
 
-What a robot says has an epoch, another one whenever it has forgotten some of its cells. Within one
-epoch its cells only become more: they are united, so that lost, repeated and late messages do no
-harm, and two halves of a fleet that was split agree once they hear each other again. With another
-epoch all that was heard of that robot is dropped, and heard anew. What a robot that is gone had
+A robot's messages carry an epoch, which changes whenever it has forgotten some of its cells. Within
+one epoch cells are only added: they are united, so that lost, repeated and late messages do no
+harm, and two halves of a fleet that was split agree once they receive from each other again. When
+the epoch changes, all that was received from that robot is dropped. What a robot that is gone had
 swept stays.
 
 Cells that this robot has to sweep again, whoever swept them (a second pass, a reset, a map that
