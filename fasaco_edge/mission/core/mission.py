@@ -63,6 +63,9 @@ class Mission:
         self._turn = LatticeTurn(self._angle.deg)
         # By how much the cells are turned against those of the ledger that is restored [deg].
         self._turned_by_deg = 0.0
+        # The newest map in the lattice's frame, and the same in the map frame.
+        self._laid_grid: OccupancyGrid | None = None
+        self._given_grid: OccupancyGrid | None = None
         config = self._turn.config(self._config)
         self._map = MapState(config)
         cell_m, sweeping = config.footprint.cell_m, config.sweeping
@@ -210,7 +213,9 @@ class Mission:
     @property
     def grid(self) -> OccupancyGrid | None:
         """The newest map; None before there is one."""
-        return self._turn.grid(self._map.grid)
+        if self._map.grid is not self._laid_grid:
+            self._laid_grid, self._given_grid = self._map.grid, self._turn.grid(self._map.grid)
+        return self._given_grid
 
     @property
     def map_revision(self) -> int:
