@@ -19,7 +19,7 @@ import sys
 import warnings
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeVar, cast
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar, cast
 
 from fasaco_edge.host.processes import ctrl_c_waits
 from fasaco_edge.kernels import release
@@ -34,10 +34,11 @@ _yaml = sys.modules.get("yaml")
 sys.modules["yaml"] = None  # type: ignore[assignment]
 try:
     import numba
-    from llvmlite.binding import ModuleRef, parse_bitcode
+    from llvmlite.binding import ModuleRef, add_symbol, parse_assembly, parse_bitcode
+    from numba.core import environment
     from numba.core.codegen import JITCodeLibrary, JITCPUCodegen
     from numba.core.compiler import CompileResult
-    from numba.core.runtime import rtsys
+    from numba.core.runtime import _nrt_python
     from numba.core.serialize import dumps
     from numba.core.types.misc import unliteral
 finally:
@@ -71,15 +72,22 @@ class CacheFaults:
 
     Attributes:
         failure: why a file could not be written; "" while all could be.
+        is_unlinked: whether code was compiled that calls other code, and is nothing without that.
     """
 
     def __init__(self) -> None:
         self.failure = ""
+        self.is_unlinked = False
         self._logged: set[str] = set()
 
     def cannot_load(self, file: Path, why: object) -> None:
         """Log that a file is damaged or cannot be rebuilt."""
         self._log("load", f"{file}: the compiled kernel {why}: it is compiled again")
+
+    def cannot_link(self, file: Path, why: object) -> None:
+        """Log that what is compiled from now on is not kept."""
+        self.is_unlinked = True
+        self._log("link", f"{file}: the compiled kernel {why}: others that need it are not kept")
 
     def cannot_keep(self, file: Path, error: OSError) -> None:
         """Log that nothing is kept."""
@@ -114,24 +122,23 @@ class _KernelCache:
 
         Whatever goes wrong here is only a reason to compile.
         """
-        # Code that runs needs no more; the rest of numba is read where something is compiled.
-        rtsys.initialize(target)
+        _know_runtime()
         triple, *processor = target.codegen().magic_tuple()
         if not release.why_unusable():
             file = release.FOLDER / self._file_name(signature, triple, *ANY_PROCESSOR)
-            if (result := _rebuilt(file, signature, target)) is not None:
+            if (result := _rebuilt(_KernelFile(file, signature), target)) is not None:
                 return result
         if (folder := _own_folder()) is None:
             return None
         file = folder / self._file_name(signature, triple, *processor)
-        result = _rebuilt(file, signature, target)
+        result = _rebuilt(_KernelFile(file, signature), target)
         if result is not None:
             _USED.add(file.name)
         return result
 
     def save_overload(self, signature: object, result: CompileResult) -> None:
         """Keep what was compiled for ``signature``, where that can be."""
-        if result.lifted or result.library.has_dynamic_globals:
+        if result.lifted or result.library.has_dynamic_globals or FAULTS.is_unlinked:
             return
         if (folder := _own_folder()) is None:
             return
@@ -156,21 +163,23 @@ class _KernelCache:
 
 
 class _KernelLibrary(JITCodeLibrary):  # type: ignore[misc]
-    """Machine code of a kernel, and its bitcode, for kernels that are compiled with it inside.
+    """Machine code of a kernel; its bitcode is read where a kernel is compiled with it inside.
 
-    numba parses the bitcode of all code that it loads: half the time that kernels take to load, and
-    for nothing where none is compiled.
+    numba parses the bitcode of all code that it loads, and keeps it: half the time that kernels
+    take to load, and 5 MB, for nothing where none is compiled.
     """
 
-    _bitcode: bytes | None = None
+    # What it was loaded from.
+    _origin: _KernelFile | None = None
+    _is_loaded = False
 
     @classmethod
     def _unserialize(
         cls, codegen: JITCPUCodegen, state: tuple[str, str, tuple[bytes, bytes]]
     ) -> _KernelLibrary:
-        name, _, (machine_code, bitcode) = state
+        name, _, (machine_code, _) = state
         library = cls(codegen, name)
-        library._bitcode = bitcode
+        library._is_loaded = True
         library.enable_object_caching()
         library._set_compiled_object(machine_code)
         library._finalize_final_module()
@@ -183,14 +192,21 @@ class _KernelLibrary(JITCodeLibrary):  # type: ignore[misc]
 
     @functools.cached_property
     def _parsed(self) -> ModuleRef:
-        return parse_bitcode(self._bitcode)
+        assert self._origin is not None
+        try:
+            (_, _, (_, bitcode)), *_ = self._origin.parts()
+        except UnsoundFileError as why:
+            # Its machine code is here, and can be called as it is.
+            FAULTS.cannot_link(self._origin.path, why)
+            return parse_assembly("")
+        return parse_bitcode(bitcode)
 
     def _get_module_for_linking(self) -> ModuleRef:
-        return super()._get_module_for_linking() if self._bitcode is None else self._parsed
+        return super()._get_module_for_linking() if self._origin is None else self._parsed
 
     def get_pointer_to_function(self, name: str) -> int:
         """Return the address of ``name``, which loaded code has for sure."""
-        if self._bitcode is None:
+        if not self._is_loaded:
             return int(super().get_pointer_to_function(name))
         # numba's engine knows the names of what was parsed alone.
         return int(self._codegen._engine.get_function_address(name))
@@ -199,23 +215,68 @@ class _KernelLibrary(JITCodeLibrary):  # type: ignore[misc]
 JITCPUCodegen._library_class = _KernelLibrary
 
 
-def _rebuilt(file: Path, signature: object, target: CPUContext) -> object:
-    """Return the code in a file, if it was compiled for ``signature``; None where it cannot be."""
+class _KernelFile(NamedTuple):
+    """A file with the code of a kernel for ``signature``."""
+
+    path: Path
+    signature: object
+
+    def parts(self) -> tuple[Any, ...]:
+        """Return what numba made of the result of compiling.
+
+        Raises:
+            UnsoundFileError: it is gone, damaged, or of another signature.
+        """
+        kept_for, parts = pickle.loads(read_sealed(self.path))
+        if kept_for != self.signature:
+            raise MissingFileError("is for other types")
+        return cast(tuple[Any, ...], parts)
+
+
+def _rebuilt(file: _KernelFile, target: CPUContext) -> CompileResult | None:
+    """Return the code in a file; None where there is none, or it cannot be used."""
     try:
-        kept_for, parts = pickle.loads(read_sealed(file))
-        if kept_for != signature:
-            return None
-        result: object = CompileResult._rebuild(target, *parts)
+        result = CompileResult._rebuild(target, *file.parts())
+        result.library._origin = file
     except MissingFileError:
         return None
     except UnsoundFileError as why:
-        FAULTS.cannot_load(file, why)
+        FAULTS.cannot_load(file.path, why)
         return None
     except Exception as error:
         # The file is sound, but numba cannot rebuild it.
-        FAULTS.cannot_load(file, f"cannot be used ({type(error).__name__}: {error})")
+        FAULTS.cannot_load(file.path, f"cannot be used ({type(error).__name__}: {error})")
         return None
     return result
+
+
+def _environment(module: str, constants: list[object], name: str) -> environment.Environment:
+    """Return what a kernel of a file needs to have at hand of a function that it has inside.
+
+    numba imports the function's module for that, as of its own arrays and linear algebra, which
+    take 6 MB. Of what has no constants, machine code never looks into it.
+    """
+    if constants or module in sys.modules or environment.lookup_environment(name) is not None:
+        return _full_environment(module, constants, name)
+    found = environment.Environment({"__name__": module})
+    found.env_name = name
+    environment.Environment._memo[name] = found
+    return found
+
+
+_full_environment = environment._rebuild_env
+environment._rebuild_env = _environment
+
+
+@functools.cache
+def _know_runtime() -> None:
+    """Let loaded code find numba's runtime.
+
+    ``rtsys.initialize`` does that, too, and compiles what is compiled into kernels of it: that goes
+    through 30 MB of the compiler. It is called where something is compiled.
+    """
+    for name, address in _nrt_python.c_helpers.items():
+        add_symbol(name if name.startswith("_") else f"NRT_{name}", address)
 
 
 def _compiled(function: Kernel, compiler: Callable[[Kernel], Dispatcher]) -> Kernel:

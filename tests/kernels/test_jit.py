@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from fasaco_edge.kernels import cache, release
-from tests.kernels.installations import ALL_LOADED, package_in
+from tests.kernels.installations import ALL_LOADED, package_in, told_by
 from tests.support.processes import ENVIRONMENT
 
 ROOT = Path(__file__).parents[2]
@@ -229,3 +229,60 @@ def test_ctrl_c_while_a_kernel_is_loaded_is_an_interrupt_and_no_crash():
     words = [sys.executable, "-c", INTERRUPTED]
     done = subprocess.run(words, env=ENVIRONMENT, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stdout, done.stderr) == (0, "interrupted\n", "")
+
+
+SEVEN_THEN_EIGHT = """
+assert seven.seven(1) == 7
+for file in jit_folder.glob({gone!r}): file.unlink()
+seven.more.clear()
+seven.tell(note=False)
+"""
+
+
+def after_seven(gone):
+    """A process that loads one kernel, then loses files, then needs the other, which calls it."""
+    head = "from pathlib import Path\njit_folder = Path(seven.jit.kernel_folder())\n"
+    return head + SEVEN_THEN_EIGHT.format(gone=gone)
+
+
+def test_what_was_loaded_is_taken_into_what_is_compiled_after_it(compiled):
+    compiled.tell("assert seven.seven(1) == 7; seven.tell()")
+    told = compiled.tell(after_seven("seven.eight-*.kernel"))
+    assert (told.loaded, told.compiled, told.warnings) == (1, 1, [])
+    assert len(list(compiled.folder.glob("seven.eight-*.kernel"))) == 1
+    assert compiled.tell().loaded == 1
+
+
+def test_what_was_loaded_is_called_by_what_is_compiled_once_its_file_is_gone(compiled):
+    """As in a folder that was deleted meanwhile; its code is in memory, what calls it not whole."""
+    compiled.tell("assert seven.seven(1) == 7; seven.tell()")
+    told = compiled.tell(after_seven("*.kernel"))
+    assert (told.loaded, told.compiled) == (1, 1)
+    (warning,) = told.warnings
+    assert warning.endswith("the compiled kernel is gone: others that need it are not kept")
+    assert not list(compiled.folder.glob("*.kernel"))
+
+
+ARRAYS = """
+import sys
+import numpy as np
+
+@jit.kernel
+def turned(x):
+    y = x.copy()
+    y[1:] = x[:-1]
+    return y.sum()
+"""
+
+
+def test_functions_inside_a_kernel_bring_no_modules_along(installed):
+    """numba's arrays and linear algebra took 6 MB, for environments that nothing looks into."""
+    with (installed.package / "seven.py").open("a") as source:
+        source.write(ARRAYS)
+    code = (
+        "assert seven.turned(seven.np.arange(4.0)) == 3.0; seven.more.append(seven.turned.stats)\n"
+        "seven.said.append('numba.np.arraymath' in seven.sys.modules); seven.tell()"
+    )
+    assert told_by(installed.start(code)).compiled == 3
+    again = told_by(installed.start(code))
+    assert (again.loaded, again.compiled, again.warnings) == (2, 0, [False])
