@@ -28,9 +28,11 @@ The rest of the ledger takes 4 bytes a cell, with the copy being written; swept 
 pixel of 2.5 cm, 18 bytes a cell of 0.3 m, and as much again where it changed since that copy. The
 ledger is bounded on its own: 34 MB of cells and twice 13 MB of floor, if jumping poses fill it.
 
-Measured (``python -m tests.campaigns.memory``, x86-64): a mission on a small map 195 MB, a path of
-440,000 cells 127 MB more, maps of 25 million pixels at 20 Hz 75 MB more, each followed by a map
-update of full size 240 MB, and 50 MB more with a recorder.
+Measured (``python -m tests.campaigns.memory``, x86-64): a path of 440,000 cells takes 127 MB more
+than a mission on a small map, maps of 25 million pixels at 20 Hz 75 MB more, each followed by a map
+update of full size 240 MB, and 50 MB more with a recorder. That mission takes 105 MB, 17 of them
+for its million pixels, and 139 while kernels are loaded (``fasaco-edge bench footprint``): the base
+has room for what waits for the loop beside maps, 42 MB.
 """
 
 from __future__ import annotations
@@ -46,7 +48,7 @@ from fasaco_edge.wire.topics import QUEUE_LENGTHS
 MB = 1_000_000
 MIB = 1 << 20
 # Interpreter, numpy, Zenoh, compiler, kernels, and the fixed part of a plan.
-BASE_BYTES = 210 * MB
+BASE_BYTES = 150 * MB
 MAPS = 10
 CELL_BYTES = 370
 # Bytes of a pixel of floor: 3 for the floor to sweep and the line's passes over it, 2 more while

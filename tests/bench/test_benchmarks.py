@@ -95,7 +95,7 @@ def test_footprint(capsys):
         assert_ordered(document[name])
     assert document["ready_s"]["median"] <= document["status_s"]["median"]
     # Memory does not depend on how busy the machine is.
-    for point, most_mb in (("idle", 50.0), ("warm", 150.0)):
+    for point, most_mb in (("idle", 45.0), ("warm", 120.0)):
         own_mb, resident_mb = (document[f"{point}{of}_mb"]["median"] for of in ("_own", ""))
         assert 5.0 < own_mb < resident_mb <= most_mb
     assert document["idle_mb"]["median"] < document["warm_mb"]["median"]

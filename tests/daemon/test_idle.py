@@ -12,7 +12,7 @@ from tests.support.outsider import Outsider
 from tests.support.processes import Daemon, daemon_process, mapped_files, resident_mb
 from tests.support.rooms import map_bytes, pillared_room, pose_bytes, update_bytes
 
-IDLE_MB = 60.0
+IDLE_MB = 50.0
 
 
 @pytest.fixture(scope="module")

@@ -83,7 +83,7 @@ def test_what_waits_for_the_loop_is_part_of_it(max_pixels):
     rooms = queues(max_pixels)
     waiting = sum(max(rooms[kind].size, most_bytes(kind, max_pixels)) for kind in QUEUE_LENGTHS)
     # The other shares of a pixel are for the turn and for Zenoh.
-    assert waiting <= BASE_BYTES / 4 + 2 * max_pixels
+    assert waiting <= BASE_BYTES / 3 + 2 * max_pixels
     assert most_bytes("pose", max_pixels) == MAX_POSE_BYTES
 
 

@@ -8,7 +8,7 @@ from tests.deploy.service import Service, wait_for
 from tests.support.processes import STOP_S
 
 WARM_S = 1.5
-IDLE_MB = 60.0
+IDLE_MB = 50.0
 IDLE_SHARE = 0.005
 
 
