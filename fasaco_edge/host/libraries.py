@@ -10,13 +10,36 @@ from __future__ import annotations
 
 import ctypes
 import mmap
+import os
 from collections.abc import Iterator
 from itertools import count, takewhile
+from pathlib import Path
 
 # elf(5), of 64 bits.
+_MAGIC = b"\x7fELF\x02"
 _LOAD, _DYNAMIC = 1, 2
 _WRITABLE = 2
 _END, _TEXT_RELOCATED, _FLAGS, _FLAG_TEXT_RELOCATED = 0, 22, 30, 4
+# dlinfo(3): where a library is.
+_LINK_MAP = 2
+
+
+class _Header(ctypes.Structure):
+    """Elf64_Ehdr."""
+
+    _fields_ = (
+        ("identity", ctypes.c_ubyte * 16),
+        ("kind", ctypes.c_uint16),
+        ("machine", ctypes.c_uint16),
+        ("version", ctypes.c_uint32),
+        ("entry", ctypes.c_uint64),
+        ("segments_at", ctypes.c_uint64),
+        ("sections_at", ctypes.c_uint64),
+        ("flags", ctypes.c_uint32),
+        ("header_size", ctypes.c_uint16),
+        ("segment_size", ctypes.c_uint16),
+        ("segment_count", ctypes.c_uint16),
+    )
 
 
 class _Segment(ctypes.Structure):
@@ -40,67 +63,79 @@ class _Entry(ctypes.Structure):
     _fields_ = (("tag", ctypes.c_int64), ("value", ctypes.c_uint64))
 
 
-class _Library(ctypes.Structure):
-    """The beginning of dl_phdr_info: all libraries for C know these."""
-
-    _fields_ = (
-        ("base", ctypes.c_uint64),
-        ("name", ctypes.c_char_p),
-        ("segments", ctypes.POINTER(_Segment)),
-        ("count", ctypes.c_uint16),
-    )
-
-
-_Visitor = ctypes.CFUNCTYPE(
-    ctypes.c_int, ctypes.POINTER(_Library), ctypes.c_size_t, ctypes.c_void_p
-)
-
-
 def unmap_unread() -> None:
     """Let go of all pages of libraries that are never written to, where the C library can.
 
     Such pages are as in their file, so they can be mapped anew; those of segments that may be
     written, as by the loader alone before it makes them read-only, are kept.
+
+    The loader would tell its libraries, too, but holding its lock while it does (dl_iterate_phdr):
+    a thread that imports meanwhile waits for that lock with the interpreter's, for ever.
     """
-    # Each call holds the loader's lock. By PyDLL it holds the interpreter's, too: without that it
-    # would wait for a thread that has it, and loads a library.
-    c_library = ctypes.PyDLL(None)
-    visit_all = getattr(c_library, "dl_iterate_phdr", None)
+    c_library = ctypes.CDLL(None)
     madvise = getattr(c_library, "madvise", None)
-    if visit_all is None or madvise is None:
+    if madvise is None or not hasattr(c_library, "dlinfo"):
         return
     madvise.argtypes = (ctypes.c_void_p, ctypes.c_size_t, ctypes.c_int)
-
-    def visit(library: ctypes._Pointer[_Library], _size: int, _data: int) -> int:
-        for start, end in _unwritten(library.contents):
-            madvise(start, end - start, mmap.MADV_DONTNEED)
-        return 0
-
-    visit_all(_Visitor(visit), None)
+    for name, start in _mapped_programs():
+        if _keep_loaded(c_library, name) == start:
+            for first, last in _unwritten(start):
+                madvise(first, last - first, mmap.MADV_DONTNEED)
 
 
-def _unwritten(library: _Library) -> Iterator[tuple[int, int]]:
-    """Yield first and last address of whole pages that nothing has written to, nor may."""
-    if not (library.name or b"").startswith(b"/"):
-        return  # the program itself, or what the system brings along, which is no file
-    segments = library.segments[: library.count]
-    if any(_relocates_text(library, segment) for segment in segments):
+def _mapped_programs() -> Iterator[tuple[str, int]]:
+    """Yield name and first address of each file of which something can be executed."""
+    try:
+        maps = Path("/proc/self/maps").read_text(encoding="utf-8", errors="surrogateescape")
+    except OSError:
+        return
+    lines = [line.split(maxsplit=5) for line in maps.splitlines()]
+    files = [words for words in lines if len(words) == 6 and words[5].startswith("/")]
+    programs = {words[5] for words in files if "x" in words[1]}
+    for addresses, _, offset, _, _, name in files:
+        if name in programs and int(offset, 16) == 0:
+            yield name, int(addresses.partition("-")[0], 16)
+
+
+def _keep_loaded(c_library: ctypes.CDLL, name: str) -> int | None:
+    """Return where a library is, which is not unloaded any more; None where it is none."""
+    try:
+        handle = ctypes.CDLL(name, mode=os.RTLD_NOLOAD)._handle
+    except (OSError, ValueError):
+        return None  # the program itself, or a file that was replaced
+    link_map = ctypes.POINTER(ctypes.c_size_t)()
+    if c_library.dlinfo(ctypes.c_void_p(handle), _LINK_MAP, ctypes.byref(link_map)):
+        return None
+    return int(link_map[0])
+
+
+def _unwritten(start: int) -> Iterator[tuple[int, int]]:
+    """Yield first and last address of whole pages that nothing has written to, nor may.
+
+    Args:
+        start: where a library is, its header first.
+    """
+    header = _Header.from_address(start)
+    if not bytes(header.identity).startswith(_MAGIC):
+        return
+    segments = (_Segment * header.segment_count).from_address(start + header.segments_at)
+    if any(_relocates_text(start, segment) for segment in segments):
         return
     page = mmap.PAGESIZE
     for segment in segments:
         if segment.kind == _LOAD and not segment.flags & _WRITABLE:
-            start = library.base + segment.address
+            begin = start + segment.address
             # Its first and last page may be the end and the beginning of other segments.
-            first, last = -(-start // page) * page, (start + segment.file_size) // page * page
+            first, last = -(-begin // page) * page, (begin + segment.file_size) // page * page
             if first < last:
                 yield first, last
 
 
-def _relocates_text(library: _Library, segment: _Segment) -> bool:
+def _relocates_text(start: int, segment: _Segment) -> bool:
     """Tell whether this says that the loader writes into what is read-only afterwards."""
     if segment.kind != _DYNAMIC:
         return False
-    table = ctypes.cast(library.base + segment.address, ctypes.POINTER(_Entry))
+    table = ctypes.cast(start + segment.address, ctypes.POINTER(_Entry))
     entries = takewhile(lambda entry: entry.tag != _END, map(table.__getitem__, count()))
     return any(
         entry.tag == _TEXT_RELOCATED or (entry.tag == _FLAGS and entry.value & _FLAG_TEXT_RELOCATED)
