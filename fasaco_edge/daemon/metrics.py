@@ -1,17 +1,23 @@
 """The metrics server for Prometheus: the newest status, over HTTP, on a thread of its own.
 
-It never blocks the loop: the loop only passes a reference. It never blocks on a connection:
-complete requests are answered one at a time, rate-limited, so a client that polls in a tight loop
-costs little CPU.
+It never blocks the loop: the loop only passes a reference. It never blocks on a connection: it
+polls them a few times a second and answers all complete requests, so a client that polls in a
+tight loop costs little CPU.
 """
 
 from __future__ import annotations
 
+import fcntl
+import functools
 import logging
 import select
 import socket
+import struct
+import sys
+import termios
 import threading
 import time
+from collections.abc import Iterator
 
 from fasaco_edge.daemon.exposition import CONTENT_TYPE, exposition
 from fasaco_edge.host.addresses import Address
@@ -20,11 +26,13 @@ from fasaco_edge.wire.documents.status import Status
 LOG = logging.getLogger(__name__)
 
 PATH = "/metrics"
-# Of a request: most bytes read, timeout of its arrival [s], timeout of sending the answer [s].
-MOST_BYTES, LONGEST_S, SEND_S = 8192, 1.0, 0.2
-# Pause between two answers [s]. Most open connections, and most that wait to be accepted: beyond
-# that the oldest, silent for the longest, is closed.
-PAUSE_S, MOST_OPEN = 0.05, 16
+# Of a request: most bytes read, timeout of its arrival and of the delivery of its answer [s].
+MOST_BYTES, LONGEST_S = 8192, 1.0
+# Pause between two polls [s]. Most connections accepted at each, which may wait until then; most
+# that stay open: beyond that the oldest are closed.
+PAUSE_S, MOST_TAKEN, MOST_OPEN = 0.05, 64, 16
+# Send buffer, which holds a whole answer [bytes].
+ANSWER_BYTES = 1 << 17
 REASONS = {200: "OK", 404: "Not Found", 405: "Method Not Allowed", 503: "Service Unavailable"}
 
 
@@ -40,7 +48,7 @@ class MetricsServer:
 
     def __init__(self, address: Address) -> None:
         family = socket.AF_INET6 if ":" in address.host else socket.AF_INET
-        self._socket = socket.create_server(address, family=family, backlog=MOST_OPEN)
+        self._socket = socket.create_server(address, family=family, backlog=MOST_TAKEN)
         self._socket.setblocking(False)
         self._shown: tuple[Status, float] | None = None
         self._is_closed = threading.Event()
@@ -61,47 +69,47 @@ class MetricsServer:
         self._socket.close()
 
     def _serve(self) -> None:
-        requests: dict[socket.socket, _Request] = {}
+        requests: list[_Request] = []
         while not self._is_closed.is_set():
-            try:
-                wait_s = LONGEST_S if requests else None
-                readable, _, _ = select.select([self._socket, *requests], [], [], wait_s)
-            except (OSError, ValueError) as error:
-                LOG.debug("metrics: %s", error)  # the socket is closed
-                continue
-            if self._socket in readable:
-                self._take(requests)
-            for connection in readable:
-                if connection in requests:
-                    requests[connection].read()
-            self._answer_one(requests)
+            self._wait(requests)
+            requests += self._taken()
+            for request in requests:
+                request.read()
+            self._answer(requests)
+            requests = _kept(requests)
             self._is_closed.wait(PAUSE_S)
-        for request in requests.values():
+        for request in requests:
             request.close()
 
-    def _take(self, requests: dict[socket.socket, _Request]) -> None:
-        """Accept waiting connections; close the oldest if there are too many."""
-        for _ in range(MOST_OPEN):
+    def _wait(self, requests: list[_Request]) -> None:
+        """Wait for data, or for the timeout of a request."""
+        # Not select(2), which takes only descriptors below 1024.
+        arrivals = select.poll()
+        try:
+            arrivals.register(self._socket, select.POLLIN)
+            for request in requests:
+                arrivals.register(request, select.POLLIN)
+            arrivals.poll(LONGEST_S * 1e3 if requests else None)
+        except (OSError, ValueError) as error:
+            LOG.debug("metrics: %s", error)  # the socket is closed
+
+    def _taken(self) -> Iterator[_Request]:
+        """Accept waiting connections."""
+        for _ in range(MOST_TAKEN):
             try:
                 connection, _ = self._socket.accept()
             except OSError as error:
                 # No more wait, or the socket is closed, or there are no descriptors left.
                 LOG.debug("metrics: %s", error)
-                break
-            requests[connection] = _Request(connection)
-        while len(requests) > MOST_OPEN:
-            requests.pop(next(iter(requests))).close()
+                return
+            yield _Request(connection)
 
-    def _answer_one(self, requests: dict[socket.socket, _Request]) -> None:
-        """Answer the oldest complete request; close expired connections."""
-        now, has_answered = time.monotonic(), False
-        for connection, request in list(requests.items()):
-            if request.is_whole and not has_answered:
-                request.answer(*self._page(*request.words()))
-                has_answered = True
-            elif not (request.is_gone or now > request.until):
-                continue
-            requests.pop(connection).close()
+    def _answer(self, requests: list[_Request]) -> None:
+        """Answer the complete requests."""
+        page = functools.cache(self._page)
+        for request in requests:
+            if request.is_whole and not request.is_answered:
+                request.answer(*page(*request.words()))
 
     def _page(self, method: str, path: str) -> tuple[int, str]:
         if method not in ("GET", "HEAD"):
@@ -114,35 +122,55 @@ class MetricsServer:
         return 200, exposition(status, time.monotonic() - at)
 
 
+def _kept(requests: list[_Request]) -> list[_Request]:
+    """Close finished and expired requests, and the oldest beyond the limit; return the rest."""
+    now = time.monotonic()
+    waiting = [request for request in requests if not request.is_over(now)]
+    kept = sorted(waiting, key=lambda request: request.until)[-MOST_OPEN:]
+    for request in set(requests) - set(kept):
+        request.close()
+    return kept
+
+
 class _Request:
-    """The received part of one request.
+    """The received part of one request, and its answer.
 
     Attributes:
-        until: deadline of its arrival, monotonic [s].
-        is_gone: the client is gone.
+        until: deadline of its arrival, then of the delivery of its answer, monotonic [s].
+        is_answered: whether its answer was sent.
     """
 
     def __init__(self, connection: socket.socket) -> None:
         connection.setblocking(False)
-        self._connection, self._head = connection, b""
-        self.until, self.is_gone = time.monotonic() + LONGEST_S, False
+        self._connection, self._head, self._is_gone = connection, b"", False
+        self.until, self.is_answered = time.monotonic() + LONGEST_S, False
+
+    def fileno(self) -> int:
+        """Return the connection's descriptor."""
+        return self._connection.fileno()
 
     @property
     def is_whole(self) -> bool:
         """Whether it is complete, or the size limit is reached."""
         return b"\r\n\r\n" in self._head or len(self._head) >= MOST_BYTES
 
+    def is_over(self, now: float) -> bool:
+        """Tell whether it has expired, its answer is delivered, or the client is gone."""
+        if now > self.until:
+            return True
+        return not self._unsent() if self.is_answered else self._is_gone
+
     def read(self) -> None:
         """Read the available bytes."""
         if self.is_whole:
             return
         try:
-            part = self._connection.recv(1024)
+            part = self._connection.recv(MOST_BYTES - len(self._head))
         except BlockingIOError:
             return
         except OSError:
             part = b""
-        self._head, self.is_gone = self._head + part, not part
+        self._head, self._is_gone = self._head + part, not part
 
     def words(self) -> tuple[str, str]:
         """Return method and path."""
@@ -150,7 +178,7 @@ class _Request:
         return method, rest.partition(" ")[0].partition("?")[0]
 
     def answer(self, code: int, body: str) -> None:
-        """Send as much of the answer as the socket takes at once."""
+        """Send the answer, without waiting for its delivery."""
         text = body.encode()
         lines = (
             f"HTTP/1.0 {code} {REASONS[code]}",
@@ -160,14 +188,26 @@ class _Request:
             *(["Allow: GET, HEAD"] if code == 405 else ()),
         )
         head = "\r\n".join((*lines, "", "")).encode()
+        self.is_answered, self.until = True, time.monotonic() + LONGEST_S
         try:
-            self._connection.settimeout(SEND_S)
-            self._connection.sendall(head if self.words()[0] == "HEAD" else head + text)
+            self._connection.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, ANSWER_BYTES)
+            self._connection.send(head if self.words()[0] == "HEAD" else head + text)
         except OSError as error:
-            LOG.debug("metrics: %s", error)  # the client is gone, or too slow
+            LOG.debug("metrics: %s", error)  # the client is gone
+
+    def _unsent(self) -> int:
+        """Return how much of the answer the client has not acknowledged [bytes]."""
+        try:
+            said = fcntl.ioctl(self._connection, termios.TIOCOUTQ, bytes(4))
+        except OSError:
+            return 0
+        return int.from_bytes(said, sys.byteorder)
 
     def close(self) -> None:
-        """Close the connection."""
+        """Close the connection, discarding data that the kernel would keep for minutes."""
+        if self._unsent():
+            at_once = struct.pack("ii", 1, 0)
+            self._connection.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, at_once)
         self._connection.close()
 
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import re
+import resource
 import socket
 import threading
 import time
@@ -161,6 +163,59 @@ def test_many_who_say_nothing_hold_up_nobody():
         with OPENER.open(f"{url}/metrics", timeout=60) as answer:
             assert answer.status == 200
         assert time.monotonic() - begun < 5.0, "each of them may take a second to say something"
+
+
+def test_a_flood_of_silent_connections_holds_up_nobody():
+    with served() as url, ExitStack() as stack:
+        address, is_over = ("127.0.0.1", int(url.rpartition(":")[2])), threading.Event()
+
+        def flood():
+            while not is_over.wait(0.01):
+                for _ in range(5):
+                    silent = stack.enter_context(socket.socket())
+                    silent.setblocking(False)
+                    silent.connect_ex(address)
+
+        flooding = threading.Thread(target=flood)
+        flooding.start()
+        try:
+            for _ in range(5):
+                with OPENER.open(f"{url}/metrics", timeout=60) as answer:
+                    assert answer.status == 200
+                    assert answer.read()
+        finally:
+            is_over.set()
+            flooding.join()
+
+
+def test_all_who_ask_at_once_are_answered():
+    """Some of them take nothing of the answer."""
+    with served() as url, ExitStack() as stack:
+        address, asking = ("127.0.0.1", int(url.rpartition(":")[2])), []
+        for number in range(40):
+            asking.append(stack.enter_context(socket.socket()))
+            asking[-1].settimeout(60.0)
+            if number % 2:
+                asking[-1].setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1)
+            asking[-1].connect(address)
+            asking[-1].sendall(b"GET /metrics HTTP/1.0\r\n\r\n")
+        assert all(each.recv(12) == b"HTTP/1.0 200" for each in asking[::2])
+
+
+def test_descriptors_beyond_the_first_thousand_count_as_well():
+    """As of a daemon with a thousand sessions of others."""
+    limits = resource.getrlimit(resource.RLIMIT_NOFILE)
+    if limits[1] < 2048:
+        pytest.skip("this system lets no process have as many")
+    with ExitStack() as stack:
+        stack.callback(resource.setrlimit, resource.RLIMIT_NOFILE, limits)
+        resource.setrlimit(resource.RLIMIT_NOFILE, (2048, limits[1]))
+        stack.callback(os.close, taken := os.open(os.devnull, os.O_RDONLY))
+        while taken <= 1024:
+            stack.callback(os.close, taken := os.dup(taken))
+        url = stack.enter_context(served())
+        with OPENER.open(f"{url}/metrics", timeout=10) as answer:
+            assert answer.status == 200
 
 
 def test_who_asks_without_end_gets_a_few_answers_a_second():
