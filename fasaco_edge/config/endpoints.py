@@ -63,6 +63,8 @@ def from_here(endpoint: str) -> str:
 
 # What Zenoh knows beside these; who builds it with them may use them.
 DEVICES = ("serial", "vsock")
+# Zenoh takes no longer one [bytes].
+MOST_BYTES = 255
 
 
 def endpoint_faults(name: str, endpoints: Sequence[str]) -> Iterator[BadConfiguration]:
@@ -87,16 +89,22 @@ def _why_none(endpoint: str) -> str:
     if protocol not in known:
         of_these = f"the protocol must be one of {', '.join(known)}"
         return f"{of_these}, got {protocol!r}" if protocol else "no protocol before the address"
-    if not address or re.search(r"\s", address):
-        return "a space in the address" if address else f"no address after {protocol}/"
+    if not address:
+        return f"no address after {protocol}/"
+    if endpoint.endswith(("?", "#")):
+        return f"nothing after {endpoint[-1]}"
+    if (length := len(endpoint.encode(errors="replace"))) > MOST_BYTES:
+        return f"it may have at most {MOST_BYTES} bytes, got {length}"
     return _why_no_socket(address) if protocol in IP else ""
 
 
 def _why_no_socket(address: str) -> str:
     host, _, port = address.rpartition(":")
+    if re.search(r"[\s\0]", address):
+        return "a space in the address"
     if not host:
         return "the address must be <host>:<port>"
-    if not re.fullmatch(r"\d{1,5}", port) or int(port) >= 1 << 16:
+    if not re.fullmatch(r"[0-9]{1,5}", port) or int(port) >= 1 << 16:
         return f"the port must be a number of at most 65535, got {port!r}"
     if ":" in host and not (host.startswith("[") and host.endswith("]")):
         return f"an IPv6 address stands in brackets, as [{host}]:{port}"

@@ -84,10 +84,15 @@ def test_endpoints_beyond_this_computer(tmp_path, endpoint):
         ("http/robot:80", "the protocol must be one of tcp, udp, tls, quic, ws"),
         ("tcp/", "no address after tcp/"),
         ("tcp/my robot:7447", "a space in the address"),
+        ("tcp/my\0robot:7447", "a space in the address"),
         ("tcp/robot", "the address must be <host>:<port>"),
         ("tcp/:7447", "the address must be <host>:<port>"),
         ("tcp/robot:door", "the port must be a number of at most 65535, got 'door'"),
         ("tcp/robot:65536", "the port must be a number of at most 65535"),
+        ("tcp/robot:٧٤٤٧", "the port must be a number of at most 65535"),
+        ("tcp/robot:7447#", "nothing after #"),
+        (f"tcp/{'r' * 250}:7447", "it may have at most 255 bytes, got 259"),
+        ("tcp/\ud800:7447#", "nothing after #"),
         ("tcp/::1:7447", r"an IPv6 address stands in brackets, as [::1]:7447"),
     ],
 )
@@ -99,6 +104,11 @@ def test_what_is_no_endpoint_is_named_before_anything_is_opened(tmp_path, key, e
     assert f"bus.{key}: {endpoint!r}: " in str(refused.value)
     assert why in str(refused.value)
     assert "as tcp/192.168.1.5:7447" in refused.value.hint
+
+
+def test_a_socket_may_have_a_space_in_its_name(tmp_path):
+    listen = ["unixsock-stream//run/my robot/bus.sock"]
+    assert list(load(tmp_path, listen=listen).bus.listen) == listen
 
 
 def test_to_connect_anywhere_opens_nothing(tmp_path):
