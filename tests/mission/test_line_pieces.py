@@ -137,3 +137,11 @@ def test_where_no_stand_comes_between_the_line_goes_on():
     joiner = Joiner(here, walk, 0, stand, without_corners, lambda a, b: True, lambda cell: False)
     pieces = [Piece(line.part(0, 2), 0), Piece(line.part(4, 6), 4)]
     assert whole(joiner.joined(pieces)).cells.tolist()[:4] == [0, 1, 4, 5]
+
+
+def test_a_walk_of_one_cell_is_a_line_of_one_stand():
+    walk = cells((0, 0))
+    here = polished(walk)
+    # Not even its own stand can be driven to from where the robot is.
+    joiner = Joiner(here, walk, 0, stand, over, lambda a, b: False, lambda cell: False)
+    assert whole(joiner.joined([])).points.tolist() == [[0.0, 0.0]]

@@ -205,7 +205,7 @@ class Joiner:
         kept = far if last is not None else np.concatenate([[True], far])
         if not kept.all():
             line = Line(line.points[kept], line.cells[kept], line.state[kept])
-        is_left_out = len(line) > 0 and not far[0]
+        is_left_out = len(line) > 0 and not kept[0]
         if last is not None and is_left_out and not self.is_clear(last, line.points[0]):
             return False
         self._done.append(Piece(line, -1))
