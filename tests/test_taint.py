@@ -44,6 +44,7 @@ from fasaco_edge.wire.messages.paths import encode_path
 from fasaco_edge.wire.messages.pheromone import encode_pheromone
 from fasaco_edge.wire.topics import RPC_NAMES
 from tests.serve.serving import looking, served
+from tests.support.forked import run_forked
 from tests.support.outsider import Outsider
 from tests.support.processes import COMMAND_S, ENVIRONMENT, PROGRAM, daemon_process, free_endpoint
 from tests.support.rooms import map_bytes, pose_bytes, room
@@ -106,14 +107,11 @@ def judge(said: str) -> None:
 
 def run(*words: object, env: dict[str, str] | None = None) -> tuple[int, str]:
     """Run a command as a user does; judge and return what it says."""
-    command = [*PROGRAM, *(os.fsencode(str(word)) for word in words)]
-    ended = subprocess.run(
-        command, check=False, capture_output=True, timeout=COMMAND_S, env=ENVIRONMENT | (env or {})
-    )
-    said = (ended.stdout + ended.stderr).decode()
-    judge(said)
-    assert "Traceback" not in said, said
-    return ended.returncode, ended.stdout.decode()
+    command = (*PROGRAM[1:], *(str(word) for word in words))
+    code, out, err = run_forked(command, ENVIRONMENT | (env or {}), COMMAND_S)
+    judge(out + err)
+    assert "Traceback" not in out + err, out + err
+    return code, out
 
 
 @contextmanager

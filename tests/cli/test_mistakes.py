@@ -15,6 +15,7 @@ from PIL import Image
 
 from fasaco_edge.cli import main
 from fasaco_edge.host.processes import cpu_seconds
+from tests.support.forked import run_forked
 from tests.support.processes import ENVIRONMENT, PROGRAM, fasaco_edge, free_endpoint
 
 NOBODY = "tcp/127.0.0.1:1"
@@ -178,13 +179,11 @@ def test_a_pipe_or_a_device_holds_nobody_up(folder, words, make):
     pytest.importorskip("pyarrow")
     for ending in ("rrd", "npy", "png", "yaml", "py"):
         make(f"it.{ending}")
-    command = [*PROGRAM, *(word.format("it") for word in words)]
-    ended = subprocess.run(
-        command, check=False, env=ENVIRONMENT, capture_output=True, text=True, timeout=120
-    )
-    assert ended.returncode != 0
-    assert "it." in ended.stderr
-    assert "Traceback" not in ended.stderr
+    command = (*PROGRAM[1:], *(word.format("it") for word in words))
+    code, _, err = run_forked(command, ENVIRONMENT, 120.0)
+    assert code != 0
+    assert "it." in err
+    assert "Traceback" not in err
 
 
 def test_a_mistake_ends_a_process_in_order(folder):

@@ -127,12 +127,14 @@ def run_forked(
         finally:
             process.kill()
             process.wait()
-        return code, out.read_text(), err.read_text()
+        # As it was written: reading text would make of a carriage return the end of a line.
+        return code, out.read_bytes().decode(), err.read_bytes().decode()
 
 
 def _settings(environment: Mapping[str, str]) -> dict[str, str]:
     """Return what may decide which kernels a process has."""
-    return {name: value for name, value in environment.items() if name[:7] != "FASACO_"}
+    others = ("COLUMNS", "NO_COLOR")
+    return {k: v for k, v in environment.items() if k[:7] != "FASACO_" and k not in others}
 
 
 _COMMON_SETTINGS = _settings(ENVIRONMENT)
