@@ -10,7 +10,7 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 
-from fasaco_edge.host import durable, files, libraries, processes
+from fasaco_edge import host
 from fasaco_edge.kernels import cache, jit, release, sealed
 from fasaco_edge.kernels.cache import note_complete
 from fasaco_edge.kernels.release import KERNEL_SUFFIX
@@ -174,11 +174,7 @@ def package_in(folder: Path) -> Path:
     package.mkdir(parents=True)
     for part in (package.parent / "__init__.py", package / "__init__.py"):
         part.touch()
-    host = package.parent / "host"
-    host.mkdir()
-    (host / "__init__.py").touch()
-    for module in (durable, files, libraries, processes):
-        shutil.copy(module.__file__, host)
+    shutil.copytree(Path(host.__file__).parent, package.parent / "host")
     for module in (jit, cache, release, sealed):
         shutil.copy(module.__file__, package)
     return package
