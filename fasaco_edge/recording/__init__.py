@@ -1,1 +1,1 @@
-"""A process of its own: bus in, .rrd out; the blueprint; reading back. Only here is rerun."""
+"""The recorder, a separate process: bus in, .rrd out; reading back. The only package with Rerun."""

@@ -1,6 +1,6 @@
-"""Arrow, which Rerun brings along, or the reason why there is none.
+"""Arrow, a dependency of Rerun, or the reason why it is missing.
 
-All that reading a recording takes: to import Rerun itself costs 0.3 s of processor time.
+Reading a recording needs no more: importing Rerun itself costs 0.3 s of processor time.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ try:
 except ImportError as error:
     raise missing_rerun(error) from error
 
-# Arrow's own pool keeps what is freed: some ten megabytes of it.
+# Arrow's own pool keeps some ten megabytes of freed memory.
 pa.set_memory_pool(pa.system_memory_pool())
 
 __all__ = ["missing_rerun", "pa"]

@@ -1,4 +1,4 @@
-"""Names of what a recording holds: they are its interface, for blueprints and for readers."""
+"""Entity and timeline names of a recording: its interface for blueprints and readers."""
 
 from __future__ import annotations
 

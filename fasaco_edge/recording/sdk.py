@@ -1,4 +1,4 @@
-"""Rerun, or the reason why there is none."""
+"""Rerun, or the reason why it is missing."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import os
 
 from fasaco_edge.recording.arrow import missing_rerun
 
-# Rerun's allocator (mimalloc) kept 130 MB of what was freed in an hour; read once, at its import.
+# Rerun's allocator (mimalloc) kept 130 MB of freed memory in an hour; read once, at its import.
 os.environ.setdefault("MIMALLOC_PURGE_DELAY", "0")
 
 try:

@@ -1,1 +1,1 @@
-"""The contract in code: keys and codecs, bytes to values and back; knows no session."""
+"""The contract in code: keys and codecs, bytes to values and back; no sessions."""

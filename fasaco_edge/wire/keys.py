@@ -1,4 +1,4 @@
-"""Keys of one robot; ``wire.topics`` has their table."""
+"""Keys of one robot; their table is ``wire.topics``."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class Keys:
 
     Attributes:
         robot: name of the robot, one chunk.
-        base: what all robots' keys begin with, one chunk or several joined by ``/``.
+        base: common prefix of all robots' keys, one chunk or several joined by ``/``.
 
     Raises:
         BadConfiguration: a chunk is empty or holds more than letters, digits, ``_``, ``-``.
@@ -36,11 +36,11 @@ class Keys:
 
     @property
     def prefix(self) -> str:
-        """What all keys of this robot begin with."""
+        """Prefix of all keys of this robot."""
         return f"{self.base}/{VERSION}/{self.robot}"
 
     def of(self, topic: Topic) -> str:
-        """Return the key of a topic; a key expression where its row has a ``*``."""
+        """Return the key of a topic; a key expression if its row has a ``*``."""
         return f"{self.prefix}/{topic.suffix}"
 
     def of_all(self, topic: Topic) -> str:
@@ -48,7 +48,7 @@ class Keys:
         return f"{self.base}/{VERSION}/*/{topic.suffix}"
 
     def robot_of(self, key: str) -> str:
-        """Return the name of the robot whose key this is; "" where it is a key expression."""
+        """Return the name of the robot of a key; "" for a key expression."""
         robot = key.removeprefix(f"{self.base}/{VERSION}/").partition("/")[0]
         return robot if is_chunk(robot) else ""
 

@@ -1,4 +1,4 @@
-"""What a message may hold at most; ``protocol/limits.yaml`` is the same table as data."""
+"""Limits of messages; ``protocol/limits.yaml`` is the same table as data."""
 
 from __future__ import annotations
 

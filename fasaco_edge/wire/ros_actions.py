@@ -1,9 +1,9 @@
-"""Names of a ROS 2 action on Zenoh: the services behind it, and what tokens say of its server.
+"""Names of a ROS 2 action on Zenoh: its services, and its server in liveliness tokens.
 
 An action is three services and two topics below ``<action>/_action``; rmw_zenoh and
-zenoh-bridge-ros2dds know no more of it. Sources: rcl_action of Jazzy (names), rmw_zenoh_cpp at
-commit 028bbe3 (``rmw_service_data.cpp``: what a request has to have, and that a number may not
-come twice), nav2_msgs of Humble, Iron, Jazzy and Lyrical. Hashes follow REP 2016; that of
+zenoh-bridge-ros2dds have no other notion of an action. Sources: rcl_action of Jazzy (names),
+rmw_zenoh_cpp at commit 028bbe3 (``rmw_service_data.cpp``: attachment of a request; sequence numbers
+must not repeat), nav2_msgs of Humble, Iron, Jazzy and Lyrical. Hashes follow REP 2016; that of
 CancelGoal is also published.
 """
 
@@ -47,7 +47,7 @@ def server_tokens(domain: int, action: str) -> str:
 
 
 def served_keys(domain: int, action: str, tokens: Iterable[str]) -> dict[Call, str]:
-    """Return the keys of the services that tokens tell of, as far as they do."""
+    """Return the keys of the services named by tokens."""
     found = dict[Call, str]()
     for token in sorted(tokens):
         parts = token.split("/")
@@ -59,5 +59,5 @@ def served_keys(domain: int, action: str, tokens: Iterable[str]) -> dict[Call, s
 
 
 def release_of(send_goal_key: str) -> Release | None:
-    """Return whose goals a server takes, by its key of rmw_zenoh; None for none that is known."""
+    """Return the ROS release of a server's goal type, by its rmw_zenoh key; None if unknown."""
     return _GOALS.get(send_goal_key.rpartition("/")[2])

@@ -5,7 +5,8 @@ commit 3411fde (``liveliness_utils.cpp``: tokens, quality of service) and 534747
 (``attachment_helpers.cpp``: as changed by #601, in 0.1.2 for Humble; older ones differ).
 eclipse-zenoh/zenoh-plugin-ros2dds at commit ebdb1e0 (``route_subscriber.rs``).
 
-Humble has no type hashes: it writes ``TypeHashNotSupported``, and does not hear who writes one.
+Humble has no type hashes: it writes ``TypeHashNotSupported``, and does not match endpoints that
+send a type hash.
 """
 
 from __future__ import annotations
@@ -53,13 +54,13 @@ Endpoint = Literal["MP", "MS", "SS"]
 
 @dataclass(frozen=True, slots=True)
 class RosTopic:
-    """A topic or a service, what it carries and how.
+    """A topic or a service: name, type and QoS.
 
     Attributes:
         name: with its namespace, ``/robot1/map``.
         schema: type of its messages, one of ``TYPE_HASHES`` or ``SERVICE_HASHES``.
-        latched: whether who joins late gets the last sample: transient local.
-        depth: how many samples are kept.
+        latched: transient local: late joiners get the last sample.
+        depth: history depth.
     """
 
     name: str
@@ -73,13 +74,13 @@ class RosTopic:
         return self.name.strip("/")
 
     def rmw_key(self, domain: int, *, any_hash: bool = False) -> str:
-        """Return the key that rmw_zenoh gives it; ``any_hash``: whatever its type's hash."""
+        """Return the key that rmw_zenoh gives it; ``any_hash``: for any type hash."""
         type_hash = "*" if any_hash else _type_hash(self.schema)
         return f"{domain}/{self.bridge_key}/{dds_type(self.schema)}/{type_hash}"
 
     @property
     def qos(self) -> str:
-        """Quality of service as in a token; what rmw_zenoh has for default is left out.
+        """Quality of service as in a token; rmw_zenoh's defaults are left out.
 
         Reliability, durability, history and its depth, deadline, lifespan, liveliness; all are
         reliable and keep the last ``depth``.
@@ -131,19 +132,19 @@ def graph_key(domain: int) -> str:
 
 
 def gid_of(token: str) -> bytes:
-    """Return ``GID_BYTES`` bytes that no other publisher's token has.
+    """Return ``GID_BYTES`` bytes that are unique to a publisher's token.
 
-    rmw_zenoh takes XXH3 for that, and tells samples apart by it. Who looks a sample's publisher
-    up in the graph by its gid does not find ours there.
+    rmw_zenoh uses XXH3 for that, and tells samples apart by it. A lookup of a sample's publisher
+    in the graph by gid does not find ours.
     """
-    # With OpenSSL, three megabytes that a follower without ROS has no use for.
+    # Loads OpenSSL, three megabytes of no use to a follower without ROS.
     from hashlib import blake2b  # noqa: PLC0415
 
     return blake2b(token.encode(), digest_size=GID_BYTES).digest()
 
 
 def attachment(sequence: int, time_ns: int, gid: bytes) -> bytes:
-    """Return what rmw_zenoh demands beside each sample.
+    """Return the attachment that rmw_zenoh demands with each sample.
 
     Args:
         sequence: number of the sample, from 1 on.
@@ -154,7 +155,7 @@ def attachment(sequence: int, time_ns: int, gid: bytes) -> bytes:
 
 
 def attachment_of(beside: bytes) -> tuple[int, bytes] | None:
-    """Return number and gid in what came beside a sample; None where it is none of rmw_zenoh's."""
+    """Return number and gid in an attachment; None if it is not rmw_zenoh's."""
     if len(beside) != _ATTACHMENT.size:
         return None
     sequence, _, size, gid = _ATTACHMENT.unpack(beside)
@@ -162,7 +163,7 @@ def attachment_of(beside: bytes) -> tuple[int, bytes] | None:
 
 
 def dds_type(schema: str) -> str:
-    """Return the name that DDS has for a type."""
+    """Return the DDS name of a type."""
     package, kind, name = schema.split("/")
     return f"{package}::{kind}::dds_::{name}_"
 
@@ -172,5 +173,5 @@ def _type_hash(schema: str) -> str:
 
 
 def mangled(name: str) -> str:
-    """Return a name as it stands in tokens."""
+    """Return a name in the form used in tokens."""
     return name.replace("/", "%")

@@ -1,4 +1,4 @@
-"""Types of the rows of the table of topics, and how a topic is sent."""
+"""Row types of the topic table, and quality of service."""
 
 from __future__ import annotations
 
@@ -29,13 +29,13 @@ class Qos:
     """Quality of service of a publisher.
 
     Attributes:
-        priority: what goes first where a link is busy.
-        reliability: whether a link that may lose what it carries sends it again.
-        congestion: ``drop``: a receiver too slow loses the sample; ``block``: the sender waits
+        priority: order of sending on a busy link.
+        reliability: whether a lossy link sends a sample again.
+        congestion: ``drop``: a slow receiver loses the sample; ``block``: the sender waits
             for it.
-        express: whether it is sent at once, never gathered with others into one packet.
-        cache: how many samples are kept for those who join late; 0 for none.
-        why: reason of what is unusual about it.
+        express: whether it is sent at once, never batched with others into one packet.
+        cache: number of samples kept for late joiners; 0 for none.
+        why: reason for an unusual choice.
     """
 
     priority: Priority = "data"
@@ -55,10 +55,10 @@ VOLATILE = Qos()
 
 
 class Queues(NamedTuple):
-    """How many samples of a topic may wait at each receiver of this package.
+    """Queue lengths of a topic at each receiver of this package.
 
     NEWEST: a newer sample replaces the one before. EVERY: as many as the receiver's memory holds;
-    the recorder keeps all until it is behind, then the newest where it says NEWEST. None: that
+    the recorder keeps all until it is behind, then only the newest if it has NEWEST. None: that
     receiver does not subscribe.
     """
 
@@ -77,18 +77,18 @@ class Topic:
     Attributes:
         name: name of the row, and of the topic in recordings.
         direction: as seen by the planner.
-        when: what makes a sample.
+        when: the event that makes a sample.
         speaker: the role that publishes it.
         listeners: roles that may subscribe to it; ``bus.access`` says which include others.
-        key: what follows the prefix; "" for the name. A ``*`` is a chunk that a session fills in.
+        key: the part after the prefix; "" for the name. A ``*`` is a chunk filled in by a session.
         schemas: message types; none for JSON and tokens.
-        json, attachment: JSON Schema of the payload, and of what comes with it; "" for none.
-        qos: how it is published; None for tokens.
-        rate_hz: how often at least; 0 where that is not promised.
-        queues: what waits at the receivers.
+        json, attachment: JSON Schema of payload and attachment; "" for none.
+        qos: quality of service; None for tokens.
+        rate_hz: lowest rate; 0 for no promise.
+        queues: queues at the receivers.
         is_input: whether a replay feeds it to the mission, so that recordings hold it byte for
-            byte; what the recorder alone takes is none.
-        limits: what bounds it, in ``protocol/limits.yaml``.
+            byte; topics for the recorder alone are no inputs.
+        limits: names of its limits in ``protocol/limits.yaml``.
     """
 
     name: str
@@ -123,7 +123,7 @@ class Topic:
 
     @property
     def size_class(self) -> SizeClass:
-        """Which limit of size holds for it, see ``bus.access.Limits``."""
+        """Its size limit, see ``bus.access.Limits``."""
         if self.qos is None:
             return "token"
         if not self.schemas:
@@ -134,17 +134,17 @@ class Topic:
 
 @dataclass(frozen=True, slots=True)
 class Query:
-    """What can be asked of a daemon, as ``@rpc/<name>``.
+    """A query to a daemon, ``@rpc/<name>``.
 
     Attributes:
         name: name of the query.
-        listeners: roles that may ask it.
-        schema: message type of the answer; "" for JSON.
-        json: JSON Schema of the answer; "" for none.
-        payload: JSON Schema of what comes with the question; "" for none.
-        parameters: what may follow ``?``.
+        listeners: roles that may send it.
+        schema: message type of the reply; "" for JSON.
+        json: JSON Schema of the reply; "" for none.
+        payload: JSON Schema of the query's payload; "" for none.
+        parameters: allowed parameters after ``?``.
         answered: ``at once`` with the newest sample; by the ``loop`` once it has decided.
-        timeout_s: how long to wait for an answer [s].
+        timeout_s: timeout of the reply [s].
         errors: codes of errors beside ``bad_query``.
     """
 
@@ -166,7 +166,7 @@ class Query:
 
     @property
     def size_class(self) -> SizeClass:
-        """Which limit of size holds for its answer."""
+        """The size limit of its reply."""
         return "large" if self.schema else "json"
 
 
@@ -177,9 +177,9 @@ class RosRow(NamedTuple):
         name: its key under ``ros2.topics`` of the configuration.
         topic: name it has in the daemon and in recordings.
         direction: as seen by the planner.
-        schemas: message types it may have.
+        schemas: allowed message types.
         latched: transient local.
-        depth: how many samples are kept.
+        depth: history depth.
     """
 
     name: str

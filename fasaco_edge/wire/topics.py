@@ -184,7 +184,7 @@ FLEET = Topic(
     direction="out",
     when="once a second, and when state or division have changed; only in a fleet",
     speaker="robot",
-    # By the others' they share an area; it comes in, too, from the keys of other robots.
+    # Robots share an area by these messages; it is also received from the keys of other robots.
     listeners=("fleet", "viewer"),
     json="fleet.json",
     qos=Qos("data_low", why="the next one says it all again, within a second"),
@@ -204,7 +204,7 @@ CLAIM = Topic(
     direction="liveliness token",
     when="each daemon of this name has one; its key says whether it plans or waits",
     speaker="robot",
-    # By these the daemons of one name see each other.
+    # The daemons of one name find each other by these.
     listeners=("viewer", "robot"),
     key="claim/*/*",
 )
@@ -229,15 +229,15 @@ RECORDER_ALIVE = Topic(
     key="recorder/alive",
 )
 
-# A recorder subscribes in this order, to the turn log last: once the daemon sees a subscriber
-# there, that subscriber receives everything else, too.
+# A recorder subscribes in this order, to the turn log last: once the daemon sees that subscriber,
+# the recorder receives everything else, too.
 TOPICS = (
     *(MAP, MAP_UPDATE, POSE, BATTERY),
     *(PATH, COVERAGE, FLOOR, PHEROMONE, DIRECTIONS, STATUS, COMMAND, TURNS, FLEET, ALIVE, CLAIM),
     *(RECORDER, RECORDER_ALIVE),
     CMD_VEL,
 )
-# They have one order, that of their one publisher: an update changes the map before it.
+# These keep the order of their one publisher: an update changes the map before it.
 IN_ORDER = frozenset({MAP.name, MAP_UPDATE.name})
 QOS = {topic.name: topic.qos for topic in TOPICS if topic.qos is not None}
 
@@ -254,7 +254,7 @@ QUERIES = (
     ),
     Query("config", ("viewer",), json="config.json"),
     Query("version", ("viewer",), json="version.json"),
-    # To ask these is to command.
+    # These queries are commands.
     Query(
         "mission",
         ("operator",),
@@ -276,7 +276,7 @@ QUERIES = (
 RPC_NAMES = tuple(query.name for query in QUERIES)
 
 TF_STATIC = "tf_static"
-# As tf2's listeners have it. A bridge keeps all nodes' static transforms in one history.
+# As in tf2's listeners. A bridge keeps the static transforms of all nodes in one history.
 TF_DEPTH = POSE_DEPTH = 100
 TF = (schemas.TF_MESSAGE,)
 _ROS_ROWS = (
@@ -301,7 +301,7 @@ def _queue_lengths() -> dict[str, int]:
     lengths = dict[str, int]()
     for topic in TOPICS:
         if topic is POSE:
-            # By ROS 2 alone; taken before the poses that need them.
+            # Only in ROS 2; taken before the poses that need them.
             lengths[TF_STATIC] = 256
         if topic.queues.daemon is not None and topic.queues.daemon > NEWEST:
             lengths[topic.name] = topic.queues.daemon

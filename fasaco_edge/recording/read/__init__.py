@@ -1,1 +1,1 @@
-"""Recordings read back."""
+"""Readers of recordings."""

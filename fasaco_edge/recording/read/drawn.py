@@ -1,6 +1,6 @@
-"""Lines, labels and pheromone fields in a recording, each as it was drawn, one after the other.
+"""Lines, labels and pheromone fields of a recording, in the order in which they were drawn.
 
-A review keeps some fields, spread over all of the time; all else is read when somebody asks for it.
+A review keeps some fields, spread over the whole time; everything else is read on demand.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from fasaco_edge.recording.arrow import pa
 from fasaco_edge.recording.read.frames import Chunk, chunks, column, wall_ns
 from fasaco_edge.recording.read.repair import open_part
 
-# Most that are kept; of more every other one is dropped.
+# Most fields that are kept; beyond that every other one is dropped.
 MOST_FIELDS = 64
 
 _POINT = pa.list_(pa.field("item", pa.float32(), nullable=False), 3)
@@ -37,11 +37,11 @@ class DrawnField:
     """A field as it was drawn.
 
     Attributes:
-        at_ns: when, by the recorder's clock [ns].
-        window: the cells it spans, as it was drawn: relative to where 0 was.
+        at_ns: time by the recorder's clock [ns].
+        window: the cells it spans, relative to the origin of the drawing.
         cell_m: edge of a cell [m].
-        yaw_deg: of its cells' rows, about where 0 was [deg]; the window is of cells so turned.
-        anchor: where 0 was, (x, y) [m] in the map frame, for those who know.
+        yaw_deg: angle of the rows of cells about that origin [deg]; the window is in these cells.
+        anchor: origin of the drawing, (x, y) [m] in the map frame, if known.
     """
 
     at_ns: int
@@ -93,8 +93,8 @@ class FieldSampler:
     """Takes fields in order of time and keeps some.
 
     Attributes:
-        count: how many there were.
-        fields: those kept, about evenly spread, and the last one.
+        count: number of all fields.
+        fields: the kept ones, about evenly spread, and the last one.
     """
 
     count: int = 0
@@ -121,19 +121,19 @@ class FieldSampler:
             self._every *= 2
 
     def spread(self) -> tuple[DrawnField, ...]:
-        """Return the fields kept, in order of time, the last one among them."""
+        """Return the kept fields in order of time, with the last one."""
         last = [] if self._last is None or self._last in self.fields else [self._last]
         return tuple(sorted([*self.fields, *last], key=lambda one: one.at_ns))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DrawnLine:
-    """A line that was drawn, without the points it runs straight through.
+    """A drawn line, reduced to its corners.
 
     Attributes:
-        at_ns: when, by the recorder's clock [ns].
-        revision: of the path in force then; 0 where none was.
-        xy: float64 (n, 2), its corners in the map frame [m]; n is 0 where a line was taken away.
+        at_ns: time by the recorder's clock [ns].
+        revision: of the path in force then; 0 for none.
+        xy: float64 (n, 2), its corners in the map frame [m]; n is 0 if a line was removed.
     """
 
     at_ns: int
@@ -143,7 +143,7 @@ class DrawnLine:
 
 @dataclass(frozen=True, slots=True)
 class DrawnLabel:
-    """A text that was drawn, and when [ns]; "" where one was taken away."""
+    """A drawn text and its time [ns]; "" if one was removed."""
 
     at_ns: int
     text: str
@@ -153,16 +153,16 @@ Drawn = DrawnLine | DrawnLabel | DrawnField
 
 
 def drawings(paths: Sequence[Path], *wanted: str) -> Iterator[tuple[str, Drawn]]:
-    """Yield the entity and what was drawn of it, of paths, labels and the pheromone field.
+    """Yield each entity and its drawing, for paths, labels and the pheromone field.
 
-    A part begins with what was in force before it; that comes once more.
+    A part begins with the drawings in force before it; these are yielded again.
 
     Args:
         paths: the parts of one run, in order.
         wanted: names of the entities.
 
     Raises:
-        UnreadableRecording: a file is missing, is no recording, or is broken.
+        UnreadableRecording: a file is missing, is no recording, or is damaged.
     """
     anchor = np.zeros(2)
     for path in paths:

@@ -1,9 +1,9 @@
-"""The chunks of a recording, read without Rerun, which trusts what a file claims.
+"""The chunks of a recording, read without Rerun, which trusts the sizes stated in a file.
 
-A chunk is an Arrow message, packed, in a Protobuf message, in a frame (``recording.read.repair``).
-Each states the size of the next; that is checked before memory is taken for it. Rerun's own reader
-takes the memory, and ends the process where there is too little, or where a message is broken. The
-footer, an index, is not needed to read from the beginning to the end.
+A chunk is a compressed Arrow message in a Protobuf message in a frame
+(``recording.read.repair``). Each states the size of the inner one, which is checked before memory
+is allocated. Rerun's own reader allocates first, and aborts the process if memory is short or a
+message is malformed. The footer, an index, is not needed for sequential reading.
 """
 
 from __future__ import annotations
@@ -18,22 +18,22 @@ from fasaco_edge.recording.arrow import pa
 from fasaco_edge.recording.read.repair import FOOTER_KIND, FRAME, HEADER_BYTES, Scan
 
 CHUNK_KIND = 2
-# Of a chunk, unpacked: the largest that a recorder writes is a map of 64 million pixels.
+# Limit of an uncompressed chunk: the largest that a recorder writes is a map of 64 million pixels.
 MOST_CHUNK_BYTES = 128 * 1024 * 1024
-# What LZ4 makes of a byte at most.
+# Largest ratio of LZ4 compression.
 LZ4_RATIO = 255
 
-# Fields of a chunk's frame, and of the store it belongs to.
+# Fields of a chunk's frame, and of its store.
 STORE, PACKING, UNPACKED, ARROW, IS_STATIC = 1, 2, 3, 5, 7
 STORE_KIND, STORE_ID = 1, 2
 RECORDING = 1
 NOT_PACKED, LZ4 = 1, 2
 ENTITY_PATH = b"rerun:entity_path"
-# Protobuf's kinds of values, and where Arrow's Flatbuffers have what.
+# Protobuf's wire types, and slots of Arrow's Flatbuffers.
 _VARINT, _FIXED64, _BYTES, _FIXED32 = 0, 1, 2, 5
 _HEADER, _COMPRESSION = 2, 3
 
-# What a message that is broken ends in.
+# Exceptions raised for a malformed message.
 BROKEN = (ValueError, LookupError, struct.error, OSError, StopIteration)
 
 Fields = dict[int, int | bytes]
@@ -44,11 +44,11 @@ class Chunk:
     """Some rows of an entity.
 
     Attributes:
-        recording_id: of the recording it is part of.
+        recording_id: of its recording.
         entity: without its leading slash.
         is_static: whether it has no times.
         batch: the rows, validated.
-        bytes: its size, unpacked.
+        bytes: its uncompressed size.
     """
 
     recording_id: str
@@ -59,10 +59,10 @@ class Chunk:
 
 
 def chunks(recording: BinaryIO, scan: Scan) -> Iterator[Chunk | None]:
-    """Yield for each whole frame the chunk in it; None for a frame without one.
+    """Yield the chunk of each complete frame; None for a frame without one.
 
     Raises:
-        ValueError: a frame is not what it claims to be.
+        ValueError: a frame is malformed.
         OSError: the file cannot be read.
     """
     recording.seek(HEADER_BYTES)
@@ -80,7 +80,7 @@ def chunks(recording: BinaryIO, scan: Scan) -> Iterator[Chunk | None]:
 
 
 def column(batch: pa.RecordBatch, name: str, kind: pa.DataType) -> pa.Array | None:
-    """Return a column of a batch; None where there is none.
+    """Return a column of a batch; None if there is none.
 
     Raises:
         ValueError: it is of another type than ``kind``, or has nulls in it.
@@ -144,7 +144,7 @@ def _batch(content: pa.Buffer) -> pa.RecordBatch:
 
 
 def _check_not_compressed(flat: bytes) -> None:
-    """Raise ValueError where columns would be unpacked once more, to whatever they claim."""
+    """Raise ValueError for compressed columns, which would expand to any stated size."""
     message = struct.unpack_from("<I", flat)[0]
     header = _slot(flat, message, _HEADER)
     rows = header + struct.unpack_from("<I", flat, header)[0]
@@ -153,7 +153,7 @@ def _check_not_compressed(flat: bytes) -> None:
 
 
 def _slot(flat: bytes, table: int, number: int) -> int:
-    """Return the offset of a field of a Flatbuffers table; 0 where it is left out."""
+    """Return the offset of a field of a Flatbuffers table; 0 if it is left out."""
     about = table - struct.unpack_from("<i", flat, table)[0]
     size = struct.unpack_from("<H", flat, about)[0]
     place = 4 + 2 * number

@@ -1,9 +1,9 @@
-"""Recordings torn by a crash: found, cut at their last whole frame, shown up to it.
+"""Repair of recordings torn by a crash: found, truncated after the last complete frame, shown.
 
-A reader refuses a whole file for one torn frame at its end, which is what a
-power cut or a full disk leaves. The format: 12 bytes of header, then frames,
-each two little-endian u64 (kind, length) and ``length`` bytes; kind 0 is the
-footer. Rerun never calls fsync, so more than the last frame may be missing.
+A power failure or a full disk leaves a torn frame at the end, and a reader refuses the
+whole file for it. The format: 12 bytes of header, then frames, each two little-endian u64
+(kind, length) and ``length`` bytes; kind 0 is the footer. Rerun never calls fsync, so more
+than the last frame may be missing.
 """
 
 from __future__ import annotations
@@ -31,8 +31,8 @@ HEADER_BYTES = 12
 FRAME = struct.Struct("<QQ")
 FOOTER_KIND = 0
 LAST_KIND = 3
-# A loss of power leaves zeros in place of what was not written yet, in a file of full size. Of its
-# own a frame ends with a zero now and then, and what follows the footer with three.
+# A power failure leaves a file of full size with zeros for data not written yet. A complete frame
+# may end with a zero, too, and the data after the footer with three.
 MOST_ZEROS = 3
 _BLOCK = 65536
 HINT = "name the .rrd files that a recorder has written"
@@ -40,13 +40,13 @@ HINT = "name the .rrd files that a recorder has written"
 
 @dataclass(frozen=True, slots=True)
 class Scan:
-    """What a recording holds, by its frames.
+    """The frames of a recording.
 
     Attributes:
-        frames: whole frames.
-        whole_bytes: size up to the end of the last whole frame [bytes].
+        frames: number of complete frames.
+        whole_bytes: size up to the end of the last complete frame [bytes].
         total_bytes: size of the file [bytes].
-        has_footer: whether the recording was ended in order.
+        has_footer: whether the recording was closed properly.
     """
 
     frames: int
@@ -56,13 +56,13 @@ class Scan:
 
     @property
     def torn_bytes(self) -> int:
-        """Bytes behind the last whole frame."""
+        """Bytes after the last complete frame."""
         return self.total_bytes - self.whole_bytes
 
 
 @dataclass(frozen=True, slots=True)
 class Repair:
-    """A recording that was cut, and by how much [bytes]; or why it could not be looked at."""
+    """A truncated recording and the bytes removed; or why it could not be read."""
 
     path: Path
     cut_bytes: int
@@ -75,10 +75,10 @@ class Repair:
 
 
 def scan_recording(recording: BinaryIO, known_bytes: int = HEADER_BYTES) -> Scan | None:
-    """Walk the frames of ``recording``; None where it does not even begin as one.
+    """Walk the frames of ``recording``; None if it does not even begin as one.
 
     A part whose writer was killed before it wrote its header is a recording without frames.
-    Of ``known_bytes`` it is known that they are header and whole frames; those are not counted.
+    The first ``known_bytes`` are known to be header and complete frames; those are not counted.
     """
     total = os.fstat(recording.fileno()).st_size
     data = _end_of_data(recording, total)
@@ -99,7 +99,7 @@ def scan_recording(recording: BinaryIO, known_bytes: int = HEADER_BYTES) -> Scan
         if kind > LAST_KIND or end + FRAME.size + length > solid:
             break
         if kind == FOOTER_KIND and solid < total:
-            break  # what follows it, to find it by, is zeros
+            break  # the data after it, which locate it, are zeros
         end += FRAME.size + length
         frames += 1
         has_footer = kind == FOOTER_KIND
@@ -108,10 +108,10 @@ def scan_recording(recording: BinaryIO, known_bytes: int = HEADER_BYTES) -> Scan
 
 @contextmanager
 def open_part(path: Path) -> Iterator[tuple[BinaryIO, Scan]]:
-    """Open a part of a recording; what goes wrong while it is read is raised with its name.
+    """Open a part of a recording; errors while it is read are raised with its name.
 
     Raises:
-        UnreadableRecording: the file is missing, is no recording, or is broken.
+        UnreadableRecording: the file is missing, is no recording, or is damaged.
     """
     try:
         check_plain(path)
@@ -127,7 +127,7 @@ def open_part(path: Path) -> Iterator[tuple[BinaryIO, Scan]]:
 
 
 def _end_of_data(recording: BinaryIO, total: int) -> int:
-    """Return where the zeros begin that a file ends with [bytes]."""
+    """Return the offset of the zeros at the end of a file [bytes]."""
     total = _end_on_disk(recording.fileno(), total)
     while total:
         start = max(total - _BLOCK, 0)
@@ -139,9 +139,9 @@ def _end_of_data(recording: BinaryIO, total: int) -> int:
 
 
 def _end_on_disk(descriptor: int, total: int) -> int:
-    """Return where the hole begins that a file ends with [bytes]; its size where there is none.
+    """Return the offset of the hole at the end of a file [bytes]; the file size if there is none.
 
-    A hole of 50 GB takes no space, and a minute to read.
+    A hole of 50 GB takes no space, but a minute to read.
     """
     before, low, high = os.lseek(descriptor, 0, os.SEEK_CUR), 0, total
     while low < high:
@@ -151,15 +151,15 @@ def _end_on_disk(descriptor: int, total: int) -> int:
         except OSError as error:
             if error.errno != errno.ENXIO:
                 return total
-            high = middle  # nothing but a hole from there on
+            high = middle  # only a hole from there on
     os.lseek(descriptor, before, os.SEEK_SET)
     return high
 
 
 def repair_recording(path: Path) -> Repair | None:
-    """Cut ``path`` behind its last whole frame; None where nothing was torn.
+    """Truncate ``path`` after its last complete frame; None if nothing was torn.
 
-    A recording whose writer lives is left alone: it holds a lock on the file. So is one
+    A recording with a live writer, which holds a lock on the file, is left alone. So is one
     with a footer, one without a header, and a file that is no recording.
     """
     with open(path, "r+b", opener=_open_no_link) as recording:
@@ -179,10 +179,10 @@ def _open_no_link(path: str, flags: int) -> int:
 
 
 def repair_folder(folder: Path) -> list[Repair]:
-    """Cut every torn recording in ``folder``; return what was cut, in order of name.
+    """Truncate every torn recording in ``folder``; return the repairs in order of name.
 
-    One that the disk does not give, or does not let be cut, is returned with the reason: it is
-    no reason to record nothing from now on.
+    A file that cannot be read or truncated is returned with the reason: that must not prevent
+    new recordings.
 
     Raises:
         OSError: the folder cannot be read.
@@ -199,16 +199,16 @@ def repair_folder(folder: Path) -> list[Repair]:
     return repairs
 
 
-# Its server would be open to the whole network else, and refuse to start beside another viewer.
+# Otherwise its server is open to the whole network, and refuses to start beside another viewer.
 VIEWER = python_program("rerun", "--bind", "127.0.0.1", "--port", "auto")
 
 
 def view(paths: Sequence[Path]) -> None:
-    """Show recordings until the viewer is closed; of torn ones what is whole.
+    """Show recordings until the viewer is closed; of torn ones the complete frames.
 
     Raises:
         MissingExtra: rerun is not installed.
-        ProcessEnded: the viewer cannot be shown, without a screen, for example.
+        ProcessEnded: the viewer cannot be shown, for example without a screen.
     """
     if importlib.util.find_spec("rerun") is None:
         raise MissingExtra("the viewer comes with rerun, which is not installed")
@@ -224,7 +224,7 @@ def view(paths: Sequence[Path]) -> None:
 
 @contextmanager
 def _whole_part(path: Path) -> Iterator[Path | None]:
-    """Yield ``path``, where its end is torn a copy of what is whole, None where nothing is.
+    """Yield ``path``, or for a torn file a copy of its complete frames, None if there are none.
 
     Raises:
         ValueError: it is no recording.

@@ -1,6 +1,6 @@
-"""What the parts of a run hold: samples byte for byte, plots, states and log.
+"""Content of the parts of a run: samples byte for byte, plots, states and log.
 
-The files are not changed: of one that is torn, or still being written, the whole frames are read.
+The files are not changed: of a torn file, or one being written, the complete frames are read.
 Pictures are skipped chunk by chunk, so that memory does not grow with them.
 """
 
@@ -29,7 +29,7 @@ COMPONENT = f"{entities.INPUTS_ARCHETYPE}:{entities.INPUTS_COMPONENT}"
 
 @dataclass(frozen=True, slots=True)
 class Batch:
-    """A batch of samples, where it belongs, and the file it is from."""
+    """A batch of samples, its position and its file."""
 
     place: Place
     body: bytes
@@ -37,26 +37,26 @@ class Batch:
 
 
 class RecordedSamples:
-    """The samples in the parts of a recording, and in those of the recordings after it.
+    """The samples in the parts of a recording, and of the recordings after it.
 
     Args:
-        paths: the files, in any order. Where parts are missing at the beginning, the samples
+        paths: the files, in any order. If parts are missing at the beginning, the samples
             begin with the map that was in force.
 
     Raises:
-        UnreadableRecording: a file is none, or all hold no samples.
+        UnreadableRecording: a file is no recording, or none has samples.
     """
 
     def __init__(self, paths: Sequence[Path]) -> None:
         batches = [batch for path in paths for batch in _batches(path)]
-        # One part alone may have none: its recorder was killed when it had just begun.
+        # A single part may have none: its recorder was killed just after it began.
         if paths and not batches:
             raise _no_samples(paths)
         self._take(batches)
 
     @classmethod
     def of(cls, batches: Sequence[Batch]) -> Self:
-        """Return the samples in batches that were read already, in any order."""
+        """Return the samples of batches that were read already, in any order."""
         samples = cls(())
         samples._take(batches)
         return samples
@@ -67,10 +67,10 @@ class RecordedSamples:
         self.missing = 0
 
     def __iter__(self) -> Iterator[Arrival]:
-        """Yield all samples in order; ``missing`` counts those that were lost in between.
+        """Yield all samples in order; ``missing`` counts those lost in between.
 
         Raises:
-            UnreadableRecording: a batch is broken.
+            UnreadableRecording: a batch is malformed.
         """
         self.missing = 0
         run, following, begun, decoder = -1, 0, False, SampleDecoder()
@@ -82,10 +82,10 @@ class RecordedSamples:
             except MalformedMessage as error:
                 raise UnreadableRecording(f"{batch.path}: {error}", hint=HINT) from error
             for numbered in samples:
-                # A part begins with samples in force that the one before it may hold already.
+                # A part begins with samples in force that the part before it may have already.
                 if numbered.number < following:
                     continue
-                # What came before the first part that is given is not missed.
+                # Samples before the first given part are not missing.
                 self.missing += numbered.number - following if begun else 0
                 begun = begun or numbered.number >= batch.place.first
                 following = numbered.number + 1
@@ -97,7 +97,7 @@ def _batches_of(chunk: Chunk, path: Path) -> list[Batch]:
 
     Raises:
         ValueError: the chunk holds something else.
-        MalformedMessage: a batch is broken.
+        MalformedMessage: a batch is malformed.
     """
     found = column(chunk.batch, COMPONENT, pa.list_(pa.uint8()))
     bodies = [np.asarray(blob.values, np.uint8).tobytes() for blob in found or ()]
@@ -124,7 +124,7 @@ def _batches(path: Path) -> list[Batch]:
 
 SCALAR, STATE, TEXT = "Scalars:scalars", "StateChange:state", "TextLog:text"
 READ = ("metrics/", "state/", "log/")
-# What is kept of a file, unpacked, is at most so many times its size, and this [bytes].
+# Limit of the uncompressed data kept of a file: this many times its size, plus this [bytes].
 MOST_RATIO, LEAST_BYTES = 16, 16_000_000
 
 TimedText = tuple[int, str]
@@ -134,7 +134,7 @@ Row = tuple[int, float | str]
 
 @dataclass(frozen=True, slots=True)
 class PartFile:
-    """A file of a recording: its size, what a crash tore off, whether it was ended in order."""
+    """A file of a recording: its size, torn bytes, whether it was closed properly."""
 
     path: Path
     bytes: int
@@ -144,17 +144,17 @@ class PartFile:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RunRecord:
-    """What the parts of one run hold.
+    """Content of the parts of one run.
 
     Attributes:
-        recording_id: what all parts share.
+        recording_id: the id common to all parts.
         parts: the files, by name.
         began_ns, ended_ns: first and last time on the timeline ``wall`` [ns].
-        plots: float64 (n, 2) of each plotted entity: when, since ``began_ns`` [s], and its value.
-        states: of each state entity when it was entered, and what it was.
-        log: of each log entity when, and the text.
-        field_count: how often the pheromone field was drawn.
-        fields: some of these, spread over all of the time, the last among them.
+        plots: float64 (n, 2) of each plotted entity: time since ``began_ns`` [s], and value.
+        states: times and names of the states of each state entity.
+        log: times and texts of each log entity.
+        field_count: number of drawings of the pheromone field.
+        fields: some of these, spread over the whole time, with the last.
         batches: samples, for ``RecordedSamples.of``.
     """
 
@@ -171,7 +171,7 @@ class RunRecord:
 
 
 def count_frames(paths: Sequence[Path]) -> int:
-    """Return how many frames there are to be read.
+    """Return the number of frames to read.
 
     Raises:
         UnreadableRecording: a file is missing, or is no recording.
@@ -187,7 +187,7 @@ def read_run_record(paths: Sequence[Path], advance: Callable[[], None]) -> RunRe
     """Read the parts of one run, in any order.
 
     Args:
-        paths: the files; a torn one is read as far as it is whole, and left as it is.
+        paths: the files; a torn one is read up to its last complete frame, and not changed.
         advance: called with each frame.
 
     Raises:
@@ -202,7 +202,7 @@ def read_run_record(paths: Sequence[Path], advance: Callable[[], None]) -> RunRe
 
 @dataclass(slots=True)
 class _RunReader:
-    """Collects what the parts hold."""
+    """Collects the content of the parts."""
 
     advance: Callable[[], None]
     ids: dict[str, Path] = field(default_factory=dict)
@@ -226,7 +226,7 @@ class _RunReader:
                         raise ValueError(f"unpacks to more than {MOST_RATIO} times its size")
 
     def _take(self, chunk: Chunk, path: Path) -> int:
-        """Take a chunk; return how many bytes of it are kept."""
+        """Take a chunk; return the number of bytes kept."""
         entity, batch = chunk.entity, chunk.batch
         if entity == entities.INPUTS:
             self.batches += _batches_of(chunk, path)
@@ -245,7 +245,7 @@ class _RunReader:
         return chunk.bytes
 
     def record(self) -> RunRecord:
-        """Return all of it, in order of time."""
+        """Return the record, in order of time."""
         if len(self.ids) > 1:
             raise DifferentRuns(
                 "these are parts of different runs: "

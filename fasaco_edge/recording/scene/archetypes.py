@@ -1,9 +1,9 @@
-"""Messages as what rerun draws: metres, z up, rows turned over.
+"""Rerun archetypes of messages: metres, z up, rows flipped.
 
 A grid's row 0 has the smallest y, an image's row 0 is its top: every grid is
 flipped here, and nowhere else.
 
-The looks of states are static, logged once.
+The colours of states are static, logged once.
 """
 
 from __future__ import annotations
@@ -40,19 +40,19 @@ DECIDED_COLOUR: Colour = (94, 234, 255)
 
 # Heights [m] only order the layers: the eye looks down from far above.
 ARROW_Z, ROBOT_Z, LABEL_Z = 0.03, 0.06, 0.1
-# On the screen [points].
+# Sizes on the screen [points].
 ARROW_WIDTH = 1.0
 MAP_ORDER, FLOOR_ORDER, COVERAGE_ORDER = 0.0, 0.5, 1.0
-# How far above a field its label is, as a share of the field's height.
+# Distance of a label above its field, as a share of the field's height.
 LABEL_ABOVE = 0.1
 
-# Sine over cosine of a bend that is none.
+# Largest tangent of a bend that counts as straight.
 STRAIGHT = 1e-6
 
 
 @dataclass(frozen=True, slots=True)
 class LineStyle:
-    """How a line is drawn: its colour, its height ``z`` [m], its width [points of the screen]."""
+    """Style of a line: its colour, its height ``z`` [m], its width [points of the screen]."""
 
     colour: Colour
     z: float
@@ -79,13 +79,13 @@ LINES = {
 
 def map_archetype(grid: OccupancyGrid) -> rr.GridMap:
     """Return an occupancy grid in rviz's colours: free white, occupied black, unknown grey."""
-    # -1 seen as 255 is what the colour map takes for unknown.
+    # -1 becomes 255, unknown in the colour map.
     pixels = grid.cells.view(np.uint8)
     return _grid(grid.geometry, pixels, rr.components.Colormap.RvizMap, MAP_ORDER)
 
 
 def coverage_archetype(grid: OccupancyGrid) -> rr.GridMap:
-    """Return a coverage grid to lie over the map: covered, re-covered and blocked cells tinted."""
+    """Return a coverage grid as a layer over the map: covered, re-covered, blocked cells tinted."""
     tints = np.zeros((256, 4), np.uint8)
     tints[CoverageValue.COVERED] = (*COVERED_COLOUR, 120)
     tints[CoverageValue.RECOVERED] = (*RECOVERED_COLOUR, 140)
@@ -94,7 +94,7 @@ def coverage_archetype(grid: OccupancyGrid) -> rr.GridMap:
 
 
 def floor_archetype(grid: OccupancyGrid) -> rr.GridMap:
-    """Return swept floor to lie over the map, the denser the more of a square is swept."""
+    """Return swept floor as a layer over the map, the denser the more of a square is swept."""
     tints = np.zeros((256, 4), np.uint8)
     tints[:101, :3] = SWEPT_COLOUR
     tints[:101, 3] = np.linspace(0, 150, 101)
@@ -102,12 +102,12 @@ def floor_archetype(grid: OccupancyGrid) -> rr.GridMap:
 
 
 def pheromone_archetype(message: PheromoneMessage) -> rr.GridMap:
-    """Return a pheromone field as it came: one byte per cell, log scale, 0 black."""
+    """Return a pheromone field unchanged: one byte per cell, log scale, 0 black."""
     return _grid(message.geometry, message.levels, rr.components.Colormap.Inferno, MAP_ORDER)
 
 
 def cohort_archetype(message: PheromoneMessage) -> rr.Points3D:
-    """Return the label over a pheromone field: the cohort that left it so."""
+    """Return the label over a pheromone field: its cohort."""
     cells = "cell" if message.velocity == 1 else "cells"
     ants = "ant" if message.ants == 1 else "ants"
     text = (
@@ -118,7 +118,7 @@ def cohort_archetype(message: PheromoneMessage) -> rr.Points3D:
 
 
 def trail_label(message: PheromoneMessage, about: TrailAttachment) -> rr.Points3D:
-    """Return the label over the living trail: the path it stands at, and how decided it is."""
+    """Return the label over the living trail: its path, and how decided it is."""
     text = (
         f"living trail at path {about.revision}, {message.best_steps} steps to drive\n"
         f"{about.cells} cells, {about.branching:.2f} directions in reach of the best"
@@ -140,7 +140,7 @@ def arrows_archetype(flows: Flows) -> rr.Arrows3D:
     count = len(flows.origins)
     origins = np.column_stack((flows.origins, np.full(count, ARROW_Z))).astype(np.float32)
     vectors = np.column_stack((flows.vectors, np.zeros(count))).astype(np.float32)
-    # A cell of four equal directions has a quarter, one that is sure of itself all.
+    # A cell with four equal directions has a quarter, a decided cell all.
     sure = np.clip((flows.share - 0.25) / 0.75, 0.0, 1.0)[:, np.newaxis]
     low, high = np.array(UNDECIDED_COLOUR), np.array(DECIDED_COLOUR)
     colours = np.rint(low + sure * (high - low)).astype(np.uint8)
@@ -150,7 +150,7 @@ def arrows_archetype(flows: Flows) -> rr.Arrows3D:
 def label_archetype(bounds: Bounds, text: str, above: float = 0.0) -> rr.Points3D:
     """Return text over the upper edge of a rectangle (x_min, y_min, x_max, y_max) [m].
 
-    ``above``: how far above it, as a share of the rectangle's height.
+    ``above``: distance above it, as a share of the rectangle's height.
     """
     x0, y0, x1, y1 = bounds
     place = ((x0 + x1) / 2, y1 + above * (y1 - y0), LABEL_Z)
@@ -158,7 +158,7 @@ def label_archetype(bounds: Bounds, text: str, above: float = 0.0) -> rr.Points3
 
 
 def words_archetype(pose: Pose2D, text: str, above_m: float) -> rr.Points3D:
-    """Return text so far above a place."""
+    """Return text at a distance above a point."""
     place = (pose.x, pose.y + above_m, LABEL_Z)
     return rr.Points3D([place], radii=0.0, labels=[text], colors=LABEL_COLOUR, show_labels=True)
 
@@ -174,9 +174,9 @@ def style_archetype(style: LineStyle) -> rr.LineStrips3D:
 
 
 def corners(xy: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return a line, points float64 (n, 2), without the points it runs straight through.
+    """Return the corners of a line, float64 (n, 2).
 
-    A path over the lattice is mostly lanes: a tenth of its points draw the same line.
+    A path over the lattice is mostly straight lanes: a tenth of its points draw the same line.
     """
     if len(xy) < 3:
         return xy
@@ -189,7 +189,7 @@ def corners(xy: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def pose_archetype(pose: Pose2D) -> rr.Transform3D:
-    """Return the robot's place, to the millimetre: it comes with each pose."""
+    """Return the robot's pose, to the millimetre: it is logged with each pose."""
     half = pose.yaw / 2
     return rr.Transform3D.from_fields(
         translation=[round(pose.x, 3), round(pose.y, 3), ROBOT_Z],
@@ -225,7 +225,7 @@ def polygons_archetype(
 
 
 def coverage_fractions(grid: OccupancyGrid) -> tuple[float, float]:
-    """Return which fractions of the coverable cells are covered, and covered more than once."""
+    """Return the fractions of the coverable cells that are covered, and covered more than once."""
     counts = np.bincount(grid.cells.view(np.uint8).ravel(), minlength=256)
     recovered = int(counts[CoverageValue.RECOVERED])
     covered = int(counts[CoverageValue.COVERED]) + recovered
@@ -240,8 +240,8 @@ def _grid(
     order: float,
 ) -> rr.GridMap:
     origin = geometry.origin
-    # All of it with every message: size and origin change while the map grows, and
-    # what was once logged static would hide what comes later.
+    # All components with every message: size and origin change while the map grows, and
+    # a component once logged as static would hide later ones.
     return rr.GridMap(
         data=pixels[::-1].tobytes(),
         format=rr.components.ImageFormat(
@@ -294,7 +294,7 @@ STATES: dict[str, dict[str, int]] = {
 
 
 def log_styles(writer: RecordingWriter) -> None:
-    """Log the colours of all states and lines, and which way is up."""
+    """Log the colours of all states and lines, and the up axis."""
     writer.log_static(entities.WORLD, rr.ViewCoordinates.RIGHT_HAND_Z_UP)
     for entity, style in LINES.items():
         writer.log_static(entity, style_archetype(style))

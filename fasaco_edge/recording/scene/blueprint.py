@@ -1,4 +1,4 @@
-"""How a recording opens: the map large, states below it, figures on the right."""
+"""The blueprint of a recording: the map large, states below it, figures on the right."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from fasaco_edge.grid.geometry import Bounds
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.sdk import rr, rrb
 
-# Before there is a map [m].
+# Bounds before there is a map [m].
 NO_MAP: Bounds = (-5.0, -5.0, 5.0, 5.0)
 # Space for the map to grow a little before the eye moves, and for a label above the field.
 MARGIN, PHEROMONE_MARGIN = 1.1, 1.3
@@ -74,7 +74,7 @@ def _pheromone_view(bounds: Bounds) -> rrb.Spatial3DView:
 
 def _plot(name: str, origin: str, legend: rrb.PlotLegend, top: float = 0.0) -> rrb.TimeSeriesView:
     axis = rrb.ScalarAxis(range=(0.0, top)) if top else None
-    # From beginning to end, whatever the mission's length: by itself it shows a minute.
+    # The whole mission, whatever its length: the default is a minute.
     whole = rrb.TimeAxis(
         view_range=rr.TimeRange(
             start=rrb.TimeRangeBoundary.infinite(), end=rrb.TimeRangeBoundary.infinite()

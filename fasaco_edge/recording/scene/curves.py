@@ -1,6 +1,6 @@
 """Curves of figures over time: a figure is drawn only where it changes.
 
-An entity drawn once a second takes five megabytes an hour, whatever is drawn: the recording is
+An entity drawn once a second takes five megabytes an hour, whatever its content: the recording is
 flushed as often, and each flush begins a chunk for each entity.
 """
 
@@ -64,13 +64,13 @@ class Curves:
             writer.log_static(entity, line)
 
     def draw(self, entity: str, value: float, noise: float = 0.0, spacing_ns: int = 0) -> None:
-        """Draw ``value`` where it differs from the one drawn.
+        """Draw ``value`` if it differs from the last one drawn.
 
         Args:
-            entity: what to draw it as.
-            value: the figure as it is now.
-            noise: the share of it by which it has to differ at least.
-            spacing_ns: the least time from one drawn to the next [ns].
+            entity: the entity to draw.
+            value: the present figure.
+            noise: least relative change to draw.
+            spacing_ns: least time between two drawings [ns].
         """
         now_ns = self._writer.wall_ns
         curve = self._curves.get(entity)
@@ -84,7 +84,7 @@ class Curves:
         self._draw(entity, curve)
 
     def finish(self) -> None:
-        """Draw what each figure was in the end."""
+        """Draw the last value of each figure."""
         for entity, curve in self._curves.items():
             if curve.last != curve.drawn:
                 self._draw(entity, curve)
@@ -98,7 +98,7 @@ class Curves:
 SHARE_SPACING_NS = 2_000_000_000
 # Ever-growing counts are drawn no more often than this.
 COUNT_SPACING_NS = 30_000_000_000
-# Processor time is averaged over at least so many seconds.
+# Processor time is averaged over at least this many seconds.
 LEAST_SHARE_S = 30.0
 # The contract has dozens of codes; a foreign daemon's must not fill the recording.
 MOST_CODES = 50
@@ -141,7 +141,7 @@ class StatusFigures:
             self._draw(f"{entities.ERRORS}/{code}", by_code[code])
 
     def add_path(self, about: PathAttachment) -> None:
-        """Draw how good a planned path is; steps, bound and cost are in the log and the inputs."""
+        """Draw the quality of a planned path; steps, bound, cost are in the log and the inputs."""
         if about.gap is not None:
             self._curves.draw(entities.GAP, about.gap)
         if about.saved_by_ants_s is not None and about.saved_by_local_search_s is not None:
@@ -151,7 +151,7 @@ class StatusFigures:
                 self._curves.draw(entity, seconds)
 
     def _add_process(self, status: Status) -> None:
-        """Draw what the daemon's process takes; 0 means that the daemon does not send it."""
+        """Draw memory and processor time of the daemon; 0 means that it does not send them."""
         if status.rss_mb:
             self._curves.draw(f"{entities.MEMORY}/planner", status.rss_mb, NOISE)
         if status.uptime_s:
@@ -161,7 +161,7 @@ class StatusFigures:
 
     def _add_processor(self, uptime_s: float, cpu_s: float) -> None:
         since = self._since
-        if since is None or uptime_s < since[0]:  # it was started again
+        if since is None or uptime_s < since[0]:  # it was restarted
             self._since = uptime_s, cpu_s
         elif uptime_s - since[0] >= LEAST_SHARE_S:
             percent = 100 * (cpu_s - since[1]) / (uptime_s - since[0])

@@ -1,4 +1,4 @@
-"""Drawings of paths and of the driven path, as a recording shows them."""
+"""Drawings of paths and of the driven path in a recording."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from fasaco_edge.recording.write.writer import RecordingWriter
 from fasaco_edge.wire.documents.path_documents import PathAttachment, Rectangle
 from fasaco_edge.wire.messages.paths import PathMessage
 
-# A point of a line in the file; each path is drawn twice, the second time as the one before.
+# Bytes of a point in the file; each path is drawn twice, the second time as the previous path.
 POINT_BYTES = 2 * 12
 
 
 class PathDrawing:
-    """Draws paths, each as soon as the allowance of its layer lets it."""
+    """Draws paths, each as soon as the rate limit of its layer allows."""
 
     def __init__(self, writer: RecordingWriter, layers: Layers) -> None:
         self._writer = writer
@@ -34,7 +34,7 @@ class PathDrawing:
         self._drawn: tuple[int, NDArray[np.float64] | None] = (0, None)
 
     def add(self, message: PathMessage, about: PathAttachment) -> None:
-        """Draw a path; one that is published again is still the same."""
+        """Draw a path; a path that is published again is not drawn anew."""
         revision = about.revision
         if revision:
             self._writer.sequence(entities.REPLAN, revision)
@@ -54,7 +54,7 @@ class PathDrawing:
         self._layers.draw(entities.PATH, POINT_BYTES * len(line), draw_path, self._writer.wall_ns)
 
     def _draw_window(self, changed: Rectangle | None, reason: str) -> None:
-        """Draw the part of the map that led to the path; nothing where none did."""
+        """Draw the part of the map that led to the path, if any."""
         if changed is not None:
             bounds: Bounds = astuple(changed)
             box = draw.box_archetype(bounds, draw.WINDOW)
@@ -79,7 +79,7 @@ def _path_line(message: PathMessage, about: PathAttachment) -> str:
     if about.planned_cost_s is not None:
         facts.append(f"{about.planned_cost_s:.0f} s")
     if about.gap is not None and about.planned_steps is not None:
-        # Of the plan as it was made; of the path, a part may have been driven since.
+        # Figures of the plan when it was made; part of the path may be driven since.
         over = f"{100 * about.gap:.0f} % of time over the bound"
         facts.append(f"planned {about.planned_steps} steps, {over}")
     if about.planner:
@@ -89,7 +89,7 @@ def _path_line(message: PathMessage, about: PathAttachment) -> str:
 
 
 SPACING_M = 0.02
-# Drawn as often as the recording is flushed, it would be a twentieth of an hour's file.
+# Drawn with each flush of the recording, it would be a twentieth of an hour's file.
 PERIOD_NS = 2_000_000_000
 
 
@@ -102,19 +102,19 @@ class DrivenPathDrawing:
         self._drawn_ns = 0
 
     def add(self, x: float, y: float) -> None:
-        """Go on to a place [m]."""
+        """Add a point [m]."""
         if self._piece and math.dist(self._piece[-1], (x, y)) < SPACING_M:
             return
         self._piece.append((x, y))
         self.catch_up()
 
     def catch_up(self) -> None:
-        """Draw what has waited long enough; call it often."""
+        """Draw a piece that has waited long enough; call it often."""
         if self._writer.wall_ns - self._drawn_ns >= PERIOD_NS:
             self.finish()
 
     def finish(self) -> None:
-        """Draw what waits."""
+        """Draw the waiting piece."""
         if len(self._piece) < 2:
             return
         self._drawn_ns = self._writer.wall_ns

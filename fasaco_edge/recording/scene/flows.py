@@ -1,4 +1,4 @@
-"""Flows: runs of cells whose trail points the same way, as arrows of a drawing."""
+"""Flows: runs of cells whose trail has the same direction, drawn as arrows."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from fasaco_edge.grid.geometry import GridGeometry, Pose2D
 from fasaco_edge.grid.turning import turned_points
 from fasaco_edge.kernels import COL_STEP, EAST, NORTH, ROW_STEP
 
-# A run is cut where the trail is more decided or less than at its beginning by so much.
+# A run is cut where the trail's share differs by this much from that at its beginning.
 DECIDED_APART = 0.2
-# An arrow in the file: where it begins, where it leads to, its colour.
+# Bytes of an arrow in the file: origin, vector, colour.
 ARROW_BYTES = 2 * 12 + 4
 NAMES = ("east", "north", "west", "south")
 
@@ -24,9 +24,9 @@ class Flows:
     """Arrows along a trail.
 
     Attributes:
-        origins: float64 (n, 2), where they begin [m].
-        vectors: float64 (n, 2), how far they lead [m].
-        share: float64 (n,), the share of the cells' pheromone that lies along them.
+        origins: float64 (n, 2) [m].
+        vectors: float64 (n, 2) [m].
+        share: float64 (n,), the share of the cells' pheromone in their direction.
     """
 
     origins: NDArray[np.float64]
@@ -35,17 +35,17 @@ class Flows:
 
     @property
     def size_bytes(self) -> int:
-        """How much they take in a file."""
+        """Their size in a file."""
         return ARROW_BYTES * len(self.origins)
 
 
 def flows_of(
     geometry: GridGeometry, pointed: NDArray[np.int8], share: NDArray[np.float32]
 ) -> Flows:
-    """Return an arrow for each straight run of cells that point the same way.
+    """Return an arrow for each straight run of cells with the same direction.
 
-    It leads from the middle of the first cell to that of the cell which the last one points to.
-    A cell that is as much for one direction as for any other has none.
+    It leads from the centre of the first cell to that of the cell after the last one. A cell
+    with four equal directions has no arrow.
 
     Args:
         geometry: of the cells.
@@ -56,7 +56,7 @@ def flows_of(
     begins: list[tuple[int, int, int, int, float]] = []
     for direction in (EAST, NORTH, EAST + 2, NORTH + 2):
         up, right = ROW_STEP[direction], COL_STEP[direction]
-        # The cell before each one on its way: on another run, if it points elsewhere.
+        # The cell before each one against its direction: of another run, if it points elsewhere.
         marked = np.pad((pointed == direction) & (share > 0.25 + 1e-6), 1)
         decided = np.pad(share, 1)
         before = (slice(1 - up, rows + 1 - up), slice(1 - right, cols + 1 - right))
@@ -86,9 +86,9 @@ def fork_at(
     share: NDArray[np.float32],
     pose: Pose2D | None,
 ) -> str:
-    """Return where the trail leads on from the robot's cell, and the share of its pheromone.
+    """Return the trail's direction at the robot's cell as text, and its share of the pheromone.
 
-    "" where nobody can tell.
+    "" if unknown.
     """
     if pose is None:
         return ""

@@ -1,11 +1,11 @@
-"""Layers of a recording: where they are drawn, what a new map changed, how often each is drawn.
+"""Layers of a recording: their origin, changes by a new map, rate limits.
 
-A viewer draws in float32, half a metre coarse at a UTM northing: far from 0 everything is drawn
-relative to whole kilometres near the first place that came.
+A viewer draws in float32, whose resolution at a UTM northing is 0.5 m: far from 0 everything is
+drawn relative to whole kilometres near the first pose.
 
 Maps of a million pixels and paths of ten thousand cells are drawn no faster than a recording may
-grow. Each layer has an allowance. While some of it is left, what comes is drawn at once; else the
-newest waits until the allowance has grown again, and what came in between is not drawn.
+grow. Each layer has a rate limit, a token bucket. While tokens are left, a drawing is made at once;
+otherwise the newest waits for tokens, and those before it are skipped.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from fasaco_edge.wire.documents.path_documents import PathAttachment, Rectangle
 from fasaco_edge.wire.messages.paths import PathMessage
 from fasaco_edge.wire.messages.pheromone import PheromoneMessage
 
-# Nearer to 0 than this float32 resolves a millimetre, and nothing is moved [m].
+# Up to this distance from 0, float32 resolves a millimetre, and nothing is shifted [m].
 NEAR_M = 10_000.0
 STEP_M = 1_000.0
 
@@ -37,14 +37,14 @@ Grid = TypeVar("Grid", OccupancyGrid, PheromoneMessage)
 
 @dataclass(frozen=True, slots=True)
 class Anchor:
-    """The place in the map's frame that is drawn at 0: x [m], y [m]."""
+    """The point of the map frame that is drawn at 0: x [m], y [m]."""
 
     x: float = 0.0
     y: float = 0.0
 
     @classmethod
     def near(cls, x: float, y: float) -> Anchor:
-        """Return the anchor of a drawing around a place [m]; 0 on an axis that is near."""
+        """Return the anchor of a drawing around a point [m]; 0 on an axis where it is near 0."""
         return cls(*(0.0 if abs(at) < NEAR_M else STEP_M * round(at / STEP_M) for at in (x, y)))
 
     def __bool__(self) -> bool:
@@ -52,11 +52,11 @@ class Anchor:
 
     @property
     def xy(self) -> tuple[float, float]:
-        """Its place [m]."""
+        """Its position [m]."""
         return self.x, self.y
 
     def pose(self, pose: Pose2D) -> Pose2D:
-        """Return where a pose is drawn."""
+        """Return the drawn pose of a pose."""
         return replace(pose, x=pose.x - self.x, y=pose.y - self.y)
 
     def grid(self, grid: Grid) -> Grid:
@@ -73,7 +73,7 @@ class Anchor:
         return replace(message, xy=message.xy - np.array((self.x, self.y)), yaw=message.yaw)
 
     def attachment(self, about: PathAttachment) -> PathAttachment:
-        """Return a path's attachment, with the rectangle of its reason where that is drawn."""
+        """Return a path's attachment, with the rectangle of its reason shifted."""
         changed = about.changed
         if not self or changed is None:
             return about
@@ -82,15 +82,15 @@ class Anchor:
         return replace_members(about, changed=moved)
 
 
-# Crossing it, a pixel has become an obstacle or ceased to be one [percent].
+# Threshold of an obstacle [percent].
 OCCUPIED_FROM = 50
 
 
 def changed_bounds(before: OccupancyGrid, after: OccupancyGrid) -> Bounds | None:
     """Return (x_min, y_min, x_max, y_max) [m] around the pixels that turned free or occupied.
 
-    Pixels that were unknown do not count, else the whole exploration would. None where
-    no pixel changed, or where the two rasters do not match.
+    Pixels that were unknown do not count, otherwise all of exploration would. None if no pixel
+    changed, or if the two rasters do not match.
     """
     (old_raster, placed), (raster, outer) = before.geometry.on_raster(), after.geometry.on_raster()
     common = outer.intersection(placed) if raster == old_raster else None
@@ -120,7 +120,7 @@ RATES = {
     entities.DIRECTIONS: 2_500,
     entities.PATH: 2_000,
 }
-# A grid's size in the file is judged by every so many-th row.
+# A grid's size in the file is estimated from every n-th row.
 EVERY_ROW = 8
 # Rerun's compression (LZ4) against the fastest deflate, at worst.
 LOOSER = 1.5
@@ -128,7 +128,7 @@ LOOSER = 1.5
 
 @dataclass(slots=True)
 class _Layer:
-    """How much may be drawn [bytes], as of when [ns], and what waits: its size, how to draw it."""
+    """Tokens of a layer [bytes] at a time [ns], and the waiting drawing: its size and function."""
 
     allowance: float
     at_ns: int = 0
@@ -136,30 +136,30 @@ class _Layer:
 
 
 class Layers:
-    """Decides when each layer is drawn; the writer's thread and clock."""
+    """Decides when each layer is drawn; on the writer's thread, by its clock."""
 
     def __init__(self) -> None:
         self._layers = {name: _Layer(BURST_S * rate) for name, rate in RATES.items()}
 
     def draw(self, name: str, size: int, draw: Callable[[], None], now_ns: int) -> None:
-        """Call ``draw`` now, or later instead of what came before.
+        """Call ``draw`` now or later, in place of a waiting drawing.
 
         Args:
             name: one of ``RATES``.
-            size: about how much it takes in the file [bytes].
-            draw: does it, at any later time.
-            now_ns: a clock that never steps [ns].
+            size: approximate size in the file [bytes].
+            draw: draws, at any later time.
+            now_ns: monotonic time [ns].
         """
         self._layers[name].waiting = size, draw
         self._catch_up(name, now_ns)
 
     def catch_up(self, now_ns: int) -> None:
-        """Draw what has waited long enough; call it often."""
+        """Make the drawings that are due; call it often."""
         for name in self._layers:
             self._catch_up(name, now_ns)
 
     def finish(self) -> None:
-        """Draw all that waits."""
+        """Make all waiting drawings."""
         for layer in self._layers.values():
             if layer.waiting is not None:
                 (_, draw), layer.waiting = layer.waiting, None
@@ -180,7 +180,7 @@ class Layers:
 
 
 def size_in_file(grid: NDArray[np.generic]) -> int:
-    """Return about how much a grid (rows, cols) of bytes takes in a recording [bytes]."""
+    """Return the approximate size of a byte grid (rows, cols) in a recording [bytes]."""
     some = np.ascontiguousarray(grid[::EVERY_ROW])
     share = grid.size / max(some.size, 1)
     return round(LOOSER * share * len(zlib.compress(some.data, 1)))

@@ -18,10 +18,10 @@ HEAD = (
     ("radius_m", "radius", " m"),
 )
 
-# The range of the pheromone is updated where it grows by this factor.
+# The range of the pheromone is updated if it grows by this factor.
 SLACK = 1.1
 
-# Of Markdown: what ends a cell, or makes links, pictures and HTML.
+# Markdown characters that end a cell, or make links, pictures and HTML.
 MARK_UP = re.compile(r"[\\`\[\]<>!|]")
 
 LEGEND = """\
@@ -43,15 +43,15 @@ LEVELS = (
 
 @dataclass(frozen=True, slots=True)
 class RunDescription:
-    """What is known of a run.
+    """Description of a run.
 
     Attributes:
         robot: name of the robot.
-        began: when the recording began, UTC, as text.
+        began: begin of the recording, UTC, as text.
         version: of the planner; "" while unknown.
-        config: its configuration, as its status gives it.
+        config: its configuration from its status.
         pheromone_range: least and greatest pheromone of all fields; None while there is none.
-        anchor: place (x, y) [m] in the map's frame that is drawn at 0; None for 0 itself.
+        anchor: point (x, y) [m] of the map frame that is drawn at 0; None for 0 itself.
     """
 
     robot: str
@@ -62,7 +62,7 @@ class RunDescription:
     anchor: tuple[float, float] | None = None
 
     def with_pheromone(self, least: float, most: float) -> RunDescription:
-        """Return it with a field of this least and greatest pheromone; 0 where it has none.
+        """Return it with the range widened by a field's least and greatest pheromone; 0 for none.
 
         A range that grows by less than ``SLACK`` stays.
         """
@@ -75,7 +75,7 @@ class RunDescription:
 
     @property
     def name(self) -> str:
-        """What the run is called."""
+        """The name of the run."""
         return f"{self.robot} {self.began}"
 
     def properties(self) -> dict[str, str]:
@@ -110,7 +110,7 @@ class RunDescription:
         return f"{self._head()}\n\n{LEGEND}\n\n| setting | value |\n|---|---|\n{table}\n"
 
     def _head(self) -> str:
-        """Return the settings that matter most, in a line."""
+        """Return the most important settings in a line."""
         settings = {name.rpartition(".")[2]: value for name, value in flat_settings(self.config)}
         facts = [f"{text} {_cell(settings[name])}{m}" for name, text, m in HEAD if name in settings]
         robot, version = _cell(self.robot), _cell(self.version or "unknown")
@@ -134,5 +134,5 @@ def _rank(setting: tuple[str, object]) -> tuple[int, str]:
 
 
 def _cell(value: object) -> str:
-    """Return a value as Markdown shows it: no link, no picture, no HTML, no further cell."""
+    """Return a value escaped for Markdown: no link, no picture, no HTML, no further cell."""
     return MARK_UP.sub(r"\\\g<0>", one_line(str(value)))

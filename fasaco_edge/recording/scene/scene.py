@@ -1,4 +1,4 @@
-"""Decoded messages in, entities out: what the recording shows of a mission."""
+"""The scene of a recording: decoded messages in, entities out."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ DEFAULT_RADIUS_M = 0.2
 # The view follows the growing map in steps of this fraction of its size: each blueprint
 # takes 120 kB.
 REFRAME_FRACTION = 0.15
-# Distance above the robot of the label that says where the trail leads.
+# Distance above the robot of the label with the trail's direction.
 FORK_CELLS = 3.0
 
 
@@ -44,7 +44,7 @@ class Scene:
     def __init__(self, writer: RecordingWriter, description: RunDescription) -> None:
         self._writer = writer
         self._run = description
-        # Where 0 is drawn; known with the first place.
+        # The anchor; known with the first pose or map.
         self._anchor: Anchor | None = None
         self._map: OccupancyGrid | None = None
         self._known: Bounds | None = None
@@ -62,7 +62,7 @@ class Scene:
         self._draw_robot(DEFAULT_RADIUS_M)
 
     def add_map(self, grid: OccupancyGrid) -> None:
-        """Draw the map, and where it contradicts the one before."""
+        """Draw the map, and where it contradicts the previous one."""
         self._draw_grid(self._anchored(grid.geometry.origin).grid(grid))
 
     def _draw_grid(self, grid: OccupancyGrid) -> None:
@@ -83,28 +83,28 @@ class Scene:
         self._draw(entities.MAP, size_in_file(grid.cells), draw_map)
 
     def add_map_update(self, patch: MapPatch) -> None:
-        """Lay a patch over the map.
+        """Apply a patch to the map.
 
         Raises:
-            PatchWithoutBase: it fits no map that came before.
+            PatchWithoutBase: it fits no earlier map.
         """
         if self._map is None:
             raise PatchWithoutBase("a map update came before any map")
         self._draw_grid(self._map.patched(patch))
 
     def add_pose(self, stamped: StampedPose) -> None:
-        """Move the robot, and draw its path."""
+        """Move the robot, and draw its driven path."""
         pose = self._anchored(stamped.pose).pose(stamped.pose)
         self._writer.log(entities.ROBOT, draw.pose_archetype(pose), latched=True)
         self._robot = pose
         self._driven.add(pose.x, pose.y)
 
     def add_command(self, command: str, order: MissionOrder) -> None:
-        """Log a command that the mission has taken; draw the zones of what it has to do then."""
+        """Log a command accepted by the mission; draw the zones of the new order."""
         self.add_line(entities.MISSION_LOG, f"command: {command}")
         if command not in ("start", "cancel", "reset"):
             return
-        # Only a start comes with an order; the others take its zones away.
+        # Only a start has an order; other commands remove its zones.
         zones = [(zone.name, zone.polygon) for zone in order.zones if zone.polygon is not None]
         keep_out = [("keep out", polygon) for polygon in order.keep_out]
         for entity, style, polygons in (
@@ -118,7 +118,7 @@ class Scene:
             self._writer.log(entity, draw.polygons_archetype(placed, style), latched=True)
 
     def add_path(self, message: PathMessage, about: PathAttachment) -> None:
-        """Draw the path to drive, over the one before it, and log reason."""
+        """Draw the path to drive, over the previous one, and log its reason."""
         anchor = self._anchor
         if anchor is None and len(message.xy):
             anchor = self._anchored(Pose2D(*message.xy[0].tolist()))
@@ -127,7 +127,7 @@ class Scene:
         self._figures.add_path(about)
 
     def add_coverage(self, grid: OccupancyGrid) -> None:
-        """Tint what is covered, and plot how much that is."""
+        """Tint the covered cells, and plot their share."""
         grid = self._anchored(grid.geometry.origin).grid(grid)
 
         def draw_coverage() -> None:
@@ -138,14 +138,14 @@ class Scene:
                 size=4 * grid.cells.size,
             )
 
-        # It is drawn in four bytes a cell, which makes it twice as large.
+        # Drawn with four bytes a cell, it is twice as large.
         self._draw(entities.COVERAGE, 2 * size_in_file(grid.cells), draw_coverage)
         covered, recovered = draw.coverage_fractions(grid)
         self._curves.draw(entities.COVERED_FRACTION, covered, spacing_ns=SHARE_SPACING_NS)
         self._curves.draw(entities.RECOVERED_FRACTION, recovered, spacing_ns=SHARE_SPACING_NS)
 
     def add_floor(self, grid: OccupancyGrid) -> None:
-        """Tint what of the floor is swept."""
+        """Tint the swept floor."""
         grid = self._anchored(grid.geometry.origin).grid(grid)
 
         def draw_floor() -> None:
@@ -153,7 +153,7 @@ class Scene:
                 entities.FLOOR, draw.floor_archetype(grid), latched=True, size=4 * grid.cells.size
             )
 
-        # As the coverage.
+        # As for the coverage.
         self._draw(entities.FLOOR, 2 * size_in_file(grid.cells), draw_floor)
 
     def add_pheromone(
@@ -161,8 +161,8 @@ class Scene:
     ) -> None:
         """Draw the living trail, or the pheromone after a cohort; plot how decided it is.
 
-        All cohorts of a plan walk on one field. What one has done is what the field is then
-        otherwise than after the one before it: the timeline ``iter`` goes from cohort to cohort.
+        All cohorts of a plan share one field. The effect of a cohort is the difference to the field
+        after the previous one: the timeline ``iter`` steps from cohort to cohort.
         """
         message = self._anchored(message.geometry.origin).grid(message)
         if about is None:
@@ -183,7 +183,7 @@ class Scene:
             self._writer.log(entities.COHORT, label, latched=True)
 
         self._draw(entities.PHEROMONE, size_in_file(message.levels), draw_pheromone)
-        # The levels' scale: with it they can be turned back into trails.
+        # The scale of the levels, to decode them into trails.
         self._curves.draw(f"{entities.PHEROMONE_RANGE}/min", message.trail_min)
         self._curves.draw(f"{entities.PHEROMONE_RANGE}/max", message.trail_max)
         known = self._run.with_pheromone(message.trail_min, message.trail_max)
@@ -192,7 +192,7 @@ class Scene:
             self._describe()
 
     def add_directions(self, grid: OccupancyGrid) -> None:
-        """Draw where the living trail points to, and tell how decided it is at the robot."""
+        """Draw the directions of the living trail, and label how decided it is at the robot."""
         grid = self._anchored(grid.geometry.origin).grid(grid)
         pointed, share = directions_of(grid)
         flows = flows_of(grid.geometry, pointed, share)
@@ -205,7 +205,7 @@ class Scene:
             arrows = draw.arrows_archetype(flows)
             self._writer.log(entities.DIRECTIONS, arrows, latched=True, size=flows.size_bytes)
 
-        # Small, and of where the robot is now: it does not wait as the arrows do.
+        # Small, and for the robot's present pose: no rate limit, unlike the arrows.
         self._writer.log(entities.HERE, here, latched=True)
         self._draw(entities.DIRECTIONS, flows.size_bytes, draw_directions)
 
@@ -224,7 +224,7 @@ class Scene:
         self._curves.draw(f"{entities.MEMORY}/recorder", report.rss_mb, NOISE)
 
     def enter(self, entity: str, state: str, reason: str = "") -> None:
-        """Show that ``entity`` is in ``state`` from now on; log it where there is a reason."""
+        """Show that ``entity`` is in ``state`` from now on; log it if there is a reason."""
         if not state or self._states.get(entity) == state:
             return
         self._states[entity] = state
@@ -239,12 +239,12 @@ class Scene:
         self._writer.log(log, rr.TextLog(message, level=level))
 
     def catch_up(self) -> None:
-        """Draw what had to wait; call it often."""
+        """Make the drawings that are due; call it often."""
         self._layers.catch_up(self._writer.wall_ns)
         self._driven.catch_up()
 
     def finish(self) -> None:
-        """Draw what waits, and frame the map as it was at the end."""
+        """Make all waiting drawings, and fit the view to the final map."""
         self._layers.finish()
         self._driven.finish()
         self._curves.finish()
@@ -255,7 +255,7 @@ class Scene:
         self._layers.draw(layer, size, draw_it, self._writer.wall_ns)
 
     def _anchored(self, place: Pose2D) -> Anchor:
-        """Return the origin of drawings, logged with the first place where that is far away."""
+        """Return the origin of drawings, logged with the first pose if that is far from 0."""
         if self._anchor is None:
             self._anchor = anchor = Anchor.near(place.x, place.y)
             if anchor:
@@ -303,7 +303,7 @@ class Scene:
             self.add_line(entities.MISSION_LOG, f"{restored} cells were covered before a restart")
 
     def _add_errors(self, errors: ErrorCounts) -> None:
-        # Fewer than before: the planner was started again.
+        # Fewer than before: the planner was restarted.
         if errors.total > self._errors:
             last = errors.last or "no text"
             self.add_line(entities.MISSION_LOG, f"error {errors.total}: {last}", "ERROR")

@@ -1,1 +1,1 @@
-"""The recorder: samples off the bus into parts of a recording."""
+"""The recorder: samples from the bus, written to parts of a recording."""

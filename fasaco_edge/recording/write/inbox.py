@@ -1,15 +1,15 @@
-"""The queue between Zenoh's threads and the one that writes, and the clock of a recording.
+"""The queue between Zenoh's threads and the writer thread, and the clock of a recording.
 
-What waits bounds what the recorder takes: a sample as large as the queue is held in up to ten
-copies by Zenoh, the drawing, the inputs and Rerun, and the allocators keep some of what was freed.
-With the largest map that fits, at any rate, it takes at most
+The queue's size bounds the recorder's memory: a sample as large as the queue is held in up to ten
+copies by Zenoh, the drawing, the inputs and Rerun, and allocators keep some freed memory. With the
+largest maps that fit, however often they are sent, it takes at most
 
     BASE_BYTES + COPIES * capacity
 
-``MemoryHigh=`` of its unit is that for ``QUEUE_BYTES``, ``MemoryMax=`` a tenth more (a test holds
-the unit to it), and under another limit less may wait. Measured for a minute each, x86-64, noise
-at 10 Hz, each followed by an update of all of it: idle 136 MB, 25 million pixels 488, 31 million
-622.
+``MemoryHigh=`` of its unit is this sum for ``QUEUE_BYTES``, ``MemoryMax=`` a tenth more (a test
+checks the unit); under another limit the queue is smaller. Measured for a minute each, x86-64,
+random maps at 10 Hz, each followed by a map update of full size: idle 136 MB, 25 million pixels
+488, 31 million 622.
 """
 
 from __future__ import annotations
@@ -25,17 +25,17 @@ from fasaco_edge.wire.topics import TOPICS
 
 
 class RunClock:
-    """UTC [ns] that never steps: a clock set during a run must not break its timeline."""
+    """Monotonic UTC [ns]: setting the clock during a run must not break its timeline."""
 
     def __init__(self) -> None:
         self._offset_ns = time.time_ns() - time.monotonic_ns()
 
     def now_ns(self) -> int:
-        """Return the time [ns] since the epoch, as the clock saw it when the run began."""
+        """Return the time since the epoch [ns], by the clock's setting when the run began."""
         return self._offset_ns + time.monotonic_ns()
 
     def arrival(self, topic: str, sample: Sample) -> Arrival:
-        """Return a sample that has just come."""
+        """Return a sample with its time of arrival, now."""
         at_ns = time.monotonic_ns()
         return Arrival(topic, sample, at_ns, self._offset_ns + at_ns)
 
@@ -43,23 +43,23 @@ class RunClock:
 MB = 1_000_000
 BASE_BYTES = 145 * MB
 COPIES = 15
-# The most that waits [bytes], where memory has no limit: maps of up to 32 million pixels.
+# Queue size without a memory limit [bytes]: maps of up to 32 million pixels.
 QUEUE_BYTES = 32 * MB
-# The least: small maps and what is not a map.
+# Least queue size: small maps and other samples.
 LEAST_QUEUE_BYTES = 4 * MB
 
 
 def afforded_bytes(limit: int | None) -> int:
-    """Return how much may wait under a memory limit [bytes]; None is no limit."""
+    """Return the queue size under a memory limit [bytes]; None is no limit."""
     if limit is None:
         return QUEUE_BYTES
     return min(max((limit - BASE_BYTES) // COPIES, LEAST_QUEUE_BYTES), QUEUE_BYTES)
 
 
-# So many samples waiting mean that the writer is behind: some ten seconds of poses.
+# With this many waiting samples the writer is behind: some ten seconds of poses.
 BEHIND_SAMPLES = 1024
 
-# What a sample supersedes when the writer is behind; a full map also the updates before it.
+# Samples superseded by a newer one when the writer is behind; a full map also supersedes updates.
 SUPERSEDED = {
     topic.name: frozenset({topic.name}) for topic in TOPICS if topic.queues.recorder == NEWEST
 }
@@ -85,7 +85,7 @@ class Inbox:
         """Add a sample; safe from any thread, never waits for the writer."""
         size = sample.size
         with self._changed:
-            # Stamped here, so that of samples on several threads none is before an earlier one.
+            # Stamped here, so that samples of several threads have increasing times.
             arrival = self._stamp(topic, sample)
             if len(self._waiting) >= BEHIND_SAMPLES or 2 * (self._bytes + size) > self._capacity:
                 self._drop(SUPERSEDED.get(arrival.topic, frozenset()))
@@ -97,7 +97,7 @@ class Inbox:
             self._changed.notify()
 
     def take(self, timeout_s: float) -> list[Arrival]:
-        """Return all samples there are; wait up to ``timeout_s`` [s] for the first."""
+        """Return all waiting samples; wait up to ``timeout_s`` [s] for the first."""
         with self._changed:
             if not self._waiting:
                 self._changed.wait(timeout_s)
@@ -108,7 +108,7 @@ class Inbox:
 
     @property
     def lost(self) -> Counter[str]:
-        """How many samples of each topic never reached the writer."""
+        """Number of samples of each topic that never reached the writer."""
         with self._changed:
             return self._lost.copy()
 

@@ -1,8 +1,8 @@
-"""The mission's inputs in a recording, byte for byte, beside what is drawn of them.
+"""The mission's inputs in a recording, byte for byte, beside their drawings.
 
-Samples are gathered for almost a second and written as one blob, past rerun's own batches: a kill
-loses no more than that. Each part begins with all that is in force, so that it can be read without
-the parts before it.
+Samples are gathered for almost a second and written as one blob, without rerun's own batching: a
+kill loses no more than that. Each part begins with all samples in force, so that it can be read
+without the parts before it.
 """
 
 from __future__ import annotations
@@ -22,22 +22,22 @@ from fasaco_edge.wire.documents.status import Status
 from fasaco_edge.wire.messages.paths import decode_path
 from fasaco_edge.wire.topics import RECORDED_INPUTS
 
-# These hold for the moment they come alone; all other inputs stay in force.
+# These have an effect only when they arrive; all other inputs stay in force.
 TRANSIENT: Final = ("pose", "command", "turns")
 PERIOD_NS = 900_000_000
 STATUS_PERIOD_NS = 15_000_000_000
 WAITING_BYTES = 4_000_000
 # Each node publishes its own once.
 MOST_STATIC = 64
-# Updates since the last full map; with more of them a part begins without the map.
+# Most updates since the last full map; with more of them a part begins without the map.
 IN_FORCE_BYTES = 8_000_000
 
 
 class InputLog:
     """Writes samples into a writer; for the writer's thread only.
 
-    Of paths only a digest is kept; of statuses those with news, and one in ``STATUS_PERIOD_NS``,
-    so that the progress of the mission is known at least as exactly.
+    Of paths only a digest is kept; of statuses the changed ones, and one in ``STATUS_PERIOD_NS``,
+    so that the progress of the mission is known at that rate.
     """
 
     def __init__(self, writer: RecordingWriter, run: int) -> None:
@@ -61,24 +61,24 @@ class InputLog:
             self.write()
 
     def note_lost(self, lost: Counter[str]) -> None:
-        """Note how many samples of each topic never came here, in all."""
+        """Note the total number of lost samples of each topic."""
         count = sum(lost[topic] for topic in RECORDED_INPUTS)
         self._encoder.skip(count - self._lost)
         self._lost = count
 
     def write_if_due(self, now_ns: int) -> None:
-        """Write what has gathered, about once a second; ``now_ns`` by a steady clock [ns]."""
+        """Write the gathered samples about once a second; ``now_ns``: monotonic [ns]."""
         if now_ns >= self._next_ns:
             self._next_ns = now_ns + PERIOD_NS
             self.write()
 
     def finish(self) -> None:
-        """Write what remains; a part begun just before the end gets a batch, too."""
+        """Write the remaining samples; a part begun just before the end gets a batch, too."""
         part = self._writer.part_number
         self._write(in_any_case=part > 1 and part != self._part)
 
     def write(self) -> None:
-        """Write what has gathered."""
+        """Write the gathered samples."""
         self._write(in_any_case=False)
 
     def _write(self, *, in_any_case: bool) -> None:
@@ -87,7 +87,7 @@ class InputLog:
             self._encoder.restart(self._in_force.samples())
         batch = self._encoder.take(in_any_case=in_any_case)
         if batch and not self._writer.write_blob(batch):
-            # Nothing can refer to what was not written.
+            # No digest may refer to a sample that was not written.
             self._part = 0
 
     def _is_news(self, arrival: Arrival) -> bool:
@@ -112,7 +112,7 @@ class InputLog:
 
 
 def _path_digest(arrival: Arrival) -> Arrival:
-    """Return a digest in place of a path: its points are many bytes, and no input."""
+    """Return a digest in place of a path: its points are many bytes and no input."""
     payload = arrival.sample.payload
     with contextlib.suppress(MalformedMessage):
         payload = decode_path(payload).xy.tobytes()
@@ -122,7 +122,7 @@ def _path_digest(arrival: Arrival) -> Arrival:
 
 
 class _InForce:
-    """The newest map, what has changed of it since, and the newest of what else is latched.
+    """The newest map, its updates, and the newest sample of each other latched topic.
 
     Static transforms come from several nodes, and all of them hold.
     """
@@ -150,7 +150,7 @@ class _InForce:
         self._updates.append(numbered)
         self._updates_bytes += len(numbered.arrival.sample.payload)
         if self._updates_bytes > IN_FORCE_BYTES:
-            # A map without its updates would be another one: better none.
+            # Without its updates the map would be wrong: better none.
             del self._newest["map"]
             self._updates, self._updates_bytes = [], 0
 

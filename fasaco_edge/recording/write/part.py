@@ -24,12 +24,12 @@ LOG = logging.getLogger(__name__)
 
 # Rows gather until the writer flushes, or at most this long [s].
 FLUSH_TICK_S = 10.0
-# How long the disk may take for the first message of a part.
+# Timeout of the disk for the first message of a part [s].
 BEGIN_TIMEOUT_S = 10.0
 
 
 class Flush(enum.Enum):
-    """What became of what was logged."""
+    """Result of a flush."""
 
     DONE = "done"
     """It is handed to the disk."""
@@ -42,10 +42,10 @@ class Flush(enum.Enum):
 class Part:
     """A file being written.
 
-    Rerun's logging calls never fail: only ``flush`` shows what became of the data.
+    Rerun's logging calls never fail: only ``flush`` tells whether the data were written.
 
     Attributes:
-        refused: why the disk has not taken the first message; then only ``abandon`` is left to do.
+        refused: why the first message was not written; then only ``abandon`` may be called.
 
     Raises:
         OSError: the file cannot be made.
@@ -68,15 +68,15 @@ class Part:
     def _attach(self) -> None:
         """Let rerun write to the file.
 
-        The call waits until the first message is on the disk, and never returns if the disk refuses
-        that or stalls (rerun 0.41). So it is made on a thread, which is abandoned then.
+        The call waits until the first message is written, and never returns if the disk fails or
+        stalls (rerun 0.41). So it is made on a thread, which is abandoned then.
         """
         errors = list[RuntimeError]()
 
         def attach() -> None:
             try:
-                # Without a blueprint: one given here is written before the call returns, too.
-                # By its descriptor: what has that name may be another file by now.
+                # Without a blueprint: one given here is also written before the call returns.
+                # By its descriptor: another file may have that name by now.
                 self.stream.set_sinks(rr.FileSink(f"/proc/self/fd/{self._lock}"))
             except RuntimeError as error:
                 errors.append(error)
@@ -104,11 +104,11 @@ class Part:
 
     @property
     def is_deleted(self) -> bool:
-        """Whether the file has lost its last name: what is written to it is gone at its end."""
+        """Whether the file was unlinked: its data are gone when it is closed."""
         return os.fstat(self._lock).st_nlink == 0
 
     def write_blob(self, blob: bytes, wall_ns: int) -> None:
-        """Write bytes at ``wall_ns`` [ns], past what gathers."""
+        """Write bytes at ``wall_ns`` [ns], without batching."""
         time = rr.TimeColumn(entities.WALL_CLOCK, timestamp=np.array([wall_ns], "datetime64[ns]"))
         columns = rr.DynamicArchetype.columns(
             archetype=entities.INPUTS_ARCHETYPE,
@@ -117,11 +117,11 @@ class Part:
         rr.send_columns(entities.INPUTS, indexes=[time], columns=columns, recording=self.stream)
 
     def flush(self, timeout_s: float) -> Flush:
-        """Wait up to ``timeout_s`` [s] until all that was logged is handed to the disk."""
+        """Wait up to ``timeout_s`` [s] until all logged data are passed to the disk."""
         try:
             self.stream.flush(timeout_sec=timeout_s)
         except RuntimeError as error:
-            # One type for both, and a writer that died during a flush lets it time out, too
+            # The same exception for both: a flush whose writer has died also times out
             # (rerun 0.41).
             slow = "timed out" in str(error) and self._has_writer()
             return Flush.STALLED if slow else Flush.BROKEN
@@ -129,9 +129,9 @@ class Part:
         return Flush.DONE
 
     def close(self) -> None:
-        """Write the footer and end the file; call it only after a flush that succeeded.
+        """Write the footer and close the file; call it only after a successful flush.
 
-        What was flushed can be read without a footer, too.
+        Flushed data can be read without a footer, too.
         """
         self.stream.disconnect()
         if not self._has_footer():
@@ -139,23 +139,23 @@ class Part:
         os.close(self._lock)
 
     def _has_footer(self) -> bool:
-        """Return whether the file was ended; rerun does not report where it could not be."""
+        """Return whether the file has its footer; rerun does not report a failure."""
         try:
             with os.fdopen(os.dup(self._lock), "rb") as file:
                 if not stat.S_ISREG(os.fstat(self._lock).st_mode):
-                    return True  # what went through a pipe is gone
+                    return True  # data sent through a pipe cannot be read back
                 scan = scan_recording(file, self._flushed_bytes)
         except OSError:
             return False
-        # The footer is followed by its place in the file.
+        # The footer is followed by its offset in the file.
         return scan is not None and scan.has_footer and scan.torn_bytes > 0
 
     def abandon(self) -> None:
-        """Save of a broken part what can be read: what was flushed, or nothing.
+        """Truncate a broken part to its flushed data.
 
-        Behind a frame that the disk took half of, rerun may still have written others, once there
-        was space again: they cannot be distinguished from the rest of that frame.
-        The stream stays: to disconnect or release it may hang (rerun 0.41).
+        After a partly written frame, rerun may have written more frames once there was space again:
+        they cannot be distinguished from the rest of that frame.
+        The stream is kept: disconnecting or releasing it may hang (rerun 0.41).
         """
         os.close(self._lock)
         if not self._flushed_bytes:
@@ -165,9 +165,9 @@ class Part:
         self.cut()
 
     def cut(self) -> None:
-        """Cut a broken part again: rerun may write to it long after it has given up on it.
+        """Truncate a broken part again: rerun may write to it long after it has given up on it.
 
-        A disk that refuses even that is asked again with the next call.
+        If that fails, the next call retries.
         """
         with suppress(OSError):
             if self.path.is_file() and self.path.stat().st_size > self._flushed_bytes:
@@ -183,7 +183,7 @@ class Part:
 
 
 def _disk_error(error: RuntimeError, path: Path) -> OSError:
-    """Return the system's error, which rerun gives as text: "... (os error 28)"."""
+    """Return the system's error from rerun's text: "... (os error 28)"."""
     number = re.search(r"\(os error (\d+)\)", str(error))
     if number is None:
         return OSError(str(error))

@@ -1,8 +1,8 @@
 """Disk space for recordings: names and age of runs, deletion of old parts, free space.
 
-A run's name begins with a number above the highest there is: clocks go backward, on a computer
-without a battery for its clock at each start, and numbers do not. Only parts that a recorder of
-this robot has named are deleted, only where no recorder writes them, and no other file.
+A run's name begins with a number above the highest existing one: clocks go backward (without a
+clock battery at each boot), numbers do not. Deletes only parts named by this robot's recorder that
+none is writing; never another file.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from fasaco_edge.errors import BadConfiguration
 
 MEGABYTE = 1_000_000
 NUMBERED = re.compile(r"run(\d{5,9})-.*\.rrd")
-# No recorder has counted so far: a name with such a number is somebody else's.
+# No recorder counts this far: a name with a larger number is not a recorder's.
 MOST_RUNS = 900_000_000
 TIME = "%Y%m%dT%H%M%SZ"
 # Free space above the minimum before recording resumes: the disk must not fill again at once.
@@ -31,7 +31,7 @@ LOG = logging.getLogger(__name__)
 
 
 def next_run(folder: Path, robot: str, began: datetime) -> str:
-    """Return the name of a run of ``robot`` that begins now, newer than all there are.
+    """Return the name of a run of ``robot`` that begins now, after all existing ones.
 
     Raises:
         BadConfiguration: the folder cannot be read.
@@ -47,16 +47,16 @@ def next_run(folder: Path, robot: str, began: datetime) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Quota:
-    """How many bytes the recordings of ``robot`` in a folder may take; 0 for no limit."""
+    """Limit of the size of ``robot``'s recordings in a folder [bytes]; 0 for none."""
 
     robot: str
     most_bytes: int
 
     def keep(self, folder: Path, coming: int = 0) -> list[Path]:
-        """Delete the oldest parts until ``coming`` bytes more fit; return what was deleted.
+        """Delete the oldest parts until ``coming`` more bytes fit; return the deleted files.
 
         Raises:
-            OSError: the folder cannot be read, or a file in it not be deleted.
+            OSError: the folder cannot be read, or a file cannot be deleted.
         """
         if not self.most_bytes:
             return []
@@ -74,15 +74,15 @@ class Quota:
 def oldest_first(folder: Path, robot: str) -> list[tuple[Path, int]]:
     """Return the parts of a robot's recordings, each with its size [bytes], the oldest first.
 
-    Runs with a name of an earlier release, without a number, are older than the others. Among
-    themselves they are ordered by their last write: the file's time, or the time in the name where
-    that is later, as it may be for a copy.
+    Runs named by earlier releases, without a number, come first. Among themselves they are ordered
+    by their last write: the later of the file's time and the time in the name, which differ for a
+    copy.
 
     Raises:
         OSError: the folder cannot be read.
     """
     named = re.compile(
-        # Without a number in front, a second run within a second has one behind.
+        # Without a leading number, a second run within a second has a trailing one.
         r"(?P<run>(?:run(?P<order>\d{5,9})-)?(?P<when>\d{8}T\d{6}Z)-"
         rf"{re.escape(robot)}(?(order)|(?:-(?P<again>\d+))?))-part(?P<number>\d+)\.rrd"
     )
@@ -90,7 +90,7 @@ def oldest_first(folder: Path, robot: str) -> list[tuple[Path, int]]:
     matches = {path: match for path in folder.iterdir() if (match := named.fullmatch(path.name))}
     runs = {match["run"] for match in matches.values()}
     for path, match in matches.items():
-        # The number behind the name may be the end of another robot's: ours is the second of two.
+        # A number after the name may be the end of another robot's name: ours is the second of two.
         if match["again"] and f"{match['when']}-{robot}" not in runs:
             continue
         if path.is_file() and not path.is_symlink():
@@ -110,7 +110,7 @@ def oldest_first(folder: Path, robot: str) -> list[tuple[Path, int]]:
 
 
 def _time(when: str) -> float:
-    """Return the time in a name [s]; 0 where there is no such day."""
+    """Return the time in a name [s]; 0 for an invalid date."""
     try:
         return datetime.strptime(when, TIME).replace(tzinfo=UTC).timestamp()
     except ValueError:
@@ -118,7 +118,7 @@ def _time(when: str) -> float:
 
 
 def _delete(path: Path) -> bool:
-    """Delete a part; return False where a recorder writes it, which holds a lock on it."""
+    """Delete a part; return False if a recorder is writing it and holds its lock."""
     descriptor = os.open(path, os.O_RDONLY | os.O_CLOEXEC | os.O_NOFOLLOW)
     try:
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -132,13 +132,13 @@ def _delete(path: Path) -> bool:
 
 @dataclass(frozen=True, slots=True)
 class DiskBudget:
-    """When a part ends, how much the disk must keep free, and what all recordings may take.
+    """Limits of parts, of free space and of all recordings.
 
     Attributes:
-        part_bytes: a part larger than this is followed by the next.
-        least_free_bytes: what must stay free on the disk.
-        part_s: a part older than this is followed by the next [s]; 0 for never. Until the footer
-            of a part is written rerun's index of it grows by a megabyte a minute.
+        part_bytes: size at which the next part begins.
+        least_free_bytes: space that must stay free on the disk.
+        part_s: age at which the next part begins [s]; 0 for never. Until the footer of a part is
+            written, rerun's index of it grows by a megabyte a minute.
         quota: of all recordings of the robot.
 
     Raises:
@@ -158,7 +158,7 @@ class DiskBudget:
             ("part_s", self.part_s, 0),
             ("quota_bytes", quota_bytes, 0),
         ):
-            # Negated, so that NaN is caught, too.
+            # Negated comparisons also catch NaN.
             if not given >= least:
                 raise BadConfiguration(f"{name} must be at least {least}, got {given}")
         if 0 < quota_bytes < 2 * self.part_bytes:
@@ -168,7 +168,7 @@ class DiskBudget:
             )
 
     def is_full(self, folder: Path) -> bool:
-        """Return whether less is free in ``folder`` than must be."""
+        """Return whether ``folder`` has less free space than required."""
         return _free_bytes(folder) < self.least_free_bytes
 
     def may_begin(self, folder: Path) -> bool:
@@ -176,7 +176,7 @@ class DiskBudget:
         return _free_bytes(folder) >= self.least_free_bytes + RESUME_BYTES
 
     def keep_quota(self, folder: Path) -> None:
-        """Delete the oldest parts in ``folder`` where all take more than they may."""
+        """Delete the oldest parts in ``folder`` above the quota."""
         if self.quota is None:
             return
         try:
@@ -189,7 +189,7 @@ class DiskBudget:
 
 
 def budget_of(config: DaemonConfig) -> DiskBudget:
-    """Return the budget that a configuration states.
+    """Return the budget of a configuration.
 
     Raises:
         BadConfiguration: a size is impossible, or the robot's name is no key.
@@ -207,5 +207,5 @@ def _free_bytes(folder: Path) -> int:
     try:
         return shutil.disk_usage(folder).free
     except OSError:
-        # The folder, or the disk it was on, is gone: nothing is free there until it is back.
+        # The folder or its disk is gone: no free space until it is back.
         return 0

@@ -1,4 +1,4 @@
-"""The recorder: a process of its own that records the samples on the bus.
+"""The recorder, a process that records the samples on the bus.
 
 Nothing it does, or fails to do, can delay the planner. Zenoh's threads only post; one thread
 decodes, draws and writes.
@@ -52,7 +52,7 @@ TAKE_TIMEOUT_S = 0.05
 REPORT_PERIOD_NS = 1_000_000_000
 # The daemon publishes a status once a second.
 SILENCE_NS = 3_500_000_000
-# How long drawing the samples that wait at the end may take [ns].
+# Timeout for drawing the waiting samples at the end [ns].
 LAST_DRAWN_NS = 300_000_000
 EXIT_STALLED = 1
 
@@ -67,7 +67,7 @@ def run_recorder(
     """Record until SIGTERM or SIGINT; return the process's exit code.
 
     Args:
-        config: the daemon's: robot, keys, poses and ROS 2 topics.
+        config: configuration of the daemon: robot, keys, poses and ROS 2 topics.
         bus_settings: how to join the bus.
         out: folder for the recordings; made if missing.
         budget: of the disk.
@@ -92,13 +92,13 @@ def run_recorder(
             recorder.step(TAKE_TIMEOUT_S)
         code = 0 if recorder.end() else EXIT_STALLED
     if recorder.hangs:
-        # What could be saved is saved; rerun's own way out would never end.
+        # All recoverable data are saved; rerun's own exit would never end.
         os._exit(code)
     return code
 
 
 class Recorder:
-    """Joins the bus to the writer: ``step`` takes what came, writes it, and reports."""
+    """Connects the bus to the writer: ``step`` takes samples, writes them, and reports."""
 
     def __init__(
         self,
@@ -154,7 +154,7 @@ class Recorder:
         self._reporter: Publisher = bus.advertise(config.keys(), topics.RECORDER)
 
     def listen(self) -> None:
-        """Subscribe to everything there is to record, and declare that the recorder is there."""
+        """Subscribe to all recorded topics, and declare the recorder's token."""
         keys = self._config.keys()
         if ros := self._config.ros2:
             for name, heard in ros.inputs.items():
@@ -167,13 +167,13 @@ class Recorder:
         self._bus.token(keys.of(topics.RECORDER_ALIVE))
 
     def step(self, timeout_s: float) -> None:
-        """Write what came within ``timeout_s`` [s], check that it is written, report."""
+        """Write samples that arrive within ``timeout_s`` [s], check the writer, report."""
         arrivals = deque(self._inbox.take(timeout_s))
         heard_ns = arrivals[-1].at_ns if arrivals else time.monotonic_ns()
-        while arrivals:  # release what is written
+        while arrivals:  # release written samples
             self._write(arrivals.popleft())
             self._sync()
-            # Much to catch up with is no silence.
+            # A long backlog is no silence.
             self._report_writing()
         self._inputs.note_lost(self._inbox.lost)
         self._writer.at(self._clock.now_ns())
@@ -183,7 +183,7 @@ class Recorder:
         self._report_writing()
 
     def end(self) -> bool:
-        """Write what waits and the footer; False where the disk does not take them."""
+        """Write waiting samples and the footer; False if the disk fails."""
         deadline_ns, undrawn = time.monotonic_ns() + LAST_DRAWN_NS, 0
         for arrival in self._inbox.take(0.0):
             is_late = time.monotonic_ns() >= deadline_ns
@@ -204,14 +204,14 @@ class Recorder:
         return self._writer.hangs
 
     def note(self, line: str) -> None:
-        """Log something that went wrong before the recording began."""
+        """Log a fault from before the recording began."""
         self._scene.add_line(entities.RECORDER_LOG, line, "WARN")
 
     def _subscribe(
         self, topic: str, key: str, latched: bool = False, depth: int = 1, schema: str = ""
     ) -> None:
         def post(sample: Sample) -> None:
-            # As the daemon has it: ROS names no type beside a sample.
+            # As in the daemon: ROS sends no type with a sample.
             self._inbox.post(topic, sample.as_type(schema) if schema else sample)
 
         in_order = topic in topics.IN_ORDER
@@ -223,7 +223,7 @@ class Recorder:
         self._writer.sync(now_ns)
 
     def _write(self, arrival: Arrival, *, is_drawn: bool = True) -> None:
-        """Write a sample; one that is not drawn is an input for a replay all the same."""
+        """Write a sample; one without a drawing is still an input for a replay."""
         self._messages += 1
         self._writer.message(arrival.wall_ns)
         if arrival.topic == "status" and _is_rival(arrival.sample.payload):
@@ -236,12 +236,12 @@ class Recorder:
         if not is_drawn:
             return
         try:
-            # What has no drawer, as the turn log, is an input for a replay alone.
+            # A sample without a drawing, as the turn log, is only an input for a replay.
             if (draw := self._drawers.get(arrival.topic)) is not None:
                 draw(arrival.sample)
         except FasacoError as error:
             self._malformed += 1
-            # A faulty publisher is so with every message: log the 1st, 2nd, 4th, 8th ...
+            # A faulty publisher may send only malformed ones: log the 1st, 2nd, 4th, 8th ...
             if self._malformed & (self._malformed - 1) == 0:
                 line = f"{self._malformed} malformed, the last on {arrival.sample.key}: {error}"
                 self._scene.add_line(entities.BUS_LOG, line, "WARN")
@@ -267,7 +267,7 @@ class Recorder:
         self._scene.add_status(decode_tolerant(sample.payload, Status))
 
     def _watch_planner(self, heard_ns: int) -> None:
-        """Tell of a planner that has said nothing for long, of all that came up to a time [ns]."""
+        """Report a planner that was silent for long, up to a time [ns]."""
         last = self._last_status_ns
         if last is not None and heard_ns - last > SILENCE_NS:
             self._scene.enter(entities.MISSION_STATE, "silent", "the planner says nothing any more")

@@ -1,9 +1,9 @@
-"""Rerun's streams: what each begins with, and what one leaves behind (rerun 0.41).
+"""Rerun's streams: their initial data, and their leaks (rerun 0.41).
 
-A stream that is no longer referenced keeps two threads and half a megabyte until it is swept up.
-Each blueprint that is sent leaves a stream that references itself: a leak, unless disconnected.
+A stream that is no longer referenced keeps two threads and half a megabyte until ``sweep``. Each
+blueprint that is sent leaves a stream that references itself: a leak, unless disconnected.
 
-A live stream is served, never sent: to a viewer that is not there rerun's memory would grow
+A live stream is served, never sent: without a viewer at the other end rerun's memory would grow
 without bound. Viewers join at rerun+http://HOST:PORT/proxy.
 """
 
@@ -18,15 +18,15 @@ from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.sdk import rr, rrb
 
-# What a viewer that joins late is shown at most; the oldest data go first.
+# Most data kept for a viewer that joins late; the oldest are dropped first.
 MEMORY_LIMIT = "25MB"
 
 
 class LatchedState:
-    """What each part begins with: static data, newest latched data, properties, layout, times.
+    """Initial data of each part: static data, newest latched data, properties, layout, times.
 
     Attributes:
-        wall_ns: the time of what is logged next [ns].
+        wall_ns: the time of the next log call [ns].
     """
 
     def __init__(self, name: str, blueprint: rrb.Blueprint) -> None:
@@ -40,13 +40,13 @@ class LatchedState:
         self._missed_ns: dict[str, int] = {}
 
     def latch(self, entity: str, archetype: rr.AsComponents, *, missed: bool) -> None:
-        """Keep what is in force from now on; ``missed``: it was not written."""
+        """Keep data in force from now on; ``missed``: they were not written."""
         self._latched[entity] = archetype
         if missed:
             self._missed_ns[entity] = self.wall_ns
 
     def begin(self, stream: rr.RecordingStream) -> None:
-        """Begin a part with all that holds."""
+        """Begin a part with all data in force."""
         send_blueprint(stream, self.blueprint)
         self.send_description(stream)
         for entity, archetypes in self.static.items():
@@ -60,16 +60,16 @@ class LatchedState:
             stream.send_property(entities.APPLICATION, rr.AnyValues(**self.properties))
 
     def send_latched(self, stream: rr.RecordingStream) -> None:
-        """Write what is latched, what was missed at the time it came."""
+        """Write latched data, missed ones at their time of arrival."""
         for entity, archetype in self._latched.items():
-            # What came while nothing was written is in force since then.
+            # Data that arrived while nothing was written are in force since then.
             self._set_times(stream, self._missed_ns.get(entity, self.wall_ns))
             stream.log(entity, archetype)
         self._missed_ns.clear()
         self.set_times(stream)
 
     def set_times(self, stream: rr.RecordingStream) -> None:
-        """Set the times of what is logged next."""
+        """Set the times of the next log calls."""
         self._set_times(stream, self.wall_ns)
 
     def _set_times(self, stream: rr.RecordingStream, wall_ns: int) -> None:
@@ -79,7 +79,7 @@ class LatchedState:
 
 
 def serve_live(recording_id: str, host: str, port: int) -> rr.RecordingStream:
-    """Return a stream that serves what is logged to it at ``host``:``port``.
+    """Return a stream that serves its data at ``host``:``port``.
 
     Raises:
         BadConfiguration: there is no such address here, or another program listens there.
@@ -92,7 +92,7 @@ def serve_live(recording_id: str, host: str, port: int) -> rr.RecordingStream:
 
 
 def _try_address(host: str, port: int) -> None:
-    """Listen there for a moment: rerun does not report where it cannot."""
+    """Listen there for a moment: rerun does not report failure to listen."""
     try:
         family = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0][0]
         with socket.socket(family, socket.SOCK_STREAM) as trial:
@@ -119,5 +119,5 @@ def send_blueprint(stream: rr.RecordingStream, blueprint: rrb.Blueprint) -> None
 
 
 def sweep() -> None:
-    """Free streams that are not referenced; flushes all there are, so none may hang."""
+    """Free unreferenced streams; flushes all streams, so none may hang."""
     bindings.flush_and_cleanup_orphaned_recordings()

@@ -1,7 +1,7 @@
-"""A recording over its parts: data survive rotation, and a full or stalled disk.
+"""The writer of a recording in parts: data survive rotation, and a full or stalled disk.
 
-The writer keeps static data and the newest value of what is latched. Each part begins with them,
-so that it can be read alone; all share one recording id, so that a viewer shows them as one run.
+The writer keeps static data and the newest latched values. Each part begins with them, so that it
+can be read alone; all share one recording id, so that a viewer shows them as one run.
 """
 
 from __future__ import annotations
@@ -19,26 +19,26 @@ from fasaco_edge.recording.write.streams import LatchedState, send_blueprint, sw
 
 LOG = logging.getLogger(__name__)
 
-# What a kill -9 costs, with what a flush takes. Each entity begins a chunk with each flush, and
-# a chunk takes more than a kilobyte.
+# Flush period: data lost by kill -9, plus the time of a flush. Each entity begins a chunk with each
+# flush, and a chunk takes more than a kilobyte.
 FLUSH_PERIOD_NS = 900_000_000
-# While nothing can be written, how often to try again.
+# Retry period while nothing can be written.
 RETRY_PERIOD_NS = 1_000_000_000
-# Each part given up leaves threads and memory behind: further tries come at longer intervals.
+# Each abandoned part leaks threads and memory: retries back off.
 MOST_DOUBLINGS = 5
-# Rerun's own queue has no bound: at most this waits in it between two flushes.
+# Rerun's own queue has no bound: this limits it between two flushes.
 FLUSH_BYTES = 8_000_000
-# How long to wait for a disk that pauses, as memory cards do, or for a slow computer: what comes
-# meanwhile waits in the recorder's queue.
+# Timeout for a disk that pauses, as memory cards do, or for a slow computer: samples that arrive
+# meanwhile wait in the recorder's queue.
 FLUSH_TIMEOUT_S = 4.0
-# How long to probe whether a stalled disk is back.
+# Timeout of a probe whether a stalled disk is back.
 PROBE_TIMEOUT_S = 0.2
-# A slow computer takes long; a supervisor does not wait for what hangs.
+# A slow computer takes long; a supervisor does not wait for a hanging writer.
 CLOSE_TIMEOUT_S = 4.0
 
 
 class WriterState(enum.Enum):
-    """Whether what is logged is being written."""
+    """State of the writer: whether logged data are written."""
 
     RECORDING = "recording"
     DISK_FULL = "disk full"
@@ -48,7 +48,7 @@ class WriterState(enum.Enum):
 class RecordingWriter:
     """Writes to the parts ``<recording_id>-part<n>.rrd`` in ``folder``; for one thread only.
 
-    Rerun keeps the time per thread, and logs as static what a thread without one logs.
+    Rerun keeps the time per thread, and logs data of a thread without a time as static.
 
     Raises:
         BadConfiguration: the folder cannot be made or written to.
@@ -84,7 +84,7 @@ class RecordingWriter:
 
     @property
     def path(self) -> Path | None:
-        """The part being written; None while the disk has no space for one."""
+        """The part being written; None while the disk is full."""
         return self._part.path if self._part else None
 
     @property
@@ -94,7 +94,7 @@ class RecordingWriter:
 
     @property
     def wall_ns(self) -> int:
-        """The time of what is logged next [ns]."""
+        """The time of the next log call [ns]."""
         return self._latched.wall_ns
 
     @property
@@ -108,10 +108,10 @@ class RecordingWriter:
         return self._part.size if self._part else 0
 
     def message(self, wall_ns: int) -> None:
-        """Begin what a message received at ``wall_ns`` gives to log.
+        """Begin logging a message received at ``wall_ns``.
 
-        A message that is not written is counted as lost, one that only may have been
-        lost with a broken part, too.
+        A message that is not written is counted as lost, and so is one that may have been lost
+        with a broken part.
         """
         self.at(wall_ns)
         if self.state is WriterState.RECORDING:
@@ -121,13 +121,13 @@ class RecordingWriter:
             self.lost += 1
 
     def at(self, wall_ns: int) -> None:
-        """Set the time [ns] of what is logged next."""
+        """Set the time [ns] of the next log calls."""
         self._latched.wall_ns = wall_ns
         for stream in self._streams():
             self._latched.set_times(stream)
 
     def sequence(self, timeline: str, number: int) -> None:
-        """Set the place on another timeline of all that is logged from now on."""
+        """Set the position on another timeline for all later log calls."""
         self._latched.sequences[timeline] = number
         for stream in self._streams():
             self._latched.set_times(stream)
@@ -138,9 +138,9 @@ class RecordingWriter:
         """Log at the time set.
 
         Args:
-            entity, archetype: what.
+            entity, archetype: what to log, and where.
             latched: in force until the next, so parts begin with it.
-            size: how much it is, where that is much [bytes].
+            size: its size, if large [bytes].
         """
         if latched:
             missed = self._part is None or self.state is not WriterState.RECORDING
@@ -150,7 +150,7 @@ class RecordingWriter:
         self._unflushed_bytes += size
 
     def write_blob(self, blob: bytes) -> bool:
-        """Write bytes at the time set, without waiting for a flush; False where it cannot be."""
+        """Write bytes at the time set, without waiting for a flush; False on failure."""
         if self._part is None or self.state is not WriterState.RECORDING:
             return False
         self._part.write_blob(blob, self.wall_ns)
@@ -158,7 +158,7 @@ class RecordingWriter:
         return True
 
     def log_static(self, entity: str, *archetypes: rr.AsComponents) -> None:
-        """Log what holds for the whole run; takes the place of what held before."""
+        """Log static data of the run; replaces earlier static data."""
         self._latched.static[entity] = archetypes
         for stream in self._streams():
             stream.log(entity, *archetypes, static=True)
@@ -170,18 +170,18 @@ class RecordingWriter:
             self._latched.send_description(stream)
 
     def show(self, blueprint: rrb.Blueprint) -> None:
-        """Make ``blueprint`` the one that opens; a file's last one counts."""
+        """Make ``blueprint`` the active one; the last one in a file counts."""
         self._latched.blueprint = blueprint
         for stream in self._streams():
             send_blueprint(stream, blueprint)
 
     def serve(self, live: rr.RecordingStream) -> None:
-        """Let all that is logged go to ``live``, too, whatever becomes of the disk."""
+        """Also log to ``live``, independent of the disk."""
         self._live = live
         self._latched.begin(live)
 
     def sync(self, now_ns: int) -> None:
-        """Check whether all is written, and act on it; call it often.
+        """Check whether all data are written, and act on it; call it often.
 
         Args:
             now_ns: a monotonic clock [ns].
@@ -199,7 +199,7 @@ class RecordingWriter:
         self._next_flush_ns = now_ns + (FLUSH_PERIOD_NS if recording else retry_ns)
 
     def close(self) -> bool:
-        """End the part in order; False where the disk holds rerun's writer up."""
+        """Close the part properly; False if the disk blocks rerun's writer."""
         for broken in self._abandoned:
             broken.cut()
         if self._part is None:

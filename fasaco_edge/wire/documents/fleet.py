@@ -1,7 +1,7 @@
-"""Fleet documents: what a robot says of itself to the others that share an area with it.
+"""Fleet documents: messages between robots that share an area.
 
-The key says whose message it is, never the message: access rules hold for keys. A reader refuses
-what is beyond a limit, as it comes from a computer of someone else.
+The sender is named by the key, never by the message: access rules hold for keys. A reader refuses
+values beyond a limit, because the sender is a foreign computer.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from fasaco_edge.wire.documents.json_text import Document
 from fasaco_edge.wire.limits import MAX_COORDINATE_M, MAX_FLEET_TILES, MAX_JSON_BYTES
 
 FLEET_VERSION: Final = 1
-# Of a tile of 64 x 64 cells: a bit each.
+# Bytes of a tile of 64 x 64 cells, a bit each.
 TILE_BYTES: Final = 512
 
 Coordinate = Annotated[float, Meta(ge=-MAX_COORDINATE_M, le=MAX_COORDINATE_M)]
@@ -26,10 +26,10 @@ Place = Annotated[int, Meta(ge=-(2**24), le=2**24)]
 
 
 class SweptTile(msgspec.Struct, frozen=True, array_like=True):
-    """Which cells of a tile of 64 x 64 were swept.
+    """The swept cells of a tile of 64 x 64.
 
     Attributes:
-        row, col: of the tile: it has the cells from 64 times these on.
+        row, col: of the tile; its first cell is at 64 times these.
         cells: 512 bytes in base64: a bit a cell, row by row, the first of eight the highest.
     """
 
@@ -39,7 +39,7 @@ class SweptTile(msgspec.Struct, frozen=True, array_like=True):
 
 
 class FleetMember(Document, frozen=True):
-    """A robot of a fleet, as it says of itself.
+    """A robot of a fleet, described by itself.
 
     Attributes:
         version: of this document.
@@ -47,12 +47,12 @@ class FleetMember(Document, frozen=True):
         cell_m: edge of a cell [m].
         frame: of the map.
         state: of the mission, as in the status.
-        x, y: where the robot is [m] in the frame of the map.
-        step_s: what sweeping a cell takes it [s].
-        epoch: another one whenever the robot has forgotten some of what it swept.
-        division: number of the newest division of what is left that it knows.
-        open_cells: how many cells it knows that are still to be swept.
-        swept: tiles of what it has swept in this epoch: those with news first, then all in turn.
+        x, y: position of the robot [m] in the frame of the map.
+        step_s: time it takes to sweep a cell [s].
+        epoch: changes whenever the robot drops some of its swept cells.
+        division: number of the newest division of the remaining cells known to it.
+        open_cells: number of cells known to it that are still to sweep.
+        swept: tiles swept in this epoch: changed ones first, then all in turn.
         lattice_deg: the angle of its cells' rows to the x axis of the map frame [deg].
     """
 
@@ -72,18 +72,18 @@ class FleetMember(Document, frozen=True):
 
 
 class _Head(msgspec.Struct, frozen=True):
-    """What is there in every version."""
+    """The members common to all versions."""
 
     version: Whole
     fleet: Text
 
 
 def decode_member(payload: bytes, fleet: str) -> FleetMember | None:
-    """Return what a robot says of itself; None where it is of another fleet.
+    """Return a robot's message; None from another fleet.
 
     Raises:
         FleetError: it is of another version.
-        MalformedMessage: it is not what it should be.
+        MalformedMessage: it is malformed.
     """
     if len(payload) > MAX_JSON_BYTES:
         raise MalformedMessage(f"fleet: must have at most {MAX_JSON_BYTES} bytes")

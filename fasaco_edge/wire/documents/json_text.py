@@ -1,7 +1,7 @@
-"""JSON documents on the bus (RFC 8259; NaN and infinities have no place).
+"""JSON documents on the bus (RFC 8259: no NaN, no infinities).
 
-Strict readers refuse a document with a member of the wrong type; tolerant ones, for what other
-versions wrote, leave that member out. Both ignore members they do not know.
+Strict readers refuse a document with a member of the wrong type; tolerant readers, for documents
+of other versions, drop that member. Both ignore unknown members.
 """
 
 from __future__ import annotations
@@ -83,7 +83,7 @@ def decode_document(payload: bytes, kind: type[Struct]) -> Struct:
 
 
 def decode_tolerant(payload: bytes, kind: type[Struct]) -> Struct:
-    """Return what fits ``kind`` of the JSON object in ``payload``; no bytes are an empty object.
+    """Return the members of a JSON object that fit ``kind``; no bytes are an empty object.
 
     Raises:
         MalformedMessage: it is no JSON object.
@@ -92,15 +92,15 @@ def decode_tolerant(payload: bytes, kind: type[Struct]) -> Struct:
 
 
 def tolerant(document: Mapping[str, object], kind: type[Struct]) -> Struct:
-    """Return what fits ``kind`` of a JSON object; other members keep their defaults.
+    """Return the members of a JSON object that fit ``kind``; others keep their defaults.
 
     Numbers beyond ``MAX_INTEGER`` and ``MAX_NUMBER`` do not fit, texts are cut at ``MAX_TEXT``.
 
     Raises:
         TypeError: a member without a default is missing, or does not fit.
     """
-    # In nearly all documents all fits: much faster than member by member. One that is nested
-    # deeply has members nobody knows.
+    # Nearly all documents fit as a whole: much faster than member by member. A deeply nested one
+    # has unknown members.
     with suppress(msgspec.ValidationError, RecursionError):
         if _is_within_bounds(document):
             return msgspec.convert(document, kind)

@@ -14,7 +14,7 @@ import hashlib
 
 
 class PlanFigures(Document, frozen=True):
-    """The plan that a path follows, as it was made; all null without one.
+    """The plan that a path follows, at the time of planning; all null without one.
 
     Attributes:
         planner: name of the planner.
@@ -22,14 +22,15 @@ class PlanFigures(Document, frozen=True):
         ants: ants that walked.
         kicks: perturbations of the local search.
         proposals: moves that the local search tried.
-        planned_steps: steps of the plan as it was made.
+        planned_steps: steps of the plan at the time of planning.
         planned_cost_s: seconds the plan takes, by configured speed and turn time.
         lower_bound_steps: no walk has fewer steps.
         lower_bound_cost_s: no walk takes fewer seconds, steps and turns together.
         gap: planned_cost_s / lower_bound_cost_s - 1.
-        saved_by_ants_s: what walks of ants, and local search on these, took off the first walk.
-        saved_by_local_search_s: what local search took off the first walk, or off the one that
-            was still to be driven.
+        saved_by_ants_s: seconds saved on the first walk by ants, and by local search on their
+            walks.
+        saved_by_local_search_s: seconds saved by local search on the first walk, or on the one
+            still to drive.
     """
 
     planner: str | None = None
@@ -47,7 +48,7 @@ class PlanFigures(Document, frozen=True):
 
     @classmethod
     def of(cls, plan: CoveragePath | None) -> Self:
-        """Return what is known of the plan a path follows."""
+        """Return the figures of the plan that a path follows."""
         if plan is None:
             return cls()
         return cls(
@@ -62,7 +63,7 @@ class PlanFigures(Document, frozen=True):
             lower_bound_cost_s=round(plan.lower_bound_cost_s, 3) or None,
             gap=None if plan.gap is None else round(plan.gap, 6),
             saved_by_ants_s=round(plan.saved.ants, 3),
-            # A repair that keeps the way ahead may cost more: it has saved nothing.
+            # A repair that keeps the path ahead may cost more: it has saved nothing.
             saved_by_local_search_s=round(max(plan.saved.local_search, 0.0), 3),
         )
 
@@ -73,8 +74,8 @@ class PathReport(PlanFigures, frozen=True):
     Attributes:
         revision: counts the published paths.
         steps: as published.
-        remaining_steps: still to be driven.
-        reason: why it replaced the one before.
+        remaining_steps: still to drive.
+        reason: why it replaced the previous one.
     """
 
     revision: Ordinal = 1
@@ -97,17 +98,17 @@ class Rectangle(Document, frozen=True):
 
 
 class PathAttachment(PlanFigures, frozen=True):
-    """What comes with each path, as its Zenoh attachment.
+    """The Zenoh attachment of each path.
 
     Attributes:
         revision: counts the published paths.
         map_stamp_ns: stamp of the map it was planned on [ns].
         map_revision: revision of that map, as in the status.
-        reason: why it replaces the one before.
+        reason: why it replaces the previous one.
         steps: steps from pose to pose.
-        plan_ms: how long planning took; 0 where no plan was needed.
-        changed: rectangle of the map whose cells came, went or have other neighbours; null where
-            that is not the reason.
+        plan_ms: duration of planning; 0 if no plan was needed.
+        changed: rectangle of the map whose cells appeared, vanished or have other neighbours;
+            null if that is not the reason.
     """
 
     revision: Ordinal = 0
@@ -120,15 +121,15 @@ class PathAttachment(PlanFigures, frozen=True):
 
 
 class TrailAttachment(Document, frozen=True):
-    """What comes with each field of the living trail, as its Zenoh attachment.
+    """The Zenoh attachment of each field of the living trail.
 
-    A field without one is what a cohort of ants has left.
+    A field without one is that of a cohort of ants.
 
     Attributes:
         revision: of the path in force.
-        cells: how many cells the trail spans: those with a step to another one.
-        branching: mean number of directions of a cell that are within reach of its strongest: 1
-            where each cell is decided.
+        cells: number of cells that the trail spans: those with a step to another one.
+        branching: mean number of directions of a cell that are close to its strongest: 1 if each
+            cell is decided.
     """
 
     revision: Count = 0
@@ -143,5 +144,5 @@ DIGEST_BYTES = 16
 
 
 def digest(payload: bytes) -> bytes:
-    """Return DIGEST_BYTES bytes that no other payload has."""
+    """Return DIGEST_BYTES bytes that are unique to a payload."""
     return hashlib.blake2b(payload, digest_size=DIGEST_BYTES).digest()

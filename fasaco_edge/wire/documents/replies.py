@@ -1,4 +1,4 @@
-"""Replies: what a daemon answers to commands and queries, and how far its mission is."""
+"""Replies of a daemon to commands and queries, and the progress of its mission."""
 
 from __future__ import annotations
 
@@ -36,15 +36,15 @@ class Point(Document, frozen=True):
 
 
 class CoverageReport(Document, frozen=True):
-    """How many cells are covered; areas are of cells, of floor see FloorReport.
+    """The coverage in cells; areas are of cells. For swept floor see FloorReport.
 
     Attributes:
-        coverable: cells that are coverable and that the robot can reach.
-        covered: of those.
-        recovered: of those, covered more than once.
-        remaining: of those, still to cover.
-        unreachable: cells where the robot would fit, but that it cannot get to.
-        free_out_of_reach_m2: area the map knows to be free, but in no reachable cell.
+        coverable: cells that are coverable and reachable.
+        covered: covered cells of these.
+        recovered: cells of these that are covered more than once.
+        remaining: cells of these that are still to cover.
+        unreachable: cells where the robot would fit, but that it cannot reach.
+        free_out_of_reach_m2: area that the map shows free, but in no reachable cell.
         fraction: covered share of coverable.
     """
 
@@ -60,22 +60,22 @@ class CoverageReport(Document, frozen=True):
 
 
 class FloorLeft(Document, frozen=True):
-    """Floor that is not swept, for one reason."""
+    """Unswept floor for one reason."""
 
     m2: Amount = 0.0
     reason: str = ""
 
 
 class FloorReport(Document, frozen=True):
-    """How much floor is swept, by what the tool passed over and not by cells.
+    """The swept floor, by the area that the tool passed over, not by cells.
 
     Attributes:
-        swept_m2: floor that the tool has passed over, within reach now or not.
-        reachable_m2: floor that the tool can reach and is asked to sweep, as far as that is known;
-            null if the robot drives through the centres of cells.
-        left: what of that is not swept, and why, the largest first; null where that is not known.
-        out_of_reach: floor that the map shows free and the tool cannot come to, asked for or not,
-            and why, the largest first; null where that is not known.
+        swept_m2: floor that the tool has passed over, reachable now or not.
+        reachable_m2: floor that the tool can reach and has to sweep, as far as known; null if the
+            robot drives through the centres of cells.
+        left: unswept part of that by reason, the largest first; null if unknown.
+        out_of_reach: floor that the map shows free and the tool cannot reach, part of the order or
+            not, by reason, the largest first; null if unknown.
     """
 
     swept_m2: Amount = 0.0
@@ -85,19 +85,19 @@ class FloorReport(Document, frozen=True):
 
     @property
     def reached_m2(self) -> float | None:
-        """What of the reachable floor is swept [m2]; None where that is not known."""
+        """Swept part of the reachable floor [m2]; None if unknown."""
         if self.reachable_m2 is None or self.left is None:
             return None
         return max(self.reachable_m2 - sum(left.m2 for left in self.left), 0.0)
 
 
 class ZoneReport(Document, frozen=True):
-    """How far a zone is.
+    """The progress of a zone.
 
     Attributes:
-        pass: its newest pass; 0: to come.
-        cells: that can be reached.
-        covered: in that pass.
+        pass: its newest pass; 0: not begun.
+        cells: number of reachable cells.
+        covered: cells covered in that pass.
     """
 
     name: str = ""
@@ -122,7 +122,7 @@ class UnreachedArea(Document, frozen=True):
 
 
 class UnreachedReport(Document, frozen=True):
-    """What of the order stays uncovered as things are."""
+    """The part of the order that stays uncovered as things are."""
 
     cells: Count = 0
     m2: Amount = 0.0
@@ -131,17 +131,17 @@ class UnreachedReport(Document, frozen=True):
 
 
 class MissionReport(Document, frozen=True):
-    """The order, and how far it is.
+    """The order and its progress.
 
     Attributes:
         paused: whether the mission is paused.
-        zone: what is being covered; null for everything reachable.
-        pass: which pass that is; null without an order.
-        passes: of how many.
-        keep_out: how many keep-out zones there are, standing ones too; a mask counts as one.
-        home: where the robot returns to; without one in the configuration where the mission began.
-        tries: how often what was left over was tried again.
-        unreached: what of the order stays uncovered as things are.
+        zone: the zone being covered; null for everything reachable.
+        pass: number of the present pass; null without an order.
+        passes: number of all passes.
+        keep_out: number of keep-out zones, with those of the configuration; a mask counts as one.
+        home: position the robot returns to; by default the position where the mission began.
+        tries: retries of cells left over.
+        unreached: part of the order that stays uncovered as things are.
     """
 
     ordered: Annotated[str | None, allowed(enum=("command", "itself", None))] = None
@@ -161,7 +161,7 @@ class MissionReport(Document, frozen=True):
 
 
 class Reply(Document, frozen=True):
-    """The answer to a command that was taken."""
+    """The reply to an accepted command."""
 
     robot: Name = ""
     state: State = ""
@@ -172,10 +172,10 @@ class Reply(Document, frozen=True):
 
 
 class Replan(Document, frozen=True):
-    """The answer to a wish for a new plan that was taken.
+    """The reply to an accepted request for a new plan.
 
     Attributes:
-        plan: number of the plan: it is made once plan.plans of the status has come to it.
+        plan: number of the plan; it is made once plan.plans of the status has reached it.
     """
 
     robot: Name
@@ -184,7 +184,7 @@ class Replan(Document, frozen=True):
 
 
 class Version(Document, frozen=True):
-    """What answers.
+    """The versions of a daemon.
 
     Attributes:
         version: of the package.
@@ -199,11 +199,11 @@ class Version(Document, frozen=True):
 
 
 class Error(Document, frozen=True, forbid_unknown_fields=True):
-    """Every answer that is an error. It comes as Zenoh's error reply.
+    """An error; sent as Zenoh's error reply.
 
     Attributes:
         code: one of those in errors.yaml.
-        message: what was wrong, and where.
+        message: the fault and its place.
         hint: what to do about it; may be empty.
     """
 

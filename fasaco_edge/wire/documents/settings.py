@@ -1,4 +1,4 @@
-"""Settings as a daemon shows them: those in force, and the ones that readers of a status use."""
+"""Settings published by a daemon: those in force, and those that readers of a status use."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ Settings = dict[str, object]
 
 
 class RobotSettings(Document, frozen=True):
-    """Size of robot and tool [m], speed; 0 where not sent. By what share lanes overlap."""
+    """Size of robot and tool [m], speed; 0 if not sent. Overlap of lanes as a share."""
 
     radius_m: float = 0.0
     tool_width_m: float = 0.0
@@ -18,20 +18,20 @@ class RobotSettings(Document, frozen=True):
 
 
 class PlannerSettings(Document, frozen=True):
-    """What the robot is given of a walk."""
+    """The form of path that the robot is given."""
 
     line: str = "cells"
 
 
 class MapSettings(Document, frozen=True):
-    """What is free and what is occupied [percent]."""
+    """Thresholds of free and occupied [percent]."""
 
     free_at_most: int | None = None
     occupied_at_least: int | None = None
 
 
 class PoseSettings(Document, frozen=True):
-    """The type of poses whose sender names none."""
+    """The type of poses sent without a type."""
 
     schema: str = ""
 
@@ -47,7 +47,7 @@ class ZoneSettings(Document, frozen=True):
 
 
 class MissionSettings(Document, frozen=True):
-    """How long the mission continues without a pose [s]; its zones; what it always keeps out of."""
+    """Timeout of the pose [s]; the named zones; the keep-out zones of all orders."""
 
     lost_pose_s: float = 0.0
     zones: tuple[ZoneSettings, ...] = ()
@@ -63,7 +63,7 @@ class Frames(Document, frozen=True):
 
 
 class RosSettings(Document, frozen=True):
-    """What poses as transforms are read by."""
+    """Settings for poses from transforms."""
 
     frames: Frames | None = None
 
@@ -80,11 +80,11 @@ class KnownSettings(Document, frozen=True):
 
     @property
     def cell_m(self) -> float:
-        """Edge of a cell [m]; 0 where not sent."""
+        """Edge of a cell [m]; 0 if not sent."""
         overlap = 0.0 if self.planner.line == "cells" else self.robot.overlap
         return self.robot.tool_width_m * (1.0 - overlap)
 
 
 def known_settings(config: Settings) -> KnownSettings:
-    """Return the settings of a status that readers use; what does not fit keeps its default."""
+    """Return the settings of a status that readers use; unfit members keep their defaults."""
     return tolerant(config, KnownSettings)

@@ -1,7 +1,7 @@
-"""Status documents: what a daemon and a recorder publish about themselves, and read back.
+"""Status documents of daemon and recorder, written and read.
 
 The structs are the contract: ``protocol/schema`` is generated from them. Each member has a
-default, so that a reader takes a document of another version (``json_text.decode_tolerant``).
+default, so that a reader accepts a document of another version (``json_text.decode_tolerant``).
 """
 
 from __future__ import annotations
@@ -28,12 +28,12 @@ CLAIMS: Final = ("looks", "waits", "yields", "plans")
 
 
 class ClaimReport(Document, frozen=True):
-    """Who sends a status, and whether that daemon plans: of several of one name one does.
+    """The sender of a status and its role: of several daemons with one name, one plans.
 
     Attributes:
         id: its Zenoh id.
-        stand: its role. looks: whether another plans is not known yet; waits: another plans;
-            yields: another plans, and this one did before; plans: this one does.
+        stand: its role. looks: not known yet whether another plans; waits: another plans;
+            yields: another plans, and this one planned before; plans: this one plans.
     """
 
     id: Annotated[str, allowed(pattern="^[0-9a-f]{1,32}$")] = ""
@@ -45,8 +45,7 @@ class MapReport(Document, frozen=True):
 
     Attributes:
         resolution_m: edge of a pixel.
-        revision: goes up by one with each new state of the map; updates that come together count
-            once.
+        revision: counts the states of the map; updates that arrive together count once.
         frame: name of its frame.
         lattice_deg: the angle of the cells' rows to the x axis of that frame.
     """
@@ -61,7 +60,7 @@ class MapReport(Document, frozen=True):
 
 
 class PoseReport(Point, frozen=True):
-    """Where the robot is.
+    """The robot's pose.
 
     Attributes:
         x, y: [m] in the frame of the map.
@@ -72,14 +71,14 @@ class PoseReport(Point, frozen=True):
 
 
 class PlanCounts(Document, frozen=True):
-    """How many plans were made.
+    """Counts of plans.
 
     Attributes:
-        plans: how many plans were made.
-        unchanged: plans that found the path there is.
-        outdated: plans that did not hold any more when they came.
-        attempts: how often spare time went into a better path.
-        planning: whether one is being made.
+        plans: plans made.
+        unchanged: plans equal to the path in force.
+        outdated: plans that no longer held when they were made.
+        attempts: attempts to improve the path in spare time.
+        planning: whether a plan is being made.
     """
 
     plans: Count = 0
@@ -90,12 +89,12 @@ class PlanCounts(Document, frozen=True):
 
 
 class Latencies(Document, frozen=True):
-    """How long things took last [ms]; null before the first time.
+    """The last durations [ms]; null before the first.
 
     Attributes:
         ingest: taking in the newest map.
         plan: making the newest plan.
-        map_to_path: from the arrival of a map to the publication of the path it led to.
+        map_to_path: from the arrival of a map to the publication of its path.
     """
 
     ingest: Amount | None = None
@@ -104,14 +103,14 @@ class Latencies(Document, frozen=True):
 
 
 class LoopTimes(Document, frozen=True):
-    """Cycles of the daemon's loop since its start, and how long they took [ms].
+    """Cycles of the daemon's loop since its start, and their durations [ms].
 
     Attributes:
-        turns: how many there were.
-        late: of those, longer than 100 ms.
-        p50: half of the cycles took at most so long, to within 10 %; null before the first.
-        p99: 99 of 100.
-        p99_9: 999 of 1,000.
+        turns: number of cycles.
+        late: cycles longer than 100 ms.
+        p50: median of the durations, to within 10 %; null before the first cycle.
+        p99: 99th percentile.
+        p99_9: 99.9th percentile.
         max: the longest.
     """
 
@@ -124,14 +123,14 @@ class LoopTimes(Document, frozen=True):
 
 
 class DriveReport(Document, frozen=True):
-    """What driving takes the robot, as its poses show; null of what too little was seen.
+    """The robot's driving, measured from its poses; null for too few measurements.
 
     Attributes:
-        planned_quarter_turn_s: what paths are planned by, of robot.quarter_turn_s or its limits.
+        planned_quarter_turn_s: value used in planning, from robot.quarter_turn_s or its limits.
         speed_m_s: in straight driving.
-        quarter_turn_s: a turn by about 90 degrees on the spot, braking and starting included.
+        quarter_turn_s: a turn by about 90 degrees on the spot, with braking and starting.
         half_turn_s: a turn by about 180 degrees.
-        turns: how many turns were measured.
+        turns: number of measured turns.
     """
 
     planned_quarter_turn_s: Amount = 0.0
@@ -142,15 +141,15 @@ class DriveReport(Document, frozen=True):
 
 
 class BatteryReport(Document, frozen=True):
-    """The battery; levels are shares of a full one, null where they are not known.
+    """The battery; levels are shares of a full one, null if unknown.
 
     Attributes:
         level: its charge.
-        power: what the supply does, as its message says; "" before there was one.
-        age_s: how long no charge has come that is believed.
-        drain_per_h: what driving takes an hour, as measured.
-        turns_back_at: the robot goes to charge at this level.
-        goes_on_at: it goes on at this level; null where it does not charge.
+        power: power supply status of its message; "" before the first.
+        age_s: time since the last plausible charge.
+        drain_per_h: discharge an hour while driving, measured.
+        turns_back_at: threshold at which the robot goes to charge.
+        goes_on_at: threshold at which it continues; null if it does not charge.
     """
 
     level: Amount | None = None
@@ -162,11 +161,11 @@ class BatteryReport(Document, frozen=True):
 
 
 class ErrorCounts(Document, frozen=True):
-    """Faults since the start: what was refused, could not be published, or failed.
+    """Faults since the start: refused input, failed publications, other failures.
 
     Attributes:
-        last: message of the newest.
-        by_code: how often, by the codes in errors.yaml.
+        last: message of the newest fault.
+        by_code: counts by the codes in errors.yaml.
     """
 
     total: Count = 0
@@ -180,10 +179,10 @@ class LedgerReport(Document, frozen=True):
     """The progress on disk.
 
     Attributes:
-        path: the file; .previous behind its name is the one before.
-        age_s: since it was last written; null before the first time.
+        path: the file; the previous one has .previous after its name.
+        age_s: time since it was last written; null before the first write.
         restored_cells: covered cells loaded at the start.
-        fault: what is or was wrong with it, and what to do.
+        fault: its present or past fault, and what to do.
     """
 
     path: str = ""
@@ -193,15 +192,15 @@ class LedgerReport(Document, frozen=True):
 
 
 class Recorder(Document, frozen=True):
-    """What the recorder says about itself, on its key.
+    """The recorder's status, on its own key.
 
     Attributes:
-        reason: why, for a person; may be empty.
+        reason: reason of the state, for a person; may be empty.
         file: the part being written; empty while there is none.
         bytes: its size.
         messages: samples taken from the bus.
         lost: samples that were not written, or may not have been.
-        malformed: samples that were not what they should be.
+        malformed: malformed samples.
         rss_mb: memory of the process [MB].
     """
 
@@ -217,16 +216,16 @@ class Recorder(Document, frozen=True):
 
 
 class SupervisedRecorder(Document, frozen=True):
-    """A supervised recorder: what it says, see recorder.json, if it has said anything.
+    """A supervised recorder: its own status, see recorder.json, once it has published one.
 
     Attributes:
-        restarts: how often it was started again.
-        reason: why, for a person; may be empty.
+        restarts: number of restarts.
+        reason: reason of the state, for a person; may be empty.
         file: the part being written; empty while there is none.
         bytes: its size.
         messages: samples taken from the bus.
         lost: samples that were not written, or may not have been.
-        malformed: samples that were not what they should be.
+        malformed: malformed samples.
         rss_mb: memory of the process [MB].
     """
 
@@ -247,9 +246,9 @@ class MemberReport(Document, frozen=True):
 
     Attributes:
         name: of the robot.
-        state: of its mission, as it said last.
-        heard_s: since then.
-        away: why it takes no part in what is left; null where it does.
+        state: of its mission, in its last message.
+        heard_s: time since that message.
+        away: why it gets no part of the remaining cells; null if it gets one.
         swept_cells: cells that count for this robot, too.
     """
 
@@ -265,8 +264,8 @@ class FleetReport(Document, frozen=True):
 
     Attributes:
         name: of the fleet.
-        division: number of the newest division of what is left.
-        part_cells: how many cells of what it can reach are this robot's; null where all are.
+        division: number of the newest division of the remaining cells.
+        part_cells: number of reachable cells assigned to this robot; null if all are.
         members: the other robots, by name.
     """
 
@@ -277,7 +276,7 @@ class FleetReport(Document, frozen=True):
 
 
 class Status(Document, frozen=True):
-    """What a daemon says about itself. Members may be added; readers ignore unknown ones.
+    """The status of a daemon. Members may be added; readers ignore unknown ones.
 
     Attributes:
         version: of the package.

@@ -1,8 +1,8 @@
-"""Turn log documents: what each cycle of the daemon's loop received and decided, as JSON.
+"""Turn log documents: inputs and decisions of each cycle of the daemon's loop, as JSON.
 
-With the samples it names, a replay repeats a mission bit for bit. The members are named by the
-contract, where a cycle is a turn and an embedded sample is ``told``. Numbers are the JSON numbers
-of float64, which come back as they were; bytes are base64.
+With the samples it names, a replay repeats a mission bit for bit. Member names are the contract's:
+``turn`` is a cycle, ``told`` a sample embedded in the log. Numbers are float64, written so that
+they are read back exactly; bytes are base64.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ class LogStart(msgspec.Struct, frozen=True):
     Attributes:
         version: its release.
         config: the configuration in force, without secrets.
-        ledger: the ledger that was restored, as its file holds it; empty for none.
+        ledger: the bytes of the restored ledger's file; empty for none.
     """
 
     version: str
@@ -39,10 +39,10 @@ class TakenSample(msgspec.Struct, frozen=True, array_like=True):
     """A sample that was taken.
 
     Attributes:
-        topic: what it is.
-        checksum: CRC-32 of its payload; 0 where the batch itself holds the sample.
-        at: when it came, of maps and their updates [s]; 0 of others, where it decides nothing.
-        told: the sample itself, from before the recorder listened; None of others.
+        topic: its topic.
+        checksum: CRC-32 of its payload; 0 if the batch itself holds the sample.
+        at: time of arrival of maps and their updates [s]; 0 for others, whose time has no effect.
+        told: the sample itself, from before the recorder listened; None for others.
     """
 
     topic: str
@@ -52,13 +52,13 @@ class TakenSample(msgspec.Struct, frozen=True, array_like=True):
 
 
 class PlanTaken(msgspec.Struct, frozen=True, array_like=True):
-    """A plan that came back.
+    """A finished plan.
 
     Attributes:
         number: of the request.
         seconds: how long it took.
-        stops: which of the planner's questions whether to stop were answered by yes, from 1.
-            These repeat it: a repair and the search after it may each have been stopped.
+        stops: numbers, from 1, of the planner's stop checks that were answered with yes; a replay
+            stops at the same ones. A repair and the search after it may each have been stopped.
         work: its ants, kicks and proposals.
         checksum: CRC-32 of its cells, int32 (row, col), little endian.
     """
@@ -71,14 +71,14 @@ class PlanTaken(msgspec.Struct, frozen=True, array_like=True):
 
 
 class Decided(msgspec.Struct, frozen=True, omit_defaults=True):
-    """What was decided, where anything was or the state has changed.
+    """Decisions of a cycle with any decision or change of state.
 
     Attributes:
         state, reason: of the mission.
-        asked: number of the plan asked for, and why; None for none.
-        path: revision of the path published, why, and the CRC-32 of its cells; None for none.
-        faults: codes of what was refused.
-        answers: to commands: their number, and "" or the code of what was wrong.
+        asked: number of the requested plan, and why; None for none.
+        path: revision of the published path, why, and the CRC-32 of its cells; None for none.
+        faults: codes of refused inputs.
+        answers: replies to commands: their number, and "" or an error code.
     """
 
     state: str
@@ -90,16 +90,16 @@ class Decided(msgspec.Struct, frozen=True, omit_defaults=True):
 
 
 class Cycle(msgspec.Struct, frozen=True, omit_defaults=True):
-    """A cycle in which something came in or was decided.
+    """A cycle with any input or decision.
 
     Attributes:
         number: of the cycle.
-        is_begun: whether there is a mission; what comes before is held for it.
+        is_begun: whether there is a mission; earlier events are held for it.
         samples: in the order they were taken in.
         patches_lost: map updates that were lost before them.
         commands: number and document of each.
-        plan: that came back.
-        decided: what was decided.
+        plan: the finished plan.
+        decided: the decisions.
     """
 
     number: int
@@ -116,12 +116,12 @@ class TurnBatch(msgspec.Struct, frozen=True, omit_defaults=True):
 
     Attributes:
         first: number of the first one, from 1.
-        times: when each was, by the daemon's steady clock [s].
-        turns: those cycles in which something came in or was decided.
-        beginning: in the first batch alone.
+        times: time of each, by the daemon's monotonic clock [s].
+        turns: cycles with any input or decision.
+        beginning: only in the first batch.
         told: poses and small maps received in these cycles, in order, as ``samples`` encodes
             them: on a busy link a recorder may miss some.
-        kernels: names the compiled kernels; in the first batch with a mission alone.
+        kernels: name of the compiled kernels; only in the first batch with a mission.
     """
 
     first: int
@@ -136,7 +136,7 @@ def decode_turns(payload: bytes) -> TurnBatch:
     """Return the batch in JSON.
 
     Raises:
-        MalformedMessage: it is none.
+        MalformedMessage: it is no batch.
     """
     try:
         return msgspec.json.decode(payload, type=TurnBatch)

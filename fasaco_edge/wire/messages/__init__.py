@@ -1,1 +1,1 @@
-"""Messages of ROS in CDR: read and written."""
+"""Codecs of ROS messages in CDR."""

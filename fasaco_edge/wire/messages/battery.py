@@ -1,4 +1,4 @@
-"""The robot's battery: sensor_msgs/BatteryState; of it the charge and what the supply does."""
+"""The robot's battery: charge and power supply status of sensor_msgs/BatteryState."""
 
 from __future__ import annotations
 
@@ -29,11 +29,11 @@ _CELLS = ("cell_voltage", "cell_temperature")
 
 @dataclass(frozen=True, slots=True)
 class BatteryState:
-    """What a battery says of itself.
+    """The state of a battery.
 
     Attributes:
-        level: charge, from 0 to 1; None where it is not known.
-        power: what the supply does.
+        level: charge, from 0 to 1; None if unknown.
+        power: power supply status.
         frame: name of the frame.
         stamp_ns: time [ns].
     """
@@ -45,7 +45,7 @@ class BatteryState:
 
 
 def encode_battery(state: BatteryState) -> bytes:
-    """Return ``state`` as a sensor_msgs/BatteryState; what is not in it is NaN, as unknown.
+    """Return ``state`` as a sensor_msgs/BatteryState; other fields are NaN, for unknown.
 
     Raises:
         MalformedMessage: the message would be one that ``decode_battery`` refuses.
@@ -64,7 +64,7 @@ def encode_battery(state: BatteryState) -> bytes:
 
 
 def decode_battery(payload: bytes) -> BatteryState:
-    """Return what is known of the battery in a sensor_msgs/BatteryState.
+    """Return the battery's state in a sensor_msgs/BatteryState.
 
     Raises:
         MalformedMessage: it is no such message, or its charge is neither in 0..1 nor NaN.

@@ -1,4 +1,4 @@
-"""Plain CDR, little endian: what ROS 2 and its Zenoh bridges put on the wire.
+"""Plain CDR, little endian: the wire format of ROS 2 and its Zenoh bridges.
 
 Sources: OMG DDS-RTPS 2.5, clause 10 (encapsulation header); OMG CORBA 3.4, clause 9.3
 (transfer syntax); OMG DDS-XTypes 1.3, clause 7.6.3.1.2 (the header's padding count).
@@ -23,7 +23,7 @@ MAX_PADDING = 3
 
 _UINT32 = struct.Struct("<I")
 _LENGTH = ("length of {}",)
-# What a number of a struct's format may be, and what it is called.
+# Range and name of the numbers in a struct's format.
 _RANGES: dict[str, tuple[float, float, str]] = {
     "i": (-(2**31), 2**31, "an int32"),
     "I": (0, 2**32, "a uint32"),
@@ -52,12 +52,12 @@ def encoded_string(value: str, message: str, field: str) -> bytes:
 
 
 class CdrReader:
-    """Reads the fields of one payload in order; each is checked before it is touched.
+    """Reads the fields of one payload in order; each is checked before use.
 
-    All methods raise MalformedMessage where the payload ends before the field does.
-    Bytes skipped for alignment are not looked at: some writers leave them unset.
-    Numbers that follow each other are read at once, and fields named only once refused:
-    a small message takes as long as there are calls.
+    All methods raise MalformedMessage if the payload ends before the field does.
+    Bytes skipped for alignment are not checked: some writers leave them unset.
+    Consecutive numbers are read in one call, and field names are made only for errors:
+    the time of a small message is that of its calls.
     """
 
     __slots__ = ("_offset", "_payload", "_size", "message")
@@ -80,12 +80,11 @@ class CdrReader:
 
     @property
     def position(self) -> int:
-        """Number of bytes read since the header, what alignment is counted in."""
+        """Number of bytes read since the header; alignment counts from there."""
         return self._offset - HEADER_SIZE
 
     def take(self, alignment: int, size: int, field: str) -> int:
-        """Step over ``size`` aligned bytes, whatever they are; return where in the payload they
-        begin."""
+        """Skip ``size`` aligned bytes of any value; return their offset in the payload."""
         start = self._offset + ((HEADER_SIZE - self._offset) & (alignment - 1))
         if start + size > self._size:
             self._cut(field, size, start)
@@ -95,12 +94,12 @@ class CdrReader:
     def words(
         self, layout: struct.Struct, names: Sequence[str], field: str = ""
     ) -> tuple[Any, ...]:
-        """Read 32-bit numbers that follow each other, as many as ``layout`` has; a tuple.
+        """Read consecutive 32-bit numbers, as many as ``layout`` has; a tuple.
 
         Args:
             layout: little endian, of the formats i, I and f.
-            names: of the numbers, each with ``{}`` where ``field`` belongs.
-            field: what they are part of.
+            names: of the numbers, each with ``{}`` in place of ``field``.
+            field: the field that they are part of.
         """
         start = self._offset + (-self._offset & 3)
         stop = start + layout.size
@@ -149,17 +148,16 @@ class CdrReader:
         return count
 
     def peek(self, count: int) -> memoryview | None:
-        """Return the next ``count`` bytes, a view, without taking them; None where there are
-        fewer."""
+        """Return the next ``count`` bytes, a view, without taking them; None if there are fewer."""
         if count > self.remaining:
             return None
         return memoryview(self._payload)[self._offset : self._offset + count]
 
     def end(self) -> None:
-        """Check that nothing follows the last field but padding to a multiple of four.
+        """Check that only padding to a multiple of four follows the last field.
 
-        DDS pads its submessages so, and what comes over a bridge keeps it: zeros, counted
-        in the header's last byte by some (XTypes), not counted by others (RTPS alone).
+        DDS pads its submessages this way, and bridges keep the padding: zeros, counted in the
+        header's last byte by some (XTypes), not counted by others (RTPS alone).
         """
         counted = self._payload[HEADER_SIZE - 1]
         if self._offset == self._size and not counted:
@@ -193,7 +191,7 @@ class CdrWriter:
 
     @property
     def position(self) -> int:
-        """Number of bytes written since the header, what alignment is counted in."""
+        """Number of bytes written since the header; alignment counts from there."""
         return self._size
 
     def words(self, layout: struct.Struct, names: Sequence[str], *values: float) -> None:

@@ -1,4 +1,4 @@
-"""The daemon's status as ROS 2 shows it: diagnostic_msgs/DiagnosticArray of one status."""
+"""The daemon's status for ROS 2: diagnostic_msgs/DiagnosticArray of one status."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ LEVELS: Final = {
 
 
 def level_of(status: Status) -> int:
-    """Return how a status is: ``OK``, ``WARN``, ``ERROR`` or ``STALE``."""
+    """Return the diagnostic level of a status: ``OK``, ``WARN``, ``ERROR`` or ``STALE``."""
     if status.claim.stand != "plans":
         return STALE
     level = LEVELS.get(status.state, OK)

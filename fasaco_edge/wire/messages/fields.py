@@ -1,4 +1,4 @@
-"""The fields that messages share: header and pose."""
+"""Common fields of messages: header and pose."""
 
 from __future__ import annotations
 
@@ -37,21 +37,21 @@ def write_header(writer: CdrWriter, frame: str, stamp_ns: int) -> None:
 
 
 def clipped(text: str) -> str:
-    """Return a text as one line that a message's string can hold."""
+    """Return a text as one line, cut to the limit of a message's string."""
     return one_line(text).encode(errors="replace")[:MAX_STRING_BYTES].decode(errors="ignore")
 
 
 def yaw_of(x: float, y: float, z: float, w: float) -> float:
     """Return the yaw [rad] of a quaternion.
 
-    The second argument is 1 - 2 (y^2 + z^2) for a unit quaternion, and stays right for
-    one that is off by the tolerance.
+    The second argument is 1 - 2 (y^2 + z^2) for a unit quaternion, and also right for one
+    whose norm is within the tolerance.
     """
     return math.atan2(2.0 * (w * z + x * y), w * w + x * x - y * y - z * z)
 
 
 def read_pose(reader: CdrReader, field: str) -> Pose2D:
-    """Read a geometry_msgs/Pose; return its place in the plane."""
+    """Read a geometry_msgs/Pose; return the pose in the plane."""
     pose = reader.doubles(POSE, field)
     check_pose(pose, reader.message, field)
     return planar(pose)
@@ -59,7 +59,7 @@ def read_pose(reader: CdrReader, field: str) -> Pose2D:
 
 def write_pose(writer: CdrWriter, pose: Pose2D, field: str) -> None:
     """Write a pose in the plane as a geometry_msgs/Pose with z = 0."""
-    # math refuses to turn by infinity; NaN it lets through, to be refused as all others.
+    # math refuses an infinite angle; NaN passes here, and is refused later as any other.
     half = pose.yaw / 2 if math.isfinite(pose.yaw) else math.nan
     floats = (pose.x, pose.y, 0.0, 0.0, 0.0, math.sin(half), math.cos(half))
     check_pose(floats, writer.message, field)
@@ -84,18 +84,18 @@ def check_pose(pose: Sequence[float], message: str, field: str) -> None:
     ):
         return
     for axis, value in zip("xyz", pose, strict=False):
-        # A negated comparison, so that NaN is caught too.
+        # A negated comparison also catches NaN.
         if not abs(value) <= far:
             refuse(message, f"{field}.position.{axis}", f"within {far:g} m of 0", value)
     refuse(message, f"norm of {field}.orientation", f"1 within {QUATERNION_TOLERANCE}", norm)
 
 
 def planar(pose: Sequence[float]) -> Pose2D:
-    """Return the place in the plane of one pose."""
+    """Return the pose in the plane."""
     x, y, _, *quaternion = pose
     return Pose2D(x, y, yaw_of(*quaternion))
 
 
 def refuse_nanosec(reader: CdrReader, field: str, nanosec: int) -> NoReturn:
-    """Refuse the nanoseconds of a time ``field``."""
+    """Raise MalformedMessage for the nanoseconds of a time ``field``."""
     refuse(reader.message, f"{field}.nanosec", f"less than {SECOND_NS}", nanosec)

@@ -41,7 +41,7 @@ ERRORS: Final = {
 
 _STAMP = struct.Struct("<iI")
 _ERROR = struct.Struct("<H")
-# A string of no character has its length and a NUL, and is longer than padding.
+# An empty string has its length and a NUL, and is longer than padding.
 LEAST_STRING_BYTES = 4
 
 
@@ -66,14 +66,14 @@ def encode_goal(
     """Return the request of ``send_goal``.
 
     Args:
-        goal_id: ``GOAL_ID_BYTES`` bytes that no other goal has.
+        goal_id: ``GOAL_ID_BYTES`` unique bytes.
         points: of the path [m], at least two; each pose faces the next one.
         frame: of the points.
         stamp_ns: of the path [ns]; 0 for the newest transform.
         plugins: as many names as the server's release has, see ``ros_actions.RELEASES``.
 
-    Raises:
-        MalformedMessage: one of them is none that a message may hold.
+        Raises:
+            MalformedMessage: one of them is not allowed in a message.
     """
     writer = CdrWriter(SEND_GOAL)
     writer.octets(goal_id)
@@ -123,7 +123,7 @@ def decode_ending(payload: bytes) -> Ending:
     status = reader.octets(1, "status")[0]
     reader.octets(1, "result")
     code, message = 0, ""
-    # Humble's result ends here; the header's last byte counts what pads it.
+    # Humble's result ends here; the header's last byte counts its padding.
     padding = payload[HEADER_SIZE - 1]
     if reader.remaining - padding >= _ERROR.size:
         code = _ERROR.unpack_from(payload, reader.take(2, _ERROR.size, "error_code"))[0]
@@ -144,7 +144,7 @@ def encode_cancel(goal_id: bytes) -> bytes:
 
 
 def decode_cancel(payload: bytes) -> int:
-    """Return what becomes of a request to cancel.
+    """Return the result of a request to cancel.
 
     Raises:
         MalformedMessage: it is no response of ``cancel_goal``.

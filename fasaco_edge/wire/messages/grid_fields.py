@@ -1,4 +1,4 @@
-"""The cells of messages with a grid, as arrays."""
+"""Cells of grid messages as arrays."""
 
 from __future__ import annotations
 

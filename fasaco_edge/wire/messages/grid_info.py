@@ -1,6 +1,6 @@
-"""The placement of a grid as messages have it, and where its cells begin.
+"""Placement fields of grid messages, and the offset of the cells.
 
-Without numpy, for a program that stays small.
+Without numpy, for small programs.
 """
 
 from __future__ import annotations
@@ -20,10 +20,10 @@ from fasaco_edge.wire.messages.fields import (
     write_pose,
 )
 
-# Of a map update: its corner and its size.
+# Fields of a map update: its corner and its size.
 PLACE = struct.Struct("<iiII")
 PLACE_NAMES = ("x", "y", "width", "height")
-# Of a pheromone grid: its scale, and how far the colony is.
+# Fields of a pheromone grid: its scale, and the progress of the colony.
 COLONY = struct.Struct("<ffIIII")
 COLONY_NAMES = ("trail_min", "trail_max", "cohort", "velocity", "ants", "best_steps")
 _INFO = struct.Struct("<iIfII")
@@ -85,9 +85,9 @@ def read_octets(
     return octets
 
 
-# A robot's maps have one resolution, and its decimal takes a while to find.
+# A robot's maps have one resolution, and finding its decimal takes a while.
 _FLOAT32 = struct.Struct("<f")
-# No resolution by far; what is rounded up may be no float32 any more.
+# Far beyond any resolution; rounded up, it may overflow float32.
 _FAR = 1e30
 
 

@@ -1,4 +1,4 @@
-"""Grids read as octets, a byte a cell: for a program that only hands them on, and stays small."""
+"""Grids read as octets, a byte a cell, for small programs that only pass them on."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ from fasaco_edge.wire.schemas import OCCUPANCY_GRID, OCCUPANCY_GRID_UPDATE, PHER
 
 @dataclass(frozen=True, slots=True, eq=False)
 class GridOctets:
-    """A grid as it came off the bus.
+    """A grid received from the bus.
 
     Attributes:
         geometry: its size and place.
-        octets: row by row, the southernmost first; an int8 of a map as its byte. Whether a value
-            is one that the message may have is not checked.
+        octets: row by row, the southernmost first; an int8 of a map as its byte. The range of
+            values is not checked.
         frame: name of the map frame.
     """
 
@@ -61,7 +61,7 @@ def read_field(payload: bytes) -> GridOctets:
 
 
 def with_update(grid: GridOctets, payload: bytes) -> GridOctets:
-    """Return a map with a map_msgs/OccupancyGridUpdate laid over it; the map before it is spent.
+    """Return a map with a map_msgs/OccupancyGridUpdate applied; the old map is consumed.
 
     Raises:
         MalformedMessage: it is no such message, or does not fit the map.

@@ -1,6 +1,6 @@
 """Maps: nav_msgs/OccupancyGrid and map_msgs/OccupancyGridUpdate.
 
-How far the mission is comes as an occupancy grid on the lattice, too: any map viewer shows it.
+The coverage is also an occupancy grid, on the lattice: any map viewer shows it.
 """
 
 from __future__ import annotations
@@ -72,7 +72,7 @@ def encode_occupancy_grid(grid: OccupancyGrid) -> bytes:
 def decode_map_update(payload: bytes, max_cells: int = MAX_GRID_CELLS) -> MapPatch:
     """Return the patch in a map_msgs/OccupancyGridUpdate; its cells are a view of ``payload``.
 
-    Whether it fits a map is for ``OccupancyGrid.patched`` to say.
+    ``OccupancyGrid.patched`` checks whether it fits a map.
 
     Raises:
         MalformedMessage: it is no such message, or has no cells or over ``max_cells``.
@@ -114,21 +114,21 @@ def _check_occupancy(cells: NDArray[np.int8], message: str) -> None:
 
 
 def _least_and_most(cells: NDArray[np.int8]) -> tuple[int, int]:
-    """Return the least value and the greatest; those of no cells are in range."""
+    """Return the least and the greatest value; for no cells, values in range."""
     if cells.size > PATCH_CELLS:
         return int(np.minimum.reduce(cells, axis=None)), int(np.maximum.reduce(cells, axis=None))
     if not cells.size:
         return UNKNOWN, OCCUPIED
-    # A reduction takes a microsecond to begin. These do not, but copy what is read-only.
+    # A reduction takes a microsecond to begin. These do not, but copy read-only data.
     return cells.item(cells.argmin()), cells.item(cells.argmax())
 
 
-# Values of a grid of directions: so many for each direction.
+# Values of a grid of directions for each direction.
 DIRECTION_VALUES = 25
 
 
 def direction_values(pointed: NDArray[np.int8], share: NDArray[np.float32]) -> NDArray[np.int8]:
-    """Return the values, int8 (rows, cols), of a grid that shows where a trail points to.
+    """Return the values, int8 (rows, cols), of a grid of a trail's directions.
 
     Args:
         pointed: int8 (rows, cols), direction 0..3 of the strongest step, -1 for none.
@@ -141,7 +141,7 @@ def direction_values(pointed: NDArray[np.int8], share: NDArray[np.float32]) -> N
 def directions_of(grid: OccupancyGrid) -> tuple[NDArray[np.int8], NDArray[np.float32]]:
     """Return the directions, int8, and shares, float32 (rows, cols), in a grid of directions.
 
-    Where there is no step, or a value that stands for none, they are -1 and 0.
+    Cells without a step, or with an invalid value, have -1 and 0.
     """
     values = grid.cells
     is_step = (values >= 0) & (values < 4 * DIRECTION_VALUES)
@@ -151,11 +151,11 @@ def directions_of(grid: OccupancyGrid) -> tuple[NDArray[np.int8], NDArray[np.flo
 
 
 def coverage_values(states: NDArray[np.uint8], visits: NDArray[np.uint16]) -> NDArray[np.int8]:
-    """Return the values, int8 (rows, cols), of a grid that shows what is covered.
+    """Return the values, int8 (rows, cols), of a coverage grid.
 
     Args:
         states: uint8 (rows, cols), the lattice's: UNKNOWN, BLOCKED or COVERABLE.
-        visits: uint16 (rows, cols), how often the tool has passed over each cell.
+        visits: uint16 (rows, cols), passes of the tool over each cell.
     """
     values = np.full(states.shape, CoverageValue.UNKNOWN, np.int8)
     values[states == cell.BLOCKED] = CoverageValue.BLOCKED

@@ -1,7 +1,7 @@
-"""A nav_msgs/Path read point by point, as far as it is needed.
+"""Incremental reader of a nav_msgs/Path, point by point.
 
-For a program that stays small and must not stop: reading a path of half a million poses would take
-seconds, and nobody drives that far before the next one comes.
+For a small program that must not pause: reading a path of half a million poses would take seconds,
+and the next path replaces it long before its end is driven.
 """
 
 from __future__ import annotations
@@ -21,10 +21,10 @@ class PathPoints:
 
     Attributes:
         frame: name of the frame of all poses.
-        left: how many points were not read yet.
+        left: number of points not read yet.
 
-    Raises:
-        MalformedMessage: the payload does not begin as a path does, or is too short for its poses.
+        Raises:
+            MalformedMessage: the payload does not begin like a path, or is too short for its poses.
     """
 
     def __init__(self, payload: bytes) -> None:
@@ -35,10 +35,10 @@ class PathPoints:
             self._reader.end()
 
     def take(self, most: int) -> list[Point]:
-        """Return the next points [m], ``most`` of them or what is left.
+        """Return the next points [m], at most ``most``.
 
         Raises:
-            MalformedMessage: a pose is none, or in another frame; or more follows the last one.
+            MalformedMessage: a pose is invalid or in another frame, or data follow the last one.
         """
         points = []
         for index in range(self._count - self.left, self._count)[:most]:
@@ -52,7 +52,7 @@ class PathPoints:
 
 
 def read_pose_count(reader: CdrReader, max_poses: int) -> int:
-    """Read how many poses a path has."""
+    """Read the number of poses of a path."""
     count = reader.length("poses", LEAST_POSE_BYTES)
     if count > max_poses:
         refuse(PATH, "length of poses", f"at most {max_poses}", count)

@@ -1,7 +1,7 @@
 """The coverage path: nav_msgs/Path, thousands of poses at once.
 
 A PoseStamped ends with eight-byte floats, so every pose after the first begins at a
-multiple of eight: with one frame name in all of them, they are the records of an array.
+multiple of eight: with the same frame name in all poses, they are records of an array.
 """
 
 from __future__ import annotations
@@ -25,13 +25,13 @@ from fasaco_edge.wire.messages.fields import (
 from fasaco_edge.wire.messages.path_points import read_path_pose, read_pose_count
 from fasaco_edge.wire.schemas import PATH
 
-# So many poses are worked out at a time.
+# Poses computed at a time.
 BLOCK_POSES = 16_384
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PathMessage:
-    """A path as it came off the bus.
+    """A path received from the bus.
 
     Attributes:
         frame: name of the frame of all poses.
@@ -76,7 +76,7 @@ def encode_path(
         records["sec"], records["nanosec"] = divmod(stamp_ns, SECOND_NS)
         records["length"] = len(text)
         records["frame"] = np.frombuffer(text, np.uint8)
-        # A path of half a million poses is some 40 MB: beside the message, only a block of it.
+        # A path of half a million poses is some 40 MB: only a block is held beside the message.
         for start in range(first, last, BLOCK_POSES):
             stop = min(start + BLOCK_POSES, last)
             poses = _planar_poses(xy[start:stop], yaw[start:stop])
@@ -91,7 +91,7 @@ def decode_path(payload: bytes, max_poses: int = MAX_PATH_POSES) -> PathMessage:
 
     Raises:
         MalformedMessage: it is no such message, has over ``max_poses`` poses, or a pose
-            names another frame than the path; a pose that names none is in the path's.
+            names another frame than the path; a pose without a frame is in the path's.
     """
     reader = CdrReader(payload, PATH)
     frame, stamp_ns = read_header(reader)
@@ -105,8 +105,9 @@ def decode_path(payload: bytes, max_poses: int = MAX_PATH_POSES) -> PathMessage:
 
 
 def _read_records(reader: CdrReader, frame: str, count: int) -> NDArray[np.float64] | None:
-    """Read poses that all name ``frame``, float64 (count, 7); take nothing and return None
-    where they do not, or where anything else is odd."""
+    """Read poses that all name ``frame``, float64 (count, 7); None, and nothing taken, otherwise.
+
+    That is also so for anything else unusual."""
     text = np.frombuffer(encoded_string(frame, reader.message, "header.frame_id"), np.uint8)
     first, rest = _record(reader.position, len(text)), _record(0, len(text))
     size = first.itemsize + (count - 1) * rest.itemsize
@@ -142,7 +143,7 @@ def _check_poses(poses: NDArray[np.float64], message: str, field_of: Callable[[i
             is not 1; ``field_of(i)`` names pose i.
     """
     position, quaternion = poses[:, :3], poses[:, 3:]
-    # Negated comparisons, so that NaN is caught too.
+    # Negated comparisons also catch NaN.
     with np.errstate(over="ignore", invalid="ignore"):
         far = ~(np.abs(position) <= MAX_COORDINATE_M)
         norm = np.sqrt(np.square(quaternion).sum(axis=1))

@@ -34,16 +34,16 @@ TOP_STEP = 254
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PheromoneMessage:
-    """The pheromone field as it came off the bus.
+    """A pheromone field received from the bus.
 
     Attributes:
         geometry: placement of the cells in the map frame.
         levels: uint8 (rows, cols), read-only: 0 not coverable, 1..255 from ``trail_min``
             to ``trail_max``.
-        trail_min, trail_max: bounds of the trail; both 0 where no cell is coverable.
-        cohort: which cohort has just walked, from 0.
+        trail_min, trail_max: bounds of the trail; both 0 if no cell is coverable.
+        cohort: number of the cohort that has just walked, from 0.
         velocity: its velocity [cells/move].
-        ants: how many ants have walked so far.
+        ants: number of ants that have walked so far.
         best_steps: steps of the best walk so far.
         frame: name of the map frame.
         stamp_ns: time of the snapshot [ns].
@@ -61,7 +61,7 @@ class PheromoneMessage:
     stamp_ns: int = 0
 
     def trail(self) -> NDArray[np.float32]:
-        """Return the trail the levels stand for, float32 (rows, cols); 0 for level 0."""
+        """Return the trail decoded from the levels, float32 (rows, cols); 0 for level 0."""
         scale = np.zeros(TOP_STEP + 2, np.float32)
         if self.trail_min > 0:
             scale[1:] = np.geomspace(self.trail_min, self.trail_max, TOP_STEP + 1)
@@ -122,7 +122,7 @@ def decode_pheromone(payload: bytes, max_cells: int = MAX_GRID_CELLS) -> Pheromo
 
 
 def _quantised(trail: NDArray[np.float32], message: str) -> tuple[NDArray[np.uint8], float, float]:
-    """Return the levels of ``trail``, its least positive value and its greatest."""
+    """Return the levels of ``trail``, its least positive and its greatest value."""
     present = trail > 0
     lowest, highest = float(trail.min(initial=0.0)), float(trail.max(initial=0.0))
     if not 0.0 <= lowest <= highest < math.inf:
@@ -131,7 +131,7 @@ def _quantised(trail: NDArray[np.float32], message: str) -> tuple[NDArray[np.uin
     if not present.any():
         return levels, 0.0, 0.0
     least = float(trail[present].min())
-    # A field of one value is all level 1; its span is 0 and is not divided by.
+    # A field of one value is all level 1; its span is 0, no divisor.
     span = math.log(highest) - math.log(least)
     logs = np.log(trail[present].astype(np.float64)) - math.log(least)
     levels[present] = 1 + np.rint(logs * (TOP_STEP / span if span else 0.0)).astype(np.uint8)

@@ -1,6 +1,7 @@
 """Poses of the robot: messages of three types, or transforms (tf2_msgs/TFMessage).
 
-From transforms, the robot's pose is the product of the newest of each link between map and robot.
+From transforms, the robot's pose is the product of the newest transform of each link between map
+and robot.
 """
 
 from __future__ import annotations
@@ -33,7 +34,7 @@ from fasaco_edge.wire.schemas import (
     TF_MESSAGE,
 )
 
-# What follows the pose in each type: how many 64-bit floats.
+# Number of 64-bit floats after the pose in each type.
 _AFTER_POSE = {
     POSE_STAMPED: {},
     POSE_WITH_COVARIANCE_STAMPED: {"pose.covariance": 36},
@@ -44,11 +45,10 @@ _AFTER_POSE = {
 def decode_pose(payload: bytes, schema: str) -> StampedPose:
     """Return the robot's pose in a message of type ``schema``, one of ``schemas.POSE_SCHEMAS``.
 
-    Covariance and twist are stepped over, not looked at: publishers write NaN there for
-    what they do not know.
+    Covariance and twist are skipped, not checked: publishers write NaN there for unknown.
 
     Raises:
-        MalformedMessage: it is no such message, or poses do not come as ``schema``.
+        MalformedMessage: it is no such message, or ``schema`` is no pose type.
     """
     if schema not in _AFTER_POSE:
         known = ", ".join(_AFTER_POSE)
@@ -82,14 +82,14 @@ LEAST_TRANSFORM_BYTES = 80
 
 @dataclass(frozen=True, slots=True)
 class Transform:
-    """Where a frame lies in another one, as it came.
+    """A received transform: the pose of a frame in another one.
 
-    A robot sends the turns of its wheels and cameras, too, so that what ``placement`` holds is
-    looked at only by who needs it, in ``planar``.
+    A robot also sends the rotations of its wheels and cameras, so ``placement`` is checked only
+    when needed, in ``planar``.
 
     Attributes:
-        frame: name of the frame it is given in.
-        child: name of the frame that lies there.
+        frame: name of the parent frame.
+        child: name of the child frame.
         stamp_ns: time of the transform [ns], by its publisher's clock.
         placement: translation x, y, z [m] and quaternion x, y, z, w.
     """
@@ -103,7 +103,7 @@ class Transform:
         """Return the pose of ``child`` in the plane of ``frame``.
 
         Raises:
-            MalformedMessage: a number is not finite or too large, the quaternion is none, or it
+            MalformedMessage: a number is not finite or too large, or the quaternion is invalid or
                 tilts the plane.
         """
         which = f"of {self.child!r} in {self.frame!r}"
@@ -147,12 +147,12 @@ def _read_transform(reader: CdrReader, field: str) -> Transform:
 
 @dataclass(frozen=True, slots=True)
 class Link:
-    """A transform as the newest between two frames.
+    """The newest transform between two frames.
 
     Attributes:
-        transform: it.
-        is_static: whether it holds for ever.
-        came_at: when it came [s]; one with the stamp of the one before is no new one.
+        transform: the transform.
+        is_static: whether it is static.
+        came_at: time of arrival [s]; a transform with the previous stamp is not new.
     """
 
     transform: Transform
@@ -161,18 +161,18 @@ class Link:
 
 
 class TransformTree:
-    """Remembers of each frame where it lies, and follows the robot's up to the map's.
+    """Stores the newest transform of each frame, and chains those from the robot's to the map's.
 
     Usually map, odom, base_link: a localiser publishes the first link, odometry the second.
-    Newest is what came last.
+    The newest is the one that arrived last.
 
     Args:
-        map_frame: the frame poses are wanted in.
+        map_frame: the frame of the resulting poses.
         robot_frame: the robot's own.
 
     Attributes:
-        oldest: of the links between map and robot that move the one that came longest ago; None
-            where none moves, or one is missing.
+        oldest: the moving link between map and robot that arrived longest ago; None if none moves,
+            or one is missing.
     """
 
     def __init__(self, map_frame: str, robot_frame: str) -> None:
@@ -184,25 +184,25 @@ class TransformTree:
         self._told: StampedPose | None = None
 
     def follow(self, map_frame: str, robot_frame: str) -> None:
-        """Want poses between other frames from now on; what is known of all of them stays."""
+        """Change the two frames of the pose; stored transforms stay."""
         self._map_frame, self._robot_frame = map_frame, robot_frame
 
     def take(
         self, transforms: Iterable[Transform], *, is_static: bool, came_at: float = 0.0
     ) -> StampedPose | None:
-        """Take transforms in; return the robot's pose if it is known and another than before.
+        """Store transforms; return the robot's pose if it is known and has changed.
 
-        Its stamp is that of the link nearest to the robot that moves: of odometry.
+        Its stamp is that of the moving link nearest to the robot, odometry.
 
         Args:
-            transforms: as they came.
+            transforms: the received transforms.
             is_static: whether they are static.
-            came_at: when they came [s].
+            came_at: time of arrival [s].
 
         Raises:
-            TransformLoop: the frames hang on each other; their links are forgotten.
-            MalformedMessage: a link between map and robot has no place in the plane, and is
-                forgotten; or there are over ``MAX_TRANSFORMS`` frames.
+            TransformLoop: the frames form a loop; their links are dropped.
+            MalformedMessage: a link between map and robot is not in the plane, and is dropped; or
+                there are over ``MAX_TRANSFORMS`` frames.
         """
         for transform in transforms:
             if transform.child not in self._links and len(self._links) >= MAX_TRANSFORMS:
@@ -233,11 +233,11 @@ class TransformTree:
         try:
             return transform.planar()
         except MalformedMessage:
-            del self._links[transform.child]  # else each message from now on would be refused
+            del self._links[transform.child]  # otherwise each later message would be refused
             raise
 
     def _chain(self) -> list[Link]:
-        """Return the links from the robot's frame up to the map's; none where one is missing."""
+        """Return the links from the robot's frame up to the map's; none if one is missing."""
         chain: list[Link] = []
         frame = self._robot_frame
         while frame != self._map_frame:
@@ -251,7 +251,7 @@ class TransformTree:
         return chain
 
     def _loop(self, frame: str) -> TransformLoop:
-        """Forget the links of the loop that ``frame`` is in; return the error that names them."""
+        """Drop the links of the loop that ``frame`` is in; return the error that names them."""
         names = []
         while (link := self._links.pop(frame, None)) is not None:
             names.append(frame)
@@ -261,7 +261,7 @@ class TransformTree:
 
 
 def _placed(frame: Pose2D, pose: Pose2D) -> Pose2D:
-    """Return ``pose``, given in a frame that lies at ``frame``, where that one is given."""
+    """Return ``pose``, given in a frame at ``frame``, in the parent of that frame."""
     cos, sin = math.cos(frame.yaw), math.sin(frame.yaw)
     return Pose2D(
         frame.x + cos * pose.x - sin * pose.y,
@@ -274,11 +274,11 @@ DEFAULT_FRAMES = ("map", "base_link")
 
 
 class PoseDecoder:
-    """Decodes poses one after the other, be they messages of three types or transforms.
+    """Decodes successive poses: messages of three types, or transforms.
 
     Args:
-        schema: type of those that come without one.
-        frames: the map's and the robot's, for transforms; None where none are taken.
+        schema: type of messages sent without one.
+        frames: the map's and the robot's, for transforms; None to take no transforms.
 
     Attributes:
         schema: as above; may be changed.
@@ -289,30 +289,30 @@ class PoseDecoder:
         self._transforms = TransformTree(*frames) if frames else None
 
     def follow(self, frames: tuple[str, str]) -> None:
-        """Take poses out of the transforms between these frames from now on."""
+        """Take poses from the transforms between these frames from now on."""
         if self._transforms is None:
             self._transforms = TransformTree(*frames)
         self._transforms.follow(*frames)
 
     @property
     def oldest_link(self) -> Link | None:
-        """What ``TransformTree.oldest`` is; None where poses are no transforms."""
+        """As ``TransformTree.oldest``; None if poses are not from transforms."""
         return self._transforms.oldest if self._transforms else None
 
     def decode(
         self, payload: bytes, schema: str, *, is_static: bool = False, came_at: float = 0.0
     ) -> StampedPose | None:
-        """Return the pose; None for transforms that tell no new one.
+        """Return the pose; None for transforms without a new one.
 
         Args:
             payload: the message.
-            schema: its type; "" where it came without one.
+            schema: its type; "" if sent without one.
             is_static: whether its transforms are static.
-            came_at: when it came [s], for ``oldest_link``.
+            came_at: time of arrival [s], for ``oldest_link``.
 
         Raises:
             MalformedMessage: it is none of these.
-            TransformLoop: the frames hang on each other.
+            TransformLoop: the frames form a loop.
         """
         schema = schema or self.schema
         if self._transforms is None or schema != TF_MESSAGE:

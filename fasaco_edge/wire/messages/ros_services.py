@@ -21,7 +21,7 @@ def check_request(payload: bytes) -> None:
     """Check the request of a Trigger.
 
     Raises:
-        MalformedMessage: it is none.
+        MalformedMessage: it is no such request.
     """
     reader = CdrReader(payload, TRIGGER)
     reader.octets(1, "request")
@@ -37,9 +37,9 @@ def encode_response(message: str, *, success: bool) -> bytes:
 
 
 def response_attachment(asked: bytes, time_ns: int) -> bytes:
-    """Return what rmw_zenoh demands beside a response, at a time [ns]; b"" for others' requests.
+    """Return rmw_zenoh's attachment of a response, at a time [ns]; b"" for other clients.
 
-    ``asked``: what came beside the request.
+    ``asked``: the attachment of the request.
     """
     parts = attachment_of(asked)
     return attachment(parts[0], time_ns, parts[1]) if parts else b""

@@ -17,7 +17,7 @@ _NAMES = tuple(f"{part}.{axis}" for part in ("linear", "angular") for axis in "x
 
 @dataclass(frozen=True, slots=True)
 class Velocity:
-    """How a base that cannot go sideways is to move; the other four numbers of a twist are 0.
+    """Velocity of a differential-drive base; the other four numbers of a twist are 0.
 
     Attributes:
         speed_m_s: forward [m/s].
