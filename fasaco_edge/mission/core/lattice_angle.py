@@ -1,7 +1,7 @@
-"""The angle at which a mission's cells lie to the map frame, and when it changes.
+"""Lattice angle: the angle of the cells' rows to the map frame, and when it changes.
 
-Where none is given, cells lie along the axes of the map frame at first, and along the walls once
-these are certain; along the axes again where a map fits in no other way.
+Without a configured angle, rows are parallel to the axes of the map frame at first, and to the
+walls once their direction is certain; to the axes again if a map fits in no other way.
 """
 
 from __future__ import annotations
@@ -18,10 +18,10 @@ from fasaco_edge.mission.map.wall_watch import WallWatch
 
 
 class LatticeAngle:
-    """Decides at which angle cells lie [deg].
+    """Decides the angle of the cells' rows [deg].
 
     Attributes:
-        deg: the angle now.
+        deg: the present angle.
     """
 
     def __init__(self, config: MissionConfig) -> None:
@@ -33,7 +33,7 @@ class LatticeAngle:
             self._walls.end()
 
     def resume(self, deg: float) -> bool:
-        """Keep the angle of a ledger from before a restart; return whether cells turn by that."""
+        """Keep the angle of a ledger from before a restart; return whether it changes by that."""
         if self._is_given or not deg:
             return False
         self.deg = deg
@@ -41,27 +41,27 @@ class LatticeAngle:
         return True
 
     def note_faults(self, faults: Iterable[FasacoError]) -> None:
-        """Look for walls anew where the map is of another building."""
+        """Estimate the walls again if the map shows another building."""
         is_other = any(isinstance(fault, LedgerMismatchError) for fault in faults)
         if is_other and not self._is_given:
             self._walls.begin()
 
     @property
     def is_settled(self) -> bool:
-        """Whether no map will turn the cells along its walls any more."""
+        """Whether no later map will rotate the lattice to its walls."""
         return self._walls.is_over
 
     def turns_along_walls(self, grid: OccupancyGrid, pose: StampedPose) -> bool:
-        """Look at the walls of the newest map; return whether the angle is another one now."""
+        """Evaluate the walls of the newest map; return whether the angle has changed."""
         deg = self._walls.look(grid, pose.pose)
-        # Askew, a lattice spans up to twice the cells; and the map may grow.
+        # A rotated lattice spans up to twice the cells; and the map may grow.
         if deg is None or deg == self.deg or not self._fits(grid, deg, share=0.5):
             return False
         self.deg = deg
         return True
 
     def turns_back_for(self, maps: Iterable[OccupancyGrid]) -> bool:
-        """Return whether the angle is 0 now, as one of the maps fits in no other way."""
+        """Return whether the angle changes to 0, because one of the maps fits in no other way."""
         if self._is_given or not self.deg:
             return False
         if all(self._fits(grid, self.deg) or not self._fits(grid, 0.0) for grid in maps):
@@ -70,7 +70,7 @@ class LatticeAngle:
         return True
 
     def _fits(self, grid: OccupancyGrid, deg: float, share: float = 1.0) -> bool:
-        """Tell whether a lattice at an angle [deg] takes no more than a share of its cells."""
+        """Tell whether a lattice at an angle [deg] takes no more than a share of the cell limit."""
         geometry = turned_geometry(grid.geometry, -deg)
         try:
             lattice_window(geometry, self._cell_m, int(share * self._most_cells))

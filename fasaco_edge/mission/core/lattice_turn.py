@@ -1,7 +1,8 @@
-"""The turn between the map frame, which all messages are of, and the frame that a mission plans in.
+"""Lattice rotation: conversion between the map frame and the frame in which a mission plans.
 
-Cells lie along the axes of the latter. Both have one origin: maps, poses and places are turned as
-they come in, paths as they go out. What is turned by nothing stays the same to the last bit.
+All messages are given in the map frame. Cells are aligned with the axes of the mission's frame,
+which has the same origin: maps, poses and places are rotated on input, paths on output. At zero
+rotation values are unchanged bit for bit.
 """
 
 from __future__ import annotations
@@ -39,7 +40,7 @@ _AnyPlace = TypeVar("_AnyPlace", bound=Place)
 
 @dataclass(frozen=True, slots=True)
 class LatticeTurn:
-    """Cells whose rows lie at an angle to the x axis of the map frame.
+    """A lattice whose rows are at an angle to the x axis of the map frame.
 
     Attributes:
         deg: the angle [deg].
@@ -48,7 +49,7 @@ class LatticeTurn:
     deg: float = 0.0
 
     def config(self, config: MissionConfig) -> MissionConfig:
-        """Return the configuration of a mission over these cells; standing zones stay as given."""
+        """Return the configuration of a mission on this lattice; standing zones stay as given."""
         policy = config.policy
         if self.deg:
             polygons = policy.keep_out + mask_polygons(policy.keep_out_mask)
@@ -62,7 +63,7 @@ class LatticeTurn:
         return replace(config, policy=policy, lattice_deg=self.deg)
 
     def event(self, event: Event) -> Event:
-        """Return an event as the mission takes it; an order is turned once it is located."""
+        """Return an event in the mission's frame; an order is rotated once it is located."""
         if not self.deg:
             return event
         match event:
@@ -76,11 +77,11 @@ class LatticeTurn:
         return event
 
     def order(self, state: OrderState, turned_by_deg: float) -> OrderState:
-        """Return an order as the mission takes it.
+        """Return an order in the mission's frame.
 
         Args:
-            state: its polygons may be turned already.
-            turned_by_deg: by how much the cells have turned since home was noted [deg].
+            state: the order; its polygons may be rotated already.
+            turned_by_deg: rotation of the lattice since home was noted [deg].
         """
         order = None if state.order is None else turned_order(state.order, -self.deg)
         home = state.home
@@ -90,7 +91,7 @@ class LatticeTurn:
         return replace(state, order=order, home=home)
 
     def path(self, update: PathUpdate, lattice: CoverageLattice | None) -> PathUpdate:
-        """Return a path as it is published."""
+        """Return a path in the map frame, as published."""
         if not self.deg or lattice is None:
             return update
         xy = lattice.centres(update.cells) if update.xy is None else update.xy
@@ -99,11 +100,11 @@ class LatticeTurn:
         return replace(update, xy=turned_points(xy, self.deg), end_yaw=yaw)
 
     def grid(self, grid: OccupancyGrid | None) -> OccupancyGrid | None:
-        """Return a map of the mission's in the map frame."""
+        """Return a map of the mission in the map frame."""
         return grid if grid is None or not self.deg else _turned_grid(grid, self.deg)
 
     def pose(self, stamped: StampedPose | None) -> StampedPose | None:
-        """Return a pose of the mission's in the map frame."""
+        """Return a pose of the mission in the map frame."""
         return stamped if stamped is None or not self.deg else _turned_stamped(stamped, self.deg)
 
     def cells(self, window: Window, cell_m: float) -> GridGeometry:
@@ -111,7 +112,7 @@ class LatticeTurn:
         return self.geometry(GridGeometry.of_cells(window, cell_m))
 
     def geometry(self, geometry: GridGeometry) -> GridGeometry:
-        """Return a placement of the mission's in the map frame."""
+        """Return a placement of the mission in the map frame."""
         return turned_geometry(geometry, self.deg) if self.deg else geometry
 
     def centre(self, cell: Cell, cell_m: float) -> Point:

@@ -1,7 +1,7 @@
-"""Mission: events in, decisions out; it owns the map, the ledger, the order and the route.
+"""Mission: events in, decisions out; owner of map, ledger, order and route.
 
-``step(events, now)`` is all there is. It opens no session, reads no clock and touches no file,
-so that a mission can be tested, and repeated, with plain values.
+``step(events, now)`` is the whole interface. It opens no session, reads no clock and touches no
+file, so a mission can be tested and repeated with plain values.
 """
 
 from __future__ import annotations
@@ -41,17 +41,17 @@ __all__ = ["Mission", "MissionConfig"]
 
 
 class Mission:
-    """Covers all that is reachable, of a map that is still growing.
+    """Covers everything reachable on a growing map.
 
     Attributes:
-        state, reason: what it is doing, and why.
-        route: the path, the plan under way, and counts of both; to be read only.
-        fleet: the other robots; to be read only.
-        charging: the battery, and when to charge; to be read only.
+        state, reason: its state, and why.
+        route: the path and the pending plan, with counts; read-only.
+        fleet: the other robots; read-only.
+        charging: the battery, and when to charge; read-only.
     """
 
     def __init__(self, config: MissionConfig, order: OrderState | None = None) -> None:
-        """Begin with an order; by default with one for everything that can be reached."""
+        """Begin with an order; by default with one for everything reachable."""
         self._config = config
         self._drive, self._gauge = DriveMeter(), BatteryGauge()
         self._angle = LatticeAngle(config)
@@ -59,9 +59,9 @@ class Mission:
         self.restore_order(order or OrderState.autostart())
 
     def _lay_cells(self) -> None:
-        """Begin with a mission over cells at the angle that is decided."""
+        """Start a mission on a lattice at the decided angle."""
         self._turn = LatticeTurn(self._angle.deg)
-        # By how much the cells are turned against those of the ledger that is restored [deg].
+        # Rotation of the lattice against that of the restored ledger [deg].
         self._turned_by_deg = 0.0
         # The newest map in the lattice's frame, and the same in the map frame.
         self._laid_grid: OccupancyGrid | None = None
@@ -86,11 +86,11 @@ class Mission:
         self._executive = Executive(*owners, *decided_by, config.policy)
 
     def restore_ledger(self, before: LedgerSnapshot) -> None:
-        """Go on where a ledger from before a restart ended, unless the map contradicts it.
+        """Continue a ledger from before a restart, unless the map contradicts it.
 
         To be called before the first step, and before ``restore_order``. A contradiction, see
         ``coverage.mission_ledger``, is reported as a fault (LedgerMismatchError) with the map that
-        shows it; what was covered since the restart still counts then.
+        shows it; coverage since the restart is kept then.
         """
         if self._angle.resume(before.lattice_deg):
             self._lay_cells()
@@ -104,7 +104,7 @@ class Mission:
         self._map.frames.activate(before.frame)
 
     def restore_order(self, order: OrderState) -> None:
-        """Go on with an order from before a restart; to be called before the first step."""
+        """Continue an order from before a restart; to be called before the first step."""
         self._handler.begin_order(self._turn.order(order, self._turned_by_deg))
         self.state, self.reason = self._executive.status()
 
@@ -112,9 +112,9 @@ class Mission:
         """Apply events in order and decide.
 
         Args:
-            events: what has happened since the last step. An event that cannot be used is
-                reported as a fault and changes nothing.
-            now: time [s] of any steady clock.
+            events: events since the last step. An event that cannot be used is reported as a fault
+                and changes nothing.
+            now: time of any monotonic clock [s].
         """
         events = list(events)
         begun = self._make_room(events, now)
@@ -132,9 +132,9 @@ class Mission:
         return self._handler.handle(map(self._turn.event, events), now)
 
     def _along_walls(self, happened: Decision, now: float) -> Decision:
-        """Lay the cells along the walls once these are certain; return all that has happened."""
+        """Rotate the lattice to the walls once these are certain; return the combined decision."""
         self._angle.note_faults(happened.faults)
-        # What was set aside for an errand is of the cells there are.
+        # A path kept for an errand is given in present cells.
         if self._angle.is_settled or self.order_state.errand:
             return happened
         pose, grid = self.pose, self.grid
@@ -146,19 +146,19 @@ class Mission:
         return replace(happened, path=stop or happened.path)
 
     def _make_room(self, events: Iterable[Event], now: float) -> PathUpdate | None:
-        """Lay the cells along the map frame's axes again for a map that fits in no other way."""
+        """Rotate the lattice back to the map frame's axes for a map that fits in no other way."""
         maps = (event.grid for event in events if isinstance(event, MapReceived))
         if not self._angle.turns_back_for(maps):
             return None
         return self._turn_cells("the map is too large for cells along the walls", now)
 
     def _turn_cells(self, why: str, now: float) -> PathUpdate | None:
-        """Go on over cells at the new angle; return the path that stops the robot, if any."""
+        """Continue on a lattice at the new angle; return the path that stops the robot, if any."""
         before, order, route = self.snapshot(), self.order_state, self.route
         is_confirmed = self._ledger.is_confirmed
         held: list[Event] = [MapReceived(self.grid)] if self.grid is not None else []
         held += [PoseReceived(self.pose)] if self.pose is not None else []
-        # No path may be driven that nobody watches.
+        # No path may be driven that is no longer checked.
         stop = route.stop(why, now)
         self._lay_cells()
         self._resume(before, is_confirmed=is_confirmed)
@@ -170,44 +170,44 @@ class Mission:
         return stop
 
     def coverage(self) -> Coverage | None:
-        """Return how much is covered; None before there is a map."""
+        """Return the counts of coverage; None before there is a map."""
         return self._map.coverage(self._ledger)
 
     def floor_to_sweep(self) -> FloorToSweep | None:
-        """Return how much floor is to be swept; None where cells are counted."""
+        """Return the areas of floor to sweep; None where cells are counted."""
         return self._line.to_sweep
 
     def drive_times(self) -> DriveTimes:
-        """Return what driving takes the robot, as its poses show."""
+        """Return speed and turn durations, measured from poses."""
         return self._drive.times
 
     def unreached(self) -> Unreached:
-        """Return what of the order stays uncovered as things are."""
+        """Return what of the order stays uncovered at present."""
         return self._orders.unreached()
 
     def zone_progress(self) -> list[ZoneProgress]:
-        """Return how far each zone of the order is."""
+        """Return the progress of each zone of the order."""
         return zone_progress(self.order_state, self._map.area, self._ledger)
 
     def snapshot(self) -> LedgerSnapshot:
-        """Return all that is to outlive a restart: what is covered, and how far the order is."""
+        """Return everything that is kept over a restart: coverage, and the order's progress."""
         trail, note = self._trail.snapshot(), self.order_state.to_json()
         ledger, lattice_deg = self._ledger.snapshot(), self._turn.deg
         return replace(ledger, trail=trail, note=note, lattice_deg=lattice_deg)
 
     @property
     def turn(self) -> LatticeTurn:
-        """At which angle to the map frame cells lie: places on the lattice are turned by that."""
+        """The lattice rotation, which converts places on the lattice to the map frame."""
         return self._turn
 
     @property
     def order_state(self) -> OrderState:
-        """The order, and how far it is carried out."""
+        """The order and its progress."""
         return self._orders.order_state
 
     @property
     def home(self) -> Cell | None:
-        """The cell (row, col) the robot returns to; None where there is none yet."""
+        """The cell (row, col) the robot returns to; None for none."""
         return self._orders.goal()
 
     @property
@@ -219,7 +219,7 @@ class Mission:
 
     @property
     def map_revision(self) -> int:
-        """Goes up by one with each new state of the map; 0 before there is one."""
+        """Counter of map states; 0 before the first."""
         return self._map.map_revision
 
     @property
@@ -229,34 +229,34 @@ class Mission:
 
     @property
     def lattice(self) -> CoverageLattice | None:
-        """The lattice over the newest map, in its own frame; None before there is one."""
+        """The lattice over the newest map, in its own frame; None before there is a map."""
         return self._map.lattice
 
     @property
     def ledger(self) -> CoverageLedger:
-        """Which cells are covered."""
+        """The covered cells."""
         return self._ledger.current
 
     @property
     def covered(self) -> MissionLedger:
-        """Which cells this robot and others have covered."""
+        """The cells covered by this robot and others."""
         return self._ledger
 
     @property
     def shared(self) -> SharedProgress:
-        """Which cells other robots have swept."""
+        """The cells swept by other robots."""
         return self._ledger.shared
 
     def open_cells(self) -> int:
-        """Return how many cells are still to be swept, by this robot or another."""
+        """Return the number of cells still to be swept, by this robot or another."""
         return self._orders.left()
 
     @property
     def trail(self) -> LivingTrail:
-        """The pheromone on the lattice."""
+        """The living trail."""
         return self._trail.trail
 
     @property
     def floor(self) -> SweptFloor:
-        """Which floor is swept, in the lattice's frame."""
+        """The swept floor, in the lattice's frame."""
         return self._ledger.floor

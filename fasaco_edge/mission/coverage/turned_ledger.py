@@ -1,8 +1,7 @@
-"""A ledger carried over to cells at another angle.
+"""Rotated ledger: conversion of a ledger to cells at another angle.
 
-Which floor is swept says all there is to know: a cell counts as covered where the floor at its
-centre is. The trail, which is of steps between cells, begins anew, and so does what other robots
-have swept: they tell it again.
+Coverage is rebuilt from swept floor alone: a cell counts as covered if the floor at its centre is
+swept. The trail, stored per step between cells, starts again; other robots resend theirs.
 """
 
 from __future__ import annotations
@@ -29,7 +28,7 @@ from fasaco_edge.planners.living_trail import NO_TRAIL
 
 
 def turned_ledger(before: LedgerSnapshot, lattice_deg: float) -> LedgerSnapshot:
-    """Return what a ledger holds, of cells at ``lattice_deg`` [deg] to the map frame."""
+    """Return a ledger converted to cells at ``lattice_deg`` [deg] to the map frame."""
     by_deg = before.lattice_deg - lattice_deg
     if not by_deg:
         return before
@@ -57,13 +56,13 @@ def turned_ledger(before: LedgerSnapshot, lattice_deg: float) -> LedgerSnapshot:
 def _turned(
     floor: FloorSnapshot, by_deg: float, side: int, edge_m: float
 ) -> Iterator[tuple[Place, Mask]]:
-    """Yield where the centres of squares lie on swept floor, tile by tile; of some tiles all.
+    """Yield tiles of the rotated raster with their swept squares; empty tiles are skipped.
 
     Args:
-        floor: as it lies now; the tiles are of floor turned by ``by_deg``.
-        by_deg: in degrees.
-        side: of a tile, in squares.
-        edge_m: of a square [m].
+        floor: the present floor.
+        by_deg: rotation of the result against it [deg].
+        side: edge of a tile, in squares.
+        edge_m: edge of a square [m].
     """
     tile_m = FLOOR_TILE * PIXEL_M
     places: set[Place] = set()

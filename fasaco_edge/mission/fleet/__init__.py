@@ -1,1 +1,1 @@
-"""Several robots that share an area: what is heard of the others, and who sweeps what."""
+"""Fleet side of a mission: the other robots that share the area, and who sweeps what."""

@@ -1,10 +1,10 @@
 """Division of the cells left among robots under way: a seed and a handicap for each robot.
 
-A cell belongs to the robot whose seed is nearest by the way there, in seconds and with the
-handicap added. So each part is connected, and cells that a map shows later have an owner, too.
-Handicaps are chosen so that all parts take about as long. Seeds are where the robots are, or lie
-far from one another, whichever makes the earlier end; from there they move to the middles of the
-parts (Lloyd's algorithm, with ways in place of distances).
+A cell belongs to the robot whose seed has the shortest travel time to it, plus the robot's
+handicap. So each part is connected, and cells that a map shows later have an owner, too. Handicaps
+balance the workload of the parts. Seeds start at the robots, or far from one another, whichever
+finishes earlier; then they move to the centres of the parts (Lloyd's algorithm, with travel times
+as distances).
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ from numpy.typing import NDArray
 from fasaco_edge.grid.lattice import Cell, CoverageLattice
 from fasaco_edge.kernels.fleet.split import ways_from
 
-# Of more cells every second, third ... is looked at; larger lattices are searched less often.
+# With more cells every second, third ... is used; on larger lattices there are fewer rounds.
 MOST_CELLS, MOST_SEARCHED = 2_000, 3_000_000
-# How often seeds move, and handicaps change; each change is so much smaller than the one before.
+# Rounds of moving the seeds; updates of the handicaps, and the factor between successive ones.
 ROUNDS, CHANGES, DAMPING = 3, 30, 0.85
 
 Seconds = NDArray[np.float32]
@@ -32,8 +32,8 @@ class Robot:
 
     Attributes:
         name: its name.
-        cell: where it is.
-        step_s: what sweeping a cell takes it [s].
+        cell: its cell.
+        step_s: its time to sweep one cell [s].
     """
 
     name: str
@@ -43,12 +43,12 @@ class Robot:
 
 @dataclass(frozen=True, slots=True)
 class Division:
-    """Who sweeps what.
+    """Assignment of cells to robots.
 
     Attributes:
-        robots: those that take part, in the order of their names.
-        seeds: a cell of each.
-        handicaps_s: what is added to the ways from there [s].
+        robots: the robots at work, sorted by name.
+        seeds: a cell for each.
+        handicaps_s: added to the travel times from the seeds [s].
     """
 
     robots: tuple[Robot, ...]
@@ -61,7 +61,7 @@ class Division:
         return tuple(robot.name for robot in self.robots)
 
     def owners(self, lattice: CoverageLattice) -> NDArray[np.int8]:
-        """Return the number of the robot that each cell belongs to, int8 (rows, cols)."""
+        """Return the index of each cell's robot, int8 (rows, cols)."""
         ways_s = _ways_s(lattice, self.seeds, [robot.step_s for robot in self.robots])
         ways_s += np.array(self.handicaps_s, np.float32)[:, None]
         owners: NDArray[np.int8] = ways_s.argmin(axis=0).astype(np.int8)
@@ -71,11 +71,11 @@ class Division:
 def divide(
     lattice: CoverageLattice, wanted: NDArray[np.bool_], robots: Sequence[Robot]
 ) -> Division:
-    """Share cells out among robots; the order in which these are given does not count.
+    """Divide cells among robots; independent of the order in which these are given.
 
     Args:
-        lattice: where they can be.
-        wanted: bool (rows, cols), the cells to share out; a walk leads from each robot to each.
+        lattice: the cells where robots fit.
+        wanted: bool (rows, cols), the cells to divide; all robots must be connected.
         robots: at least one.
     """
     robots = sorted(robots, key=lambda robot: robot.name)
@@ -103,7 +103,7 @@ def divide(
 
 
 def _ways_s(lattice: CoverageLattice, cells: Sequence[Cell], steps_s: Sequence[float]) -> Seconds:
-    """Return how far cells are from some [s], float32 (k, rows * cols); from outside very far."""
+    """Return travel times from cells [s], float32 (k, rows * cols); huge where unreachable."""
     ways = np.full((len(cells), lattice.steps.size), np.float32(1e9))
     for way, cell, step_s in zip(ways, cells, steps_s, strict=True):
         if lattice.contains(cell):
@@ -115,7 +115,7 @@ def _ways_s(lattice: CoverageLattice, cells: Sequence[Cell], steps_s: Sequence[f
 
 
 def _handicaps_s(ways_s: Seconds, steps_s: NDArray[np.float64]) -> Seconds:
-    """Return what to add to ways, float32 (k, n), so that all have about as much to do."""
+    """Return handicaps, float32 (k,), that balance the load, for travel times float32 (k, n)."""
     handicaps = np.zeros(len(ways_s), np.float32)
     best, least = handicaps, np.inf
     change = float(np.ptp(ways_s)) / 2
@@ -130,7 +130,7 @@ def _handicaps_s(ways_s: Seconds, steps_s: NDArray[np.float64]) -> Seconds:
 
 
 def _end_s(from_starts_s: Seconds, owner: NDArray[np.int64], cell_s: NDArray[np.float64]) -> float:
-    """Return when the last robot will be done, if a cell takes each so long, float64 (k,) [s]."""
+    """Return when the last robot finishes, given its time per cell, float64 (k,) [s]."""
     ends_s = [0.0]
     for robot, way_s in enumerate(from_starts_s):
         own = owner == robot
@@ -142,7 +142,7 @@ def _end_s(from_starts_s: Seconds, owner: NDArray[np.int64], cell_s: NDArray[np.
 def _spread(
     lattice: CoverageLattice, cells: NDArray[np.int64], from_starts_s: Seconds
 ) -> list[Cell]:
-    """Return seeds far from one another, of each robot one that is as near to it as can be."""
+    """Return seeds far from one another, each assigned to a robot near it."""
     count, nearest_s = len(from_starts_s), from_starts_s.min(axis=0)
     seeds: list[int] = []
     for _ in range(count):
@@ -160,7 +160,7 @@ def _spread(
 def _middles(
     lattice: CoverageLattice, cells: NDArray[np.int64], owner: NDArray[np.int64], seeds: list[Cell]
 ) -> list[Cell]:
-    """Return of each part the cell that is nearest to its middle; the seed where it is empty."""
+    """Return the cell nearest to the centre of each part; the seed for an empty part."""
     rows, cols = np.divmod(cells, lattice.steps.shape[1])
     found = []
     for robot, seed in enumerate(seeds):

@@ -1,9 +1,9 @@
-"""Fleet layer: the other robots of the fleet, and this robot's part of what is left.
+"""Fleet layer: the other robots of the fleet, and this robot's part of the remaining area.
 
-There is no leader. Each robot divides what is left, on its own map, by the same rule from what all
-say of themselves; divisions are numbered, and a robot that hears of a later one than its own
-divides anew, too. Where two disagree for a moment cells may be swept twice; none is left out,
-because a robot that is done with its part takes one of what is still left.
+There is no leader. Each robot computes the same division from all robots' announced states, on its
+own map. Divisions are numbered, and a robot that hears of a later one than its own divides again.
+While two robots disagree, cells may be swept twice; none is left out, because a robot that finishes
+takes over a part of the remaining area.
 """
 
 from __future__ import annotations
@@ -25,16 +25,17 @@ from fasaco_edge.mission.fleet.shared import MOST_ROBOTS
 from fasaco_edge.mission.map.map_state import MapState
 from fasaco_edge.mission.map.reachable_area import ReachableArea, anchor_cell
 
-# A robot that was not heard for so long is gone; one that covers and stands for so long hangs [s].
+# Timeouts of a silent robot, and of one that should move; motion that counts [s], [s], [m].
 GONE_S, HANGING_S, STANDING_M = 5.0, 8.0, 0.05
-# How often the division is looked at, and how long one holds at least that nobody has left [s].
+# Period of checks; least life of a division while no robot leaves: in general, and for balance [s].
 LOOK_S, HOLDS_S, EVEN_S = 1.0, 2.0, 10.0
-# Parts that differ by less than this share and time [s] are left alone.
+# Parts are rebalanced only above this ratio and this difference [s].
 UNEVEN, UNEVEN_S = 1.25, 40.0
-# Another robot that has swept so many cells of this one's part changes its path: one that only
-# comes through does not. In unknown buildings 4 cost 7 % of two robots' time.
+# Number of cells of this robot's part swept by another one that triggers a new plan: more than by
+# merely passing through. In unknown buildings 4 cost 7 % of two robots' time.
 MANY_TAKEN = 30
-# A division is numbered no further ahead of the own, nor of a newcomer's first, but in error.
+# Limits on a division's number: absolute, ahead of this robot's own, and the first of a newcomer.
+# Numbers beyond are errors.
 MOST_NUMBER, MOST_AHEAD, MOST_FIRST = 2**31 - 1, 2**10, 2**24
 LATER = "another robot has divided anew"
 
@@ -44,15 +45,15 @@ OpenCells = Callable[[Window], NDArray[np.bool_]]
 
 @dataclass(slots=True)
 class Member:
-    """Another robot.
+    """State of another robot.
 
     Attributes:
-        newest: what it said last.
-        heard_at: when [s].
-        left_out: why it cannot be of this fleet; "" where it can.
-        place: where it is, to STANDING_M, x, y [m].
-        moved_at: since when [s].
-        left_at: when it last left a division that had hardly begun [s].
+        newest: its newest message.
+        heard_at: time of that [s].
+        left_out: why it does not belong to this fleet; "" where it does.
+        place: its position, to STANDING_M, x, y [m].
+        moved_at: time of the last motion [s].
+        left_at: when it last left a new division [s].
     """
 
     newest: MemberHeard
@@ -63,12 +64,12 @@ class Member:
     left_at: float = float("-inf")
 
     def has_moved(self, heard: MemberHeard) -> bool:
-        """Tell whether it is elsewhere by now, or has begun to work."""
+        """Tell whether it has moved or has started to work."""
         has_begun = self.newest.state not in AT_WORK and heard.state in AT_WORK
         return has_begun or math.dist(self.place, (heard.x, heard.y)) > STANDING_M
 
     def absence(self, now: float) -> str:
-        """Return why it takes no part now; "" where it does."""
+        """Return why it takes no part now; "" if it does."""
         if self.left_out:
             return self.left_out
         if now - self.heard_at > GONE_S:
@@ -79,12 +80,12 @@ class Member:
 
 
 class FleetLayer:
-    """Knows the others; does nothing without a fleet.
+    """Tracks the other robots; inactive without a fleet.
 
     Attributes:
         members: the others, by name.
-        number: of the newest division.
-        step_s: what sweeping a cell takes this robot [s].
+        number: number of the newest division.
+        step_s: this robot's time to sweep one cell [s].
     """
 
     def __init__(
@@ -98,25 +99,25 @@ class FleetLayer:
         self._divided_at = self._looked_at = float("-inf")
         self._owners: tuple[ReachableArea | None, NDArray[np.int8]]
         self._owners = None, np.zeros((0, 0), np.int8)
-        # What this robot could not sweep, while others are at work; of an area.
+        # Cells of an area that this robot tried in vain, while others are at work.
         self._tried: tuple[ReachableArea | None, NDArray[np.bool_]]
         self._tried = None, np.zeros((0, 0), np.bool_)
-        # How many cells of its own part others had swept when the path was planned; as of which
-        # version of what is shared that was looked at last.
+        # Number of own cells that others had swept at the last plan; version of the shared progress
+        # at the last check.
         self._taken, self._counted = 0, 0
-        # Whether the last division had a part for it, and how many cells were left then.
+        # Whether the last division gave this robot a part; number of cells left at that time.
         self._had_part, self._left = False, 0
 
     @property
     def has_company(self) -> bool:
-        """Whether others are at work on what is left, too."""
+        """Whether other robots are at work on the remaining area."""
         return self._division is not None
 
     def hear(self, event: MemberHeard, now: float) -> str:
-        """Take in what another robot says; return why a plan is wanted by that, or "".
+        """Take in another robot's message; return why it requires a plan, or "".
 
         Raises:
-            FleetError: there is no room for what it says.
+            FleetError: there is no room for its data.
         """
         if not self._robot:
             return ""
@@ -143,9 +144,9 @@ class FleetLayer:
         return f"{event.robot}: cells are to be swept again" if is_open_again else ""
 
     def mine(self, cells: NDArray[np.bool_], area: ReachableArea) -> NDArray[np.bool_]:
-        """Return which of some cells are this robot's to sweep; all where none of its part are.
+        """Return which cells are this robot's to sweep; all of them if its part has none.
 
-        What it has given up is left to the others, as long as there are any.
+        Cells that it has given up are left to the others, while there are any.
         """
         if self._division is None:
             return cells
@@ -154,22 +155,22 @@ class FleetLayer:
         return part if (part & area.reachable).any() else cells
 
     def give_up(self, cells: NDArray[np.bool_], area: ReachableArea) -> None:
-        """Leave cells that this robot has tried in vain to the others."""
+        """Leave cells that this robot tried in vain to the others."""
         before = self._tried[1] if self._tried[0] is area else np.False_
         self._tried = area, cells | before
 
     def try_again(self) -> None:
-        """Begin anew with what was given up."""
+        """Clear the list of cells given up."""
         self._tried = None, self._tried[1]
 
     def share(self, open_cells: OpenCells, cell: Cell, now: float, *, at_once: bool = False) -> str:
-        """Divide anew what is left, if that is worth it; return why a plan is wanted, or "".
+        """Divide the remaining area again if worthwhile; return why a plan is wanted, or "".
 
         Args:
-            open_cells: returns of a window which cells still need a visit.
-            cell: where this robot is.
-            now: [s].
-            at_once: whether this robot waits for work.
+            open_cells: mask function: a window to the cells that still need a visit.
+            cell: this robot's cell.
+            now: time [s].
+            at_once: whether this robot is out of work.
         """
         area = self._map.area
         if area is None or not self.members:
@@ -192,14 +193,14 @@ class FleetLayer:
         return why if (own != after).any() else ""
 
     def part_cells(self) -> int | None:
-        """Return how many cells of the area are in this robot's part; None where all are."""
+        """Return the number of cells in this robot's part; None if all are."""
         if self._division is None or self._map.area is None:
             return None
         area = self._map.area
         return int(np.count_nonzero(self._is_own(self._division, area) & area.reachable))
 
     def _newest_heard(self) -> int:
-        """Return the number of the newest division that others know, and that can be."""
+        """Return the highest valid division number heard."""
         numbers = [
             member.newest.division for member in self.members.values() if not member.left_out
         ]
@@ -208,7 +209,7 @@ class FleetLayer:
         return max((number for number in numbers if number <= most), default=0)
 
     def _robots(self, area: ReachableArea, cell: Cell, now: float) -> list[Robot]:
-        """Return who is at work where this robot can come to."""
+        """Return the robots at work in the area that this robot can reach."""
         robots = [Robot(self._robot, cell, self.step_s)]
         for name, member in self.members.items():
             place = anchor_cell(area.lattice, Pose2D(member.newest.x, member.newest.y))
@@ -225,7 +226,7 @@ class FleetLayer:
         *,
         at_once: bool,
     ) -> str:
-        """Return why to divide anew, or ""."""
+        """Return why to divide again, or ""."""
         division = self._division
         names = {robot.name for robot in robots}
         known = set() if division is None else set(division.names)
@@ -236,7 +237,7 @@ class FleetLayer:
             return f"{', '.join(gone)} no longer at work"
         if now - self._divided_at < HOLDS_S and not at_once:
             return ""
-        # Of one that comes and goes each time would change everybody's path.
+        # A robot that leaves and returns repeatedly would change all paths each time.
         new = names - known - {self._robot}
         if more := sorted(name for name in new if now - self.members[name].left_at >= EVEN_S):
             return f"shared with {', '.join(more)}"
@@ -246,7 +247,7 @@ class FleetLayer:
         return LATER if is_later else self._why_by_parts(division, area, left, now)
 
     def _note_left(self, names: list[str], now: float) -> None:
-        """Note who is at work no longer, soon after what is left was divided."""
+        """Note robots that stop working soon after a division."""
         if now - self._divided_at < EVEN_S:
             for name in self.members.keys() & set(names):
                 self.members[name] = replace(self.members[name], left_at=now)
@@ -254,10 +255,10 @@ class FleetLayer:
     def _why_by_parts(
         self, division: Division, area: ReachableArea, left: NDArray[np.bool_], now: float
     ) -> str:
-        """Return why parts of what is left are to be others, or ""."""
+        """Return why the parts should change, or ""."""
         cells = np.bincount(self._owners_on(division, area)[left], minlength=len(division.robots))
         if not cells[division.names.index(self._robot)]:
-            # Where there was none for it, there is none soon after.
+            # If there was no part for it, there will be none soon after.
             is_other = self._had_part or cells.sum() > self._left
             is_other |= now - self._divided_at >= EVEN_S
             return "own part is done" if left.any() and is_other else ""
@@ -281,9 +282,9 @@ class FleetLayer:
         return self._owners[1]
 
     def _why_by_taken(self) -> str:
-        """Return why a plan is wanted by what others have swept since the path was planned, or "".
+        """Return why a plan is wanted after others swept cells of this robot's part, or "".
 
-        Once for all that was heard: a fleet says much in a moment.
+        Checked once per batch of messages: a fleet sends many.
         """
         if self._counted == self._ledger.shared.version:
             return ""
@@ -295,7 +296,7 @@ class FleetLayer:
         return "others have swept cells of this robot's part"
 
     def _count_taken(self) -> int:
-        """Return how many cells of this robot's part others have swept, and it has not."""
+        """Return the number of this robot's cells that only others have swept."""
         self._counted = self._ledger.shared.version
         area = self._map.area
         if area is None:
@@ -308,10 +309,10 @@ class FleetLayer:
         return int(np.count_nonzero(swept))
 
     def _make_room(self, robot: str, now: float) -> None:
-        """Make room for another robot: the one not heard for longest goes, if it is gone.
+        """Make room for another robot: the longest silent one is removed, if it is gone.
 
-        Were it not, as many as there is room for and one more would take turns, and each time what
-        is left would be divided anew.
+        Otherwise one robot too many would displace another in turn, and each time cause a new
+        division.
         """
         if len(self.members) < MOST_ROBOTS:
             return

@@ -1,10 +1,9 @@
-"""Shared progress: which cells the other robots of a fleet have swept, as each of them reports.
+"""Shared progress: the cells that the other robots of a fleet report as swept.
 
-A robot's messages carry an epoch, which changes whenever it has forgotten some of its cells. Within
-one epoch cells are only added: they are united, so that lost, repeated and late messages do no
-harm, and two halves of a fleet that was split agree once they receive from each other again. When
-the epoch changes, all that was received from that robot is dropped. What a robot that is gone had
-swept stays.
+Each report carries an epoch number, changed whenever the sender forgets cells. Within an epoch the
+set only grows, so reports are merged by union: lost, repeated and late messages do no harm, and two
+halves of a split fleet agree once they hear each other again. When the epoch changes, the sender's
+earlier reports are dropped. The progress of a robot that is gone stays.
 
 Cells that this robot has to sweep again, whoever swept them (a second pass, a reset, a map that
 moved), are disregarded until the robot that swept them has forgotten them itself.
@@ -27,14 +26,14 @@ from fasaco_edge.grid.geometry import Window
 from fasaco_edge.mission.coverage.ledger import TILE, Cells, LedgerSnapshot
 
 if TYPE_CHECKING:
-    # For types only: a daemon speaks of its fleet before it has loaded the kernels.
+    # For types only: a daemon announces itself to its fleet before the kernels are loaded.
     from fasaco_edge.grid.lattice import Cell
 
-# A tile's cells as bits, row by row, the first of eight the highest [bytes].
+# Size of a tile as bits, row by row, the first of eight highest [bytes].
 TILE_BYTES = TILE * TILE // 8
-# How many bits of a byte are set.
+# Number of bits set in each byte value.
 _ONES = np.unpackbits(np.arange(256, dtype=np.uint8)[:, None], axis=1).sum(axis=1)
-# Of how many robots something is kept, and how many tiles of all of them: 16 million cells.
+# Limits on the robots and, over all of them, on the tiles: 16 million cells.
 MOST_ROBOTS, MOST_TILES = 32, 4096
 MOST_TILES_OF_ONE = MOST_TILES // 8
 
@@ -45,7 +44,7 @@ Inside = Callable[[Cells, Cells], NDArray[np.bool_]]
 
 @dataclass(slots=True)
 class _Heard:
-    """What one robot has swept: tiles of bits, and which of those bits do not count."""
+    """Cells swept by one robot: tiles of bits, and the bits that are disregarded."""
 
     epoch: int
     tiles: Tiles = field(default_factory=dict)
@@ -55,13 +54,13 @@ class _Heard:
         self.epoch, self.tiles = epoch, {}
 
     def drop_gone(self) -> None:
-        """Keep nothing of tiles that were not heard again in this epoch."""
+        """Drop tiles that were not repeated in this epoch."""
         known = self.disregarded.items()
         self.disregarded = {place: bits for place, bits in known if place in self.tiles}
 
     @property
     def count(self) -> int:
-        """How many cells count."""
+        """Number of cells that count."""
         counted = [self.counted(place) for place in self.tiles]
         return int(_ONES[np.concatenate(counted)].sum()) if counted else 0
 
@@ -71,25 +70,25 @@ class _Heard:
 
 
 class SharedProgress:
-    """The cells that others have swept, on this robot's lattice.
+    """The cells that other robots have swept, on this robot's lattice.
 
     Attributes:
-        epoch: of this robot's own cells; 0 without a fleet.
-        version: goes up with each change.
+        epoch: epoch of this robot's own cells; 0 without a fleet.
+        version: counter of changes.
     """
 
     def __init__(self) -> None:
         self.epoch = 0
         self.version = 0
         self._robots: dict[str, _Heard] = {}
-        # What was asked for last, and the answer; which tiles have got more cells since.
+        # The last query and its result; the tiles that have gained cells since.
         self._known: tuple[Window | None, NDArray[np.bool_]]
         self._known = None, np.zeros((0, 0), np.bool_)
         self._grown: set[Cell] = set()
         self._kept: tuple[int, bytes] = 0, b""
 
     def begin(self, epoch: int) -> None:
-        """Begin with an epoch that no earlier ledger of this robot had, unless one was restored."""
+        """Start an epoch that no earlier ledger of this robot used, unless one was restored."""
         if not self.epoch:
             self.epoch = epoch
             self.version += 1
@@ -107,16 +106,16 @@ class SharedProgress:
         tiles: Iterable[tuple[Cell, bytes]],
         members: Collection[str] = (),
     ) -> bool:
-        """Take in what a robot says of itself; tell whether cells are to be swept again by that.
+        """Take in a robot's report; tell whether cells need sweeping again because of it.
 
         Args:
             robot: its name.
-            epoch: of its cells.
-            tiles: places, and TILE_BYTES of bits each.
-            members: names of the robots that make no room for another.
+            epoch: epoch of its cells.
+            tiles: places, with TILE_BYTES of bits each.
+            members: names of robots that must not be displaced.
 
         Raises:
-            FleetError: there is no room for it.
+            FleetError: there is no room for its data.
         """
         heard, has_lost = self._robots.get(robot), False
         if heard is None:
@@ -168,18 +167,18 @@ class SharedProgress:
         return _cells(bits)
 
     def _note_lost(self) -> None:
-        """Note that cells may be to be swept again."""
+        """Note that some cells may need sweeping again."""
         self._known = None, self._known[1]
         self.version += 1
 
     def disregard(self, inside: Inside) -> None:
-        """Count no sweep so far of some cells.
+        """Disregard all sweeps so far of some cells.
 
         Args:
-            inside: returns which of some cells, rows and columns int64 (n,), bool (n,).
+            inside: mask function: rows and columns int64 (n,) to bool (n,).
         """
         for place in self._places():
-            # Once for all robots: what is inside takes longer than their tiles.
+            # Once for all robots: evaluating ``inside`` is the expensive part.
             swept = (heard.tiles[place] for heard in self._robots.values() if place in heard.tiles)
             at = np.argwhere(_cells(np.bitwise_or.reduce(list(swept))))
             rows, cols = (at + np.multiply(place, TILE)).T
@@ -199,23 +198,23 @@ class SharedProgress:
         return {place for heard in self._robots.values() for place in heard.tiles}
 
     def clear(self) -> None:
-        """Forget all that was heard: it lies in another frame, or in another building."""
+        """Forget all reports: they belong to another frame or building."""
         if self._robots:
             self._robots.clear()
             self._note_lost()
 
     def snapshot(self, cell_m: float) -> LedgerSnapshot:
-        """Return what others have swept as if one robot had."""
+        """Return the cells swept by others as one ledger."""
         tiles = {place: self._swept_of(place).astype(np.uint16) for place in self._places()}
         return LedgerSnapshot(cell_m, "", 0, MappingProxyType(tiles))
 
     def cells_of(self, robot: str) -> int:
-        """Return how many cells of a robot's count."""
+        """Return the number of a robot's cells that count."""
         heard = self._robots.get(robot)
         return 0 if heard is None else heard.count
 
     def encode(self) -> bytes:
-        """Return all of it, to be kept with the ledger; b"" where there is nothing."""
+        """Return everything as bytes, to be kept with the ledger; b"" for nothing."""
         if self._kept[0] != self.version:
             robots = {
                 name: _Kept(heard.epoch, _listed(heard.tiles), _listed(heard.disregarded))
@@ -225,7 +224,7 @@ class SharedProgress:
         return self._kept[1]
 
     def resume(self, kept: bytes) -> None:
-        """Go on with what ``encode`` returned; what another release kept is heard anew."""
+        """Restore the bytes of ``encode``; those of another release are ignored."""
         try:
             if not kept or msgspec.json.decode(kept, type=_Head).version != _VERSION:
                 return
@@ -240,7 +239,7 @@ class SharedProgress:
         }
 
     def _make_room(self, robot: str, members: Collection[str]) -> bool:
-        """Make room for another robot; tell whether cells are to be swept again by that."""
+        """Make room for another robot; tell whether cells need sweeping again because of it."""
         if len(self._robots) < MOST_ROBOTS:
             return False
         gone = sorted(self._robots.keys() - set(members))
@@ -257,7 +256,7 @@ class SharedProgress:
             raise FleetError(f"{robot}: {MOST_TILES} tiles of others' progress are kept at most")
 
 
-# Of the note that is kept.
+# Version of the bytes.
 _VERSION = 1
 _Tile = tuple[int, int, Annotated[bytes, Meta(min_length=TILE_BYTES, max_length=TILE_BYTES)]]
 
@@ -269,7 +268,7 @@ class _Kept(msgspec.Struct, frozen=True, array_like=True):
 
 
 class _Head(msgspec.Struct, frozen=True):
-    """What is there in every version."""
+    """Members common to all versions."""
 
     version: int
 
@@ -281,16 +280,16 @@ class _Note(msgspec.Struct, frozen=True):
 
 
 class Telling:
-    """Chooses which of its tiles a robot tells next: what is new first, then all others in turn."""
+    """Selects the tiles of the next report: new ones first, then all others in turn."""
 
     def __init__(self) -> None:
-        # What each was heard to have swept, in the order in which that came.
+        # Cells reported per tile, in the order of reporting.
         self._told: dict[Cell, NDArray[np.uint16]] = {}
 
     def next(
         self, tiles: Mapping[Cell, NDArray[np.uint16]], most: int
     ) -> tuple[tuple[Cell, bytes], ...]:
-        """Return places and bits of at most so many tiles of a ledger's snapshot."""
+        """Return places and bits of a limited number of tiles of a ledger's snapshot."""
         self._told = {place: tile for place, tile in self._told.items() if place in tiles}
         new = [place for place, tile in tiles.items() if self._told.get(place) is not tile]
         chosen = [*sorted(new), *(place for place in self._told if place not in new)][:most]
@@ -301,7 +300,7 @@ class Telling:
 
 
 def tile_bits(tile: NDArray[np.uint16]) -> bytes:
-    """Return which cells of a ledger's tile were visited, as TILE_BYTES of bits."""
+    """Return the visited cells of a ledger's tile as TILE_BYTES of bits."""
     return np.packbits((tile > 0).reshape(-1)).tobytes()
 
 

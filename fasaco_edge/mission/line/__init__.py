@@ -1,1 +1,1 @@
-"""The line that the robot drives: between the walk over cells and the path that is published."""
+"""Line that the robot drives: between the walk over cells and the published path."""

@@ -1,6 +1,6 @@
-"""Line layer: turns each path over cells into the line that the robot is given.
+"""Line layer: converts each path over cells to the line that is published.
 
-It follows map, poses and paths, and says when the line is another one although the path is not.
+It follows map, poses and paths, and publishes a changed line even if the path is unchanged.
 """
 
 from __future__ import annotations
@@ -27,18 +27,18 @@ from fasaco_edge.mission.line.polisher import Polisher
 from fasaco_edge.mission.map.map_state import MapState
 from fasaco_edge.mission.orders.sequencer import Sequencer
 
-# A cell of which less floor is left is not driven to again [m2].
+# A cell with less unswept floor than this is not driven to [m2].
 LEAST_LEFT_M2 = 0.04
 
 
 class FloorToSweep(NamedTuple):
-    """How much floor is to be swept, as of the newest map and order.
+    """Areas of floor to sweep, on the newest map and for the present order.
 
     Attributes:
-        asked_m2: floor in reach that is asked for, swept or not [m2].
-        ahead_m2: what of it is not swept, and the line ahead sweeps [m2].
-        left_m2: what of it the line ahead does not sweep, either [m2].
-        beyond_m2: free floor that the tool cannot come to, asked for or not, by reason [m2].
+        asked_m2: reachable floor that is asked for, swept or not [m2].
+        ahead_m2: the unswept part of it that the line ahead sweeps [m2].
+        left_m2: the unswept part of it that the line ahead does not sweep [m2].
+        beyond_m2: free floor out of the tool's reach, asked for or not, by cause [m2].
     """
 
     asked_m2: float
@@ -48,7 +48,7 @@ class FloorToSweep(NamedTuple):
 
 
 class LineLayer:
-    """Owns the line; does nothing where cells are counted."""
+    """Owns the line; inactive where cells are counted."""
 
     def __init__(
         self,
@@ -61,24 +61,24 @@ class LineLayer:
         self._map, self._ledger, self._orders, self._route = map_state, ledger, orders, route
         self._polisher = Polisher(sweeping.line) if sweeping else None
         self._ahead: LineAhead | None = None
-        # What may have changed of map and floor since the last look, and which cells were asked
-        # for then, and in reach, on which window.
+        # Window of map and floor that may have changed since the last update; window, asked-for
+        # cells and reachable cells of that update.
         self._touched: Window | None = None
         self._is_dropped = False
-        # Where what is out of reach may have changed, and was not looked at.
+        # Window in which causes of unreachable floor may be outdated.
         self._unexplained: Window | None = None
         self._asked: tuple[Window, NDArray[np.bool_], NDArray[np.bool_]] | None = None
-        # Whether the map is known; None before the first look.
+        # Whether the map is complete; None before the first check.
         self._is_settled: bool | None = None
-        # The swept floor that was seen last, how many changes it had, and how often some of it
-        # had been forgotten.
+        # The swept floor at the last update, its number of changes, and how often it had forgotten
+        # pixels.
         self._swept: tuple[SweptFloor | None, int] = None, 0
         self._forgotten = 0
-        # The floor that was seen last, and its revision.
+        # The floor at the last update, and its revision.
         self._seen: tuple[FloorMap | None, int] = None, 0
 
     def note_map(self) -> None:
-        """Follow the newest map; to be called for each."""
+        """Follow the newest map; to be called with each."""
         floor = self._map.floor
         if floor is None or (floor is self._seen[0] and floor.revision == self._seen[1]):
             return
@@ -98,11 +98,11 @@ class LineLayer:
         self._touched = Window.around(touched, floor.touched)
 
     def note_pose(self, pose: Pose2D) -> None:
-        """Note where the robot is now: on its line, maybe."""
+        """Note the robot's pose, which may be on its line."""
         ahead = self._ahead
         if ahead is None:
             return
-        # What was forgotten is open before the robot drives on: what it drives then is not.
+        # Forgotten floor is opened before the next sweep is recorded.
         if self._ledger.floor.forgotten != self._forgotten:
             self._take_floor()
         before = self._route.held.index
@@ -115,14 +115,14 @@ class LineLayer:
         self._map.follow_path((row, col) if is_on_it else None)
 
     def finish(self, update: PathUpdate | None, now: float) -> PathUpdate | None:
-        """Return what is to be published after a step that decided on a path, or on none."""
+        """Return the update to publish after a step, with or without a new path."""
         ahead, stamped = self._ahead, self._map.pose
         if ahead is None or stamped is None or self._polisher is None or self._map.floor is None:
             return update
         touched, self._touched = self._touched, None
         self._take_floor(touched)
         reason, path = "", self._route.path
-        # By its cells it is further on than by its line, which leads where it need not drive.
+        # Its cell may be ahead of its place on the line, which may skip cells.
         is_further = path.index > ahead.cell
         if update is not None:
             ahead.lay(update.cells, stamped.pose)
@@ -135,11 +135,11 @@ class LineLayer:
             reason = "line blocked"
         if touched is not None or self._is_settled is None:
             self._is_settled = not self._orders.is_exploring
-        # What the robot waits for is published first; the rest comes with the next pose.
+        # Urgent updates are published first; the rest comes with the next pose.
         is_waited_for = update is not None or reason or is_further
         if not is_waited_for:
             self._explain()
-            # On the way home or to its dock the robot sweeps nothing beside it.
+            # On the way home or to its dock the robot sweeps nothing beside its path.
             is_errand = bool(self._orders.order_state.errand)
             if not is_errand and self._polisher.polish(
                 ahead, self._map.floor, is_settled=self._is_settled
@@ -154,7 +154,7 @@ class LineLayer:
 
     @property
     def to_sweep(self) -> FloorToSweep | None:
-        """How much floor is to be swept; None where cells are counted, or no floor is known."""
+        """Areas of floor to sweep; None where cells are counted, or before a floor is known."""
         if self._ahead is None or self._map.area is None:
             return None
         tally = self._ahead.tally
@@ -163,9 +163,9 @@ class LineLayer:
         return FloorToSweep(tally.wanted_m2, open_m2 - left_m2, left_m2, beyond_m2)
 
     def _credit(self, passed: NDArray[np.int32]) -> None:
-        """Take cells that the robot passed for covered, where hardly any floor is left of them.
+        """Count passed cells as covered if hardly any of their floor is left.
 
-        A polished line need not lead over the place where the robot would stand.
+        A polished line need not pass the stand of a cell.
         """
         ahead, floor, covered = self._ahead, self._map.floor, self._ledger.current
         assert ahead is not None
@@ -179,7 +179,7 @@ class LineLayer:
                 self._ledger.credit(cell)
 
     def _explain(self) -> None:
-        """Find out what is out of reach, and why, where that may have changed."""
+        """Update the causes of unreachable floor where they may have changed."""
         ahead, floor, part = self._ahead, self._map.floor, self._unexplained
         assert ahead is not None
         assert floor is not None
@@ -192,13 +192,14 @@ class LineLayer:
             ahead.tally.set_causes(strip, causes_of(floor, free, self._asked[2], strip))
 
     def _take_floor(self, touched: Window | None = None) -> None:
-        """Tell the tally what is still to be swept where that may have changed."""
+        """Update the tally where the floor to sweep may have changed."""
         ahead, floor = self._ahead, self._map.floor
         assert ahead is not None
         assert floor is not None
         swept = self._ledger.floor
         whole = Window(0, 0, floor.geometry.rows, floor.geometry.cols)
-        # Another floor, as after a reset, is another anywhere; so may be one that was forgotten.
+        # After a reset the floor is another object, and changed everywhere; likewise after
+        # forgetting.
         known, since = self._swept
         news = swept.changed_since(since) if known is swept else ANYWHERE
         if known is not swept or swept.forgotten != self._forgotten:
@@ -220,9 +221,9 @@ class LineLayer:
         self._swept = swept, swept.changes
 
     def _asked_part(self, floor: FloorMap) -> Window | None:
-        """Find which cells are asked for now; return the pixels where that has changed."""
+        """Update the asked-for cells; return the window of pixels where they changed."""
         area = self._map.area
-        # While the robot is nowhere nothing is known of it; after that all is looked at.
+        # Without an area nothing is known; afterwards everything is updated.
         if area is None or area.lattice.window != floor.stands.lattice.window:
             return None
         window = area.lattice.window

@@ -1,8 +1,8 @@
-"""The line ahead: what the robot drives along a walk, as points on the fine raster of its floor.
+"""Line ahead: the line that the robot drives along a walk, as points on the fine raster.
 
-A walk is laid as a line over stands; of the line before, what leads along the same cells stays as
-it was polished. Points keep the number of the cell of the walk that
-they stand for, so that the robot's place on the line tells its place on the walk.
+A new walk is laid as a line over stands, except where the previous line leads along the same cells:
+there it stays as polished. Points keep the index of their cell in the walk, so the robot's place on
+the line gives its place on the walk.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from fasaco_edge.mission.line.place_on_line import PlaceOnLine
 from fasaco_edge.mission.line.tally import SweepTally
 from fasaco_edge.planners.path import common_beginning
 
-# All of the line is published.
+# Value of ``unpublished_from`` if all of the line is published.
 ALL_PUBLISHED = 1 << 60
 
 
@@ -40,10 +40,10 @@ class LineAhead:
     """Owns the line from the last point behind the robot on, and its sweeps.
 
     Attributes:
-        line: what is left of it.
-        tally: what it sweeps.
-        cell: number of the cell of the walk that the robot is at.
-        unpublished_from: the first point from which on the published line is another one.
+        line: the rest of the line.
+        tally: counts of its sweeps.
+        cell: index of the robot's cell in the walk.
+        unpublished_from: index of the first point that differs from the published line.
     """
 
     def __init__(self, floor: FloorMap) -> None:
@@ -53,10 +53,10 @@ class LineAhead:
         self.unpublished_from = ALL_PUBLISHED
         self._floor = floor
         self._walk: Walk = np.empty((0, 2), np.int32)
-        # Where the walk was cut off: so many cells are published, 0 where it was stopped.
-        # The rest is kept until the next walk comes. None for all.
+        # Number of published cells of a walk that was cut off, 0 after a stop; the rest is kept
+        # until the next walk. None for a complete walk.
         self._cut: int | None = None
-        # What of maps that came meanwhile was not looked at beyond the cut.
+        # Window of later maps that was not checked beyond the cut.
         self._unchecked: Window | None = None
         self._place = PlaceOnLine()
 
@@ -75,11 +75,11 @@ class LineAhead:
         return dropped
 
     def _move(self, shape: tuple[int, int], by: tuple[int, int]) -> None:
-        """Lie on a raster of another shape, (rows, cols), on which pixels have moved."""
+        """Move to a raster of another shape, (rows, cols), and shift."""
         edges, before = _edges(self.line.points), self.tally.shape
         self.line = self.line.moved(by)
         moved = _edges(self.line.points)
-        # What a raster lacks of an edge was not counted, or is no longer.
+        # Edges that extend beyond either raster are dropped: they were not, or are not, counted.
         beyond = self._is_beyond(edges, before) | self._is_beyond(moved, shape)
         self.tally.exchange(edges[beyond], edges[:0])
         self.tally.move(shape, by)
@@ -88,7 +88,7 @@ class LineAhead:
         self._unchecked = self._unchecked and self._unchecked.moved(*by)
 
     def _is_beyond(self, edges: NDArray[np.float64], shape: tuple[int, int]) -> NDArray[np.bool_]:
-        """Return which edges, float64 (n, 4), the tool leaves a raster of some shape on, bool."""
+        """Return which edges, float64 (n, 4), the tool sweeps beyond a raster of a shape, bool."""
         low, high = np.minimum(edges[:, :2], edges[:, 2:]), np.maximum(edges[:, :2], edges[:, 2:])
         margin = self._tool + 1.0
         beyond: NDArray[np.bool_] = np.any(
@@ -97,14 +97,14 @@ class LineAhead:
         return beyond
 
     def lay(self, walk: NDArray[np.int32], pose: Pose2D) -> None:
-        """Lay the line along a walk; what leads along the same cells stays.
+        """Lay the line along a walk; it stays where it leads along the same cells.
 
         Args:
-            walk: int32 (n, 2), cells (row, col), each a legal step from the one before.
-            pose: of the robot, in or near its first cell.
+            walk: int32 (n, 2), cells (row, col), each a legal step from the previous one.
+            pose: pose of the robot, in or near the first cell.
         """
         self._see(pose)
-        # A plan's cells cannot be written; for those kernels would be compiled anew, on the loop.
+        # A plan's cells are read-only; for those kernels would be compiled again, in the loop.
         walk = walk.copy()
         ahead, line = self._walk[self.cell :], self.line.renumbered(-self.cell)
         is_beginning = common_beginning(walk, ahead) == len(walk)
@@ -124,11 +124,11 @@ class LineAhead:
             self.check(unchecked)
 
     def _join(self, pieces: list[Piece], beyond: Piece | None = None) -> None:
-        """Take the line that is put together of pieces of the one before.
+        """Replace the line by one joined from pieces.
 
         Args:
             pieces: in order.
-            beyond: what is kept behind the cut, where the walk was cut off.
+            beyond: the kept part beyond the cut, if the walk was cut off.
         """
         begin = self._begin()[None]
         here = Line(begin, np.array([self.cell]), np.array([POLISHED], np.uint8))
@@ -151,9 +151,9 @@ class LineAhead:
         self._take(joined)
 
     def _put_behind(self, last: Points, beyond: Piece) -> list[Piece]:
-        """Return what is kept behind the cut, to come after a point.
+        """Return the kept part beyond the cut, to follow a point.
 
-        Whether it can be driven to from there is looked at once the next walk comes.
+        The connection is checked when the next walk comes.
         """
         while len(beyond.line) and np.abs(last - beyond.line.points[0]).sum() < LEAST_EDGE:
             beyond = beyond.without_first()
@@ -166,11 +166,11 @@ class LineAhead:
         return [beyond]
 
     def _begin(self) -> Points:
-        """Return where a new line begins: where the robot is.
+        """Return the first point of a new line: the robot's position.
 
-        Where its disc does not fit, as a real robot is a little off its line and poses err, it
-        is where the robot should be on the line before: from the other place no way would be
-        clear, and the line would begin where the first one is, metres away.
+        If its disc does not fit there, as a real robot is a little off its line and poses are
+        noisy, it is the robot's place on the previous line: from the position itself no path would
+        be clear, and the line would begin at the first clear point, metres away.
         """
         here = self._place.here
         if self.is_followed and not self._is_clear(here, here):
@@ -179,14 +179,14 @@ class LineAhead:
 
     @property
     def is_cut(self) -> bool:
-        """Whether the walk was cut off, and the next one is waited for."""
+        """Whether the walk was cut off, and the next one is awaited."""
         return self._cut is not None
 
     def check(self, touched: Window) -> bool:
-        """Lay again over stands what a new map blocks; return whether it blocks anything.
+        """Replace parts that a new map blocks by stands; return whether it blocks any.
 
         Args:
-            touched: the part of the raster that may have changed.
+            touched: window of the raster that may have changed.
         """
         line = self.line
         if self._cut is not None:
@@ -201,13 +201,13 @@ class LineAhead:
             return False
         first, last = blocked[0], blocked[-1] + 1
         head = [Piece(line.part(0, first + 1), 0)] if first else []
-        # Beyond the cut the walk may lead where no cell is any more: the line there stays.
+        # Beyond the cut the walk may contain cells that no longer exist: the line there stays.
         beyond = Piece(self.line.part(len(line)), len(line)) if self.is_cut else None
         self._join([*head, Piece(line.part(last), last)], beyond)
         return True
 
     def drive(self, pose: Pose2D) -> None:
-        """Note where the robot is; what it has driven is dropped."""
+        """Note the robot's pose; the driven part is dropped."""
         self._see(pose)
         number = self._place.find(self.line.points, self._tool, self.tally.unit_m)
         if number is None:
@@ -219,7 +219,7 @@ class LineAhead:
             self.line = self.line.part(number)
             self.unpublished_from = max(self.unpublished_from - number, 0)
         # The nearest cell, or the next plan would begin behind the robot. At the last one the robot
-        # has arrived, as is found out below.
+        # has arrived, which is checked below.
         first, second = self.line.cells[:2].tolist()
         nearest = first + int(self._place.along * (second - first) + 0.5)
         self.cell = max(self.cell, min(nearest, len(self._walk) - 2))
@@ -248,7 +248,7 @@ class LineAhead:
         return raster_to_map(self._floor.geometry, points)
 
     def _published(self) -> Points:
-        """Return the points to be published: where the walk is cut off the robot stops."""
+        """Return the points to publish; the line ends at a cut."""
         points = self.line.points
         if not self._cut:
             return points if self._cut is None else points[:0]
@@ -261,7 +261,7 @@ class LineAhead:
         return np.concatenate([points[:count], end[None]])
 
     def put(self, first: int, end: int, points: Points, cells: NDArray[np.int64]) -> None:
-        """Put polished points in the place of those from ``first`` to ``end``; they are counted."""
+        """Replace the points from ``first`` to ``end`` by polished ones, and update the counts."""
         line = self.line
         state = line.state[first:end].min(initial=POLISHED)
         part = Line(points, cells, np.full(len(points), state, np.uint8))
@@ -269,17 +269,17 @@ class LineAhead:
         self.unpublished_from = min(self.unpublished_from, first)
 
     def first_below(self, state: int) -> int:
-        """Return the first point that is not as far yet as MOVED, or POLISHED, or their number."""
+        """Return the index of the first point below MOVED, or POLISHED; the count if none."""
         below = self.line.state < state
         return int(np.argmax(below)) if below.any() else len(below)
 
     def raw_until(self, first: int) -> int:
-        """Return the first point from one on that was moved, or their number."""
+        """Return the index of the first moved point from ``first`` on; the count if none."""
         moved = self.line.state[first:] >= MOVED
         return first + int(np.argmax(moved)) if moved.any() else len(self.line)
 
     def note(self, first: int, end: int, state: int) -> None:
-        """Note that points are as far as MOVED or POLISHED."""
+        """Mark points as MOVED or POLISHED."""
         line, states = self.line, self.line.state.copy()
         states[first:end] = np.maximum(states[first:end], state)
         self.line = Line(line.points, line.cells, states)
@@ -289,16 +289,16 @@ class LineAhead:
         self.unpublished_from = ALL_PUBLISHED
 
     def lengths(self) -> NDArray[np.float64]:
-        """Return how far it is from the robot to each point, float64 (n,) [m]; the first is 0."""
+        """Return the distance along the line to each point, float64 (n,) [m]; the first is 0."""
         edges = np.hypot(*np.diff(self.line.points, axis=0).T)
         edges[:1] *= 1.0 - self._place.along
         return np.concatenate([[0.0], np.cumsum(edges)]) * self.tally.unit_m
 
     def _take(self, pieces: list[Piece]) -> None:
-        """Take another line; count, and polish again, what differs.
+        """Replace the line; what differs is counted and polished again.
 
         Args:
-            pieces: of the line before where their ``begin`` is 0 or more.
+            pieces: their ``begin`` is 0 or more if they are part of the previous line.
         """
         old = self.line
         new = pieces[0].line.joined(*(piece.line for piece in pieces[1:])) if pieces else Line()
@@ -312,7 +312,7 @@ class LineAhead:
             if piece.begin >= 0:
                 goes[piece.begin : piece.begin + inner] = False
                 comes[at : at + inner] = False
-                # What lies at a joint may find a better place.
+                # Points at a joint may improve.
                 new.state[at : at + 1 if at else 0] = RAW
                 new.state[at + inner : at + inner + 1 if at + inner + 1 < len(new) else 0] = RAW
             at += inner + 1
@@ -326,7 +326,7 @@ class LineAhead:
         return bool(is_clear(self._floor.blocked, a[0], a[1], b[0], b[1], radius))
 
     def _edges_near(self, points: Points, part: Window) -> list[int]:
-        """Return the edges between points that a robot comes near a part of the raster on."""
+        """Return the edges between points that bring the robot near a window of the raster."""
         if len(points) < 2:
             return []
         margin = self._floor.discs.radius_m / self._floor.geometry.resolution + 1.0
@@ -338,7 +338,7 @@ class LineAhead:
             & (low[:, 1] < part.col1)
             & (high[:, 1] > part.col0)
         )
-        # What is no longer on the raster is not near any part of it.
+        # Edges off the raster are always included.
         near |= ((low < 0.0) | (high > np.array(self.tally.shape) - 1.0)).any(axis=1)
         numbers: list[int] = np.flatnonzero(near).tolist()
         return numbers

@@ -1,4 +1,4 @@
-"""Floor out of reach: what the map shows free and the tool cannot come to, and why."""
+"""Floor out of reach: free floor that the tool cannot reach, and the cause."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from fasaco_edge.kernels.floor.bits import WORD, unpacked
 
 
 class Cause(IntEnum):
-    """Why the tool cannot come to a pixel; 0 is one that it can come to, or that is not free."""
+    """Why the tool cannot reach a pixel; 0 if it can, or if the pixel is not free."""
 
     NARROW = 1
     CLOSED = 2
@@ -30,13 +30,13 @@ REASONS = {
 def causes_of(
     floor: FloorMap, free: FloorMap, reachable: NDArray[np.bool_], part: Window
 ) -> NDArray[np.uint8]:
-    """Return the cause of each pixel of a part of the raster, uint8 (rows, cols) of it.
+    """Return the cause of each pixel in a window of the raster, uint8 (rows, cols).
 
     Args:
-        floor: with keep-out zones.
-        free: of the same map without; the same one where there are none.
-        reachable: bool (rows, cols) of the lattice, the cells that the robot can come to.
-        part: of the raster.
+        floor: the floor with keep-out zones.
+        free: the floor of the same map without; the same object if there are none.
+        reachable: bool (rows, cols) of the lattice, the reachable cells.
+        part: window of the raster.
     """
     anywhere = floor.stands.lattice.coverable
     fits = floor.reached(anywhere, part)

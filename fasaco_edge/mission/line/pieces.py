@@ -1,7 +1,7 @@
-"""Pieces of a line: points with the cells that they stand for, and a line put together of them.
+"""Pieces of a line: points with the cells that they stand for, and their joining to a line.
 
-A line along another walk keeps the pieces of the line before that lead along the same cells,
-forward or backward. Between them it goes over stands.
+A line along a new walk reuses the pieces of the previous line that lead along the same cells,
+forward or backward; between them it goes over stands.
 """
 
 from __future__ import annotations
@@ -19,19 +19,19 @@ Points = NDArray[np.float64]
 Numbers = NDArray[np.int64]
 Walk = NDArray[np.int32]
 
-# How far points are: over stands; moved; polished with all moves.
+# States of points: at a stand; moved; polished with all moves.
 RAW, MOVED, POLISHED = range(3)
-# Stretches of a walk with fewer steps are not kept: joints would take most of them.
+# Least steps of a reused piece: shorter ones would consist mostly of joints.
 LEAST_STEPS = 8
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Line:
-    """Points in a row, straight ways between them.
+    """A polyline.
 
     Attributes:
         points: float64 (n, 2): y, x [pixels of the fine raster].
-        cells: int64 (n,), rising: of which cell of the walk each is.
+        cells: int64 (n,), ascending: index in the walk of each point's cell.
         state: uint8 (n,): RAW, MOVED or POLISHED.
     """
 
@@ -44,15 +44,15 @@ class Line:
 
     @classmethod
     def raw(cls, points: Points, cells: Numbers) -> Line:
-        """Return points that were not moved yet."""
+        """Return a line of points that have not been moved yet."""
         return cls(points, cells, np.full(len(points), RAW, np.uint8))
 
     def part(self, begin: int, end: int | None = None) -> Line:
-        """Return the points from one place to another."""
+        """Return the points from ``begin`` to ``end``."""
         return Line(self.points[begin:end], self.cells[begin:end], self.state[begin:end])
 
     def joined(self, *others: Line) -> Line:
-        """Return it with others behind."""
+        """Return this line with others appended."""
         lines = self, *others
         return Line(
             np.concatenate([line.points for line in lines]),
@@ -61,26 +61,26 @@ class Line:
         )
 
     def renumbered(self, by: int) -> Line:
-        """Return it along a walk whose cells have other numbers."""
+        """Return this line with cell indices shifted."""
         return Line(self.points, self.cells + by, self.state)
 
     def moved(self, by: tuple[int, int]) -> Line:
-        """Return it on a raster on which pixels have moved, rows and columns."""
+        """Return this line shifted by rows and columns of the raster."""
         return Line(self.points + np.array(by), self.cells, self.state)
 
     def before(self, cell: int) -> int:
-        """Return how many points are of cells before one."""
+        """Return the number of points of cells before ``cell``."""
         return int(np.searchsorted(self.cells, cell))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Piece:
-    """What is kept of the line before.
+    """A reused piece of the previous line.
 
     Attributes:
-        line: as it is in the new line.
-        begin: its first point's number in the line before; its last one's if ``backward``.
-        backward: whether it is driven the other way now.
+        line: the piece, as in the new line.
+        begin: index of its first point in the previous line; of its last one if ``backward``.
+        backward: whether the direction is reversed.
     """
 
     line: Line
@@ -88,15 +88,15 @@ class Piece:
     backward: bool = False
 
     def without_first(self) -> Piece:
-        """Return it without its first point."""
+        """Return the piece without its first point."""
         return Piece(self.line.part(1), self.begin + (not self.backward), self.backward)
 
 
 def kept_pieces(line: Line, before: Walk, after: Walk) -> list[Piece]:
-    """Return what of a line along one walk leads along the same cells as another walk.
+    """Return the pieces of a line along one walk that lead along the cells of another walk.
 
     Args:
-        line: along ``before``.
+        line: the line along ``before``.
         before, after: int32 (n, 2) and (m, 2), cells (row, col).
     """
     pieces = []
@@ -109,7 +109,7 @@ def kept_pieces(line: Line, before: Walk, after: Walk) -> list[Piece]:
             turned = Line(part.points[::-1], cells, part.state[::-1])
             pieces.append(Piece(turned, first, backward=True))
         else:
-            # Where both begin, the point behind the robot, too.
+            # If both begin together, include the point behind the robot.
             first = 0 if begin == origin == 0 else line.before(origin + 1)
             last = line.before(origin + steps)
             pieces.append(Piece(line.part(first, last).renumbered(begin - origin), first))
@@ -118,13 +118,13 @@ def kept_pieces(line: Line, before: Walk, after: Walk) -> list[Piece]:
 
 @dataclass(slots=True, eq=False)
 class Joiner:
-    """Puts a line together of pieces, and of stands between them.
+    """Joins pieces to a line, with stands between them.
 
     Attributes:
-        here: where the robot is: the beginning, where no piece is.
-        walk: int32 (n, 2), what the line leads along.
-        begin: the number of its cell that the robot is at.
-        stand: returns where the robot stands in a cell, float64 (2,).
+        here: the robot's position, where the line begins without a piece.
+        walk: int32 (n, 2), the walk of the new line.
+        begin: index of the robot's cell in the walk.
+        stand: returns the stand of a cell, float64 (2,).
         raw: returns the line over the stands of a walk, points and cells from 0.
         is_clear: tells whether the robot can drive straight between two points.
         is_swept: tells whether a cell's stand needs no sweep.
@@ -140,9 +140,9 @@ class Joiner:
     _done: list[Piece] = field(default_factory=list, init=False)
 
     def joined(self, pieces: list[Piece]) -> list[Piece]:
-        """Return the line, piece by piece; what was not in the line before begins at -1."""
+        """Return the line as pieces; new ones have ``begin`` -1."""
         self._done = [Piece(self.here, -1)]
-        # With the point behind the robot it takes one more, or both are left.
+        # The point behind the robot needs the one after it; both are kept or dropped.
         if pieces and pieces[0].begin == 0:
             if len(pieces[0].line) > 1:
                 self._done = pieces[:1]
@@ -153,7 +153,7 @@ class Joiner:
         return [piece for piece in self._done if len(piece.line)]
 
     def _join(self, piece: Piece) -> None:
-        """Go over stands to a piece; points at the joint that cannot be driven are dropped."""
+        """Append a piece, connected over stands; drop points at the joint that are not clear."""
         self._go_on(int(piece.line.cells[0]))
         while len(piece.line):
             last = self._last()
@@ -168,14 +168,14 @@ class Joiner:
                 self._go_on(int(piece.line.cells[0]))
 
     def _go_on(self, until: int) -> None:
-        """Go over the stands of the walk's cells before one."""
+        """Append the stands of the walk's cells up to ``until``, excluding it."""
         while True:
             last = self._last()
             if last is None:
                 self._append(self.begin, until)
                 return
-            # From a point that was moved one need not go back to the stand it comes from; nor
-            # from where the robot is, if that is swept.
+            # After a moved point its own cell's stand can be skipped; after the robot's position,
+            # too, if the floor there is swept.
             at = max(int(self._done[-1].line.cells[-1]), self.begin)
             is_here = self._is_here()
             starts = [at]
@@ -188,14 +188,15 @@ class Joiner:
             self._drop_last()
 
     def _append(self, first: int, until: int) -> bool:
-        """Append the stands of cells from one to before another; return whether they can be driven.
+        """Append the stands of cells up to ``until``, excluding it; return whether that is clear.
 
-        A stand that the last point is all but at is left out. From the stand the way to the next
-        one is clear, from that point it may be blocked by a hair: nothing is appended then.
+        A stand that nearly coincides with the last point is left out. The segment from the stand
+        to the next one is clear, but from that point it may just be blocked: then nothing is
+        appended.
         """
         if first >= until:
             return True
-        # Whether a stand is a corner is seen from the next one.
+        # Whether a stand is a corner depends on the next one.
         points, cells = self.raw(self.walk[first : until + 1])
         line = Line.raw(points, cells + first)
         line = line.part(0, line.before(until))
@@ -220,7 +221,7 @@ class Joiner:
         return len(self._done) == 1 and self._done[0].line is self.here
 
     def _drop_last(self) -> None:
-        """Drop the last point; of the edge that the robot is on both stay, or none."""
+        """Drop the last point; of the robot's edge both points, or none."""
         if self._is_here():
             self._done = []
             return

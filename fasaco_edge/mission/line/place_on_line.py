@@ -1,6 +1,6 @@
-"""The robot's place on its line: how far it is between two points of it, and whether it arrived.
+"""Place on line: the robot's place on its line, between two points, and its arrival.
 
-Lengths are in pixels of the fine raster that the line's points, float64 (n, 2), are on.
+Lengths are in pixels of the fine raster, as the line's points, float64 (n, 2).
 """
 
 from __future__ import annotations
@@ -11,29 +11,30 @@ import numpy as np
 
 from fasaco_edge.mission.line.pieces import Points
 
-# The robot is looked for so far ahead on its line [m]: further on, the next lane may lie as near.
+# The robot is searched for this far ahead on its line [m]: farther on, the next lane may be as
+# near.
 LOOK_AHEAD_M = 0.8
-# So near to the end of its line a robot has arrived [m]; or where it comes no nearer for so many
-# poses, and the tool is over the end: it drives beside its line, maybe.
+# Distance to the end of its line at which a robot has arrived [m]; it has also arrived if the tool
+# covers the end, and so many poses come no nearer: it may drive beside its line.
 ARRIVED_M, STANDING_POSES = 0.05, 10
 
 
 class PlaceOnLine:
-    """Where the robot is, and where on the line that begins with the last point behind it.
+    """The robot's position, and its place on a line that begins at the last point behind it.
 
     Attributes:
-        here: where it is, (2,).
-        along: how far it is on the way from the first point to the next, a share.
+        here: the position, (2,).
+        along: fraction of the first edge that is driven.
     """
 
     def __init__(self) -> None:
         self.here = np.zeros(2)
         self.along = 0.0
-        # How near the robot came to the end of its line, and for how many poses no nearer.
+        # Least distance to the end of the line so far, and number of poses that came no nearer.
         self._nearest, self._poses_there = math.inf, 0
 
     def on(self, points: Points) -> Points:
-        """Return the place on a line of two points or more where the robot should be, (2,)."""
+        """Return the robot's place on a line of two points or more, (2,)."""
         a, b = points[:2]
         place: Points = a + self.along * (b - a)
         return place
@@ -43,15 +44,15 @@ class PlaceOnLine:
         return len(points) > 1 and math.hypot(*(self.on(points) - self.here)) <= tool
 
     def find(self, points: Points, tool: float, unit_m: float) -> int | None:
-        """Look for the robot along the line, and note how far along an edge it is.
+        """Search for the robot along the line, and update ``along``.
 
         Args:
-            points: of the line.
-            tool: half of the tool's width: further off it is not on the line.
-            unit_m: a pixel [m].
+            points: points of the line.
+            tool: half of the tool's width, the greatest distance from the line.
+            unit_m: edge of a pixel [m].
 
         Returns:
-            The number of the edge that it is nearest to; None where it is on none.
+            The index of the nearest edge; None if none is within that distance.
         """
         nearest, at = tool, None
         look = LOOK_AHEAD_M / unit_m
@@ -74,11 +75,11 @@ class PlaceOnLine:
         return at[0]
 
     def has_arrived(self, points: Points, left_m: float, tool: float, unit_m: float) -> bool:
-        """Tell whether the robot is at the end of its line; to be asked once for each pose.
+        """Tell whether the robot is at the end of its line; to be called once for each pose.
 
         Args:
             points, tool, unit_m: as for ``find``.
-            left_m: what is left of the line [m].
+            left_m: length of the rest of the line [m].
         """
         apart = math.hypot(*(points[-1] - self.here))
         if len(points) == 2 and apart * unit_m <= ARRIVED_M:

@@ -1,6 +1,6 @@
 """Polisher: polishes the line ahead of the robot, a piece at a time.
 
-What lies just ahead of the robot holds still, and what lies far ahead may still change.
+The line just ahead of the robot stays fixed; farther ahead it may still change.
 """
 
 from __future__ import annotations
@@ -24,43 +24,44 @@ from fasaco_edge.planners.line import (
 )
 from fasaco_edge.planners.path import common_beginning
 
-# So much of the line ahead of the robot stays as it is [m].
+# Length of the fixed line ahead of the robot [m].
 HELD_M = 1.0
-# Points are moved along all of the line, so much of it at a time [m].
+# First pass: points are moved along the whole line, in pieces of this length [m].
 MOVED_M = 6.0
-# Detours over what is left come once all points have found their place, or the robot is so near;
-# they are looked for so far ahead, and along so much of the line at a time [m]. Further ahead the
-# map of a robot that explores may still grow.
+# Second pass: detours to unswept floor, once all points are moved, or within NEAR_M of the robot;
+# at most AHEAD_M ahead, in pieces of PIECE_M [m]. Farther ahead the map of an exploring robot may
+# still grow.
 NEAR_M, AHEAD_M, PIECE_M = 5.0, 8.0, 4.0
-# Pieces are annealed from here on ahead of the robot, so long and so many, in turn [m].
+# Third pass: annealing, from this distance ahead, in so many pieces of this length, in turn [m].
 ANNEALED_M, ANNEALED_PIECE_M, ANNEALED_PIECES = 2.0, 4.0, 2
-# Moves for each of them, and the share of the temperature that the farthest is annealed at, where
-# the map is known.
+# Moves for each of them; and, on a complete map, the temperature of the farthest piece, as a share
+# of the full one.
 ANNEAL_MOVES, HOTTEST = 300, 0.3
-# What is polished further on is published once the robot is so near to it [m].
+# Changes farther ahead are published once the robot is this close to them [m].
 PUBLISHED_M = 1.5
-# Most moves before the loop continues.
+# Limit on the moves per call, which bounds a cycle of the loop.
 MOST_MOVES = 3000
-# Moves of points alone: no detour leads so far.
+# As the greatest detour: excludes detours.
 NO_DETOURS = -1e6
 
 
 class Polisher:
-    """Polishes at prices; counts its work in moves, not in seconds."""
+    """Polishes at given prices; effort is counted in moves, not in seconds."""
 
     def __init__(self, config: LineConfig) -> None:
         self._config = config
         self._memory = memory_for_moves()
         self._random = np.array([SEED], np.uint64)
-        # Which piece is annealed next.
+        # Index of the piece to be annealed next.
         self._at = 0
 
     def polish(self, ahead: LineAhead, floor: FloorMap, *, is_settled: bool) -> bool:
-        """Polish what is due of the line; return whether it is to be published.
+        """Polish the next piece of the line; return whether to publish the line.
 
-        That is once all points are moved; what changed later, when the robot comes near. On a map
-        that still grows (``is_settled`` is False) random moves are taken as well, but only those
-        that lose nothing: what a detour or a lane was there for may be swept by another lane since.
+        It is published once all points are moved; later changes are published when the robot comes
+        near. On a map that still grows (``is_settled`` is False) random moves are included, but
+        only those at no loss: the floor that a detour or a lane was for may be swept by another
+        lane meanwhile.
         """
         if self._config.price_s_m2 == 0.0 or len(ahead.line) < 3 or ahead.is_cut:
             return False
@@ -71,7 +72,7 @@ class Polisher:
             first, last = _piece(lengths, begin, MOVED_M)
             last = max(min(last, ahead.raw_until(begin) + 1, len(lengths) - 1), first)
             end = self._polish(ahead, floor, first, last, lengths, NO_DETOURS)
-            # The last point of the line stays where it is.
+            # The last point of the line is fixed.
             end += end >= len(ahead.line) - 1
             ahead.note(min(begin, first), max(end, begin + 1), MOVED)
             is_all = ahead.first_below(MOVED) == len(ahead.line)
@@ -89,15 +90,15 @@ class Polisher:
         return self._is_due(ahead)
 
     def _is_due(self, ahead: LineAhead) -> bool:
-        """Tell whether the robot is near what is not published yet."""
+        """Tell whether the robot is near an unpublished change."""
         lengths, unpublished = ahead.lengths(), ahead.unpublished_from
         return unpublished < len(lengths) and bool(lengths[unpublished] < PUBLISHED_M)
 
     def _anneal(
         self, ahead: LineAhead, floor: FloorMap, lengths: NDArray[np.float64], hottest: float
     ) -> None:
-        """Anneal the next piece; the farther from the robot, the hotter."""
-        # Where pieces begin is drawn, too: no joint stays.
+        """Anneal the next piece; the temperature rises with its distance from the robot."""
+        # The beginning is random, too, so that joints do not stay in place.
         drawn = int(self._random[0] >> np.uint64(40)) / (1 << 24)
         begins_m = ANNEALED_M + (self._at + drawn) * ANNEALED_PIECE_M
         self._at = (self._at + 1) % ANNEALED_PIECES
@@ -107,7 +108,7 @@ class Polisher:
         if last - first < 4:
             return
         heat = hottest * begins_m / (ANNEALED_M + (ANNEALED_PIECES + 1) * ANNEALED_PIECE_M)
-        first -= 1  # turns at the first point count
+        first -= 1  # the turn at the first point counts
         piece = ahead.line.part(first, last + 1)
         line = linked(piece.points, ahead.tally.sweeps.left.shape, is_end_fixed=True)
         on, prices = self._on(ahead, floor)
@@ -123,9 +124,9 @@ class Polisher:
         return on, self._config.prices(unit)
 
     def _put(self, ahead: LineAhead, first: int, last: int, piece: Line, line: kernel.Line) -> int:
-        """Put a polished piece in the place of what it was; return where its last point is then."""
+        """Replace a piece by its polished version; return the new index of its last point."""
         numbers = np.array(numbers_along(line))
-        # Points that were put in are of the cell of the one before.
+        # Inserted points belong to the cell of the previous point.
         cells = np.where(numbers < len(piece), piece.cells[np.minimum(numbers, len(piece) - 1)], -1)
         points, cells = line.points[numbers], np.maximum.accumulate(cells)
         if np.array_equal(points, piece.points):
@@ -143,7 +144,7 @@ class Polisher:
         lengths: NDArray[np.float64],
         farthest: float,
     ) -> int:
-        """Polish from one point to another; return where the last one is then."""
+        """Polish from one point to another; return the new index of the last one."""
         if last - first < 2:
             return last
         piece = ahead.line.part(first, last + 1)
@@ -157,7 +158,7 @@ class Polisher:
 
 
 def _piece(lengths: NDArray[np.float64], begin: int, piece_m: float) -> tuple[int, int]:
-    """Return the points from which and to which a piece of a line is polished."""
+    """Return the range of points of the piece that begins at ``begin``."""
     begin = min(begin, len(lengths) - 1)
     first = max(int(np.searchsorted(lengths, HELD_M)), begin - 2)
     last = int(np.searchsorted(lengths, lengths[begin] + piece_m))

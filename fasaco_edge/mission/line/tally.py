@@ -1,7 +1,7 @@
-"""Sweep tally: how often the line ahead sweeps each pixel of the floor that is still to be swept.
+"""Sweep tally: how often the line ahead sweeps each pixel of the floor to be swept.
 
-What the robot has swept, what it is not asked to sweep, and what its tool cannot come to count as
-swept ``NEVER`` times more: no line gains anything there.
+Floor that is swept already, not asked for, or out of the tool's reach gets the offset ``NEVER`` in
+the count, so sweeping it never improves a line.
 """
 
 from __future__ import annotations
@@ -30,22 +30,22 @@ NO_MASK = np.zeros((0, 0), np.bool_)
 
 
 class SweepTally:
-    """Counts over the fine raster of a floor.
+    """Sweep counts on the fine raster of a floor.
 
     Attributes:
-        sweeps: the counts, for the kernels.
+        sweeps: the counts, as the kernels use them.
         unit_m: edge of a pixel [m].
     """
 
     def __init__(self, floor: FloorMap) -> None:
         shape = floor.geometry.rows, floor.geometry.cols
         self.unit_m = floor.geometry.resolution
-        # Of each pixel whether it is WANTED, OPEN and DRIVEN, and why it is out of reach.
+        # Flags of each pixel, WANTED, OPEN and DRIVEN, and its cause of being out of reach.
         self._state = np.zeros(shape, np.uint8)
         self.sweeps = Sweeps(np.full(shape, NEVER, np.int16), np.zeros(blocks_of(shape), np.int32))
-        # How many pixels are wanted, and open.
+        # Number of wanted pixels, and of open ones.
         self._wanted_pixels = self._open_pixels = 0
-        # How many are out of reach for each cause; the first number is of no use.
+        # Number of pixels out of reach by cause; the first element is unused.
         self._beyond_pixels = np.zeros(len(Cause) + 1, np.int64)
         self._tool = floor.discs.tool_m / 2 / self.unit_m
         self._scratch: Scratch = memory_for_moves().capsules
@@ -57,7 +57,7 @@ class SweepTally:
         return rows, cols
 
     def move(self, shape: tuple[int, int], by: tuple[int, int]) -> None:
-        """Lie on a raster of another shape, (rows, cols), on which pixels have moved."""
+        """Move to a raster of another shape, (rows, cols), and shift."""
         rows, cols = self.shape
         old, new = Window(*by, by[0] + rows, by[1] + cols), Window(0, 0, *shape)
         for part in old.without(new):
@@ -71,19 +71,19 @@ class SweepTally:
         count_blocks(self.sweeps, new)
 
     def exchange(self, goes: NDArray[np.float64], comes: NDArray[np.float64]) -> None:
-        """Count edges out and others in, float64 (n, 4): y, x and y, x of their ends [pixels]."""
+        """Subtract edges and add others, float64 (n, 4): y, x and y, x of their ends [pixels]."""
         for edges, times in ((goes, -1), (comes, 1)):
             sweep_edges(self.sweeps, edges, self._tool, times, self._scratch)
 
     def set_open(
         self, part: Window, wanted: NDArray[np.bool_] | None, swept: NDArray[np.bool_]
     ) -> None:
-        """Set what of a part of the raster is still to be swept.
+        """Set the floor to sweep in a window of the raster.
 
         Args:
-            part: of the raster.
-            wanted: bool (rows, cols) of it, what is asked for; None for what was.
-            swept: bool (rows, cols) of it, what the robot has swept.
+            part: window of the raster.
+            wanted: bool (rows, cols) of it, the floor asked for; None for no change.
+            swept: bool (rows, cols) of it, the floor that the robot has swept.
         """
         more_wanted, more_open = set_open(
             self.sweeps,
@@ -96,46 +96,47 @@ class SweepTally:
         self._open_pixels += more_open
 
     def set_causes(self, part: Window, causes: NDArray[np.uint8]) -> None:
-        """Set why the tool cannot come to pixels of a part, uint8 (rows, cols), see ``Cause``."""
+        """Set the causes of being out of reach in a window, uint8 (rows, cols), see ``Cause``."""
         set_causes(self._state, (part.row0, part.col0), causes, self._beyond_pixels)
 
     def drive(self, points: NDArray[np.float64]) -> None:
-        """Note that the robot has driven a line, float64 (n, 2), y, x [pixels].
+        """Mark a driven line, float64 (n, 2), y, x [pixels], as swept.
 
-        The ledger learns that from poses, a little later, on pixels of its own, and more strictly:
-        ribbons that only the two rasters differ in, or that are still to come, would seem left.
+        The ledger records the same from poses: later, on other pixels, and more strictly. Without
+        the mark, strips that only the two rasters differ in, or that are not recorded yet, would
+        seem unswept.
         """
         self._open_pixels -= note_driven(
             self.sweeps, self._state, points, self._tool, self._scratch
         )
 
     def forget_driven(self) -> None:
-        """Take what the ledger holds for all that was swept, from the next ``set_open`` on."""
+        """Remove these marks at the next ``set_open``: the ledger alone counts."""
         self._state &= ~np.uint8(DRIVEN)
 
     def missed_m2(self, part: Window) -> float:
-        """Return how much of a part of the raster nothing sweeps that should be swept [m2]."""
+        """Return the area in a window that should be swept and is not on the line [m2]."""
         counts = self.sweeps.counts[part.row0 : part.row1, part.col0 : part.col1]
         return int(np.count_nonzero(counts == 0)) * self.unit_m**2
 
     @property
     def wanted_m2(self) -> float:
-        """How much floor is asked for [m2]."""
+        """Area asked for [m2]."""
         return self._wanted_pixels * self.unit_m**2
 
     @property
     def open_m2(self) -> float:
-        """How much of that is still to be swept [m2]."""
+        """Area asked for and not swept yet [m2]."""
         return self._open_pixels * self.unit_m**2
 
     @property
     def left_m2(self) -> float:
-        """How much of that the line ahead does not sweep [m2]."""
+        """The part of that which the line ahead does not sweep [m2]."""
         return int(self.sweeps.left.sum()) * self.unit_m**2
 
     @property
     def beyond_m2(self) -> dict[Cause, float]:
-        """How much free floor the tool cannot come to, for each cause [m2]."""
+        """Free area out of the tool's reach, by cause [m2]."""
         return {cause: int(self._beyond_pixels[cause]) * self.unit_m**2 for cause in Cause}
 
     def is_open(self, point: NDArray[np.float64]) -> bool:
@@ -145,6 +146,6 @@ class SweepTally:
 
 
 def _count_causes(state: NDArray[np.uint8]) -> NDArray[np.int64]:
-    """Return how many pixels have each cause, int64 (4,)."""
+    """Return the number of pixels with each cause, int64 (4,)."""
     causes = state & np.uint8(CAUSE)
     return np.array([np.count_nonzero(causes == cause << CAUSE_SHIFT) for cause in (0, *Cause)])
