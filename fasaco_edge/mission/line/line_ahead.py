@@ -79,7 +79,7 @@ class LineAhead:
         edges, before = _edges(self.line.points), self.tally.shape
         self.line = self.line.moved(by)
         moved = _edges(self.line.points)
-        # Edges that extend beyond either raster are dropped: they were not, or are not, counted.
+        # Sweeps beyond a raster are not counted: such edges are subtracted before and added after.
         beyond = self._is_beyond(edges, before) | self._is_beyond(moved, shape)
         self.tally.exchange(edges[beyond], edges[:0])
         self.tally.move(shape, by)
