@@ -175,7 +175,7 @@ class GridGeometry:
     def of_cells(cls, window: Window, cell_m: float) -> GridGeometry:
         """Return the placement of a window of the coverage lattice, cells ``cell_m`` [m] wide.
 
-        In the lattice's own frame, which may be rotated, see ``grid.turning``.
+        In the lattice's own frame, which may be rotated, see ``grid.rotation``.
         """
         corner = Pose2D(window.col0 * cell_m, window.row0 * cell_m)
         return cls(window.rows, window.cols, cell_m, corner)

@@ -59,7 +59,7 @@ BETTER = 1.25
 NEAR_DEG = 0.3
 # A smaller rotation gains nothing [deg]. One of 1 degree leaves a seventh of the patches, in the
 # same time; from 2 degrees on it also saves time.
-LEAST_TURN_DEG = 0.5
+LEAST_ROTATION_DEG = 0.5
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,9 +80,9 @@ class WallDirection:
     is_of_rim: bool = False
 
     @property
-    def turn_deg(self) -> float:
+    def rotation_deg(self) -> float:
         """The lattice rotation for these walls: 0 if it would gain nothing [deg]."""
-        return self.angle_deg if abs(self.angle_deg) >= LEAST_TURN_DEG else 0.0
+        return self.angle_deg if abs(self.angle_deg) >= LEAST_ROTATION_DEG else 0.0
 
 
 def wall_direction(grid: OccupancyGrid) -> WallDirection | None:

@@ -17,7 +17,7 @@ from fasaco_edge.grid.fine_raster import RobotDiscs, map_to_raster
 from fasaco_edge.grid.floor import Floor, StandLattice
 from fasaco_edge.grid.lattice import Cell, CoverageLattice
 from fasaco_edge.grid.occupancy import OccupancyGrid
-from fasaco_edge.grid.turning import turned_geometry
+from fasaco_edge.grid.rotation import rotated_geometry
 from fasaco_edge.grid.walls import wall_direction
 from fasaco_edge.offline.settings import AXES, HOME, WALLS
 from fasaco_edge.planners.line import LINES, line_over
@@ -124,14 +124,14 @@ def _lattice_deg(align: str | float, grid: OccupancyGrid) -> float:
 
     if align == WALLS:
         walls = wall_direction(grid)
-        return walls.turn_deg if walls else 0.0
+        return walls.rotation_deg if walls else 0.0
     return 0.0 if align == AXES else float(align)
 
 
 def _stands(floor: Floor, cell_m: float, lattice_deg: float) -> StandLattice:
     """Return the stands in cells whose rows are at an angle to the map frame's x axis."""
     # To rotate the lattice over a map is to rotate the map below it. Stands are pixels of it.
-    below = replace(floor, geometry=turned_geometry(floor.geometry, -lattice_deg))
+    below = replace(floor, geometry=rotated_geometry(floor.geometry, -lattice_deg))
     return StandLattice.over(below, cell_m)
 
 

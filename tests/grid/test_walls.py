@@ -12,7 +12,7 @@ from fasaco_edge.grid import walls
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D
 from fasaco_edge.grid.map_files import find_map, read_map
 from fasaco_edge.grid.occupancy import OccupancyGrid
-from fasaco_edge.grid.turning import turned_geometry, turned_points
+from fasaco_edge.grid.rotation import rotated_geometry, rotated_points
 from fasaco_edge.grid.walls import wall_direction
 
 UNKNOWN, FREE, WALL = -1, 0, 100
@@ -47,7 +47,7 @@ def room(angle_deg: float, **options):
 def test_the_angle_of_a_room(angle_deg, thick_m):
     found = wall_direction(grid_of(room(angle_deg, thick_m=thick_m)))
     assert found.angle_deg == pytest.approx(angle_deg, abs=0.4)
-    assert found.turn_deg == found.angle_deg
+    assert found.rotation_deg == found.angle_deg
     # But for its corners all of its 30 m point there.
     assert found.share > 0.85
     assert 20.0 < found.wall_m < 30.0
@@ -76,14 +76,14 @@ def test_the_yaw_of_a_map_counts_in_full():
         assert found.angle_deg == pytest.approx(math.degrees(expected), abs=1e-9)
     found = wall_direction(grid_of(room(20.0), yaw=0.3))
     assert found.angle_deg == pytest.approx(20.0 + math.degrees(0.3), abs=0.4)
-    assert wall_direction(grid_of(room(-17.0), yaw=0.3)).turn_deg == 0.0
+    assert wall_direction(grid_of(room(-17.0), yaw=0.3)).rotation_deg == 0.0
 
 
 @pytest.mark.parametrize("angle_deg", [0.0, 0.25, -0.25, 90.25])
 def test_a_small_turn_is_none(angle_deg):
     found = wall_direction(grid_of(room(angle_deg)))
     assert abs(found.angle_deg) < 0.5
-    assert found.turn_deg == 0.0
+    assert found.rotation_deg == 0.0
 
 
 def test_maps_nearly_alike_do_not_turn_by_45_and_by_minus_45():
@@ -273,17 +273,17 @@ def test_a_large_map_takes_little_memory():
 
 def test_points_stay_where_they_are_on_a_turned_grid():
     geometry = GridGeometry(30, 40, 0.05, Pose2D(3.0, -2.0, 0.2))
-    turned = turned_geometry(geometry, 25.0)
+    turned = rotated_geometry(geometry, 25.0)
     assert turned.origin.yaw == pytest.approx(0.2 + math.radians(25.0))
     pixels = [(0.0, 0.0), (40.0, 0.0), (7.5, 21.0)]
     points, there = (np.array([one.to_map(*at) for at in pixels]) for one in (geometry, turned))
-    assert turned_points(points, 25.0) == pytest.approx(there)
-    assert turned_points(there, -25.0) == pytest.approx(points)
-    assert turned_geometry(geometry, 0.0) == geometry
+    assert rotated_points(points, 25.0) == pytest.approx(there)
+    assert rotated_points(there, -25.0) == pytest.approx(points)
+    assert rotated_geometry(geometry, 0.0) == geometry
 
 
 def test_turned_back_the_walls_lie_along_the_axes():
     grid = grid_of(room(31.0), yaw=-0.4)
     angle_deg = wall_direction(grid).angle_deg
-    level = OccupancyGrid(turned_geometry(grid.geometry, -angle_deg), grid.cells)
+    level = OccupancyGrid(rotated_geometry(grid.geometry, -angle_deg), grid.cells)
     assert wall_direction(level).angle_deg == pytest.approx(0.0, abs=1e-9)

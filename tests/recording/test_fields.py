@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from fasaco_edge.grid.geometry import Window
-from fasaco_edge.grid.turning import turned_point
+from fasaco_edge.grid.rotation import rotated_point
 from fasaco_edge.recording.arrow import pa
 from fasaco_edge.recording.read.drawn import MOST_FIELDS, FieldSampler
 
@@ -42,7 +42,7 @@ def rows_of(*images, x=0.6, y=-0.3, cell_m=0.3, yaw=None):
 
 def test_a_field_at_an_angle_has_the_cells_that_it_is_of():
     sampler = FieldSampler()
-    x, y = turned_point(0.6, -0.3, -25.0)
+    x, y = rotated_point(0.6, -0.3, -25.0)
     sampler.take(rows_of(np.ones((2, 3), np.uint8), x=x, y=y, yaw=math.radians(-25.0)), [5])
     sampler.take(rows_of(np.ones((2, 3), np.uint8), yaw=0.0), [6])
     askew, straight = sampler.spread()

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D
-from fasaco_edge.grid.turning import turned_points
+from fasaco_edge.grid.rotation import rotated_points
 from fasaco_edge.recording.scene.flows import flows_of, fork_at
 
 EDGE = 0.5
@@ -43,8 +43,8 @@ def test_of_cells_at_an_angle_the_arrows_are_so_too():
         flows_of(replace(geometry, origin=Pose2D(1.0, 2.0, yaw)), pointed, share)
         for yaw in (0.0, math.radians(25.0))
     )
-    assert askew.vectors == pytest.approx(turned_points(straight.vectors, 25.0))
-    there = turned_points(straight.origins - (1.0, 2.0), 25.0)
+    assert askew.vectors == pytest.approx(rotated_points(straight.vectors, 25.0))
+    there = rotated_points(straight.origins - (1.0, 2.0), 25.0)
     assert askew.origins - (1.0, 2.0) == pytest.approx(there)
 
 

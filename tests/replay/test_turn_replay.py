@@ -90,7 +90,7 @@ def test_cells_along_askew_walls_are_found_once_more(tmp_path):
     samples = list(RecordedSamples(recording.paths))
     replay, record, steps = played(samples)
     assert (record.gap, replay.difference, replay.lacking) == ("", None, [])
-    assert replay.mission.turn.deg == pytest.approx(
+    assert replay.mission.rotation.deg == pytest.approx(
         recording.status["map"]["lattice_deg"], abs=1e-3
     )
     assert all(step.as_recorded for step in steps if step.decision.path is not None)

@@ -19,7 +19,7 @@ from fasaco_edge.bus.settings import BusSettings
 from fasaco_edge.errors import BusUnavailable
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D, Window
 from fasaco_edge.grid.occupancy import MapPatch, OccupancyGrid
-from fasaco_edge.grid.turning import turned_geometry, turned_pose
+from fasaco_edge.grid.rotation import rotated_geometry, rotated_pose
 from fasaco_edge.planners.warmup import warm_up
 from fasaco_edge.simulation.robot import SimulationConfig
 from fasaco_edge.simulation.world import World
@@ -120,7 +120,7 @@ class MappingRobot:
         self._commands = list(COMMANDS)
         pixels = fill(room(*SIZE_M), 1.5, 0.0, 1.6, 1.2, WALL)
         geometry = GridGeometry(*pixels.shape, RESOLUTION_M, Pose2D(0.0, 0.0))
-        geometry, start = turned_geometry(geometry, yaw_deg), turned_pose(START, yaw_deg)
+        geometry, start = rotated_geometry(geometry, yaw_deg), rotated_pose(START, yaw_deg)
         self._world = World(OccupancyGrid(geometry, pixels), start, SIMULATION)
         self._maps = Sender(bus, topics.MAP)
         self._updates = Sender(bus, topics.MAP_UPDATE)

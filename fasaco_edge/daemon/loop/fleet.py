@@ -145,7 +145,7 @@ class FleetVoice:
             version=FLEET_VERSION,
             fleet=self._fleet,
             cell_m=self._cell_m,
-            lattice_deg=mission.turn.deg,
+            lattice_deg=mission.rotation.deg,
             frame=mission.ledger.frame,
             state=str(mission.state),
             x=round(stamped.pose.x, 3),

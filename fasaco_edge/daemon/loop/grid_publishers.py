@@ -48,7 +48,7 @@ class CoveragePublisher:
         if lattice is None or grid is None:
             return
         self._published_at, self._key = now, key
-        geometry = mission.turn.cells(lattice.window, lattice.cell_m)
+        geometry = mission.rotation.cells(lattice.window, lattice.cell_m)
         values = coverage_values(lattice.states, mission.covered.visits(lattice.window))
         self._outbox.coverage(OccupancyGrid(geometry, values, grid.frame, grid.stamp_ns))
 
@@ -74,7 +74,7 @@ class FloorPublisher:
         self._published_at, self._key = now, key
         shown = floor.snapshot().shown(MOST_SQUARES, grid.frame, grid.stamp_ns)
         if shown is not None:
-            self._outbox.floor(replace(shown, geometry=mission.turn.geometry(shown.geometry)))
+            self._outbox.floor(replace(shown, geometry=mission.rotation.geometry(shown.geometry)))
 
 
 class TrailPublisher:
@@ -108,7 +108,7 @@ class TrailPublisher:
         steps = max(len(mission.route.path.ahead) - 1, 0)
         of_path = mission.route.revision, steps
         shown = ShownTrail(
-            held, lattice.cell_m, grid.frame, *of_path, time.time_ns(), mission.turn.deg
+            held, lattice.cell_m, grid.frame, *of_path, time.time_ns(), mission.rotation.deg
         )
         self._kept = key
         self._outbox.keep_trail(shown)

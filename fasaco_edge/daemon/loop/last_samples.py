@@ -15,7 +15,7 @@ from fasaco_edge.daemon.loop.answers import Said, answering, check
 from fasaco_edge.errors import BadQuery, NotYet
 from fasaco_edge.grid.geometry import GridGeometry
 from fasaco_edge.grid.occupancy import OccupancyGrid
-from fasaco_edge.grid.turning import turned_geometry
+from fasaco_edge.grid.rotation import rotated_geometry
 from fasaco_edge.planners.living_trail import (
     TrailSnapshot,
     branching,
@@ -147,6 +147,6 @@ class ShownTrail:
     def directions(self) -> bytes:
         """Return its directions as a payload."""
         plain = GridGeometry.of_cells(self.held.window, self.cell_m)
-        geometry = turned_geometry(plain, self.lattice_deg)
+        geometry = rotated_geometry(plain, self.lattice_deg)
         values = direction_values(*directions(self.held.tau))
         return encode_occupancy_grid(OccupancyGrid(geometry, values, self.frame, self.stamp_ns))

@@ -221,7 +221,7 @@ class Loop:
         mission = self._runner.mission
         frame = mission.grid.frame if mission and mission.grid else "map"
         for seen in batch.snapshots:
-            self._bus.outbox.pheromone(seen, frame, mission.turn.deg if mission else 0.0)
+            self._bus.outbox.pheromone(seen, frame, mission.rotation.deg if mission else 0.0)
         for plan in batch.plans:
             if isinstance(plan, PlanReady) and not (mission and mission.route.is_improving):
                 self._status.plan_s = plan.seconds

@@ -38,7 +38,7 @@ def map_report(mission: Mission | None) -> MapReport | None:
         revision=mission.map_revision,
         stamp_ns=mission.grid.stamp_ns,
         frame=mission.grid.frame,
-        lattice_deg=round(mission.turn.deg, 3),
+        lattice_deg=round(mission.rotation.deg, 3),
     )
 
 
@@ -177,5 +177,5 @@ def _place(mission: Mission, cell: tuple[int, int]) -> Point | None:
 
 
 def _centre(mission: Mission, cell: tuple[int, int], cell_m: float) -> tuple[float, float]:
-    x, y = mission.turn.centre(cell, cell_m)
+    x, y = mission.rotation.centre(cell, cell_m)
     return round(x, 3), round(y, 3)

@@ -199,7 +199,7 @@ def rectangle(window: Window | None, mission: Mission) -> Rectangle | None:
     """Return the rectangle around a window of the lattice, in the map frame [m]; None if none."""
     if window is None or mission.lattice is None:
         return None
-    bounds = mission.turn.cells(window, mission.lattice.cell_m).bounds()
+    bounds = mission.rotation.cells(window, mission.lattice.cell_m).bounds()
     return Rectangle(*(round(edge, 3) for edge in bounds))
 
 

@@ -34,7 +34,7 @@ from fasaco_edge.mission.line.layer import LineLayer
 from fasaco_edge.mission.map.inputs import InputMonitor
 from fasaco_edge.mission.map.map_state import MapState
 from fasaco_edge.mission.orders.mask import mask_polygons
-from fasaco_edge.mission.orders.order import located, turned_order
+from fasaco_edge.mission.orders.order import located, rotated_order
 from fasaco_edge.mission.orders.order_state import OrderState, Stage
 from fasaco_edge.mission.orders.sequencer import Sequencer
 
@@ -234,7 +234,7 @@ class EventHandler:
         """Carry out a command; an error becomes its answer."""
         before = self.orders.order_state
         try:
-            order = turned_order(located(event.order, self.policy.zones), -self.lattice_deg)
+            order = rotated_order(located(event.order, self.policy.zones), -self.lattice_deg)
             if event.command == "start":
                 self.map.check_zones(order)
             has_home = self.policy.place("home") is not None

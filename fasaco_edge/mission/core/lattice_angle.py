@@ -12,7 +12,7 @@ from fasaco_edge.errors import FasacoError, LedgerMismatchError, MapTooFar, MapT
 from fasaco_edge.grid.geometry import StampedPose
 from fasaco_edge.grid.lattice import lattice_window
 from fasaco_edge.grid.occupancy import OccupancyGrid
-from fasaco_edge.grid.turning import turned_geometry
+from fasaco_edge.grid.rotation import rotated_geometry
 from fasaco_edge.mission.config import MissionConfig
 from fasaco_edge.mission.map.wall_watch import WallWatch
 
@@ -51,7 +51,7 @@ class LatticeAngle:
         """Whether no later map will rotate the lattice to its walls."""
         return self._walls.is_over
 
-    def turns_along_walls(self, grid: OccupancyGrid, pose: StampedPose) -> bool:
+    def rotates_to_walls(self, grid: OccupancyGrid, pose: StampedPose) -> bool:
         """Evaluate the walls of the newest map; return whether the angle has changed."""
         deg = self._walls.look(grid, pose.pose)
         # A rotated lattice spans up to twice the cells; and the map may grow.
@@ -60,7 +60,7 @@ class LatticeAngle:
         self.deg = deg
         return True
 
-    def turns_back_for(self, maps: Iterable[OccupancyGrid]) -> bool:
+    def rotates_back_for(self, maps: Iterable[OccupancyGrid]) -> bool:
         """Return whether the angle changes to 0, because one of the maps fits in no other way."""
         if self._is_given or not self.deg:
             return False
@@ -71,7 +71,7 @@ class LatticeAngle:
 
     def _fits(self, grid: OccupancyGrid, deg: float, share: float = 1.0) -> bool:
         """Tell whether a lattice at an angle [deg] takes no more than a share of the cell limit."""
-        geometry = turned_geometry(grid.geometry, -deg)
+        geometry = rotated_geometry(grid.geometry, -deg)
         try:
             lattice_window(geometry, self._cell_m, int(share * self._most_cells))
         except (MapTooLarge, MapTooFar):

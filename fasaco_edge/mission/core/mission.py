@@ -18,15 +18,15 @@ from fasaco_edge.mission.core.event_handler import EventHandler
 from fasaco_edge.mission.core.events import Decision, Event, MapReceived, PathUpdate, PoseReceived
 from fasaco_edge.mission.core.executive import Executive
 from fasaco_edge.mission.core.lattice_angle import LatticeAngle
-from fasaco_edge.mission.core.lattice_turn import LatticeTurn
+from fasaco_edge.mission.core.lattice_rotation import LatticeRotation
 from fasaco_edge.mission.core.route import Route
 from fasaco_edge.mission.core.trail_layer import TrailLayer
 from fasaco_edge.mission.coverage.drive_meter import DriveMeter, DriveTimes
 from fasaco_edge.mission.coverage.ledger import CoverageLedger, LedgerSnapshot
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
 from fasaco_edge.mission.coverage.progress import Coverage, ZoneProgress, zone_progress
+from fasaco_edge.mission.coverage.rotated_ledger import rotated_ledger
 from fasaco_edge.mission.coverage.swept_floor import SweptFloor
-from fasaco_edge.mission.coverage.turned_ledger import turned_ledger
 from fasaco_edge.mission.coverage.unreached import Unreached
 from fasaco_edge.mission.fleet.layer import FleetLayer
 from fasaco_edge.mission.fleet.shared import SharedProgress
@@ -60,13 +60,13 @@ class Mission:
 
     def _lay_cells(self) -> None:
         """Start a mission on a lattice at the decided angle."""
-        self._turn = LatticeTurn(self._angle.deg)
+        self._rotation = LatticeRotation(self._angle.deg)
         # Rotation of the lattice against that of the restored ledger [deg].
-        self._turned_by_deg = 0.0
+        self._rotated_by_deg = 0.0
         # The newest map in the lattice's frame, and the same in the map frame.
         self._laid_grid: OccupancyGrid | None = None
         self._given_grid: OccupancyGrid | None = None
-        config = self._turn.config(self._config)
+        config = self._rotation.config(self._config)
         self._map = MapState(config)
         cell_m, sweeping = config.footprint.cell_m, config.sweeping
         self._ledger = MissionLedger(cell_m, sweeping.tool_m if sweeping else cell_m)
@@ -80,7 +80,7 @@ class Mission:
         self.charging = Charging(config, self._map, self._orders, self.route, self._gauge)
         measured = self._drive, self.fleet, self._gauge
         self._handler = EventHandler(
-            *owners, self._line, self._trail, *measured, config.policy, self._turn.deg
+            *owners, self._line, self._trail, *measured, config.policy, self._rotation.deg
         )
         decided_by = self._trail, self.fleet, self.charging
         self._executive = Executive(*owners, *decided_by, config.policy)
@@ -97,15 +97,15 @@ class Mission:
         self._resume(before)
 
     def _resume(self, before: LedgerSnapshot, *, is_confirmed: bool = False) -> None:
-        self._turned_by_deg = self._turn.deg - before.lattice_deg
-        before = turned_ledger(before, self._turn.deg)
+        self._rotated_by_deg = self._rotation.deg - before.lattice_deg
+        before = rotated_ledger(before, self._rotation.deg)
         self._ledger.resume(before, is_confirmed=is_confirmed)
         self._trail.resume(before.trail)
         self._map.frames.activate(before.frame)
 
     def restore_order(self, order: OrderState) -> None:
         """Continue an order from before a restart; to be called before the first step."""
-        self._handler.begin_order(self._turn.order(order, self._turned_by_deg))
+        self._handler.begin_order(self._rotation.order(order, self._rotated_by_deg))
         self.state, self.reason = self._executive.status()
 
     def step(self, events: Iterable[Event], now: float) -> Decision:
@@ -125,11 +125,11 @@ class Mission:
         self._trail.finish(path)
         path = self._line.finish(path, now)
         if path is not None:
-            path = self._turn.path(path, self.lattice)
+            path = self._rotation.path(path, self.lattice)
         return replace(happened, plan=decided.plan, path=path)
 
     def _handle(self, events: Iterable[Event], now: float) -> Decision:
-        return self._handler.handle(map(self._turn.event, events), now)
+        return self._handler.handle(map(self._rotation.event, events), now)
 
     def _along_walls(self, happened: Decision, now: float) -> Decision:
         """Rotate the lattice to the walls once these are certain; return the combined decision."""
@@ -138,21 +138,21 @@ class Mission:
         if self._angle.is_settled or self.order_state.errand:
             return happened
         pose, grid = self.pose, self.grid
-        if pose is None or grid is None or not self._angle.turns_along_walls(grid, pose):
+        if pose is None or grid is None or not self._angle.rotates_to_walls(grid, pose):
             return happened
         deg = self._angle.deg
         why = f"cells lie along the walls from now on, at {deg:.1f} degrees to the map frame"
-        stop = self._turn_cells(why, now)
+        stop = self._rotate_lattice(why, now)
         return replace(happened, path=stop or happened.path)
 
     def _make_room(self, events: Iterable[Event], now: float) -> PathUpdate | None:
         """Rotate the lattice back to the map frame's axes for a map that fits in no other way."""
         maps = (event.grid for event in events if isinstance(event, MapReceived))
-        if not self._angle.turns_back_for(maps):
+        if not self._angle.rotates_back_for(maps):
             return None
-        return self._turn_cells("the map is too large for cells along the walls", now)
+        return self._rotate_lattice("the map is too large for cells along the walls", now)
 
-    def _turn_cells(self, why: str, now: float) -> PathUpdate | None:
+    def _rotate_lattice(self, why: str, now: float) -> PathUpdate | None:
         """Continue on a lattice at the new angle; return the path that stops the robot, if any."""
         before, order, route = self.snapshot(), self.order_state, self.route
         is_confirmed = self._ledger.is_confirmed
@@ -192,13 +192,13 @@ class Mission:
     def snapshot(self) -> LedgerSnapshot:
         """Return everything that is kept over a restart: coverage, and the order's progress."""
         trail, note = self._trail.snapshot(), self.order_state.to_json()
-        ledger, lattice_deg = self._ledger.snapshot(), self._turn.deg
+        ledger, lattice_deg = self._ledger.snapshot(), self._rotation.deg
         return replace(ledger, trail=trail, note=note, lattice_deg=lattice_deg)
 
     @property
-    def turn(self) -> LatticeTurn:
+    def rotation(self) -> LatticeRotation:
         """The lattice rotation, which converts places on the lattice to the map frame."""
-        return self._turn
+        return self._rotation
 
     @property
     def order_state(self) -> OrderState:
@@ -214,7 +214,7 @@ class Mission:
     def grid(self) -> OccupancyGrid | None:
         """The newest map; None before there is one."""
         if self._map.grid is not self._laid_grid:
-            self._laid_grid, self._given_grid = self._map.grid, self._turn.grid(self._map.grid)
+            self._laid_grid, self._given_grid = self._map.grid, self._rotation.grid(self._map.grid)
         return self._given_grid
 
     @property
@@ -225,7 +225,7 @@ class Mission:
     @property
     def pose(self) -> StampedPose | None:
         """The newest pose; None before there is one."""
-        return self._turn.pose(self._map.pose)
+        return self._rotation.pose(self._map.pose)
 
     @property
     def lattice(self) -> CoverageLattice | None:

@@ -21,7 +21,7 @@ from fasaco_edge.grid.floor_map import FloorMap
 from fasaco_edge.grid.geometry import Point, Polygon, StampedPose, Window, polygon_bounds
 from fasaco_edge.grid.lattice import COVERABLE, UNKNOWN, Cell, CoverageLattice, lattice_window
 from fasaco_edge.grid.occupancy import MapPatch, OccupancyGrid, without_base
-from fasaco_edge.grid.turning import turned_geometry
+from fasaco_edge.grid.rotation import rotated_geometry
 from fasaco_edge.mission.config import MissionConfig
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
 from fasaco_edge.mission.coverage.progress import Coverage, FreeArea
@@ -262,7 +262,7 @@ class MapState:
         """
         if self.grid is None:
             return
-        geometry = turned_geometry(self.grid.geometry, self._config.lattice_deg or 0.0)
+        geometry = rotated_geometry(self.grid.geometry, self._config.lattice_deg or 0.0)
         west, south, east, north = whole = geometry.bounds()
         for index, zone in enumerate(order.as_given.zones):
             x0, y0, x1, y1 = polygon_bounds(zone.polygon) if zone.polygon else whole

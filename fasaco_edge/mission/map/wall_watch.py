@@ -19,7 +19,7 @@ LEAST_WALL_M, LEAST_SHARE = 5.0, 0.45
 # Two estimates must agree within the first [deg]; with this length of walls [m] one suffices.
 SAME_DEG, PLENTY_M = 1.5, 15.0
 # A smaller rotation is not worth the stop that it costs [deg].
-LEAST_TURN_DEG = 2.0
+LEAST_ROTATION_DEG = 2.0
 # Distance driven between estimates [m]; the limit on estimates.
 BETWEEN_M, MOST_LOOKS = 1.0, 40
 # Poses farther apart than the first are a jump [m]; maps with more pixels take too long.
@@ -70,7 +70,7 @@ class WallWatch:
         if seen is None or not (seen.wall_m >= PLENTY_M or _agree(before, seen)):
             return None
         self.end()
-        return seen.angle_deg if abs(seen.angle_deg) >= LEAST_TURN_DEG else 0.0
+        return seen.angle_deg if abs(seen.angle_deg) >= LEAST_ROTATION_DEG else 0.0
 
 
 def _certain(grid: OccupancyGrid) -> WallDirection | None:

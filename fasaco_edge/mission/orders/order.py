@@ -16,7 +16,7 @@ from msgspec import Meta
 from fasaco_edge.errors import OrderError
 from fasaco_edge.grid.geometry import FARTHEST_M, Polygon
 from fasaco_edge.grid.polygons import polygon_flaw
-from fasaco_edge.grid.turning import turned_polygon
+from fasaco_edge.grid.rotation import rotated_polygon
 
 # Limit on the zones of an order: it is kept with the ledger, which is written once a second.
 MOST_ZONES = 100
@@ -56,7 +56,7 @@ class MissionOrder:
         return_home: whether to drive back to the start at the end.
         keep_covered: whether the first pass skips cells that were covered before.
         given: the order as given, in the map frame, if the polygons are rotated, see
-            ``turned_order``.
+            ``rotated_order``.
     """
 
     zones: tuple[Zone, ...] = (Zone(EVERYTHING, None),)
@@ -187,16 +187,16 @@ def located(order: MissionOrder, standing: tuple[StandingZone, ...]) -> MissionO
     return replace(order, zones=tuple(zones))
 
 
-def turned_order(order: MissionOrder, by_deg: float) -> MissionOrder:
+def rotated_order(order: MissionOrder, by_deg: float) -> MissionOrder:
     """Return an order whose polygons are the given ones rotated by ``by_deg`` [deg]."""
     given = order.as_given
     if not by_deg:
         return given
     zones = tuple(
-        replace(zone, polygon=turned_polygon(zone.polygon, by_deg)) if zone.polygon else zone
+        replace(zone, polygon=rotated_polygon(zone.polygon, by_deg)) if zone.polygon else zone
         for zone in given.zones
     )
-    keep_out = tuple(turned_polygon(polygon, by_deg) for polygon in given.keep_out)
+    keep_out = tuple(rotated_polygon(polygon, by_deg) for polygon in given.keep_out)
     return replace(given, zones=zones, keep_out=keep_out, given=given)
 
 

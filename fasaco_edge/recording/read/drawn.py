@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.grid.geometry import Window
-from fasaco_edge.grid.turning import turned_point
+from fasaco_edge.grid.rotation import rotated_point
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.arrow import pa
 from fasaco_edge.recording.read.frames import Chunk, chunks, column, wall_ns
@@ -81,7 +81,7 @@ def fields_in(batch: pa.RecordBatch, times: list[int]) -> Iterator[DrawnField]:
         if turns is not None:
             _, _, sine, cosine = turns[row].as_py()[0]
             yaw_deg = math.degrees(2.0 * math.atan2(sine, cosine))
-        x, y = turned_point(x, y, -yaw_deg)
+        x, y = rotated_point(x, y, -yaw_deg)
         corner = Window(0, 0, *shape).moved(round(y / cell_m), round(x / cell_m))
         # An image's row 0 is its top.
         upright = np.ascontiguousarray(levels.reshape(shape)[::-1])

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D
-from fasaco_edge.grid.turning import turned_points
+from fasaco_edge.grid.rotation import rotated_points
 from fasaco_edge.kernels import COL_STEP, EAST, NORTH, ROW_STEP
 
 # A run is cut where the trail's share differs by this much from that at its beginning.
@@ -75,9 +75,9 @@ def flows_of(
     found = np.array(begins, np.float64).reshape(-1, 5)
     edge, origin = geometry.resolution, geometry.origin
     yaw_deg = math.degrees(origin.yaw)
-    centres = turned_points((found[:, 1::-1] + 0.5) * edge, yaw_deg)
+    centres = rotated_points((found[:, 1::-1] + 0.5) * edge, yaw_deg)
     centres += (origin.x, origin.y)
-    return Flows(centres, turned_points(found[:, 3:1:-1] * edge, yaw_deg), found[:, 4])
+    return Flows(centres, rotated_points(found[:, 3:1:-1] * edge, yaw_deg), found[:, 4])
 
 
 def fork_at(

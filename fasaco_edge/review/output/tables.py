@@ -10,7 +10,7 @@ import msgspec
 import numpy as np
 from msgspec.structs import astuple
 
-from fasaco_edge.grid.turning import turned_points
+from fasaco_edge.grid.rotation import rotated_points
 from fasaco_edge.mission.orders.order import order_document
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.read.drawn import DrawnField, DrawnLine, drawings
@@ -232,7 +232,7 @@ def _levels(review: Review) -> Iterator[tuple[object, ...]]:
         levels, corner = field.levels, np.array((field.window.row0, field.window.col0))
         at_s = round(1e-9 * (field.at_ns - record.began_ns), 6)
         cells = np.argwhere(levels > 0)
-        middles = turned_points((cells + corner + 0.5)[:, ::-1] * field.cell_m, field.yaw_deg)
+        middles = rotated_points((cells + corner + 0.5)[:, ::-1] * field.cell_m, field.yaw_deg)
         middles += field.anchor
         values = levels[levels > 0].tolist()
         for (x, y), level in zip(middles.tolist(), values, strict=True):

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.grid.geometry import GridGeometry
-from fasaco_edge.grid.turning import turned_geometry
+from fasaco_edge.grid.rotation import rotated_geometry
 from fasaco_edge.planners.planner import ColonySnapshot
 from fasaco_edge.wire.limits import MAX_GRID_CELLS
 from fasaco_edge.wire.messages.cdr import CdrReader, CdrWriter, refuse
@@ -82,7 +82,7 @@ def encode_pheromone(
     levels, trail_min, trail_max = _quantised(snapshot.trail, writer.message)
     write_header(writer, frame, stamp_ns)
     plain = GridGeometry.of_cells(snapshot.window, snapshot.cell_m)
-    geometry = turned_geometry(plain, lattice_deg)
+    geometry = rotated_geometry(plain, lattice_deg)
     if levels.shape != (geometry.rows, geometry.cols):
         refuse(writer.message, "levels", f"{geometry.rows, geometry.cols}", levels.shape)
     write_grid_geometry(writer, geometry, stamp_ns)

@@ -13,7 +13,7 @@ from types import MappingProxyType
 import numpy as np
 
 from fasaco_edge.grid.geometry import GridGeometry, Window
-from fasaco_edge.grid.turning import turned_geometry
+from fasaco_edge.grid.rotation import rotated_geometry
 from fasaco_edge.mission.coverage.floor_tiles import (
     FLOOR_TILE,
     PIXEL_M,
@@ -27,7 +27,7 @@ from fasaco_edge.mission.coverage.ledger import TILE, LedgerSnapshot
 from fasaco_edge.planners.living_trail import NO_TRAIL
 
 
-def turned_ledger(before: LedgerSnapshot, lattice_deg: float) -> LedgerSnapshot:
+def rotated_ledger(before: LedgerSnapshot, lattice_deg: float) -> LedgerSnapshot:
     """Return a ledger converted to cells at ``lattice_deg`` [deg] to the map frame."""
     by_deg = before.lattice_deg - lattice_deg
     if not by_deg:
@@ -35,11 +35,11 @@ def turned_ledger(before: LedgerSnapshot, lattice_deg: float) -> LedgerSnapshot:
     floor = before.floor
     tiles = {
         place: np.packbits(swept, axis=1)
-        for place, swept in _turned(floor, by_deg, FLOOR_TILE, PIXEL_M)
+        for place, swept in _rotated(floor, by_deg, FLOOR_TILE, PIXEL_M)
     }
     visits = {
         place: swept.astype(np.uint16)
-        for place, swept in _turned(floor, by_deg, TILE, before.cell_m)
+        for place, swept in _rotated(floor, by_deg, TILE, before.cell_m)
     }
     return replace(
         before,
@@ -53,7 +53,7 @@ def turned_ledger(before: LedgerSnapshot, lattice_deg: float) -> LedgerSnapshot:
     )
 
 
-def _turned(
+def _rotated(
     floor: FloorSnapshot, by_deg: float, side: int, edge_m: float
 ) -> Iterator[tuple[Place, Mask]]:
     """Yield tiles of the rotated raster with their swept squares; empty tiles are skipped.
@@ -68,7 +68,7 @@ def _turned(
     places: set[Place] = set()
     for row, col in floor.tiles:
         here = GridGeometry.of_cells(Window(row, col, row + 1, col + 1), tile_m)
-        x0, y0, x1, y1 = turned_geometry(here, by_deg).bounds()
+        x0, y0, x1, y1 = rotated_geometry(here, by_deg).bounds()
         rows, cols = (
             range(int(low // (side * edge_m)), int(high // (side * edge_m)) + 1)
             for low, high in ((y0, y1), (x0, x1))
@@ -77,7 +77,7 @@ def _turned(
     for place in sorted(places):
         row, col = side * place[0], side * place[1]
         window = Window(row, col, row + side, col + side)
-        squares = turned_geometry(GridGeometry.of_cells(window, edge_m), -by_deg)
+        squares = rotated_geometry(GridGeometry.of_cells(window, edge_m), -by_deg)
         swept = swept_on(floor.swept_in, Similarity.of(squares), Window(0, 0, side, side))
         if swept.any():
             yield place, swept

@@ -15,32 +15,32 @@ from numpy.typing import NDArray
 from fasaco_edge.grid.geometry import GridGeometry, Point, Polygon, Pose2D
 
 
-def turned_point(x: float, y: float, by_deg: float) -> Point:
+def rotated_point(x: float, y: float, by_deg: float) -> Point:
     """Return a point x, y [m] rotated by ``by_deg`` [deg]."""
     cos, sin = math.cos(math.radians(by_deg)), math.sin(math.radians(by_deg))
     return cos * x - sin * y, sin * x + cos * y
 
 
-def turned_points(points: NDArray[np.float64], by_deg: float) -> NDArray[np.float64]:
+def rotated_points(points: NDArray[np.float64], by_deg: float) -> NDArray[np.float64]:
     """Return points x, y [m], float64 (n, 2), rotated by ``by_deg`` [deg]."""
     cos, sin = math.cos(math.radians(by_deg)), math.sin(math.radians(by_deg))
     x, y = points[:, 0], points[:, 1]
     return np.stack([cos * x - sin * y, sin * x + cos * y], axis=1)
 
 
-def turned_polygon(polygon: Polygon, by_deg: float) -> Polygon:
+def rotated_polygon(polygon: Polygon, by_deg: float) -> Polygon:
     """Return a polygon rotated by ``by_deg`` [deg]."""
-    return tuple(turned_point(x, y, by_deg) for x, y in polygon)
+    return tuple(rotated_point(x, y, by_deg) for x, y in polygon)
 
 
-def turned_pose(pose: Pose2D, by_deg: float) -> Pose2D:
+def rotated_pose(pose: Pose2D, by_deg: float) -> Pose2D:
     """Return a pose rotated by ``by_deg`` [deg]."""
-    return Pose2D(*turned_point(pose.x, pose.y, by_deg), pose.yaw + math.radians(by_deg))
+    return Pose2D(*rotated_point(pose.x, pose.y, by_deg), pose.yaw + math.radians(by_deg))
 
 
-def turned_geometry(geometry: GridGeometry, by_deg: float) -> GridGeometry:
+def rotated_geometry(geometry: GridGeometry, by_deg: float) -> GridGeometry:
     """Return the placement of a grid rotated by ``by_deg`` [deg].
 
     Rotated by minus their angle, the walls of a building are parallel to the axes.
     """
-    return replace(geometry, origin=turned_pose(geometry.origin, by_deg))
+    return replace(geometry, origin=rotated_pose(geometry.origin, by_deg))

@@ -12,7 +12,7 @@ from fasaco_edge.bench.floor import judge_floor
 from fasaco_edge.daemon.ledger.codec import decode_ledger, encode_ledger
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D, StampedPose, Window
 from fasaco_edge.grid.occupancy import OccupancyGrid
-from fasaco_edge.grid.turning import turned_geometry, turned_point, turned_points, turned_pose
+from fasaco_edge.grid.rotation import rotated_geometry, rotated_point, rotated_points, rotated_pose
 from fasaco_edge.mission.config import Dock, Place
 from fasaco_edge.mission.core.events import (
     CommandReceived,
@@ -21,7 +21,7 @@ from fasaco_edge.mission.core.events import (
     PoseReceived,
 )
 from fasaco_edge.mission.core.mission import Mission
-from fasaco_edge.mission.coverage.turned_ledger import turned_ledger
+from fasaco_edge.mission.coverage.rotated_ledger import rotated_ledger
 from fasaco_edge.mission.map.wall_watch import WallWatch
 from fasaco_edge.mission.orders.order import read_order
 from fasaco_edge.mission.orders.order_state import OrderState
@@ -38,12 +38,12 @@ AUTO = replace(CONFIG, lattice_deg=None)
 
 def turned(grid, deg):
     """The map of the same building, turned about the frame's origin; its pixels are not."""
-    x0, y0, x1, y1 = turned_geometry(grid.geometry, deg).bounds()
+    x0, y0, x1, y1 = rotated_geometry(grid.geometry, deg).bounds()
     unit = grid.geometry.resolution
     rows, cols = math.ceil((y1 - y0) / unit), math.ceil((x1 - x0) / unit)
     geometry = GridGeometry(rows, cols, unit, Pose2D(x0, y0))
     centres = np.stack(np.meshgrid(np.arange(cols) + 0.5, np.arange(rows) + 0.5), axis=-1)
-    there = turned_points(centres.reshape(-1, 2) * unit + (x0, y0), -deg)
+    there = rotated_points(centres.reshape(-1, 2) * unit + (x0, y0), -deg)
     col, row = (np.floor(at).astype(int) for at in grid.geometry.to_pixels(*there.T))
     inside = (row >= 0) & (col >= 0) & (row < grid.geometry.rows) & (col < grid.geometry.cols)
     cells = np.full(rows * cols, -1, np.int8)
@@ -52,7 +52,7 @@ def turned(grid, deg):
 
 
 def in_yaw(grid, deg):
-    return replace(grid, geometry=turned_geometry(grid.geometry, deg))
+    return replace(grid, geometry=rotated_geometry(grid.geometry, deg))
 
 
 def first_path(mission, grid, at, order=None):
@@ -75,23 +75,23 @@ COLUMN = [[4.0, 2.4], [4.4, 2.4], [4.4, 2.8], [4.0, 2.8]]
 def test_a_turned_building_is_driven_as_the_same_building_is_that_lies_straight(order):
     """Map, pose, zones and keep-out zones are turned, and so is the line."""
     straight = Mission(with_policy(CONFIG, keep_out=(tuple(map(tuple, COLUMN)),)))
-    around = tuple(turned_point(x, y, DEG) for x, y in COLUMN)
+    around = tuple(rotated_point(x, y, DEG) for x, y in COLUMN)
     askew = Mission(with_policy(replace(CONFIG, lattice_deg=DEG), keep_out=(around,)))
     path, _ = first_path(straight, room(3.0, 2.4), START, order)
     if order is not None:
-        polygon = [turned_point(x, y, DEG) for x, y in ZONE]
+        polygon = [rotated_point(x, y, DEG) for x, y in ZONE]
         order = {"zones": [{"name": "a", "polygon": polygon}]}
-    other, _ = first_path(askew, in_yaw(room(3.0, 2.4), DEG), turned_point(*START, DEG), order)
+    other, _ = first_path(askew, in_yaw(room(3.0, 2.4), DEG), rotated_point(*START, DEG), order)
     assert (other.cells == path.cells).all()
     # Rounding decides where in a cell some of the line's points are.
-    there = turned_points(path.xy, DEG)
+    there = rotated_points(path.xy, DEG)
     away = np.hypot(*(there[:, None] - other.xy[None]).T)
     assert max(away.min(axis=0).max(), away.min(axis=1).max()) < 0.15
     lengths = [np.hypot(*np.diff(xy, axis=0).T).sum() for xy in (there, other.xy)]
     assert lengths[1] == pytest.approx(lengths[0], rel=0.02)
     # What is said to others is of the map frame.
     told = askew.pose.pose
-    assert (told.x, told.y, told.yaw) == pytest.approx((*turned_point(*START, DEG), 0.0))
+    assert (told.x, told.y, told.yaw) == pytest.approx((*rotated_point(*START, DEG), 0.0))
     assert askew.grid.geometry.origin.yaw == pytest.approx(math.radians(DEG))
 
 
@@ -110,7 +110,7 @@ def test_a_way_home_ends_at_the_place_and_the_heading_of_the_map_frame():
     assert decision.path is not None
     assert math.dist(decision.path.xy[-1], (2.6, 3.0)) < CELL_M
     assert decision.path.end_yaw == pytest.approx(math.radians(80.0))
-    assert math.dist(mission.turn.centre(mission.home, CELL_M), (2.6, 3.0)) < CELL_M
+    assert math.dist(mission.rotation.centre(mission.home, CELL_M), (2.6, 3.0)) < CELL_M
     assert mission.pose == replace(at, pose=mission.pose.pose)
 
 
@@ -160,28 +160,28 @@ def seen_around(grid, at, reach_m):
 
 def test_cells_are_laid_along_the_walls_once_and_what_was_swept_counts():
     grid = askew_building()
-    robot = Robot(Mission(AUTO), at=turned_point(*START, DEG))
+    robot = Robot(Mission(AUTO), at=rotated_point(*START, DEG))
     robot.tell(MapReceived(seen_around(grid, robot.at, 1.2)))
     robot.drive(20)
     mission = robot.mission
-    assert mission.turn.deg == 0.0
+    assert mission.rotation.deg == 0.0
     swept_m2, revision = mission.floor.swept_m2, mission.route.revision
     robot.tell(MapReceived(grid))
     robot.drive(15)
-    assert mission.turn.deg == pytest.approx(DEG, abs=1.0)
+    assert mission.rotation.deg == pytest.approx(DEG, abs=1.0)
     assert swept_m2 > 0.5
     assert mission.floor.swept_m2 > swept_m2
     assert mission.route.revision > revision
     laid = [reason for reason in robot.reasons if "cells lie along the walls" in reason]
     assert laid
     kept = decode_ledger(encode_ledger(mission.snapshot()), CELL_M)
-    assert kept.lattice_deg == mission.turn.deg
+    assert kept.lattice_deg == mission.rotation.deg
     # A mission that goes on after a restart has the angle at once.
     again = Robot(Mission(AUTO), at=robot.at)
     again.mission.restore_ledger(kept)
     again.mission.restore_order(mission.order_state)
     again.tell(MapReceived(grid))
-    assert again.mission.turn.deg == mission.turn.deg
+    assert again.mission.rotation.deg == mission.rotation.deg
     assert again.mission.floor.pixels == mission.floor.pixels
     assert again.mission.order_state.home == mission.order_state.home
     robot.finish()
@@ -194,14 +194,14 @@ def test_cells_are_laid_along_the_walls_once_and_what_was_swept_counts():
 def test_a_map_that_has_no_room_for_askew_cells_has_them_along_its_axes():
     """A lattice askew over a map spans more cells than one along its axes."""
     grid = turned(room(5.0, 4.0), DEG)
-    robot = Robot(Mission(replace(AUTO, max_lattice_cells=2600)), at=turned_point(*START, DEG))
+    robot = Robot(Mission(replace(AUTO, max_lattice_cells=2600)), at=rotated_point(*START, DEG))
     robot.tell(MapReceived(grid))
     robot.drive(40)
-    assert robot.mission.turn.deg
+    assert robot.mission.rotation.deg
     cells = np.pad(grid.cells, ((0, 0), (0, 276)), constant_values=-1)
     grown = OccupancyGrid(replace(grid.geometry, cols=cells.shape[1]), cells)
     robot.tell(MapReceived(grown))
-    assert robot.mission.turn.deg == 0.0
+    assert robot.mission.rotation.deg == 0.0
     assert robot.mission.grid is grown
     robot.drive(3)
     assert robot.line
@@ -213,12 +213,12 @@ def test_floor_that_is_carried_over_lies_where_it_was():
     robot.drive(60)
     robot.mission._ledger.break_track()
     before = robot.mission.snapshot()
-    after = turned_ledger(before, DEG)
+    after = rotated_ledger(before, DEG)
     assert after.lattice_deg == DEG
     assert after.floor.pixels == pytest.approx(before.floor.pixels, rel=0.01)
     # Pixels of the map frame, looked up in both.
     place = GridGeometry(80, 90, 0.05, Pose2D(1.5, 0.5))
-    there = turned_geometry(place, -DEG)
+    there = rotated_geometry(place, -DEG)
     was, now = (
         snapshot_of(ledger).swept_on(geometry)
         for ledger, geometry in ((before, place), (after, there))
@@ -228,10 +228,10 @@ def test_floor_that_is_carried_over_lies_where_it_was():
     rows, cols = np.nonzero(after.visits(Window(-20, -20, 60, 60)))
     assert len(rows)
     for row, col in zip((rows - 20).tolist(), (cols - 20).tolist(), strict=True):
-        x, y = turned_point((col + 0.5) * CELL_M, (row + 0.5) * CELL_M, DEG)
+        x, y = rotated_point((col + 0.5) * CELL_M, (row + 0.5) * CELL_M, DEG)
         pixel = Window(int(y / 0.025), int(x / 0.025), int(y / 0.025) + 1, int(x / 0.025) + 1)
         assert before.floor.swept_in(pixel).all()
-    assert turned_ledger(before, 0.0) is before
+    assert rotated_ledger(before, 0.0) is before
 
 
 def snapshot_of(ledger):
@@ -263,4 +263,4 @@ def test_a_pose_that_jumps_is_no_drive_to_look_again_after():
     watch, grid = WallWatch(), turned(room(2.6, 2.0), 20.0)
     found = [watch.look(grid, Pose2D(50.0 * step, 0.0)) for step in range(50)]
     assert found == [None] * 50
-    assert turned_pose(Pose2D(1.0, 0.0, 0.0), 90.0).x == pytest.approx(0.0)
+    assert rotated_pose(Pose2D(1.0, 0.0, 0.0), 90.0).x == pytest.approx(0.0)

@@ -16,12 +16,12 @@ import msgspec
 from fasaco_edge.grid.geometry import GridGeometry, Point, StampedPose, Window
 from fasaco_edge.grid.lattice import Cell, CoverageLattice
 from fasaco_edge.grid.occupancy import OccupancyGrid
-from fasaco_edge.grid.turning import (
-    turned_geometry,
-    turned_point,
-    turned_points,
-    turned_polygon,
-    turned_pose,
+from fasaco_edge.grid.rotation import (
+    rotated_geometry,
+    rotated_point,
+    rotated_points,
+    rotated_polygon,
+    rotated_pose,
 )
 from fasaco_edge.mission.config import MissionConfig, Place
 from fasaco_edge.mission.core.events import (
@@ -32,14 +32,14 @@ from fasaco_edge.mission.core.events import (
     PoseReceived,
 )
 from fasaco_edge.mission.orders.mask import mask_polygons
-from fasaco_edge.mission.orders.order import turned_order
+from fasaco_edge.mission.orders.order import rotated_order
 from fasaco_edge.mission.orders.order_state import OrderState
 
 _AnyPlace = TypeVar("_AnyPlace", bound=Place)
 
 
 @dataclass(frozen=True, slots=True)
-class LatticeTurn:
+class LatticeRotation:
     """A lattice whose rows are at an angle to the x axis of the map frame.
 
     Attributes:
@@ -55,7 +55,7 @@ class LatticeTurn:
             polygons = policy.keep_out + mask_polygons(policy.keep_out_mask)
             policy = msgspec.structs.replace(
                 policy,
-                keep_out=tuple(turned_polygon(polygon, -self.deg) for polygon in polygons),
+                keep_out=tuple(rotated_polygon(polygon, -self.deg) for polygon in polygons),
                 keep_out_mask="",
                 home=self._place(policy.home),
                 dock=self._place(policy.dock),
@@ -68,25 +68,25 @@ class LatticeTurn:
             return event
         match event:
             case MapReceived(grid):
-                return MapReceived(_turned_grid(grid, -self.deg))
+                return MapReceived(_rotated_grid(grid, -self.deg))
             case PoseReceived(pose):
-                return PoseReceived(_turned_stamped(pose, -self.deg))
+                return PoseReceived(_rotated_stamped(pose, -self.deg))
             case MemberHeard(x=x, y=y):
-                x, y = turned_point(x, y, -self.deg)
+                x, y = rotated_point(x, y, -self.deg)
                 return replace(event, x=x, y=y)
         return event
 
-    def order(self, state: OrderState, turned_by_deg: float) -> OrderState:
+    def order(self, state: OrderState, rotated_by_deg: float) -> OrderState:
         """Return an order in the mission's frame.
 
         Args:
             state: the order; its polygons may be rotated already.
-            turned_by_deg: rotation of the lattice since home was noted [deg].
+            rotated_by_deg: rotation of the lattice since home was noted [deg].
         """
-        order = None if state.order is None else turned_order(state.order, -self.deg)
+        order = None if state.order is None else rotated_order(state.order, -self.deg)
         home = state.home
-        if home is not None and turned_by_deg:
-            x, y = turned_point(home[1] + 0.5, home[0] + 0.5, -turned_by_deg)
+        if home is not None and rotated_by_deg:
+            x, y = rotated_point(home[1] + 0.5, home[0] + 0.5, -rotated_by_deg)
             home = math.floor(y), math.floor(x)
         return replace(state, order=order, home=home)
 
@@ -97,15 +97,15 @@ class LatticeTurn:
         xy = lattice.centres(update.cells) if update.xy is None else update.xy
         yaw = update.end_yaw
         yaw = None if yaw is None else math.remainder(yaw + math.radians(self.deg), math.tau)
-        return replace(update, xy=turned_points(xy, self.deg), end_yaw=yaw)
+        return replace(update, xy=rotated_points(xy, self.deg), end_yaw=yaw)
 
     def grid(self, grid: OccupancyGrid | None) -> OccupancyGrid | None:
         """Return a map of the mission in the map frame."""
-        return grid if grid is None or not self.deg else _turned_grid(grid, self.deg)
+        return grid if grid is None or not self.deg else _rotated_grid(grid, self.deg)
 
     def pose(self, stamped: StampedPose | None) -> StampedPose | None:
         """Return a pose of the mission in the map frame."""
-        return stamped if stamped is None or not self.deg else _turned_stamped(stamped, self.deg)
+        return stamped if stamped is None or not self.deg else _rotated_stamped(stamped, self.deg)
 
     def cells(self, window: Window, cell_m: float) -> GridGeometry:
         """Return the placement of a window of cells, ``cell_m`` [m] wide, in the map frame."""
@@ -113,24 +113,24 @@ class LatticeTurn:
 
     def geometry(self, geometry: GridGeometry) -> GridGeometry:
         """Return a placement of the mission in the map frame."""
-        return turned_geometry(geometry, self.deg) if self.deg else geometry
+        return rotated_geometry(geometry, self.deg) if self.deg else geometry
 
     def centre(self, cell: Cell, cell_m: float) -> Point:
         """Return the centre (x, y) [m] of a cell, ``cell_m`` [m] wide, in the map frame."""
         x, y = (cell[1] + 0.5) * cell_m, (cell[0] + 0.5) * cell_m
-        return turned_point(x, y, self.deg) if self.deg else (x, y)
+        return rotated_point(x, y, self.deg) if self.deg else (x, y)
 
     def _place(self, place: _AnyPlace | None) -> _AnyPlace | None:
         if place is None:
             return None
-        x, y = turned_point(place.x_m, place.y_m, -self.deg)
+        x, y = rotated_point(place.x_m, place.y_m, -self.deg)
         yaw_deg = math.remainder(place.yaw_deg - self.deg, 360.0)
         return msgspec.structs.replace(place, x_m=x, y_m=y, yaw_deg=yaw_deg)
 
 
-def _turned_grid(grid: OccupancyGrid, by_deg: float) -> OccupancyGrid:
-    return replace(grid, geometry=turned_geometry(grid.geometry, by_deg))
+def _rotated_grid(grid: OccupancyGrid, by_deg: float) -> OccupancyGrid:
+    return replace(grid, geometry=rotated_geometry(grid.geometry, by_deg))
 
 
-def _turned_stamped(stamped: StampedPose, by_deg: float) -> StampedPose:
-    return replace(stamped, pose=turned_pose(stamped.pose, by_deg))
+def _rotated_stamped(stamped: StampedPose, by_deg: float) -> StampedPose:
+    return replace(stamped, pose=rotated_pose(stamped.pose, by_deg))
