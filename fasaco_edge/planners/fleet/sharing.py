@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 from fasaco_edge.grid.lattice import Cell, CoverageLattice
 from fasaco_edge.kernels import EAST, NORTH
 from fasaco_edge.planners.cost import MICROSECONDS, CoverageCost, SearchWork
-from fasaco_edge.planners.fleet.loops import Loop, LoopGround
+from fasaco_edge.planners.fleet.tours import Tour, TourGround
 from fasaco_edge.planners.paper.colony import ColonyConfig
 from fasaco_edge.planners.planner import AnyOf, SearchProgress, StoppingCriterion, WorkLimit
 from fasaco_edge.planners.problem import CoverageProblem
@@ -68,7 +68,7 @@ class Fleet:
 class _Best(NamedTuple):
     """The best division so far: tours, owner of each cell, greatest cost [us]."""
 
-    loops: list[Loop]
+    tours: list[Tour]
     owner: NDArray[np.int32]
     worst_us: int
 
@@ -78,9 +78,9 @@ class Sharing:
 
     def __init__(self, lattice: CoverageLattice, fleet: Fleet, reached: NDArray[np.bool_]) -> None:
         self._lattice, self._fleet, self._reached = lattice, fleet, reached
-        self._ground = LoopGround(lattice, fleet.cost, fleet.starts)
+        self._ground = TourGround(lattice, fleet.cost, fleet.starts)
         self._starts = self._ground.starts
-        self._loops: list[Loop] = []
+        self._tours: list[Tour] = []
         self._costs_us: list[int] = []
         # The robot that covers each cell, -1 for none; int32 (rows * cols,).
         self._owner = np.full(lattice.steps.size, -1, np.int32)
@@ -107,7 +107,7 @@ class Sharing:
 
     def progress(self) -> SearchProgress:
         """Return progress: figures of the longest walk of the best division so far."""
-        steps = max(map(len, self._best.loops), default=0)
+        steps = max(map(len, self._best.tours), default=0)
         work = SearchWork(perturbations=self.rounds)
         return SearchProgress(work, self._best.worst_us / MICROSECONDS, steps)
 
@@ -133,8 +133,8 @@ class Sharing:
 
     def _note_best(self) -> None:
         worst_us = max(self._costs_us)
-        if not self._best.loops or worst_us < self._best.worst_us:
-            self._best = _Best(list(self._loops), self._owner.copy(), worst_us)
+        if not self._best.tours or worst_us < self._best.worst_us:
+            self._best = _Best(list(self._tours), self._owner.copy(), worst_us)
 
     def _is_proven(self) -> bool:
         return self._best.worst_us <= self._least_us
@@ -148,11 +148,11 @@ class Sharing:
         planner = NearOptimal(ColonyConfig(seed=(self._fleet.seed + attempt) % SEEDS))
         tour = planner.plan(problem, partial(self._is_tour_over, stop))
         robots = range(len(self._starts))
-        loops = self._ground.parted(self._ground.loop_of(tour.cells), robots)
-        self._costs_us = [self._ground.cost_us(loops[robot]) for robot in robots]
-        self._loops = [loops[robot] for robot in robots]
+        tours = self._ground.parted(self._ground.tour_of(tour.cells), robots)
+        self._costs_us = [self._ground.cost_us(tours[robot]) for robot in robots]
+        self._tours = [tours[robot] for robot in robots]
         for robot in reversed(robots):
-            self._owner[loops[robot]] = robot
+            self._owner[tours[robot]] = robot
 
     def _is_tour_over(self, stop: StoppingCriterion, progress: SearchProgress) -> bool:
         """Ask ``stop`` about the common tour, of which each robot gets a share."""
@@ -170,12 +170,12 @@ class Sharing:
         groups = self._groups(size)
         # All results before the first is accepted, as accepting changes their input.
         found = list(pool.map(self._shared_anew, groups))
-        for robots, loops in zip(groups, found, strict=True):
-            self._accept(robots, loops)
+        for robots, tours in zip(groups, found, strict=True):
+            self._accept(robots, tours)
 
     def _touching(self) -> NDArray[np.bool_]:
         """Return which robots have adjacent parts, bool (k, k), symmetric."""
-        robots = len(self._loops)
+        robots = len(self._tours)
         touch = np.zeros((robots, robots), np.bool_)
         steps = self._lattice.steps
         grid = self._owner.reshape(steps.shape)
@@ -185,8 +185,8 @@ class Sharing:
         ):
             is_open = steps[: here.shape[0], : here.shape[1]] >> direction & 1 > 0
             touch[here[is_open], there[is_open]] = True
-        for robot, loop in enumerate(self._loops):
-            touch[robot, self._owner[loop]] = True
+        for robot, tour in enumerate(self._tours):
+            touch[robot, self._owner[tour]] = True
         touch |= touch.T
         np.fill_diagonal(touch, False)
         return touch
@@ -196,7 +196,7 @@ class Sharing:
 
         Pairs that differ most come first, in random order among equals.
         """
-        robots = len(self._loops)
+        robots = len(self._tours)
         touch, costs_us = self._touching(), np.array(self._costs_us)
         random = np.random.default_rng((self._fleet.seed, self.rounds))
         # In every other round all small differences count as equal.
@@ -216,22 +216,22 @@ class Sharing:
             groups.append(tuple(sorted(group)))
         return [group for group in groups if len(group) > 1]
 
-    def _shared_anew(self, robots: tuple[int, ...]) -> dict[int, Loop] | None:
+    def _shared_anew(self, robots: tuple[int, ...]) -> dict[int, Tour] | None:
         """Return new tours of these robots over all their cells; None for none."""
         random = np.random.default_rng((self._fleet.seed, self.rounds, robots[0]))
         if len(robots) == 2 and random.random() < SHIFTED:
             return self._shifted(robots, random)
         wanted = np.isin(self._owner, robots)
         wanted[[self._starts[robot] for robot in robots]] = True
-        loop = self._loops[robots[0]]
+        tour = self._tours[robots[0]]
         for robot in robots[1:]:
-            loop = self._ground.merged(loop, self._loops[robot])
+            tour = self._ground.merged(tour, self._tours[robot])
         stream = stream_of(self._fleet.seed, self.rounds, robots[0])
-        return self._ground.parted(self._ground.improved(loop, wanted, stream), robots)
+        return self._ground.parted(self._ground.improved(tour, wanted, stream), robots)
 
     def _shifted(
         self, robots: tuple[int, ...], random: np.random.Generator
-    ) -> dict[int, Loop] | None:
+    ) -> dict[int, Tour] | None:
         """Return new tours of two robots: the one with the higher cost hands over some cells."""
         giver, taker = sorted(robots, key=lambda robot: -self._costs_us[robot])
         apart_us = self._costs_us[giver] - self._costs_us[taker]
@@ -239,14 +239,14 @@ class Sharing:
         cells = self._piece(giver, taker, int(random.integers(1, max(most, FEW) + 1)), random)
         if not cells:
             return None
-        loops = {}
+        tours = {}
         for robot in robots:
             wanted = self._owner == robot
             wanted[cells] = robot == taker
             wanted[self._starts[robot]] = True
             stream = stream_of(self._fleet.seed, self.rounds, robot)
-            loops[robot] = self._ground.improved(self._loops[robot], wanted, stream)
-        return loops
+            tours[robot] = self._ground.improved(self._tours[robot], wanted, stream)
+        return tours
 
     def _piece(self, giver: int, taker: int, size: int, random: np.random.Generator) -> list[int]:
         """Return about ``size`` connected cells of one robot adjacent to the other's part."""
@@ -269,12 +269,12 @@ class Sharing:
                     found.append(beside)
         return found
 
-    def _accept(self, robots: tuple[int, ...], loops: dict[int, Loop] | None) -> None:
+    def _accept(self, robots: tuple[int, ...], tours: dict[int, Tour] | None) -> None:
         """Replace the tours of these robots, unless the new ones are worse."""
-        if loops is None:
+        if tours is None:
             return
         before = [self._costs_us[robot] for robot in robots]
-        after = [self._ground.cost_us(loops[robot]) for robot in robots]
+        after = [self._ground.cost_us(tours[robot]) for robot in robots]
         is_no_worse = (max(after), sum(after)) <= (max(before), sum(before))
         is_shorter = sum(after) < sum(before) and max(after) < max(self._costs_us)
         if not is_no_worse and not is_shorter:
@@ -282,18 +282,18 @@ class Sharing:
         theirs = np.isin(self._owner, robots)
         theirs[[self._starts[robot] for robot in robots]] = True
         for robot, cost_us in zip(robots, after, strict=True):
-            self._loops[robot], self._costs_us[robot] = loops[robot], cost_us
+            self._tours[robot], self._costs_us[robot] = tours[robot], cost_us
         for robot in reversed(robots):
             passed = np.zeros_like(theirs)
-            passed[loops[robot]] = True
+            passed[tours[robot]] = True
             self._owner[theirs & passed] = robot
 
     def walks(self, stop: StoppingCriterion) -> list[NDArray[np.int32]]:
         """Return the walks, cells (row, col) int32 (n, 2)."""
-        return [self._walk(robot, stop) for robot in range(len(self._best.loops))]
+        return [self._walk(robot, stop) for robot in range(len(self._best.tours))]
 
     def _walk(self, robot: int, stop: StoppingCriterion) -> NDArray[np.int32]:
-        walk = self._ground.walk_of(self._best.loops[robot], self._starts[robot])
+        walk = self._ground.walk_of(self._best.tours[robot], self._starts[robot])
         mine = (self._best.owner == robot).reshape(self._lattice.steps.shape)
         if self._fleet.returns or len(walk) < 3 or not mine.any():
             return walk

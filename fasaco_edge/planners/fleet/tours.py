@@ -27,10 +27,10 @@ from fasaco_edge.planners.walk_before import completed
 # Proposals per visit of an improved tour, and perturbations of it.
 PROPOSALS, PERTURBATIONS = 20, 4
 
-Loop = NDArray[np.int32]
+Tour = NDArray[np.int32]
 
 
-class LoopGround:
+class TourGround:
     """A lattice, the cost of tours on it, and the robots' starts.
 
     Attributes:
@@ -49,21 +49,21 @@ class LoopGround:
         self.ways = np.array([ways_from(self._steps, start) for start in self.starts])
         self._offsets = np.array([1, self._cols, -1, -self._cols], np.int64)
 
-    def loop_of(self, cells: NDArray[np.int32]) -> Loop:
+    def tour_of(self, cells: NDArray[np.int32]) -> Tour:
         """Return the tour of a closed walk, cells (row, col) int32 (n, 2)."""
-        loop: Loop = self._flat(cells)
-        return loop[:-1] if len(loop) > 1 else loop
+        tour: Tour = self._flat(cells)
+        return tour[:-1] if len(tour) > 1 else tour
 
-    def walk_of(self, loop: Loop, start: int) -> NDArray[np.int32]:
+    def walk_of(self, tour: Tour, start: int) -> NDArray[np.int32]:
         """Return a tour as a walk from ``start`` and back, cells (row, col) int32 (n, 2)."""
-        loop = np.roll(loop, -int(np.argmax(loop == start)))
-        return self._cells(np.append(loop, loop[0]) if len(loop) > 1 else loop)
+        tour = np.roll(tour, -int(np.argmax(tour == start)))
+        return self._cells(np.append(tour, tour[0]) if len(tour) > 1 else tour)
 
-    def cost_us(self, loop: Loop) -> int:
+    def cost_us(self, tour: Tour) -> int:
         """Return the cost of a tour, including its first turn [us]."""
-        return 0 if len(loop) == 1 else int(self._visit_costs(loop).sum())
+        return 0 if len(tour) == 1 else int(self._visit_costs(tour).sum())
 
-    def merged(self, first: Loop, second: Loop) -> Loop:
+    def merged(self, first: Tour, second: Tour) -> Tour:
         """Return two tours merged into one, at a common cell, or else at neighbours."""
         place = np.full(self._steps.size, -1, np.int64)
         place[second] = np.arange(len(second))
@@ -83,28 +83,28 @@ class LoopGround:
         way = self._way(int(first[0]), int(second[0]))
         return np.concatenate((way[:-1], second, way[:0:-1], first))
 
-    def parted(self, loop: Loop, robots: Sequence[int]) -> dict[int, Loop]:
+    def parted(self, tour: Tour, robots: Sequence[int]) -> dict[int, Tour]:
         """Split a tour until each robot has a part, with the shortest path to it and back."""
-        loops = {}
-        parts = [(loop, np.array(robots))]
+        tours = {}
+        parts = [(tour, np.array(robots))]
         while parts:
             part, theirs = parts.pop()
             if len(theirs) == 1:
-                loops[int(theirs[0])] = self._reached(int(theirs[0]), part)
+                tours[int(theirs[0])] = self._reached(int(theirs[0]), part)
             else:
                 parts += self._split(part, theirs)
-        return loops
+        return tours
 
-    def improved(self, loop: Loop, wanted: NDArray[np.bool_], random: NDArray[np.uint64]) -> Loop:
+    def improved(self, tour: Tour, wanted: NDArray[np.bool_], random: NDArray[np.uint64]) -> Tour:
         """Return a tour over ``wanted`` cells, improved by local search.
 
         Args:
-            loop: the tour so far.
+            tour: the tour so far.
             wanted: bool (rows * cols,), the cells to visit from now on; those not on the tour must
                 be connected to it by others of them.
             random: stream, uint64 (1,); advanced.
         """
-        problem = self._cut_out(loop, wanted)
+        problem = self._cut_out(tour, wanted)
         framed = FramedGround.of(problem)
         assert problem.before is not None
         walk = completed(problem, framed, problem.before)
@@ -115,7 +115,7 @@ class LoopGround:
             region.go_back()
             region.perturb(effort_for(problem.cost).rules, PERTURBATIONS, random)
             walk = region.put_back()
-        return self.loop_of(problem.cells_of(framed.unframed(walk)))
+        return self.tour_of(problem.cells_of(framed.unframed(walk)))
 
     def beside(self, cell: int) -> list[int]:
         """Return the neighbours of a flat cell that a step leads to."""
@@ -138,32 +138,32 @@ class LoopGround:
         way = shortest_walk(self._steps, divmod(begin, self._cols), divmod(end, self._cols))
         return (way @ (self._cols, 1)).astype(np.int32)
 
-    def _visit_costs(self, loop: Loop) -> NDArray[np.int64]:
+    def _visit_costs(self, tour: Tour) -> NDArray[np.int64]:
         """Return the cost of each visit: the turn in it and the step out of it [us]."""
-        after = np.roll(loop, -1) - loop
+        after = np.roll(tour, -1) - tour
         before = np.roll(after, 1)
         quarters = np.where(after == before, 0, np.where(after == -before, 2, 1)).astype(np.int64)
         costs: NDArray[np.int64] = self.cost.step_us + self.cost.quarter_turn_us * quarters
         return costs
 
-    def _split(self, loop: Loop, robots: NDArray[np.int64]) -> list[tuple[Loop, NDArray[np.int64]]]:
+    def _split(self, tour: Tour, robots: NDArray[np.int64]) -> list[tuple[Tour, NDArray[np.int64]]]:
         """Split a tour in two, each with some of the robots."""
         found, order = np.zeros(5, np.int64), np.zeros(len(robots), np.int64)
-        costs_us = np.concatenate(([0], np.cumsum(np.tile(self._visit_costs(loop), 2))))
+        costs_us = np.concatenate(([0], np.cumsum(np.tile(self._visit_costs(tour), 2))))
         ways, step_us = self.ways[robots], self.cost.step_us
-        is_split = len(loop) > 1 and best_split(
-            self._steps.ravel(), self._offsets, loop, costs_us, ways, step_us, found, order
+        is_split = len(tour) > 1 and best_split(
+            self._steps.ravel(), self._offsets, tour, costs_us, ways, step_us, found, order
         )
         if not is_split:
-            return [(loop, robots[:1]), (loop[:1], robots[1:])]  # fewer cells than robots
+            return [(tour, robots[:1]), (tour[:1], robots[1:])]  # fewer cells than robots
         first, count, second, rest, share = found.tolist()
-        twice = np.concatenate((loop, loop))
+        twice = np.concatenate((tour, tour))
         return [
             (twice[first : first + count], robots[order[:share]]),
             (twice[second : second + rest], robots[order[share:]]),
         ]
 
-    def _reached(self, robot: int, part: Loop) -> Loop:
+    def _reached(self, robot: int, part: Tour) -> Tour:
         """Return a part of a tour with the shortest path to it from a robot's start, and back."""
         part = np.roll(part, -int(np.argmin(self.ways[robot][part])))
         if part[0] == self.starts[robot]:
@@ -173,10 +173,10 @@ class LoopGround:
             return np.concatenate((way, way[-2:0:-1]))
         return np.concatenate((way[:-1], part, way[:0:-1]))
 
-    def _cut_out(self, loop: Loop, wanted: NDArray[np.bool_]) -> CoverageProblem:
+    def _cut_out(self, tour: Tour, wanted: NDArray[np.bool_]) -> CoverageProblem:
         """Return the problem of covering ``wanted`` around a tour, its ``before``."""
         whole = self.lattice.window
-        rows, cols = np.divmod(np.concatenate((loop, np.flatnonzero(wanted))), self._cols)
+        rows, cols = np.divmod(np.concatenate((tour, np.flatnonzero(wanted))), self._cols)
         top, left = int(rows.min()), int(cols.min())
         inside = slice(top, int(rows.max()) + 1), slice(left, int(cols.max()) + 1)
         steps = self._steps[inside].copy()
@@ -189,7 +189,7 @@ class LoopGround:
         window = Window(row0, col0, row0 + steps.shape[0], col0 + steps.shape[1])
         states = self.lattice.states[inside].copy()
         lattice = CoverageLattice(window, self.lattice.cell_m, states, steps)
-        before = self._cells(np.append(loop, loop[0]))
+        before = self._cells(np.append(tour, tour[0]))
         row, col = before[0].tolist()
         to_cover = wanted.reshape(self._steps.shape)[inside].copy()
         return CoverageProblem(
