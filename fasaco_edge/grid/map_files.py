@@ -74,7 +74,7 @@ def read_map_rows(
     path = Path(path)
     if path.suffix.lower() in IMAGE_SUFFIXES:
         raise MapFileError(
-            f"{path}: an image alone does not tell how large its pixels are",
+            f"{path}: an image alone has no resolution",
             hint="give --resolution (metres a pixel), or the map_server YAML file beside it",
         )
     keys = _YamlKeys(path, _load_yaml(path))
@@ -148,7 +148,8 @@ def _grid(geometry: GridGeometry, stripes: Iterator[NDArray[np.int8]]) -> Occupa
 def map_sources(path: Path) -> list[Path]:
     """Return the files of a map: itself, and the image that a YAML file names.
 
-    Raises: MapFileError: it is not a YAML file, or names no image.
+    Raises:
+        MapFileError: it is not a YAML file, or names no image.
     """
     if path.suffix.lower() in (*IMAGE_SUFFIXES, ".npy"):
         return [path]

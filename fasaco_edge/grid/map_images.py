@@ -139,7 +139,7 @@ def _check_affordable(path: Path, image: ImageFile, most_bytes: int) -> None:
     if needed > most_bytes:
         raise MapFileError(
             f"{path}: {cols} x {rows} pixels ({image.mode}) take {needed / 1e6:.1f} MB to read, "
-            f"more than the {most_bytes / 1e6:.1f} MB that there are",
+            f"more than the {most_bytes / 1e6:.1f} MB available",
             hint="save it as 8-bit grey, or with larger pixels, or raise the memory limit",
         )
     is_slow = any(tile[0] in DECODERS for tile in image.tile)

@@ -158,7 +158,9 @@ class PlannedFloor:
         if self.seconds_per_m2 is not None:
             words += f", {self.seconds_per_m2:.1f} s/m2"
         if self.illegal_share:
-            words += f"; {self.illegal_share:.1%} of the line is too near to what is not free"
+            words += (
+                f"; {self.illegal_share:.1%} of the line is too close to obstacles or unknown floor"
+            )
         return words
 
     @classmethod
@@ -241,7 +243,7 @@ def picture_of(plan: Plan) -> Image.Image:
     lines = [
         f"{plan.map.name}: {plan.problem.cells} cells of {ground.lattice.cell_m:g} m{askew}, "
         f"{walk.steps} steps, {walk.revisits} revisits, {walk.turns_90} quarter-turns; "
-        f"at most {path.gap or 0.0:.1%} above the least time there can be",
+        f"optimality gap at most {path.gap or 0.0:.1%}",
     ]
     if judged is not None:
         lines.append(f"reachable floor: {plan.floor}")
@@ -267,11 +269,9 @@ def pheromone_picture_of(plan: Plan, tau: Tau) -> Image.Image:
     deg = round(ground.lattice_deg, 3)
     askew = f", along rows at {deg:g} degrees to the map, which is not drawn" if deg else ""
     lines = [
-        f"{plan.map.name}: where the pheromone on a cell's steps points to{askew}. The stronger "
-        "the colour and the larger the arrow, the more of it lies on that one step, beside "
-        "the cell where it is most.",
-        f"On average {branching(tau):.2f} of a cell's directions have much pheromone (1: the trail "
-        "leads one way everywhere).",
+        f"{plan.map.name}: direction of the strongest pheromone in each cell{askew}. Colour and "
+        "size of an arrow: amount on that step, relative to the greatest on the map.",
+        f"Mean branching factor {branching(tau):.2f} (1: one dominant direction in every cell).",
     ]
     return draw_trail(
         ground.lattice,

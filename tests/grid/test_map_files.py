@@ -134,7 +134,7 @@ def test_an_image_alone_is_a_map_with_a_resolution(tmp_path, name):
         np.kron(np.array([[0, 255], [255, 205]]), np.ones((16, 16))).astype("B")
     )
     image.save(tmp_path / name)
-    with pytest.raises(MapFileError, match="how large its pixels are") as refused:
+    with pytest.raises(MapFileError, match="an image alone has no resolution") as refused:
         read_map(tmp_path / name)
     assert "--resolution" in refused.value.hint
     grid = read_bare_image(tmp_path / name, 0.02)

@@ -237,7 +237,7 @@ class Decision:
 
 
 class State(StrEnum):
-    """What the mission is doing."""
+    """State of the mission."""
 
     IDLE = "idle"
     WAITING_FOR_MAP = "waiting for map"

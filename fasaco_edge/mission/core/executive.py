@@ -196,8 +196,7 @@ class Executive:
         return len(ahead) > 1 and cell != tuple(ahead[0].tolist()) and self._stood_s() >= BESIDE_S
 
     def _stands_at(self, last: Cell | None) -> bool:
-        """Tell whether the robot stands in the last cell of a path that it did not drive
-        completely.
+        """Tell whether the robot stands in the last cell of a path that it did not complete.
 
         It missed a cell, so its index on the path is before the last.
         """

@@ -37,7 +37,7 @@ MANY_TAKEN = 30
 # Limits on a division's number: absolute, ahead of this robot's own, and the first of a newcomer.
 # Numbers beyond are errors.
 MOST_NUMBER, MOST_AHEAD, MOST_FIRST = 2**31 - 1, 2**10, 2**24
-LATER = "another robot has divided anew"
+LATER = "another robot has a newer division"
 
 AT_WORK = (State.PLANNING, State.COVERING, State.DEGRADED)
 OpenCells = Callable[[Window], NDArray[np.bool_]]
@@ -141,7 +141,7 @@ class FleetLayer:
         except FleetError as error:
             self.members[event.robot] = replace(member, left_out=str(error))
             raise
-        return f"{event.robot}: cells are to be swept again" if is_open_again else ""
+        return f"{event.robot}: cells must be swept again" if is_open_again else ""
 
     def mine(self, cells: NDArray[np.bool_], area: ReachableArea) -> NDArray[np.bool_]:
         """Return which cells are this robot's to sweep; all of them if its part has none.

@@ -58,7 +58,8 @@ class FrameSelector:
     def note_patches(self, patches: Sequence[MapPatch]) -> tuple[list[MapPatch], list[FasacoError]]:
         """Apply updates to the map of a frame that is not active.
 
-        Returns: The updates of the active frame; and the faults of the others.
+        Returns:
+            The updates of the active frame; and the faults of the others.
         """
         others = [frame for frame in self._maps if self.active not in ("", frame)]
         faults: list[FasacoError] = []

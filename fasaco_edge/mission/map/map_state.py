@@ -104,7 +104,8 @@ class MapState:
     def take_patches(self, patches: Sequence[MapPatch]) -> tuple[bool, list[FasacoError]]:
         """Take in consecutive map updates as one: the map is copied and classified once.
 
-        Returns: Whether the map has changed; and the faults of updates that could not be applied.
+        Returns:
+            Whether the map has changed; and the faults of updates that could not be applied.
         """
         own, faults = self.frames.note_patches(patches)
         if self.grid is None or self._patches_lost:

@@ -169,7 +169,8 @@ def order_document(order: MissionOrder) -> dict[str, object]:
 def located(order: MissionOrder, standing: tuple[StandingZone, ...]) -> MissionOrder:
     """Return an order with its named zones replaced by standing zones.
 
-    Raises: OrderError: there is no zone of that name.
+    Raises:
+        OrderError: there is no zone of that name.
     """
     known = {zone.name: tuple(zone.polygon) for zone in standing}
     for index, zone in enumerate(order.zones):

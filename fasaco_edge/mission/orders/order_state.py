@@ -204,7 +204,8 @@ class OrderState:
     def from_json(cls, note: str) -> OrderState:
         """Return the state encoded by ``to_json``.
 
-        Raises: OrderError: it has another version, or is incomplete.
+        Raises:
+            OrderError: it has another version, or is incomplete.
         """
         try:
             kept = msgspec.json.decode(note, type=_Note)
