@@ -262,10 +262,10 @@ def directions(tau: Tau) -> tuple[NDArray[np.int8], NDArray[np.float32]]:
     strongest, total = np.zeros(shape, np.float32), np.zeros(shape, np.float32)
     pointed = np.full(shape, -1, np.int8)
     for direction in range(4):
-        way = tau[..., direction]
-        pointed[way > strongest] = direction
-        np.maximum(strongest, way, out=strongest)
-        total += way
+        layer = tau[..., direction]
+        pointed[layer > strongest] = direction
+        np.maximum(strongest, layer, out=strongest)
+        total += layer
     return pointed, np.divide(strongest, total, out=strongest, where=total > 0)
 
 
@@ -274,13 +274,13 @@ def branching(tau: Tau) -> float:
 
     It is 1 if one direction dominates in every cell; 0 without steps.
     """
-    ways = [tau[..., direction] for direction in range(4)]
-    strongest = np.maximum(np.maximum(ways[0], ways[1]), np.maximum(ways[2], ways[3]))
+    layers = [tau[..., direction] for direction in range(4)]
+    strongest = np.maximum(np.maximum(layers[0], layers[1]), np.maximum(layers[2], layers[3]))
     weakest = strongest.copy()
-    for way in ways:
-        np.minimum(weakest, way, out=weakest, where=way > 0)
+    for layer in layers:
+        np.minimum(weakest, layer, out=weakest, where=layer > 0)
     least = weakest + np.float32(LAMBDA) * (strongest - weakest)
-    within = sum(int(np.count_nonzero((way > 0) & (way >= least))) for way in ways)
+    within = sum(int(np.count_nonzero((layer > 0) & (layer >= least))) for layer in layers)
     cells = int(np.count_nonzero(strongest))
     return within / cells if cells else 0.0
 

@@ -184,8 +184,8 @@ class CoverageProblem:
         cols = self.lattice.window.cols
         # Plain integers: numpy's would compile a second variant of the kernel.
         here, end = divmod(int(walk[-1]), cols), self.lattice.local(self.end)
-        way = shortest_walk(self.lattice.steps, here, end)
-        return np.concatenate((walk, way[1:, 0] * np.int32(cols) + way[1:, 1]))
+        rest = shortest_walk(self.lattice.steps, here, end)
+        return np.concatenate((walk, rest[1:, 0] * np.int32(cols) + rest[1:, 1]))
 
 
 def _check_cell(

@@ -28,7 +28,7 @@ STEP, LEAST_S = 0.01, 10.0
 # The drain is the median over the NEWEST stretches; at least FEWEST are needed.
 NEWEST, FEWEST = 15, 3
 # Period of updating the path back to the dock [s].
-WAY_EVERY_S = 5.0
+DOCK_EVERY_S = 5.0
 # Least difference between the levels of turning back and of resuming; factor on the time planned
 # for the rest, as lines are longer than walks over cells.
 BETWEEN, SPARE = 0.1, 1.2
@@ -112,7 +112,7 @@ class Charging:
     route: Route
     gauge: BatteryGauge = field(default_factory=BatteryGauge)
     # Time to the dock, time for the rest of the order where known [s], and when both were computed.
-    _way_s: float = field(default=0.0, init=False)
+    _to_dock_s: float = field(default=0.0, init=False)
     _rest_s: float | None = field(default=None, init=False)
     _looked_at: float | None = field(default=None, init=False)
     # The highest level since the robot is in its dock, and since when; None elsewhere.
@@ -129,12 +129,12 @@ class Charging:
             return
         if self._looked_at is None:
             self.gauge.begin(now)
-        elif self.gauge.drain_per_s is None or now - self._looked_at < WAY_EVERY_S:
+        elif self.gauge.drain_per_s is None or now - self._looked_at < DOCK_EVERY_S:
             return
         self._looked_at = now
         is_charging = self.orders.order_state.errand == "charge"
         self._rest_s = self._seconds_left() if is_charging else None
-        self._way_s = 0.0 if is_charging else self._seconds_to_dock()
+        self._to_dock_s = 0.0 if is_charging else self._seconds_to_dock()
 
     def silence(self, now: float) -> str:
         """Return why the battery level is unknown; "" where it is known or not needed."""
@@ -169,7 +169,7 @@ class Charging:
         low, drain = self.policy.low, self.gauge.drain_per_s
         if drain is None:
             return low
-        needed = self.policy.reserve + drain * SPARE * self._way_s
+        needed = self.policy.reserve + drain * SPARE * self._to_dock_s
         return min(max(low, needed), self.policy.enough - BETWEEN)
 
     @property
@@ -220,5 +220,5 @@ class Charging:
         if not is_last or area is None or goal is None or cells is None or not len(cells):
             return None
         ends = [(int(row), int(col)) for row, col in (cells[0], cells[-1])]
-        ways = area.shortest_path(goal, ends[0]), cells, area.shortest_path(ends[1], goal)
-        return sum(self.config.cost.of_walk(way) for way in ways)
+        walks = area.shortest_path(goal, ends[0]), cells, area.shortest_path(ends[1], goal)
+        return sum(self.config.cost.of_walk(walk) for walk in walks)

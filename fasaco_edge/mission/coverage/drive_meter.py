@@ -136,9 +136,9 @@ class DriveMeter:
             return
         yaws = [old.yaw for old in seen[begin : last + 1]]
         turned = abs(sum(math.remainder(b - a, math.tau) for a, b in pairwise(yaws)))
-        way = seen[first], seen[begin], seen[last], seen[-1]
-        way_m = sum(_apart(a, b) for a, b in pairwise(way))
-        took_s = seen[-1].at - seen[first].at - way_m / speed_m_s
+        stops = seen[first], seen[begin], seen[last], seen[-1]
+        distance_m = sum(_apart(a, b) for a, b in pairwise(stops))
+        took_s = seen[-1].at - seen[first].at - distance_m / speed_m_s
         for of_kind, (least, most) in ((self._quarters, QUARTER), (self._halves, HALF)):
             if least <= turned <= most:
                 of_kind.append(max(took_s, 0.0))
@@ -154,11 +154,11 @@ def _before(seen: list[_Seen], index: int, seconds: float) -> int | None:
 def _is_even(seen: list[_Seen]) -> bool:
     """Tell whether poses fit straight driving at constant speed."""
     a, b = seen[0], seen[-1]
-    most_m, way_s = UNEVEN * _apart(a, b), b.at - a.at
+    most_m, took_s = UNEVEN * _apart(a, b), b.at - a.at
     return all(
         math.hypot(
-            p.x - a.x - (b.x - a.x) * (p.at - a.at) / way_s,
-            p.y - a.y - (b.y - a.y) * (p.at - a.at) / way_s,
+            p.x - a.x - (b.x - a.x) * (p.at - a.at) / took_s,
+            p.y - a.y - (b.y - a.y) * (p.at - a.at) / took_s,
         )
         < most_m
         for p in seen

@@ -45,9 +45,9 @@ class PoseScatter:
         if len(self._before) == 2:
             first, middle = self._before
             dx, dy = pose.x - first.x, pose.y - first.y
-            way = math.hypot(dx, dy)
+            length = math.hypot(dx, dy)
             across = dx * (middle.y - first.y) - dy * (middle.x - first.x)
-            self._off_m.append(abs(across) / way if way else 0.0)
+            self._off_m.append(abs(across) / length if length else 0.0)
             if len(self._off_m) >= FEWEST:
                 self.sigma_m = median(self._off_m) / _MEDIAN_OFF
         self._before = (*self._before[-1:], pose)

@@ -61,7 +61,7 @@ TOUCH_M = 1e-9
 BLOCK = 256
 
 # A segment from one place to the next.
-Way = tuple[Place, Place]
+Segment = tuple[Place, Place]
 
 
 class SweptFloor:
@@ -218,9 +218,9 @@ class SweptFloor:
 
     def _keep(self, places: list[Place]) -> None:
         for place in places:
-            way = self._kept_to or place, place
-            window = self._around(way)
-            self._mark(window, np.packbits(self._under([way], window), axis=1))
+            segment = self._kept_to or place, place
+            window = self._around(segment)
+            self._mark(window, np.packbits(self._under([segment], window), axis=1))
             self._kept_to = place
 
     def _begin_ahead(self) -> None:
@@ -245,24 +245,24 @@ class SweptFloor:
         """Return the preliminary sweeps and their window."""
         if self._ahead is None:
             places = self._track.ahead()
-            ways = list(pairwise([self._kept_to or places[0], *places])) if places else []
-            windows = [self._around(way) for way in ways]
+            segments = list(pairwise([self._kept_to or places[0], *places])) if places else []
+            windows = [self._around(segment) for segment in segments]
             whole = Window.around(*windows) or NOWHERE
             if whole.rows * whole.cols > MOST_AHEAD:
                 # Poses that noisy are no drive, and a mask would take much memory.
-                whole, ways = NOWHERE, []
-            if len(ways) * whole.rows * whole.cols <= MOST_TOGETHER:
-                ahead = self._under(ways, whole)
+                whole, segments = NOWHERE, []
+            if len(segments) * whole.rows * whole.cols <= MOST_TOGETHER:
+                ahead = self._under(segments, whole)
             else:
                 ahead = np.zeros((whole.rows, whole.cols), np.bool_)
-                for way, window in zip(ways, windows, strict=True):
-                    ahead[window.slices_in(whole)] |= self._under([way], window)
+                for segment, window in zip(segments, windows, strict=True):
+                    ahead[window.slices_in(whole)] |= self._under([segment], window)
             self._ahead = whole, ahead
         return self._ahead
 
-    def _around(self, way: Way) -> Window:
+    def _around(self, segment: Segment) -> Window:
         """Return a window around a segment's sweep whose columns are whole bytes."""
-        start, end = way
+        start, end = segment
         reach = self._reach(end)
         row0, row1 = _span(start.y, end.y, reach, 1)
         col0, col1 = _span(start.x, end.x, reach, 8)
@@ -272,10 +272,10 @@ class SweptFloor:
         """Return the radius around a place that the tool swept with certainty [m]."""
         return max(0.5 * self._tool_m - end.error_m, 0.25 * self._tool_m)
 
-    def _under(self, ways: Sequence[Way], window: Window) -> Mask:
+    def _under(self, segments: Sequence[Segment], window: Window) -> Mask:
         """Return which pixel centres of a window the tool passed with certainty."""
         values = []
-        for start, end in ways:
+        for start, end in segments:
             # Relative to each start: far from the origin rounding would swamp differences.
             far_y, far_x = end.y - start.y, end.x - start.x
             length2 = far_x * far_x + far_y * far_y or 1.0

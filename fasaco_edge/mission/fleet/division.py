@@ -62,9 +62,9 @@ class Division:
 
     def owners(self, lattice: CoverageLattice) -> NDArray[np.int8]:
         """Return the index of each cell's robot, int8 (rows, cols)."""
-        ways_s = _ways_s(lattice, self.seeds, [robot.step_s for robot in self.robots])
-        ways_s += np.array(self.handicaps_s, np.float32)[:, None]
-        owners: NDArray[np.int8] = ways_s.argmin(axis=0).astype(np.int8)
+        times_s = _times_s(lattice, self.seeds, [robot.step_s for robot in self.robots])
+        times_s += np.array(self.handicaps_s, np.float32)[:, None]
+        owners: NDArray[np.int8] = times_s.argmin(axis=0).astype(np.int8)
         return owners.reshape(lattice.steps.shape)
 
 
@@ -84,16 +84,16 @@ def divide(
     cells = cells[:: -(-len(cells) // MOST_CELLS) or 1]
     if len(robots) == 1 or not len(cells):
         return Division(tuple(robots), tuple(starts), (0.0,) * len(robots))
-    from_starts_s = _ways_s(lattice, starts, steps_s)[:, cells]
+    from_starts_s = _times_s(lattice, starts, steps_s)[:, cells]
     scale = np.count_nonzero(wanted) / len(cells)
     rounds = max(1, min(ROUNDS, MOST_SEARCHED // (len(robots) * lattice.steps.size)))
     best: tuple[float, list[Cell], NDArray[np.float32]] | None = None
     for begin in (starts, _spread(lattice, cells, from_starts_s)):
         seeds = begin
         for _ in range(rounds):
-            ways_s = _ways_s(lattice, seeds, steps_s)[:, cells]
-            handicaps_s = _handicaps_s(ways_s, np.array(steps_s))
-            owner = (ways_s + handicaps_s[:, None]).argmin(axis=0)
+            times_s = _times_s(lattice, seeds, steps_s)[:, cells]
+            handicaps_s = _handicaps_s(times_s, np.array(steps_s))
+            owner = (times_s + handicaps_s[:, None]).argmin(axis=0)
             end_s = _end_s(from_starts_s, owner, scale * np.array(steps_s))
             if best is None or end_s < best[0]:
                 best = end_s, seeds, handicaps_s
@@ -102,26 +102,26 @@ def divide(
     return Division(tuple(robots), tuple(best[1]), tuple(best[2].tolist()))
 
 
-def _ways_s(lattice: CoverageLattice, cells: Sequence[Cell], steps_s: Sequence[float]) -> Seconds:
+def _times_s(lattice: CoverageLattice, cells: Sequence[Cell], steps_s: Sequence[float]) -> Seconds:
     """Return travel times from cells [s], float32 (k, rows * cols); huge where unreachable."""
-    ways = np.full((len(cells), lattice.steps.size), np.float32(1e9))
-    for way, cell, step_s in zip(ways, cells, steps_s, strict=True):
+    times = np.full((len(cells), lattice.steps.size), np.float32(1e9))
+    for time, cell, step_s in zip(times, cells, steps_s, strict=True):
         if lattice.contains(cell):
             row, col = lattice.local(cell)
-            way[:] = ways_from(lattice.steps, row * lattice.steps.shape[1] + col) * np.float32(
+            time[:] = ways_from(lattice.steps, row * lattice.steps.shape[1] + col) * np.float32(
                 step_s
             )
-    return ways
+    return times
 
 
-def _handicaps_s(ways_s: Seconds, steps_s: NDArray[np.float64]) -> Seconds:
+def _handicaps_s(times_s: Seconds, steps_s: NDArray[np.float64]) -> Seconds:
     """Return handicaps, float32 (k,), that balance the load, for travel times float32 (k, n)."""
-    handicaps = np.zeros(len(ways_s), np.float32)
+    handicaps = np.zeros(len(times_s), np.float32)
     best, least = handicaps, np.inf
-    change = float(np.ptp(ways_s)) / 2
+    change = float(np.ptp(times_s)) / 2
     for _ in range(CHANGES):
-        owner = (ways_s + handicaps[:, None]).argmin(axis=0)
-        load_s = np.bincount(owner, minlength=len(ways_s)) * steps_s
+        owner = (times_s + handicaps[:, None]).argmin(axis=0)
+        load_s = np.bincount(owner, minlength=len(times_s)) * steps_s
         if load_s.max() < least:
             best, least = handicaps, load_s.max()
         handicaps = (handicaps + change * (load_s / load_s.mean() - 1.0)).astype(np.float32)
@@ -132,10 +132,10 @@ def _handicaps_s(ways_s: Seconds, steps_s: NDArray[np.float64]) -> Seconds:
 def _end_s(from_starts_s: Seconds, owner: NDArray[np.int64], cell_s: NDArray[np.float64]) -> float:
     """Return when the last robot finishes, given its time per cell, float64 (k,) [s]."""
     ends_s = [0.0]
-    for robot, way_s in enumerate(from_starts_s):
+    for robot, time_s in enumerate(from_starts_s):
         own = owner == robot
         if own.any():
-            ends_s.append(float(way_s[own].min() + np.count_nonzero(own) * cell_s[robot]))
+            ends_s.append(float(time_s[own].min() + np.count_nonzero(own) * cell_s[robot]))
     return max(ends_s)
 
 
@@ -147,8 +147,8 @@ def _spread(
     seeds: list[int] = []
     for _ in range(count):
         seeds.append(int(nearest_s.argmax()))
-        (ways_s,) = _ways_s(lattice, [_cell(lattice, int(cells[seeds[-1]]))], [1.0])[:, cells]
-        nearest_s = np.minimum(nearest_s, ways_s) if len(seeds) > 1 else ways_s
+        (times_s,) = _times_s(lattice, [_cell(lattice, int(cells[seeds[-1]]))], [1.0])[:, cells]
+        nearest_s = np.minimum(nearest_s, times_s) if len(seeds) > 1 else times_s
     apart_s, order = from_starts_s[:, seeds].copy(), [0] * count
     for _ in range(count):
         robot, seed = divmod(int(apart_s.argmin()), count)

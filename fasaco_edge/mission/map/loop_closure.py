@@ -36,8 +36,8 @@ from fasaco_edge.mission.coverage.ledger import Cells, LedgerSnapshot
 LEAST_CELLS, LEAST_SHARE = 20, 0.1
 # Smaller motions are ignored: [m], [rad].
 STILL_M, STILL_RAD = 0.02, math.radians(0.2)
-# A point this close to a cell's centre [cells] belongs to that cell alone, not to its four
-# neighbours.
+# A point this close to a row, or column, of cell centres [cells] needs only that one covered, not
+# its neighbours on both sides.
 NEAR = 0.1
 # Intermediate map positions that are tested, as shares of the motion.
 BETWEEN = (0.25, 0.5, 0.75, 1.0)

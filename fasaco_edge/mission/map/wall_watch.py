@@ -59,8 +59,8 @@ class WallWatch:
         """
         last, self._last = self._last, pose
         if last is not None:
-            way_m = math.hypot(pose.x - last.x, pose.y - last.y)
-            self._driven_m += way_m if way_m <= JUMP_M else 0.0
+            distance_m = math.hypot(pose.x - last.x, pose.y - last.y)
+            self._driven_m += distance_m if distance_m <= JUMP_M else 0.0
         if self.is_over or self._driven_m < self._due_m:
             return None
         self._due_m = self._driven_m + BETWEEN_M

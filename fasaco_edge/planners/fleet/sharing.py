@@ -102,7 +102,7 @@ class Sharing:
         visits = 2 * max(odd, self.cells - odd) if returns else self.cells
         share = -(-visits // robots)
         share = share + share % 2 if returns else share - 1
-        farthest = int(self._ground.ways.min(axis=0)[self._reached.ravel()].max())
+        farthest = int(self._ground.distances.min(axis=0)[self._reached.ravel()].max())
         return max(share if self.cells > robots else 0, farthest * (2 if returns else 1))
 
     def progress(self) -> SearchProgress:

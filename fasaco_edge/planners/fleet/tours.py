@@ -37,7 +37,7 @@ class TourGround:
         lattice: the cells where robots fit.
         cost: prices of steps and turns.
         starts: flat cells.
-        ways: int32 (k, rows * cols): distance from each start to each cell, in steps.
+        distances: int32 (k, rows * cols): distance from each start to each cell, in steps.
     """
 
     def __init__(
@@ -46,7 +46,7 @@ class TourGround:
         self.lattice, self.cost = lattice, cost
         self._steps, self._cols = lattice.steps, lattice.steps.shape[1]
         self.starts = [row * self._cols + col for row, col in map(lattice.local, starts)]
-        self.ways = np.array([ways_from(self._steps, start) for start in self.starts])
+        self.distances = np.array([ways_from(self._steps, start) for start in self.starts])
         self._offsets = np.array([1, self._cols, -1, -self._cols], np.int64)
 
     def tour_of(self, cells: NDArray[np.int32]) -> Tour:
@@ -80,8 +80,8 @@ class TourGround:
                 at = int(near[0])
                 inner = np.roll(second, -place[beside[at]])
                 return np.concatenate((first[: at + 1], inner, inner[:1], first[at:]))
-        way = self._way(int(first[0]), int(second[0]))
-        return np.concatenate((way[:-1], second, way[:0:-1], first))
+        path = self._shortest(int(first[0]), int(second[0]))
+        return np.concatenate((path[:-1], second, path[:0:-1], first))
 
     def parted(self, tour: Tour, robots: Sequence[int]) -> dict[int, Tour]:
         """Split a tour until each robot has a part, with the shortest path to it and back."""
@@ -133,10 +133,10 @@ class TourGround:
         window = self.lattice.window
         return np.column_stack((rows + window.row0, cols + window.col0)).astype(np.int32)
 
-    def _way(self, begin: int, end: int) -> NDArray[np.int32]:
+    def _shortest(self, begin: int, end: int) -> NDArray[np.int32]:
         """Return a shortest path between two flat cells, with both, int32 (n,)."""
-        way = shortest_walk(self._steps, divmod(begin, self._cols), divmod(end, self._cols))
-        return (way @ (self._cols, 1)).astype(np.int32)
+        path = shortest_walk(self._steps, divmod(begin, self._cols), divmod(end, self._cols))
+        return (path @ (self._cols, 1)).astype(np.int32)
 
     def _visit_costs(self, tour: Tour) -> NDArray[np.int64]:
         """Return the cost of each visit: the turn in it and the step out of it [us]."""
@@ -150,9 +150,9 @@ class TourGround:
         """Split a tour in two, each with some of the robots."""
         found, order = np.zeros(5, np.int64), np.zeros(len(robots), np.int64)
         costs_us = np.concatenate(([0], np.cumsum(np.tile(self._visit_costs(tour), 2))))
-        ways, step_us = self.ways[robots], self.cost.step_us
+        distances, step_us = self.distances[robots], self.cost.step_us
         is_split = len(tour) > 1 and best_split(
-            self._steps.ravel(), self._offsets, tour, costs_us, ways, step_us, found, order
+            self._steps.ravel(), self._offsets, tour, costs_us, distances, step_us, found, order
         )
         if not is_split:
             return [(tour, robots[:1]), (tour[:1], robots[1:])]  # fewer cells than robots
@@ -165,13 +165,13 @@ class TourGround:
 
     def _reached(self, robot: int, part: Tour) -> Tour:
         """Return a part of a tour with the shortest path to it from a robot's start, and back."""
-        part = np.roll(part, -int(np.argmin(self.ways[robot][part])))
+        part = np.roll(part, -int(np.argmin(self.distances[robot][part])))
         if part[0] == self.starts[robot]:
             return part
-        way = self._way(self.starts[robot], int(part[0]))
+        path = self._shortest(self.starts[robot], int(part[0]))
         if len(part) == 1:
-            return np.concatenate((way, way[-2:0:-1]))
-        return np.concatenate((way[:-1], part, way[:0:-1]))
+            return np.concatenate((path, path[-2:0:-1]))
+        return np.concatenate((path[:-1], part, path[:0:-1]))
 
     def _cut_out(self, tour: Tour, wanted: NDArray[np.bool_]) -> CoverageProblem:
         """Return the problem of covering ``wanted`` around a tour, its ``before``."""

@@ -53,7 +53,7 @@ DEAR_PIECES, PIECES = 50, 5
 # This many windows without gain count as one perturbation.
 WINDOWS_A_PERTURBATION = 10
 # Beam of solving the whole ground, with expensive turns: WHOLE_STATES over its number of cells,
-# within the limits; WIDER times as many if no state is left.
+# within the limits; then WIDER times that if there was no gain.
 WHOLE_STATES, LEAST_BEAM, MOST_BEAM, WIDER = 8_000, 8, 100, 4
 
 # Cells that the bound solves in bands: per pause, and per call: some 3 % of the time with expensive
