@@ -130,8 +130,8 @@ class MissionConfig:
         plans_on_trail: whether the planner's ants start from the living trail.
         robot: its name in a fleet that shares the work; "" without one.
         battery: when to charge; None for never.
-        lattice_deg: the angle of the cells' rows to the x axis of the map frame [deg]; None for
-            along the walls, once the map shows them.
+        lattice_deg: angle of the cells' rows to the x axis of the map frame [deg]; None to align
+            them with the walls, once their direction is certain.
     """
 
     footprint: Footprint

@@ -1,4 +1,4 @@
-"""Maps to plan on: a map_server file, a built-in map, or a coverage grid of True and False."""
+"""Input maps of plans: a map_server file, a built-in map, or a coverage grid of True and False."""
 
 from __future__ import annotations
 

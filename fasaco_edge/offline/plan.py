@@ -87,7 +87,6 @@ def plan(
         watch: called with the progress of the search.
         observe: called with the colony's pheromone: a ``ColonySnapshot`` after each cohort, or
             once at the end of a search with local search; not by planners without pheromone.
-            the search with local search is over; nothing by planners without pheromone.
 
     Raises:
         BadConfiguration: a value is impossible.

@@ -44,7 +44,6 @@ class CoveragePath:
         saved: savings of ants and of local search against the first walk.
         first_walk_s: time to the first complete walk [s]: measured, so the only value that is
             not reproduced.
-            so the one thing here that a repetition does not repeat.
     """
 
     cells: NDArray[np.int32]

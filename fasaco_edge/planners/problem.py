@@ -51,8 +51,6 @@ class CoverageProblem:
         whole: the problem that this one is the end of, see ``after``: a path that solves this
             one begins with the lead, and its figures are those of the whole. None for a problem
             that is whole itself.
-            one begins with what comes before, and its figures are those of the whole. None for
-            a problem that is whole itself.
     """
 
     lattice: CoverageLattice

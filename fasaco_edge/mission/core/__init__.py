@@ -1,1 +1,1 @@
-"""The mission itself: events in, decisions out."""
+"""Core of the mission: events in, decisions out."""

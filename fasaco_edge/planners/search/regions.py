@@ -88,6 +88,7 @@ class Neighbourhood:
     Attributes:
         box: its cells.
         changed: int32 (n,), the changed cells, as cells of the region's own ground.
+        is_first: whether the robot and the cells just ahead of it are in it.
     """
 
     box: Box
