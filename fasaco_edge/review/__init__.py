@@ -1,1 +1,1 @@
-"""What happened in a recorded mission: figures, pictures, and two missions side by side."""
+"""The review of a recorded mission: figures, pictures, comparison of two missions."""

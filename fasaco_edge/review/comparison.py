@@ -1,4 +1,4 @@
-"""The figures of a run by name, and two runs side by side: how set-ups and figures differ."""
+"""The figures of a run by name, and the comparison of set-ups and figures of two runs."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ SETTINGS = {
     "turn acceleration": "robot.turn_deg_s2",
     "acceleration": "robot.acceleration_m_s2",
 }
-# Where these differ, walks, cells and times belong to different problems.
+# If these differ, walks, cells and times belong to different problems.
 ANOTHER_PROBLEM = ("tool width", "robot radius", "line", "width of lanes", "building", "orders")
 # These members compare in any case.
 ANYWAY = (
@@ -69,7 +69,7 @@ NUMBERS = (
 
 
 def setup_differences(one: ReviewDocument, other: ReviewDocument) -> list[Difference]:
-    """Return in what the set-ups of two runs differ; what one does not state does not count."""
+    """Return the differences of two runs' set-ups; settings missing in one do not count."""
     found = [
         (name, mine, theirs)
         for name, mine, theirs in (
@@ -115,7 +115,7 @@ def setup_words(one: ReviewDocument, other: ReviewDocument) -> str:
 
 
 def side_by_side(one: ReviewDocument, other: ReviewDocument) -> dict[str, object]:
-    """Return two documents, how their set-ups differ, and the differences of their numbers.
+    """Return two documents, the differences of their set-ups and of their numbers.
 
     A difference is the first less the second, of each number that both have and that compares.
     """
@@ -145,7 +145,7 @@ def differences(one: Mapping[str, object], other: Mapping[str, object]) -> dict[
 
 
 def compared_rows(one: ReviewDocument, other: ReviewDocument) -> list[Row]:
-    """Return the figures of two runs side by side, with the difference where they compare."""
+    """Return the figures of two runs side by side, with the difference if they compare."""
     mine, theirs = ({figure.name: figure for figure in figures(each)} for each in (one, other))
     compares = do_compare(setup_differences(one, other))
     anyway = {name for name, member, _ in NUMBERS if member in ANYWAY}
@@ -181,7 +181,7 @@ def _is_one_building(one: ReviewDocument, other: ReviewDocument) -> bool:
     pairs = zip(one.map.sides_m, other.map.sides_m, strict=True)
     if any(abs(mine - theirs) > SIDE_M for mine, theirs in pairs):
         return False
-    # A line reaches into cells whose centres the robot cannot stand at.
+    # A line also sweeps cells whose centres the robot cannot reach.
     if _line(one) != _line(other):
         return True
     mine, theirs = _cells_m2(one), _cells_m2(other)
@@ -191,12 +191,12 @@ def _is_one_building(one: ReviewDocument, other: ReviewDocument) -> bool:
 
 
 def _line(document: ReviewDocument) -> str:
-    """Return what was driven; recordings of before know nothing but cells."""
+    """Return the form of path that was driven; older recordings only know cells."""
     return str(document.config.get("planner.line", "cells"))
 
 
 def _lane_m(document: ReviewDocument) -> float | None:
-    """Return how far apart lanes lie, which is the edge of a cell [m]; None where not stated."""
+    """Return the spacing of lanes, the edge of a cell [m]; None if not stated."""
     width_m, overlap = (
         document.config.get(f"robot.{name}", 0.0) for name in ("tool_width_m", "overlap")
     )
@@ -228,7 +228,7 @@ class Figure:
 
 
 def figures(document: ReviewDocument) -> Iterator[Figure]:
-    """Yield the figures that two runs are compared by."""
+    """Yield the figures used to compare two runs."""
     share = f" ({document.share_covered})" if document.share_covered else ""
     covered = document.covered_cells
     yield Figure("complete", {True: "yes", False: "no", None: NOT_KNOWN}[document.complete])

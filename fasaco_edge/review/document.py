@@ -62,7 +62,7 @@ class TimesTaken(msgspec.Struct):
 
 
 class Trouble(msgspec.Struct):
-    """A time in which something was not as it should be."""
+    """A period with a fault."""
 
     state: str
     reason: str
@@ -71,7 +71,7 @@ class Trouble(msgspec.Struct):
 
 
 class Charge(msgspec.Struct, frozen=True):
-    """A time in which the robot charged, and how full its battery was before and after."""
+    """A period of charging, with the battery level before and after."""
 
     at_s: float
     seconds: float
@@ -80,7 +80,7 @@ class Charge(msgspec.Struct, frozen=True):
 
 
 class PheromoneFigures(msgspec.Struct, frozen=True):
-    """The pheromone that was drawn; None where nothing tells."""
+    """The recorded pheromone; None if unknown."""
 
     fields: int
     cells_share: float | None
@@ -229,7 +229,7 @@ class ReviewDocument(msgspec.Struct):
 
     @property
     def is_ended(self) -> bool:
-        """Whether each part was ended in order."""
+        """Whether each part was closed properly."""
         return all(part.ended for part in self.files)
 
     @property
@@ -241,7 +241,7 @@ class ReviewDocument(msgspec.Struct):
 
 
 def explanations() -> Iterator[str]:
-    """Yield what each member of a document means, behind its name."""
+    """Yield the name and meaning of each member of a document."""
     listed = inspect.getdoc(ReviewDocument) or ""
     for entry in re.split(r"\n {4}(?=\S)", listed.partition("Attributes:")[2])[1:]:
         yield " ".join(entry.split()).rstrip(".")

@@ -2,8 +2,8 @@
 
 Cells count as the mission's own ledger counts them: one is covered when the tool passes over
 its centre. So a walk is the cells in the order they were passed over. The floor is judged on the
-pixels of the last map along the recorded poses, by tool and robot of the configuration. What a
-keep-out zone touches is as good as a wall.
+pixels of the last map along the recorded poses, by tool and robot of the configuration. Pixels
+touched by a keep-out zone count as wall.
 """
 
 from __future__ import annotations
@@ -31,15 +31,15 @@ MILESTONES = (50, 90, 99, 100)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Drive:
-    """The robot's way over the lattice.
+    """The robot's walk over the lattice.
 
     Attributes:
         cells: int32 (n, 2), the cells (row, col) it passed over, in order.
-        at_s: float64 (n,), when [s].
-        visits: uint16, shape of the lattice: how often each was passed over.
-        reachable: bool, shape of the lattice: what could be covered at the end.
+        at_s: float64 (n,), times [s].
+        visits: uint16, shape of the lattice: passes over each cell.
+        reachable: bool, shape of the lattice: cells that could be covered at the end.
         coverage: counts over both.
-        driven_m: length of the way, without jumps [m].
+        driven_m: driven distance, without jumps [m].
     """
 
     cells: NDArray[np.int32]
@@ -66,14 +66,13 @@ def drive_over(
     track: NDArray[np.float64],
     lost_pose_s: float,
 ) -> Drive:
-    """Return the way of a robot over the lattice that the map has at the end.
+    """Return the walk of a robot over the lattice of the last map.
 
     Args:
-        lattice: without the cells to keep out of.
-        at_s: float64 (n,), when each pose came [s].
+        lattice: without keep-out cells.
+        at_s: float64 (n,), arrival of each pose [s].
         track: float64 (n, 3), the poses: x [m], y [m], yaw [rad].
-        lost_pose_s: after so long without a pose [s] the way to the next one is unknown; 0 for
-            never.
+        lost_pose_s: gap between poses [s] over which the path is unknown; 0 for none.
     """
     ledger = CoverageLedger(lattice.cell_m)
     walk: list[Cell] = []
@@ -82,7 +81,7 @@ def drive_over(
     last = track[0] if len(track) else np.zeros(3)
     for now, pose in zip(at_s.tolist(), track, strict=True):
         x, y = float(pose[0]), float(pose[1])
-        # As the mission has it: a pose kilometres astray is no drive.
+        # As in the mission: a jump of kilometres is no driving.
         if not lattice.contains(lattice.cell_at(x, y)):
             continue
         if 0 < lost_pose_s < now - before:
@@ -132,11 +131,11 @@ def first_covered(drive: Drive, lattice: CoverageLattice) -> NDArray[np.float64]
 
 
 def milestones(first_s: NDArray[np.float64], coverable: int) -> dict[int, float | None]:
-    """Return when each of MILESTONES was reached [s]; None where it was not.
+    """Return when each of MILESTONES was reached [s]; None if it was not.
 
     Args:
         first_s: float64 (n,), when each cell was first covered [s], ascending.
-        coverable: how many cells could be covered at the end.
+        coverable: number of cells that could be covered at the end.
     """
     needed = {percent: -(-coverable * percent // 100) for percent in MILESTONES}
     return {
@@ -146,7 +145,7 @@ def milestones(first_s: NDArray[np.float64], coverable: int) -> dict[int, float 
 
 
 def _reachable(lattice: CoverageLattice, track: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Return what can be reached from where the robot was last on coverable ground."""
+    """Return the cells reachable from the robot's last position on coverable ground."""
     for x, y, _ in track[::-1].tolist():
         cell = anchor_cell(lattice, Pose2D(x, y))
         if cell is not None:
@@ -170,15 +169,14 @@ def swept_floor(
     lost_pose_s: float,
     keep_out: tuple[Polygon, ...] | None = None,
 ) -> JudgedFloor | None:
-    """Return what the robot did to the floor; None without a pose on the map.
+    """Return the swept floor; None without a pose on the map.
 
-    None also where some was swept before the recording began: a recording does not tell what.
+    None also if floor was swept before the recording began: it is not in the recording.
 
     Args:
         data: of the samples, with a map and a configuration.
-        lattice: over that map; a pose beyond it is astray.
-        lost_pose_s: after so long without a pose [s] the way to the next one is unknown; 0 for
-            never.
+        lattice: over that map; a pose beyond it is invalid.
+        lost_pose_s: gap between poses [s] over which the path is unknown; 0 for none.
         keep_out: other keep-out zones than the last order's.
     """
     footprint = data.footprint
@@ -194,7 +192,7 @@ def swept_floor(
     driven = _driven(track, at_s, data.jump_m, lost_pose_s)
     tool_m = known_settings(data.config).robot.tool_width_m
     robot = SweepingRobot(tool_m, footprint.robot_radius_m, free_at_most=footprint.free_at_most)
-    # What can be reached is told from where the robot was in the end, as with the cells.
+    # Reachability is from the robot's last position, as for the cells.
     x, y = track[-1].tolist()
     grid = with_kept_out(data.grid, data.keep_out if keep_out is None else keep_out)
     return judge_floor(grid, track, robot, driven=driven, stands_at=(x, y))
@@ -203,7 +201,7 @@ def swept_floor(
 def _driven(
     track: NDArray[np.float64], at_s: NDArray[np.float64], jump_m: float, lost_pose_s: float
 ) -> NDArray[np.bool_]:
-    """Return which ways between poses, (n, 2), were driven, bool (n - 1,), as the ledger has it."""
+    """Return which segments between poses, (n, 2), were driven, bool (n - 1,), as in the ledger."""
     driven: NDArray[np.bool_] = np.hypot(*np.diff(track, axis=0).T) <= jump_m
     if lost_pose_s > 0:
         driven &= np.diff(at_s) <= lost_pose_s

@@ -89,7 +89,7 @@ def document_of(review: Review) -> ReviewDocument:
 
 
 def charges_of(review: Review) -> list[Charge]:
-    """Return each time the robot charged, with the levels in the statuses at its ends."""
+    """Return each period of charging, with the levels in the statuses at its ends."""
     levels = [
         (each.at_s, each.status.battery.level)
         for each in review.data.statuses

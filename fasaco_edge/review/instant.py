@@ -1,7 +1,7 @@
 """One moment of a recorded mission: robot, paths before and after, map, command, trail.
 
-It answers why the robot did then what it did. Maps are decoded once more up to that time, and the
-lines of paths are read as they were drawn: of many paths in quick succession not each one was.
+It shows why the robot acted as it did at that moment. Maps are decoded again up to that time, and
+paths are read as drawn: where paths follow each other quickly, some were not recorded as drawings.
 """
 
 from __future__ import annotations
@@ -28,14 +28,15 @@ if TYPE_CHECKING:
     from fasaco_edge.review.review import Review
     from fasaco_edge.review.run_data import PublishedPath
 
-# A turn is looked for so long before and after [s], and lasts at most so long.
+# A turn is searched for this long before and after [s], and lasts at most this long.
 TURN_S = 2.0
-# Less is a bend [deg]; a turn by so many more may be a second longer, or further off.
+# A smaller angle is a bend [deg]; per this many more degrees a turn may be a second longer, or
+# further off.
 TURN_DEG, SHORTER_DEG_S = 60.0, 20.0
-# How far ahead a path shows where it leads to [m]; less than this apart it leads the same way.
+# Distance ahead at which a path's heading is taken [m]; the least difference of two headings.
 AHEAD_M = 0.5
 APART_DEG = 60.0
-# What of the map changed is told for so long before [s].
+# Map changes are reported for this long before [s].
 MAP_S = 5.0
 
 DIRECTIONS = (
@@ -45,7 +46,7 @@ DIRECTIONS = (
 
 
 class PathThen(msgspec.Struct):
-    """A path: when it came, why, and where it leads on from the robot's place [deg]."""
+    """A path: its time, its reason, and its heading at the robot's position [deg]."""
 
     at_s: float
     revision: int
@@ -66,7 +67,7 @@ class MapThen(msgspec.Struct):
 
 
 class TurnThen(msgspec.Struct):
-    """The sharpest turn about a time: how far to the left [deg], where, and why."""
+    """The sharpest turn around a time: angle to the left [deg], position and reason."""
 
     begin_s: float
     end_s: float
@@ -77,7 +78,7 @@ class TurnThen(msgspec.Struct):
 
 
 class Instant(msgspec.Struct):
-    """All that is known of one moment; times are [s] since the recording began."""
+    """The state at one moment; times are [s] since the recording began."""
 
     at_s: float
     state: str | None
@@ -98,7 +99,7 @@ class Instant(msgspec.Struct):
 
 
 class Scene(msgspec.Struct, frozen=True):
-    """An instant and what a picture of it shows: the map then, and lines of the paths."""
+    """An instant with the data of its picture: the map then, and lines of the paths."""
 
     instant: Instant
     grid: OccupancyGrid | None
@@ -108,7 +109,7 @@ class Scene(msgspec.Struct, frozen=True):
 
 
 def scene_at(review: Review, at_s: float) -> Scene:
-    """Return what was at a time [s].
+    """Return the scene at a time [s].
 
     Raises:
         UnreadableRecording: a file of the recording is gone.
@@ -120,7 +121,7 @@ def scene_at(review: Review, at_s: float) -> Scene:
     span = next((s for s in reversed(review.states) if s.begin_s <= at_s), None)
     chapter = next((c for c in reversed(review.orders) if c.at_s <= at_s), None)
     turn = _turn(review, drawn, at_s)
-    # A turn has the path for its reason that came while it began.
+    # The reason of a turn is the path that arrived as it began.
     place = (turn.x, turn.y) if turn else pose[:2] if pose else None
     index = sum(path.at_s <= at_s for path in data.paths) - 1
     before, path, after = (
@@ -173,7 +174,7 @@ class _Drawn(msgspec.Struct):
         return self.lines.get(revision)
 
     def trail_at(self, at_ns: int) -> str:
-        """Return what the labels of the living trail said; "" where there were none."""
+        """Return the text of the living trail's labels; "" if there were none."""
         said = []
         for lead, entity in (("", entities.COHORT), ("from the robot's cell ", entities.HERE)):
             past = [one for one in self.labels[entity] if one.at_ns <= at_ns]
@@ -205,9 +206,9 @@ def _path(
 
 
 def heading_from(line: NDArray[np.float64], place: tuple[float, float]) -> float | None:
-    """Return where a line (n, 2) leads to from its point nearest to a place, (-180, 180] [deg].
+    """Return the heading of a line (n, 2) at its point nearest to a position, (-180, 180] [deg].
 
-    None where it ends there.
+    None if it ends there.
     """
     if len(line) < 2:
         return None
@@ -223,7 +224,7 @@ def heading_from(line: NDArray[np.float64], place: tuple[float, float]) -> float
 
 
 def _turn(review: Review, drawn: _Drawn, at_s: float) -> TurnThen | None:
-    """Return the sharpest turn about a time; None where it went on as it did."""
+    """Return the sharpest turn around a time; None if the robot went straight."""
     data = review.data
     times, track = data.times, data.track
     about = np.abs(times - at_s) <= TURN_S
@@ -233,7 +234,7 @@ def _turn(review: Review, drawn: _Drawn, at_s: float) -> TurnThen | None:
     yaw = np.degrees(np.unwrap(track[:, 2]))
     turned = yaw[None, :] - yaw[:, None]
     seconds = times[None, :] - times[:, None]
-    # Of turns as sharp the shortest and nearest one; two in a row are two.
+    # Of equally sharp turns the shortest and nearest one; two in a row are two.
     away = np.abs((times[None, :] + times[:, None]) / 2 - at_s)
     sharp = np.minimum(np.abs(turned), 180.0) - SHORTER_DEG_S * (seconds + away)
     worth = np.where((seconds > 0) & (seconds <= TURN_S), sharp, 0.0)
@@ -256,7 +257,7 @@ def _why(
     begin_s: float,
     end_s: float,
 ) -> str:
-    """Return which path turned the robot at a place: a new one, or the one that it followed."""
+    """Return the path that turned the robot at a position: a new one, or the one it followed."""
     index = sum(path.at_s <= begin_s for path in paths) - 1
     known = [
         (path, heading)

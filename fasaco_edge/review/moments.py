@@ -1,4 +1,4 @@
-"""What stands out in a recording: states and their lengths, replans, worst moments, faults."""
+"""Extremes of a recording: states and their durations, replans, worst moments, faults."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ from fasaco_edge.review.run_data import PublishedPath, RunData
 # Less than this is no motion.
 STILL_M = 0.05
 STILL_RAD = 0.1
-# In these the robot has nothing to do, or not yet.
+# States in which the robot has nothing to do, or not yet.
 AT_REST = (
     *("idle", "waiting for map", "waiting for pose"),
     *("loading", "charging", "done", "silent"),
 )
 TROUBLES = ("degraded", "blocked", "silent")
-# The effect of a command is published at most so long after it [s].
+# The effect of a command is published at most this long after it [s].
 COMMAND_S = 1.5
 RECORDER_IN_ORDER = ("recording", "stopping")
 # "path blocked at cell (2, 3)" is of the kind "path blocked".
@@ -36,14 +36,14 @@ _DETAIL = re.compile(r":| at cell|,| \d")
 _MAP = "map: "
 _CHANGES = ("more", "fewer", "passages changed")
 _ERROR = re.compile(r"error (\d+): ")
-# Log lines of a recorder where nothing is wrong.
+# Log lines of a recorder without a fault.
 IN_ORDER = tuple(f"{state}: " for state in RECORDER_IN_ORDER)
 NOT_RECORDED = "code not recorded"
 
 
 @dataclass(frozen=True, slots=True)
 class Span:
-    """A time [s] in which something held, and why."""
+    """A period of a state [s], and its reason."""
 
     name: str
     begin_s: float
@@ -52,7 +52,7 @@ class Span:
 
     @property
     def seconds(self) -> float:
-        """How long it held [s]."""
+        """Its duration [s]."""
         return self.end_s - self.begin_s
 
 
@@ -61,8 +61,8 @@ class Moment:
     """An extreme of some figure.
 
     Attributes:
-        what: which figure it is the extreme of.
-        value, unit: how much it was.
+        what: name of the figure.
+        value, unit: of the extreme.
         at_s: when it began [s].
         note: context of it.
     """
@@ -75,7 +75,7 @@ class Moment:
 
 
 def spans_of(entered: Sequence[tuple[float, str, str]], end_s: float) -> tuple[Span, ...]:
-    """Return how long states lasted that were entered at some times, for some reasons."""
+    """Return the periods of states entered at given times, for given reasons."""
     spans: list[Span] = []
     for at_s, state, reason in entered:
         # Parts begin with the state in force.
@@ -137,12 +137,12 @@ def longest_gap(what: str, at_s: Sequence[float], during: Span) -> Moment | None
 def largest_drop(
     fractions: NDArray[np.float64], map_s: Sequence[float], command_s: Sequence[float] = ()
 ) -> Moment | None:
-    """Return by how much a new map made the covered share of what was known smaller, at most.
+    """Return the largest drop of the covered share that was caused by a new map.
 
     Args:
-        fractions: float64 (n, 2), when [s], and the covered share as the daemon published it.
-        map_s: when maps and updates came [s].
-        command_s: when commands came [s]: what drops with one, no map has made smaller.
+        fractions: float64 (n, 2), times [s] and covered shares as published by the daemon.
+        map_s: arrivals of maps and updates [s].
+        command_s: arrivals of commands [s]: a drop at a command is not caused by a map.
     """
     drops = list(_drops(fractions, np.array(sorted(map_s)), np.array(sorted(command_s))))
     return max(drops, key=lambda drop: drop.value, default=None)
@@ -174,7 +174,7 @@ class Replans:
 
     @classmethod
     def of(cls, paths: Sequence[PublishedPath]) -> Replans:
-        """Sort out ``paths``; those that no plan was needed for are none."""
+        """Return the replans in ``paths``; paths without a plan are none."""
         planned = [path for path in paths if path.about.planner]
         later = [
             after
@@ -198,17 +198,17 @@ class Replans:
         return {kind: (percentile(ms, 50), percentile(ms, 100)) for kind, ms in took.items()}
 
     def slowest_first(self, most: int) -> list[PublishedPath]:
-        """Return up to ``most`` of them, those that took longest first."""
+        """Return up to ``most`` of them, the slowest first."""
         return sorted(self.later, key=lambda path: -(path.plan_ms or 0.0))[:most]
 
     @property
     def slowest(self) -> PublishedPath | None:
-        """The one that took longest."""
+        """The slowest one."""
         timed = [path for path in self.later if path.plan_ms is not None]
         return max(timed, key=lambda path: path.plan_ms or 0.0, default=None)
 
     def milliseconds(self, percent: float) -> float | None:
-        """Return a percentile of what they took [ms], by nearest rank."""
+        """Return a percentile of their durations [ms], by nearest rank."""
         return percentile([p.plan_ms for p in self.later if p.plan_ms is not None], percent)
 
 
@@ -247,7 +247,7 @@ def worst_moments(
         reason = slowest.about.reason
         found.append(Moment("slowest replan", slowest.plan_ms, "ms", slowest.at_s, reason))
     found.append(largest_drop(fractions, data.map_s, [at_s for at_s, _, _ in data.commands]))
-    # A mission that was begun again has its moments each time: the worst one counts.
+    # A restarted mission has such moments several times: the worst one counts.
     worst: dict[str, Moment] = {}
     for moment in found:
         if moment is not None and (

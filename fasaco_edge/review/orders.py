@@ -1,4 +1,4 @@
-"""The orders of a recording, one chapter each: when it held, and its result."""
+"""The orders of a recording, one section each: when it was in force, and its result."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from fasaco_edge.review.moments import Span
 from fasaco_edge.review.run_data import RunData, StatusSample
 from fasaco_edge.wire.documents.replies import UnreachedArea
 
-# What comes so soon after a status [s] is still of the same step.
+# Samples this soon after a status [s] are of the same step.
 SAME_STEP_S = 1.5
 ENDS = ("cancel", "reset")
 # In these an order is over, or there is none: the same one would start again.
@@ -27,17 +27,17 @@ class OrderChapter:
 
     Attributes:
         ordered: "command", or "itself" for one that was given before the recording.
-        at_s, until_s: while it held [s].
-        ended_by: "cancel" or "reset"; "start" where another took its place; None for the end of
-            the recording.
+        at_s, until_s: period in force [s].
+        ended_by: "cancel" or "reset"; "start" if another replaced it; None for the end of the
+            recording.
         state: of the mission, the last one; None without any.
-        covered_cells, coverable_cells: by the last status; None where that is outdated.
-        complete: whether it came to ``done`` with nothing missing; None where that is not recorded.
-        order: what it asked for, as a command says it; None for one from before the recording.
-        replans: paths that a plan led to while it held.
-        paused_s: how long it was paused [s].
-        driven_m: what the robot drove meanwhile, without jumps [m].
-        unreached: what stayed uncovered, by its last status: place, area and reason of each.
+        covered_cells, coverable_cells: by the last status; None if that is outdated.
+        complete: whether it reached ``done`` with nothing missing; None if not recorded.
+        order: its content as in a command; None for one from before the recording.
+        replans: paths from a plan while it was in force.
+        paused_s: time paused [s].
+        driven_m: distance driven meanwhile, without jumps [m].
+        unreached: uncovered areas by its last status: position, area and reason of each.
     """
 
     ordered: str
@@ -56,7 +56,7 @@ class OrderChapter:
 
 
 class CommandThen(msgspec.Struct):
-    """A command: when it came [s], and what it said, in words."""
+    """A command: its time [s] and its text."""
 
     at_s: float
     command: str
@@ -71,14 +71,14 @@ def commands_of(data: RunData) -> list[CommandThen]:
 
 
 def command_words(name: str, order: MissionOrder) -> str:
-    """Return a command in words, with what it asked for."""
+    """Return a command in words, with its order."""
     if name != "start":
         return name
     return f"start: {order_words(msgspec.convert(order_document(order), OrderDocument))}"
 
 
 def order_words(order: OrderDocument) -> str:
-    """Return what an order asks for, in words."""
+    """Return an order in words."""
     asked = [
         f"zone {zone.name}" + (f" {zone.passes} times" if (zone.passes or 1) > 1 else "")
         for zone in order.zones
@@ -128,7 +128,7 @@ def is_complete(state: str, sample: StatusSample | None, covered: int, coverable
 def _held(
     data: RunData, states: Sequence[Span], end_s: float
 ) -> Iterator[tuple[str, float, float, str | None, MissionOrder | None]]:
-    """Yield who gave each order, from when to when it held [s], what ended it, and the order."""
+    """Yield each order with its source, its period in force [s] and its end."""
     ordered, began, order = "itself", 0.0, None
     is_open = True
     for at_s, name, given in data.commands:

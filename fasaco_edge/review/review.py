@@ -47,7 +47,7 @@ from fasaco_edge.review.orders import OrderChapter, chapters, is_complete, is_st
 from fasaco_edge.review.run_data import RunData, first_counted, gather
 from fasaco_edge.wire.documents.settings import known_settings
 
-# Progress is reported with each so many-th sample.
+# Progress is reported with every n-th sample.
 REPORT_EVERY = 200
 
 Progress = Callable[[str, int, int], None]
@@ -59,7 +59,7 @@ def read_review(paths: Sequence[Path], progress: Progress = lambda *_: None) -> 
     """Read the parts of one run, and review it.
 
     Args:
-        paths: the files, in any order; they are left as they are.
+        paths: the files, in any order; they are not changed.
         progress: called now and then.
 
     Raises:
@@ -105,21 +105,21 @@ class Review:
     Attributes:
         record: its files, plots, states and log.
         data: of its samples.
-        lattice: over the map at the end; None without a map or a configuration, or where the map
-            is too large or too far away.
-        no_lattice: why there is none; "" where there is one.
-        drive, walk: what the robot drove over it.
-        floor: what of the reachable floor it swept; None without a drive, or where some was swept
+        lattice: over the last map; None without a map or a configuration, or if the map is too
+            large or too far away.
+        no_lattice: why there is none; "" if there is one.
+        drive, walk: the robot's drive over it.
+        floor: the swept part of the reachable floor; None without a drive, or if some was swept
             before.
-        first_s: float64 (n,), when each cell was first covered, ascending; where a line over the
-            floor was driven, as the daemon counted: the track passes beside centres then.
-        first_of: how many cells could be covered at the end, by the same count.
-        counts: of cells; None where that is not recorded.
+        first_s: float64 (n,), when each cell was first covered, ascending; by the daemon's counts
+            if a line over the floor was driven, because the track then passes beside centres.
+        first_of: number of cells that could be covered at the end, by the same count.
+        counts: of cells; None if not recorded.
         replans: plans after the first.
         states: of the mission, in order.
         recorder_states: of the recorder.
         moments: the worst ones.
-        faults: what was refused and what was lost.
+        faults: refused messages and losses.
         missing: samples that were lost before they were written.
     """
 
@@ -153,13 +153,13 @@ class Review:
 
     @property
     def known_fractions(self) -> NDArray[np.float64]:
-        """When [s], and which share of what was known then was covered; float64 (n, 2)."""
+        """Times [s] and covered shares of the cells known then; float64 (n, 2)."""
         nothing = np.zeros((0, 2))
         return self.record.plots.get(entities.COVERED_FRACTION, nothing)
 
     @property
     def complete(self) -> bool | None:
-        """Whether the last order came to ``done``, nothing missing; None where not recorded."""
+        """Whether the last order reached ``done`` with nothing missing; None if not recorded."""
         if not self.state or (self.state == "done" and self.counts is None):
             return None
         if self.counts is None:
@@ -169,7 +169,7 @@ class Review:
 
     @property
     def troubles(self) -> list[Span]:
-        """Each time the mission was not as it should be, or the recorder, in order."""
+        """The periods with a fault of mission or recorder, in order."""
         mission = [span for span in self.states if span.name in TROUBLES]
         recorder = [
             replace(span, name=f"recorder: {span.name}")
@@ -188,7 +188,7 @@ class Review:
 
     @property
     def reached_s(self) -> dict[int, float | None] | None:
-        """When each of ``MILESTONES`` was reached [s]; None where that is not recorded."""
+        """When each of ``MILESTONES`` was reached [s]; None if not recorded."""
         if self.drive is None or self.data.restored_cells:
             return None
         return milestones(self.first_s, self.first_of)
@@ -203,9 +203,9 @@ def review_of(record: RunRecord, data: RunData, missing: int) -> Review:
     """Return the review of a recording.
 
     Args:
-        record: what was read of it.
+        record: its content.
         data: of its samples.
-        missing: how many samples were lost in between.
+        missing: number of samples lost in between.
     """
     end_s = _end_s(record, data)
     lattice, no_lattice = _lattice(data)
@@ -240,7 +240,7 @@ def review_of(record: RunRecord, data: RunData, missing: int) -> Review:
 
 
 def _lattice(data: RunData) -> tuple[CoverageLattice | None, str]:
-    """Return the lattice over the map at the end, or why there is none."""
+    """Return the lattice over the last map, or why there is none."""
     footprint = data.footprint
     if data.grid is None:
         return None, "there is no map"
@@ -257,7 +257,7 @@ def _lattice(data: RunData) -> tuple[CoverageLattice | None, str]:
 
 
 def _end_s(record: RunRecord, data: RunData) -> float:
-    """Return when the recording ended [s]; samples are written before what is drawn of them."""
+    """Return when the recording ended [s]; samples are written before their drawings."""
     return max(1e-9 * (record.ended_ns - record.began_ns), data.last_s)
 
 
@@ -293,7 +293,7 @@ def _counts(
         return CoverageCounts(
             own.covered, own.coverable, own.recovered, own.unreachable, source="status"
         )
-    # The track does not show what was covered before the recording began.
+    # Cells covered before the recording began are not in the track.
     if drive is None or data.restored_cells:
         return None
     cover = drive.coverage
@@ -310,7 +310,7 @@ def _first_covered(
 ) -> tuple[NDArray[np.float64], int]:
     """Return when each cell was first covered [s], float64 (n,), and how many could be at the end.
 
-    A line over the floor covers cells beside whose centres it leads: only the daemon counted them.
+    A line over the floor covers cells without passing their centres: only the daemon counted them.
     """
     is_line = known_settings(data.config).planner.line != "cells"
     if is_line and counts is not None and counts.source == "status":

@@ -29,7 +29,7 @@ from fasaco_edge.wire.messages.maps import decode_map_update, decode_occupancy_g
 from fasaco_edge.wire.messages.poses import PoseDecoder
 from fasaco_edge.wire.schemas import POSE_STAMPED
 
-# The reasons that the mission gives when it asks for a better path, and when it takes one.
+# The mission's reasons for requesting a better path, and for accepting one.
 SPARE, BETTER = "spare time", "better further on"
 
 
@@ -38,10 +38,10 @@ class MadePlan:
     """A plan that was made.
 
     Attributes:
-        at_s: when it came back, since the recording began [s].
-        took_ms: how long planning took [ms].
-        reason: why it was asked for; "" where that is not recorded.
-        is_attempt: whether it was only to make the path better.
+        at_s: when it was finished, since the recording began [s].
+        took_ms: duration of planning [ms].
+        reason: why it was requested; "" if not recorded.
+        is_attempt: whether it was only an attempt to improve the path.
         is_used: whether it became a path.
     """
 
@@ -54,7 +54,7 @@ class MadePlan:
 
 @dataclass(slots=True)
 class PlanLog:
-    """Joins the plans asked for with what became of them, batch by batch."""
+    """Matches plan requests with their results, batch by batch."""
 
     plans: list[MadePlan] = field(default_factory=list)
     _asked: dict[int, str] = field(default_factory=dict)
@@ -98,7 +98,7 @@ class PublishedPath:
 
     @property
     def plan_ms(self) -> float | None:
-        """How long planning took [ms]; None where no plan was needed."""
+        """Duration of planning [ms]; None if no plan was needed."""
         return self.about.plan_ms if self.about.planner else None
 
 
@@ -115,10 +115,10 @@ class RunData:
     """All data in the samples; times are [s] since the recording began.
 
     Attributes:
-        pose_s, poses: when each pose came, and x [m], y [m], yaw [rad] of it.
-        map_s: when each map and each update came.
+        pose_s, poses: arrival of each pose, and its x [m], y [m], yaw [rad].
+        map_s: arrival of each map and update.
         paths, statuses: in order.
-        commands: when each came, its name, and what a ``start`` was to start.
+        commands: arrival and name of each, and the order of a ``start``.
         plan_log: plans, by the turn log.
         grid: the map at the end, with all updates.
         ordered_keep_out: polygons of the last order.
@@ -157,7 +157,7 @@ class RunData:
 
     @property
     def keep_out(self) -> tuple[Polygon, ...]:
-        """What the robot had to keep out of, at the end: by the last order and always."""
+        """Keep-out zones in force at the end: of the last order and of the configuration."""
         always = known_settings(self.config).mission
         polygons = self.ordered_keep_out + always.keep_out
         with suppress(BadConfiguration):
@@ -166,7 +166,7 @@ class RunData:
 
     @property
     def footprint(self) -> Footprint | None:
-        """Tool, robot and thresholds by the configuration; None where it does not tell."""
+        """Tool, robot and thresholds of the configuration; None if unknown."""
         known = known_settings(self.config)
         cell_m, radius_m = known.cell_m, known.robot.radius_m
         if not cell_m or not radius_m:
@@ -182,7 +182,7 @@ class RunData:
 
     @property
     def jump_m(self) -> float:
-        """Two poses further apart than this are no drive [m]."""
+        """Two poses further apart than this are a jump [m]."""
         return JUMP_CELLS * self.footprint.cell_m if self.footprint else math.inf
 
     @property
@@ -199,9 +199,9 @@ class RunData:
 def first_counted(statuses: Iterable[StatusSample]) -> NDArray[np.float64]:
     """Return when the daemon had counted each number of covered cells, float64 (n,) [s], rising.
 
-    A recording has a status each quarter of a minute: between two of them cells are taken to have
-    been covered evenly. What stopped counting, as after a reset or a loop closure, counts from when
-    it was covered again.
+    A recording has a status each quarter of a minute: cells are interpolated evenly between two of
+    them. Cells that stopped counting, as after a reset or a loop closure, count from when they were
+    covered again.
     """
     at_s: list[float] = []
     before_s: float | None = None
@@ -253,7 +253,7 @@ class _SampleReader:
         }
 
     def read(self, arrival: Arrival) -> None:
-        # A part begins with what was in force before it.
+        # A part begins with the samples in force before it.
         self._now = max(1e-9 * (arrival.wall_ns - self._began_ns), 0.0)
         self.data.last_s = max(self.data.last_s, self._now)
         reader = self._readers.get(arrival.topic)
@@ -308,7 +308,7 @@ class _SampleReader:
     def _path(self, arrival: Arrival) -> None:
         about = decode_tolerant(arrival.sample.attachment, PathAttachment)
         paths = self.data.paths
-        # One that is published again is still the same.
+        # A path that is published again is the same.
         if paths and paths[-1].about.revision == about.revision:
             return
         paths.append(PublishedPath(self._now, about))

@@ -1,7 +1,13 @@
 """One spot of the floor: swept or not, and why not.
 
-The reasons are looked for in this order: the map does not show it, it is no floor, a keep-out zone,
-no way for the robot, not ordered; what the robot could have swept it missed, or its path passed by.
+Reasons are checked in this order:
+
+1. the map does not show it;
+2. it is no floor;
+3. it is in a keep-out zone;
+4. the robot cannot reach it;
+5. it is not part of the order;
+6. it is sweepable, but was missed by the robot or by its path.
 """
 
 from __future__ import annotations
@@ -32,23 +38,23 @@ from fasaco_edge.wire.documents.settings import known_settings
 if TYPE_CHECKING:
     from fasaco_edge.review.review import Review
 
-# A path that leads so near [m] would have swept what lies at its tool's edge.
+# A path this near [m] would have swept a spot at its tool's edge.
 NEAR_M = 0.02
-# The reason of a path whose line alone is another, as the mission gives it.
+# The mission's reason for a path that differs only in its line.
 POLISHED = "line polished"
-# Patches that are listed, the largest first, and the least one [m2].
+# Number of listed patches, the largest first, and the smallest area [m2].
 MOST_PATCHES, LEAST_M2 = 8, 0.04
 
 
 class Spot(msgspec.Struct):
-    """A place (x, y) [m] in the map frame, and why it was not swept.
+    """A position (x, y) [m] in the map frame, and why it was not swept.
 
     Attributes:
-        swept: whether the tool passed over it; None where that is not known.
+        swept: whether the tool passed over it; None if unknown.
         why: the reason in a word: swept, never seen, not floor, keep-out, too narrow, closed off,
             not ordered, still to come, seen late, missed, not worth it, not known.
         words: the reason in full.
-        missed_m: how far the edge of the tool stayed away from it [m].
+        missed_m: least distance of the tool's edge [m].
         nearest_s: when the robot came nearest [s since the recording began].
         seen_s: when the map first showed it free [s].
         patch_m2: all unswept floor in one piece with it [m2].
@@ -66,7 +72,7 @@ class Spot(msgspec.Struct):
 
 
 class LeftPatch(msgspec.Struct, frozen=True):
-    """Reachable floor in one piece that was not swept: its area, and its most inner place [m]."""
+    """A connected patch of unswept reachable floor: its area, and an inner point [m]."""
 
     m2: float
     x: float
@@ -74,7 +80,7 @@ class LeftPatch(msgspec.Struct, frozen=True):
 
 
 def left_patches(floor: JudgedFloor) -> list[LeftPatch]:
-    """Return the largest patches that a robot left, the largest first."""
+    """Return the largest unswept patches, the largest first."""
     found, rest, pixel_m2 = [], floor.unswept, floor.geometry.resolution**2
     patches = Patches.of(rest)
     cols = rest.shape[1] + 1
@@ -100,7 +106,7 @@ def spots_left(review: Review) -> list[Spot]:
 
 
 def explain(review: Review, places: Sequence[tuple[float, float]]) -> list[Spot]:
-    """Return of each place (x, y) [m] why it was not swept, or that it was.
+    """Return for each position (x, y) [m] why it was not swept, or that it was.
 
     Raises:
         UnreadableRecording: a file of the recording is gone.
@@ -110,14 +116,14 @@ def explain(review: Review, places: Sequence[tuple[float, float]]) -> list[Spot]
 
 
 class _DrawnLater:
-    """What is read once more of a recording, for all places together, where one needs it."""
+    """Data read again from a recording on demand, once for all positions."""
 
     def __init__(self, review: Review, places: Sequence[tuple[float, float]]) -> None:
         self._review, self.places = review, places
 
     @cached_property
     def seen_s(self) -> list[float | None]:
-        """Since when the map has shown each place free to the end [s]."""
+        """When the map first showed each position free, to the end [s]."""
         record, footprint = self._review.record, self._review.data.footprint
         free_at_most = footprint.free_at_most if footprint else -1
         since: list[float | None] = [None] * len(self.places)
@@ -138,7 +144,7 @@ class _DrawnLater:
 
 
 class _Judge:
-    """Looks for the reason of one place."""
+    """Finds the reason for one position."""
 
     def __init__(self, review: Review, drawn: _DrawnLater, number: int) -> None:
         self._review, self._drawn, self._number = review, drawn, number
@@ -166,7 +172,7 @@ class _Judge:
         return self._within_reach(floor)
 
     def _off_the_floor(self, grid: OccupancyGrid, footprint: Footprint) -> Spot | None:
-        """Tell why it is no floor to sweep by the map and the order; None where it is."""
+        """Return why it is no floor to sweep by map and order; None if it is."""
         value = _value(grid.cells, grid.geometry, self._x, self._y)
         if value is None:
             return self._spot("never seen", "outside of the map at the end")
@@ -184,7 +190,7 @@ class _Judge:
         return None
 
     def _out_of_reach(self, grid: OccupancyGrid) -> Spot:
-        """Tell why the tool cannot come to it."""
+        """Return why the tool cannot reach it."""
         lattice, footprint = self._review.lattice, self._data.footprint
         assert lattice is not None
         assert footprint is not None
@@ -194,7 +200,7 @@ class _Judge:
                 return self._spot("keep-out", "a keep-out zone is in the way, or too near")
         geometry = grid.geometry
         free_mask = (grid.cells >= FREE) & (grid.cells <= footprint.free_at_most)
-        # As the judge has it: a disc fits where all that it touches is free.
+        # As in the judge: a disc fits if all pixels that it touches are free.
         radius_px, tool_px = (m / geometry.resolution for m in (self._radius_m, self._tool_m / 2))
         fits = ~within(~np.pad(free_mask, 1), radius_px + 0.5)[1:-1, 1:-1]
         could = within(fits, tool_px)
@@ -233,7 +239,7 @@ class _Judge:
         return spot
 
     def _missed(self, missed_m: float, nearest_s: float) -> Spot:
-        """Tell why the tool passed by."""
+        """Return why the tool missed it."""
         by = f"the tool's edge passed {100 * missed_m:.0f} cm from it at {clock(nearest_s)}"
         if self._data.zones and self._zone([zone.polygon for zone in self._data.zones]) is None:
             words = f"in no zone of the last order; {by}"
@@ -269,13 +275,13 @@ class _Judge:
         return None
 
     def _left_by(self, over: DrawnLine) -> tuple[str, str]:
-        """Tell what became of a path that led over it."""
+        """Return the fate of a path that led over it."""
         led = f"path {over.revision} led over it"
         later = [p.about for p in self._data.paths if p.about.revision > over.revision]
         if not later:
             return "missed", f"{led}, and the robot did not follow it so far"
         words = f"{led}, until path {later[0].revision} took its place ({later[0].reason})"
-        # What makes a line shorter leaves floor that is not worth the way.
+        # A shorter line leaves floor that is not worth the distance.
         return "not worth it" if later[0].reason in (POLISHED, BETTER) else "missed", words
 
     def _zone(self, polygons: Sequence[Polygon | None]) -> int | None:
@@ -287,8 +293,8 @@ class _Judge:
 
 
 def is_inside(polygon: Polygon, x: float, y: float) -> bool:
-    """Return whether a polygon holds a place [m]."""
-    # As one cell of a lattice whose centre the place is.
+    """Return whether a polygon contains a point [m]."""
+    # As one cell of a lattice with its centre at the point.
     moved = tuple((px - x + 0.5, py - y + 0.5) for px, py in polygon)
     return bool(cells_inside(moved, Window(0, 0, 1, 1), 1.0)[0, 0])
 
@@ -306,7 +312,7 @@ def _is_in(mask: Mask, geometry: GridGeometry, x: float, y: float) -> bool:
 def _nearest(
     mask: Mask, geometry: GridGeometry, x: float, y: float
 ) -> tuple[float | None, tuple[float, float] | None]:
-    """Return how far the nearest marked pixel is [m], and where; None without any."""
+    """Return the distance to the nearest marked pixel [m] and its position; None without any."""
     rows, cols = np.nonzero(mask)
     if not len(rows):
         return None, None
@@ -323,7 +329,7 @@ def _passed(
     jump_m: float,
     place: tuple[float, float],
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return how near each piece of a line came to a place [m], and when it ended [s]."""
+    """Return the distance of each piece of a line to a point [m], and when it ended [s]."""
     if len(line) < 2:
         return np.hypot(*(line - place).T), at_s
     starts, ways = line[:-1], np.diff(line, axis=0)

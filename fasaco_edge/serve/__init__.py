@@ -1,1 +1,1 @@
-"""A live page of a mission: samples off the bus in, a picture in browsers out; orders back."""
+"""The live page of a mission: samples from the bus in, a picture in browsers out; orders back."""

@@ -1,4 +1,4 @@
-"""What a page tells of a robot: state, progress, areas and events, as plain documents."""
+"""The page's documents about a robot: state, progress, areas and events."""
 
 from __future__ import annotations
 
@@ -16,19 +16,19 @@ from fasaco_edge.wire.documents.status import FleetReport, Status
 
 Digest = dict[str, object]
 
-# Of lists from elsewhere so much is shown.
+# Most entries shown of received lists.
 MOST_ENTRIES, MOST_AREAS, MOST_ROBOTS = 40, 100, 50
 MOST_CORNERS = 1_000
-# Longer is a speed of next to nothing [s].
+# A longer time means a speed of almost 0 [s].
 MOST_TO_GO_S = 1e8
-# Further off is no place [m].
+# Coordinates beyond this are invalid [m].
 MOST_M = 1e6
-# In these there is something to go.
+# States with a path to drive.
 UNDERWAY = ("planning", "covering", "returning", "paused", "charging")
 
 
 def state(view: RobotState, way: Way, now: float) -> Digest:
-    """Return what the newest status says, and whether there is one at all; ``way`` is the path."""
+    """Return the content of the newest status, and whether there is one; ``way``: the path."""
     status = view.status
     others = sorted(view.robots - {view.robot})[:MOST_ROBOTS]
     found: Digest = {"robot": view.robot, "absent": _absent(view, now), "others": others}
@@ -56,7 +56,7 @@ def state(view: RobotState, way: Way, now: float) -> Digest:
 
 
 def _absent(view: RobotState, now: float) -> str:
-    """Return why there is nothing new to show; "" where there is."""
+    """Return why there is nothing new to show; "" if there is."""
     if view.trouble:
         return f"waiting for the bus at {view.trouble}"
     if view.gone_since is not None:
@@ -129,7 +129,7 @@ def _battery(status: Status) -> Digest | None:
 
 
 def _faults(status: Status) -> Iterator[str]:
-    """Yield what is wrong, in words."""
+    """Yield the faults in words."""
     if status.errors.total:
         count = status.errors.total
         yield f"refused or failed {count} times since the start, last: {status.errors.last}"
@@ -148,7 +148,7 @@ def _fleet(fleet: FleetReport) -> list[Digest]:
 
 
 def areas(settings: KnownSettings, order: dict[str, Any]) -> Digest:
-    """Return zones and keep-outs: of the configuration, and of the order if it was heard."""
+    """Return zones and keep-outs: of the configuration, and of the order if it was received."""
     mission = settings.mission
     standing = [
         {"name": zone.name, "polygon": zone.polygon[:MOST_CORNERS], "is": "standing"}
@@ -175,7 +175,7 @@ def _items(value: object, most: int = MOST_AREAS) -> list[object]:
 
 
 def _polygon(value: object) -> list[list[float]]:
-    """Return corners (x, y) [m]; none where they are not such."""
+    """Return corners (x, y) [m]; none if they are invalid."""
     pairs = (pair for pair in _items(value, MOST_CORNERS) if isinstance(pair, list))
     corners = [
         [float(x), float(y)]
@@ -188,7 +188,7 @@ def _polygon(value: object) -> list[list[float]]:
 def lately(events: EventLog) -> list[Digest]:
     """Return the newest entries, the newest first."""
     entries = list(events.entries)[-MOST_ENTRIES:]
-    # What the wall clock showed; entries keep a steady time.
+    # The wall clock's time; entries keep a monotonic time.
     offset = time.time() - phrases.steady_now()
     return [
         {"at_s": round(entry.at_s + offset, 1), "text": entry.text, "tone": entry.tone}

@@ -1,7 +1,8 @@
-"""Who may open the page, and who may command: hosts, origins, tokens.
+"""Access control of the page and its commands: hosts, origins, tokens.
 
-A page of somewhere else in a browser on this computer may call this server, too: it names itself
-as the origin, or has its own name point here (DNS rebinding). An address as a host cannot be that.
+A foreign page in a browser on this computer may call this server, too: its requests have its own
+origin, or its host name resolves to this server (DNS rebinding). A host that is an address is
+neither.
 """
 
 from __future__ import annotations
@@ -30,12 +31,12 @@ ROLES: tuple[Role, ...] = get_args(Role)
 
 @dataclass(frozen=True, slots=True)
 class Guard:
-    """Says what a caller may do.
+    """Decides the rights of a client.
 
     Attributes:
-        names: host names that are this server's, beside addresses.
-        tokens: by role; none: no token is asked for, and all who get here have ``role``.
-        role: of all, where there are no tokens.
+        names: host names of this server, beside addresses.
+        tokens: by role; none: no token is required, and all clients have ``role``.
+        role: of all clients, without tokens.
     """
 
     names: frozenset[str]
@@ -54,11 +55,11 @@ class Guard:
         return True
 
     def role_of(self, token: str) -> Role | None:
-        """Return what who knows ``token`` may do; None for nothing."""
+        """Return the role of a client with ``token``; None for none."""
         if not self.tokens:
             return self.role
         found: Role | None = None
-        # All are compared, each in a time that tells nothing.
+        # All are compared, each in constant time.
         for role, known in self.tokens:
             if hmac.compare_digest(token.encode(), known.encode()):
                 found = role
@@ -66,7 +67,7 @@ class Guard:
 
 
 def is_same_origin(origins: list[str], host: str) -> bool:
-    """Tell whether a page of ``host`` itself calls; only browsers name an origin, and one."""
+    """Tell whether the caller is a page of ``host`` itself; only browsers send an origin."""
     own = (f"{scheme}://{host.lower()}" for scheme in ("http", "https"))
     return not origins or (len(origins) == 1 and origins[0].lower() in own)
 
@@ -74,16 +75,16 @@ def is_same_origin(origins: list[str], host: str) -> bool:
 def guard_for(
     address: Address, tokens: Path | None, names: list[str], *, allow_commands: bool
 ) -> Guard:
-    """Return who may do what.
+    """Return the guard of a server.
 
     Args:
         address: where the server listens.
-        tokens: the file with tokens; it is made where it is not there. None for none.
+        tokens: the file with tokens, created if missing. None for none.
         names: more host names of this server.
         allow_commands: whether all may command, without a token.
 
     Raises:
-        BadConfiguration: others could come in unasked, or the file of tokens is none.
+        BadConfiguration: access would be open to the network, or the token file is invalid.
     """
     if tokens is None and not address.is_loopback:
         raise BadConfiguration(
@@ -103,10 +104,10 @@ def guard_for(
 
 
 def read_tokens(file: Path) -> tuple[tuple[Role, str], ...]:
-    """Return the tokens in a file, lines as ``operator: TOKEN``; make them where it is not there.
+    """Return the tokens in a file, lines as ``operator: TOKEN``; create the file if missing.
 
     Raises:
-        BadConfiguration: it cannot be read or made, others may read it, or a line is wrong.
+        BadConfiguration: it cannot be read or made, others may read it, or a line is invalid.
     """
     try:
         if not file.exists():

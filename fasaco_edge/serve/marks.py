@@ -1,8 +1,8 @@
-"""Grids as marks, a byte a pixel that says by its bits what is there.
+"""Grids as marks, a byte of flags for each pixel.
 
-So written, many pixels are made one by OR, and no thin wall is lost; and levels, of which a higher
-one has the bits of all lower ones, give their maximum. Without numpy: the whole process is to
-take no more than a browser's tab on the robot would.
+Pixels are merged by OR, so no thin wall is lost; a level has the bits of all lower levels, so OR
+gives the maximum. Without numpy: the whole process should take no more memory than a browser tab on
+the robot.
 """
 
 from __future__ import annotations
@@ -14,14 +14,14 @@ from fasaco_edge.serve.messages import framed
 from fasaco_edge.wire.documents.settings import MapSettings
 from fasaco_edge.wire.messages.grid_octets import GridOctets
 
-# Of a map: what is not marked is unknown.
+# Marks of a map: unmarked pixels are unknown.
 FREE, WALL = 1, 2
 LEVELS = 7
 # Of what a daemon says it needs of a map; where it does not say, its defaults [percent].
 FREE_AT_MOST, OCCUPIED_AT_LEAST = 25, 65
 # Values of a coverage grid, as ``wire.messages.maps.CoverageValue`` has them for arrays.
 TO_COVER, COVERED, RECOVERED, BLOCKED = 0, 50, 75, 100
-# A phone draws so many pixels with ease.
+# A phone draws this many pixels easily.
 MOST_PIXELS = 2_000_000
 COMPRESSION = 1
 
@@ -58,7 +58,7 @@ FIELD_MARKS = level_marks(255)
 
 
 def grid_message(kind: str, grid: GridOctets, marks: bytes) -> bytes:
-    """Return a grid as the page gets it: its place, and its marks, compressed."""
+    """Return a grid message for the page: placement and compressed marks."""
     size, origin = grid.geometry, grid.geometry.origin
     octets = bytes(grid.octets).translate(marks)
     step = 1

@@ -1,7 +1,6 @@
 """Messages between the server and its page: JSON, or a JSON head with a body of bytes.
 
-Whatever text is in them is cleaned here, once, before any page sees it; the page shows text as
-text only.
+All text in them is sanitized here, once, before it is sent; the page shows text as text only.
 """
 
 from __future__ import annotations
@@ -13,17 +12,17 @@ import msgspec
 
 from fasaco_edge.text import one_line
 
-# What is shown of a text on a page [characters].
+# Longest text on a page [characters].
 MOST_TEXT = 400
 _LENGTH = struct.Struct("<I")
 
 Role = Literal["viewer", "operator"]
-# What the page may command: not to drop what was covered.
+# Commands of the page: all but a reset of the coverage.
 Command = Literal["start", "pause", "resume", "home", "cancel", "replan"]
 
 
 class Hello(msgspec.Struct, tag="hello", tag_field="kind", forbid_unknown_fields=True):
-    """The first message of a page: who it is."""
+    """The first message of a page: its token."""
 
     token: str = ""
 
@@ -38,9 +37,9 @@ class Order(msgspec.Struct, tag="command", tag_field="kind", forbid_unknown_fiel
     """A command for the robot.
 
     Attributes:
-        id: comes back with the answer.
-        command: one of those a page may give.
-        order: what to cover, as ``protocol/schema/mission.json`` has it; with ``start`` alone.
+        id: returned with the reply.
+        command: one of the page's commands.
+        order: what to cover, as in ``protocol/schema/mission.json``; only with ``start``.
     """
 
     id: int
@@ -53,7 +52,7 @@ _DECODER: msgspec.json.Decoder[FromPage] = msgspec.json.Decoder(FromPage)
 
 
 def from_page(text: str | bytes) -> FromPage:
-    """Return what a page says.
+    """Return the message of a page.
 
     Raises:
         msgspec.DecodeError: it is no such message.
@@ -62,7 +61,7 @@ def from_page(text: str | bytes) -> FromPage:
 
 
 def message_text(kind: str, **members: object) -> str:
-    """Return a message as JSON, all text in it cleaned."""
+    """Return a message as JSON with sanitized text."""
     return msgspec.json.encode({"kind": kind} | _cleaned(members)).decode()
 
 

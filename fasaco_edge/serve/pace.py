@@ -1,4 +1,4 @@
-"""How long the rest of a path takes: by its length and its turns, and the robot's own pace."""
+"""The remaining time of a path, from its length, its turns and the robot's measured speeds."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from fasaco_edge.wire.documents.status import DriveReport
 
 
 class Way:
-    """A path as way and turns that are left from each of its points on.
+    """The remaining distance and turns from each point of a path.
 
     Args:
         xy: its points (x, y) [m].
@@ -32,7 +32,7 @@ class Way:
         self._lengths, self._quarters = lengths[::-1], quarters[::-1]
 
     def left_s(self, at: int, robot: RobotSettings, drive: DriveReport) -> float | None:
-        """Return how long the way from point ``at`` takes [s]; None where no speed is known."""
+        """Return the remaining time from point ``at`` [s]; None if no speed is known."""
         speed_m_s = drive.speed_m_s or robot.speed_m_s
         if not speed_m_s > 0.0:
             return None

@@ -7,17 +7,17 @@ import hashlib
 from dataclasses import dataclass
 from importlib.resources import files
 
-# In this order they are one script.
+# Concatenated in this order they are one script.
 SCRIPTS = ("model.js", "view.js", "picture.js", "drawing.js", "panel.js", "link.js")
 
 
 @dataclass(frozen=True, slots=True)
 class Page:
-    """A page and what a browser may do with it.
+    """The page and its policy.
 
     Attributes:
-        body: HTML, style and script in it.
-        policy: its Content-Security-Policy, less where it may connect to.
+        body: HTML with style and script.
+        policy: its Content-Security-Policy without connect-src.
     """
 
     body: bytes

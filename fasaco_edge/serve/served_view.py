@@ -1,4 +1,4 @@
-"""A robot as its page shows it: its newest samples, as messages for browsers."""
+"""The page's view of a robot: its newest samples, as messages for browsers."""
 
 from __future__ import annotations
 
@@ -27,11 +27,11 @@ from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.messages.grid_octets import GridOctets, read_field, read_grid, with_update
 from fasaco_edge.wire.messages.path_points import PathPoints
 
-# Of a path so much is shown; reading one takes some 4 us a point.
+# Most points shown of a path; reading one takes some 4 us a point.
 MOST_POINTS = 20_000
-# Other robots, the newest heard of; they are heard once a second.
+# Most other robots, the most recently heard; they publish once a second.
 MOST_OTHERS, OTHER_LASTS_S = 50, 10.0
-# How often each message is sent at most [s]; what has not changed is not sent again.
+# Least period of each message [s]; unchanged messages are not sent again.
 PERIODS_S = {
     "pose": 0.1,
     "state": 0.2,
@@ -46,13 +46,13 @@ PERIODS_S = {
 
 
 class ServedView(RobotState):
-    """The newest of one robot; grids stay the bytes they came as."""
+    """The newest samples of one robot; grids stay bytes."""
 
     def __init__(self, keys: Keys) -> None:
         super().__init__(keys.robot)
         self._keys = keys
         self._grids: dict[str, GridOctets] = {}
-        # What an order says of zones and keep-outs; the status names them only.
+        # Zones and keep-outs of the order; the status only names them.
         self._order: dict[str, object] = {}
         self._others: dict[str, tuple[float, float, float]] = {}
         self._path: Sample | None = None
@@ -78,12 +78,12 @@ class ServedView(RobotState):
             "others": lambda now: message_text("others", robots=list(self._near(now))),
         }
         self._made_at = dict.fromkeys(self._makers, float("-inf"))
-        # What the newest message of a kind was made of.
+        # The source of the newest message of each kind.
         self._made_of: dict[str, object] = {}
         self._said: dict[str, str] = {}
 
     def news(self, now: float) -> dict[str, str | bytes]:
-        """Return the messages, by kind, that are due and tell something new."""
+        """Return the messages, by kind, that are due and changed."""
         found: dict[str, str | bytes] = {}
         for kind, make in self._makers.items():
             if now - self._made_at[kind] < PERIODS_S[kind] or not self._is_new(kind, now):
@@ -104,7 +104,7 @@ class ServedView(RobotState):
         return True
 
     def _source(self, kind: str, now: float) -> object:
-        """Return what a message is made of: where that is the same, the message is."""
+        """Return the source of a message: an equal source makes an equal message."""
         made_of: dict[str, object] = {
             "pose": (self.pose, self.walk, self.walk.at),
             "path": self._path,
@@ -122,7 +122,7 @@ class ServedView(RobotState):
         self._grids["map"] = read_grid(sample.payload)
 
     def _read_map_update(self, sample: Sample, _: float) -> None:
-        # Updates of a map that came before this process did are of no use to it.
+        # Updates of a map sent before this process started are of no use.
         if "map" in self._grids:
             self._grids["map"] = with_update(self._grids["map"], sample.payload)
 
@@ -133,7 +133,7 @@ class ServedView(RobotState):
         self._grids["floor"] = read_grid(sample.payload)
 
     def _read_field(self, sample: Sample, _: float) -> None:
-        # Without an attachment it is what a cohort has left.
+        # Without an attachment it is the field of a cohort.
         if sample.attachment:
             self._grids["field"] = read_field(sample.payload)
 
@@ -182,7 +182,7 @@ class ServedView(RobotState):
             self.note_unreadable("path", error, now)
             return None
         self.walk, self._way = PathProgress(xy, about.revision), Way(xy)
-        # Far from 0 a float32 has no centimetres.
+        # Far from 0, float32 does not resolve centimetres.
         x, y = xy[0] if xy else (0.0, 0.0)
         flat = array("f", (value for px, py in xy for value in (px - x, py - y)))
         if sys.byteorder == "big":
@@ -193,7 +193,7 @@ class ServedView(RobotState):
     def _map_message(self) -> bytes | None:
         if "map" in self._grids:
             return grid_message("map", self._grids["map"], map_marks(self.settings.map))
-        # Under ROS 2, and after a map that nobody kept, the lattice shows what is free.
+        # In ROS 2, and for a map without a cache, the lattice shows free floor.
         cells = self._grids.get("coverage")
         return None if cells is None else grid_message("map", cells, COVERAGE_MARKS)
 

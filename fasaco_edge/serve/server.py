@@ -30,16 +30,16 @@ from fasaco_edge.wire.topics import FLOOR, PHEROMONE
 LOG = logging.getLogger(__name__)
 
 MOST_VIEWERS = 20
-# Connections that have not said yet who they are: of more, the oldest makes room. A page says so at
-# once, so that silent ones keep none out.
+# Most connections that are not yet authenticated: beyond that the oldest is closed. A page sends
+# its token at once, so silent ones block no page.
 MOST_STRANGERS = 20
 # The longest order is some hundred kilobytes.
 MOST_BYTES = 262_144
-# Pages get news at most so often; without any, whether there are viewers is looked at [s].
+# Least period of messages to pages; without any, period of the check for viewers [s].
 FRAME_S, IDLE_S = 0.1, 0.2
-# A connection that is no page yet, and one whose computer is gone, ends after so long [s].
+# Timeout of a connection that is no page yet, and of one whose computer is gone [s].
 OPEN_S, PING_S = 5.0, 15.0
-# What waits for a viewer in this process [bytes], beside the message being sent.
+# Send buffer for a viewer in this process [bytes], beside the message being sent.
 WAITING_BYTES = 65_536
 
 
@@ -48,8 +48,8 @@ class Server:
 
     Args:
         feed: its samples.
-        view: what is made of them.
-        guard: who may do what.
+        view: makes messages of them.
+        guard: decides rights.
     """
 
     def __init__(self, feed: Feed, view: ServedView, guard: Guard) -> None:
@@ -58,7 +58,7 @@ class Server:
         self._guard = guard
         self._page = load_page()
         self._viewers: set[Viewer] = set()
-        # In order of their coming.
+        # In order of arrival.
         self._strangers: dict[Viewer, ServerConnection] = {}
         self._newest: dict[str, tuple[int, str | bytes]] = {}
         self._ended = threading.Event()
@@ -87,7 +87,7 @@ class Server:
             *address,
             ssl=secured,
             process_request=self._answer,
-            compression=None,  # what is large is compressed once, for all
+            compression=None,  # large messages are compressed once, for all
             server_header=None,
             open_timeout=OPEN_S,
             ping_interval=PING_S,
@@ -99,14 +99,14 @@ class Server:
         ):
             release_unused()
             hearing = asyncio.create_task(asyncio.to_thread(self._hear))
-            # Where it fails the server ends, too: a page must not show for ever what was last.
+            # If it fails the server ends, too: a page must not show old data for ever.
             hearing.add_done_callback(lambda _: stop.set())
             await stop.wait()
             self._ended.set()
         await hearing
 
     def _answer(self, connection: ServerConnection, request: Request) -> Response | None:
-        """Answer what is no WebSocket; None lets one begin."""
+        """Answer a request that is no WebSocket; None lets one begin."""
         hosts = request.headers.get_all("Host")
         host = hosts[0] if len(hosts) == 1 else ""
         if not self._guard.is_ours(host):
@@ -158,7 +158,7 @@ class Server:
             self._viewers.discard(viewer)
 
     async def _greet(self, viewer: Viewer, socket: ServerConnection) -> Role | None:
-        """Return what a viewer may do; None where it has to go."""
+        """Return the role of a viewer; None if it is rejected."""
         self._strangers[viewer] = socket
         if len(self._strangers) > MOST_STRANGERS:
             oldest = next(iter(self._strangers))
@@ -173,7 +173,7 @@ class Server:
         return role
 
     def _hear(self) -> None:
-        """Take in what comes, and make messages of it while somebody looks."""
+        """Take in samples, and make messages of them while there are viewers."""
         while not self._ended.is_set():
             items = self._feed.take(IDLE_S)
             now = steady_now()

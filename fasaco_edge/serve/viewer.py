@@ -1,4 +1,4 @@
-"""One browser: what it was sent, what it asks, and its end where it hangs."""
+"""The connection of one browser: messages out, requests in, timeout if it hangs."""
 
 from __future__ import annotations
 
@@ -24,15 +24,15 @@ if TYPE_CHECKING:
 
 LOG = logging.getLogger(__name__)
 
-# Who does not say who it is, does not read, or says no token, goes after so long [s].
+# Timeout of a client that does not identify itself, does not read, or sends no token [s].
 HELLO_S, SEND_S, REFUSED_S = 5.0, 10.0, 1.0
 ANSWER_S = 8.0
-# Codes of the end of a connection, from those free for applications.
+# Close codes of a connection, from the range for applications.
 DENIED, MALFORMED = 4401, 4400
 
 
 class Source(Protocol):
-    """What viewers are shown, and whom they command."""
+    """The source of messages, and the receiver of commands."""
 
     def newest(self) -> list[tuple[str, int, str | bytes]]:
         """Return the newest messages: kind, number, message."""
@@ -42,11 +42,11 @@ class Source(Protocol):
 
 
 class Viewer:
-    """A connection of one page. Nothing waits for it here: it gets what is newest when it can.
+    """A connection of one page. Nothing is queued: it gets the newest message when it is ready.
 
     Attributes:
         wants_field: whether it shows the pheromone field.
-        news: is set when there is something newer.
+        news: set when there is a newer message.
     """
 
     def __init__(self, socket: ServerConnection, source: Source, guard: Guard) -> None:
@@ -57,12 +57,12 @@ class Viewer:
         self._guard = guard
 
     async def greet(self) -> Role | None:
-        """Return what it may do; None where it is sent away."""
+        """Return its role; None if it is rejected."""
         async with asyncio.timeout(HELLO_S):
             said = from_page(await self._socket.recv())
         role = self._guard.role_of(said.token) if isinstance(said, Hello) else None
         if role is None:
-            # Who tries tokens tries one a second on each connection.
+            # Rate limit for guessing tokens: one a second on each connection.
             await asyncio.sleep(REFUSED_S)
             await self._send(
                 message_text("denied", asks=isinstance(said, Hello) and not said.token)
@@ -73,7 +73,7 @@ class Viewer:
         return role
 
     async def serve(self, role: Role) -> None:
-        """Send what is new and do what it asks, until it goes or hangs."""
+        """Send new messages and handle its requests, until it closes or hangs."""
         sending = asyncio.create_task(self._send_news())
         try:
             async for text in self._socket:
@@ -135,7 +135,7 @@ class Viewer:
 
 @contextlib.asynccontextmanager
 async def ending_oddities(socket: ServerConnection) -> AsyncIterator[None]:
-    """End the connection of a viewer that says what no page does."""
+    """Close the connection of a viewer that sends what no page sends."""
     try:
         yield
     except (msgspec.DecodeError, TimeoutError, RecursionError):

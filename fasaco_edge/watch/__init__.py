@@ -1,1 +1,1 @@
-"""A live mission in a terminal: samples off the bus in, lines of text out."""
+"""The live view of a mission in a terminal: samples from the bus in, lines of text out."""

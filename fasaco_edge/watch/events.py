@@ -1,4 +1,4 @@
-"""What happened to a robot lately, in words: entries, and what is new in a status."""
+"""The event log of a robot in words: entries, and changes of a status."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ TROUBLED = ("blocked", "degraded")
 
 @dataclass(frozen=True, slots=True)
 class Event:
-    """Something that happened: when, since the epoch [s], what, and its tone."""
+    """An event: its time since the epoch [s], its text and its tone."""
 
     at_s: float
     text: str
@@ -24,7 +24,7 @@ class Event:
 
 
 class EventLog:
-    """The newest entries, and how many there ever were."""
+    """The newest entries, and the number of all so far."""
 
     def __init__(self) -> None:
         self.entries: deque[Event] = deque(maxlen=KEPT)
@@ -36,13 +36,13 @@ class EventLog:
         self.count += 1
 
     def since(self, count: int) -> list[Event]:
-        """Return what was noted after the first ``count`` entries, as far as it is kept."""
+        """Return the kept entries after the first ``count``."""
         new = min(self.count - count, len(self.entries))
         return list(self.entries)[len(self.entries) - new :]
 
 
 def differences(before: Status | None, after: Status) -> list[tuple[str, str]]:
-    """Return what is new in a status, as (text, tone)."""
+    """Return the changes of a status, as (text, tone)."""
     found: list[tuple[str, str]] = []
     if before is None or before.state != after.state:
         tone = BAD if after.state in TROUBLED else GOOD if after.state == "done" else PLAIN

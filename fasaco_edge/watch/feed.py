@@ -1,4 +1,4 @@
-"""The feed of samples from the bus; it joins as soon as it can, and stays."""
+"""The feed of samples from the bus; it connects as soon as possible, and stays connected."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ WATCHED = [topic for topic in TOPICS if topic.queues.watch is not None]
 # The daemon makes these only while a subscriber exists: they are requested.
 ON_REQUEST = (PHEROMONE, FLOOR)
 SUBSCRIBED = [topic for topic in WATCHED if topic not in ON_REQUEST]
-# How many messages of other robots of a fleet wait.
+# Queue length of messages of a fleet's other robots.
 FLEET_WAITING = 64
 QUEUED = {"token": Queue(256), FLEET.name: Queue(FLEET_WAITING, MAX_JSON_BYTES)} | {
     topic.name: Queue(topic.queues.watch, MAX_MESSAGE_BYTES)
@@ -31,7 +31,7 @@ QUEUED = {"token": Queue(256), FLEET.name: Queue(FLEET_WAITING, MAX_JSON_BYTES)}
     if topic.queues.watch is not None and topic.queues.watch > NEWEST
 }
 RETRY_S = 0.5
-# Longest time that the end may wait for a host that does not answer.
+# Timeout at the end for a host that does not answer.
 END_S = 0.5
 
 
@@ -40,9 +40,9 @@ def _size_of(item: object) -> int:
 
 
 class Feed:
-    """The samples of one robot, and the robots there are; a context that has to be left.
+    """The samples of one robot, and the names of all robots; a context manager.
 
-    ``hears_fleet``: also what all robots say to those that they share an area with.
+    ``hears_fleet``: also the fleet messages of all robots.
 
     Attributes:
         trouble: why the bus cannot be joined yet; "" once it is.
@@ -74,14 +74,14 @@ class Feed:
 
     def __exit__(self, *_: object) -> None:
         self._ended.set()
-        # An interpreter must not end while a thread comes back from Zenoh: that is an abort.
+        # An interpreter that ends while a thread returns from Zenoh aborts.
         self._joining.join(END_S)
         with self._lock:
             if self._bus is not None:
                 self._bus.close()
 
     def take(self, timeout_s: float) -> list[tuple[str, object]]:
-        """Return what came, as (topic, Sample or Token); wait up to ``timeout_s`` [s] for it."""
+        """Return arrivals as (topic, Sample or Token); wait up to ``timeout_s`` [s] for one."""
         return self._mailbox.take(timeout_s)
 
     def want(self, topic: Topic, wants: bool) -> None:
@@ -92,12 +92,12 @@ class Feed:
                 self._request(self._bus)
 
     def ask(self, query: str, payload: bytes, timeout_s: float) -> list[Reply]:
-        """Ask the robot's daemon; return all answers.
+        """Query the robot's daemon; return all replies.
 
         Args:
             query: name of the query.
-            payload: JSON that goes with it.
-            timeout_s: how long to wait for an answer [s].
+            payload: its JSON payload.
+            timeout_s: how long to wait for a reply [s].
 
         Raises:
             BusUnavailable: the bus is not joined yet.

@@ -57,7 +57,7 @@ _SYSTEMS = {
 
 @dataclass(frozen=True, slots=True)
 class GlyphSet:
-    """What a terminal can show.
+    """Capabilities of a terminal.
 
     Attributes:
         colours: None for no colours.
@@ -90,7 +90,7 @@ class GlyphSet:
         return Text(full * filled, "green").append(empty * (width - filled), "bright_black")
 
     def scale(self, pixel_m: float, longest: int) -> str:
-        """Return a bar that is a round length long [m], of at most ``longest`` characters."""
+        """Return a scale bar of a round length [m], of at most ``longest`` characters."""
         decades = math.floor(math.log10(max(longest * pixel_m, pixel_m)))
         lengths = [digit * 10.0**decades for digit in (5, 2, 1)]
         length_m = next((m for m in lengths if m <= longest * pixel_m), lengths[-1])
@@ -110,7 +110,7 @@ class GlyphSet:
         )
 
 
-# Most lines of a picture are those of the one before.
+# Most lines of a picture equal those of the previous one.
 @lru_cache(maxsize=512)
 def _line(glyphs: GlyphSet, upper: bytes, lower: bytes) -> str:
     runs: list[str] = []

@@ -26,17 +26,17 @@ from fasaco_edge.wire.documents.json_text import decode_json
 from fasaco_edge.wire.topics import PHEROMONE
 
 END_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
-# At most ten pages a second, and only where something changed or the clock did [s].
+# At most ten pages a second, and only if the content or the clock changed [s].
 FRAME_S = 0.1
 LINE_EVERY_S = 1.0
-# The largest page. A terminal may say that it is of 65,535 x 65,535, and a page take gigabytes.
+# The largest page. A terminal may claim 65,535 x 65,535, and a page would take gigabytes.
 MOST_COLUMNS, MOST_LINES = 800, 400
-# How long to wait for the rest once a status is there [s].
+# Time to wait for the rest after a status [s].
 REST_S = 1.0
 
 
 def take(feed: Feed, view: RobotView, timeout_s: float) -> list[tuple[str, object]]:
-    """Take in what came; wait up to ``timeout_s`` [s] for it. Return it as well."""
+    """Take in arrivals, and return them; wait up to ``timeout_s`` [s] for one."""
     items = feed.take(timeout_s)
     now = phrases.steady_now()
     for topic, item in items:
@@ -71,7 +71,7 @@ def watch_on_screen(feed: Feed, view: RobotView, console: Console) -> None:
 
 
 def watch_in_lines(feed: Feed, view: RobotView) -> None:
-    """Print what happens, and once a second the state, until a signal arrives."""
+    """Print events, and once a second the state, until a signal arrives."""
     # What exists already arrives within the first second.
     printed, last_line, next_line_at = 0, "", phrases.steady_now() + LINE_EVERY_S
     with stop_event(*END_SIGNALS) as stop:
@@ -129,7 +129,7 @@ def status_line(view: RobotView, now: float) -> str:
 
 
 def print_json(payload: bytes) -> None:
-    """Print a JSON object as one line, however it came."""
+    """Print a JSON object as one line, whatever its layout."""
     print(json_line(decode_json(payload)), flush=True)
 
 
@@ -197,7 +197,7 @@ class Screen:
             self._shown = lines
 
     def keys(self, timeout_s: float) -> str:
-        """Return what was typed; wait up to ``timeout_s`` [s] for it."""
+        """Return the typed keys; wait up to ``timeout_s`` [s] for one."""
         keyboard = [self._keyboard.fileno()] if self._keyboard and self._has_input else []
         ready, _, _ = select.select(keyboard, [], [], timeout_s)
         if not ready:
@@ -233,7 +233,7 @@ class Screen:
         self._begin()
 
     def _write(self, text: str) -> None:
-        # Past the stream's buffer: what a terminal that is gone did not take must not wait there.
+        # Without the stream's buffer: after the terminal is gone, data must not stay in it.
         left = text.encode(self._terminal.encoding, errors="replace")
         while left:
             left = left[os.write(self._terminal.fileno(), left) :]

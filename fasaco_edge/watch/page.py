@@ -41,7 +41,7 @@ FIELD_LEGEND = (
 
 @dataclass(frozen=True, slots=True)
 class Layout:
-    """How a screen is divided [characters]; figures of width 0 are left out.
+    """Layout of a screen [characters]; figures of width 0 are left out.
 
     Attributes:
         columns, lines: of the picture.
@@ -65,7 +65,7 @@ class Layout:
 
 
 class Page:
-    """Draws a robot view as lines of text; keeps what did not change."""
+    """Draws a robot view as lines of text; caches unchanged parts."""
 
     def __init__(self, console: Console) -> None:
         self._glyphs = GlyphSet.of(console)
@@ -95,7 +95,7 @@ class Page:
         return page[:height]
 
     def toggle_field(self) -> bool:
-        """Show the living trail in place of coverage and path, or no more; return whether."""
+        """Toggle the living trail in place of coverage and path; return whether it is shown."""
         self._picture.shows_field = not self._picture.shows_field
         return self._picture.shows_field
 

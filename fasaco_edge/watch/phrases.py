@@ -18,12 +18,12 @@ _OFFSET_S = time.time() - time.monotonic()
 
 
 def covered(coverage: CoverageReport) -> str:
-    """Return how much is covered."""
+    """Return the covered share as text."""
     return f"{percent(coverage.fraction)}: {coverage.covered} of {coverage.coverable} cells"
 
 
 def swept(floor: FloorReport) -> str:
-    """Return how much floor is swept."""
+    """Return the swept floor as text."""
     reached_m2, reachable_m2 = floor.reached_m2, floor.reachable_m2
     if reached_m2 is None or not reachable_m2:
         return f"{floor.swept_m2:.1f} m2"
@@ -47,7 +47,7 @@ def stage(mission: MissionReport) -> str:
 
 
 def zone_progress(zone: ZoneReport) -> tuple[str, str]:
-    """Return which pass a zone is in, and how far that is."""
+    """Return the pass of a zone, and its progress."""
     at = f"{zone.pass_number} of {zone.passes}" if zone.pass_number else "to come"
     share = percent(zone.covered / zone.cells if zone.cells else 0.0)
     return at, f"{share}: {zone.covered} of {zone.cells} cells"
@@ -66,7 +66,7 @@ def figures(status: Status) -> str:
 
 
 def drive(report: DriveReport) -> str:
-    """Return how fast the robot drives and turns on the spot, as far as that was measured."""
+    """Return the measured speeds of driving and of turning on the spot."""
     measured = (
         ("", report.speed_m_s, " m/s"),
         ("90 deg ", report.quarter_turn_s, " s"),
@@ -77,12 +77,12 @@ def drive(report: DriveReport) -> str:
 
 
 def steady_now() -> float:
-    """Return the time since the epoch [s]; it does not step while this process runs."""
+    """Return the time since the epoch [s]; monotonic while this process runs."""
     return _OFFSET_S + time.monotonic()
 
 
 def clock(at_s: float) -> str:
-    """Return a steady time as a text, by the wall clock as it is set now."""
+    """Return a monotonic time as text, by the present setting of the wall clock."""
     wall_s = time.time() - (steady_now() - at_s)
     return time.strftime("%H:%M:%S", time.localtime(round(wall_s, 3)))
 

@@ -15,7 +15,7 @@ from fasaco_edge.wire.documents.settings import known_settings
 from fasaco_edge.wire.messages.maps import CoverageValue
 
 LEAST_PIXEL_M = 0.01
-# Pictures grow by so much at once [m]: with every row of a growing map they would jump.
+# Pictures grow in steps of this size [m]: with every row of a growing map they would jump.
 ROUNDED_TO_M = 0.5
 
 
@@ -39,7 +39,7 @@ class Frame:
 
     @classmethod
     def over(cls, bounds: Bounds, columns: int, lines: int) -> Frame:
-        """Return the largest frame of so many characters that shows all of ``bounds``.
+        """Return the largest frame in a number of characters that shows all of ``bounds``.
 
         Args:
             bounds: x0, y0, x1, y1 [m].
@@ -91,9 +91,9 @@ class Frame:
         return sampled
 
 
-# Where several things meet in one character without colours, the larger number is shown.
+# If several kinds share a character without colours, the larger number is shown.
 UNKNOWN, FLOOR, TO_COVER, COVERED, RECOVERED, WALL, AHEAD, NEXT, ROBOT = range(9)
-# The living trail, from least to most, where it is shown instead of coverage and path.
+# The living trail, from least to most, when shown in place of coverage and path.
 FIELD = range(9, 9 + FIELD_LEVELS)
 HEADING = 16
 """The character of the robot's centre: this plus its heading in eighths of a turn."""
@@ -102,9 +102,9 @@ HEADING = 16
 FREE_AT_MOST, OCCUPIED_AT_LEAST = 25, 65
 # A thin wall must not vanish between samples; maps larger than this resolves are rare.
 MOST_SAMPLES = 12
-# The path the robot takes next is drawn over this much of it [m].
+# The next part of the path is highlighted over this length [m].
 NEXT_M = 3.0
-# Where lanes are closer than so many pixels, the path beyond this [m] would hide the ground.
+# If lanes are closer than this many pixels, the path beyond this [m] would hide the ground.
 RESOLVED_PIXELS, NEAR_M = 2.0, 15.0
 
 Kinds = NDArray[np.uint8]
@@ -140,9 +140,9 @@ def field_ground(frame: Frame, grid: OccupancyGrid | None, field: OccupancyGrid 
 
 
 def draw_path(kinds: Kinds, frame: Frame, xy: NDArray[np.float64]) -> bool:
-    """Draw the path ahead, float64 (n, 2) [m], into ``kinds``; what comes next stands out.
+    """Draw the path ahead, float64 (n, 2) [m], into ``kinds``; its next part is highlighted.
 
-    Where its lanes would run together only the first ``NEAR_M``; returns whether it is whole.
+    If its lanes would merge, only the first ``NEAR_M``; returns whether it is complete.
     """
     if len(xy) < 2:
         return True
@@ -152,7 +152,7 @@ def draw_path(kinds: Kinds, frame: Frame, xy: NDArray[np.float64]) -> bool:
     drawn_m = way[-1] if resolved else min(way[-1], NEAR_M)
     at = np.append(np.arange(0.0, drawn_m, frame.pixel_m / 2), drawn_m)
     points = np.stack([np.interp(at, way, xy[:, axis]) for axis in (0, 1)], axis=-1)
-    # The nearest last: where the path crosses itself, that is what is seen.
+    # The nearest last: it is visible where the path crosses itself.
     for kind, some in ((AHEAD, points[at > NEXT_M]), (NEXT, points[at <= NEXT_M])):
         _put(kinds, frame.pixels(some), kind)
     return bool(drawn_m == way[-1])
@@ -214,7 +214,7 @@ class MissionPicture:
         self._ground: Kinds | None = None
 
     def kinds(self, view: RobotView, columns: int, lines: int) -> Kinds | None:
-        """Return a picture, uint8 (2 * lines, columns); None as long as nothing is to be seen."""
+        """Return a picture, uint8 (2 * lines, columns); None while there is nothing to show."""
         # Grids are values: a new one is another object.
         grids = view.map, view.coverage
         if (key := (*grids, view.field, self.shows_field)) != self._key:

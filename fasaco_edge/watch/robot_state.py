@@ -1,6 +1,6 @@
-"""A robot as its newest pose, status and commands show it, and the latest events.
+"""The state of a robot by its newest pose, status and commands, and the latest events.
 
-Without numpy, for a program that stays small.
+Without numpy, for small programs.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ POSE_LASTS_S = 2.0
 
 @dataclass(frozen=True, slots=True)
 class Token:
-    """A robot's daemon that has come (``here``) or gone."""
+    """A robot's daemon that has appeared (``here``) or gone."""
 
     robot: str
     here: bool
@@ -47,13 +47,13 @@ class RobotState:
     Attributes:
         pose: where the robot is; None before the first pose.
         status: the newest one; None before the first.
-        document: the same as it came, b"" before the first.
-        settings: of the daemon, as the status says.
-        walk: the path, and how far the robot is on it.
-        robots: of all robots on the bus that have a daemon, the names.
-        trouble: why the bus cannot be reached; "" where it can.
-        gone_since: when the daemon went, since the epoch [s]; None while it is there,
-            and before it ever was.
+        document: its bytes, b"" before the first.
+        settings: of the daemon, from the status.
+        walk: the path, and the robot's progress on it.
+        robots: names of all robots on the bus with a daemon.
+        trouble: why the bus cannot be reached; "" if it can.
+        gone_since: when the daemon disappeared, since the epoch [s]; None while it is present,
+            and before it first appeared.
     """
 
     def __init__(self, robot: str) -> None:
@@ -81,14 +81,14 @@ class RobotState:
         return self.robot in self.robots
 
     def silent_s(self, now: float) -> float:
-        """Return for how long a status of the daemon has been overdue [s]; 0 while none is."""
+        """Return how long a status of the daemon is overdue [s]; 0 if it is not."""
         silent = now - self._reported_at
         return silent if self.status is not None and silent > SILENCE_S else 0.0
 
     def take(self, topic: str, item: object, now: float) -> None:
-        """Take in a sample of ``topic`` or a Token, which came ``now``, since the epoch [s].
+        """Take in a sample of ``topic`` or a Token that arrived ``now``, since the epoch [s].
 
-        What cannot be read costs that sample, and is noted.
+        An unreadable sample is dropped and noted.
         """
         if isinstance(item, Token):
             self._note_token(item, now)
@@ -101,7 +101,7 @@ class RobotState:
     def note_unreadable(self, topic: str, error: FasacoError, now: float) -> None:
         """Note that a sample of ``topic`` could not be read."""
         self._malformed += 1
-        # A faulty publisher is so with every message: note the 1st, 2nd, 4th, 8th ...
+        # A faulty publisher may send only malformed ones: note the 1st, 2nd, 4th, 8th ...
         if self._malformed & (self._malformed - 1) == 0:
             text = f"{topic} cannot be read ({self._malformed} so far): {error}"
             self.events.add(now, text, BAD)
@@ -129,7 +129,7 @@ class RobotState:
         if not status.state:
             raise MalformedMessage("status: it has no state")
         if status.claim.stand != "plans":
-            # It may be a second daemon of this name: what that is like is not how the robot is.
+            # It may be a second daemon of this name, whose state is not the robot's.
             if status.claim.stand != "looks":
                 self.events.add(now, f"a second daemon is {status.state}: {status.reason}", BAD)
             return
@@ -169,17 +169,17 @@ def _zones(order: object) -> list[dict[str, object]]:
     return [zone for zone in found if isinstance(zone, dict) and "name" in zone]
 
 
-# Poses come more often than steps are driven: further ahead, a path may pass the place again.
+# Poses are more frequent than steps: further ahead, a path may pass the position again.
 LOOK_AHEAD_STEPS = 8
 
 
 class PathProgress:
-    """A path, and which of its points the robot is at.
+    """A path, and the robot's progress on it.
 
     Attributes:
         xy: points (x, y) [m]; an array, float64 (n, 2), or a list.
         revision: number of the path.
-        at: index of the point the robot came to last.
+        at: index of the last point reached.
     """
 
     def __init__(self, xy: Points = (), revision: int = 0) -> None:
@@ -188,11 +188,11 @@ class PathProgress:
         self.at = 0
 
     def left(self, steps: int) -> None:
-        """Note how many steps are left, as the daemon says."""
+        """Note the daemon's number of remaining steps."""
         self.at = max(self.at, len(self.xy) - 1 - max(steps, 0))
 
     def passed(self, pose: Pose2D) -> None:
-        """Note where the robot is; it goes forward only."""
+        """Note the robot's position; progress only grows."""
         near = self.xy[self.at : self.at + LOOK_AHEAD_STEPS]
         if len(near) < 2:
             return

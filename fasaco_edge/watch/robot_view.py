@@ -1,4 +1,4 @@
-"""A robot as its newest samples show it, map and path as arrays."""
+"""The view of a robot by its newest samples, map and path as arrays."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ class RobotView(RobotState):
 
     Attributes:
         map, coverage: None before the first.
-        field: the living trail, on the cells: 0 for none, else 1 to ``FIELD_LEVELS``; None as long
-            as it is not asked for, and before the first.
+        field: the living trail, on the cells: 0 for none, else 1 to ``FIELD_LEVELS``; None while
+            it is not requested, and before the first.
     """
 
     def __init__(self, robot: str) -> None:
@@ -42,7 +42,7 @@ class RobotView(RobotState):
 
     @property
     def path_ahead(self) -> NDArray[np.float64]:
-        """What is still to be driven, float64 (n, 2) [m], beginning where the robot is."""
+        """The path still to drive, float64 (n, 2) [m], from the robot's position."""
         rest = np.array(self.walk.xy[self.walk.at + 1 :], np.float64).reshape(-1, 2)
         if not len(rest):
             return rest
@@ -55,7 +55,7 @@ class RobotView(RobotState):
 
     def _read_map_update(self, sample: Sample, _: float) -> None:
         patch = decode_map_update(sample.payload)
-        # Updates of a map that came before this process did are of no use to it.
+        # Updates of a map sent before this process started are of no use.
         if self.map is not None:
             self.map = self.map.patched(patch)
 
@@ -69,7 +69,7 @@ class RobotView(RobotState):
         self.coverage = decode_occupancy_grid(sample.payload)
 
     def _read_field(self, sample: Sample, _: float) -> None:
-        # Without an attachment it is what a cohort has left.
+        # Without an attachment it is the field of a cohort.
         if sample.attachment:
             message = decode_pheromone(sample.payload)
             levels = -(-message.levels.astype(np.int16) * FIELD_LEVELS // 255)

@@ -1,1 +1,1 @@
-"""What a review is shown and written as: rows, tables, charts, pictures, an HTML page."""
+"""Output formats of a review: rows, tables, charts, pictures, an HTML page."""

@@ -103,7 +103,7 @@ def _batch(rows: list[Sequence[object]], schema: pa.Schema) -> pa.RecordBatch:
 
 
 def _cell(value: object) -> object:
-    """Return a value that no spreadsheet takes for a formula, unless it is a number."""
+    """Return a value that is not read as a formula by spreadsheets, unless it is a number."""
     if isinstance(value, bool):
         return int(value)
     text = one_line(value) if isinstance(value, str) else value

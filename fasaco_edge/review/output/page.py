@@ -39,7 +39,7 @@ from fasaco_edge.text import Html, element, html
 
 MAP_ROOM = (1000, 700)
 KINDS = {True: "good", False: "bad", None: "open"}
-# What a browser may do with it: show pictures that are in it, and its own style.
+# Content security policy: only embedded pictures and its own style.
 POLICY = "default-src 'none'; img-src data:; style-src 'unsafe-inline'"
 INTRODUCTION = (
     "A robot was to cover every place it can reach, on a map that grows while it drives. "
@@ -198,7 +198,7 @@ def _fields(review: Review, of: int, name: str) -> Html:
 
 
 def _orders(review: Review, figures: ReviewDocument, of: int) -> Html:
-    """Return a chapter of each order, the commands, and what was left and why."""
+    """Return a section of each order, the commands, and the floor left with reasons."""
     parts = [_table(rows.ORDERS, rows.order_rows(figures), "notes")]
     for title, names, cells in (
         ("Commands", rows.COMMANDS, rows.command_rows(figures)),

@@ -1,4 +1,4 @@
-"""Charts of a review over time, and a curve of characters."""
+"""Charts of a review over time, and a curve in text characters."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ Points = tuple[NDArray[np.float64], NDArray[np.float64]]
 
 
 def covered_share(review: Review) -> Points:
-    """Return which share of the cells coverable at the end was covered, 0 to 1.
+    """Return the covered share of the cells coverable at the end, 0 to 1.
 
-    Where some were covered before the recording began, the share of what was known then.
+    If some were covered before the recording began, the share of the cells known then.
     """
     if review.drive is None or review.data.restored_cells:
         return review.known_fractions[:, 0], review.known_fractions[:, 1]
@@ -30,7 +30,7 @@ def covered_share(review: Review) -> Points:
 
 
 def replan_times(review: Review) -> Points:
-    """Return when each replan came [s], and how long it took [ms]."""
+    """Return the time [s] and duration [ms] of each replan."""
     timed = [path for path in review.replans.later if path.plan_ms is not None]
     return (
         np.array([path.at_s for path in timed], np.float64),
@@ -40,7 +40,7 @@ def replan_times(review: Review) -> Points:
 
 MOST_POINTS = 700
 FAINT: Colour = (150, 156, 166)
-# From the bottom up; what is not in it is drawn as the last one.
+# From the bottom up; other states are drawn as the last one.
 STATES: dict[str, Colour] = {
     "done": palette.BLUE,
     "returning": palette.SKY,
@@ -54,7 +54,7 @@ STATES: dict[str, Colour] = {
 }
 SHORT = {"waiting for map": "no map", "waiting for pose": "no pose"}
 BAND_PX = 12
-# A state is to be seen however short it was: share of the whole time.
+# Least width of a state, as a share of the whole time: short ones stay visible.
 LEAST_SHARE = 0.006
 
 
@@ -87,7 +87,7 @@ class TimeAxis:
 
 
 def coverage_panel(reviews: Sequence[Review], labels: Sequence[str]) -> Panel:
-    """Return how the covered share grew; of one review also the share of what was known then.
+    """Return a chart of the covered share; of one review also the share of the cells known then.
 
     ``labels`` name two of them.
     """
@@ -109,7 +109,7 @@ def coverage_panel(reviews: Sequence[Review], labels: Sequence[str]) -> Panel:
 
 
 def replan_panel(reviews: Sequence[Review], labels: Sequence[str]) -> Panel:
-    """Return how long replans took, a dot each."""
+    """Return a chart of the durations of replans, a dot each."""
     time = TimeAxis.over(max(review.duration_s for review in reviews))
     found = [replan_times(review) for review in reviews]
     # Two have the colours of their curves, one has another than the curve above it.
@@ -123,7 +123,7 @@ def replan_panel(reviews: Sequence[Review], labels: Sequence[str]) -> Panel:
 
 
 def state_panel(review: Review) -> Panel:
-    """Return what the mission was doing, a bar for each time it was in a state."""
+    """Return a chart of the mission's states, a bar for each period."""
     time = TimeAxis.over(review.duration_s)
     known = [name for name in STATES if any(span.name == name for span in review.states)]
     others = [span.name for span in review.states if span.name not in STATES]
@@ -142,7 +142,7 @@ def state_panel(review: Review) -> Panel:
 
 
 def branching_panel(review: Review) -> Panel | None:
-    """Return how decided the trail was; None where that is not recorded."""
+    """Return a chart of how decided the trail was; None if not recorded."""
     points = review.record.plots.get(entities.BRANCHING)
     if points is None:
         return None
@@ -155,7 +155,7 @@ def branching_panel(review: Review) -> Panel | None:
 
 
 def saved_panel(review: Review) -> Panel | None:
-    """Return what ants and local search saved, plan by plan; None where that is not recorded."""
+    """Return a chart of savings by ants and local search, plan by plan; None if not recorded."""
     plots = review.record.plots
     saved = [
         (colour, points)
@@ -178,7 +178,7 @@ def saved_panel(review: Review) -> Panel | None:
 
 
 def _held(points: NDArray[np.float64], end_s: float) -> Points:
-    """Return a plot, float64 (n, 2), as one that holds each value until the next one comes."""
+    """Return a plot, float64 (n, 2), as a staircase."""
     at_s = np.concatenate((points[:, 0].repeat(2)[1:], [end_s]))
     return at_s, points[:, 1].repeat(2)
 
@@ -213,11 +213,11 @@ def curve(
     height: int,
     marks: str = EIGHTHS,
 ) -> list[str]:
-    """Return the lines of a picture of a share that changes at some times, the top one first.
+    """Return a curve of a share over time as lines of text, the top one first.
 
     Args:
-        at_s: float64 (n,), when it changed [s], ascending.
-        shares: float64 (n,), what it was from then on, 0 to 1; before the first time it is 0.
+        at_s: float64 (n,), times of its changes [s], ascending.
+        shares: float64 (n,), its values from then on, 0 to 1; before the first time it is 0.
         end_s: the right end of the picture [s]; the left one is 0.
         width, height: of the picture [characters].
         marks: nine characters, from an empty one to a full one.
@@ -226,7 +226,7 @@ def curve(
     index = np.searchsorted(at_s, places, side="right")
     levels = np.concatenate(([0.0], shares))[index]
     eighths = np.rint(np.clip(levels, 0, 1) * height * 8).astype(int)
-    # What is not nothing is to be seen, and what is not all, too.
+    # A value above 0 never looks like 0, and a value below 1 never like 1.
     eighths[(levels > 0) & (eighths == 0)] = 1
     eighths[(levels < 1) & (eighths == 8 * height)] -= 1
     return [

@@ -51,7 +51,7 @@ def draw_fields(review: Review) -> list[tuple[float, Image.Image]]:
 
 
 SIZE = (1600, 900)
-# What title, caption and key take beside the map.
+# Space of title, caption and key beside the map.
 AROUND = (56, 210)
 TRAIL_SPACING_M = 0.02
 # How wide a drive is drawn beside the lines of paths [m].
@@ -81,11 +81,11 @@ def draw_review(review: Review) -> Image.Image:
 
 
 def draw_map(review: Review, space: tuple[int, int]) -> Image.Image | None:
-    """Return the map at the end with cells, floor not swept and track; None without any of them.
+    """Return the last map with cells, unswept floor and track; None without any of them.
 
     Args:
-        review: of what.
-        space: the most the map may take (width, height) [px].
+        review: the review.
+        space: largest size of the map (width, height) [px].
     """
     grid, lattice, drive, floor = review.data.grid, review.lattice, review.drive, review.floor
     track = _thinned(review.data.track[:, :2])
@@ -201,7 +201,7 @@ def _caption(review: Review) -> list[str]:
 
 
 def _thinned(track: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return a track (n, 2) without the points that lie as good as on others."""
+    """Return a track (n, 2) without points that almost coincide with others."""
     if len(track) < 3:
         return track
     way = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(track, axis=0).T))))

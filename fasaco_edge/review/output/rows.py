@@ -1,4 +1,4 @@
-"""What a review tells, as rows of text: the same for terminal and page."""
+"""Rows of text of a review, for terminal and page."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ CHARGES = ("at", "for", "battery")
 
 
 def order_rows(document: ReviewDocument) -> list[tuple[str, ...]]:
-    """Return a chapter of each order: when it held, how it went, and what it asked for."""
+    """Return a section of each order: its period, its result and its content."""
     return [
         (
             str(number),
@@ -64,7 +64,7 @@ def unreached_rows(document: ReviewDocument) -> list[tuple[str, ...]]:
 
 
 def left_rows(document: ReviewDocument, spots: Sequence[Spot]) -> list[tuple[str, ...]]:
-    """Return the patches left of the reachable floor, and why; spots are of their places."""
+    """Return the unswept patches of the reachable floor with reasons; spots are their positions."""
     return [
         (f"{patch.m2:.2f}", f"({patch.x:.2f}, {patch.y:.2f})", f"{spot.why}: {spot.words}")
         for patch, spot in zip(document.left, spots, strict=True)
@@ -72,7 +72,7 @@ def left_rows(document: ReviewDocument, spots: Sequence[Spot]) -> list[tuple[str
 
 
 def command_rows(document: ReviewDocument) -> list[tuple[str, str]]:
-    """Return when each command came, and what it said."""
+    """Return the time and text of each command."""
     return [(clock(each.at_s), each.command) for each in document.commands]
 
 
@@ -82,7 +82,7 @@ def replans_in_time(review: Review) -> list[tuple[str, ...]]:
 
 
 def screen_rows(review: Review, document: ReviewDocument) -> list[tuple[str, str]]:
-    """Return what matters most, a line each: it fits on one screen with verdict and curve."""
+    """Return the most important rows: with verdict and curve they fit on one screen."""
     by_name = {figure.name: figure.text for figure in figures(document)}
     config, grid = document.config, document.map
     sides = "" if grid is None else "{:.1f} x {:.1f} m, ".format(*grid.sides_m)
@@ -127,7 +127,7 @@ def _some(texts: Sequence[str]) -> str:
 
 
 def verdicts(document: ReviewDocument) -> list[tuple[bool | None, str]]:
-    """Return for each order whether it was completed, and that in words."""
+    """Return for each order whether it was completed, also in words."""
     orders = document.orders
     if len(orders) < 2:
         return [(document.complete, _ending(document))]
@@ -188,7 +188,7 @@ def figure_rows(document: ReviewDocument) -> list[tuple[str, str]]:
 
 
 def reason_rows(document: ReviewDocument) -> list[tuple[str, str, str, str]]:
-    """Return each kind of reason for a replan: how many there were, the median, the slowest."""
+    """Return each kind of reason for a replan: number, median and slowest."""
     took = document.replan_ms_by_reason
     return [
         (kind, str(count), amount(took[kind].p50, "ms"), amount(took[kind].max, "ms"))
@@ -197,7 +197,7 @@ def reason_rows(document: ReviewDocument) -> list[tuple[str, str, str, str]]:
 
 
 def replan_rows(review: Review) -> list[tuple[str, ...]]:
-    """Return the slowest replans: when, how long, the plan, where the map changed, and why."""
+    """Return the slowest replans: time, duration, plan, change of the map, reason."""
     return [_replan_row(path) for path in review.replans.slowest_first(MOST_REPLANS)]
 
 
@@ -215,7 +215,7 @@ def _replan_row(path: PublishedPath) -> tuple[str, ...]:
 
 
 def moment_rows(review: Review) -> list[tuple[str, ...]]:
-    """Return the worst moments: what, how much, when, and a note."""
+    """Return the worst moments: figure, value, time and note."""
     return [(m.what, amount(m.value, m.unit), clock(m.at_s), m.note) for m in review.moments]
 
 
@@ -245,7 +245,7 @@ def fault_rows(document: ReviewDocument) -> list[tuple[str, str]]:
 
 
 def unknown_lines(document: ReviewDocument) -> Iterator[str]:
-    """Yield which samples and figures a recording does not give, and why."""
+    """Yield samples and figures missing in a recording, and why."""
     for topic, number in document.unreadable.items():
         yield f"{number} samples of {topic} cannot be read"
     for names, why in document.not_recorded.items():
@@ -260,7 +260,7 @@ def _place(changed: Rectangle | None) -> str:
 
 
 def _began(began: str) -> str:
-    """Return when it began; a clock that shows a time before this program was is not set."""
+    """Return when it began; a time before this program existed means that the clock was not set."""
     when = began.replace("T", " ").replace("Z", " UTC")
     return when if began >= "2024" else f"{when}, by a clock that was not set"
 
@@ -268,7 +268,7 @@ def _began(began: str) -> str:
 def instant_rows(instant: Instant) -> Iterator[tuple[str, str]]:
     """Yield name and text of all that is known of a moment."""
     state, why = instant.state or "not known", instant.state_reason
-    # The first path since that state was entered: which one it is now is told below.
+    # The first path since that state was entered: the present one follows below.
     yield "state", f"{state}: {why}" if why and not why.startswith("path ") else state
     if instant.order:
         yield "order", instant.order

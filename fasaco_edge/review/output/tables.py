@@ -20,7 +20,7 @@ from fasaco_edge.review.review import Review
 
 
 class Column(NamedTuple):
-    """A column: its name, type ("float", "int", "bool" or "text"), unit, and what it is."""
+    """A column: its name, type ("float", "int", "bool" or "text"), unit and meaning."""
 
     name: str
     kind: str
@@ -30,13 +30,13 @@ class Column(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Table:
-    """A table; a value of a row is None where it is not known.
+    """A table; unknown values of a row are None.
 
     Attributes:
         name: of its file.
-        about: what a row is.
+        about: meaning of a row.
         columns: in order.
-        rows: once to be gone through.
+        rows: an iterator, usable once.
     """
 
     name: str
