@@ -1,6 +1,6 @@
-"""Random numbers in whole numbers, the same on every machine.
+"""Pseudo-random numbers in integer arithmetic.
 
-No function of the mathematical library takes part, so no machine rounds otherwise.
+No libm function is called, so results are equal on all machines.
 """
 
 import numpy as np
@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from fasaco_edge.kernels.jit import inlined, lean_kernel
 
-# The lowest bits choose among few things, the highest an index: they do not meet.
+# The lowest bits select one of few alternatives, the highest an index: they do not overlap.
 INDEX_BITS = 41
 WORD = 0xFFFFFFFF
 

@@ -1,10 +1,10 @@
-"""Compiled kernels that an installation brings along: a folder of code files, and their manifest.
+"""Compiled kernels shipped with an installation: a folder of code files, and their manifest.
 
 A release (``make wheelhouse``) compiles them for any processor of its kind, so that no robot has
-to: a first start compiles for a minute or more, and needs 500 MB for it. The manifest says what
-they were made of and for, and has the SHA-256 of each file. Where anything differs, a source, the
-compiler, Python or a single byte, none of them is used: kernels are then compiled into the user's
-own folder, as in an installation from sources, which brings none.
+to: a first start compiles for a minute or more, and needs 500 MB for it. The manifest states their
+sources and target, and has the SHA-256 of each file. If anything differs, a source, the compiler,
+Python or a single byte, none of them is used: kernels are then compiled into the user's own folder,
+as in an installation from sources, which has none.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ KERNEL_SUFFIX = ".kernel"
 COMPILERS = ("numba", "llvmlite")
 FOLDER = KERNELS.parent / "_share" / "kernels"
 MANIFEST = "manifest.json"
-# What every processor of a kind can do: name and features, as numba has them.
+# Baseline of each kind of processor: name and features, as in numba.
 ANY_PROCESSOR = ("generic", "")
 # The environment of a process that compiles for all of them. The order of sets is the same each
 # time, which some names in the code follow.
@@ -53,7 +53,7 @@ def sources_digest() -> str:
 
 
 def made_for() -> dict[str, str]:
-    """Return what compiled code depends on: it can be used where all of it is the same.
+    """Return the dependencies of compiled code: it can be used if all are equal.
 
     The patch level of Python makes no difference, nor does the processor, within its kind.
     """
@@ -86,10 +86,10 @@ def has_kernels() -> bool:
 def why_unusable(user: int | None = None) -> str:
     """Return why the kernels of this installation are not used; "" if they are.
 
-    Looked at once a process, down to the last byte; what is wrong is logged.
+    Checked once a process, byte by byte; faults are logged.
 
     Args:
-        user: who would load them; without it this process's.
+        user: the user who would load them; by default this process's.
     """
     if not has_kernels():
         return "this installation brings no compiled kernels along"

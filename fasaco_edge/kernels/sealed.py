@@ -1,8 +1,8 @@
 """Sealed files, which carry the SHA-256 of their content: a damaged one is never used as code.
 
-A loss of power leaves files that are empty, cut off or full of zeros, a worn card other bytes;
-such machine code ends the process, and a pickle may do anything. So each file begins with a line
-that has the digest of all that follows, and is checked before a byte of it is used::
+A power failure leaves files that are empty, truncated or full of zeros, a worn card wrong bytes;
+such machine code crashes the process, and a pickle may do anything. So each file begins with a line
+that has the digest of the rest, and is checked before a byte of it is used::
 
     fasaco-edge sealed 9f86d081...\\n
     content

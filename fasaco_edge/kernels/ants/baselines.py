@@ -10,13 +10,13 @@ continuous areas by a mobile robot", 2001. The area is cut into blocks of 2 x 2 
 tree spans the blocks, and the walk goes around the tree: along a cycle that visits every
 cell once where all blocks are whole.
 
-Deviation, for blocks that are not: a node of the tree is a connected part of a
+Deviation, for incomplete blocks: a node of the tree is a connected part of a
 block. Each node begins with a closed walk of its own, the cycle of a whole
-block or the way there and back through the cells of a part. A tree edge joins
-two closed walks into one: where both run along the common side, one copy of
+block or a walk there and back through the cells of a part. A tree edge joins
+two closed walks into one: if both run along the common side, one copy of
 that step on either side is exchanged for the two steps across, at no cost;
-elsewhere the one step across is walked there and back. All steps together, each
-as often as it is walked, are an even connected multigraph, and any Eulerian
+otherwise the one step across is walked there and back. All steps, each counted
+as often as it is walked, form an even connected multigraph, and any Eulerian
 circuit of it is the walk.
 """
 
@@ -239,7 +239,7 @@ def _circuit(blocks: Blocks, start: int) -> NDArray[np.int32]:
     while depth:
         here = stack[depth - 1]
         moved = False
-        # To the left first: clockwise around the tree, where there is a choice.
+        # Left first: clockwise around the tree, if there is a choice.
         for turn in (1, 0, 3, 2):
             direction = (heading[depth - 1] + turn) & 3
             if _has_step(blocks, here, direction) and _times(blocks, here, direction):

@@ -40,9 +40,9 @@ from fasaco_edge.kernels.jit import lean_kernel
 from fasaco_edge.kernels.lattice.reach import walk_cost
 from fasaco_edge.kernels.random import draw_unit
 
-# What eta of equation (5) is 1 over: the distance to a neighbour, which is 1; the
-# distance an ant of this velocity will go; one more than the cells still open
-# beside the neighbour (Warnsdorff's rule: visit first what will soon be cut off).
+# Denominator of eta in equation (5): the distance to a neighbour, which is 1; the
+# distance an ant of this velocity will go; one more than the open cells beside the
+# neighbour (Warnsdorff's rule: visit cells first that will soon be cut off).
 NEIGHBOUR, DISTANCE, FEWEST_OPEN = 0, 1, 2
 
 
@@ -53,7 +53,7 @@ class Rules(NamedTuple):
         q0, alpha, tau0: as in the equations.
         start: the cell that all ants start from.
         end: the cell the walk ends in, -1 for anywhere.
-        step_us, quarter_turn_us: what they cost [us].
+        step_us, quarter_turn_us: costs [us].
         visibility: NEIGHBOUR, DISTANCE or FEWEST_OPEN.
         powers: float64, ``(1 / (i + 1)) ** beta`` at index i, for each index in use.
     """
@@ -70,7 +70,7 @@ class Rules(NamedTuple):
 
 
 class ColonyState(NamedTuple):
-    """Where ants walk, and by what.
+    """The ants' graph, trail and rules.
 
     Attributes:
         graph: where they walk; all wanted cells, and the end, can be reached from the start.
@@ -195,10 +195,10 @@ def walk_ants(
     walks: NDArray[np.int32],
     lengths: NDArray[np.int64],
 ) -> None:
-    """Let ants walk on a trail that stays as it is.
+    """Let ants walk on a constant trail.
 
     Args:
-        colony: where they walk, and by what.
+        colony: their graph, trail and rules.
         scratch: working memory.
         velocity: cells an ant keeps straight on for, at least 1.
         streams: int64 (ants, 4): state of each ant's random stream, words of 32 bits,

@@ -1,8 +1,8 @@
-"""The graph that walks are built on cell by cell, and the way out of their dead ends.
+"""The graph that walks are built on cell by cell, and the shortest walk out of a dead end.
 
 Cells are flat indices ``row * cols + col``; n of them. A walk is an int32 array
-with a count beside it; where the array is too short the count continues and nothing
-is written, so that the caller can pass a longer one and ask again.
+with a separate length; if the array is too short, the length counts on and nothing is
+written, so that the caller can retry with a longer array.
 """
 
 from typing import NamedTuple
@@ -14,7 +14,7 @@ from fasaco_edge.kernels.jit import lean_kernel
 
 
 class Graph(NamedTuple):
-    """Where walks go.
+    """The graph of walks.
 
     Attributes:
         steps: step masks, uint8 (n,).
@@ -39,8 +39,8 @@ class Scratch(NamedTuple):
         seen: int32 (n,), number of the last search that reached the cell.
         came_from: int8 (n,), direction by which it was reached.
         queue: int32 (n,).
-        searches: int32 (1,), how many searches there were.
-        weights: float64 (1, 4), how much each direction attracts.
+        searches: int32 (1,), number of searches.
+        weights: float64 (1, 4), weight of each direction.
     """
 
     open_steps: NDArray[np.uint8]
@@ -53,7 +53,7 @@ class Scratch(NamedTuple):
 
 @lean_kernel
 def begin(graph: Graph, scratch: Scratch, start: int) -> int:
-    """Open all wanted cells but the start; return how many they are."""
+    """Open all wanted cells but the start; return their number."""
     for index in range(graph.open_steps.size):
         scratch.open_steps[index] = graph.open_steps[index]
     close(graph, scratch, start)
@@ -109,10 +109,10 @@ def _find(graph: Graph, scratch: Scratch, here: int, goal: int) -> int:
 def append_way(
     graph: Graph, scratch: Scratch, walk: NDArray[np.int32], length: int, here: int, goal: int
 ) -> tuple[int, int]:
-    """Append a shortest way from ``here`` to ``goal``, or with goal -1 to the nearest open cell.
+    """Append a shortest walk from ``here`` to ``goal``, or with goal -1 to the nearest open cell.
 
     Returns:
-        The walk's new length and the cell it has come to, by step ``scratch.came_from[cell]``.
+        The walk's new length and its last cell, entered by step ``scratch.came_from[cell]``.
     """
     goal = _find(graph, scratch, here, goal)
     distance, cell = 0, goal

@@ -1,1 +1,1 @@
-"""Kernels for lower bounds: of steps, and of what steps and turns cost."""
+"""Kernels for lower bounds: of steps, and of the cost of steps and turns."""

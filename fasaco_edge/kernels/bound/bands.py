@@ -1,15 +1,15 @@
-"""A closer bound: bands of cells in which the passages fit together, solved exactly.
+"""A tighter bound: bands of cells with consistent passages, solved exactly.
 
-Cell by cell the relaxation of ``kernels.bound.turns`` is as weak as its fractional optimum: half a
-passage along a cell and half a one across it cost less than any whole one. Here the cells of a
-band, some rows wide, have whole passages, and each step within it is left as often as it is
-entered; between bands prices take care of that, as before. A dynamic program over the frontier
-finds the cheapest choice: a state is how often each step is used that leads on from the cells
-behind, 0, 1, or twice and more, which count as the same and so only make the bound lower.
+Solved cell by cell, the relaxation of ``kernels.bound.turns`` is as weak as its fractional optimum:
+half a passage along a cell and half a passage across it cost less than any whole one. Here the
+cells of a band, some rows wide, have whole passages, and each step within the band is left as often
+as it is entered; between bands, flow balance stays relaxed and is only priced. A dynamic program
+over the frontier finds the cheapest choice. A state is the use of each step that leads on from the
+cells behind: 0, 1, or 2 and more, which count as the same and so only lower the bound.
 
-All prices are feasible, so each passage costs at least nothing, and what a choice costs above the
-cheapest passages of all cells (its excess) only grows. States are dropped above a limit; a band
-whose best choice lies above that has at least the limit for excess.
+All prices are feasible, so no passage has a negative reduced cost, and the cost of a choice above
+the cheapest passages of all cells (its excess) only grows. States above a limit are dropped; if
+every choice of a band exceeds the limit, its excess is at least the limit.
 
 Source: Guignard and Kim, "Lagrangean decomposition", 1987, for bounds by parts solved exactly.
 """
@@ -30,9 +30,9 @@ from fasaco_edge.kernels.bound.ways import (
 )
 from fasaco_edge.kernels.jit import inlined, lean_kernel
 
-# A band's next limit is a quarter above the excess met, and a corner by this.
+# A band's next limit is the excess found plus a quarter of it, plus 1 / SLACK of a corner.
 SLACK = 8
-# Entries of ``sums``: the bound so far, what the free end can save at most, and the next band.
+# Entries of ``sums``: the bound so far, the largest saving by the free end, and the next band.
 TOTAL, SAVING, BAND = 0, 1, 2
 
 
@@ -85,7 +85,7 @@ def solve_bands(
     turn: int,
     cells: int,
 ) -> bool:
-    """Solve the next bands, until they have so many cells; return whether any is left."""
+    """Solve the next bands, up to a number of cells; return whether any is left."""
     saving, band = memory.sums[SAVING], memory.sums[BAND]
     until = bands.first[band] + cells
     while band < bands.first.size - 1 and bands.first[band] < until:
@@ -109,7 +109,7 @@ def end_bands(
     turn: int,
     pace: int,
 ) -> int:
-    """Return the bound of the prices [half us], and move these on by the pace [half us]."""
+    """Return the bound of the prices [half us], and move the prices by the pace [half us]."""
     total = memory.sums[TOTAL]
     if lines.end < 0:
         total += _end(lines, prices, bands, memory, step, turn, memory.sums[SAVING])
@@ -129,7 +129,7 @@ def _end(
     turn: int,
     saving: int,
 ) -> int:
-    """Let the walk end in the band where that costs least; return what it costs more for that."""
+    """Let the walk end in the band where that is cheapest; return the additional cost."""
     while True:
         ends, cost = 0, NO_SIDE
         for band in range(bands.first.size - 1):
@@ -157,7 +157,7 @@ def _solve(
     turn: int,
     saving: int,
 ) -> bool:
-    """Solve a band with a limit high enough; return False if there is no memory for its states."""
+    """Solve a band with a sufficient limit; return False if its states do not fit the memory."""
     while True:
         if not _expand(lines, prices, bands, memory, band, step, turn, saving):
             memory.is_met[band] = 1
@@ -181,10 +181,10 @@ def _expand(
     turn: int,
     saving: int,
 ) -> bool:
-    """Expand a band's states, and note what excess it has at least; return as ``_solve`` does.
+    """Expand a band's states, and note its least excess; return as ``_solve`` does.
 
-    States without the free end are of interest below the limit, those with it below the limit
-    less what that end can save.
+    States without the free end are kept below the limit, states with it below the limit minus
+    the largest saving by that end.
     """
     first, last = bands.first[band], bands.first[band + 1]
     limit, below, free = memory.limit[band], 2 * bands.width, 2 * bands.width + 2
@@ -213,7 +213,7 @@ def _expand(
                         if made == value.size:
                             _forget(memory, begins[number + 1], made)
                             _note_least(memory, band, begins[number], begins[number + 1], free)
-                            # States that were dropped have no less than the limit.
+                            # Dropped states have at least the limit.
                             least = min(memory.found[band, 0], limit)
                             memory.found[band, 0] = least
                             memory.found[band, 1] = min(memory.found[band, 1], least - saving)

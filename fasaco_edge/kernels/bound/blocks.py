@@ -1,4 +1,4 @@
-"""Biconnected blocks of a lattice, which stay connected without any one cell; islands in them.
+"""Biconnected blocks of a lattice, which stay connected if any one cell is removed; their islands.
 
 Source: Hopcroft and Tarjan, "Algorithm 447: efficient algorithms for graph
 manipulation", 1973, depth first without recursion. Two blocks share at most one
@@ -24,7 +24,7 @@ class Blocks(NamedTuple):
 
     Attributes:
         cells: int32, the blocks' flat cells one block after the other. The first cell of a
-            block is its top, the one that every way from the root enters it by.
+            block is its top, by which every walk from the root enters it.
         first: int32 (blocks + 1,), where each block begins in ``cells``.
     """
 
@@ -44,7 +44,7 @@ def biconnected_blocks(steps: NDArray[np.uint8], offsets: NDArray[np.int64], roo
     most = 1
     for mask in steps:
         most += mask != 0
-    # Every cell but the root is below the top of one block, and each block has one top.
+    # Every cell except the root is below the top of exactly one block.
     cells, first = np.empty(2 * most, np.int32), np.empty(most + 1, np.int32)
     open_cells = np.empty(most, np.int32)
     rank, low = np.zeros(steps.size, np.int32), np.empty(steps.size, np.int32)
@@ -93,10 +93,10 @@ def biconnected_blocks(steps: NDArray[np.uint8], offsets: NDArray[np.int64], roo
 
 @kernel
 def wanted_first(cells: NDArray[np.int32], wanted: NDArray[np.uint8]) -> int:
-    """Move the wanted of a block's cells to the front, behind its top; return how many.
+    """Move the wanted cells of a block to the front, after its top; return their number.
 
     Args:
-        cells: int32 (k,), a block's cells, the top first; it counts in any case.
+        cells: int32 (k,), a block's cells, the top first; the top always counts as wanted.
         wanted: uint8 (n,), 1 for wanted cells.
     """
     count = 1
@@ -133,7 +133,7 @@ class Sea(NamedTuple):
 
 @kernel
 def find_islands(sea: Sea, chosen: NDArray[np.uint8], colour: NDArray[np.uint8]) -> tuple[int, int]:
-    """Number the islands with a wanted cell; return how many there are of each colour.
+    """Number the islands with a wanted cell; return the number of islands of each colour.
 
     An island's colour is that of its chosen cells. They agree: a step from a
     chosen cell leads to a cell of the other colour that is not chosen, and a step from
@@ -184,7 +184,7 @@ def spanning_weight(sea: Sea, islands: int) -> tuple[int, int]:
     parent = np.arange(islands)
     total, heaviest, head = 0, 0, 0
     while head < tail:
-        # All cells that are ``ring`` steps away: first the steps within the ring.
+        # All cells at a distance of ``ring`` steps: first the steps within the ring.
         ring, begin = sea.away[sea.queue[head]], head
         while head < tail and sea.away[sea.queue[head]] == ring:
             head += 1
@@ -200,7 +200,7 @@ def spanning_weight(sea: Sea, islands: int) -> tuple[int, int]:
 
 @kernel
 def measure_from(sea: Sea, source: int) -> None:
-    """Write into ``away`` how many steps each cell is from ``source``; islands are forgotten."""
+    """Write each cell's distance from ``source`` [steps] into ``away``; islands are cleared."""
     for cell in sea.cells:
         sea.island[cell] = NO_ISLAND
     sea.island[source] = 0
@@ -209,7 +209,7 @@ def measure_from(sea: Sea, source: int) -> None:
 
 @kernel
 def _spread(sea: Sea) -> int:
-    """Give every cell its nearest island; return how many cells the queue holds, in order."""
+    """Assign each cell to its nearest island; return the number of cells in the queue, in order."""
     tail = 0
     for cell in sea.cells:
         if sea.island[cell] != NO_ISLAND:
@@ -233,7 +233,7 @@ def _spread(sea: Sea) -> int:
 
 @kernel
 def _join(sea: Sea, parent: NDArray[np.int64], cell: int, away: int) -> int:
-    """Join the islands of ``cell`` and of neighbours ``away`` from theirs; return how many."""
+    """Join the islands of ``cell`` and of neighbours at ``away`` steps; return how many."""
     joined = 0
     for direction in range(4):
         if sea.steps[cell] >> direction & 1:

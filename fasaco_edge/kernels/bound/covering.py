@@ -3,40 +3,39 @@
 A walk from ``start`` to ``end`` visits all required cells; start and end count as
 required. Each bound below counts some steps that every such walk makes.
 
-*Blocks.* Take what the walk does in one biconnected block B. It leaves B by a cut
-vertex and returns by the same one, so with its excursions cut out it is a walk in B:
-from a, the start or the cut vertex on the way to it, to b, the end or the cut vertex
-on the way to it. It visits the wanted cells of B: the required ones, and cut vertices
-with required cells beyond them. It is open, a != b, only in blocks between start and
-end. A block with no wanted cell but a counts nothing. No step lies in two blocks, so
-the bounds of the blocks add up.
+*Blocks.* Restrict the walk to one biconnected block B. It leaves B by a cut vertex and
+returns by the same one, so without its excursions it is a walk in B: from a, the start
+or the cut vertex towards it, to b, the end or the cut vertex towards it. It visits the
+wanted cells of B: the required ones, and cut vertices with required cells beyond them.
+It is open, a != b, only in blocks between start and end. A block whose only wanted cell
+is a counts 0. No step lies in two blocks, so the bounds of the blocks add up.
 
 *Independent set.* Let I be wanted cells of B, no two of them neighbours. A step has
 at most one end in I, so visits to I share no steps. Each has a step before it and one
-after it, but for the first and the last cell of an open walk. So a closed walk makes
-2 |I| steps at I, an open one 2 |I| - [a in I] - [b in I]. Any I is valid: the matching it
-is read from decides only how large it is.
+after it, except the first and the last cell of an open walk. So a closed walk makes
+2 |I| steps at I, an open one 2 |I| - [a in I] - [b in I]. Any I is valid: the matching from
+which it is derived only determines its size.
 
 *Islands.* Cells joined by steps at I are an island; only islands with wanted cells
 count. If there are k > 1, the walk makes further steps between them, none of them at I:
 (1) Islands have two colours, and no step joins two of one colour (see ``blocks.find_islands``).
-A walk comes to each of the m islands of a colour and leaves it, which is 2 m steps, as
-none of them serves two of these islands; one less for each end of the walk in one of
-them. With both ends in the same island it leaves that one, too, and comes back: 2 m.
-(2) Its ways from island to island connect them, so they weigh no less than a minimum
+A walk enters and leaves each of the m islands of a colour, which takes 2 m steps, as no
+step serves two of these islands; one less for each end of the walk in one of them. With
+both ends in the same island it leaves that one, too, and returns: 2 m.
+(2) Its paths from island to island connect them, so they weigh no less than a minimum
 spanning tree. If it is closed, or ends in the island where it began, it crosses every
 cut at least twice. Without one crossing of the cut at the tree's heaviest edge, the
-lightest across it, the other ways still connect: tree + heaviest.
+lightest across it, the other paths still connect: tree + heaviest.
 
-*Way back.* An open walk and a shortest way from b to a make a closed walk: the bound of
-that, less the distance.
+*Return.* An open walk and a shortest path from b to a form a closed walk: its bound minus
+the distance is a bound.
 
-*Parity.* Each step changes the colour on the chessboard: the colours of a and b say
-whether the steps are even.
+*Parity.* Each step changes the colour on the chessboard: the colours of a and b determine
+whether the number of steps is even.
 
-*End anywhere.* A shortest walk ends in a required cell, the last one it comes to. So the
-bound is the least of those for given ends: all blocks closed, less the largest saving by
-open ones on the way to an end, found from the leaves of the tree of blocks up.
+*End anywhere.* A shortest walk ends in a required cell, the last one it visits. So the
+bound is the least of those for given ends: all blocks closed, minus the largest saving by
+open blocks between start and end, found from the leaves of the block tree up.
 """
 
 from typing import NamedTuple
@@ -62,8 +61,8 @@ from fasaco_edge.kernels.bound.matching import (
 from fasaco_edge.kernels.jit import kernel
 
 NO_END = -(2**30)
-# Cells searched for a larger matching. On maps of a million cells with scattered obstacles no
-# bound gained from more; without any search they were up to four steps lower.
+# Search budget for a larger matching [cells]. On maps of a million cells with scattered obstacles a
+# larger budget improved no bound; without any search bounds were up to four steps lower.
 SEARCHED_PER_CELL, SEARCHED_AT_LEAST = 10, 10_000
 
 
@@ -102,14 +101,14 @@ class Ground(NamedTuple):
 def covering_bound(
     steps: NDArray[np.uint8], required: NDArray[np.uint8], start: int, end: int
 ) -> int:
-    """Return a number of steps that no walk over all required cells can beat.
+    """Return a lower bound on the steps of a walk over all required cells.
 
     Args:
         steps: step masks, uint8 (rows, cols); symmetric.
         required: uint8 (rows, cols), 1 for cells to visit; those that cannot be reached
             from the start are left out.
-        start: flat cell ``row * cols + col`` the walk begins in.
-        end: flat cell it ends in, one that can be reached; -1 for anywhere.
+        start: first flat cell ``row * cols + col`` of the walk.
+        end: its last flat cell, reachable; -1 for anywhere.
     """
     ground = _ground(steps, required)
     ground.wanted[start] = 1

@@ -1,9 +1,9 @@
-"""The projection of step prices onto feasible ones: no passage costs less than nothing.
+"""The projection of step prices onto feasible ones: no passage has a negative reduced cost.
 
-Along a line of cells the price of a step may fall by one step's cost from one to the next, or
-passing straight on were too cheap: pooling adjacent violators (isotonic regression) projects onto
-that. Corners and ways back are satisfied if what a side is paid stays within a box, one for the two
-sides along the row and one along the column, that add up to the cost of a corner.
+Along a line of cells the price of a step may fall by at most one step's cost between consecutive
+steps; otherwise going straight would have a negative cost. Pooling adjacent violators (isotonic
+regression) projects onto that. Corners and U-turns are feasible if the price at each side is within
+a bound; the row's and the column's bound add up to a corner's cost.
 """
 
 import numpy as np
@@ -12,13 +12,13 @@ from numpy.typing import NDArray
 from fasaco_edge.kernels.bound.lines import ALONG_COLS, ALONG_ROWS, Lines, StepPrices
 from fasaco_edge.kernels.jit import lean_kernel
 
-# What a side costs that a cell does not have, in size [half us].
+# Magnitude of the price of a missing side [half us].
 NO_SIDE = 1 << 60
 
 
 @lean_kernel
 def make_feasible(lines: Lines, prices: StepPrices, step: int, turn: int) -> None:
-    """Change the prices as little as it takes that no passage costs less than nothing."""
+    """Change the prices as little as possible so that no passage has a negative reduced cost."""
     for axis in range(2):
         _level(lines.links[axis], prices.price[axis], step, prices.use)
     _fit_boxes(lines, prices, step, turn)
@@ -30,7 +30,7 @@ def make_feasible(lines: Lines, prices: StepPrices, step: int, turn: int) -> Non
 def _level(
     links: NDArray[np.uint8], price: NDArray[np.int64], step: int, spare: NDArray[np.int64]
 ) -> None:
-    """Let prices fall by no more than ``step`` from each one to the next of its line."""
+    """Limit the fall of prices to ``step`` between consecutive steps of a line."""
     mean, weight = spare[0], spare[1]
     first = 0
     for index in range(links.size):
@@ -56,7 +56,7 @@ def _level(
 
 @lean_kernel
 def _fit_boxes(lines: Lines, prices: StepPrices, step: int, turn: int) -> None:
-    """Share the cost of a corner among a cell's two axes, each as it needs."""
+    """Divide the cost of a corner between a cell's two axes, as each needs."""
     rows, cols = prices.price[ALONG_ROWS], prices.price[ALONG_COLS]
     corner, least, most = step + turn, step // 2, step // 2 + turn
     for cell in range(lines.sides.size):
@@ -85,10 +85,10 @@ def _clamp(
     step: int,
     highest: NDArray[np.int64],
 ) -> None:
-    """Keep what sides are paid within the boxes, and prices from falling faster than ``step``.
+    """Clamp the prices at sides to the bounds, and their fall to ``step``.
 
-    This alone makes any prices feasible; those that are level move less for it. ``highest``,
-    int64 (m,), is working memory.
+    This alone makes any prices feasible; levelled prices change less. ``highest``, int64 (m,), is
+    working memory.
     """
     limit = NO_SIDE
     for index in range(links.size - 1, -1, -1):

@@ -18,8 +18,8 @@ class Lines(NamedTuple):
         sides: uint8 (m,), step masks, in the order of the rows.
         rank: int32 (m,), number of each of them in the order of the columns.
         links: uint8 (2, m), 1 where a step leads to the next cell: along rows, along columns.
-        wanted: uint8 (m,), 1 for cells with a passage to pay: those to cover, but for the
-            start and a given end.
+        wanted: uint8 (m,), 1 for cells that need a passage: those to cover, except the start
+            and a given end.
         start, end: numbers of cells; end -1 for anywhere.
     """
 
@@ -32,7 +32,7 @@ class Lines(NamedTuple):
 
 
 class StepPrices(NamedTuple):
-    """Prices of the steps to the next cell: the cell pays them, the next one is paid.
+    """Prices of the steps to the next cell: the cell pays them, the next one receives them.
 
     All arrays are int64 (2, m): along rows, along columns, in their order.
 
@@ -40,9 +40,9 @@ class StepPrices(NamedTuple):
         price: in force [half us].
         best: those of the best bound so far.
         trend: running mean of the directions of ascent [1 / 256].
-        use: how much more often cells pay a price than are paid it, in the cheapest passages;
-            before that is known, working memory.
-        box: what a side may be paid at most [half us].
+        use: payments minus receipts of a price in the cheapest passages; before that is known,
+            working memory.
+        box: bound of the price at a side [half us].
     """
 
     price: NDArray[np.int64]
@@ -98,9 +98,9 @@ def lines_of(
 
 @kernel
 def first_prices(lines: Lines, turn: int) -> StepPrices:
-    """Return prices that rise evenly along each line, by half a turn's cost at either side of 0.
+    """Return prices that rise evenly along each line, by half a turn's cost on either side of 0.
 
-    So each cell of a long strip pays its part of the turn at the end.
+    So each cell of a long strip pays a part of the turn at its end.
 
     Args:
         lines: the cells.

@@ -1,4 +1,4 @@
-"""Large matchings of a bipartite lattice, and the independent sets they lead to.
+"""Large matchings of a bipartite lattice, and the independent sets derived from them.
 
 A lattice is bipartite: every step leads from one colour of a chessboard to the
 other. Sources: Karp and Sipser, "Maximum matchings in sparse random graphs",
@@ -66,12 +66,12 @@ def pairing_for(size: int) -> Pairing:
 
 @kernel
 def match(graph: Bipartite, pairing: Pairing, budget: int) -> None:
-    """Find a maximum matching, or a large one where that takes long.
+    """Find a maximum matching, or a large one if that takes long.
 
     Args:
-        graph: what to match.
-        pairing: out; only the entries of the graph's cells are touched.
-        budget: begin no more searches after so many cells were searched.
+        graph: the cells to match.
+        pairing: out; only the entries of the graph's cells are changed.
+        budget: begin no more searches after this many cells were searched.
     """
     for cell in graph.cells:
         pairing.mate[cell] = SINGLE
@@ -81,7 +81,7 @@ def match(graph: Bipartite, pairing: Pairing, budget: int) -> None:
     for cell in graph.cells:
         if pairing.mate[cell] == SINGLE:
             single[graph.colour[cell]] += 1
-    # Each augmenting path has an end of either colour: the fewer searches will do.
+    # Each augmenting path has an end of each colour: search from the colour with fewer cells.
     side = 0 if single[0] <= single[1] else 1
     search = 0
     for cell in graph.cells:
@@ -114,7 +114,7 @@ def _match_lone_cells_first(graph: Bipartite, pairing: Pairing) -> None:
 
 @kernel
 def _match_with_rarest(graph: Bipartite, pairing: Pairing, cell: int, waiting: int) -> int:
-    """Match ``cell`` with the single neighbour of least degree; return how many cells wait."""
+    """Match ``cell`` with the single neighbour of least degree; return how many wait."""
     mate, degree = pairing.mate, pairing.degree
     partner, least = SINGLE, 5
     for direction in range(4):
@@ -141,7 +141,7 @@ def _match_with_rarest(graph: Bipartite, pairing: Pairing, cell: int, waiting: i
 def _augment(graph: Bipartite, pairing: Pairing, source: int, search: int) -> int:
     """Search an augmenting path from ``source`` and switch it; return the cells searched.
 
-    Where there is none, none will ever run through a cell of this search.
+    If there is none, no later path can run through a cell of this search.
     """
     mate, queue, seen = pairing.mate, pairing.queue, pairing.seen
     queue[0] = source
@@ -184,11 +184,11 @@ def _switch(graph: Bipartite, pairing: Pairing, source: int, end: int) -> None:
 def choose_independent(
     graph: Bipartite, pairing: Pairing, side: int, first: int, chosen: NDArray[np.uint8]
 ) -> int:
-    """Choose an independent set; return how many cells it has.
+    """Choose an independent set; return its size.
 
-    All cells of the colour other than ``side`` are chosen, but for the neighbours of
-    chosen cells of ``side``: the single cells, ``first``, and the mates of what these
-    displace. So the set is independent whatever the matching is. It is as large as any
+    All cells of the colour other than ``side`` are chosen, except the neighbours of
+    chosen cells of ``side``: the single cells, ``first``, and the mates of displaced
+    cells. So the set is independent whatever the matching is. It is as large as any
     (Koenig) if the matching is maximum and no single cell can be reached from ``first``.
 
     Args:

@@ -1,4 +1,4 @@
-"""The passages of one cell: what its sides cost, which one is cheapest, what they use."""
+"""The passages of one cell: cost of its sides, cheapest passage, use of sides."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -7,8 +7,8 @@ from fasaco_edge.kernels.bound.feasible import NO_SIDE
 from fasaco_edge.kernels.bound.lines import ALONG_COLS, ALONG_ROWS, Lines, StepPrices
 from fasaco_edge.kernels.jit import inlined, lean_kernel
 
-# Of 256: what is kept of the running mean of directions, and what a new one adds. Trials on
-# grids of 170 to 9,000 cells: 230 is slower at first, 160 no better at last.
+# Weights, of 256, of the running mean of directions and of a new one. Trials on grids of 170 to
+# 9,000 cells: 230 is slower at first, 160 no better in the end.
 KEPT, ADDED = 200, 56
 UNIT = 256
 
@@ -25,7 +25,7 @@ def follow(lines: Lines, prices: StepPrices, pace: int) -> None:
 
 @inlined
 def sides_of(lines: Lines, prices: StepPrices, cell: int) -> tuple[int, int, int, int]:
-    """Return what a cell pays for its sides, by direction."""
+    """Return the prices at a cell's sides, by direction."""
     rows, cols = prices.price[ALONG_ROWS], prices.price[ALONG_COLS]
     mask, rank = lines.sides[cell], lines.rank[cell]
     east = rows[cell] if mask & 1 else NO_SIDE
@@ -37,7 +37,7 @@ def sides_of(lines: Lines, prices: StepPrices, cell: int) -> tuple[int, int, int
 
 @inlined
 def cheapest(sides: tuple[int, int, int, int], step: int, turn: int) -> int:
-    """Return what the cheapest passage costs."""
+    """Return the cost of the cheapest passage."""
     east, north, west, south = sides
     straight = step + min(east + west, north + south)
     corner = step + turn + min(east, west) + min(north, south)
@@ -55,7 +55,7 @@ def use_passage(
     turn: int,
     times: int,
 ) -> None:
-    """Count the use of the sides of a cell's passage that costs so much."""
+    """Count the use of sides by a cell's passage of this cost."""
     east, north, west, south = sides
     if cost == step + east + west:
         one, other = 0, 2
@@ -72,7 +72,7 @@ def use_passage(
 
 @inlined
 def which_side(sides: tuple[int, int, int, int], cost: int) -> int:
-    """Return the direction of the first side that costs so much."""
+    """Return the direction of the first side with this price."""
     east, north, west, _ = sides
     if east == cost:
         return 0

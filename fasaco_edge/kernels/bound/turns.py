@@ -1,19 +1,19 @@
-"""A lower bound on what a covering walk costs, steps and quarter-turns.
+"""A lower bound on the cost of a covering walk, in steps and quarter-turns.
 
-Sources: Held and Karp 1970 for prices that rise where a relaxed walk does not fit together;
+Sources: Held and Karp 1970 for prices that rise where a relaxed walk is inconsistent;
 Fekete and Krupke, "Practical methods for computing large covering tours and cycle covers with
 turn cost", 2019, for the relaxation: a walk is a set of passages, one for each visit of a cell.
 
-A passage comes into its cell by one side and leaves by another one, or by the same. It costs a
-step, half of it for each side, and its quarter-turns: none straight on, one around a corner, two
-back.
-The first and the last visit have one side only, and cost half a step. Every step leaves one cell
-and enters the next one, so a price on each step that one cell pays and the other one is paid
-leaves the cost of a walk as it is. With prices that let no passage cost less than nothing a walk
-costs no less than: the cheapest first visit of the start; and the cheapest passage of each cell
-to cover; and the last visit. That is the cheapest one of a given end, else it takes the place of
-a passage of the cell where that saves most: a best walk ends in a cell to cover, at its first
-visit.
+A passage enters its cell by one side and leaves it by another one, or by the same. It costs a step,
+half of it for each side, and its quarter-turns: none straight on, one at a corner, two in a U-turn.
+The first and the last visit have only one side, and cost half a step. Give each step a price that
+the cell left pays and the cell entered receives. Prices cancel along a walk, so its cost is
+unchanged. If no passage has a negative reduced cost, a walk costs at least the sum of:
+
+* the cheapest first visit of the start;
+* the cheapest passage of each cell to cover;
+* the last visit: the cheapest one of a given end; else it replaces the passage of a cell where that
+  saves most, because a best walk ends in a cell to cover, at its first visit.
 
 The prices after every iteration are exactly feasible (``kernels.bound.feasible``) and give a valid
 bound; the best one counts.
@@ -41,16 +41,16 @@ from fasaco_edge.kernels.jit import inlined, lean_kernel
 def ascend(
     lines: Lines, prices: StepPrices, step: int, turn: int, pace: int, falls: int, times: int
 ) -> int:
-    """Improve the prices; return the best bound met [half us], ``best`` having its prices.
+    """Improve the prices; return the best bound found [half us], with its prices in ``best``.
 
-    A subgradient method with exactly feasible iterates: each price follows how much more often
-    its step is left than entered, in the mean of the last iterations.
+    A subgradient method with exactly feasible iterates: each price follows the imbalance of its
+    step, leavings minus entries, averaged over the last iterations.
 
     Args:
         lines: the cells, two or more.
-        prices: to begin with, feasible or not; changed in place.
+        prices: initial ones, feasible or not; changed in place.
         step, turn: a step and a quarter-turn [half us], the step an even number.
-        pace: how far a price moves at first [half us].
+        pace: initial step size of the prices [half us].
         falls: the pace falls by a factor of about e to this power.
         times: how many iterations.
     """
@@ -76,7 +76,7 @@ def _copy(source: NDArray[np.int64], target: NDArray[np.int64]) -> None:
 
 @lean_kernel
 def _relaxed(lines: Lines, prices: StepPrices, step: int, turn: int) -> int:
-    """Return the bound of feasible prices, and write into ``use`` what its passages use."""
+    """Return the bound of feasible prices; write the use of sides by its passages into ``use``."""
     use = prices.use
     for axis in range(2):
         for index in range(lines.sides.size):

@@ -1,7 +1,7 @@
-"""The ways to use a cell's sides, for the dynamic program over bands (``kernels.bound.bands``).
+"""Usage patterns of a cell's sides, for the dynamic program over bands (``kernels.bound.bands``).
 
-A way says of each side to a cell of the same band how often it is used: 0, 1, or twice and more,
-in two bits, by direction. Its cost is that of the cheapest passages which use the sides so.
+A pattern (way) has for each side to a cell of the same band the number of its uses, 0, 1, or 2 and
+more, in two bits by direction. Its cost is that of the cheapest passages with these uses.
 """
 
 from typing import NamedTuple
@@ -30,14 +30,14 @@ class BandMemory(NamedTuple):
         is_met: uint8 (k,), whether the latter is met, or cannot be known.
         entry: int32, by state its number in ``value``, or -1.
         value, state, parent, pattern: int64 and int32 (n,), states of one band cell by cell:
-            excess, the state, the one it came from, and how the cell's sides are used.
-        begins: int32, where the states after each cell begin.
-        codes: int16 (16, 81), by mask of inner sides all ways to use these, in order; counts
-            int32 (16,), how many.
+            excess, the state, its predecessor, and the pattern of the cell's sides.
+            begins: int32, where the states after each cell begin.
+            codes: int16 (16, 81), by mask of inner sides all their patterns, in order; counts
+            int32 (16,), their number.
         cost: int64 (3, PATTERNS), of the ways to use a cell's sides: of passages alone, and with
             one and two visits of one side.
         how: int16 (PATTERNS,), the last passage of each way, and the way without it.
-        listed: int32 (2, INCOMING), how many ways are listed by what comes in, without the free
+        listed: int32 (2, INCOMING), number of patterns listed by incoming uses, without the free
             end and with it.
         ways: int16 (2, INCOMING, OUTGOING), these; priced: int64, their excess.
     """
@@ -63,13 +63,13 @@ class BandMemory(NamedTuple):
 
 @inlined
 def halves_of(lines: Lines, cell: int) -> int:
-    """Return how many visits of one side a cell has for sure: the first one, the last one."""
+    """Return the number of a cell's visits with one side only: the walk's first and last visit."""
     return int(cell == lines.start) + int(cell == lines.end)
 
 
 @inlined
 def least_of(lines: Lines, prices: StepPrices, cell: int, step: int, turn: int) -> int:
-    """Return what a cell costs at least."""
+    """Return the least cost of a cell."""
     sides = sides_of(lines, prices, cell)
     halves = halves_of(lines, cell)
     if halves:
@@ -79,7 +79,7 @@ def least_of(lines: Lines, prices: StepPrices, cell: int, step: int, turn: int) 
 
 @inlined
 def _with_side(inner: int, way: int, side: int) -> int:
-    """Return a way to use a cell's sides, with one of them used once more."""
+    """Return a pattern with one more use of a side."""
     if not inner >> side & 1 or way >> 2 * side & 2:
         return way
     return way + (1 << 2 * side)
@@ -96,7 +96,7 @@ def _price_ways(
     step: int,
     turn: int,
 ) -> tuple[int, int]:
-    """Price all ways to use a cell's sides that passages below ``highest`` can make up.
+    """Price all patterns of a cell that passages below ``highest`` can form.
 
     Returns:
         The cheapest passage between sides that lead out of the band: its price, and which one it
@@ -165,9 +165,9 @@ def list_ways(
     step: int,
     turn: int,
 ) -> None:
-    """List the ways to use a cell's sides by what comes in, with their excess."""
+    """List a cell's patterns by incoming uses, with their excess."""
     sides, least = sides_of(lines, prices, cell), least_of(lines, prices, cell, step, turn)
-    # First and last visits may be paid for.
+    # First and last visits may have a negative cost.
     highest = limit + saving + max(least, 0)
     outer, _ = _price_ways(lines, prices, memory, inner, cell, highest, step, turn)
     for coming in range(INCOMING):
@@ -185,7 +185,7 @@ def list_ways(
 
 @inlined
 def _list(memory: BandMemory, layer: int, row: int, inner: int, least: int, limit: int) -> None:
-    """List the ways of a row of ``cost`` whose excess is below the limit."""
+    """List the patterns of a row of ``cost`` whose excess is below the limit."""
     for number in range(memory.counts[inner]):
         way = int(memory.codes[inner, number])
         excess = memory.cost[row, way] - least

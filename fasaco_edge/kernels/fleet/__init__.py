@@ -1,1 +1,1 @@
-"""Kernels that share one coverage walk out among several robots."""
+"""Kernels that divide one coverage walk among several robots."""

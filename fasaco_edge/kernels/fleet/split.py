@@ -1,9 +1,9 @@
 """Splitting a closed walk into two closed walks, for two groups of robots.
 
-A closed walk comes apart without an extra step where it passes a cell twice, and where it passes
+A closed walk can be split without an extra step where it passes a cell twice, and where it passes
 two neighbouring cells in one direction and the two beside them in the other: the two steps across
-take the place of the two along. Anywhere else one step more is needed on either side, between two
-neighbouring cells that it visits. All of these places are tried.
+replace the two along. Anywhere else each side needs one more step, between two neighbouring cells
+that the walk visits. All of these places are tried.
 """
 
 from typing import NamedTuple
@@ -15,15 +15,15 @@ from fasaco_edge.kernels.jit import kernel, lean_kernel
 from fasaco_edge.kernels.lattice.reach import UNSEEN, search
 
 NONE = -1
-# From a start to a cell that cannot be reached from it [steps]; twice this is no overflow.
+# Distance of an unreachable cell [steps]; twice this does not overflow.
 FAR = 1 << 28
-# The worst share counts so much more than all shares together.
+# Weight of the worst share relative to the sum of all shares.
 WORST = 4
 
 
 @lean_kernel
 def _nearest(tables: NDArray[np.int32], robot: int, begin: int, count: int) -> int:
-    """Return the least way of a robot to ``count`` visits from ``begin`` on, read cyclically."""
+    """Return a robot's least distance to ``count`` visits from ``begin`` on, read cyclically."""
     level = 0
     while 2 << level <= count:
         level += 1
@@ -34,7 +34,7 @@ def _nearest(tables: NDArray[np.int32], robot: int, begin: int, count: int) -> i
 
 @lean_kernel
 def _worst_share(first_us: int, second_us: int, robots: int) -> int:
-    """Return the least that the worst of ``robots`` shares of two parts can be, ways left out."""
+    """Return the least worst share of ``robots`` in two parts, without distances."""
     worst = first_us + second_us
     for count in range(1, robots):
         worst = min(worst, max(first_us // count, second_us // (robots - count)))
@@ -64,8 +64,8 @@ class _Parts(NamedTuple):
     seconds: int
 
 
-# Where it comes apart: a cell that is passed twice, two steps side by side in opposite directions,
-# two neighbouring cells.
+# Kinds of splits: at a cell that is passed twice, at two steps side by side in opposite directions,
+# at two neighbouring cells.
 TWICE, ABREAST, BESIDE = 0, 1, 2
 
 
@@ -95,13 +95,13 @@ def _parts(places: _Places, kind: int, index: int, other: int, direction: int) -
 
 
 class _Shares(NamedTuple):
-    """What tells how good parts are, and working memory.
+    """Data to score parts, and working memory.
 
     Attributes:
-        costs_us: int64 (2n + 1,), what the first visits cost, the walk gone through twice [us].
-        nearest: int32 (k, levels, 2n), the least ways to 1, 2, 4 ... visits from each on [steps].
-        step_us: of a step [us].
-        ways: int64 (2, k), each robot's way to either part [steps].
+        costs_us: int64 (2n + 1,), cumulative costs of visits, over the walk twice [us].
+        nearest: int32 (k, levels, 2n), least distances to 1, 2, 4 ... visits from each on [steps].
+        step_us: cost of a step [us].
+        ways: int64 (2, k), each robot's distance to either part [steps].
         gains: int64 (k,), of the first part over the second.
         order: int64 (k,), robots, those nearest to the first part first.
     """
@@ -116,10 +116,10 @@ class _Shares(NamedTuple):
 
 @lean_kernel
 def _deal(shares: _Shares, first_us: int, second_us: int) -> tuple[int, int]:
-    """Deal robots out to two parts of a walk by their ways; return the score, and how many.
+    """Assign robots to two parts of a walk by their distances; return the score, and how many.
 
-    By what the one part is nearer to them than the other; the two about whom that is closest may
-    change places, as the sum of all ways says little of the worst share.
+    In order of the difference of the two distances; the two robots next to the dividing point may
+    be swapped, as the sum of all distances says little about the worst share.
 
     ``shares.order`` has the robots then, those of the first part first.
     """
@@ -157,7 +157,7 @@ def _deal(shares: _Shares, first_us: int, second_us: int) -> tuple[int, int]:
 
 @lean_kernel
 def _score(shares: _Shares, parts: _Parts, best: int) -> tuple[int, int]:
-    """Return how bad parts are, and how many robots go to the first; -1 if no better than best."""
+    """Return the parts' score and the number of robots for the first; -1 if not below best."""
     robots = shares.order.size
     first_us = shares.costs_us[parts.first + parts.firsts] - shares.costs_us[parts.first]
     second_us = shares.costs_us[parts.second + parts.seconds] - shares.costs_us[parts.second]
@@ -184,10 +184,10 @@ def best_split(
     found: NDArray[np.int64],
     order: NDArray[np.int64],
 ) -> bool:
-    """Find where a closed walk is best split in two, and which robots drive which part.
+    """Find the best split of a closed walk in two, and the robots of each part.
 
-    Best is what leaves the worst share, and then all of them, cheapest: a part is shared by its
-    robots alike, and each drives out to it and back.
+    The best split has the cheapest worst share, then the cheapest sum of shares: the robots of a
+    part get equal shares, and each drives out to it and back.
 
     Args:
         steps: step masks, uint8 (size,).

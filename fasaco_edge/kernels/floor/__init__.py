@@ -1,1 +1,1 @@
-"""Floor: where a robot's disc may be, what its tool sweeps, and the line that is driven."""
+"""Kernels on floor rasters: places of a robot's disc, sweeping by its tool, the driven line."""

@@ -1,12 +1,12 @@
 """Annealing of the driven line: random moves, some of which may lose a little at first.
 
-At each point of the line in turn one move is drawn: leave the next one or two points out, move
-the next point, shift the edge behind it, cut the corner at it, or lead the edge before it round
-over what is left nearby. Lengths of a move are drawn over several octaves. A move that loses
-less than a temperature times a random number is made, too (Metropolis); the temperature falls to 0.
+At each point of the line in turn one move is drawn: remove the next one or two points, move the
+next point, shift the edge after it, cut the corner at it, or reroute the edge before it over
+unswept floor nearby. Lengths of a move are drawn over several octaves. A move that loses less than
+a temperature times a random number is accepted, too (Metropolis); the temperature falls to 0.
 
 Source: S. Kirkpatrick, C. D. Gelatt, M. P. Vecchi, Optimization by Simulated Annealing, 1983.
-No function of the mathematical library takes part, so no machine rounds otherwise.
+No libm function is called, so results are equal on all machines.
 """
 
 import numpy as np
@@ -29,15 +29,15 @@ from fasaco_edge.kernels.floor.sweeps import BLOCK
 from fasaco_edge.kernels.jit import inlined, lean_kernel
 from fasaco_edge.kernels.random import draw
 
-# The temperature at the beginning, as a part of the seconds that driving a tool's width takes.
+# Initial temperature, as a share of the time to drive a tool's width.
 HOTTEST = 0.16
-# The farthest that a move goes, in radii of the tool, and into how many octaves it is divided.
+# Largest length of a move, in radii of the tool, and the number of its octaves.
 FARTHEST, OCTAVES = 2.5, 5
-# Of sixteen moves so many are of each kind; the rest lead round over what is left.
+# Number of moves of each kind in sixteen; the rest are detours over unswept floor.
 LEFT_OUT, MOVED, SHIFTED, CUT = 2, 4, 3, 3
-# A cut leaves so much of an edge that it would use up.
+# A cut leaves at least this much of an edge.
 MOST_CUT = 0.95
-# Nothing is left nearby, or the line has too few points for a move.
+# No unswept floor nearby, or too few points for a move.
 NO_MOVE = -1
 # Unit exponential variates, rounded: the logarithm's last bits differ between machines.
 EXPONENTIAL = np.round(-np.log((np.arange(4096) + 0.5) / 4096) * 65536) / 65536
@@ -51,7 +51,7 @@ def _unit(random: NDArray[np.uint64]) -> float:
 
 @inlined
 def _length(random: NDArray[np.uint64], farthest: float) -> float:
-    """Return the length of a move, either way: each octave below ``farthest`` is as likely."""
+    """Return the signed length of a move: each octave below ``farthest`` is equally likely."""
     bits = draw(random)
     size = farthest * (0.5 + 0.5 * _unit(random))
     for _ in range((bits >> 20) % OCTAVES):
@@ -134,7 +134,7 @@ def _cut(line: Line, memory: Memory, random: NDArray[np.uint64], begin: int, far
 def _round_left(
     line: Line, floor: Floor, memory: Memory, random: NDArray[np.uint64], begin: int, far: float
 ) -> int:
-    """Lead the edge behind ``begin`` round over what is left of a block nearby."""
+    """Reroute the edge after ``begin`` over the unswept floor of a block nearby."""
     points, left, new, place = line.points, floor.sweeps.left, memory.new, memory.place
     end = line.next[begin]
     ay, ax = points[begin, 0], points[begin, 1]
@@ -155,7 +155,7 @@ def _round_left(
     spread = 0.0
     if draw(random) >> 30 & 3:
         spread = 0.3 * floor.tool + 0.7 * far * _unit(random)
-    # A corner, or a bulge; a bulge as narrow as can be goes there and back.
+    # A corner, or a bulge; the narrowest bulge goes there and back.
     if draw(random) >> 30 & 1 or along - spread < 1.0 or along + spread > length - 1.0:
         new[0, 0], new[0, 1] = place[0], place[1]
         return 1
@@ -172,7 +172,7 @@ def _draw_move(
     """Draw a move at a point.
 
     Returns:
-        How many points of ``memory.new`` it puts in, or NO_MOVE; the point behind these.
+        Number of points of ``memory.new`` to insert, or NO_MOVE; the point after these.
     """
     far = FARTHEST * floor.tool
     middle = line.next[begin]
@@ -212,19 +212,19 @@ def anneal(
     heat: tuple[float, float],
     most_tried: int,
 ) -> float:
-    """Anneal a line until so many moves were tried.
+    """Anneal a line until a number of moves were tried.
 
     Args:
         line: counted into ``floor.sweeps``; of two points or more.
         floor, price, memory: as for ``polish``.
         random: uint64 (1,), not 0.
-        margin: 1 where the first edge and the last one only tell the turns behind and before
-            them, as of a piece of a longer line; else 0.
-        heat: shares of the temperature at the beginning that it falls from, and to.
-        most_tried: moves, those tried before among them.
+        margin: 1 if the first and the last edge only define the turns after and before them, as
+            for a piece of a longer line; else 0.
+        heat: first and last temperature, as shares of the initial one.
+        most_tried: most moves, including those tried before.
 
-    Returns:
-        What it gained in all [s]; it may have lost.
+        Returns:
+            The total gain [s]; it may be negative.
     """
     following = line.next
     hottest_s = HOTTEST * 2.0 * floor.tool * price.drive_s

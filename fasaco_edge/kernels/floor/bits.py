@@ -1,6 +1,6 @@
 """Bit rasters: yes or no for each pixel, 64 pixels of a row in a word.
 
-A row is padded to whole words, with what lies outside of the raster. Column j of a row is bit
+A row is padded to whole words with pixels outside of the raster. Column j of a row is bit
 ``j & 63``, the lowest first, of its word ``j >> 6``.
 """
 
@@ -16,7 +16,7 @@ LAST = np.uint64(63)
 
 
 def packed(mask: NDArray[np.bool_], beyond: bool) -> Bits:
-    """Return a mask, bool (rows, cols), as bits; ``beyond``: what lies outside of it."""
+    """Return a mask, bool (rows, cols), as bits; ``beyond``: value outside of it."""
     rows, cols = mask.shape
     words = -(-cols // WORD)
     padded = mask
@@ -34,7 +34,7 @@ def unpacked(bits: Bits, cols: int) -> NDArray[np.bool_]:
 
 @inlined
 def is_marked(bits: NDArray[np.uint64], i: int, j: int) -> bool:
-    """Tell whether a pixel, which has to lie on the raster, is marked."""
+    """Tell whether a pixel, which must be on the raster, is marked."""
     return bool((bits[i, j >> 6] >> np.uint64(j & 63)) & ONE)
 
 
@@ -54,7 +54,7 @@ def any_between(row: NDArray[np.uint64], first: int, last: int) -> bool:
 
 @lean_kernel
 def _widen(row: NDArray[np.uint64], times: int) -> None:
-    """Mark the neighbours of what is marked in a row, so many times."""
+    """Mark the neighbours of marked pixels in a row, a number of times."""
     words = len(row)
     for _ in range(times):
         before = NONE

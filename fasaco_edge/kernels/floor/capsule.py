@@ -1,4 +1,4 @@
-"""Capsules: what a disc covers while its centre drives straight from one point to another.
+"""Capsules: the area covered by a disc whose centre moves straight from one point to another.
 
 All lengths are in pixels, and pixel (i, j) is the unit square around the point (y = i, x = j). A
 capsule is convex, so it meets each row of pixels in one stretch, found from the two discs at its
@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from fasaco_edge.kernels.floor.bits import any_between, is_marked
 from fasaco_edge.kernels.jit import inlined, lean_kernel
 
-# A robot exactly as wide as a door fits: so much nearer counts as not touched.
+# Tolerance of contact: a robot exactly as wide as a door fits.
 TOUCH = 1e-3
-# No row blocks a way; it leads out of the raster.
+# No row blocks a segment; it leads out of the raster.
 CLEAR, BEYOND = -1, -2
 # A line that rises by less counts as level.
 LEVEL = 1e-9
@@ -66,7 +66,7 @@ def right_side(
 def _blocked_row(
     blocked: NDArray[np.uint64], ay: float, ax: float, by: float, bx: float, radius: float
 ) -> tuple[int, int, int]:
-    """Return the first row with a blocked pixel nearer than ``radius`` to the way from a to b.
+    """Return the first row with a blocked pixel nearer than ``radius`` to the segment a to b.
 
     With the row, the columns from and to which that may be; ``CLEAR`` or ``BEYOND`` for no row.
 
@@ -116,7 +116,7 @@ def _blocked_row(
 def _is_box_clear(
     blocked: NDArray[np.uint64], ay: float, ax: float, by: float, bx: float, radius: float
 ) -> bool:
-    """Tell whether nothing is blocked in the box around a capsule, which is soon seen."""
+    """Tell whether nothing is blocked in the box around a capsule, a fast test."""
     first, last = (
         int(np.floor(min(ay, by) - radius + 0.5)),
         int(np.ceil(max(ay, by) + radius - 0.5)),
@@ -134,7 +134,7 @@ def _is_box_clear(
 def is_clear(
     blocked: NDArray[np.uint64], ay: float, ax: float, by: float, bx: float, radius: float
 ) -> bool:
-    """Tell whether no blocked pixel comes nearer than ``radius`` to the way from a to b.
+    """Tell whether no blocked pixel is nearer than ``radius`` to the segment a to b.
 
     Args:
         blocked: uint64 (rows, words), see ``bits``. What lies outside is blocked, too.
@@ -161,7 +161,7 @@ def is_clear_but(
     row, first, last = _blocked_row(blocked, ay, ax, by, bx, radius)
     if row < 0:
         return row == CLEAR
-    # The one nearest to the middle is in the way of most ways beside this one, too.
+    # The one nearest to the middle blocks most neighbouring segments, too.
     middle = (first + last) >> 1
     for away in range(last - first + 1):
         for col in (middle - away, middle + away):
@@ -173,7 +173,7 @@ def is_clear_but(
 
 @inlined
 def is_near(y: float, x: float, ay: float, ax: float, by: float, bx: float, radius: float) -> bool:
-    """Tell whether a point is nearer than ``radius`` to the way from a to b, for sure."""
+    """Tell whether a point is certainly nearer than ``radius`` to the segment a to b."""
     dy, dx = by - ay, bx - ax
     length2 = max(dy * dy + dx * dx, 1e-18)
     along = min(max(((y - ay) * dy + (x - ax) * dx) / length2, 0.0), 1.0)

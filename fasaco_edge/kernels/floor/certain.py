@@ -1,9 +1,9 @@
-"""Certain floor: what was swept wherever a map lay that has moved, over tiles of pixels.
+"""Certain floor: pixels that are swept for every possible position of a map that has moved.
 
-Tiles are as ``mission.coverage.floor_tiles`` has them: a bit for each pixel, eight of a row in a
-byte, the first in the highest bit. A block is a byte wide and as many rows high. Inside of swept
-floor most blocks have swept ones all around, they lie deep; wherever the middle of a block lies on
-such a one, all of the block lies on swept floor, and none of its pixels is looked up.
+Tiles are those of ``mission.coverage.floor_tiles``: a bit for each pixel, eight of a row in a byte,
+the first in the highest bit. A block is eight by eight pixels. A swept block whose neighbours are
+all swept is *deep* (interior), as most are. A block whose centre falls in a deep block is swept as
+a whole; none of its pixels is looked up.
 """
 
 from typing import NamedTuple
@@ -18,9 +18,9 @@ TILE_SHIFT, BLOCK_SHIFT = 7, 3
 TILE, BLOCK = 1 << TILE_SHIFT, 1 << BLOCK_SHIFT
 # Blocks, and bytes, along a tile.
 BLOCKS = TILE // BLOCK
-# Rows and columns of tiles that a tile's pixels may lie on, however the map has turned.
+# Rows and columns of tiles that a rotated tile can overlap.
 NEAR = 3
-# Within so many pixels all places of a tile are counted from one corner.
+# Within this many pixels all positions of a tile are counted from one corner.
 MOST_TOGETHER = 1 << 20
 
 ONE, SEVEN, ALL = np.uint64(1), np.uint64(7), np.uint8(255)
@@ -41,12 +41,12 @@ class FloorTiles(NamedTuple):
 
 
 class Whereabouts(NamedTuple):
-    """Where a map that has moved may have lain.
+    """Possible positions of a map that has moved.
 
     Attributes:
-        places: float64 (k, k, 4), of row n the first n + 1: each a ``Similarity`` (see
-            ``mission.coverage.floor_tiles``) that moves and turns alone.
-        counts: int64 (m,), for each tile that is asked for: how many places are looked at.
+        places: float64 (k, k, 4), in row n the first n + 1: each a ``Similarity`` (see
+            ``mission.coverage.floor_tiles``) of translation and rotation only.
+        counts: int64 (m,), number of positions checked for each requested tile.
     """
 
     places: NDArray[np.float64]
@@ -54,7 +54,7 @@ class Whereabouts(NamedTuple):
 
 
 class _Around(NamedTuple):
-    """NEAR by NEAR tiles put together, so that no pixel asks for its tile.
+    """NEAR by NEAR tiles put together, so that no pixel needs a lookup of its tile.
 
     Attributes:
         first: int64 (2,), row and column of the first tile.
@@ -68,7 +68,7 @@ class _Around(NamedTuple):
 
 
 class _Lookup(NamedTuple):
-    """Where in ``_Around`` points [pixels] lie.
+    """Transform of points [pixels] into ``_Around``.
 
     A point lies in row ``right * row + i0 + up * col``, column ``j0 - up * row + right * col`` from
     a corner on, and the corner at (``rows``, ``cols``).
@@ -84,7 +84,7 @@ class _Lookup(NamedTuple):
 
 @inlined
 def _tile_at(places: NDArray[np.int64], row: int, col: int) -> int:
-    """Return the index of a tile; -1 where there is none."""
+    """Return the index of a tile; -1 if there is none."""
     low, high = 0, len(places)
     while low < high:
         middle = (low + high) >> 1
@@ -105,7 +105,7 @@ def _find_deep(
     deep: NDArray[np.uint64],
     rows: NDArray[np.uint64],
 ) -> None:
-    """Find the blocks that are swept, and those of them with swept ones all around.
+    """Find the swept blocks, and those of them whose neighbours are all swept.
 
     ``whole`` and ``deep``, uint64 (n, BLOCKS), receive them, the first of a row in the lowest bit;
     ``rows``, uint64 (BLOCKS + 2,), is for the blocks of a tile and those beside it.
@@ -179,7 +179,7 @@ def _put_together(
 @inlined
 def _pixel(lookup: _Lookup, row: float, col: float) -> tuple[np.uint64, np.uint64]:
     """Return the row and column in ``_Around`` of a point."""
-    # In this order, by which the last bits are rounded.
+    # In this order, which determines rounding.
     i = (lookup.right * row + lookup.i0) + lookup.up * col
     j = (lookup.j0 - lookup.up * row) + lookup.right * col
     return np.uint64(int(i) + lookup.rows), np.uint64(int(j) + lookup.cols)
@@ -189,7 +189,7 @@ def _pixel(lookup: _Lookup, row: float, col: float) -> tuple[np.uint64, np.uint6
 def _leave_at(
     lookup: _Lookup, around: _Around, row: int, col: int, left: NDArray[np.uint8]
 ) -> bool:
-    """Unmark what of the tile from pixel (row, col) on was not swept; return if any is left."""
+    """Unmark unswept pixels of the tile from pixel (row, col) on; return if any is left."""
     is_any = False
     for top in range(0, TILE, BLOCK):
         for byte in range(BLOCKS):
@@ -220,12 +220,12 @@ def _leave_at(
 def certain_floor(
     before: FloorTiles, after: FloorTiles, whereabouts: Whereabouts
 ) -> NDArray[np.uint8]:
-    """Return what of some tiles was swept wherever the map lay, uint8 like their bits.
+    """Return the pixels of some tiles that are swept for every position, uint8 like their bits.
 
     Args:
-        before: all tiles before it moved.
-        after: the tiles asked for.
-        whereabouts: where the map may have lain, for each of these.
+        before: all tiles before the map moved.
+        after: the requested tiles.
+        whereabouts: possible positions of the map, for each of these.
     """
     whole, deep = np.empty((2, len(before.bits), BLOCKS), np.uint64)
     _find_deep(before, whole, deep, np.empty(BLOCKS + 2, np.uint64))
@@ -244,10 +244,10 @@ def certain_floor(
             _find_bounds(places[number], row, col, bounds[number])
         row0, col0 = bounds[:count, 0].min(), bounds[:count, 1].min()
         row1, col1 = bounds[:count, 2].max(), bounds[:count, 3].max()
-        # Far apart, as of a map that jumped, each counts from its own corner: rounding decides on
-        # which of two pixels a centre lies that lies on their border.
+        # If far apart, as for a map that jumped, each counts from its own corner: for a centre on
+        # the border of two pixels rounding decides.
         is_near = (row1 - row0) * (col1 - col0) <= MOST_TOGETHER
-        # From the last one on, which leaves the least.
+        # From the last one on, which leaves the fewest pixels.
         for number in range(count - 1, -1, -1):
             alone, place = bounds[number], places[number]
             if not is_near:

@@ -1,4 +1,4 @@
-"""Detours: ways of an edge round over what is left unswept beside it."""
+"""Detours: an edge rerouted over unswept floor beside it."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,15 +19,15 @@ from fasaco_edge.kernels.floor.line import (
 from fasaco_edge.kernels.floor.sweeps import BLOCK, Sweeps
 from fasaco_edge.kernels.jit import inlined, kernel, lean_kernel
 
-# A detour leaves its edge so far before, and joins it so far behind [pixels].
+# A detour leaves its edge this far before the spot, and joins it this far after [pixels].
 SPREAD = 6.0
-# What is left of a block is no reason for a detour if it is less [pixels].
+# Least unswept floor of a block for a detour [pixels].
 LEAST_LEFT = 3
 
 
 @lean_kernel
 def middle_left(sweeps: Sweeps, i: int, j: int, place: NDArray[np.float64]) -> bool:
-    """Find the middle of what is left of a block; False where nothing is."""
+    """Find the middle of a block's unswept floor; False if there is none."""
     rows, cols = sweeps.counts.shape
     count = total_y = total_x = 0
     for y in range(i << BLOCK, min((i + 1) << BLOCK, rows)):
@@ -44,7 +44,7 @@ def middle_left(sweeps: Sweeps, i: int, j: int, place: NDArray[np.float64]) -> b
 
 @lean_kernel
 def nearest_place(places: NDArray[np.uint64], place: NDArray[np.float64], reach: int) -> bool:
-    """Move a point to the nearest place within reach; False where there is none."""
+    """Move a point to the nearest place within reach; False if there is none."""
     rows, cols = places.shape[0], places.shape[1] << 6
     i, j = int(place[0] + 0.5), int(place[1] + 0.5)
     best = (reach + 1) * (reach + 1)
@@ -63,11 +63,11 @@ def nearest_place(places: NDArray[np.uint64], place: NDArray[np.float64], reach:
 def _round_over(
     line: Line, floor: Floor, price: Price, memory: Memory, begin: int, best: float
 ) -> tuple[float, int]:
-    """Try five ways round over ``memory.place`` from the edge behind ``begin``.
+    """Try five detours over ``memory.place`` from the edge after ``begin``.
 
     Returns:
-        What the best gains, no less than ``best`` [s], and how many points it has, in
-        ``memory.best``; 0 points where none is better.
+        The best gain, at least ``best`` [s], and its number of points, in ``memory.best``; 0
+        points if none is better.
     """
     points, new = line.points, memory.new
     end = line.next[begin]
@@ -122,9 +122,9 @@ def detour(
     farthest: float,
     least: int,
 ) -> float:
-    """Lead the edge behind ``begin`` round over what is left nearby; return the gain [s].
+    """Reroute the edge after ``begin`` over unswept floor nearby; return the gain [s].
 
-    ``least`` pixels have to be left of a block and of those around it.
+    A block and those around it must have ``least`` unswept pixels.
     """
     points, left = line.points, floor.sweeps.left
     end = line.next[begin]
@@ -161,9 +161,9 @@ def detour(
 
 @kernel
 def find_patches(sweeps: Sweeps, least: int) -> NDArray[np.bool_]:
-    """Return the blocks that patches of ``least`` pixels or more lie in, bool (rows, cols).
+    """Return the blocks with patches of at least ``least`` pixels, bool (rows, cols).
 
-    Pixels of a patch hang together by their edges.
+    Pixels of a patch are connected by their edges.
     """
     counts = sweeps.counts
     rows, cols = counts.shape
@@ -199,7 +199,7 @@ def find_patches(sweeps: Sweeps, least: int) -> NDArray[np.bool_]:
 
 @inlined
 def _is_near(line: Line, begin: int, place: NDArray[np.float64], farthest: float) -> bool:
-    """Tell whether the edge behind ``begin`` may come near a place."""
+    """Tell whether the edge after ``begin`` may come near a place."""
     a, b = line.points[begin], line.points[line.next[begin]]
     y, x = place[0], place[1]
     return bool(
@@ -218,13 +218,13 @@ def sweep_patches(
     patches: NDArray[np.bool_],
     most_tried: int,
 ) -> None:
-    """Lead the line over patches, each from the edge that it takes least from.
+    """Reroute the line over patches, each from the edge where that is cheapest.
 
     Args:
         line, floor, memory, farthest: as for ``polish``.
-        price: what a pixel of a patch is worth.
+        price: value of a pixel of a patch.
         patches: bool (rows, cols), of blocks, see ``find_patches``.
-        most_tried: moves, those tried before among them.
+        most_tried: most moves, including those tried before.
     """
     place = memory.place
     for i in range(patches.shape[0]):

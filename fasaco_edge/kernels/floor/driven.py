@@ -1,4 +1,4 @@
-"""Open floor: what is still to be swept, and what the robot drove over no longer is."""
+"""Open floor: floor still to sweep; floor the robot has driven over is removed from it."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,9 +14,9 @@ from fasaco_edge.kernels.floor.sweeps import (
 )
 from fasaco_edge.kernels.jit import lean_kernel
 
-# A pixel is asked for; it is still to be swept; the robot drove over it.
+# A pixel is wanted; it is still to sweep; the robot has driven over it.
 WANTED, OPEN, DRIVEN = 1, 2, 4
-# Where the state of a pixel has the cause for which it is out of reach.
+# Position in a pixel's state of the cause why it is out of reach.
 CAUSE_SHIFT, CAUSE = 3, 24
 
 
@@ -28,7 +28,7 @@ def note_driven(
     radius: float,
     scratch: Scratch,
 ) -> int:
-    """Note that the robot has driven a line; return how many pixels that closes.
+    """Note that the robot has driven a line; return the number of pixels closed by it.
 
     Args:
         sweeps: whose counts go up by ``NEVER`` where a pixel is no longer open.
@@ -65,17 +65,17 @@ def set_open(
     wanted: NDArray[np.bool_],
     swept: NDArray[np.bool_],
 ) -> tuple[int, int]:
-    """Set what of a part of the raster is still to be swept: wanted, and neither swept nor driven.
+    """Set the open pixels in a part of the raster: wanted, and neither swept nor driven.
 
     Args:
-        sweeps: whose counts are higher by ``NEVER`` where a pixel is not open.
+        sweeps: their counts are higher by ``NEVER`` where a pixel is not open.
         state: uint8 (rows, cols) of ``WANTED``, ``OPEN`` and ``DRIVEN``, changed.
         corner: first pixel (row, col) of the part.
-        wanted: bool (rows, cols) of the part, what is asked for; empty for what was.
+        wanted: bool (rows, cols) of the part, wanted pixels; empty for no change.
         swept: bool (rows, cols) of the part.
 
-    Returns:
-        How many more pixels are wanted, and open.
+        Returns:
+            Increase in the number of wanted and of open pixels.
     """
     counts, left = sweeps.counts, sweeps.left
     more_wanted, more_open = 0, 0
@@ -116,7 +116,7 @@ def set_causes(
         state: uint8 (rows, cols), changed: causes lie from bit ``CAUSE_SHIFT`` on.
         corner: first pixel (row, col) of the part.
         causes: uint8 (rows, cols) of the part.
-        pixels: int64 (4,), how many have each cause, changed; what is in reach has 0.
+        pixels: int64 (4,), number of pixels with each cause, changed; reachable pixels have 0.
     """
     for i in range(causes.shape[0]):
         for j in range(causes.shape[1]):

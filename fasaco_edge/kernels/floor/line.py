@@ -1,8 +1,8 @@
-"""The driven line as a list of points: what a change of it gains, and how it is made.
+"""The driven line as a list of points: gain of a change, and its execution.
 
 A change replaces the points between two others. Its gain is exact: seconds of the chains before
-and after, with the turns at either end, and the pixels that are swept more or less. Each block of
-pixels keeps the time of the line's last change there.
+and after, with the turns at either end, and the difference in swept pixels. Each block of pixels
+stores the time of the line's last change there.
 """
 
 from typing import NamedTuple
@@ -24,31 +24,31 @@ from fasaco_edge.kernels.floor.sweeps import (
 from fasaco_edge.kernels.floor.turning import Turning
 from fasaco_edge.kernels.jit import inlined, lean_kernel
 
-# A move that gains less is not made [s]: sums of floats must not go in circles.
+# Least gain of a move [s]: rounding of sums must not cause cycles.
 LEAST_GAIN_S = 1e-3
 # No edge is shorter than this [pixels].
 LEAST_EDGE = 0.3
-# The most points that a move puts in.
+# Most points that a move inserts.
 MOST_NEW = 4
-# The most points of a chain: those replaced, and two on either side.
+# Most points of a chain: those replaced, and two on either side.
 MOST_CHAIN = MOST_NEW + 4
-# So many capsules are compared at most: edges of the chains before and after.
+# Most capsules compared: edges of the chains before and after.
 MOST_CAPSULES = 2 * (MOST_CHAIN - 1)
 NONE = -1
 
 
 class Line(NamedTuple):
-    """The driven line as a list of points, and what was looked at since it changed.
+    """The driven line as a list of points, with times of changes and of trials.
 
     Attributes:
         points: float64 (capacity, 2): y, x [pixels]; the line begins with the first.
         next, previous: int32 (capacity,): the number of the next point, and of the one before;
             NONE at the ends.
         seen: int64 (capacity,): when all moves at a point were last tried.
-        changed: int64, a block each: when the line was last changed there.
-        state: int64 (4,): points used, the time, moves tried, and the first of the numbers that
-            points have left free, each of which has the one after it as its ``next``; or NONE.
-        is_end_fixed: whether the line has to end where it does.
+        changed: int64, by block: when the line was last changed there.
+        state: int64 (4,): points used, the time, moves tried, and the head of the free list of
+            point numbers, linked by ``next``; or NONE.
+        is_end_fixed: whether the line's last point is fixed.
     """
 
     points: NDArray[np.float64]
@@ -64,12 +64,12 @@ USED, TIME, TRIED, FREE = range(4)
 
 
 class Floor(NamedTuple):
-    """What the line lies on.
+    """The floor below the line.
 
     Attributes:
-        blocked: uint64 (rows, words), see ``bits``: what the robot must not touch.
-        places: the same: where the robot may be, and can come to.
-        sweeps: what the line sweeps.
+        blocked: uint64 (rows, words), see ``bits``: pixels the robot must not touch.
+        places: the same: reachable places of the robot.
+        sweeps: sweeps by the line.
         robot, tool: their radii [pixels].
     """
 
@@ -81,7 +81,7 @@ class Floor(NamedTuple):
 
 
 class Price(NamedTuple):
-    """What is weighed: seconds for a pixel driven, for turns, for a pixel left unswept."""
+    """The objective: seconds for a pixel driven, for turns, for an unswept pixel."""
 
     drive_s: float
     turning: Turning
@@ -110,7 +110,7 @@ def copy_point(source: NDArray[np.float64], at: int, target: NDArray[np.float64]
 def _left_around(
     left: NDArray[np.int32], points: NDArray[np.float64], first: int, last: int, tool: float
 ) -> int:
-    """Return at least how many unswept pixels the edges from ``first`` to ``last`` pass over."""
+    """Return a lower bound on the unswept pixels under the edges from ``first`` to ``last``."""
     rows, cols = left.shape
     found = 0
     for number in range(first, last):
@@ -132,7 +132,7 @@ class Chains(NamedTuple):
     """The points in ``Memory.before`` and ``after``: those replaced, and up to two on either side.
 
     Attributes:
-        lead: number of the first point whose edge changes; the one before it tells a turn.
+        lead: number of the first point whose edge changes; the one before it defines a turn.
         olds, news: points before and after; 0 where they are too many.
         last_old, last_new: the last point whose edge changes.
     """
@@ -213,15 +213,14 @@ def gain_above(
     count: int,
     least_s: float,
 ) -> float:
-    """Return what is gained if ``memory.new[:count]`` replace the points between two others [s].
+    """Return the gain if ``memory.new[:count]`` replace the points between two others [s].
 
-    -inf where that is less than ``least_s``, which may be below 0, or where the way would not be
-    clear.
+    -inf if it is less than ``least_s``, which may be below 0, or if the new edges are blocked.
 
     Args:
         line, floor, price, memory: see above.
         begin: number of the point before.
-        end: of the point behind; NONE where the line shall end with the new ones.
+        end: of the point after; NONE if the line ends with the new ones.
         count: new points.
         least_s: see above.
     """
@@ -251,7 +250,7 @@ def gain_above(
 def gain_of(
     line: Line, floor: Floor, price: Price, memory: Memory, begin: int, end: int, count: int
 ) -> float:
-    """Return the same [s]; 0.0 where it is less than LEAST_GAIN_S."""
+    """Return the same [s]; 0.0 if it is less than LEAST_GAIN_S."""
     return max(gain_above(line, floor, price, memory, begin, end, count, LEAST_GAIN_S), 0.0)
 
 
@@ -284,13 +283,13 @@ def note_change(line: Line, begin: int, tool: float, hops: int, now: int) -> int
     return newest
 
 
-# Points around one whose moves depend on each other.
+# Points around a point whose moves depend on it.
 HOPS = 6
 
 
 @inlined
 def has_room(line: Line) -> bool:
-    """Tell whether there are numbers for the points of a move."""
+    """Tell whether there are free numbers for the points of a move."""
     return bool(line.state[USED] <= len(line.points) - MOST_NEW)
 
 
@@ -311,7 +310,7 @@ def _sweep_between(
 def replace_points(
     line: Line, floor: Floor, memory: Memory, begin: int, end: int, count: int
 ) -> None:
-    """Put ``memory.new[:count]`` in the place of the points between two others."""
+    """Replace the points between two others by ``memory.new[:count]``."""
     points, following, preceding, tool = line.points, line.next, line.previous, floor.tool
     line.state[TIME] += 1
     note_change(line, begin, tool, HOPS, line.state[TIME])
@@ -323,8 +322,8 @@ def replace_points(
         exchange(floor.sweeps, scratch, taken, given, tool)
     else:
         _sweep_between(line, floor, memory, begin, end, -1)
-    # The points that go lend their numbers to those that come. Numbers of points that are gone are
-    # taken only once all others are: who knows a point by its number sees it again, or a new one.
+    # New points reuse the numbers of the replaced ones. Free numbers are taken only after these: a
+    # caller that holds a number sees the same or a new point.
     free, last = following[begin], begin
     for number in range(count):
         if free != end and free != NONE:  # noqa: PLR1714 - numba has no `in` for tuples

@@ -1,7 +1,8 @@
 """Places: pixels where the robot's centre may be, and the floor that its tool reaches from them.
 
-In each cell of the lattice the robot stands at one place, the nearest to the cell's middle. Where
-the straight way between the stands of two neighbours is blocked, one bend may lead round.
+In each cell of the lattice the robot stands at one place, the nearest to the cell's centre (the
+stand). If the straight segment between the stands of two neighbours is blocked, one bend may avoid
+the obstacle.
 """
 
 import numpy as np
@@ -13,22 +14,22 @@ from fasaco_edge.kernels.floor.capsule import TOUCH, is_clear, is_clear_but, is_
 from fasaco_edge.kernels.jit import inlined, kernel, lean_kernel
 from fasaco_edge.kernels.lattice.footprint import Box, Placement
 
-# Bends are looked for at every so many-th pixel.
+# Bends are searched at every n-th pixel.
 BEND_STEP = 2
-# A way round a corner is at most so many times as long as a cell is wide.
+# Longest path round a corner, in edges of a cell.
 LONGEST_BEND = 3.0
-# In nobody's way.
+# No blocker.
 FAR = -1_000_000
-# Points on the border of cells or pixels, and distances, are told apart from here on: what is found
-# must not depend on where the raster begins.
+# Tolerance for points on the border of cells or pixels, and for distances: results must not depend
+# on where the raster begins.
 TIE = 1e-6
 
 
 def disc_rows(radius: float) -> NDArray[np.int64]:
-    """Return how far a disc around a pixel's centre reaches in the rows from its own one on.
+    """Return the reach of a disc around a pixel's centre in its own row and the following ones.
 
-    int64 (n,): how many pixels it touches to either side of the middle one, in the row that many
-    rows above, or below. A pixel is a square, as for ``capsule.is_clear``.
+    int64 (n,): number of pixels it touches on either side of the middle one, in the row that many
+    rows above or below. A pixel is a square, as for ``capsule.is_clear``.
     """
     radius -= TOUCH
     rows = np.arange(int(np.ceil(radius - 0.5)) + 1)
@@ -63,7 +64,7 @@ def within(marked: Bits, radius: float) -> Bits:
 
 @kernel
 def connected(places: NDArray[np.bool_], row: int, col: int) -> NDArray[np.bool_]:
-    """Return the places that are joined to one of them by their edges, bool (rows, cols)."""
+    """Return the places connected to one of them by their edges, bool (rows, cols)."""
     rows, cols = places.shape
     found = np.zeros((rows, cols), np.bool_)
     waiting = np.empty(rows * cols, np.int32)
@@ -100,18 +101,19 @@ def keep_in_cells(
     cell: tuple[int, int],
     corner: tuple[int, int],
 ) -> None:
-    """Keep of a part of the raster only the pixels that lie in chosen cells.
+    """Keep only the pixels of a part of the raster that lie in chosen cells.
 
     Args:
         found: uint64 (rows, words), the part, see ``bits``; changed.
-        placement: where the lattice's cells lie on the raster.
+        placement: of the lattice's cells on the raster.
         chosen: bool (rows, cols) of the lattice.
         cell: its first cell (row, col).
         corner: first pixel (row, col) of the part.
     """
     is_level = placement.uy == 0.0
     for i in range(found.shape[0]):
-        # On a level lattice a row of pixels lies in one of cells, as the one before, mostly.
+        # On an axis-aligned lattice a row of pixels lies in one row of cells, mostly that of the
+        # row before.
         row = _cell_of(placement, corner[0] + i, corner[1])[0] - cell[0]
         if is_level and not 0 <= row < chosen.shape[0]:
             for word in range(found.shape[1]):
@@ -135,7 +137,7 @@ def keep_in_cells(
 
 @inlined
 def _pixels_of(placement: Placement, row: int, col: int, shape: tuple[int, int]) -> Box:
-    """Return the smallest box of pixels, of those there are, that holds a cell."""
+    """Return the smallest box of existing pixels that contains a cell."""
     ux, uy = placement.ux, placement.uy
     x = placement.x0 + ux * (col + 0.5) - uy * (row + 0.5)
     y = placement.y0 + uy * (col + 0.5) + ux * (row + 0.5)
@@ -175,7 +177,7 @@ def choose_stands(
         if not stale[row, col]:
             continue
         stands[row, col, 0] = stands[row, col, 1] = np.nan
-        # Middles on a level lattice are rounded to pixels alike in a row: lanes stay straight.
+        # Centres on an axis-aligned lattice are rounded alike in a row: lanes stay straight.
         x = placement.x0 + ux * (col + col0 + 0.5) - uy * (row + row0 + 0.5)
         y = placement.y0 + uy * (col + col0 + 0.5) + ux * (row + row0 + 0.5)
         if is_level:
@@ -217,10 +219,10 @@ def _bend(
     bend: NDArray[np.float32],
     blockers: NDArray[np.int64],
 ) -> bool:
-    """Find the place over which the way from a to b is shortest; False where there is none.
+    """Find the place over which the path from a to b is shortest; False if there is none.
 
-    ``blockers``, int64 (2, 2), is memory: the pixels, row and col, that were in the way from a and
-    to b the last time. Mostly they are in the way again, and that is soon seen.
+    ``blockers``, int64 (2, 2), is a cache: the pixels, row and col, that last blocked the segments
+    from a and to b. Mostly they block again, and that test is fast.
     """
     blockers[:] = FAR
     rows, cols = places.shape[0], places.shape[1] << 6

@@ -1,9 +1,9 @@
-"""Polish: greedy descent of the driven line on seconds to drive plus a price of unswept floor.
+"""Polish: greedy descent of the driven line on driving time plus a price of unswept floor.
 
-Four moves are tried at each point of the line in turn: leave the next one or two points out, move
-the next point, shift the edge behind it as a whole, and lead the edge before it round over what is
-left nearby. A move is made if it gains. Where nothing has changed since a point was looked at, it
-is not looked at again.
+Four moves are tried at each point of the line in turn: remove the next one or two points, move the
+next point, shift the edge after it as a whole, and reroute the edge before it over unswept floor
+nearby. A move is made if it gains. A point is skipped if nothing near it has changed since it was
+last tried.
 """
 
 import numpy as np
@@ -28,14 +28,14 @@ from fasaco_edge.kernels.jit import inlined, lean_kernel
 
 # A pass that gains less is the last [s].
 LEAST_PASS_S = 0.2
-# So far a point is moved and an edge is shifted, in turn [pixels].
+# Lengths by which points are moved and edges shifted, in turn [pixels].
 SHIFTS = (1.0, -1.0, 2.0, -2.0, 4.0, -4.0, 7.0, -7.0)
 HALF_ROOT = 0.7071067811865476
 # Points move along both axes, both diagonals, and their two edges.
 DIRECTIONS = ((1.0, 0.0), (0.0, 1.0), (HALF_ROOT, HALF_ROOT), (HALF_ROOT, -HALF_ROOT))
-# Where lines meet, a point moves at most so far, and the end of an edge slides at most so far.
+# Longest move of a point to a crossing of lines, and longest slide of an edge's end.
 FARTHEST_MEETING, FARTHEST_SLIDE = 16.0, 12.0
-# What is left around a block is no reason for a detour if it is worth less [s].
+# Least value of unswept floor around a block for a detour [s].
 LEAST_WORTH_S = 0.3
 
 
@@ -62,7 +62,7 @@ def meeting(
 
 @lean_kernel
 def _leave_out(line: Line, floor: Floor, price: Price, memory: Memory, begin: int) -> float:
-    """Leave out the next point, or the next two, while that gains; return what it gained [s]."""
+    """Remove the next point, or the next two, while that gains; return the gain [s]."""
     gained = 0.0
     while line.next[begin] != NONE:
         end, gain = line.next[begin], 0.0
@@ -80,7 +80,7 @@ def _leave_out(line: Line, floor: Floor, price: Price, memory: Memory, begin: in
 
 @lean_kernel
 def _move(line: Line, floor: Floor, price: Price, memory: Memory, begin: int) -> float:
-    """Move the point behind ``begin``; return what it gained [s]."""
+    """Move the point after ``begin``; return the gain [s]."""
     points, following, preceding, new = line.points, line.next, line.previous, memory.new
     middle = following[begin]
     end = following[middle]
@@ -142,7 +142,7 @@ def slide(
 
 @lean_kernel
 def _shift(line: Line, floor: Floor, price: Price, memory: Memory, begin: int) -> float:
-    """Shift the edge behind ``begin``'s next point as a whole; return what it gained [s]."""
+    """Shift the edge after ``begin``'s next point as a whole; return the gain [s]."""
     points, following, new = line.points, line.next, memory.new
     gained = 0.0
     for slides in range(2):
@@ -174,16 +174,16 @@ def _shift(line: Line, floor: Floor, price: Price, memory: Memory, begin: int) -
 def polish(
     line: Line, floor: Floor, price: Price, memory: Memory, farthest: float, most_tried: int
 ) -> float:
-    """Polish a line until nothing gains any more, or so many moves were tried.
+    """Polish a line until no move gains, or a number of moves were tried.
 
     Args:
         line: counted into ``floor.sweeps``.
         floor, price, memory: see above.
-        farthest: what is left further from an edge is not looked at [pixels].
-        most_tried: moves.
+        farthest: unswept floor further from an edge is ignored [pixels].
+        most_tried: most moves.
 
     Returns:
-        What it gained in all [s].
+        The total gain [s].
     """
     gained = 0.0
     least = int(LEAST_WORTH_S / price.left_s) + 1
@@ -208,7 +208,7 @@ def polish(
             gain += _move(line, floor, price, memory, begin)
             if line.next[line.next[begin]] != NONE:
                 gain += _shift(line, floor, price, memory, begin)
-            # Detours come once all has found its place, or they would stay.
+            # Detours follow once the other moves have converged, otherwise they would stay.
             if passes > 0:
                 gain += detour(line, floor, price, memory, begin, farthest, least)
             elif gain == 0.0:

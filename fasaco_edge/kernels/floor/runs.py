@@ -1,4 +1,4 @@
-"""Runs: stretches that one walk over cells has in common with another, forward or backward."""
+"""Runs: common stretches of two walks over cells, forward or backward."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +17,7 @@ def _same(one: NDArray[np.int32], a: int, other: NDArray[np.int32], b: int) -> b
 def common_runs(
     before: NDArray[np.int32], after: NDArray[np.int32], least: int
 ) -> NDArray[np.int64]:
-    """Return stretches of one walk that lead along the same cells as another.
+    """Return the common stretches of two walks.
 
     No step of either walk is in two of them.
 
@@ -30,7 +30,7 @@ def common_runs(
         ``before``; how many steps it has; 1 where ``before`` goes the other way, else 0.
     """
     size, most = len(before), len(after)
-    # Of the walk before alone, whose lattice bounds it: the other one may be a thousand miles away.
+    # Only of the old walk, which its lattice bounds: the new one may be a thousand miles away.
     row0, col0 = before[:, 0].min(), before[:, 1].min()
     rows, cols = before[:, 0].max() - row0 + 1, before[:, 1].max() - col0 + 1
     # The visits of each cell of the walk before, in order.

@@ -1,4 +1,4 @@
-"""Seconds of a way: driven straight from point to point, turned on the spot."""
+"""Driving time of a polyline: straight from point to point, turns on the spot."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,7 +57,7 @@ def chain_s(
         first, last: points.
         count: of points.
         drive_s: for a pixel driven [s].
-        turning: what turns take.
+        turning: durations of turns.
     """
     seconds = 0.0
     for number in range(first, last):

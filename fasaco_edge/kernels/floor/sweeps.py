@@ -1,7 +1,7 @@
-"""Counts of sweeps: how often each pixel is swept by a tool that drives along straight ways.
+"""Counts of sweeps: number of passes of the tool over each pixel, along straight segments.
 
-A pixel is swept by each capsule of the tool's radius that its centre lies in, see ``capsule``. What
-lies outside of the raster does not count.
+A pixel is swept by each capsule of the tool's radius that contains its centre, see ``capsule``.
+Pixels outside of the raster do not count.
 """
 
 from typing import NamedTuple
@@ -24,11 +24,11 @@ Y0, X0, Y1, X1, SIDE_Y, SIDE_X, SLOPE = COLUMNS = range(7)
 
 
 class Sweeps(NamedTuple):
-    """How often each pixel is swept, by capsules of the tool's radius.
+    """Number of sweeps of each pixel by capsules of the tool's radius.
 
     Attributes:
-        counts: int16 (rows, cols): by how many capsules; from ``NEVER`` on where the tool cannot
-            come to.
+        counts: int16 (rows, cols): number of capsules; from ``NEVER`` on for pixels out of the
+            tool's reach.
         left: int32 (rows >> BLOCK, cols >> BLOCK), rounded up: pixels of a block with count 0.
     """
 
@@ -132,7 +132,7 @@ def _next_outside(
 def _lost(
     row: NDArray[np.int16], before: NDArray[np.int64], count: int, begin: int, end: int
 ) -> int:
-    """Return how many pixels are swept by the capsules of ``before`` alone."""
+    """Return the number of pixels swept only by the capsules of ``before``."""
     lost = 0
     if count == 1:
         for j in range(begin, end + 1):
@@ -198,16 +198,16 @@ def swept_more(
     radius: float,
     most_lost: float,
 ) -> int:
-    """Return how many pixels more are swept once some capsules have taken the place of others.
+    """Return the increase in swept pixels if some capsules replace others.
 
-    Nothing is changed: only pixels under one of both, and not under the other, are looked at.
+    Nothing is changed: only pixels under one set and not under the other are read.
 
     Args:
-        counts: int16 (rows, cols), of sweeps; the capsules to be taken away are counted in it.
-        scratch: whose first ``taken`` capsules are taken away, and the next ``given`` put in.
-        taken, given: how many.
+        counts: int16 (rows, cols), of sweeps, with the capsules to remove.
+        scratch: its first ``taken`` capsules are removed, and the next ``given`` added.
+        taken, given: their numbers.
         radius: of the tool [pixels].
-        most_lost: once more pixels than these are swept no longer, the rest is not looked at.
+        most_lost: the search stops once more pixels than this are lost.
     """
     before, after = scratch.before, scratch.after
     rows, cols = counts.shape
@@ -290,7 +290,7 @@ def sweep_edges(
 
 @lean_kernel
 def count_left(sweeps: Sweeps, row0: int, col0: int, row1: int, col1: int) -> None:
-    """Count what is left in the blocks of a part of the pixels again."""
+    """Recount the unswept pixels in the blocks of a part of the raster."""
     counts, left = sweeps.counts, sweeps.left
     rows, cols = counts.shape
     side = 1 << BLOCK

@@ -1,4 +1,4 @@
-"""Turning: what turns on the spot take a robot.
+"""Turning: durations of turns on the spot.
 
 The robot brakes to a stop, turns, and starts again. Its rate of turning goes up, stays at its
 limit and goes down (a trapezoid over time), or, in smaller turns, goes up and down (a triangle).
@@ -10,12 +10,12 @@ from typing import NamedTuple
 
 
 class Turning(NamedTuple):
-    """What turns take.
+    """Durations of turns.
 
     Attributes:
         steered_rad: a turn up to this is steered while driving, and takes no time [rad].
-        stop_s: what braking before any other turn and starting behind it take longer than to drive
-            on [s].
+        stop_s: additional time of braking before any other turn and starting after it, compared
+            with driving on [s].
         ramp_s: for the rate to go from rest to its limit [s].
         full_rad: the smallest turn in which the rate reaches its limit [rad].
         radian_s: a radian at that limit [s].
@@ -29,7 +29,7 @@ class Turning(NamedTuple):
 
 
 def turn_seconds(turning: Turning, angle: float) -> float:
-    """Return what a turn by an angle in [0, pi] takes [s]; kernels compile this."""
+    """Return the duration of a turn by an angle in [0, pi] [s]; kernels compile this."""
     if angle <= turning.steered_rad:
         seconds = 0.0
     elif angle < turning.full_rad:
@@ -40,7 +40,7 @@ def turn_seconds(turning: Turning, angle: float) -> float:
 
 
 def proportional_turning(quarter_turn_s: float) -> Turning:
-    """Return turns that take as long as their angle is large, by 90 degrees ``quarter_turn_s``."""
+    """Return turns with durations proportional to the angle, ``quarter_turn_s`` for 90 degrees."""
     return Turning(0.0, 0.0, 0.0, 0.0, quarter_turn_s / (0.5 * math.pi))
 
 

@@ -1,1 +1,1 @@
-"""Kernels on maps and the lattice: which cells are coverable, reachable, changed."""
+"""Kernels on maps and the lattice: coverable, reachable and changed cells."""

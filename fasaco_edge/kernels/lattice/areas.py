@@ -14,7 +14,7 @@ from fasaco_edge.kernels.jit import kernel, lean_kernel
 
 
 class Areas(NamedTuple):
-    """Areas, numbered in the order in which a reader meets them, row by row.
+    """Areas, numbered in the order of their first cells, row by row.
 
     Attributes:
         labels: int32 (rows, cols), number of each cell's area, from 1; 0 for none.
@@ -31,7 +31,7 @@ class Areas(NamedTuple):
 
 @lean_kernel
 def root(parents: NDArray[np.integer], piece: int) -> int:
-    """Return the piece that stands for all that ``piece`` was joined with; ways to it get shorter.
+    """Return the root of ``piece`` (union-find with path compression).
 
     Joined pieces are a tree, by each one's parent, int (n,); the root is its own.
     """
@@ -45,9 +45,9 @@ def root(parents: NDArray[np.integer], piece: int) -> int:
 def _join_pieces(
     kinds: NDArray[np.uint8], labels: NDArray[np.int32], parents: NDArray[np.int32]
 ) -> int:
-    """Give each cell the number of a piece; return how many pieces that are.
+    """Give each cell the number of a piece; return the number of pieces.
 
-    Of connected pieces the root is the one that was met first.
+    The root of connected pieces is the one found first.
     """
     rows, cols = kinds.shape
     pieces = 0
@@ -129,7 +129,7 @@ def find_areas(kinds: NDArray[np.uint8]) -> Areas:
 
 @lean_kernel
 def _beside(labels: NDArray[np.int32], row: int, col: int, found: NDArray[np.int32]) -> int:
-    """Fill in the areas beside a cell, each once; return how many they are."""
+    """Fill in the areas beside a cell, each once; return their number."""
     rows, cols = labels.shape
     count = 0
     for side in range(4):

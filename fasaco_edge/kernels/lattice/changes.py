@@ -1,8 +1,8 @@
 """Differences of two maps on one raster, and the lattice cells that they may change.
 
-Most of two maps is equal. So strips as wide as the map are compared first, in the order
-they lie in memory, then segments of those that differ, and pixels last. Beyond its
-window a map is unknown: one that has grown differs where it is known now.
+Most of two maps is equal. So strips as wide as the map are compared first, in memory order, then
+segments of those that differ, and pixels last. Beyond its window a map is unknown: a map that has
+grown differs where it is known now.
 """
 
 import numpy as np
@@ -104,10 +104,10 @@ def _changed_box(before: Pixels, after: Pixels, box: Box, thresholds: Thresholds
 def _mark_around(
     box: Box, placement: Placement, stale: NDArray[np.bool_], row: int, col: int
 ) -> int:
-    """Mark the cells for which a pixel of a box may matter; return how many were not yet.
+    """Mark the cells that a pixel of a box may affect; return the number of newly marked ones.
 
-    The box, widened by what a robot reaches, is turned into the lattice; a pixel more on
-    each side takes up rounding.
+    The box, widened by the robot's reach, is transformed into the lattice; one more pixel on each
+    side allows for rounding.
     """
     reach = reach_of(placement) + 1.0
     x = 0.5 * (box.col0 + box.col1) - placement.x0
@@ -146,14 +146,13 @@ def mark_stale(
 ) -> None:
     """Mark the lattice cells whose state or steps may have changed with the pixels.
 
-    Where they are most of the lattice, all are marked: to search on would cost more than
-    it saves.
+    If they are most of the lattice, all are marked: searching on would cost more than it saves.
 
     Args:
         before, after: the maps.
-        region: where they may differ; other pixels are not looked at.
-        thresholds: what counts as free and as occupied.
-        placement: where the lattice cells lie.
+        region: where they may differ; other pixels are not read.
+        thresholds: of free and occupied.
+        placement: of the lattice cells.
         stale: in and out, bool (rows, cols); its first cell is cell (row, col).
         row, col: place in the lattice.
     """

@@ -2,9 +2,9 @@
 
 Most of a map is open floor or unknown: one read of a summed-area table replaces reading
 each pixel under the robot. A table as large as the map would not fit into the cache, and
-would cost more than what has changed, so each tile has its own, of the pixels around the
-cells to be classified. The tables only save work: where they do not hold the answer, it
-is found row by row of the disc, or by ``footprint``.
+would cost more than the changed cells, so each tile has its own, of the pixels around the
+cells to classify. The tables only save work: if they do not have the answer, it is found
+row by row of the disc, or by ``footprint``.
 """
 
 from typing import NamedTuple
@@ -34,8 +34,8 @@ from fasaco_edge.kernels.lattice.pixels import (
     weigh,
 )
 
-# A tile spans about so many pixels, beside those that the robot reaches from it, and at
-# most so many cells: smaller tables overlap too much, larger ones leave the cache.
+# Pixels of a tile, approximately, beside those within the robot's reach, and most cells of a
+# tile: smaller tables overlap too much, larger ones do not fit the cache.
 TILE_PIXELS = 192
 MOST_TILE_CELLS = 128
 
@@ -138,7 +138,7 @@ def _classify_tile(
 ) -> None:
     pixels, placement, cells = given.pixels, given.placement, given.cells
     rows, cols = cells.stale.shape
-    # With the neighbours in the north and east, whose states the steps depend on.
+    # With the neighbours in the north and east, because the steps depend on their states.
     block = Box(tile.row0, tile.col0, min(tile.row1 + 1, rows), min(tile.col1 + 1, cols))
     high, wide = block.row1 - block.row0 - 1, block.col1 - block.col0 - 1
     x, y = centre(

@@ -2,8 +2,8 @@
 
 All lengths are in pixels of the map's raster. A pixel is the closed unit square
 ``[col, col + 1] x [row, row + 1]``; a robot touches it when the distance is smaller
-than the radius, so a wall flush with the disc is no hit. The answers depend on the
-place and the pixels around it alone, never on how much of the raster is at hand.
+than the radius, so a wall flush with the disc is no hit. Results depend only on the
+position and the pixels around it, never on the extent of the raster in memory.
 """
 
 from typing import NamedTuple
@@ -16,7 +16,7 @@ from fasaco_edge.kernels.jit import inlined, lean_kernel
 
 
 class Placement(NamedTuple):
-    """Where lattice cells lie on the raster, and how large the robot is.
+    """Placement of lattice cells on the raster, and the robot's radius.
 
     The centre of cell (row, col) is at raster coordinates (x, y) =
     ``(x0 + (col + 0.5) * ux - (row + 0.5) * uy, y0 + (col + 0.5) * uy + (row + 0.5) * ux)``.
@@ -60,7 +60,7 @@ class Box(NamedTuple):
 
 @inlined
 def state_of(value: int, thresholds: Thresholds) -> int:
-    """Return the state that an occupancy value stands for."""
+    """Return the state of an occupancy value."""
     if 0 <= value <= thresholds.free:
         return COVERABLE
     return BLOCKED if value >= thresholds.occupied else UNKNOWN
@@ -88,7 +88,7 @@ def centre(placement: Placement, row: float, col: float) -> tuple[float, float]:
 
 @lean_kernel
 def reach_of(placement: Placement) -> float:
-    """Return how far off a cell's centre, on either axis, a pixel may be to matter for it."""
+    """Return the largest distance on an axis at which a pixel affects a cell."""
     return max(abs(placement.ux), abs(placement.uy)) + placement.radius
 
 

@@ -20,7 +20,7 @@ from fasaco_edge.kernels.lattice.footprint import Pixels, Placement, Thresholds,
 
 @lean_kernel
 def _count(values: NDArray[np.int8], free: int) -> int:
-    # Without a branch the loop is vectorised.
+    # Without a branch the loop vectorises.
     count = 0
     for index in range(len(values)):
         count += (values[index] >= 0) & (values[index] <= free)
@@ -37,10 +37,10 @@ def _stretches_beside(
     first: int,
     bounds: NDArray[np.int32],
 ) -> int:
-    """Find the stretches of a row of pixels that lie in no reached cell; return twice how many.
+    """Find the stretches of a row of pixels outside reached cells; return twice their number.
 
-    ``bounds`` receives where each begins and ends, as columns of the map, whose first pixel is
-    in column ``first`` of the raster.
+    ``bounds`` receives the begin and end of each, as columns of the map, whose first pixel is in
+    column ``first`` of the raster.
     """
     rows, cols = reached.shape
     per_cell = placement.ux * placement.ux + placement.uy * placement.uy
@@ -121,7 +121,7 @@ class PixelSums(NamedTuple):
 
 @lean_kernel
 def weigh(thresholds: Thresholds, weights: NDArray[np.int64]) -> None:
-    """Fill in what a pixel of occupancy v adds to a count: int64 (256,), at ``v & 255``."""
+    """Fill in the weight of a pixel of occupancy v in a count: int64 (256,), at ``v & 255``."""
     for value in range(-128, 128):
         state = state_of(value, thresholds)
         weights[value & 255] = (state != COVERABLE) + ((state != UNKNOWN) << KNOWN_BIT)
@@ -180,7 +180,7 @@ def is_unknown(count: int) -> bool:
 
 @inlined
 def _is_off(col: int, x: float, dy: float, radius: float) -> bool:
-    """Return whether a disc leaves out the pixel of a column, its row being ``dy`` away."""
+    """Return whether a disc misses the pixel of a column, whose row is ``dy`` away."""
     dx = max(col - x, 0.0, x - col - 1)
     return bool(dx * dx + dy * dy >= radius * radius)
 
@@ -207,7 +207,7 @@ def disc_state(pixels: Pixels, x: float, y: float, radius: float, table: PixelSu
         if dy * dy >= radius * radius:
             continue
         half = np.sqrt(radius * radius - dy * dy)
-        # The root may be off by a rounding: the distance of the pixel itself decides.
+        # The root may be rounded: the distance of the pixel itself decides.
         left = max(int(np.floor(x - half)) - 1, int(np.floor(x - radius)))
         right = min(int(np.floor(x + half)) + 1, int(np.floor(x + radius)))
         while _is_off(left, x, dy, radius):

@@ -28,7 +28,7 @@ def turn_inside(
 ) -> None:
     """Mark the cells whose centres lie inside a polygon, by the even-odd rule.
 
-    Each edge that a row's line of centres crosses turns all centres beyond it over.
+    Each edge that crosses a row's line of centres toggles all centres beyond it.
 
     Args:
         corners: float64 (n, 2), x, y [m]; the last is joined to the first.
@@ -72,10 +72,10 @@ def add_near(
     reach_m: float,
     starts: NDArray[np.int32],
 ) -> None:
-    """Add a polygon's border: 1 where a stretch of cells that it comes near begins, -1 behind it.
+    """Add a polygon's border: 1 at the begin of a stretch of cells near it, -1 after its end.
 
-    Near is where it touches the square around the cell's centre that reaches ``reach_m`` to each
-    side. A cell is near one of several borders if what was added up to it is above 0.
+    A cell is near if the border touches the square of ``reach_m`` to each side around its centre. A
+    cell is near one of several borders if the running sum at it is above 0.
 
     Args:
         corners: float64 (n, 2), x, y [m]; the last is joined to the first.
@@ -109,7 +109,7 @@ def add_near(
 
 @kernel
 def count_in(planes: NDArray[np.uint8], marked: NDArray[np.uint8]) -> NDArray[np.int64]:
-    """Return how many bits are set both in ``marked``, uint8 (n,), and in each plane, uint8 (k, n).
+    """Count the bits set both in ``marked``, uint8 (n,), and in each plane, uint8 (k, n).
 
     The counts are int64 (k,).
     """

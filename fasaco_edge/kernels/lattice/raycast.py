@@ -1,4 +1,4 @@
-"""Ray casting: what a laser scanner sees of a ground-truth map; pixels under a disc.
+"""Ray casting of a laser scanner in a ground-truth map; pixels under a disc.
 
 Rays follow J. Amanatides and A. Woo, "A fast voxel traversal algorithm for
 ray tracing", Eurographics 1987: every pixel a ray passes is visited, in order,
@@ -87,7 +87,7 @@ def cast_rays(
     scanner: Scanner,
     directions: NDArray[np.float64],
 ) -> tuple[int, int, int, int]:
-    """Copy from ``truth`` to ``known`` what the rays of a scanner see.
+    """Copy the pixels seen by the rays of a scanner from ``truth`` to ``known``.
 
     A ray sees the free pixels it passes and the first pixel that is not free,
     at which it stops; unknown pixels stop it too, and stay unknown. It ends

@@ -1,11 +1,11 @@
-"""Reachability over a lattice and its update after a change; shortest walks, and what a walk costs.
+"""Reachability over a lattice and its update after a change; shortest walks, cost of a walk.
 
-After some cells have changed, reachability is updated at the cost of these. Steps have
-changed in a part of the lattice alone. If inside this part the cells at its rim - those
-with a step across it - are connected as they were before, then outside all is connected
-as it was before: any walk can be led around. So it is enough to look at the part, and at
-which cells of its rim were reachable. Only where cells of the rim were parted or joined
-must the whole lattice be searched.
+After some cells have changed, the cost of updating reachability depends only on these. Steps
+have changed only in a part of the lattice. If the cells at its rim - those with a step across
+it - are connected inside the part as before, then connectivity outside the part is unchanged:
+any walk can be rerouted. So it is enough to search the part, and to know which cells of its
+rim were reachable. The whole lattice must be searched only if cells of the rim were separated
+or joined.
 """
 
 from typing import NamedTuple
@@ -29,7 +29,7 @@ def search(
     came_from: NDArray[np.uint8],
     queue: NDArray[np.int32],
 ) -> int:
-    """Search breadth first from flat cell ``start`` until ``goal``, -1 for all that is reachable.
+    """Search breadth first from flat cell ``start`` until ``goal``, -1 for all reachable cells.
 
     Args:
         steps: step masks, uint8 (n,).
@@ -40,7 +40,7 @@ def search(
         queue: int32 (n,), out: the cells reached, nearest first.
 
     Returns:
-        How many cells were reached.
+        Number of cells reached.
     """
     queue[0] = start
     came_from[start] = ROOT
@@ -61,7 +61,7 @@ def search(
 
 @lean_kernel
 def steps_to(offsets: NDArray[np.int64], came_from: NDArray[np.uint8], goal: int) -> int:
-    """Return the steps of the way to a ``goal`` that ``search`` reached."""
+    """Return the number of steps to a ``goal`` that ``search`` reached."""
     count = 0
     while came_from[goal] != ROOT:
         goal -= offsets[came_from[goal]]
@@ -71,7 +71,7 @@ def steps_to(offsets: NDArray[np.int64], came_from: NDArray[np.uint8], goal: int
 
 @kernel
 def reachable_from(steps: NDArray[np.uint8], row: int, col: int) -> NDArray[np.uint8]:
-    """Return uint8 (rows, cols), 1 where a walk from (row, col) can come."""
+    """Return uint8 (rows, cols), 1 for cells reachable from (row, col)."""
     cols = steps.shape[1]
     offsets = np.array([1, cols, -1, -cols], np.int64)
     came_from = np.full(steps.size, UNSEEN, np.uint8)
@@ -86,7 +86,7 @@ def reachable_from(steps: NDArray[np.uint8], row: int, col: int) -> NDArray[np.u
 def shortest_walk(
     steps: NDArray[np.uint8], start: tuple[int, int], goal: tuple[int, int]
 ) -> NDArray[np.int32]:
-    """Return a shortest walk from start to goal, int32 (n, 2); empty where there is none.
+    """Return a shortest walk from start to goal, int32 (n, 2); empty if there is none.
 
     Args:
         steps: step masks, uint8 (rows, cols).
@@ -128,8 +128,8 @@ def walk_cost(walk: NDArray[np.int32], step_us: int, quarter_turn_us: int) -> in
     return int((walk.size - 1) * step_us + quarters * quarter_turn_us)
 
 
-# The part reaches so many cells beyond those that changed, so that a new obstacle in the
-# open does not part its rim.
+# Margin of the part around changed cells, so that a new obstacle in the open does not
+# separate its rim.
 MARGIN = 2
 
 
@@ -240,15 +240,15 @@ def update_reach(
     row: int,
     col: int,
 ) -> bool:
-    """Update what can be reached after steps have changed; return whether that was possible.
+    """Update the reachable cells after steps have changed; return whether that was possible.
 
-    Where it was not, nothing was written, and ``reachable_from`` has the answer.
+    If it was not, nothing was written: use ``reachable_from``.
 
     Args:
         before, after: step masks, uint8 (rows, cols).
         changed: int32 (n, 2), n > 0: all cells (row, col) whose steps differ.
-        reachable: in and out, bool (rows, cols): what was reachable, and is now.
-        row, col: the cell from which.
+        reachable: in and out, bool (rows, cols): cells reachable before, and now.
+        row, col: the cell to start from.
     """
     rows, cols = after.shape
     top, left, bottom, right = rows, cols, 0, 0

@@ -1,14 +1,13 @@
-"""Holes of the ground, and a test whether a loop goes round one.
+"""Holes of the ground, and a test whether a loop encloses one.
 
 The moves of the local search change a walk within unit squares. They cannot change
 whether the walk passes an obstacle on one side an odd or an even number of times: the
 parity of a walk's steps is a chain over the two-element field, a square adds a boundary,
-and what stays is the chain's class in the first homology of the ground. To leave a class
-takes a loop round a hole. To find one, each hole has a ray to the east, and a loop goes
-round some hole if the rays it crosses do not cancel out.
+and the invariant is the chain's class in the first homology of the ground. Changing the
+class takes a loop around a hole. To find one, each hole has a ray to the east, and a loop
+encloses some hole if the rays it crosses do not cancel out.
 
-A hole is a connected set of squares of which some step is missing; the one
-outside is no hole.
+A hole is a connected set of squares with a missing step; the outside is no hole.
 """
 
 import numpy as np

@@ -1,11 +1,11 @@
 """Changes of a walk's step parities, which local search cannot make: a moved end, a loop.
 
-Only how often each step is walked counts for a covering walk's length: any such numbers
-that are connected and have an odd sum at the walk's two ends only are a walk (Euler).
-Along a way or a loop each number changes by one, down where the step is walked twice, up
-where it is not: the walk stays connected, and its ends move, or the walk passes a hole
-on another side. A search to which steps walked twice cost nothing proposes ways that
-gain much and lose little.
+A covering walk's length depends only on the multiplicity of each step: any connected
+multiplicities with an odd sum only at the walk's two ends form a walk (Euler). Along a
+path or a loop each multiplicity changes by one, down if the step is walked twice, up
+otherwise: the walk stays connected, and its ends move, or the walk passes a hole on
+another side. A shortest-path search in which steps walked twice cost 0 proposes such
+paths: it prefers those that remove many steps and add few.
 """
 
 from typing import NamedTuple
@@ -18,8 +18,8 @@ from fasaco_edge.kernels.jit import inlined, lean_kernel
 from fasaco_edge.kernels.local_search.walk_array import LENGTH, Ground, Walk, axis_of
 from fasaco_edge.kernels.random import draw, index_of
 
-# Odds of a change that makes the walk longer by so many steps, from -16 on:
-# e ** (-steps / 3), in whole numbers.
+# Odds of a change by the growth of the walk in steps, from -16 on: e ** (-steps / 3), as
+# integers.
 SHORTEST = -16
 ODDS = np.round(np.exp(-(np.arange(64) + SHORTEST) / 3.0) * 65536).astype(np.int64)
 
@@ -29,19 +29,19 @@ DRAWS = 1 << 20
 
 
 class Tally(NamedTuple):
-    """How often steps are walked, and working memory for the search over them.
+    """Multiplicities of steps, and working memory for the search over them.
 
     Attributes:
-        times: int16 (n, 2), how often the steps east and north of a cell are walked.
-        order_of_old: int8 (n, 4), the direction in which the walk, seen from its end, went on
-            from a cell that it came to in each direction; -1 for none.
+        times: int16 (n, 2), multiplicities of the steps east and north of a cell.
+        order_of_old: int8 (n, 4), by direction of entering a cell, the direction of leaving it
+            in the old walk, read from its end; -1 for none.
         rays: int64 (n,), see ``holes.rays``.
         reached: int64 (n,), number of the search that reached the cell, doubled; one
             more once its distance is settled.
-        distance: int32 (n,), steps on the way there that are walked less than twice.
-        growth: int32 (n,), by how much a change of the way there lengthens the walk.
-        parent: int32 (n,), the cell before it on the way.
-        crossed: int64 (n,), rays crossed on the way.
+        distance: int32 (n,), steps on the path there that are walked less than twice.
+        growth: int32 (n,), growth of the walk by a change of the path there.
+        parent: int32 (n,), the cell before it on the path.
+        crossed: int64 (n,), rays crossed on the path.
         order: int32 (n,), cells in the order they were settled.
         near, far: int32 (4 * n,), cells to look at now and one step later.
         loops: int64 (n, 2), loops found: twice the cell, one more for the step north;
@@ -115,10 +115,10 @@ def count_steps(ground: Ground, walk: Walk, tally: Tally) -> None:
 def search_ways(
     ground: Ground, tally: Tally, root: int, limit: int, random: NDArray[np.uint64]
 ) -> int:
-    """Search from ``root``, steps that are walked twice being free (0-1 breadth first).
+    """Search from ``root`` with cost 0 for steps walked twice (0-1 breadth first).
 
     Returns:
-        How many cells were settled, at most about ``limit``: ``order`` has them.
+        Number of settled cells, at most about ``limit``: ``order`` has them.
     """
     tally.clock[0] += 2
     now = tally.clock[0]
@@ -178,14 +178,14 @@ def _odds(growth: int) -> int:
 
 @inlined
 def change_step(ground: Ground, tally: Tally, one: int, other: int) -> None:
-    """Walk a step once less where it is walked twice, else once more."""
+    """Decrease the multiplicity of a step that is walked twice, else increase it."""
     edge, axis = min(one, other), axis_of(one, other)
     tally.times[edge, axis] += -1 if tally.times[edge, axis] >= 2 else 1
 
 
 @lean_kernel
 def draw_end(tally: Tally, settled: int, random: NDArray[np.uint64]) -> int:
-    """Return another end for the walk, by the odds of how much longer it gets."""
+    """Draw another end for the walk, with odds by the walk's growth."""
     total = 0
     for index in range(1, settled):
         total += _odds(tally.growth[tally.order[index]])
@@ -199,7 +199,7 @@ def draw_end(tally: Tally, settled: int, random: NDArray[np.uint64]) -> int:
 
 @lean_kernel
 def common_ancestor(tally: Tally, one: int, other: int) -> int:
-    """Return the last cell that the ways to two settled cells share."""
+    """Return the last common cell of the paths to two settled cells."""
     tally.clock[1] += 1
     climb = tally.clock[1]
     while one != NOWHERE:
@@ -212,7 +212,7 @@ def common_ancestor(tally: Tally, one: int, other: int) -> int:
 
 @lean_kernel
 def find_loops(ground: Ground, tally: Tally, settled: int) -> int:
-    """List in ``loops`` the steps that close a loop round a hole; return how many there are."""
+    """List the steps that close a loop around a hole in ``loops``; return their number."""
     now, found = tally.clock[0], 0
     for index in range(settled):
         here = tally.order[index]
@@ -278,7 +278,7 @@ def _list_jumps(tally: Tally) -> None:
 
 @inlined
 def _next_step(ground: Ground, tally: Tally, here: int, heading: int) -> int:
-    """Take a step that is still to be walked; return its direction, or -1."""
+    """Take an unused step; return its direction, or -1."""
     for turn in range(4):
         direction = (heading + turn) & 3
         after = here + ground.offsets[direction]
@@ -291,7 +291,7 @@ def _next_step(ground: Ground, tally: Tally, here: int, heading: int) -> int:
 
 @inlined
 def _next_jump(tally: Tally, here: int) -> int:
-    """Take a jump that is still to be made; return twice its number and its side, or -1."""
+    """Take an unused jump; return twice its number plus its side, or -1."""
     while tally.links[here] >= 0:
         link = tally.links[here]
         tally.links[here] = tally.next_jump[link >> 1, link & 1]
@@ -313,9 +313,9 @@ def euler_walk(
 ) -> int:
     """Write into ``walk.cells`` a walk that takes each step as often as ``times`` says.
 
-    Hierholzer's algorithm from the walk's ``end``, so that what it yields begins
-    with the start. Uses up ``times``. Where there is a choice it continues as the walk
-    did of old (``order_of_old``) or straight if ``steady``, else at random. Returns the
+    Hierholzer's algorithm from the walk's ``end``, so that its result begins with the
+    start. Uses up ``times``. If there is a choice it continues like the old walk
+    (``order_of_old``) or straight if ``steady``, else at random. Returns the
     walk's length.
     """
     bound, stack = ground.bound, tally.stack

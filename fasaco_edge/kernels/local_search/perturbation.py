@@ -1,9 +1,9 @@
-"""Perturbations: change the walk where local search cannot, improve it, keep it or take it back.
+"""Perturbations: change the walk in ways local search cannot, improve it, then keep or revert it.
 
-Three kinds: the free end moves; a loop round a hole is added (see ``parity``);
-or, where turns count, only the temperature rises at a spot. Where steps alone count,
-proposals are made all over the walk afterwards, as spare visits must travel to meet.
-Where turns count, the surroundings are annealed.
+Three kinds: the free end moves; a loop around a hole is added (see ``parity``);
+or, if turns count, only the temperature rises at a spot. If only steps count, proposals
+are then made all over the walk, as spare visits must travel to meet. If turns count, the
+surroundings are annealed.
 """
 
 from typing import NamedTuple
@@ -45,7 +45,7 @@ COOLING = np.round(1024 * 0.2 ** (np.arange(8) / 7)).astype(np.int64)
 
 
 class PerturbationRules(NamedTuple):
-    """How to perturb.
+    """Parameters of perturbations.
 
     Attributes:
         limit: cells that a search for another end or a loop settles.
@@ -55,8 +55,8 @@ class PerturbationRules(NamedTuple):
         temperature_us: temperature that an annealing begins with [us].
         acceptance_us: temperature at which a worse walk is kept [us].
         loops_of_256: so many of 256 perturbations change the end or add a loop.
-        steady: whether what need not change stays in the order it is in.
-        strict: whether a walk that costs the same as the one before is taken back.
+        steady: whether unchanged parts of the walk keep their order.
+        strict: whether a walk of equal cost is reverted.
     """
 
     limit: int
@@ -218,7 +218,7 @@ def touch_up(
 ) -> None:
     """Improve the walk around the first ``touched`` cells of ``memory.touched``.
 
-    If that gains nothing the walk stays as it was.
+    If that gains nothing the walk is unchanged.
     """
     walk, memory = search.walk, search.memory
     length, cost = walk.counts[LENGTH], walk.counts[COST]

@@ -14,10 +14,10 @@ shrink        a spike, or two spare visits between neighbours,   -2 (-1 at a
 detour        one step becomes three, or a spike                 +2
 ============  =================================================  ==============
 
-A visit is spare where its cell is visited more often than it needs to be. Where
-steps alone count, the moves at no cost are always taken: they move spare visits
-about until two of them meet and shrink. Where turns count, most moves cost
-something, and simulated annealing decides (Metropolis).
+A visit is spare if its cell is visited more often than needed. If only steps count,
+moves at no cost are always taken: they move spare visits around until two of them
+meet and shrink. If turns count, most moves have a cost, and simulated annealing
+decides (Metropolis).
 """
 
 from typing import NamedTuple
@@ -43,17 +43,17 @@ from fasaco_edge.kernels.local_search.walk_array import (
 )
 from fasaco_edge.kernels.random import draw, index_of
 
-# -ln(u) for u spread evenly over (0, 1), in units of 1 / 65536: whole numbers, so
-# that every machine decides alike.
+# -ln(u) for u uniform in (0, 1), in units of 1 / 65536: integers, so that decisions are
+# equal on all machines.
 EXPONENTIAL = np.round(-np.log((np.arange(4096) + 0.5) / 4096) * 65536).astype(np.int64)
 
-# Of 64 proposals at a spare visit so many try to remove it, and of 64 proposals at a
-# temperature above 0 so many are detours.
+# Number of 64 proposals at a spare visit that try to remove it, and number of 64 proposals
+# at a temperature above 0 that are detours.
 REMOVALS_OF_64 = 40
 DETOURS_OF_64 = 8
 
-# Half of the proposals go where something can be gained: to cells with spare visits,
-# or to a cell one or two steps beside one.
+# Half of the proposals go where a gain is possible: to cells with spare visits, or to a
+# cell one or two steps beside one.
 AT_SPARE_OF_256 = 128
 BESIDE_OF_256 = 128
 
@@ -69,7 +69,7 @@ def accepts(delta: int, temperature_us: int, random: NDArray[np.uint64]) -> bool
 
 
 class _State(NamedTuple):
-    """The walk, and what decides over its changes: arguments of ``improve``."""
+    """The walk and the acceptance parameters: arguments of ``improve``."""
 
     ground: Ground
     walk: Walk
@@ -144,9 +144,9 @@ def _drop_detour(state: _State, index: int) -> None:
 
 @inlined
 def _takes_flip(state: _State, first: int, delta: int) -> bool:
-    """Return whether a change from visit ``first`` on that keeps the length is taken, and count it.
+    """Return whether a change from visit ``first`` on of equal length is taken, and count it.
 
-    Visits that are held are changed only where something is gained.
+    Held visits change only for a gain.
     """
     if delta >= 0 and first < state.prices.held:
         return False
@@ -203,7 +203,7 @@ def _remove(state: _State, index: int, choice: int) -> None:
 
 @inlined
 def _turns_of_flip(walk: Walk, first: int, last: int, turn: int) -> int:
-    """Return by how much turns cost more if visits ``first + 1`` to ``last`` are reversed."""
+    """Return the change in cost of turns if visits ``first + 1`` to ``last`` are reversed."""
     cells, length = walk.cells, walk.counts[LENGTH]
     near, after, far = cells[first], cells[first + 1], cells[last]
     delta = turning(near, far, cells[last - 1], turn)

@@ -1,11 +1,11 @@
-"""Regions of a large ground: where a walk changed, and parts of a walk cut out and put back.
+"""Regions of a large ground: changed cells of a walk, and its parts cut out and put back.
 
-A part of the walk outside becomes a jump in the region's own walk, between the two
-cells just outside where it leaves and comes back; jumps and those cells stay as they
-are (``needed`` is FIXED, no step leads there), so that whatever improves the region's
-walk improves the whole one, and the whole one stays connected. Put back, the outside
-parts are copied in the order and the direction that the region's walk now visits
-them in.
+Each stretch of the walk outside becomes one jump in the region's own walk, between the
+border cells where it leaves and re-enters; jumps and those cells do not change
+(``needed`` is FIXED, no step leads there), so any improvement of the region's walk
+improves the whole one, and the whole one stays connected. When put back, the outside
+stretches are copied in the order and direction in which the region's walk now visits
+them.
 """
 
 from typing import NamedTuple
@@ -26,7 +26,7 @@ def changed_cells(
     times: NDArray[np.int32],
     cells: NDArray[np.int32],
 ) -> int:
-    """List the cells at steps that one walk takes more often than the other.
+    """List the cells at steps with different multiplicities in two walks.
 
     Args:
         ground: where both walks lie; cells without a step are left out.
@@ -35,7 +35,7 @@ def changed_cells(
         cells: out, int32 (2 * (m + n),): a cell may be listed more than once.
 
     Returns:
-        How many are listed.
+        The number listed.
     """
     for index in range(walk.size - 1):
         one, other = walk[index], walk[index + 1]
@@ -76,8 +76,8 @@ def neighbourhood(
         found: out, int32 (capacity,), the labelled cells, nearest first; no more are
             labelled than fit.
 
-    Returns:
-        How many were labelled.
+        Returns:
+            The number labelled.
     """
     size = 0
     for cell in cells:
@@ -143,7 +143,7 @@ class Jumps(NamedTuple):
 
 @inlined
 def _bound(box: Box) -> int:
-    """Return how many cells the region's ground has, frame and all."""
+    """Return the number of cells of the region's ground with its frame."""
     return (box.rows + 2 * FRAME) * (box.cols + 2 * FRAME)
 
 

@@ -1,7 +1,7 @@
 """Repair of a walk after the ground changed: lost cells are left out, new ones put in.
 
-A repaired walk is legal and complete, and where nothing changed it is the walk
-that it was; local search improves it.
+A repaired walk is legal and complete, and unchanged where the ground is unchanged;
+local search improves it.
 """
 
 from typing import NamedTuple
@@ -23,15 +23,15 @@ VISITS, LAST = range(2)
 def keep_legal(
     ground: Ground, before: NDArray[np.int32], start: int, walk: NDArray[np.int32]
 ) -> int:
-    """Write what remains of a walk; return its length.
+    """Write the remaining legal walk; return its length.
 
     Args:
         ground: as it is now.
         before: int32 (m,), the walk before the change, cells of this ground.
         start: where the walk begins now.
         walk: out, int32 (capacity,): the walk from ``start``. Where a step no longer exists
-            or starts elsewhere, it goes by a shortest way to the next cell that is still
-            to be covered; it ends with the last of these.
+            or starts elsewhere, it takes a shortest walk to the next cell that is still
+            to cover; it ends with the last of these.
 
     Returns:
         The walk's length; it ends early where the array does.
@@ -178,7 +178,7 @@ def _spread(
 def put_in_new(
     ground: Ground, before: NDArray[np.int32], free_end: bool, held: int, out: NDArray[np.int32]
 ) -> int:
-    """Lead a walk over all cells that it misses; return the new walk's length.
+    """Extend a walk over all cells that it misses; return the new walk's length.
 
     In a wave from the walk outward, each missing cell is visited from the nearest
     cell that is on the walk by then: there and back; or one way, where a free end lies

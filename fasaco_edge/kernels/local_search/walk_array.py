@@ -1,4 +1,4 @@
-"""A covering walk as an array of cells, and the elementary changes of it.
+"""A covering walk as an array of cells, and its elementary changes.
 
 Cells are flat indices of a ground that is framed by two cells without any step,
 so that a neighbour is one addition away and never outside. Steps lead to a
@@ -6,7 +6,7 @@ neighbour; a cell may be visited more than once. ``place`` holds the index of on
 visit of each cell, which may be out of date: it is checked before it is used.
 
 A walk of this form stays connected through every change, and needs no distances:
-what would be a jump is a run of cells that are visited elsewhere too.
+a transfer is a run of cells that are also visited elsewhere.
 """
 
 from typing import NamedTuple
@@ -27,7 +27,7 @@ FRAME = 2
 
 
 class Ground(NamedTuple):
-    """Where the walk goes.
+    """The ground of the walk.
 
     Attributes:
         steps: step masks, uint8 (n,); 0 for a jump.
@@ -64,12 +64,12 @@ class Walk(NamedTuple):
 
 
 class Prices(NamedTuple):
-    """Prices of steps and turns, and what may change of a walk.
+    """Prices of steps and turns, and limits to changes of a walk.
 
     Attributes:
         step_us, quarter_turn_us: [us]; a half turn is two quarter-turns.
         free_end: whether the walk may end anywhere.
-        held: so many of the first visits change only where something is gained.
+        held: this many first visits change only for a gain.
     """
 
     step_us: int

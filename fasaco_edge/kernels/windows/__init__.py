@@ -1,1 +1,1 @@
-"""Kernels that solve windows of a walk anew, exactly or nearly so."""
+"""Kernels that re-optimise windows of a walk, exactly or nearly so."""

@@ -1,4 +1,4 @@
-"""What a cell of a window may have, and what that costs."""
+"""Choices of passages for a cell of a window, and their costs."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,7 +37,7 @@ def _price(
     other: int,
     may_end: bool,
 ) -> int:
-    """Return the reduced cost of a passage from a side, MUCH where there is none."""
+    """Return the reduced cost of a passage from a side, MUCH if there is none."""
     if other < WALK_BEGINS:
         if not ground.steps[cell] >> other & 1:
             return MUCH
@@ -104,7 +104,7 @@ def list_choices(
     may_end: bool,
     most: int,
 ) -> None:
-    """List what a cell may have, cheapest first, below a cost."""
+    """List a cell's choices below a cost, cheapest first."""
     keys = program.choice.keys[kind]
     reduced, kinds, pairs = program.reduced[here.number], program.kinds, program.pairs
     at_ahead = at_rim(program, here.cell, here.ahead)
@@ -172,7 +172,7 @@ def _sort(keys: NDArray[np.int64], size: int) -> None:
 
 @lean_kernel
 def real_cost(passages: Passages, terms: Terms, program: Program, count: int) -> int:
-    """Return what the window's passages cost, without prices."""
+    """Return the cost of the window's passages, without prices."""
     total = 0
     for index in range(count):
         cell = program.cells[index]

@@ -1,4 +1,4 @@
-"""One cell of a window decided: the states after it from those before."""
+"""One step of the dynamic program: the successor states of one cell."""
 
 from fasaco_edge.kernels.jit import inlined, lean_kernel
 from fasaco_edge.kernels.windows.choices import list_choices
@@ -38,7 +38,7 @@ def _words(here: Here) -> int:
 
 @inlined
 def _leads_nowhere(program: Program, ends: Ends, closed: int) -> bool:
-    """Return whether the state in ``scratch`` is known to cover what is left no more."""
+    """Return whether the state in ``scratch`` is known to be infeasible for the remaining cells."""
     may_ring = ends.ring_price > 0
     if not ends.is_checked or (closed > 0 and not may_ring):
         return False
@@ -48,7 +48,7 @@ def _leads_nowhere(program: Program, ends: Ends, closed: int) -> bool:
 
 @inlined
 def _order_sides(program: Program, here: Here) -> int:
-    """Order the lanes of the sides to come; return where they change places: 1 ahead, 2 below."""
+    """Order the lanes of the next sides; return which were swapped: 1 ahead, 2 below."""
     swaps = order_lanes(program.scratch, here.ahead_id) if here.to_ahead else 0
     if here.to_below:
         swaps += 2 * order_lanes(program.scratch, here.below_id)
@@ -67,7 +67,7 @@ def _expand(
     threshold: int,
     room: int,
 ) -> tuple[int, int]:
-    """File all states that a state leads to; return how many there are, and the new threshold."""
+    """File all successors of a state; return the number of states, and the new threshold."""
     words, cost, base = _words(here), program.cost[layer, state], program.base
     for word in range(words):
         program.base_words[word] = program.words[layer, state, word]
@@ -111,11 +111,11 @@ def _expand(
 def decide(
     program: Program, here: Here, ends: Ends, layer: int, states: int, beam: int, limit: int
 ) -> int:
-    """Write the states after a cell into the other layer; return how many there are."""
+    """Write the states after a cell into the other layer; return their number."""
     program.clock[LAYER_STAMP] += 1
     for kind in range(KINDS):
         program.choice.listed[kind] = -1
-    # From what cost on a state before the cell, and one after it, cannot come below the limit.
+    # Costs from which a state before the cell, and one after it, cannot stay below the limit.
     most, threshold = limit - program.left[here.number], limit - program.left[here.number + 1]
     cheapest = MUCH
     for state in range(states):

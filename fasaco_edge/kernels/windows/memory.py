@@ -27,10 +27,10 @@ FIRST_NEW, SECOND_NEW, NO_PAIR = 1, 2, 4
 
 
 class Choice(NamedTuple):
-    """What a cell may have, by kind of what comes in: cheapest first.
+    """A cell's choices by kind of incoming sides, cheapest first.
 
     Attributes:
-        listed: int32 (KINDS,), how many; -1 where they are not listed yet.
+        listed: int32 (KINDS,), their number; -1 if they are not listed yet.
         keys: int64 (KINDS, MOST_CHOICES): cost, and in the lowest CODE_BITS the code: lanes ahead,
             lanes below, whether it ends, pairing.
         named: int32 (KINDS,), of how many of them the ends are named.
@@ -47,16 +47,16 @@ class Choice(NamedTuple):
 
 
 class Parts(NamedTuple):
-    """The cells of a window that are not yet decided, and how they hang together.
+    """The undecided cells of a window, and their connected parts.
 
     Attributes:
         label: int32 (n,), the part of each such cell.
         root: int32 (n,), working memory; number int32 (n,), place of a cell in the order.
         queue: int32 (most cells,), working memory.
-        splits: uint8 (most cells,), whether the part of a cell falls apart without it.
-        left: int32 (most cells,), cells left of each part; needed int32, how many need a visit.
+        splits: uint8 (most cells,), whether the cell is a cut vertex of its part.
+        left: int32 (most cells,), cells left of each part; needed int32, those that need a visit.
         leads: int16 (MOST_IDS, 2), identifiers that lead into a part, and the part.
-        sizes: int64 (2,), how many parts; how many identifiers.
+        sizes: int64 (2,), numbers of parts and of identifiers.
     """
 
     label: NDArray[np.int32]
@@ -81,24 +81,25 @@ class Program(NamedTuple):
         words: int64 (2, states, MOST_IDS / 4), the same memory.
         cost: int64 (2, states).
         closed: uint8 (2, states), whether the ring is closed.
-        parent, code: int32, int64 (states,): how the states of the layer after came about.
+        parent, code: int32, int64 (states,): predecessor and choice of the states of the layer
+            after.
         kept_parent, kept_code: int32, int64 (most cells + 1, beam), the same of all layers.
         hash: int64 (states,), of the states of the layer after.
         table: int64 (slots,), stamp of the layer and number of a state, by its hash.
-        order: int64 (states,), costs while the dearest are dropped.
-        scratch, base: int16 (MOST_IDS,), the state that comes about, and without the cell's ends;
+        order: int64 (states,), costs while the most expensive are dropped.
+        scratch, base: int16 (MOST_IDS,), the new state, and without the cell's ends;
             scratch_words, base_words int64 (MOST_IDS / 4,), the same memory.
         ident: int16 (n, SLOTS), identifier of a slot at the rim.
         inside: uint8 (n,), 1 in the window.
         cells: int32 (most cells,), of the window, in order.
         rim: int32 (MOST_IDS, 2), cell and slot of each identifier at the rim.
         reduced: int64 (most cells, 6, 6), costs of passages by the directions of their sides.
-        left: int64 (most cells + 1,), what the cells from here on cost at least.
+        left: int64 (most cells + 1,), least cost of the cells from here on.
         clock: int64 (2,): stamp of the layer; states expanded so far.
         taken: int16 (12,), identifiers of the slots that a cell has; kinds int64 (12,), their
             directions.
-        at: int64 (11,), how far it is: entries NUMBER to RING_PRICE.
-        parts: what the cells not yet decided hang together in.
+        at: int64 (11,), its progress: entries NUMBER to RING_PRICE.
+        parts: the connected parts of the undecided cells.
     """
 
     pairs: NDArray[np.int8]
@@ -132,13 +133,13 @@ class Program(NamedTuple):
 
 
 class Terms(NamedTuple):
-    """What the walk is to be.
+    """Costs and end of the walk.
 
     Attributes:
         step, turn: a step and a quarter-turn [half us].
-        prices: int64 (n, 4), what a side of a cell costs beside, by direction.
-        begin_price, end_price: what its first and its last visit cost beside.
-        free_end: whether it may end in any cell that is to be covered.
+        prices: int64 (n, 4), additional price at a side of a cell, by direction.
+        begin_price, end_price: additional price of its first and its last visit.
+        free_end: whether it may end in any cell to cover.
     """
 
     step: int
@@ -175,7 +176,7 @@ NUMBER, LINE, LAYER, STATES, LIMIT, COUNT, LAST, IDS, BEGIN_ID, END_ID, RING_PRI
 
 
 class Here(NamedTuple):
-    """A cell that is decided.
+    """The cell being decided.
 
     Attributes:
         cell, number: the cell, and its number in the window.
@@ -202,17 +203,17 @@ class Here(NamedTuple):
 
 
 class Ends(NamedTuple):
-    """What of the walk's ends concerns a cell.
+    """The walk's ends and ring rules at a cell.
 
     Attributes:
-        begin_id: identifier of the walk's begin, where it is in this cell, else -1.
-        end_id: of its end, where that is in the window, else -1.
+        begin_id: identifier of the walk's begin if it is in this cell, else -1.
+        end_id: of its end if that is in the window, else -1.
         is_needed: whether the cell must have a passage.
-        may_close: whether a ring may close: no cell after it must have one, or several may.
-        ring_price: what each ring but the first one costs; 0 where there is to be one.
+        may_close: whether a ring may close: no later cell needs a passage, or several rings may.
+        ring_price: price of each ring except the first; 0 if there must be one.
         is_given: whether the walk must end in this cell.
         is_free: whether the walk may still end in any cell that is left.
-        is_checked: whether the ends into each part that is left are to be counted.
+        is_checked: whether to count the ends into each remaining part.
     """
 
     begin_id: int
@@ -227,7 +228,7 @@ class Ends(NamedTuple):
 
 @inlined
 def at_rim(program: Program, cell: int, direction: int) -> int:
-    """Return how many lanes of a side lead out of the window; they are used from the first on."""
+    """Return the number of lanes of a side that lead out of the window, used from the first on."""
     if program.ident[cell, 2 * direction] == NO_END:
         return 0
     return 1 if program.ident[cell, 2 * direction + 1] == NO_END else 2

@@ -1,9 +1,9 @@
-"""Parts that the undecided cells of a window fall into, and states that can cover them no more.
+"""Connected parts of the undecided cells of a window, and states that can no longer cover them.
 
-A walk that enters a part leaves it again, but for its end. So the number of open ends that lead
-into a part is even, or odd in one part while the walk may end there; and no part with a cell to
-cover is without any, unless it may have a ring of its own. A state where that does not hold leads
-nowhere, however cheap it is.
+A walk that enters a part leaves it again, except at its end. So the number of open ends that lead
+into a part is even, or odd in one part while the walk may end there; and each part with a cell to
+cover has at least one open end, unless it may have a ring of its own. A state that breaks this rule
+is infeasible and is dropped.
 """
 
 from fasaco_edge.kernels.jit import inlined, lean_kernel
@@ -12,9 +12,9 @@ from fasaco_edge.kernels.local_search.walk_array import Ground
 from fasaco_edge.kernels.windows.memory import NO_END, Program
 from fasaco_edge.kernels.windows.passages import END
 
-# Parts that are looked at: bits of a word.
+# Most parts that are checked: bits of a word.
 MOST_PARTS = 62
-# Of the part of a cell just decided so many cells may be left without a look at it.
+# A part that did not fall apart is checked once it has no more cells left than this.
 FEW_CELLS = 3
 
 PARTS, LEADS = 0, 1
@@ -24,7 +24,7 @@ PARTS, LEADS = 0, 1
 def prepare_parts(
     ground: Ground, program: Program, count: int, ahead: int, below: int, begin: int
 ) -> None:
-    """Find out without which cells a part falls apart; label the parts of the whole window."""
+    """Find the cut vertices of parts; label the parts of the whole window."""
     parts, cells = program.parts, program.cells
     for number in range(count):
         parts.root[cells[number]] = cells[number]
@@ -95,11 +95,11 @@ def list_rim(program: Program, number: int, first: int, ids: int, is_free: bool)
 
 @inlined
 def is_stuck(program: Program, is_open: bool, may_ring: bool) -> bool:
-    """Return whether the state in ``scratch`` cannot cover what is left.
+    """Return whether the state in ``scratch`` cannot cover the remaining cells.
 
     Args:
         program: the memory.
-        is_open: whether the walk may end in any cell that is left.
+        is_open: whether the walk may end in any remaining cell.
         may_ring: whether a part of two cells or more may have a ring of its own.
     """
     parts = program.parts

@@ -1,9 +1,9 @@
-"""A covering walk as passages through cells, which a window of it can be solved anew in.
+"""A covering walk as passages through cells, the form in which windows are re-optimised.
 
 A step is walked at most twice: a lane each. So a cell has two lanes to each of four sides, eight
 slots ``2 * direction + lane``; a passage joins two of them. The walk's two ends are slots, too:
-BEGIN in the cell it begins in, END in the one it ends in. From END the walk is taken to lead on
-to BEGIN, outside the ground: then every walk is closed, and its passages are all on one ring.
+BEGIN in its first cell, END in its last one. A virtual connection from END to BEGIN outside the
+ground closes every walk, so all its passages are on one ring.
 """
 
 from typing import NamedTuple
@@ -40,7 +40,7 @@ def side_of(slot: int) -> int:
 
 @inlined
 def across(passages: Passages, offsets: NDArray[np.int64], cell: int, slot: int) -> tuple[int, int]:
-    """Return the cell and the slot that the walk comes to when it leaves by a slot."""
+    """Return the cell and the slot that the walk enters when it leaves by a slot."""
     if slot == BEGIN:
         return passages.ends[1], END
     if slot == END:
@@ -53,7 +53,7 @@ def across(passages: Passages, offsets: NDArray[np.int64], cell: int, slot: int)
 def passages_of(
     ground: Ground, walk: NDArray[np.int32], lanes: NDArray[np.uint8], passages: Passages
 ) -> bool:
-    """Write a walk's passages; return False where a step is walked three times.
+    """Write a walk's passages; return False if a step is walked three times.
 
     Args:
         ground: framed.
@@ -101,7 +101,7 @@ def walk_of(ground: Ground, passages: Passages, walk: NDArray[np.int32]) -> int:
 
 @inlined
 def passage_cost(one: int, other: int, step: int, turn: int) -> int:
-    """Return what a passage between two sides costs, by direction; 4 and 5 are the walk's ends."""
+    """Return the cost of a passage between two sides, by direction; 4 and 5 are the walk's ends."""
     if one >= NORTH + 3 or other >= NORTH + 3:
         return step // 2
     gap = (one - other) & 3

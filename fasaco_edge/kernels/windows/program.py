@@ -1,19 +1,19 @@
-"""A window of a walk, solved anew exactly or nearly so, by dynamic programming over its frontier.
+"""A window of a walk, re-optimised exactly or nearly so by dynamic programming over its frontier.
 
-Cell by cell, row by row of the window's shorter side, the program decides which passages the cell
-has. A state is what the rest needs to know: which open ends the walk so far has at the frontier
-and at the window's rim, and which of them are two ends of the same piece; what lies outside the
-window joins the ends at its rim. States that agree are one, the cheapest (Simpath; Inoue and
-Minato 2016 name it the frontier method). A ring may close once, when all cells are covered: so
-the result is one walk, as before.
+Cell by cell, row by row of the window's shorter side, the program chooses the cell's passages. A
+state is the information that the remaining cells need: the open ends of the walk so far at the
+frontier and at the window's rim, and which of them belong to the same piece; the walk outside the
+window joins the ends at its rim. Of equal states the cheapest is kept (Simpath; Inoue and Minato
+2016 name it the frontier method). A ring may close once, when all cells are covered: so the result
+is one walk, as before.
 
-Costs are reduced by the prices of steps (``kernels.bound.turns``): no passage costs less than
-nothing, so what is left to decide costs at least the sum of the cells' cheapest passages, and
-states that cannot come below the present walk are dropped. Where more states are left than the
-beam takes, the dearest ones are dropped, too. All amounts are half microseconds.
+Costs are reduced by the prices of steps (``kernels.bound.turns``): no passage has a negative
+reduced cost, so the undecided cells cost at least the sum of their cheapest passages, and states
+that cannot be cheaper than the present walk are dropped. If more states are left than the beam
+takes, the most expensive ones are dropped, too. All amounts are half microseconds.
 
-Over a whole ground a beam of few states soon has none that is one ring. So several may close there
-at a price (``ring_price``), and ``kernels.windows.rings`` joins them.
+On a whole ground a narrow beam soon holds no state that can still become a single ring. So several
+rings may close there at a price (``ring_price``), and ``kernels.windows.rings`` joins them.
 """
 
 import numpy as np
@@ -78,18 +78,18 @@ def solve_window(
     allowance: int,
     random: NDArray[np.uint64],
 ) -> int:
-    """Solve a window anew; return by how much the walk's cost changes [half us], 0 if not at all.
+    """Re-optimise a window; return the change of the walk's cost [half us], 0 for none.
 
     Args:
         ground: framed.
-        passages: of the walk; changed in place where something better is found.
-        terms: what it is to be.
-        window: where.
+        passages: of the walk; changed in place if a better solution is found.
+        terms: costs and end of the walk.
+        window: the window.
         program: memory.
         beam: most states kept after a cell.
-        noise: up to so much is added to each passage's cost at random, so that the walk may
-            become a little dearer.
-        allowance: so much dearer it may become for sure: several rings in the window become one.
+        noise: largest random amount added to each passage's cost, so that the walk may become a
+            little more expensive.
+        allowance: accepted increase in cost: several rings in the window become one.
         random: state of the stream, uint64 (1,).
     """
     begin_window(ground, passages, terms, window, program, noise, allowance, 0, random)
@@ -110,7 +110,7 @@ def begin_window(
     ring_price: int,
     random: NDArray[np.uint64],
 ) -> None:
-    """Begin to solve a window; see ``solve_window``, and for ``ring_price`` above."""
+    """Begin to solve a window; see ``solve_window``, and above for ``ring_price``."""
     lines, wide = max(window.rows, window.cols), min(window.rows, window.cols)
     at, count = program.at, 0
     for line in range(lines):
@@ -220,7 +220,7 @@ def end_window(
 
 @lean_kernel
 def _name_rim(ground: Ground, passages: Passages, program: Program, first: int, count: int) -> int:
-    """Give the slots that lead out of the window identifiers; return how many there are, or -1."""
+    """Give identifiers to the slots that lead out of the window; return their number, or -1."""
     ids = first
     for index in range(count):
         cell = program.cells[index]
@@ -262,7 +262,7 @@ def _join_outside(
 def _part_with(
     ground: Ground, program: Program, cell: int, index: int, count: int, begin: int
 ) -> bool:
-    """Take a cell out of its part; return whether states are to be looked at for it."""
+    """Take a cell out of its part; return whether to check states for it."""
     parts = program.parts
     label = parts.label[cell]
     parts.left[label] -= 1
@@ -331,7 +331,7 @@ def _put_back(
     state: int,
     count: int,
 ) -> None:
-    """Write the passages that led to a last state."""
+    """Write the passages of a final state."""
     ahead, below = _directions(window)
     behind, above = (ahead + 2) & 3, (below + 2) & 3
     taken, partner = program.taken, passages.partner

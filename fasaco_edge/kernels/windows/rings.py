@@ -1,7 +1,7 @@
 """Rings of passages joined into one, by windows where two of them touch.
 
-A whole ground that is solved with few states comes apart into several rings. A small window over
-the seam of two, solved anew for one ring, joins them where it costs least.
+The solution of a whole ground with few states consists of several rings. A small window over the
+seam of two, re-optimised for one ring, joins them at the least cost.
 """
 
 import numpy as np
@@ -15,11 +15,11 @@ from fasaco_edge.kernels.windows.passages import NONE, SLOTS, Passages, across
 from fasaco_edge.kernels.windows.program import solve_window
 from fasaco_edge.kernels.windows.search import COST, SOLVED, Aim, laid_in
 
-# Sides of the windows: so long at least, and of so many lengths.
+# Sides of the windows: least length, and number of lengths.
 SIDE, SIDES = 4, 3
 # Joined at any price, in half microseconds.
 ANY_PRICE = 1 << 50
-# Of a cell with several rings; else the number of its ring, or NONE.
+# Label of a cell with several rings; other cells have the number of their ring, or NONE.
 SEVERAL = -2
 RING, SEEN = 0, 1
 
@@ -37,17 +37,17 @@ def join_rings(
     windows: int,
     random: NDArray[np.uint64],
 ) -> int:
-    """Join rings by some windows; return how many rings are left.
+    """Join rings by some windows; return the number of rings left.
 
     Args:
         ground: framed.
         passages: changed in place.
-        terms: what the walk is to be.
+        terms: costs and end of the walk.
         program: memory.
         aim: where windows may lie; the beam.
         rings: int32 (n, 2), working memory; seams int32 (cells of ``aim``,), too.
-        tally: as of ``solve_windows``, COST and SOLVED are changed in place.
-        windows: how many at most.
+        tally: as in ``solve_windows``; COST and SOLVED are changed in place.
+        windows: most windows.
         random: state of the stream, uint64 (1,).
     """
     left = _label(ground, passages, aim, rings)
@@ -72,7 +72,7 @@ def join_rings(
 
 @lean_kernel
 def _label(ground: Ground, passages: Passages, aim: Aim, rings: NDArray[np.int32]) -> int:
-    """Write of each cell its ring, and which of its slots were seen; return how many there are."""
+    """Write each cell's ring and its visited slots; return the number of rings."""
     partner = passages.partner
     for index in range(aim.cells.size):
         rings[aim.cells[index], RING], rings[aim.cells[index], SEEN] = NONE, 0
@@ -98,7 +98,7 @@ def _label(ground: Ground, passages: Passages, aim: Aim, rings: NDArray[np.int32
 def _list_seams(
     ground: Ground, aim: Aim, rings: NDArray[np.int32], seams: NDArray[np.int32]
 ) -> int:
-    """List the cells with several rings, or with another one beside; return how many."""
+    """List the cells with several rings, or beside another ring; return their number."""
     listed = 0
     for index in range(aim.cells.size):
         cell = aim.cells[index]

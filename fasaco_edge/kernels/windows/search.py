@@ -1,7 +1,7 @@
-"""Windows one after the other, anywhere along a walk: large neighbourhood search.
+"""Large neighbourhood search: windows anywhere along a walk, one after the other.
 
 Source: Shaw, "Using constraint programming and local search methods to solve vehicle routing
-problems", 1998, for the scheme: a part is freed, all else is held, and the part is solved anew.
+problems", 1998, for the scheme: a part is freed, the rest is fixed, and the part is re-optimised.
 """
 
 from typing import NamedTuple
@@ -18,7 +18,7 @@ from fasaco_edge.kernels.windows.program import solve_window
 
 
 class Aim(NamedTuple):
-    """Where windows lie, and how large they are.
+    """Positions and sizes of windows.
 
     Attributes:
         cells: int32 (k,), framed cells that windows are laid around.
@@ -43,7 +43,7 @@ class Aim(NamedTuple):
 # Entries of the tally: cost of the walk and of the best one [half us]; windows solved and cells
 # in them since the search began.
 COST, BEST, SOLVED, SWEPT = 0, 1, 2, 3
-# The noise, in shares of a turn: so many. Trials: falling from a tenth finds no better walks.
+# The noise is 1 / NOISE of a turn. Trials: falling from a tenth finds no better walks.
 NOISE = 25
 # States kept at first; half as many more with each sweep.
 FIRST_BEAM = 60
@@ -63,26 +63,26 @@ def solve_windows(
     expansions: int,
     random: NDArray[np.uint64],
 ) -> None:
-    """Solve windows until so many states were expanded.
+    """Solve windows until a number of states were expanded.
 
     Args:
         ground: framed.
         passages: of the walk; changed in place.
-        best: out, those of the best walk, where a better one is found.
-        terms: what the walk is to be.
+        best: out, those of the best walk, if a better one is found.
+        terms: costs and end of the walk.
         program: memory.
-        aim: where windows lie.
+        aim: positions and sizes of windows.
         tally: int64 (4,), COST, BEST, SOLVED, SWEPT; changed in place.
         expansions: states to expand at least.
         random: state of the stream, uint64 (1,).
     """
     until = program.clock[EXPANDED] + expansions
-    # A window in which nothing can be gained expands none.
+    # A window without a possible gain expands none.
     for _ in range(max(expansions // 64, 1)):
         if program.clock[EXPANDED] >= until:
             break
         window = _draw_window(aim, tally[SWEPT], random)
-        # At first nearly any change gains: few states find one.
+        # At first nearly any change gains: few states suffice.
         beam = min(aim.beam, FIRST_BEAM + FIRST_BEAM * (tally[SWEPT] // aim.cells.size) // 2)
         noise = terms.turn // NOISE
         gain = solve_window(ground, passages, terms, window, program, beam, noise, 0, random)
@@ -122,7 +122,7 @@ def _draw_window(aim: Aim, swept: int, random: NDArray[np.uint64]) -> Window:
 
 @inlined
 def laid_in(aim: Aim, row: int, col: int, rows: int, cols: int) -> Window:
-    """Return a window as near to where it was to lie as the ground has room for it."""
+    """Return a window as near to its drawn position as the ground allows."""
     rows, cols = min(rows, aim.rows - 2 * aim.frame), min(cols, aim.cols - 2 * aim.frame)
     row = min(max(row, aim.frame), aim.rows - aim.frame - rows)
     col = min(max(col, aim.frame), aim.cols - aim.frame - cols)

@@ -1,4 +1,4 @@
-"""States of the program: a choice for a cell applied to one, states filed, the dearest dropped."""
+"""States of the program: apply a choice to a state, file states, drop the most expensive."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,13 +20,13 @@ from fasaco_edge.kernels.windows.memory import (
     Program,
 )
 
-# Of what is filed in a slot the lowest bits are the state, the others the stamp of its layer.
+# The lowest bits of a slot's entry are the state, the others the stamp of its layer.
 INDEX_BITS, INDICES = 16, 65535
 
 
 @inlined
 def take_in(base: NDArray[np.int16], first: int, spare: int) -> int:
-    """Name the ends at two identifiers of the frontier anew; return how many there are."""
+    """Rename the ends at two identifiers of the frontier; return their number."""
     found = 0
     for lane in range(2):
         mate = base[first + lane]
@@ -137,7 +137,7 @@ def order_lanes(mates: NDArray[np.int16], first: int) -> int:
 
 @inlined
 def _hash(state: NDArray[np.int64], words: int) -> int:
-    """Return the hash of a state: its highest bits depend on all that is in it."""
+    """Return the hash of a state: its highest bits depend on the whole state."""
     one, other = 1469598103934665603, 6148914691236517205
     # Two chains: each multiplication waits for the last one.
     for word in range(0, words, 2):
@@ -170,7 +170,7 @@ def file_state(
     parent: int,
     code: int,
 ) -> int:
-    """File the state in ``scratch``, or its lower cost; return how many states there are."""
+    """File the state in ``scratch``, or its lower cost; return the number of states."""
     mask = program.table.size - 1
     stamp = program.clock[LAYER_STAMP]
     value = _hash(program.scratch_words, words)
@@ -194,7 +194,7 @@ def file_state(
 
 @lean_kernel
 def shrink(program: Program, layer: int, made: int, words: int, beam: int) -> tuple[int, int]:
-    """Keep the ``beam`` cheapest states; return how many, and the cost from which on none is."""
+    """Keep the ``beam`` cheapest states; return their number, and the least cost dropped."""
     cost, order = program.cost[layer], program.order
     for state in range(made):
         order[state] = cost[state]
@@ -228,7 +228,7 @@ def shrink(program: Program, layer: int, made: int, words: int, beam: int) -> tu
 
 @lean_kernel
 def _nth(values: NDArray[np.int64], size: int, place: int) -> int:
-    """Return what is at ``place`` when the first ``size`` values are in order (Hoare, 1961)."""
+    """Return the value at ``place`` if the first ``size`` values were sorted (Hoare, 1961)."""
     first, last = 0, size - 1
     while first < last:
         pivot = values[(first + last) >> 1]
