@@ -1,8 +1,8 @@
-"""A control loop as robots have: it wakes at a fixed rate, works a little, and sleeps.
+"""A robot's control loop: it wakes at a fixed rate, works a little, and sleeps.
 
-A process of its own, ``python -m fasaco_edge.bench.control_loop HZ SECONDS``: how late it woke,
-tick by tick, goes to standard output, as microseconds, a line each. Deadlines are absolute: who
-wakes late once does not stay late.
+A separate process, ``python -m fasaco_edge.bench.control_loop HZ SECONDS``, prints the wake-up
+latency of each tick to standard output, in microseconds, a line each. Deadlines are absolute: one
+late wake-up does not delay the next.
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 
 The robot comes to rest wherever it turns on the spot. Between two such places it speeds up, drives
 and brakes (a trapezoid of speed over time, or a triangle on short ways); a turn is a trapezoid of
-its rate. Knows nothing of what planners assume.
+its rate. Independent of the planners' assumptions.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ Points = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class DriveLimits:
-    """What bounds a robot's motion, beside its speed.
+    """Limits of a robot's motion, beside its speed.
 
     Attributes:
         acceleration_m_s2: of driving, up and down.
@@ -43,7 +43,7 @@ class DriveLimits:
 def drive_seconds(
     ways_m: NDArray[np.float64], bends_deg: NDArray[np.float64], speed_m_s: float, by: DriveLimits
 ) -> float:
-    """Return what driving along a line takes [s].
+    """Return the driving time of a line [s].
 
     Args:
         ways_m: float64 (n,), lengths between its points [m].

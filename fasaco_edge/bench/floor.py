@@ -1,6 +1,6 @@
-"""A judge of swept floor: how much of it a driven line has swept, and what that took.
+"""A judge of swept floor: the area swept by a driven line, and the time it took.
 
-It knows a map and a line of points, and nothing of cells, walks and planners.
+Its inputs are a map and a line of points, no cells, walks or planners.
 
 Reachable floor
     All that the tool's disc touches at the places that the robot's disc can come to from the
@@ -48,7 +48,7 @@ PIECES = 4096
 
 @dataclass(frozen=True, slots=True)
 class SweepingRobot:
-    """What drives along a line.
+    """The robot that drives along a line.
 
     Attributes:
         tool_m: width of its tool, a disc [m].
@@ -69,7 +69,7 @@ class SweepingRobot:
 
 @dataclass(frozen=True, slots=True)
 class FloorFigures:
-    """How well a line sweeps a floor.
+    """Quality of a line on a floor.
 
     Attributes:
         reachable_m2: reachable floor [m2].
@@ -111,7 +111,7 @@ def share_words(share: float) -> str:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class JudgedFloor:
-    """A floor and what a line did to it.
+    """A floor and its parts swept by a line.
 
     Attributes:
         figures: how well it did.
@@ -126,7 +126,7 @@ class JudgedFloor:
 
     @property
     def unswept(self) -> Mask:
-        """What is reachable and was not swept, bool (rows, cols)."""
+        """Reachable unswept pixels, bool (rows, cols)."""
         return self.reachable & ~self.swept
 
 

@@ -1,4 +1,4 @@
-"""Masks of pixels: what lies within a distance of a mask, and what of a mask hangs together.
+"""Masks of pixels: dilation by a distance, and connected patches.
 
 Exact, and of numpy alone; distances are between the centres of pixels.
 """
@@ -56,7 +56,7 @@ def _along_rows(mask: Mask) -> NDArray[np.int32]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Patches:
-    """The patches of a mask: pixels that hang together by their edges.
+    """The patches of a mask: pixels connected by their edges.
 
     Attributes:
         shape: of the mask.

@@ -1,4 +1,4 @@
-"""A robot for a daemon to work for, and the building it publishes: halls of ten metres with doors.
+"""A robot that a daemon plans for, and the building it publishes: halls of ten metres with doors.
 
 The building is fully known, 50 m x 50 m, as it comes from SLAM. A crate in it moves.
 """
@@ -135,7 +135,7 @@ class MapSource:
         )
 
     def forget_paths(self) -> None:
-        """Let go of the paths that nobody waited for."""
+        """Drop paths that were not waited for."""
         while not self._arrivals.empty():
             self._arrivals.get()
 

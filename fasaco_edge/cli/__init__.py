@@ -45,8 +45,8 @@ COMMANDS = {
 }
 """Each command, and its line in the list of them."""
 
-# A broken or full disk, a computer that is out of files or memory. Its exit code is not that of a
-# faulty configuration, so that a service is restarted.
+# A faulty or full disk, a computer without free files or memory. Its exit code differs from that of
+# an invalid configuration, so that a service is restarted.
 _PASSING = frozenset(
     (errno.EIO, errno.ENOSPC, errno.EDQUOT, errno.EMFILE, errno.ENFILE, errno.ENOMEM, errno.ESTALE)
 )
@@ -63,7 +63,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def program() -> NoReturn:
-    """Run one command as a process of its own, and end that with the command's exit code.
+    """Run one command as a separate process, and exit with the command's code.
 
     A session of Zenoh leaves threads behind that still release callbacks after it was closed (Zenoh
     1.10). Where the interpreter ends meanwhile, the C library aborts the process with "FATAL:
@@ -141,7 +141,7 @@ def _describe(parser: argparse.ArgumentParser, command: Command) -> None:
 
 
 def _may_pass(error: BaseException | None) -> bool:
-    """Tell whether what is behind an error is no mistake of anybody's, and may be over soon."""
+    """Tell whether an error is transient: nobody's mistake, and perhaps over soon."""
     # What a user's own planner raised is his to mend.
     while error is not None and not isinstance(error, PlannerFailed):
         if isinstance(error, OSError) and error.errno in _PASSING:

@@ -28,7 +28,7 @@ class TlsFiles(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Certificate:
-    """What a certificate says.
+    """Content of a certificate.
 
     Attributes:
         name: its common name, by which roles are given.

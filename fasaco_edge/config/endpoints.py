@@ -1,4 +1,4 @@
-"""Endpoints of the bus: what is wrong with one, and who can reach it.
+"""Endpoints of the bus: their faults, and who can reach them.
 
 An endpoint is ``<protocol>/<address>[?<metadata>][#<configuration>]``.
 """
@@ -29,7 +29,7 @@ def host_of(endpoint: str) -> str:
 
 
 def is_local(endpoint: str) -> bool:
-    """Tell whether only this computer can reach an endpoint; False where that is not certain.
+    """Tell whether only this computer can reach an endpoint; False if uncertain.
 
     Names are not resolved: any but ``localhost`` may stand for any address.
     """
@@ -68,7 +68,7 @@ MOST_BYTES = 255
 
 
 def endpoint_faults(name: str, endpoints: Sequence[str]) -> Iterator[BadConfiguration]:
-    """Yield what is wrong with endpoints, of which Zenoh would say nothing but that none answers.
+    """Yield the faults of endpoints, for which Zenoh would only report that none answers.
 
     Args:
         name: of the key or option that has them.
@@ -83,7 +83,7 @@ def endpoint_faults(name: str, endpoints: Sequence[str]) -> Iterator[BadConfigur
 
 
 def _why_none(endpoint: str) -> str:
-    """Return why a text is no endpoint; "" where it is one."""
+    """Return why a text is no endpoint; "" if it is one."""
     protocol, address = protocol_of(endpoint), re.split(r"[?#]", endpoint.partition("/")[2])[0]
     known = (*IP, *UNIX, *DEVICES)
     if protocol not in known:

@@ -1,4 +1,4 @@
-"""Loading of configurations: a YAML file read and checked as a whole, with all that is wrong."""
+"""Loading of configurations: a YAML file read and checked as a whole, with all its faults."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def with_mask(
     Args:
         config: with the name of a file, sought from the configuration's own folder.
         file: of the configuration.
-        most_bytes: what it may take to read the mask [bytes]; None for anything.
+        most_bytes: most memory for reading the mask [bytes]; None for no limit.
 
     Raises:
         BadConfiguration: the mask cannot be read, or takes more.
@@ -60,7 +60,7 @@ def with_mask(
 
 
 def mask_fault(config: DaemonConfig, file: Path, most_bytes: int | None = None) -> Fault | None:
-    """Return what is wrong with a configuration's keep-out mask, and in which line of ``file``."""
+    """Return the fault of a configuration's keep-out mask, with its line in ``file``."""
     try:
         with_mask(config, file, most_bytes)
     except BadConfiguration as error:

@@ -27,11 +27,11 @@ class Section(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
 
 @dataclass(frozen=True, slots=True)
 class Fault:
-    """One thing that is wrong.
+    """A fault of a configuration.
 
     Attributes:
-        key: where, like ``bus.listen[0]``; "" for the file.
-        error: what, and what is allowed; without the name of the file.
+        key: its place, like ``bus.listen[0]``; "" for the file.
+        error: the fault, and what is allowed; without the name of the file.
         line: of the file, from 1 on; None where it has none.
     """
 
@@ -111,7 +111,7 @@ def _choices(kind: object) -> str:
 
 
 def _meant(name: str, key: str, names: list[str], root: type[Section]) -> str:
-    """Return which key may have been meant, or which exist."""
+    """Return the key that was probably meant, or the existing keys."""
     before = f"{key}." if key else ""
     if near := get_close_matches(name, names, 1):
         return f"; did you mean {before}{near[0]}?"

@@ -1,4 +1,4 @@
-"""The robot's section of the configuration: its outline, its size, and what driving takes it."""
+"""The robot's section of the configuration: outline, size, and cost of driving."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class FootprintConfig(Section, frozen=True):
     polygon: tuple[tuple[Coordinate, Coordinate], ...] = ()
 
     def radius(self) -> float:
-        """Return the radius of the disc around it [m]; 0 where too little is said."""
+        """Return the radius of the disc around it [m]; 0 if underspecified."""
         corners = self.polygon
         if self.width_m is not None and self.length_m is not None:
             ahead = 0.5 * self.length_m if self.ahead_m is None else self.ahead_m
@@ -131,7 +131,7 @@ class RobotConfig(Section, frozen=True):
         return half - math.sqrt(square)
 
     def turning(self) -> Turning:
-        """Return what turns on the spot take."""
+        """Return the durations of turns on the spot."""
         if self.turn_deg_s is None:
             return proportional_turning(self.quarter_turn_s)
         return limited_turning(

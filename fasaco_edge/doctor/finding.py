@@ -1,4 +1,4 @@
-"""What a check finds, what it looks at, and the daemon's unit as systemd has it."""
+"""Findings of a check, its context, and the daemon's systemd unit."""
 
 from __future__ import annotations
 
@@ -32,12 +32,12 @@ class Unit:
 
     @property
     def pid(self) -> int | None:
-        """The daemon's process; None where it does not run."""
+        """The daemon's process; None if it is not running."""
         return int(self.properties.get("MainPID", "0")) or None
 
     @property
     def environ(self) -> dict[str, str]:
-        """What the daemon finds in its environment, as far as that is for us."""
+        """The daemon's environment, as far as checks need it."""
         words = shlex.split(self.properties.get("Environment", ""))
         environ = dict(word.partition("=")[::2] for word in words)
         if state := self.properties.get("StateDirectory", "").split():
@@ -63,7 +63,7 @@ class Unit:
 
 
 def find_unit(root: Path = Path("/")) -> Unit | None:
-    """Ask systemd; None where it is not at work here, knows no such unit, or does not answer."""
+    """Query systemd; None if it does not run here, has no such unit, or does not answer."""
     if not (root / "run/systemd/system").is_dir():
         return None
     command = ["systemctl", "show", NAME, f"--property={','.join(PROPERTIES)}"]
@@ -90,10 +90,10 @@ class Finding:
     """One line of the doctor's report.
 
     Attributes:
-        level: how it is.
-        found: what was found.
-        to_do: what to do about it; "" where there is nothing.
-        details: more lines, for who wants to know.
+        level: its severity.
+        found: the finding in words.
+        to_do: what to do about it; "" for nothing.
+        details: more lines, shown on request.
     """
 
     level: Level
@@ -104,7 +104,7 @@ class Finding:
 
 @dataclass(frozen=True, slots=True)
 class CheckContext:
-    """What checks look at.
+    """The inputs of checks.
 
     Attributes:
         config: the daemon's configuration.
@@ -132,8 +132,8 @@ class Check:
 
     Attributes:
         name: one or two words.
-        look: finds the answer; it changes nothing.
-        of_machine: whether it says something without a configuration, too.
+        look: runs the check; it changes nothing.
+        of_machine: whether it also runs without a configuration.
     """
 
     name: str
@@ -152,7 +152,7 @@ def warn(found: str, to_do: str, details: Iterable[str] = ()) -> Finding:
 
 
 def fail(found: str, to_do: str, details: Iterable[str] = ()) -> Finding:
-    """Return a finding to be mended."""
+    """Return a finding that must be fixed."""
     return Finding(Level.FAIL, found, to_do, tuple(details))
 
 

@@ -64,7 +64,7 @@ def _room(name: str, folder: Path, least_mb: float) -> Finding:
 
 
 def permissions(context: CheckContext) -> Finding:
-    """Check that others may not read or write what is the daemon's alone."""
+    """Check that others cannot read or write the daemon's own files."""
     faults = [*_config_faults(context), *_state_faults(context)]
     if not faults:
         return ok("others may neither change the configuration nor the state")

@@ -16,7 +16,7 @@ from fasaco_edge.daemon.memory import afforded, limits_mib, needed_bytes
 from fasaco_edge.doctor.finding import CheckContext, Finding, fail, ok, warn
 
 MACHINES = ("x86_64", "aarch64")
-# What makes a difference to array code, as /proc/cpuinfo spells it.
+# Processor features that affect array code, as named in /proc/cpuinfo.
 FEATURES = ("avx2", "avx512f", "asimd", "sve")
 COMPILED = ("eclipse-zenoh", "llvmlite", "msgspec", "numba", "numpy", "pillow", "rerun-sdk")
 LEAST_PYTHON = (3, 11)
@@ -24,7 +24,7 @@ LEAST_PYTHON = (3, 11)
 TIMEX_BYTES, MAXERROR_AT, STATUS_AT = 208, 24, 40
 STA_UNSYNC = 0x40
 TIME_ERROR = 5
-# A daemon with a plan of a large building takes less; what is free should do for it.
+# Memory above that of a daemon with a plan of a large building.
 WANTED_MB = 350
 PI_CMDLINES = ("boot/firmware/cmdline.txt", "boot/cmdline.txt")
 
@@ -86,7 +86,7 @@ def clock(context: CheckContext) -> Finding:
 
 
 def kernel_clock() -> tuple[bool, float] | None:
-    """Return whether the kernel's clock is synchronised, and how far off at most [s]; only asks."""
+    """Return whether the kernel's clock is synchronised, and its largest error [s]; read-only."""
     timex = ctypes.create_string_buffer(TIMEX_BYTES)
     try:
         state = ctypes.CDLL(None).adjtimex(timex)
@@ -160,7 +160,7 @@ def memory(context: CheckContext) -> Finding:
 
 
 def controller(root: Path) -> int | None:
-    """Return which version of control groups limits memory; None where none does."""
+    """Return the version of control groups that limits memory; None if none does."""
     if "memory" in _read(root / "sys/fs/cgroup/cgroup.controllers").split():
         return 2
     # The names of version 1's are listed even where the kernel was configured without them.

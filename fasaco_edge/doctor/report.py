@@ -55,7 +55,7 @@ class _RunningCheck:
             self._found = warn(said, "please report this")
 
     def finding(self, deadline: float) -> Finding:
-        """Return what it finds until ``deadline`` [s, monotonic]."""
+        """Return its finding by ``deadline`` [s, monotonic]."""
         self._thread.join(max(deadline - time.monotonic(), 0.0))
         return self._found or warn(
             f"no answer after {PATIENCE_S:g} s", "check whether a disk or a peer on the bus hangs"
@@ -65,9 +65,9 @@ class _RunningCheck:
 def findings(
     path: Path | None, checks: Sequence[Check] = CHECKS, recordings: Path | None = None
 ) -> Iterator[tuple[str, Finding]]:
-    """Yield the name of each check and what it finds.
+    """Yield the name and finding of each check.
 
-    The first is the configuration; where that is refused only the computer is looked at besides.
+    The first is the configuration; if it is refused only the computer is checked besides.
 
     Args:
         path: a configuration; None for the defaults.

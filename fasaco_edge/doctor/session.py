@@ -1,6 +1,6 @@
-"""Checks of the bus: whether the daemon can join it, and who is there.
+"""Checks of the bus: whether the daemon can join it, and its participants.
 
-Who listens at an endpoint is found out without Zenoh.
+Listeners at an endpoint are found without Zenoh.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ STREAMS = ("tcp", "tls", "ws")
 
 
 def address_of(endpoint: str) -> tuple[str, int] | None:
-    """Return where a TCP connection reaches an endpoint from here; None where none does."""
+    """Return the address of an endpoint for a TCP connection from here; None if there is none."""
     if protocol_of(endpoint) not in STREAMS:
         return None
     port = re.search(r":(\d+)(?:[?#]|$)", endpoint)
@@ -54,7 +54,7 @@ def answers(endpoint: str) -> bool | None:
 
 
 def why_not_bound(endpoint: str) -> str:
-    """Return why nobody could listen at an endpoint of this computer; "" where one could."""
+    """Return why a program could not listen at an endpoint of this computer; "" if it could."""
     address = address_of(endpoint)
     if address is None:
         return ""
@@ -72,7 +72,7 @@ def why_not_bound(endpoint: str) -> str:
 def program_at(endpoint: str) -> str:
     """Return the name and process of the program that listens at an endpoint of this computer.
 
-    "" where it cannot be seen: those of other users only root sees.
+    "" if it is not visible: those of other users are visible only to root.
     """
     address = address_of(endpoint)
     inodes = _listening(address[1]) if address else set()
@@ -105,7 +105,7 @@ def _listening(port: int) -> set[str]:
 # Time to listen for maps and poses [s]; poses come ten times a second.
 LISTEN_S = 0.7
 ASK_S = 0.7
-# Of maps elsewhere no more are named.
+# Most maps elsewhere that are named.
 MOST_PLACES = 8
 # Where in a token of rmw_zenoh (``wire.ros_keys``) it says what it is of, and its topic's type.
 TOKEN_KIND, TOKEN_TYPE = 5, 10
@@ -150,7 +150,7 @@ def session(context: CheckContext) -> Finding:
 
 
 def peers(context: CheckContext, listen_s: float = LISTEN_S) -> Finding:
-    """Check who is on the bus: the daemon, other robots, maps and poses within a time [s]."""
+    """Check the participants of the bus: daemon, other robots, maps and poses within a time [s]."""
     if not any(answers(endpoint) is not False for endpoint in _ways(context)):
         return ok("neither a daemon nor a router answers")
     try:

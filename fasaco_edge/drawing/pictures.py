@@ -19,7 +19,7 @@ from fasaco_edge.kernels.lattice.reach import reachable_from
 
 
 def draw_swept(plot: Plot, swept: MapLayer) -> list[KeyEntry]:
-    """Tint the floor that was swept; return what that and the marks of a line mean."""
+    """Tint the swept floor; return the meaning of the tint and of a line's marks."""
     plot.paint(swept, palette.COVERED)
     label = f"floor swept ({swept.area_m2:,.1f} m2)"
     return [*_ENDS, KeyEntry("tile", palette.COVERED, label)]
@@ -33,7 +33,7 @@ def draw_unswept(plot: Plot, unswept: MapLayer) -> list[KeyEntry]:
 
 
 def draw_order(plot: Plot, zones: Sequence[Polygon], keep_out: Sequence[Polygon]) -> list[KeyEntry]:
-    """Outline the zones of an order and where it keeps out of; return what the colours mean."""
+    """Outline the zones and keep-out zones of an order; return the meaning of the colours."""
     key = []
     for polygons, colour, label in (
         (zones, palette.BLUE, "zone to cover"),

@@ -48,7 +48,7 @@ class KeyEntry:
 
 @dataclass(frozen=True, slots=True)
 class Sheet:
-    """What surrounds a plot.
+    """The surroundings of a plot.
 
     Attributes:
         title: one line, large.
@@ -57,7 +57,7 @@ class Sheet:
         bar: labels at the beginning and the end of the colour bar; None for no bar.
         scale: pixels per unit of the plot.
         framed: whether a line goes around the plot.
-        unit: what the scale bar counts.
+        unit: of the scale bar.
     """
 
     title: str

@@ -1,4 +1,4 @@
-"""The picture of a pheromone trail: where it points to from each cell, and how decided it is."""
+"""The picture of a pheromone trail: its direction at each cell, and how decided it is."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def draw_trail(
     key = []
     for direction, (name, colour) in WAYS.items():
         here = (pointed == direction) & (decided > 0.0)
-        # White where the trail is undecided: multiplied with what is below, that leaves the map.
+        # White where the trail is undecided: multiplied with the map, white leaves it unchanged.
         share = 0.15 + 0.85 * decided[here][:, np.newaxis]
         colours[here] += share * (np.array(colour) - palette.PAPER)
         key.append(KeyEntry("tile", colour, f"{name} ({np.count_nonzero(here):,} cells)"))

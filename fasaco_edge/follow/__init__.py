@@ -1,1 +1,1 @@
-"""A program that drives the robot's base along the path: path and pose in, velocities out."""
+"""The path follower: path and pose in, velocities for the robot's base out."""

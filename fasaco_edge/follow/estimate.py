@@ -1,13 +1,13 @@
-"""Where the robot is between two poses: the newest one, moved on by what was sent since.
+"""The pose estimate between two poses: the newest pose, advanced by the commands sent since.
 
-Poses come ten times a second, say, and velocities go out twenty times. A command takes a while to
-move the base, and a pose to be heard of: together that is the delay. What is wanted is where the
-robot is once all that was sent has moved it, so a pose is moved on by what was sent since the delay
-before it came. How long that is shows where the robot starts, brakes and turns: the poses move as
-the commands say, so much later.
+Poses arrive, for example, ten times a second, and velocities are sent twenty times. A command takes
+a while to move the base, and a pose to arrive: together that is the delay. The estimate is the pose
+after all sent commands have taken effect: a pose is advanced by the commands sent since the delay
+before its arrival. The delay is measured when the robot starts, brakes and turns: the poses follow
+the commands after it.
 
-A pose far from where the robot can be is not believed at once: a localiser that errs for a moment
-must not make the robot turn. One that stays where it is after a jump is believed after a while.
+A pose far from the expected one is not accepted at once: a momentary error of the localiser must
+not make the robot turn. After a jump, poses that agree with each other are accepted after a while.
 """
 
 from __future__ import annotations
@@ -20,29 +20,27 @@ from dataclasses import dataclass
 from fasaco_edge.grid.geometry import Pose2D
 from fasaco_edge.grid.motion import limited
 
-# A pose further off than this from where the robot should be is a jump [m, rad].
+# A pose further than this from the expected one is a jump [m, rad].
 JUMP_M, JUMP_RAD = 0.3, 0.8
-# After so many poses that agree with each other a jump is believed.
+# A jump is accepted after this many poses that agree with each other.
 AGREEING = 5
-# Without a pose for so long the robot may be anywhere [s].
+# Timeout of the pose: after it the robot may be anywhere [s].
 FORGET_S = 2.0
-# What was sent is remembered so long [s].
+# Commands are stored for this long [s].
 REMEMBER_S = 1.0
-# Delays that are told apart [s], the one that is assumed at first, and how fast old poses count
-# less, from one pose to the next.
+# Candidate delays [s], the initial one, and the decay of old poses from one pose to the next.
 DELAYS_S = tuple(0.03 * step for step in range(12))
 FIRST_DELAY_S = DELAYS_S[1]
 FORGETTING = 0.98
-# What was sent shows the delay only where it changed by so much.
+# Least change of the commands from which the delay can be measured.
 VARIED_M_S, VARIED_RAD_S = 0.05, 0.2
-# What is known of the pose counts less from one pose to the next, and has gone after some times
-# this [s]: poses scatter.
+# Time constant of the pose filter [s]: poses scatter.
 BLEND_S = 0.15
 
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """What the base can do.
+    """The limits of the base.
 
     Attributes:
         speed: [m/s].
@@ -79,14 +77,14 @@ class PoseEstimate:
     """Poses and commands in, the robot's pose at any time out.
 
     Args:
-        limits: of the base, which does what is sent as fast as it can.
+        limits: of the base, which executes commands as fast as it can.
 
-    Attributes:
-        jump: how far the newest pose is from where the robot should be [m], and how far turned
-            [rad]; None where it is believed.
-        pose_at: when the newest pose that is believed came [s]; None before there is one.
-        measured: the newest pose as it came.
-        delay: between a command and its effect on a pose that comes [s].
+        Attributes:
+            jump: distance [m] and angle [rad] of the newest pose from the expected one; None if it
+                is accepted.
+            pose_at: arrival of the newest accepted pose [s]; None before there is one.
+            measured: the newest pose, unfiltered.
+            delay: between a command and its effect on an arriving pose [s].
     """
 
     def __init__(self, limits: Limits) -> None:
@@ -102,7 +100,7 @@ class PoseEstimate:
         self._sent = deque[tuple[float, Command]]()
 
     def take(self, pose: Pose2D, now: float) -> None:
-        """Take a pose in, as it comes."""
+        """Take in a pose on arrival."""
         if self.pose_at is None or now - self.pose_at > FORGET_S:
             self._believe(pose, now, pose)
             return
@@ -119,7 +117,7 @@ class PoseEstimate:
             self._believe(pose, now, pose)
 
     def sent(self, command: Command, now: float) -> None:
-        """Note what is sent to the base, from now on in force."""
+        """Note the command sent to the base, in force from now on."""
         if self._sent:
             before, last = self._sent[-1]
             seconds = now - before
@@ -135,11 +133,11 @@ class PoseEstimate:
 
     @property
     def speed(self) -> float:
-        """How fast the robot drives, once it has done what was sent [m/s]."""
+        """The robot's speed after all sent commands have taken effect [m/s]."""
         return self._sent[-1][1].speed if self._sent else 0.0
 
     def at(self, now: float) -> Pose2D:
-        """Return where the robot is once it has done what was sent until ``now``."""
+        """Return the robot's pose after all commands sent until ``now`` have taken effect."""
         assert self.pose_at is not None
         pose = self._pose
         for seconds, command in self._between(self.pose_at - self.delay, now):
@@ -147,7 +145,7 @@ class PoseEstimate:
         return pose
 
     def _between(self, since: float, until: float) -> Iterator[tuple[float, Command]]:
-        """Yield what was in force between two times, each for how long [s]."""
+        """Yield the commands in force between two times, with their durations [s]."""
         for index, (begins, command) in enumerate(self._sent):
             ends = self._sent[index + 1][0] if index + 1 < len(self._sent) else until
             seconds = min(ends, until) - max(begins, since)
@@ -155,13 +153,13 @@ class PoseEstimate:
                 yield seconds, command
 
     def _measure_delay(self, pose: Pose2D, now: float) -> None:
-        """Compare turn and way since the pose before with what was sent, so much earlier."""
+        """Compare the motion since the last pose with the commands of each delay earlier."""
         before = self.pose_at
         speeds, turns = [c.speed for _, c in self._sent], [c.turn_rate for _, c in self._sent]
         if before is None or not self._sent:
             return
         if max(speeds) - min(speeds) < VARIED_M_S and max(turns) - min(turns) < VARIED_RAD_S:
-            return  # what hardly changes shows nothing
+            return  # almost constant commands do not show the delay
         turned = math.remainder(pose.yaw - self.measured.yaw, math.tau)
         went = math.hypot(pose.x - self.measured.x, pose.y - self.measured.y)
         for index, delay in enumerate(DELAYS_S):
@@ -181,7 +179,7 @@ class PoseEstimate:
 
 
 def moved(pose: Pose2D, command: Command, seconds: float) -> Pose2D:
-    """Return where a robot comes to that moves so for a short time."""
+    """Return the pose after moving with a command for a short time."""
     turn = command.turn_rate * seconds
     heading = pose.yaw + 0.5 * turn
     way = command.speed * seconds
@@ -193,7 +191,7 @@ def moved(pose: Pose2D, command: Command, seconds: float) -> Pose2D:
 
 
 def _between_poses(pose: Pose2D, other: Pose2D, share: float) -> Pose2D:
-    """Return the pose at a share of the way from one to another."""
+    """Return the pose interpolated between two poses."""
     turn = math.remainder(other.yaw - pose.yaw, math.tau)
     return Pose2D(
         pose.x + share * (other.x - pose.x),
@@ -208,6 +206,6 @@ def _is_near(pose: Pose2D, other: Pose2D) -> bool:
 
 
 def _apart(pose: Pose2D, other: Pose2D) -> tuple[float, float]:
-    """Return how far two poses are from each other, and how far turned [m, rad]."""
+    """Return distance and angle between two poses [m, rad]."""
     far = math.hypot(pose.x - other.x, pose.y - other.y)
     return far, abs(math.remainder(pose.yaw - other.yaw, math.tau))

@@ -1,6 +1,6 @@
-"""The follower: paths, poses and signs of the daemon in, a command and a state out.
+"""The follower: paths, poses and heartbeats of the daemon in, a command and a state out.
 
-No clock, no session: who calls tells the time, by a clock that never steps.
+No clock, no session: the caller passes the monotonic time.
 """
 
 from __future__ import annotations
@@ -18,19 +18,19 @@ from fasaco_edge.wire.messages.path_points import PathPoints
 
 # Commands a second.
 RATE_HZ = 20.0
-# Zeros are sent for so long after a stop; then something else may drive [s].
+# Zeros are sent for this long after a stop; then another program may drive [s].
 ZEROS_S = 1.0
-# Further than this from its leg the robot is not on the path any more [m].
+# Largest distance of the robot from its leg; beyond it the robot has left the path [m].
 OFF_PATH_M = 0.3
 
 
 class Follower(Supervision):
-    """Follows the newest path while all that it takes is there.
+    """Follows the newest path while all its inputs are up to date.
 
     Args:
         limits: of the base.
-        patience: how old pose and status may become.
-        moves: whether the base does what the commands say; in a dry run it does not.
+        patience: timeouts of pose and status.
+        moves: whether the base executes the commands; in a dry run it does not.
     """
 
     def __init__(self, limits: Limits, patience: Patience = USUAL, *, moves: bool = True) -> None:
@@ -41,18 +41,18 @@ class Follower(Supervision):
         self._pursuit = Pursuit(limits, 1.0 / RATE_HZ)
         self._grip = Grip()
         self._route: Route | None = None
-        # What is driven until a new path is joined.
+        # The route driven until a new path is joined.
         self._before: Route | None = None
         self._is_new = False
         self._driven_at = -float("inf")
 
     def step(self, now: float) -> Command | None:
-        """Return what is to be sent now; None where nothing is."""
+        """Return the command to send now; None for none."""
         try:
             self.state, self.detail = self._trouble(now)
             command = self._steer(now) if self.state is State.DRIVING else None
         except MalformedMessage as error:
-            # Further on the path is none.
+            # The rest of the path is malformed.
             self._have_none(State.BAD_PATH, str(error))
             self.state, self.detail, command = State.BAD_PATH, str(error), None
         if command is None:

@@ -1,4 +1,4 @@
-"""Goals along a path: the pieces of it that Nav2 is given, and how far the robot is on them."""
+"""Goals along a path: the pieces sent to Nav2, and the robot's progress on them."""
 
 from __future__ import annotations
 
@@ -8,28 +8,28 @@ from dataclasses import dataclass
 from fasaco_edge.follow.pieces import STEP_M, Line, end_of_piece
 from fasaco_edge.grid.geometry import Point
 
-# The next goal is sent only if it leads on by so much [m].
+# The next goal is sent only if it extends the last one by this much [m].
 GAIN_M = 0.3
-# Where the path comes back to itself, the next goal begins so far before the end of the one before
-# [m]: what is left out there is less than half of a tool.
+# Where the path returns to itself, the next goal begins this far before the end of the last one
+# [m]: the part skipped there is less than half of a tool.
 TIP_M = 0.1
-# Where two paths are as near as this to each other they are the same [m].
+# Two paths nearer than this to each other are the same [m].
 SAME_M = 0.03
-# Along a goal the robot is looked for so far ahead [m].
+# The robot is searched this far ahead along a goal [m].
 LOOK_AHEAD_M = 2.0
-# After its goal was ended it rolls on by no more [m].
+# After its goal has ended the robot rolls on by at most this [m].
 COAST_M = 0.5
 
 
 @dataclass(slots=True)
 class Goal:
-    """A piece that Nav2 was given.
+    """A piece sent to Nav2.
 
     Attributes:
         id: of the goal, 16 bytes.
         start, end: on the line [m].
-        next_start: where the next one may begin, infinite where it has to wait for the end of this
-            one; None as long as nobody looked [m].
+        next_start: where the next one may begin, infinite if it must wait for the end of this
+            one; None if not computed yet [m].
     """
 
     id: bytes
@@ -39,16 +39,16 @@ class Goal:
 
 
 class PathDriven:
-    """A path that is driven goal by goal.
+    """A path driven goal by goal.
 
     Attributes:
         line: the path.
-        way: how far the robot is along it [m].
+        way: the robot's distance along it [m].
     """
 
     def __init__(self, line: Line, way: float) -> None:
         self.line, self.way = line, way
-        # Where the last goal was done: from there the next one goes on, wherever the robot stopped.
+        # End of the last finished goal: the next one begins there, wherever the robot stopped.
         self._done = -1.0
 
     def finish(self, goal: Goal) -> None:
@@ -56,7 +56,7 @@ class PathDriven:
         self.way = self._done = goal.end
 
     def advance(self, here: Point, goal: Goal | None) -> None:
-        """Find the robot along the line: never back, and not beyond the goal it has, if any."""
+        """Update the robot's distance along the line: never backward nor beyond its goal."""
         if goal is not None:
             end = min(goal.end, self.way + LOOK_AHEAD_M)
         elif self.way != self._done:
@@ -68,12 +68,12 @@ class PathDriven:
             self.way, _ = self.line.nearest(here, self.way, end)
 
     def start_after(self, goal: Goal, ahead: float, near: float) -> float:
-        """Return how early a piece may begin that leads on from a goal; infinite if none does.
+        """Return the earliest begin of a piece that continues a goal; infinite if there is none.
 
         Args:
-            goal: the one before.
-            ahead: how far before its end the piece begins where it can [m].
-            near: how near a piece may not come to itself [m].
+            goal: the last goal.
+            ahead: distance before its end at which the piece begins if possible [m].
+            near: least distance of a piece to itself [m].
         """
         for before_m in (ahead, TIP_M, 0.0):
             start = max(goal.end - before_m, goal.start)
@@ -82,15 +82,15 @@ class PathDriven:
         return math.inf
 
     def shift_to(self, line: Line, way: float, goal: Goal) -> float | None:
-        """Return how much further what is left of a goal is along another line [m].
+        """Return the offset of a goal's rest along another line [m].
 
         Args:
             line: the other line.
-            way: how far the robot is along it [m].
+            way: the robot's distance along it [m].
             goal: of this line.
 
         Returns:
-            None where the other line leads elsewhere before the goal's end.
+            None if the other line diverges before the goal's end.
         """
         was, far = self.line.nearest(line.at(way), self.way, goal.end)
         left = goal.end - was

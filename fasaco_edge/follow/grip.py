@@ -1,4 +1,4 @@
-"""Whether the base does as it is told: one that pushes against something should not go on."""
+"""Check that the base moves as commanded: one that pushes against an obstacle must stop."""
 
 from __future__ import annotations
 
@@ -7,33 +7,33 @@ import math
 from fasaco_edge.follow.estimate import Command
 from fasaco_edge.grid.geometry import Pose2D
 
-# Looked at once the robot should have come so far [m], of which it has to have come the share; a
-# radian of turning counts as the third. A fast one is looked at after so long [s]: poses are late.
+# The check follows this commanded distance [m], of which the robot must have moved this share; a
+# radian of turning counts as the third. For a fast robot it follows after this time [s]: poses lag.
 LEAST_WAY_M, LEAST_SHARE, WAY_M_RAD = 0.2, 0.15, 0.2
 LOOK_S = 2.0
-# So long it is left alone before the next try [s], and after so many tries until its pose shows
-# that it came this far [m], or there is something else to do.
+# Pause before a retry [s], and number of retries, after which it waits until its pose has moved
+# this far [m], or there is a new task.
 REST_S = 2.0
 TRIES = 3
 FREED_M = 0.1
 
 
 class Grip:
-    """Compares what was sent with how far the poses came.
+    """Compares the commands with the motion of the poses.
 
     Attributes:
-        tries: in how many tries, one after the other, the robot did not move.
+        tries: consecutive tries in which the robot did not move.
     """
 
     def __init__(self) -> None:
         self.tries = 0
         self._from = Pose2D(0.0, 0.0)
-        # What it was told since then: how far, and for how long.
+        # Commanded distance and duration since then.
         self._way, self._seconds = 0.0, 0.0
         self._rests_until = -math.inf
 
     def is_lost(self, pose: Pose2D, now: float) -> bool:
-        """Tell whether the robot has to be left alone for not moving.
+        """Tell whether the robot must pause because it did not move.
 
         Args:
             pose: the newest one measured.
@@ -60,11 +60,11 @@ class Grip:
         return is_lost
 
     def try_again(self) -> None:
-        """Let the robot try as often as at first: there is something else to do."""
+        """Reset the number of retries: there is a new task."""
         self.tries = 0
 
     def sent(self, command: Command, seconds: float) -> None:
-        """Note what is sent, for how long."""
+        """Note a command and its duration."""
         if way := seconds * (command.speed + WAY_M_RAD * abs(command.turn_rate)):
             self._way += way
             self._seconds += seconds

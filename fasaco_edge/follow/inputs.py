@@ -1,4 +1,4 @@
-"""What a follower hears on the bus: poses, paths, and signs of the daemon; between its turns."""
+"""A follower's inputs from the bus: poses, paths and heartbeats of the daemon, by cycle."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from fasaco_edge.wire import topics
 from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.messages.poses import PoseDecoder
 
-# Poses that may wait for the next turn; of more the oldest go.
+# Most poses that wait for the next cycle; beyond that the oldest are dropped.
 MOST_POSES = 256
 
 
 def patience_of(settings: FollowSettings) -> Patience:
-    """Return how old what a follower depends on may become."""
+    """Return the timeouts of a follower's inputs."""
     return Patience(
         settings.pose_age_s,
         max(settings.pose_age_s, LINK_S),
@@ -31,7 +31,7 @@ def patience_of(settings: FollowSettings) -> Patience:
 
 
 class Inputs:
-    """Subscribes, and tells a follower at its turn what came since the turn before."""
+    """Subscribes, and passes the inputs since the last cycle to a follower."""
 
     def __init__(self, settings: FollowSettings, bus: Bus) -> None:
         self._pace = settings.pace
@@ -50,11 +50,11 @@ class Inputs:
         bus.listen(keys, topics.PATH, self._path.put)
 
     def now(self) -> float:
-        """Return the time by the clock that the robot's seconds are counted by [s]."""
+        """Return the time by the clock of the robot's seconds [s]."""
         return time.monotonic() * self._pace
 
     def feed(self, follower: Supervision) -> None:
-        """Tell a follower what came."""
+        """Pass the inputs to a follower."""
         with self._lock:
             planner = min(self._planners, default="")
             heard_at, self._heard_at = self._heard_at, None

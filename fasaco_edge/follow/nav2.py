@@ -1,9 +1,9 @@
-"""Nav2's controller as follower: paths, poses, signs of the daemon and answers in, requests out.
+"""Nav2's controller as follower: paths, poses, heartbeats and replies in, requests out.
 
-A goal is a piece of the path that begins where the robot is. The next one is sent while the robot
-is still on its way to the end: Nav2 goes over to it without standing. Where the path comes back to
-itself, that piece begins only shortly before the end: a controller that has it goes on at whatever
-part is nearest, and would leave out the rest of the way there. No clock, no session.
+A goal is a piece of the path that begins at the robot. The next one is sent before the robot
+reaches the end: Nav2 switches to it without a stop. Where the path returns to itself, that piece
+begins only shortly before the end: a controller continues at the nearest part of a path, and would
+skip the rest of the last goal. No clock, no session.
 """
 
 from __future__ import annotations
@@ -27,20 +27,20 @@ from fasaco_edge.wire.messages.follow_path import (
 )
 from fasaco_edge.wire.messages.path_points import PathPoints
 
-# The next goal is sent so far before the end of the one before [m], and as far as the robot
-# drives in so many seconds.
+# The next goal is sent this far before the end of the last one [m], plus the distance driven in
+# this many seconds.
 AHEAD_M, AHEAD_S = 0.5, 3.0
-# It is sent so far before the robot is where it begins [m].
+# It is sent this far before the robot reaches its begin [m].
 EARLY_M = 0.05
-# Where a path begins further off, it is not driven [m]; how far on it the robot may be by then.
+# A path that begins further away is not driven [m]; largest progress of the robot on it by then.
 BEGINNING_M = 1.0
-# Nav2 says that a goal is done; so far from its end it is not [m].
+# A goal that Nav2 reports as done is not done at this distance from its end [m].
 DONE_M = 0.5
-# After an error the next goal is sent so much later [s], twice as long each time, at most so long.
+# Pause after an error before the next goal [s], doubled each time up to the maximum.
 RETRY_S, MOST_RETRY_S = 1.0, 30.0
-# A robot that has not moved by so much in so long stands [m, s], near the end of its goal sooner;
-# then the result is asked for again, as it may have been lost, and after longer the goal is given
-# up [s].
+# A robot that has moved less than this in this time is standing [m, s], near the end of its goal
+# sooner; then the result is queried again, as it may have been lost, and after a longer timeout the
+# goal is given up [s].
 MOVED_M, STANDS_S, ARRIVED_S, GIVE_UP_S = 0.05, 3.0, 1.0, 20.0
 
 
@@ -58,13 +58,13 @@ class Tally:
 
 
 class Nav2Follower(Supervision):
-    """Gives Nav2's controller the newest path, piece by piece, while all that it takes is there.
+    """Sends the newest path to Nav2's controller, piece by piece, while all inputs are up to date.
 
     Args:
-        near: how near a piece may not come to itself [m].
+        near: least distance of a piece to itself [m].
         speed: of the robot [m/s].
         new_id: makes the id of a goal.
-        patience: how old pose and status may become.
+        patience: timeouts of pose and status.
     """
 
     def __init__(
@@ -78,9 +78,9 @@ class Nav2Follower(Supervision):
         self._here: Point | None = None
         self._came_at: float | None = None
         self._path: PathDriven | None = None
-        # What takes its place, once Nav2 has answered what it was sent.
+        # Its successor, once Nav2 has answered the pending request.
         self._next: Line | None = None
-        # What Nav2 drives, and what it was sent and has not answered yet.
+        # The goal that Nav2 drives, and the one sent but not answered yet.
         self._active: Goal | None = None
         self._pending: Goal | None = None
         self._cancellations = Cancellations()
@@ -89,11 +89,11 @@ class Nav2Follower(Supervision):
         self._retry_at, self._retry_s = -math.inf, RETRY_S
         self._trouble_of_nav2: tuple[State, str] | None = None
         self._requests: list[Request] = []
-        # What follows from answers, and is asked for at the next step.
+        # Requests that follow from answers, sent at the next step.
         self._requests_later: list[Request] = []
 
     def step(self, now: float) -> list[Request]:
-        """Return what is to be asked of Nav2 now."""
+        """Return the requests to Nav2 now."""
         self._requests = []
         try:
             self.state, self.detail = self._trouble(now)
@@ -102,14 +102,14 @@ class Nav2Follower(Supervision):
             else:
                 self._stop()
         except MalformedMessage as error:
-            # Further on the path is none.
+            # The rest of the path is malformed.
             self._have_none(State.BAD_PATH, str(error))
             self.state, self.detail = State.BAD_PATH, str(error)
             self._stop()
         return self._requests + self._cancellations.due(now)
 
     def end(self) -> list[Request]:
-        """Return what ends all goals."""
+        """Return the requests that end all goals."""
         self._stop()
         return self._cancellations.due(math.inf)
 
@@ -121,7 +121,7 @@ class Nav2Follower(Supervision):
         self._cancellations.drop(goal_id)
 
     def take_accepted(self, goal_id: bytes, accepted: bool | None, why: str, now: float) -> None:
-        """Take in whether Nav2 took a goal; None where it did not say: then it has to end it."""
+        """Take in whether Nav2 accepted a goal; None without an answer: then it must end it."""
         self._cancellations.take_accepted(goal_id, accepted)
         if self._pending is None or self._pending.id != goal_id:
             return
@@ -139,7 +139,7 @@ class Nav2Follower(Supervision):
         self._fail(state, why or "is its controller server active?", now)
 
     def take_ending(self, goal_id: bytes, ending: Ending | None, why: str, now: float) -> None:
-        """Take in how a goal ended; None where Nav2 did not say, and will not: it may drive it."""
+        """Take in how a goal ended; None if Nav2 will not answer: it may still drive it."""
         if ending is not None:
             self._cancellations.drop(goal_id)
         if self._active is None or self._active.id != goal_id:
@@ -149,7 +149,7 @@ class Nav2Follower(Supervision):
             self._cancellations.add(goal_id)
         self._requests_later.clear()
         if self._pending is not None:
-            # It goes over to the next one.
+            # It switches to the next one.
             return
         if ending is None:
             self._fail(State.NO_NAV2, why, now)
@@ -166,7 +166,7 @@ class Nav2Follower(Supervision):
             self._fail(State.NO_NAV2, "it knows nothing of its goal: was it started anew?", now)
 
     def take_cancelled(self, goal_id: bytes, code: int | None) -> None:
-        """Take in what becomes of a request to cancel; None where Nav2 did not say."""
+        """Take in the result of a request to cancel; None without an answer."""
         self._cancellations.take_answer(goal_id, code)
 
     def _drive(self, now: float) -> None:
@@ -188,7 +188,7 @@ class Nav2Follower(Supervision):
                 self._send_next(path, goal)
 
     def _begin(self, path: PathDriven, whole: float, now: float) -> None:
-        """Send a goal where Nav2 has none."""
+        """Send a goal if Nav2 has none."""
         if self._trouble_of_nav2 is not None:
             self.state, self.detail = self._trouble_of_nav2
         if whole - path.way <= STEP_M:
@@ -197,7 +197,7 @@ class Nav2Follower(Supervision):
             self._send(path, path.way)
 
     def _send_next(self, path: PathDriven, goal: Goal) -> None:
-        """Send the next goal, once the robot is near enough to where that begins."""
+        """Send the next goal, once the robot is near enough to its begin."""
         if goal.next_start is None:
             goal.next_start = path.start_after(goal, self._ahead, self._near)
         if goal.next_start - path.way <= EARLY_M:
@@ -212,10 +212,10 @@ class Nav2Follower(Supervision):
         self._requests.append(SendGoal(goal.id, points, self._path_frame))
 
     def _join(self, line: Line, now: float) -> bool:
-        """Go over to a new path; where it is the same ahead, what Nav2 drives stays.
+        """Switch to a new path; if it is the same ahead, Nav2 keeps its goal.
 
         Returns:
-            whether the path begins where the robot is.
+            whether the path begins at the robot.
         """
         assert self._here is not None
         way, far = line.nearest(self._here, 0.0, line.length(BEGINNING_M))
@@ -232,16 +232,16 @@ class Nav2Follower(Supervision):
         assert before is not None
         shift = before.shift_to(line, way, goal)
         if shift is None:
-            # Nav2 goes over to it from what it drives.
+            # Nav2 switches to it from its present goal.
             self._send(path, way)
         else:
             goal.start, goal.end = goal.start + shift, goal.end + shift
-            # What follows may be another line.
+            # The rest may be another line.
             goal.next_start = None
         return True
 
     def _watch(self, path: PathDriven, goal: Goal, now: float) -> None:
-        """Ask again, or give up, where the robot stands."""
+        """Query again, or give up, if the robot stands."""
         assert self._here is not None
         if self._moved_last is None or math.dist(self._here, self._moved_last[0]) > MOVED_M:
             self._moved_last = (self._here, now)
@@ -278,7 +278,7 @@ class Nav2Follower(Supervision):
         self._retry_s = min(2.0 * self._retry_s, MOST_RETRY_S)
 
     def _stop(self) -> None:
-        """Have all goals end."""
+        """End all goals."""
         for goal, is_known in ((self._active, True), (self._pending, False)):
             if goal is not None:
                 self._cancellations.add(goal.id, is_known=is_known)

@@ -1,7 +1,6 @@
-"""Nav2's controller on the bus: requests of the follower as queries, their answers between turns.
+"""Nav2's controller on the bus: the follower's requests as queries, their replies by cycle.
 
-rmw_zenoh shows in its graph what the server's types are, and where it is; a bridge does not, and is
-asked by name.
+rmw_zenoh shows the server's types and keys in its graph; a bridge does not, and is queried by name.
 """
 
 from __future__ import annotations
@@ -40,24 +39,24 @@ from fasaco_edge.wire.ros_actions import (
 )
 from fasaco_edge.wire.ros_keys import RosNode, attachment, gid_of
 
-# How long an answer may take [s]; that of a result, as long as the way to the end of a goal. What
-# does not come by then is asked for again.
+# Timeout of a reply [s]; of a result, as long as driving to the end of a goal. After it the query
+# is repeated.
 ANSWER_S, RESULT_S = 5.0, 300.0
-# Whoever ends a question for a result sooner, and says nothing, is not there any more [s].
+# A server that ends a query for a result sooner, without a reply, is gone [s].
 GONE_S = 290.0
-# How often the graph is looked at for the action's server [s].
+# Period of searching the graph for the action's server [s].
 LOOK_EVERY_S = 2.0
-# At the end, goals are given so long to end [s].
+# Timeout for goals to end at the exit [s].
 END_S = 1.0
 
 
 def nav2_node(bus: Bus, settings: FollowSettings, report: Callable[[str], None]) -> Nav2Node:
-    """Return what gives Nav2's controller its goals."""
+    """Return the node that sends goals to Nav2's controller."""
     return Nav2Node(bus, settings, report)
 
 
 class Nav2Node:
-    """Takes what came in, steps the follower, and asks Nav2 what it says."""
+    """Takes the inputs, steps the follower, and sends its requests to Nav2."""
 
     def __init__(self, bus: Bus, settings: FollowSettings, report: Callable[[str], None]) -> None:
         nav2, ros = settings.nav2, settings.ros
@@ -73,7 +72,7 @@ class Nav2Node:
         self._follower = Nav2Follower(nav2["near_m"], speed, new_id, patience_of(settings))
         self._inputs = Inputs(settings, bus)
         self._states = StateLog()
-        # What Nav2 said, by threads of Zenoh's.
+        # Replies of Nav2, from Zenoh's threads.
         self._answers = deque[Callable[[], None]]()
         self._sequence = 0
         self._gid = b""
@@ -85,7 +84,7 @@ class Nav2Node:
             self._roll = bus.roll(server_tokens(self._domain, self._action))
 
     def turn(self) -> None:
-        """Take what came, and ask for what follows from it."""
+        """Take the inputs, and send the resulting requests."""
         if self._roll is not None:
             self._roll.ask(LOOK_EVERY_S)
         self._take_answers()
@@ -95,7 +94,7 @@ class Nav2Node:
         self._states.note(self._follower.state, self._follower.detail)
 
     def end(self) -> None:
-        """Have the robot stand."""
+        """Stop the robot."""
         requests = self._follower.end()
         for request in requests:
             self._ask(request)
@@ -143,7 +142,7 @@ class Nav2Node:
         )
 
     def _take(self, request: Request, replies: list[Reply], asked_at: float) -> None:
-        """Tell the follower what came of a request."""
+        """Pass the result of a request to the follower."""
         follower, now = self._follower, self._inputs.now()
         payload = next((reply.payload for reply in replies if not reply.is_error), None)
         why = f"{self._action} did not answer"
@@ -172,7 +171,7 @@ class Nav2Node:
         return served_keys(self._domain, self._action, self._roll.there())
 
     def _release_at(self, keys: dict[Call, str]) -> tuple[Release | None, str]:
-        """Return whose goals the server takes; or why none can be sent."""
+        """Return the ROS release of the server's goals; or why none can be sent."""
         if self._roll is None:
             return self._release, ""
         if len(keys) < 3:

@@ -1,4 +1,4 @@
-"""Requests to Nav2: goals, questions for their results, cancellations until Nav2 confirms them."""
+"""Requests to Nav2: goals, queries for results, cancellations repeated until confirmed."""
 
 from __future__ import annotations
 
@@ -8,15 +8,15 @@ from dataclasses import dataclass
 from fasaco_edge.grid.geometry import Point
 from fasaco_edge.wire.messages.follow_path import ENDED_BEFORE, NO_SUCH_GOAL, TAKEN
 
-# A cancellation is asked for again after so long [s].
+# Retry period of a cancellation [s].
 CANCEL_EVERY_S = 1.0
-# So many goals are cancelled at a time, the newest ones: Nav2 drives no other.
+# Most goals cancelled at a time, the newest ones: Nav2 drives no other.
 MOST_CANCELLED = 8
 
 
 @dataclass(frozen=True, slots=True)
 class SendGoal:
-    """Have Nav2 follow points [m] in a frame."""
+    """A request to follow points [m] in a frame."""
 
     id: bytes
     points: list[Point]
@@ -25,14 +25,14 @@ class SendGoal:
 
 @dataclass(frozen=True, slots=True)
 class AskResult:
-    """Ask how a goal ended; the answer comes when it has."""
+    """A query for the result of a goal; the reply comes when it has ended."""
 
     id: bytes
 
 
 @dataclass(frozen=True, slots=True)
 class CancelGoal:
-    """Have Nav2 end a goal."""
+    """A request to cancel a goal."""
 
     id: bytes
 
@@ -42,31 +42,31 @@ Request = SendGoal | AskResult | CancelGoal
 
 @dataclass(slots=True)
 class _Cancellation:
-    """A goal that is to end, and when that was last asked for [s]."""
+    """A goal to cancel, and the time of the last request [s]."""
 
     asked_at: float = -math.inf
-    # Whether Nav2 has said if it took the goal: before, it may not know it yet.
+    # Whether Nav2 has answered the goal: before that it may not know it yet.
     is_known: bool = True
 
 
 class Cancellations:
-    """The goals that Nav2 is to end, and has not confirmed yet."""
+    """The goals to cancel that Nav2 has not confirmed yet."""
 
     def __init__(self) -> None:
         self._goals: dict[bytes, _Cancellation] = {}
 
     def add(self, goal_id: bytes, *, is_known: bool = True) -> None:
-        """Have a goal end; ``is_known`` tells whether Nav2 has answered it."""
+        """Cancel a goal; ``is_known``: whether Nav2 has answered it."""
         self._goals[goal_id] = _Cancellation(is_known=is_known)
         while len(self._goals) > MOST_CANCELLED:
             del self._goals[next(iter(self._goals))]
 
     def drop(self, goal_id: bytes) -> None:
-        """Take in that a goal has ended, or never went out."""
+        """Take in that a goal has ended, or was never sent."""
         self._goals.pop(goal_id, None)
 
     def take_accepted(self, goal_id: bytes, accepted: bool | None) -> None:
-        """Take in whether Nav2 took a goal; None where it did not say."""
+        """Take in whether Nav2 accepted a goal; None without an answer."""
         if goal_id not in self._goals:
             return
         if accepted is False:
@@ -75,13 +75,13 @@ class Cancellations:
             self._goals[goal_id] = _Cancellation()
 
     def take_answer(self, goal_id: bytes, code: int | None) -> None:
-        """Take in what Nav2 said of a cancellation; None where it said nothing."""
+        """Take in Nav2's answer to a cancellation; None without one."""
         goal = self._goals.get(goal_id)
         if goal and goal.is_known and code in (TAKEN, NO_SUCH_GOAL, ENDED_BEFORE):
             del self._goals[goal_id]
 
     def due(self, now: float) -> list[Request]:
-        """Return the cancellations to ask for now, each every ``CANCEL_EVERY_S``."""
+        """Return the cancellations to send now, each every ``CANCEL_EVERY_S``."""
         due = [one for one, goal in self._goals.items() if now - goal.asked_at >= CANCEL_EVERY_S]
         for goal_id in due:
             self._goals[goal_id].asked_at = now

@@ -1,4 +1,4 @@
-"""The follower on the bus: a loop of twenty turns a second between samples and commands."""
+"""The follower on the bus: a loop of twenty cycles a second from samples to commands."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from fasaco_edge.wire.topic_types import VOLATILE
 
 log = logging.getLogger(__name__)
 
-# While nobody listens at the endpoint it is tried again after so long [s].
+# Retry period while nobody listens at the endpoint [s].
 RETRY_S = 1.0
 REPORT_EVERY_S = 1.0
 
@@ -41,7 +41,7 @@ class Node(Protocol):
     """A follower on the bus."""
 
     def turn(self) -> None:
-        """Take what came, and do what follows from it."""
+        """Run a cycle: take the inputs, and send commands."""
 
     def end(self) -> None:
         """Have the robot stand."""
@@ -53,13 +53,13 @@ def run_follower(
     node_of: Callable[[Bus, FollowSettings, Callable[[str], None]], Node],
     report: Callable[[str], None],
 ) -> None:
-    """Drive the base along the path until ``stop`` is set; it is told to stand before the end.
+    """Drive the base along the path until ``stop`` is set; then stop the base.
 
     Args:
         settings: the follower's.
         stop: ends it.
-        node_of: makes what takes the turns.
-        report: is told each second what would be sent, in a dry run.
+        node_of: makes the node that runs the cycles.
+        report: called each second with the command in a dry run.
     """
     bus = _joined(settings, stop)
     if bus is None:
@@ -74,13 +74,13 @@ def run_follower(
 
 
 def native_node(bus: Bus, settings: FollowSettings, report: Callable[[str], None]) -> FollowerNode:
-    """Return what sends velocities on the native key."""
+    """Return the node that sends velocities on the native key."""
     out = bus.publisher(settings.cmd_key, settings.schema, topics.CMD_VEL.qos or VOLATILE)
     return FollowerNode(settings, bus, out, report)
 
 
 def _joined(settings: FollowSettings, stop: threading.Event) -> Bus | None:
-    """Join the bus, once somebody listens there; None where ``stop`` is set before."""
+    """Join the bus, once somebody listens there; None if ``stop`` is set before."""
     told = False
     while not stop.is_set():
         try:
@@ -100,13 +100,13 @@ def _take_turns(node: Node, period_s: float, stop: threading.Event) -> None:
         due += period_s
         now = time.monotonic()
         if due <= now:
-            # Turns that were missed are not made up for.
+            # Missed cycles are not made up for.
             due = now + period_s
         stop.wait(due - now)
 
 
 class FollowerNode:
-    """Takes what came in, steps the follower, and sends what it says."""
+    """Takes the inputs, steps the follower, and sends its commands."""
 
     def __init__(
         self, settings: FollowSettings, bus: Bus, out: Out, report: Callable[[str], None]
@@ -130,7 +130,7 @@ class FollowerNode:
         self._reported_at = -math.inf
 
     def turn(self) -> None:
-        """Take what came, and send what follows from it."""
+        """Take the inputs, and send the resulting command."""
         follower = self._follower
         self._inputs.feed(follower)
         command = follower.step(self._inputs.now())
@@ -167,13 +167,13 @@ class FollowerNode:
 
 
 class StateLog:
-    """Logs what the robot does, where that is new."""
+    """Logs changes of the robot's state."""
 
     def __init__(self) -> None:
         self._state: State | None = None
 
     def note(self, state: State, detail: str) -> bool:
-        """Log a state that is another one than before; return whether it is."""
+        """Log a state if it has changed; return whether it has."""
         if state is self._state:
             return False
         self._state = state

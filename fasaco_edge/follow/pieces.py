@@ -1,9 +1,8 @@
-"""Pieces of a path that neither cross nor come near themselves, as poses for a controller.
+"""Pieces of a path that neither cross nor approach themselves, as poses for a controller.
 
-A coverage path crosses and touches itself. A controller that gets it whole goes on at whatever part
-is nearest, and is done where the end is near; so it gets no more at a time than what is simple:
-between two poses that are further from each other along the piece than ``APART`` times ``near``,
-there is at least ``near``.
+A coverage path crosses and touches itself. A controller with the whole path would continue at the
+nearest part, and finish wherever the end is near. So it gets a simple piece at a time: two poses
+further apart along the piece than ``APART`` times ``near`` have a distance of at least ``near``.
 """
 
 from __future__ import annotations
@@ -14,22 +13,22 @@ from collections.abc import Callable
 
 from fasaco_edge.grid.geometry import Point
 
-# Poses of a piece are so far from each other [m]: controllers look for the nearest one.
+# Spacing of the poses of a piece [m]: controllers search the nearest one.
 STEP_M = 0.05
-# Along a piece so many times ``near`` is near for a reason: a bend of up to 120 degrees is.
+# Poses up to this many times ``near`` apart along a piece may be near: a bend of up to 120 degrees.
 APART = 2.0
-# At a bend that is sharper the robot turns on the spot: there a piece ends if it has to [rad].
+# At a sharper bend the robot turns on the spot: a piece preferably ends there [rad].
 CORNER_RAD = math.radians(60.0)
-# A piece is no longer [m].
+# Longest piece [m].
 MOST_M = 20.0
-# Points are read as they are needed, so many at a time.
+# Points are read on demand, this many at a time.
 CHUNK = 500
-# Nearer points are one [m].
+# Points nearer than this are the same [m].
 LEAST_M = 1e-3
 
 
 class Line:
-    """A path by the way along it, from 0 at its beginning.
+    """A path parametrised by arc length, from 0 at its begin.
 
     Args:
         take: returns the next points of the path [m], at most as many as asked for.
@@ -42,7 +41,7 @@ class Line:
         self._is_read = False
 
     def length(self, most: float) -> float:
-        """Return how long it is, or ``most`` where it is longer [m]."""
+        """Return its length, at most ``most`` [m]."""
         while not self._is_read and (not self._ways or self._ways[-1] < most):
             points = self._take(CHUNK)
             self._is_read = len(points) < CHUNK
@@ -54,7 +53,7 @@ class Line:
         return min(self._ways[-1], most) if self._ways else 0.0
 
     def at(self, way: float) -> Point:
-        """Return the point there [m]; its end, or beginning, beyond."""
+        """Return the point at an arc length [m]; the end or begin for values beyond."""
         self.length(way)
         index = bisect_right(self._ways, way)
         if not 0 < index < len(self._ways):
@@ -64,9 +63,9 @@ class Line:
         return x + share * (to_x - x), y + share * (to_y - y)
 
     def nearest(self, here: Point, start: float, stop: float) -> tuple[float, float]:
-        """Return where between two places it is nearest to a point, and how near [m].
+        """Return the arc length between two limits nearest to a point, and the distance [m].
 
-        Of places as near the first counts.
+        Of equally near ones the first counts.
         """
         self.length(stop)
         best, best_m = start, math.dist(self.at(start), here)
@@ -85,7 +84,7 @@ class Line:
             start, index = end, index + 1
 
     def corners(self, start: float, stop: float) -> list[float]:
-        """Return the places between two others at which it bends sharply, in order [m]."""
+        """Return the arc lengths of sharp bends between two limits, in order [m]."""
         self.length(stop + LEAST_M)
         first = max(bisect_right(self._ways, start), 1)
         found = []
@@ -99,11 +98,11 @@ class Line:
         return found
 
     def poses(self, start: float, stop: float) -> list[Point]:
-        """Return points from one place to another, ``STEP_M`` apart and at each corner [m]."""
+        """Return points between two arc lengths, ``STEP_M`` apart and at each corner [m]."""
         return [self.at(way) for way in self.ways(start, stop)]
 
     def ways(self, start: float, stop: float) -> list[float]:
-        """Return where these points are."""
+        """Return the arc lengths of these points."""
         first, last = bisect_right(self._ways, start), bisect_right(self._ways, stop)
         bends = [way for way in self._ways[first:last] if start < way < stop]
         ways = [start]
@@ -116,21 +115,21 @@ class Line:
 
 
 def end_of_piece(line: Line, start: float, near: float) -> float:
-    """Return how far a piece may go that begins at ``start``, by the way along the line [m].
+    """Return the end of a piece that begins at ``start``, as arc length [m].
 
-    Where it has to end before the line does, it ends at a corner of the last ``APART`` times
-    ``near``, if there is one: the robot stands there anyway.
+    If it must end before the line does, it ends at a corner of the last ``APART`` times
+    ``near``, if there is one: the robot stops there anyway.
 
     Args:
         line: the path.
-        start: beginning of the piece [m].
-        near: how near the piece may not come to itself [m].
+        start: begin of the piece [m].
+        near: least distance of the piece to itself [m].
     """
     stop = line.length(start + MOST_M)
     ways = line.ways(start, stop)
     seen: dict[tuple[int, int], list[int]] = {}
     points = [line.at(way) for way in ways]
-    # Poses that are far enough behind to count are filed as the piece goes on.
+    # Poses that are far enough behind to count are added as the piece grows.
     filed = 0
     for index, (way, point) in enumerate(zip(ways, points, strict=True)):
         while way - ways[filed] > APART * near:
@@ -146,7 +145,7 @@ def end_of_piece(line: Line, start: float, near: float) -> float:
 def _touched(
     seen: dict[tuple[int, int], list[int]], points: list[Point], point: Point, near: float
 ) -> int | None:
-    """Return the last of the filed points that one is too near to."""
+    """Return the last stored point that a point is too near to."""
     column, row = _cell(point, near)
     touched = [
         other

@@ -3,9 +3,9 @@
 Source: R. C. Coulter, Implementation of the Pure Pursuit Path Tracking Algorithm, CMU-RI-TR-92-01:
 the robot steers the arc through a point of the path some way ahead, of curvature 2 y / L^2. The
 speed is regulated as by S. Macenski et al., Regulated Pure Pursuit for Robot Path Tracking (2023),
-but by what the base can do: it brakes for each stop so as to come to rest there, and never turns
-faster than it may. Deviations: past a stop the point lies straight on, so that no corner is cut,
-and a robot that points elsewhere comes to rest and turns on the spot.
+but by the limits of the base: it brakes to come to rest at each stop, and respects the turn rate.
+Deviations: past a stop the point lies straight on, so that no corner is cut, and a robot with a
+large heading error comes to rest and turns on the spot.
 """
 
 from __future__ import annotations
@@ -17,13 +17,13 @@ from fasaco_edge.follow.route import Route
 from fasaco_edge.grid.geometry import Pose2D
 from fasaco_edge.grid.motion import limited, stopping_rate
 
-# The point ahead is as far off as the robot drives in the first figure [s], but at least [m].
+# Lookahead time [s], and least lookahead distance [m].
 LOOKAHEAD_S, LOOKAHEAD_M = 0.8, 0.2
 # A stop is reached within this [m].
 ARRIVED_M = 0.005
-# A run begins within this heading error; from the second on the robot turns on the spot [rad].
+# Heading error below which a run begins, and above which the robot turns on the spot [rad].
 ALIGNED_RAD, MISALIGNED_RAD = 0.03, 0.2
-# About to turn back, the robot keeps turning to the side it turns to [rad].
+# Near a half turn, the robot keeps its direction of turning [rad].
 BACK_RAD = 2.8
 
 
@@ -42,11 +42,11 @@ class Pursuit:
         self.last = STAND
 
     def stand(self) -> None:
-        """Note that the robot was told to stop at once."""
+        """Note that the robot was commanded to stop at once."""
         self._is_turning, self.last = True, STAND
 
     def brake(self) -> Command:
-        """Return the next command on the way to rest."""
+        """Return the next command of braking."""
         speed = max(self.last.speed - self._limits.acceleration * self._period, 0.0)
         self._is_turning, self.last = True, Command(speed, self._toward(0.0))
         return self.last

@@ -1,4 +1,4 @@
-"""The follower in a ROS 2 graph: its velocities under the key that ROS has for their topic."""
+"""The follower in a ROS 2 graph: its velocities under the key of their ROS topic."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from fasaco_edge.wire.topic_types import VOLATILE
 
 
 def ros_node(bus: Bus, settings: FollowSettings, report: Callable[[str], None]) -> FollowerNode:
-    """Return what sends velocities to ROS; to rmw_zenoh it shows itself as a node."""
+    """Return the node that sends velocities to ROS; rmw_zenoh sees it as a node."""
     ros, gid = settings.ros, b""
     if ros["kind"] == "rmw_zenoh":
         node = RosNode(ros["domain"], bus.id, ros["namespace"], ros["node"])

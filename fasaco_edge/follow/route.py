@@ -1,8 +1,8 @@
-"""The way along a path: legs, the corners to stop at, and how far the robot is.
+"""The route along a path: legs, the corners to stop at, and the robot's progress.
 
-A coverage path crosses and touches itself, so that where the robot is says nothing about how far
-along it is. The robot is always on one leg; it comes to the next one by driving this one to its
-end, never by being near it.
+A coverage path crosses and touches itself, so the robot's position does not determine its progress.
+The robot is always on one leg; it reaches the next one by driving this one to its end, never by
+being near it.
 """
 
 from __future__ import annotations
@@ -14,22 +14,21 @@ from dataclasses import dataclass
 
 from fasaco_edge.grid.geometry import Point
 
-# Points are read as they are needed, so many at a time.
+# Points are read on demand, this many at a time.
 CHUNK = 500
 # Shorter legs have no direction of their own [m].
 LEAST_LEG_M = 1e-3
-# A new path is joined where it passes the robot within this of its beginning [m], and no further
-# on: the stretch that was driven while it was under way.
+# A new path is joined where it passes the robot within this distance from its begin [m]: the
+# stretch that was driven while it was under way.
 JOIN_WITHIN_M = 0.3
-# It passes the robot, if it does so by this [m], within this of where it points [rad]. From
-# further off the robot comes to rest, and drives to the nearest point, or to the beginning, where
-# one of them is so near [m].
+# It passes the robot if it is within this distance [m] and this angle of its heading [rad]. If
+# further away, the robot comes to rest, and drives to the nearest point, or to the begin, if one of
+# them is this near [m].
 BESIDE_M, ALONG_RAD = 0.02, 0.1
 NEAREST_M, BEGINNING_M = 0.15, 0.6
-# A path that begins so far ahead on the one before, at least and at most, is still one from here
-# [m].
+# A path that begins on the last one at a distance ahead between these is a continuation [m].
 LEAST_LEAD_M, LEAD_M = 0.15, 2.0
-# A corner was missed by this [m].
+# A corner was overshot by more than this [m].
 MISSED_M = 0.03
 # A corner of the new path is that of the old one, if it is as near as this [m].
 SAME_M = 1e-3
@@ -62,18 +61,18 @@ class Leg:
     stops: bool
 
     def placed(self, point: Point) -> tuple[float, float]:
-        """Return how far along the leg's line a point is, and how far to its left [m]."""
+        """Return a point's distance along the leg's line, and to its left [m]."""
         dx, dy = point[0] - self.start[0], point[1] - self.start[1]
         return dx * self.ux + dy * self.uy, self.ux * dy - self.uy * dx
 
     def distance(self, point: Point) -> float:
-        """Return how far a point is from the leg [m]."""
+        """Return a point's distance from the leg [m]."""
         along, aside = self.placed(point)
         beyond = max(-along, along - self.length, 0.0)
         return math.hypot(beyond, aside)
 
     def at(self, along: float) -> Point:
-        """Return the point so far along its line [m]."""
+        """Return the point at a distance along its line [m]."""
         return self.start[0] + along * self.ux, self.start[1] + along * self.uy
 
 
@@ -88,7 +87,7 @@ class Route:
     def __init__(self, take: Callable[[int], list[Point]], steered_rad: float) -> None:
         self._take = take
         self._steered_rad = steered_rad
-        # The first leg is the one that the robot is on; of the last its end may be unknown yet.
+        # The first leg is the robot's; the end of the last one may be unknown yet.
         self._legs: list[Leg] = []
         self._ahead: list[Point] = []
         self._is_read = False
@@ -102,8 +101,8 @@ class Route:
     def next_leg(self, here: Point | None = None) -> None:
         """Go on to the next leg.
 
-        A robot that is ``here``, at rest, and has driven past the corner by more than ``MISSED_M``,
-        goes back to it first: the straight way to the next leg may be through a wall.
+        A robot ``here``, at rest, that has overshot the corner by more than ``MISSED_M`` returns to
+        it first: the straight line to the next leg may cross a wall.
         """
         self._fill(2)
         corner = self._legs[0].end if self._legs else None
@@ -142,14 +141,14 @@ class Route:
     def join(self, here: Point, heading: float | None, before: Route | None) -> Joining:
         """Find the leg that passes the robot, near the beginning of a new path.
 
-        That is the one to the corner that the robot was driving to, where the path has it. Else
-        it is where the distance to the robot stops becoming less. Where the path begins further
-        on along the one before, that one is driven until there.
+        That is the leg to the corner that the robot was driving to, if the path has it. Otherwise
+        it is the leg where the distance to the robot stops decreasing. If the path begins further
+        along the last one, that one is driven until there.
 
         Args:
-            here: where the robot is.
-            heading: where it drives to [rad]; None at rest.
-            before: what it has driven along; None for nothing.
+            here: the robot's position.
+            heading: its direction of driving [rad]; None at rest.
+            before: the last route; None for none.
 
         Returns:
             how it can be joined; if it is, the robot is on its first leg.
@@ -184,7 +183,7 @@ class Route:
         return Joining.JOINED
 
     def _lead_to(self, point: Point, here: Point) -> list[Leg]:
-        """Return the legs as far as a point that they lead over soon; none where they do not."""
+        """Return the legs up to a point that they pass soon; none if they do not."""
         leg = self.leg
         way, index = -leg.placed(here)[0] if leg is not None else 0.0, 0
         while way <= LEAD_M and (leg := self._leg(index)):
@@ -209,7 +208,7 @@ class Route:
         return None
 
     def _nearest(self, here: Point) -> int:
-        """Return the leg at which the distance to ``here`` stops becoming less."""
+        """Return the leg at which the distance to ``here`` stops decreasing."""
         way, index = 0.0, 0
         while (leg := self._leg(index)) and (after := self._leg(index + 1)):
             way += leg.length
@@ -224,7 +223,7 @@ class Route:
         return self._legs[index] if index < len(self._legs) else None
 
     def _fill(self, count: int) -> None:
-        """Have ``count`` legs, if the path has them."""
+        """Read until there are ``count`` legs, if the path has them."""
         while len(self._legs) < count and self._read():
             start, end = self._ahead[:2]
             stops = len(self._ahead) == 2 or self._bend(*self._ahead[:3]) > self._steered_rad
@@ -232,7 +231,7 @@ class Route:
             del self._ahead[0]
 
     def _read(self) -> bool:
-        """Have the next two points and the one behind them, if there is one."""
+        """Read the next two points and the one after them, if there is one."""
         while len(self._ahead) < 3 and not self._is_read:
             points = self._take(CHUNK)
             self._is_read = len(points) < CHUNK

@@ -1,4 +1,4 @@
-"""Settings of the follower, as one process hands them to another: plain JSON."""
+"""Settings of the follower, passed between processes as plain JSON."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from fasaco_edge.wire.schemas import TWIST
 
 @dataclass(frozen=True, slots=True)
 class PoseSource:
-    """A key that poses come by.
+    """A key of poses.
 
     Attributes:
         key: key expression to subscribe to.
-        schema: type of what comes without one; "" for whatever the sample says.
+        schema: type of samples sent without one; "" for the type in the sample.
         latched, depth: whether late joiners get the newest samples, and how many.
         is_static: whether these are static transforms.
     """
@@ -30,26 +30,26 @@ class PoseSource:
 
 @dataclass(frozen=True, slots=True)
 class FollowSettings:
-    """What the follower needs to know.
+    """Settings of the follower.
 
     Attributes:
-        robot, base: name of the robot, and what its keys begin with.
+        robot, base: name of the robot, and prefix of its keys.
         connect: endpoints of the bus.
-        secured: what shows who this is, a part of Zenoh's configuration.
+        secured: credentials, a part of Zenoh's configuration.
         speed_m_s, acceleration_m_s2: of driving.
         turn_deg_s, turn_deg_s2, steered_deg: of turning; the largest bend that is steered.
-        pose_schema: type of a pose that comes without one.
-        pose_age_s: how old the newest pose may be.
-        poses: where poses come from.
-        frames: the map's and the robot's under ROS 2, where poses come as transforms.
-        schema: type of what is sent, one of ``TWIST_SCHEMAS``.
+        pose_schema: type of a pose sent without one.
+        pose_age_s: timeout of the newest pose.
+        poses: keys of poses.
+        frames: the map's and the robot's in ROS 2, for poses from transforms.
+        schema: type of the velocities, one of ``TWIST_SCHEMAS``.
         frame: of a TwistStamped, the robot's own.
-        cmd_key: what it is sent on.
-        ros: kind, domain, namespace, name of the node and topic, where ``cmd_key`` is ROS 2's.
-        nav2: where it is Nav2's controller that drives: name of its action, release, names of
-            plugins, and how near goals may not come to themselves [m].
+        cmd_key: key of the velocities.
+        ros: kind, domain, namespace, name of the node and topic, if ``cmd_key`` is ROS 2's.
+        nav2: if Nav2's controller drives: name of its action, release, names of plugins, and least
+            distance of goals to themselves [m].
         pace: simulated seconds in a second.
-        dry_run: say what would be sent, and send nothing.
+        dry_run: report commands instead of sending them.
     """
 
     robot: str

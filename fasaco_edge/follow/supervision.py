@@ -1,6 +1,6 @@
-"""What a follower needs to be there: a daemon that plans, a path of its, and the robot's pose.
+"""Supervision of a follower's inputs: a daemon that plans, its path, and the robot's pose.
 
-No clock, no session: who calls tells the time, by a clock that never steps.
+No clock, no session: the caller passes the monotonic time.
 """
 
 from __future__ import annotations
@@ -14,12 +14,12 @@ from fasaco_edge.grid.geometry import Pose2D, StampedPose
 from fasaco_edge.wire.messages.path_points import PathPoints
 from fasaco_edge.wire.messages.poses import Link
 
-# Links of poses that are transforms may be older than poses [s].
+# Links of poses from transforms may be older than poses [s].
 LINK_S = 2.0
 
 
 class State(enum.Enum):
-    """What the robot does, and why it stands."""
+    """State of the robot, with reasons to stand."""
 
     DRIVING = "driving"
     DRIVEN = "the path is driven"
@@ -45,13 +45,13 @@ class State(enum.Enum):
 
 @dataclass(frozen=True, slots=True)
 class Patience:
-    """How old what a follower depends on may become.
+    """Timeouts of a follower's inputs.
 
     Attributes:
-        pose_s: the newest pose, by its arrival [s].
-        link_s: each other transform between map and robot, by its arrival [s]: localisers say where
-            odometry began less often than odometry comes.
-        status_s: the newest sign of a daemon that is there [s].
+        pose_s: of the newest pose, by its arrival [s].
+        link_s: of each other transform between map and robot, by its arrival [s]: localisers
+            publish the origin of odometry less often than odometry itself is published.
+        status_s: of the daemon's heartbeat [s].
     """
 
     pose_s: float = 0.5
@@ -63,13 +63,13 @@ USUAL = Patience()
 
 
 class Supervision:
-    """Tells whether path, pose and daemon let the robot drive; what drives it is built on this.
+    """Decides whether path, pose and daemon let the robot drive; base class of followers.
 
     Args:
-        patience: how old pose and status may become.
+        patience: timeouts of pose and status.
 
     Attributes:
-        state: what the robot does.
+        state: of the robot.
         detail: the same in figures, for people.
     """
 
@@ -88,7 +88,7 @@ class Supervision:
         self._status_at = -float("inf")
 
     def take_pose(self, stamped: StampedPose, now: float) -> None:
-        """Take a pose in, as it comes; one with the stamp of the one before is no new one."""
+        """Take in a pose on arrival; one with the previous stamp is not new."""
         self._repeats = stamped.stamp_ns != 0 and stamped.stamp_ns == self._stamp_ns
         if self._repeats and stamped.frame == self._frame:
             return
@@ -97,15 +97,15 @@ class Supervision:
         self._moved_to(stamped.pose, now)
 
     def heard_link(self, link: Link) -> None:
-        """Note which transform between map and robot came longest ago."""
+        """Note the transform between map and robot that arrived longest ago."""
         self._link = link
 
     def refuse_pose(self, error: FasacoError) -> None:
-        """Stop for a pose that is none, until the next one."""
+        """Stop for a malformed pose, until the next one."""
         self._pose_fault = error
 
     def take_path(self, payload: bytes) -> None:
-        """Follow another path from now on; an empty one, or one that is none, stops the robot."""
+        """Follow another path from now on; an empty or malformed one stops the robot."""
         self._path_of = self._planner
         try:
             points = PathPoints(payload)
@@ -119,7 +119,7 @@ class Supervision:
         self._have(points)
 
     def take_planner(self, planner: str, now: float) -> None:
-        """Note which daemon plans, "" for none; another one's path is not this one's."""
+        """Note which daemon plans, "" for none; a path of the previous one is dropped."""
         if planner == self._planner:
             return
         self._planner, self._status_at = planner, now
@@ -130,12 +130,12 @@ class Supervision:
             self._path_of = planner
 
     def heard_status(self, now: float) -> None:
-        """Note a sign of the daemon."""
+        """Note a heartbeat of the daemon."""
         self._status_at = now
 
     @abstractmethod
     def _moved_to(self, pose: Pose2D, now: float) -> None:
-        """Take in where the robot is."""
+        """Take in the robot's pose."""
 
     @abstractmethod
     def _have(self, points: PathPoints) -> None:
@@ -153,19 +153,19 @@ class Supervision:
     @property
     @abstractmethod
     def _pose_at(self) -> float | None:
-        """When the newest pose that is believed came [s]; None before there is one."""
+        """Arrival of the newest accepted pose [s]; None before there is one."""
 
     def _jump(self) -> str:
-        """Return how far the newest pose jumped; "" where it is believed."""
+        """Return the jump of the newest pose as text; "" if it is accepted."""
         return ""
 
     def _have_none(self, state: State, detail: str = "") -> None:
-        """Have no path; the one before is withdrawn, too."""
+        """Have no path; the previous one is withdrawn, too."""
         self._withdraw()
         self._path_state, self._path_detail = state, detail
 
     def _trouble(self, now: float) -> tuple[State, str]:
-        """Return why the robot has to stand, and figures; or that it may drive."""
+        """Return why the robot must stand, with figures; or that it may drive."""
         if not self._planner:
             return State.NO_DAEMON, "none plans for this robot"
         if (silent_s := now - self._status_at) > self._patience.status_s:
@@ -189,7 +189,7 @@ class Supervision:
         return None
 
     def _age(self, pose_at: float, now: float) -> str:
-        """Return how old pose or link is, where that is too old; else ""."""
+        """Return the age of pose or link as text if too old; else ""."""
         if (age_s := now - pose_at) > self._patience.pose_s:
             why = ", and comes again and again by its stamp" if self._repeats else ""
             return f"{age_s:.2f} s{why}"

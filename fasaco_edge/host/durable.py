@@ -1,4 +1,4 @@
-"""Durable writes: bytes and names that outlive a loss of power."""
+"""Durable writes: bytes and names that survive a power failure (fsync)."""
 
 from __future__ import annotations
 

@@ -1,10 +1,10 @@
 """Files and folders that other users of this computer cannot have put in place.
 
-Own files belong to this process's user or to root. Trusted ones, whose content is run as code, lie
-besides in folders that only root and one user may write to, each one above included: who may write
-to a folder can replace what lies in it. Two things that look wrong are not: a sticky folder
-(``/tmp``) keeps what lies in it from all but its owner, and a link is as good as who made it and
-where it lies (systemd's ``/var/cache/NAME`` of a DynamicUser= is one of root's).
+Own files belong to this process's user or to root. Trusted files, whose content is run as code, are
+also in folders to which only root and one user may write, including all parent folders: anyone who
+can write to a folder can replace its files. Two cases are safe: in a sticky folder (``/tmp``) only
+the owner can replace a file, and a link is trusted like its maker and its folder (systemd's
+``/var/cache/NAME`` of a DynamicUser= is a link of root's).
 """
 
 from __future__ import annotations
@@ -105,11 +105,11 @@ _MOST_LINKS = 40
 
 
 class UntrustedFileError(Exception):
-    """Another user could have written this; the text says what, and who."""
+    """Another user could have written this; the text names the file and the user."""
 
 
 def why_not_trusted(folder: Path, user: int | None = None) -> str:
-    """Return why others could decide what lies in ``folder``; "" if nobody else could.
+    """Return why others could change the content of ``folder``; "" if nobody else could.
 
     Args:
         folder: an absolute path. Of one that is not there, what there is of it is looked at: ""

@@ -1,4 +1,4 @@
-"""Files that somebody asked for: each takes an older one's place as a whole, once it is written."""
+"""Output files, written atomically: a complete file replaces an older one."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 """Processes: starting this interpreter again, signals, memory, threads and libraries by proc(5).
 
-A signal asks a process to end in order, with what it has done so far.
+A signal requests an orderly exit.
 """
 
 from __future__ import annotations
@@ -44,9 +44,9 @@ def resident_mb(pid: int | str = "self") -> float:
 
 
 def own_mb(pid: int | str = "self") -> float:
-    """Return how much of a process's resident memory is its own [MB]: no pages of files.
+    """Return a process's resident memory without pages of files [MB].
 
-    How much of its libraries is in memory is up to the system, which shares it and takes it back.
+    The system decides how much of its libraries is in memory, shares that and reclaims it.
     """
     return _field_mb(pid, "RssAnon")
 
@@ -148,7 +148,7 @@ def _own_status() -> int:
 
 
 def release_unused() -> None:
-    """Give back to the system what starting, or loading kernels, took and left behind.
+    """Return unused memory of the startup, or of loading kernels, to the system.
 
     That is memory which was freed, in the arena of the thread that loaded them, where the C library
     can (glibc), and pages of libraries (``fasaco_edge.host.libraries``).
@@ -160,7 +160,7 @@ def release_unused() -> None:
 
 
 def return_soon() -> None:
-    """Let what is freed go back to the system soon, where the C library can (glibc).
+    """Let freed memory return to the system soon, if the C library can (glibc).
 
     It learns from large blocks to keep them, in an arena for each thread: a recorder of large
     maps was 15 MB larger by that. Call it before there are threads.

@@ -1,7 +1,7 @@
 """Replay by cycles of the recorded daemon's loop: the same decisions bit for bit.
 
-The turn log says what the daemon took in each cycle of its loop, and when; plans are stopped where
-they were stopped then. The replay ends at the first cycle with another decision.
+The turn log has the inputs of each cycle of the daemon's loop, with times; plans are stopped at the
+same stop checks as then. The replay ends at the first cycle with a different decision.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ from fasaco_edge.wire.documents.turns import (
 )
 from fasaco_edge.wire.topics import TURNS
 
-# A sample that waits longer than this was taken by nobody [ns].
+# A sample that waits longer than this was taken in no cycle [ns].
 KEPT_NS = 60_000_000_000
 # The log comes twice a second: for so long after it nothing else should come [ns].
 SILENT_NS = 5_000_000_000
@@ -50,12 +50,12 @@ STRANGE = 4
 
 @dataclass(frozen=True, slots=True)
 class CycleRecord:
-    """What the turn log of a recording holds in all.
+    """Content of the turn log of a recording.
 
     Attributes:
-        beginning: what the daemon began with.
-        kernels: names its compiled kernels; "" where the mission did not begin.
-        turns: how many follow each other without a gap, from the first.
+        beginning: initial state of the daemon.
+        kernels: name of its compiled kernels; "" if the mission did not begin.
+        turns: number of cycles without a gap, from the first.
         gap: what is missing after them; "" for nothing.
         taken: topic and checksum of every sample it took.
     """
@@ -68,7 +68,7 @@ class CycleRecord:
 
 
 def read_turns(samples: Iterable[Arrival]) -> CycleRecord | None:
-    """Return what the turn log says; None where there is none, or not from the beginning."""
+    """Return the content of the turn log; None if it is missing, or its begin is."""
     beginning: LogStart | None = None
     kernels, turns, gap = "", 0, ""
     taken: set[tuple[str, int]] = set()
@@ -152,13 +152,13 @@ def inflated_sample(told: EarlySample) -> Sample:
 
 @dataclass(frozen=True, slots=True)
 class Difference:
-    """Something that is not as it was recorded.
+    """A difference to the recording.
 
     Attributes:
         turn: number of the cycle.
-        at_s: when, since the first cycle [s].
-        what: what it is.
-        recorded, replayed: what it was and is.
+        at_s: time since the first cycle [s].
+        what: name of the value.
+        recorded, replayed: its values.
     """
 
     turn: int
@@ -202,7 +202,7 @@ class CycleReplay:
         self.lacking: list[Difference] = []
 
     def steps(self, samples: Iterable[Arrival]) -> Iterator[ReplayStep]:
-        """Yield each cycle, up to the first that ends otherwise than recorded."""
+        """Yield each cycle, up to the first that differs from the recording."""
         # A batch is played when the next has come: its samples are all there by then.
         batch: TurnBatch | None = None
         for arrival in samples:
@@ -268,7 +268,7 @@ class CycleReplay:
         return sample
 
     def _plans(self, turn: Cycle) -> list[PlanReady]:
-        """Return the plan that came back in this cycle, made once more."""
+        """Return the plan that was finished in this cycle, made again."""
         taken, request = turn.plan, self._request
         if taken is None:
             return []

@@ -1,11 +1,11 @@
 """Replay by time: the samples of a recording through the daemon's inbox and mission.
 
 Time is that of the samples, and planning is counted in work, so that the same samples give the
-same decisions, bit for bit, on any machine. A recording without a turn log does not say in which
-cycle the daemon took a sample, nor how much work each plan had time for. So samples get a cycle
-of their own, and between them are cycles as the daemon's clock makes them; a plan whose path was
-recorded gets the work it had, and comes when it came. Where a mission went its usual way, the
-decisions are those of the recording.
+same decisions, bit for bit, on any machine. A recording without a turn log does not tell in which
+cycle the daemon took a sample, nor how much work each plan had time for. So each sample gets its
+own cycle, with cycles of the daemon's clock in between; a plan whose path was recorded gets the
+same work, and arrives at the same time. For an ordinary mission, the decisions are those of the
+recording.
 """
 
 from __future__ import annotations
@@ -66,7 +66,7 @@ class RecordedPath:
 
 @dataclass(frozen=True, slots=True)
 class RecordedRun:
-    """What is known of the run of a daemon; without one, nothing.
+    """The recorded run of a daemon, as far as known.
 
     Attributes:
         config: its configuration, as its first status gave it.

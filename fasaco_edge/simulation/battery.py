@@ -1,10 +1,10 @@
-"""The simulated robot's battery: full after so many minutes, empty after so many of driving."""
+"""The simulated robot's battery, with given times of charging and of driving."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-# Standing takes this share of what driving takes; charging is so many times as fast as that.
+# Discharge while standing, as a share of driving; rate of charging, as a multiple of driving.
 STANDING, CHARGING = 0.2, 4.0
 
 
@@ -33,7 +33,7 @@ class Battery:
             drain *= 1.0 if moves else STANDING
         else:
             drain *= -CHARGING
-            # In passing, or before it sets out, it charges nothing worth a word.
+            # In passing, or before it sets out, charging is negligible.
             self.charges += not was_charging and self.level < 0.5
         self.level = min(max(self.level - drain, 0.0), 1.0)
         self.lowest = min(self.lowest, self.level)

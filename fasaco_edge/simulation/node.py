@@ -36,10 +36,10 @@ REPORT_EVERY_S = 0.5
 
 
 class Pace:
-    """Says when the next tick is due, so that ``speed`` simulated seconds pass in a second.
+    """Schedules ticks, so that ``speed`` simulated seconds pass in a second.
 
-    A machine that cannot keep up falls behind by ``patience_s`` at most; what is more
-    is forgiven, so that the simulation slows down instead of racing later.
+    A machine that cannot keep up falls behind by ``patience_s`` at most; a larger debt is
+    dropped, so that the simulation slows down instead of racing later.
 
     Args:
         speed: simulated seconds per second, above 0.
@@ -71,11 +71,11 @@ class Progress:
         pose: the robot's pose.
         activity: what it is doing.
         distance_m: distance driven [m].
-        collisions: how often a path led into an obstacle.
-        stops: how often the robot stopped before one that its map showed.
+        collisions: number of times a path led into an obstacle.
+        stops: number of stops before an obstacle on its map.
         longest_stand_s: the longest time that it stood between two moves [s].
-        refused: how many paths or velocities were malformed, or in another frame.
-        speed: simulated seconds per second, achieved since the report before.
+        refused: paths or velocities that were malformed, or in another frame.
+        speed: simulated seconds per second, since the last report.
     """
 
     sim_s: float
@@ -178,7 +178,7 @@ class RobotOnBus:
             self._battery.put(encode_battery(state))
 
     def _take_newest(self, timeout_s: float) -> None:
-        """Wait for what drives the robot; what cannot do that costs only itself."""
+        """Wait for paths or velocities; a malformed one affects nothing else."""
         sample = self._newest.take(timeout_s)
         if sample is None:
             return

@@ -1,14 +1,13 @@
 """The simulated robot: a differential drive that follows a polyline, and takes up new ones.
 
-It drives straight and turns on the spot. The drive is ideal (no slip, no delay), so that what
-a run shows is the path's doing. It comes to rest at every corner, which is what makes turns
-cost time.
+It drives straight and turns on the spot. The drive is ideal (no slip, no delay), so that a run
+shows effects of the path alone. It comes to rest at every corner: that is the cost of turns.
 
 A path begins at the centre of the cell the robot was in when it was planned.
 Since then the robot has moved on: through the first waypoints, if the new path
-begins like the old one, or off to a side. Only what it has driven through may
-be left out. To ask merely where the robot is would not do: a path that goes
-into a dead end and comes back passes the same place twice.
+begins like the old one, or off to a side. Only waypoints that it has driven
+through may be skipped. The robot's position alone does not determine them: a
+path into a dead end and back passes the same point twice.
 """
 
 from __future__ import annotations
@@ -114,7 +113,7 @@ class SimulationConfig:
 
 @dataclass(frozen=True, slots=True)
 class DriveState:
-    """Where the robot is and how it moves.
+    """Pose and velocity of the robot.
 
     Attributes:
         pose: in the map frame.
@@ -160,7 +159,7 @@ def driven(state: DriveState, goal: Point | None, config: SimulationConfig) -> D
 def moved_by(
     state: DriveState, speed_m_s: float, turn_rad_s: float, config: SimulationConfig
 ) -> DriveState:
-    """Return the state a tick later, of a base that is told how to move and does what it can."""
+    """Return the state a tick later, of a base that follows a velocity within its limits."""
     dt = config.tick_s
     goal = min(max(speed_m_s, 0.0), config.speed_m_s)
     turn_goal = min(max(turn_rad_s, -config.turn_rad_s), config.turn_rad_s)

@@ -1,6 +1,6 @@
 """The simulated world: a ground truth, a robot that maps it, and a clock of equal ticks.
 
-No bus, no file, no wall clock: ``tick`` returns what is to be published. The
+No bus, no file, no wall clock: ``tick`` returns the messages to publish. The
 same calls give the same values, bit for bit.
 """
 
@@ -36,14 +36,14 @@ TRACK_SPACING_M = 0.02
 # So many metres of it show which part of a new path is driven already: at twenty times the real
 # speed, a path that took a second begins five metres behind the robot.
 RECENT_TRACK_POINTS = 500
-# A base that hears no velocity for so long stops by itself [s].
+# Timeout of the velocity, after which a base stops by itself [s].
 DEAF_S = 0.5
 # A way of its own to its path keeps so far from everything where one does [m].
 MARGIN_M = 0.005
 
 
 class Activity(enum.Enum):
-    """What the robot is doing."""
+    """Activity of the robot."""
 
     IDLE = "idle"
     """It has no path, or has driven it to its end."""
@@ -161,7 +161,7 @@ class World:
         self._join()
 
     def move(self, speed_m_s: float, turn_rad_s: float) -> None:
-        """Move so from the next tick on, for ``DEAF_S`` at most; paths are nothing to it then."""
+        """Move with a velocity from the next tick on, for ``DEAF_S`` at most, ignoring paths."""
         self._told = speed_m_s, turn_rad_s, self._ticks
         self._path, self._corners = None, []
 
@@ -236,7 +236,7 @@ class World:
             self._go_on(driven(self._drive, goal, self.config))
 
     def _looks_ahead(self) -> bool:
-        """Tell whether the robot may drive on: it stops before what its own map shows."""
+        """Tell whether the robot may drive on: it stops before obstacles on its own map."""
         if self.activity is Activity.STOPPED:
             return False
         ahead = driven(self._drive, self._corners[-1], self.config)
@@ -279,7 +279,7 @@ class World:
             self._stands += 1
 
     def _extend_track(self, ahead: DriveState) -> None:
-        """Add the place the robot is about to leave, if the track so far misses it."""
+        """Add the point the robot is about to leave, if the track does not have it."""
         here = (self.pose.x, self.pose.y)
         gone = math.dist(self._track[-1], here)
         turns_off = ahead.speed > 0.0 and self._drive.speed == 0.0

@@ -1,1 +1,1 @@
-"""What all commands share: arguments, terminal, logs, exit codes, signals."""
+"""Common parts of commands: arguments, terminal, logs, exit codes, signals."""

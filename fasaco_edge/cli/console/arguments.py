@@ -1,6 +1,6 @@
 """A command: its description, its exit codes, and the arguments that several commands share.
 
-A file that a command writes is checked before the work begins, so that none is done in vain.
+A file that a command writes is checked before the work begins, so that no work is wasted.
 """
 
 from __future__ import annotations
@@ -133,7 +133,7 @@ def with_negative_pairs(words: Sequence[str]) -> list[str]:
 
 
 def add_robot_on_bus(parser: argparse.ArgumentParser, *, config: bool = True) -> None:
-    """Add what names a robot on the bus and how to get there; read it by ``robot_on_bus``.
+    """Add the options of a robot and its bus; read them by ``robot_on_bus``.
 
     ``config``: also ``--config``, where a command has none of its own.
     """
@@ -223,15 +223,16 @@ def _client(name: str, connect: tuple[str, ...], security_file: str | None) -> B
 
 
 def check_outputs(outputs: Iterable[Path | None], inputs: Iterable[Path] = ()) -> None:
-    """Check that files can be written; None is no file at all.
+    """Check that files can be written; None is no file.
 
     Args:
-        outputs: what is to be written.
-        inputs: what is read: none of it may be written over.
+        outputs: files to write.
+        inputs: files to read: none may be overwritten.
 
     Raises:
-        BadConfiguration: one is a folder, its folder is missing, neither may be written to, it is
-            read from, or two are one and the same.
+        BadConfiguration: one is a folder, its folder is missing or not writable, it is also an
+            input,
+            or two outputs are the same.
     """
     # Unlike Path's methods these do not raise on names no file system takes.
     taken = {os.path.realpath(file): "it is read from" for file in inputs}

@@ -1,7 +1,8 @@
 """Logging: to standard error, or to the systemd journal where standard error leads there.
 
-Of each kind of line one in ten seconds is written, with how many were left out. The journal gets a
-datagram a line, with priority and fields (https://systemd.io/JOURNAL_NATIVE_PROTOCOL/).
+Lines are rate-limited: one of a kind in ten seconds, with the number of suppressed lines. The
+journal gets a datagram a line, with priority and fields
+(https://systemd.io/JOURNAL_NATIVE_PROTOCOL/).
 """
 
 from __future__ import annotations
@@ -31,11 +32,11 @@ class _Kind:
 
 
 class OneOfAKind(logging.Handler):
-    """Passes lines on to another handler, but of each kind only one in ten seconds.
+    """Rate limiter: passes on one line of each kind in ten seconds to another handler.
 
-    The kind is the event and its code, where a line has them (``extra``), else the whole text.
-    The next line of a kind says how many were left out; where none comes, a line of its own
-    does, once another line is due.
+    The kind is the event and its code, if a line has them (``extra``), else the whole text.
+    The next line of a kind has the number of suppressed ones; if none follows, a separate line
+    has it, once another line is due.
     """
 
     def __init__(
@@ -62,7 +63,7 @@ class OneOfAKind(logging.Handler):
         self._report_others(now)
 
     def close(self) -> None:
-        """Report what was left out, and close the target."""
+        """Report suppressed lines, and close the target."""
         self._report_others(float("inf"))
         self._target.close()
         super().close()
@@ -213,7 +214,7 @@ def begin_logging(level: str) -> None:
 
 
 def say_why(error: FasacoError) -> None:
-    """Print or log why a command has failed, and what to do."""
+    """Print or log the reason of a command's failure, with its hint."""
     if is_journal():
         text = f"{error} ({error.hint})" if error.hint else str(error)
         LOG.error("%s", text, extra={"event": "failure", "code": error.code})

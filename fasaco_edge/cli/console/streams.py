@@ -16,7 +16,7 @@ from fasaco_edge.text import json_line, lines
 
 
 class CleanStream:
-    """A text stream that shows what would control a terminal; line ends and tabs are meant."""
+    """A text stream that escapes control characters, except line ends and tabs."""
 
     def __init__(self, stream: TextIO) -> None:
         # By this name rich finds the stream itself: its own escapes have to go through.
@@ -52,7 +52,7 @@ def open_missing_streams() -> None:
 
 
 def clean_streams() -> None:
-    """Let all that this process prints go out clean, from now on."""
+    """Sanitize all output of this process from now on."""
     for name in ("stdout", "stderr"):
         stream = getattr(sys, name)
         if stream is not None and not isinstance(stream, CleanStream):
