@@ -25,7 +25,13 @@ from fasaco_edge.host.processes import ctrl_c_waits
 from fasaco_edge.kernels import release
 from fasaco_edge.kernels.cache import note_complete, own_folder
 from fasaco_edge.kernels.release import ANY_PROCESSOR, KERNEL_SUFFIX, KERNELS, kernel_module
-from fasaco_edge.kernels.sealed import MissingFileError, UnsoundFileError, read_sealed, write_sealed
+from fasaco_edge.kernels.sealed import (
+    MissingFileError,
+    UnsoundFileError,
+    read_sealed,
+    seal_of,
+    write_sealed,
+)
 
 # numba takes settings from .numba_config.yaml in the working folder, which may be anybody's: at
 # import, unless there is no reader of YAML, and before it compiles, unless no file has that name.
@@ -72,16 +78,19 @@ class CacheFaults:
 
     Attributes:
         failure: why a file could not be written; "" while all could be.
+        refused: files that were there, and could not be loaded.
         is_unlinked: whether code was compiled that calls other code, and is nothing without that.
     """
 
     def __init__(self) -> None:
         self.failure = ""
+        self.refused: set[Path] = set()
         self.is_unlinked = False
         self._logged: set[str] = set()
 
     def cannot_load(self, file: Path, why: object) -> None:
         """Log that a file is damaged or cannot be rebuilt."""
+        self.refused.add(file)
         self._log("load", f"{file}: the compiled kernel {why}: it is compiled again")
 
     def cannot_link(self, file: Path, why: object) -> None:
@@ -143,6 +152,10 @@ class _KernelCache:
         if (folder := _own_folder()) is None:
             return
         file = folder / self._file_name(signature, *result.codegen.magic_tuple())
+        if file not in FAULTS.refused and _KernelFile(file, signature).is_there():
+            # Another process was faster, and those that loaded its code read it again to link it.
+            _USED.add(file.name)
+            return
         try:
             # Without the annotated source, which is not used here: a fifth of all files, and
             # addresses in it, that differ from one process to the next.
@@ -169,8 +182,8 @@ class _KernelLibrary(JITCodeLibrary):  # type: ignore[misc]
     take to load, and 5 MB, for nothing where none is compiled.
     """
 
-    # What it was loaded from.
-    _origin: _KernelFile | None = None
+    # What it was loaded from, and the seal that had.
+    _origin: tuple[_KernelFile, bytes] | None = None
     _is_loaded = False
 
     @classmethod
@@ -193,11 +206,15 @@ class _KernelLibrary(JITCodeLibrary):  # type: ignore[misc]
     @functools.cached_property
     def _parsed(self) -> ModuleRef:
         assert self._origin is not None
+        file, seal = self._origin
         try:
-            (_, _, (_, bitcode)), *_ = self._origin.parts()
+            found, ((_, _, (_, bitcode)), *_) = file.read()
+            if found != seal:
+                # Each process numbers functions in its own way: this code has other names.
+                raise UnsoundFileError("was written again by another process")
         except UnsoundFileError as why:
             # Its machine code is here, and can be called as it is.
-            FAULTS.cannot_link(self._origin.path, why)
+            FAULTS.cannot_link(file.path, why)
             return parse_assembly("")
         return parse_bitcode(bitcode)
 
@@ -221,23 +238,32 @@ class _KernelFile(NamedTuple):
     path: Path
     signature: object
 
-    def parts(self) -> tuple[Any, ...]:
-        """Return what numba made of the result of compiling.
+    def read(self) -> tuple[bytes, tuple[Any, ...]]:
+        """Return its seal, and what numba made of the result of compiling.
 
         Raises:
             UnsoundFileError: it is gone, damaged, or of another signature.
         """
-        kept_for, parts = pickle.loads(read_sealed(self.path))
+        payload = read_sealed(self.path)
+        kept_for, parts = pickle.loads(payload)
         if kept_for != self.signature:
             raise MissingFileError("is for other types")
-        return cast(tuple[Any, ...], parts)
+        return seal_of(payload), parts
+
+    def is_there(self) -> bool:
+        """Tell whether there is sound code in it."""
+        try:
+            return bool(self.read())
+        except Exception:
+            return False
 
 
 def _rebuilt(file: _KernelFile, target: CPUContext) -> CompileResult | None:
     """Return the code in a file; None where there is none, or it cannot be used."""
     try:
-        result = CompileResult._rebuild(target, *file.parts())
-        result.library._origin = file
+        seal, parts = file.read()
+        result = CompileResult._rebuild(target, *parts)
+        result.library._origin = file, seal
     except MissingFileError:
         return None
     except UnsoundFileError as why:
@@ -337,7 +363,9 @@ def inlined(function: Kernel) -> Kernel:
 
 def note_all_compiled() -> None:
     """Record that every kernel has been compiled or loaded by now."""
-    if numba.config.DISABLE_JIT or FAULTS.failure or not release.why_unusable():
+    if numba.config.DISABLE_JIT or not release.why_unusable():
         return
+    if FAULTS.failure or FAULTS.is_unlinked:
+        return  # not all is kept
     if (folder := _own_folder()) is not None:
         note_complete(folder, _USED)

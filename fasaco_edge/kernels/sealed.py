@@ -65,6 +65,11 @@ def read_sealed(file: Path, user: int | None = None) -> memoryview:
     return payload
 
 
+def seal_of(payload: memoryview) -> bytes:
+    """Return the seal that ``read_sealed`` found on a payload: another content has another one."""
+    return bytes(memoryview(payload.obj)[:_HEAD])
+
+
 def write_sealed(file: Path, payload: bytes) -> None:
     """Write a sealed file in one step: a reader meanwhile finds the one before it, or none.
 

@@ -263,6 +263,48 @@ def test_what_was_loaded_is_called_by_what_is_compiled_once_its_file_is_gone(com
     assert not list(compiled.folder.glob("*.kernel"))
 
 
+WRITTEN_AGAIN = """
+import shutil
+from pathlib import Path
+assert seven.seven(1) == 7
+shutil.copyfile({other!r}, {file!r})
+for eight in Path({file!r}).parent.glob("seven.eight-*"): eight.unlink()
+seven.more.clear()
+seven.tell(note=False)
+"""
+
+
+def test_what_another_process_wrote_meanwhile_is_not_taken_for_what_was_loaded(compiled, tmp_path):
+    """As where two begin with an empty folder: one had called what the other names differently.
+
+    What was compiled then was kept, and ended each process after it with SIGSEGV.
+    """
+    (file,) = compiled.folder.glob("seven.seven-*.kernel")
+    first = file.read_bytes()
+    file.unlink()
+    others = "for _ in range(9): seven.jit.kernel(lambda x: x)(1)\n"
+    compiled.tell(f"{others}assert seven.seven(1) == 7; seven.tell()")
+    (other := tmp_path / "other").write_bytes(file.read_bytes())
+    assert other.read_bytes() != first
+    file.write_bytes(first)
+    told = compiled.tell(WRITTEN_AGAIN.format(other=str(other), file=str(file)))
+    (warning,) = told.warnings
+    assert warning.endswith("written again by another process: others that need it are not kept")
+    assert (told.loaded, told.compiled) == (1, 1)
+    assert compiled.tell().warnings == []
+
+
+def test_what_another_process_was_faster_with_stays(compiled):
+    """Who has loaded it links it later, and reads it again for that."""
+    (file,) = compiled.folder.glob("seven.seven-*.kernel")
+    first = file.read_bytes()
+    # It comes between the look and the compiling.
+    late = "seven.seven._cache.load_overload = lambda *_: None\nseven.jit.kernel(lambda x: x)(1)\n"
+    told = compiled.tell(f"{late}assert seven.seven(1) == 7; seven.tell(note=False)")
+    assert (told.compiled, told.warnings) == (1, [])
+    assert file.read_bytes() == first
+
+
 ARRAYS = """
 import sys
 import numpy as np
