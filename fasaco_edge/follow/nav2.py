@@ -46,11 +46,11 @@ MOVED_M, STANDS_S, ARRIVED_S, GIVE_UP_S = 0.05, 3.0, 1.0, 20.0
 
 @dataclass(slots=True)
 class Tally:
-    """What was done, to be reported.
+    """Counts for reports.
 
     Attributes:
-        goals: how many were sent.
-        errors: how many ended otherwise than done.
+        goals: goals sent.
+        errors: goals that failed.
     """
 
     goals: int = 0
