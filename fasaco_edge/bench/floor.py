@@ -34,7 +34,7 @@ from fasaco_edge.bench.pixels import Mask, Patches, within
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D, Window
 from fasaco_edge.grid.occupancy import FREE, OccupancyGrid, marked_window
 
-# Pixels are at most so large [m], if that makes no more than so many of them.
+# Largest pixel [m], unless that makes more than this many of them.
 FINE_M = 0.025
 MOST_PIXELS = 24_000_000
 # A patch larger than this counts [m2]: 4 dm2.
@@ -201,7 +201,7 @@ class _Floor:
         return self.robot.radius_m / self.geometry.resolution
 
     def reachable_from(self, point: tuple[float, float]) -> Mask:
-        """Return what the tool touches where the robot can come to from a point (x, y) [m]."""
+        """Return the pixels that the tool touches from places reachable from a point (x, y) [m]."""
         # Half a pixel beyond the centre of a blocked one lies its edge.
         fits = ~within(~self.free, self.radius_px + 0.5 - TOUCH_TOLERANCE_PX)
         stands = Patches.of(fits).nearest_to(*self.geometry.to_pixels(*point))

@@ -18,7 +18,7 @@ from fasaco_edge.host.processes import peak_mb as peak_mb_of
 
 GOAL_REST_P99_MS = 20.0
 GOAL_RECORDER_RATIO = 1.05
-# With and without a recorder by turns, so many of each.
+# Rounds with and without a recorder, alternating: the number of each.
 ROUNDS = 4
 # The first paths come with the kernels and the first plan of all.
 WARM_UP_MAPS = 5

@@ -78,7 +78,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _parameter(text: str) -> str:
-    # What has a meaning in a selector would ask something else.
+    # Characters with a meaning in a selector would change the query.
     if not re.fullmatch(r"\w+=[^;?#&|]*", text):
         raise argparse.ArgumentTypeError(f"must be KEY=VALUE, got {text!r}")
     return text

@@ -102,7 +102,7 @@ def _size(text: str) -> dict[str, float]:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Ask for what is missing, write the file, and tell what is heard on the bus."""
+    """Ask for missing values, write the file, and report maps and poses on the bus."""
     file: Path = args.file
     if file.exists() and not args.force:
         raise BadConfiguration(
@@ -154,7 +154,7 @@ def document_of(args: argparse.Namespace) -> dict[str, object]:
 
 
 def _ask(args: argparse.Namespace) -> None:
-    """Ask for what was not given, where there is somebody to ask.
+    """Ask for missing values if the terminal is interactive.
 
     Raises:
         BadConfiguration: there is nobody, an answer is no number, or there is none.

@@ -33,7 +33,7 @@ def run(args: argparse.Namespace) -> int:
     """Plan, print the figures, write what was asked for."""
     request = read_request(args)
     robot, search = request.robot, request.search
-    search.colony()  # what is wrong with it is said before kernels are compiled
+    search.colony()  # its faults are reported before kernels are compiled
     check_outputs(
         (args.path_out, args.xy_out, args.png, args.pheromone_png),
         [*map_sources(find_map(args.map)), *request.sources],

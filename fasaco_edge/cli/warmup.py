@@ -123,7 +123,7 @@ def _has_room_for_two() -> bool:
 
 @contextmanager
 def _from_the_end(folder: Path) -> Iterator[None]:
-    """Let another process compile from the last stage on; each loads what the other one has made.
+    """Let another process compile from the last stage on; each loads the other's kernels.
 
     Nothing depends on it: what it leaves over this process compiles.
     """

@@ -44,7 +44,7 @@ class Certificate:
 
 
 def read_certificate(files: TlsFiles, *, listens: bool = True) -> Certificate:
-    """Check a certificate, and return what it says.
+    """Check a certificate, and return its content.
 
     Args:
         files: certificate, key and CA.

@@ -48,7 +48,7 @@ class FootprintConfig(Section, frozen=True):
         return max((math.hypot(x, y) for x, y in corners), default=0.0)
 
     def faults(self) -> Iterator[BadConfiguration]:
-        """Yield what is missing, there twice, or does not fit together."""
+        """Yield missing, duplicate and inconsistent values."""
         lengths = (self.width_m, self.length_m)
         if self.polygon and any(length is not None for length in (*lengths, self.ahead_m)):
             yield BadConfiguration("must be a polygon, or width_m and length_m, not both")

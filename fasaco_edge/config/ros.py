@@ -48,7 +48,7 @@ class RosTopicNames(Section, frozen=True):
 
 
 class RosFrames(Section, frozen=True):
-    """Where the chain of transforms begins and ends; what is between is found by itself."""
+    """First and last frame of the chain of transforms; frames in between are found by itself."""
 
     map: str = "map"
     robot: str = "base_link"
@@ -124,7 +124,7 @@ class RosConfig(Section, frozen=True):
         return self._name(self.nav2.action)
 
     def velocities(self, schema: str) -> RosTopic:
-        """Return what the follower publishes, of type ``schema``."""
+        """Return the follower's topic of velocities, of type ``schema``."""
         return self._topic("cmd_vel", schema)
 
     def _topic(self, name: str, schema: str = "") -> RosTopic:

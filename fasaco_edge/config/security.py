@@ -189,7 +189,7 @@ def security_faults(
     *,
     open_to_everyone: bool = False,
 ) -> Iterator[BadConfiguration]:
-    """Yield what is missing or does not fit together.
+    """Yield missing and inconsistent values.
 
     Remote endpoints without authentication are OpenToEveryone.
     """

@@ -107,7 +107,8 @@ LISTEN_S = 0.7
 ASK_S = 0.7
 # Most maps elsewhere that are named.
 MOST_PLACES = 8
-# Where in a token of rmw_zenoh (``wire.ros_keys``) it says what it is of, and its topic's type.
+# Positions of the entity's kind and of its topic's type in a token of rmw_zenoh
+# (``wire.ros_keys``).
 TOKEN_KIND, TOKEN_TYPE = 5, 10
 
 

@@ -1,4 +1,4 @@
-"""Pictures of a walk over the lattice, and of a whole mission: visited cells and the way taken."""
+"""Pictures of a walk over the lattice, and of a mission: visited cells and the driven path."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def draw_swept(plot: Plot, swept: MapLayer) -> list[KeyEntry]:
 
 
 def draw_unswept(plot: Plot, unswept: MapLayer) -> list[KeyEntry]:
-    """Paint reachable floor that was not swept; return what the colour means."""
+    """Paint unswept reachable floor; return the meaning of the colour."""
     plot.paint(unswept, palette.UNSWEPT)
     label = f"reachable floor not swept ({unswept.area_m2:,.1f} m2)"
     return [KeyEntry("tile", palette.UNSWEPT, label)] if unswept.mask.any() else []
@@ -51,7 +51,7 @@ _ENDS = (KeyEntry("disc", palette.START, "start"), KeyEntry("square", palette.EN
 def draw_visits(
     plot: Plot, lattice: CoverageLattice, visits: NDArray[np.integer], start: Cell
 ) -> list[KeyEntry]:
-    """Tint the lattice's cells by number of visits; return what the tints mean.
+    """Tint the lattice's cells by number of visits; return the meaning of the tints.
 
     Args:
         plot: what to draw on.

@@ -1,4 +1,4 @@
-"""The drawing area, in map coordinates: what it shows at what scale, and what is drawn on it."""
+"""The drawing area in map coordinates: its view and scale, and drawing on it."""
 
 from __future__ import annotations
 
@@ -132,7 +132,7 @@ class Plot:
         return self._image.reduce(self.view.oversampling)
 
     def ground(self, source: OccupancyGrid | CoverageLattice) -> None:
-        """Draw what is free, occupied and unknown: a map's pixels, or a lattice's cells."""
+        """Draw free, occupied and unknown floor: a map's pixels, or a lattice's cells."""
         if isinstance(source, CoverageLattice):
             table = np.empty((3, 3), np.uint8)
             table[UNKNOWN], table[BLOCKED] = palette.UNKNOWN, palette.OCCUPIED

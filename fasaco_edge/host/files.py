@@ -29,7 +29,7 @@ def open_own(path: str | Path, flags: int, mode: int = 0o644) -> int:
         OSError: that failed, or the file is not ours.
     """
     flags |= os.O_CREAT | os.O_NOFOLLOW | os.O_CLOEXEC
-    # What is there is only emptied once it is known to be ours.
+    # An existing file is only truncated once it is known to be ours.
     descriptor = os.open(path, flags & ~os.O_TRUNC, mode)
     try:
         status = os.fstat(descriptor)
@@ -44,7 +44,7 @@ def open_own(path: str | Path, flags: int, mode: int = 0o644) -> int:
 
 
 def read_own(path: str | Path, most: int = -1) -> bytes:
-    """Return what is in a plain file of ours, or of root's, that is no link; ``most`` bytes of it.
+    """Return the content of a plain file of ours, or of root's, that is no link; ``most`` bytes.
 
     Raises:
         OSError: that failed, or it belongs to another user.
@@ -126,7 +126,7 @@ def why_not_trusted(folder: Path, user: int | None = None) -> str:
 
 
 def read_trusted(file: Path, user: int | None = None) -> bytes:
-    """Return what is in a file of a folder that is trusted.
+    """Return the content of a file in a trusted folder.
 
     Raises:
         UntrustedFileError: others could have written it, or it is no plain file.

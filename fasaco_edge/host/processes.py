@@ -185,7 +185,7 @@ def call_on(*numbers: int, call: Callable[[], None]) -> Callable[[], None]:
 
 
 def end_within(seconds: float) -> None:
-    """End this process if it still exists after so long [s]: code 1, its stacks on stderr.
+    """End this process if it still exists after a timeout [s]: code 1, its stacks on stderr.
 
     A thread of C does that, which needs no lock of the interpreter's.
     """

@@ -42,9 +42,9 @@ from fasaco_edge.wire.topics import TURNS
 
 # A sample that waits longer than this was taken in no cycle [ns].
 KEPT_NS = 60_000_000_000
-# The log comes twice a second: for so long after it nothing else should come [ns].
+# The log comes twice a second: this long after its end nothing else should come [ns].
 SILENT_NS = 5_000_000_000
-# Of samples that nobody took so many are kept, of each topic.
+# Most untaken samples that are kept of each topic.
 STRANGE = 4
 
 
@@ -300,7 +300,7 @@ class CycleReplay:
 
 
 def _facts(decided: Decided | None) -> dict[str, object]:
-    """Return what is compared of a decision: all but the reasons, which each release may word."""
+    """Return the compared parts of a decision: all but the reasons, which releases may reword."""
     if decided is None:
         return {"path": None}
     asked, path = decided.asked, decided.path

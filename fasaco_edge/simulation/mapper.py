@@ -90,7 +90,7 @@ class Mapper:
         return bool(disc_is_free(self._known, x, y, self._hull_px, self._free_at_most))
 
     def snapshot(self, stamp_ns: int) -> OccupancyGrid | None:
-        """Return the own map, cropped to what is known; None before anything is known.
+        """Return the own map, cropped to its known part; None before anything is known.
 
         The crop is rounded outward to whole chunks, and ends where the truth ends.
         """

@@ -38,7 +38,7 @@ TRACK_SPACING_M = 0.02
 RECENT_TRACK_POINTS = 500
 # Timeout of the velocity, after which a base stops by itself [s].
 DEAF_S = 0.5
-# A way of its own to its path keeps so far from everything where one does [m].
+# Clearance of the robot's own line to its path, where possible [m].
 MARGIN_M = 0.005
 
 
@@ -166,7 +166,7 @@ class World:
         self._path, self._corners = None, []
 
     def tick(self) -> Emission:
-        """Let one time step pass; return what is published after it."""
+        """Let one time step pass; return the messages published after it."""
         self._move()
         self._ticks += 1
         self._count_stand()

@@ -135,7 +135,7 @@ class Page:
         return lines
 
     def _block(self, shown: RenderableType, width: int, height: int) -> list[str]:
-        """Return something of rich in so many lines and columns."""
+        """Return a renderable of rich as lines and columns of a given number."""
         options = self._console.options.update(width=width, height=None)
         lines = self._console.render_lines(shown, options, pad=True)[:height]
         drawn = [self._glyphs.drawn(line) for line in lines]

@@ -27,7 +27,7 @@ class CleanConsole(Console):
     def render(
         self, renderable: RenderableType, options: ConsoleOptions | None = None
     ) -> Iterable[Segment]:
-        """Yield what is written: also that of texts which never were strings of ours."""
+        """Yield the sanitized output, also of text from other renderables."""
         for segment in super().render(renderable, options):
             yield segment if segment.control else segment._replace(text=lines(segment.text))
 

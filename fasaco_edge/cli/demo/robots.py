@@ -107,7 +107,7 @@ def demo_robots(args: argparse.Namespace, out: Path) -> list[DemoRobot]:
 
 
 def _apart(lattice: CoverageLattice, first: Point, count: int) -> list[Point]:
-    """Return places each of which is as far as can be by the way from all before it."""
+    """Return places, each with the largest walking distance from all earlier ones."""
     from fasaco_edge.kernels.fleet.split import FAR, ways_from
 
     start = anchor_cell(lattice, Pose2D(*first))

@@ -36,7 +36,7 @@ from fasaco_edge.mission.map.reachable_area import ReachableArea, anchor_cell
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Truth:
-    """The building, what of it can be reached, and what the robots' trails did to it.
+    """The building, its reachable floor, and the floor swept along the robots' trails.
 
     ``floor`` is judged for all trails together, ``floors`` for each.
     """

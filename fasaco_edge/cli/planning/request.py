@@ -52,7 +52,7 @@ class PlanRequest:
 
 
 def read_request(args: argparse.Namespace) -> PlanRequest:
-    """Return what the options ask for; what they leave open is as in ``--config``, if given.
+    """Return the request of the options; other values are those of ``--config``, if given.
 
     Raises:
         BadConfiguration: a value is impossible; the error names it.

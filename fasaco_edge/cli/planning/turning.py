@@ -31,7 +31,7 @@ def add_turning(group: argparse._ArgumentGroup, turn_s_help: str) -> None:
 
 
 def turning_of(args: argparse.Namespace, robot: RobotConfig) -> dict[str, float | None]:
-    """Return what the options change of a robot's turning.
+    """Return the changes of a robot's turning by the options.
 
     Raises:
         BadConfiguration: a limit is impossible, or of no use with the other options.

@@ -233,7 +233,7 @@ class Loop:
     def _step(
         self, events: list[Event], commands: list[CommandReceived], batch: Batch, now: float
     ) -> Decision:
-        """Step the mission and perform what it decides; during startup, only hold events."""
+        """Step the mission and perform its decision; during startup, only hold events."""
         mission, events, faults = self._runner.mission_for(events, self._bus.claim.state)
         self._count_faults(faults)
         if mission is None:

@@ -321,7 +321,7 @@ def _box_words(box: Rectangle) -> str:
 
 
 def spot_rows(spot: Spot) -> Iterator[tuple[str, str]]:
-    """Yield name and text of what is known of a spot."""
+    """Yield name and text of each known fact about a spot."""
     known = {True: "swept", False: "not swept", None: "not known"}[spot.swept]
     yield "at", f"({spot.x:.2f}, {spot.y:.2f}) m: {known}"
     yield "why", spot.words if spot.words.startswith(spot.why) else f"{spot.why}: {spot.words}"
