@@ -258,8 +258,8 @@ def ctrl_c_waits() -> Iterator[None]:
         yield
     finally:
         restore()
-    if came:
-        raise KeyboardInterrupt
+        if came:
+            raise KeyboardInterrupt
 
 
 def end_with_parent(parent: int) -> None:

@@ -147,7 +147,9 @@ def fuzz_missions(most: int, seed: int, findings: Findings) -> dict[str, Any]:
             findings.note(error, seed + number, event)
             if findings.are_enough:
                 break
-        largest = max(counts["largest ledger [tiles]"], trial.counts.pop("largest ledger [tiles]"))
+        # A mission that fails early has not been looked at yet.
+        largest = trial.counts.pop("largest ledger [tiles]", 0)
+        largest = max(counts["largest ledger [tiles]"], largest)
         counts += trial.counts
         counts["largest ledger [tiles]"] = largest
         slowest = sorted([*slowest, *trial.slowest_s], reverse=True)[:5]

@@ -140,14 +140,17 @@ def test_what_is_available_is_no_more_than_the_limit(tmp_path):
 def test_ctrl_c_waits_for_the_end_of_what_must_not_be_interrupted():
     before, reached = signal.signal(signal.SIGINT, signal.default_int_handler), []
 
-    def interrupted():
+    def interrupted(error=None):
         with ctrl_c_waits():
             os.kill(os.getpid(), signal.SIGINT)
+            if error is not None:
+                raise error
             reached.append(True)
 
     try:
-        with pytest.raises(KeyboardInterrupt):
-            interrupted()
+        for error in (None, OSError()):
+            with pytest.raises(KeyboardInterrupt):
+                interrupted(error)
         assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
         with ctrl_c_waits():
             pass
