@@ -105,12 +105,13 @@ def _print(report: Report, interrupted: bool) -> None:
     console = terminal.out()
     for shown in report.tables:
         table = _table(shown.title)
-        first, *others = shown.header
+        # As text, cells keep their line ends, which a string has shown as a backslash and an n.
+        first, *others = map(Text, shown.header)
         table.add_column(first, style="cyan", overflow="fold")
         for column in others:
             table.add_column(column, justify="right", overflow="fold")
         for row in shown.rows:
-            table.add_row(*row)
+            table.add_row(*map(Text, row))
         console.print(table)
     if report.goals:
         console.print(_goals(report))

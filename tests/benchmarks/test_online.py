@@ -405,3 +405,4 @@ def test_tables(capsys, tmp_path):
     for words in ("1 missions in unknown", "rooms, 2 m", "latency", "person", "goals"):
         assert words in shown
     assert "NOT ALL" not in shown
+    assert "\\n" not in shown, "cells have two lines"
