@@ -38,4 +38,6 @@ MAX_POSE_BYTES: Final = 1_048_576
 
 MAX_JSON_BYTES: Final = 1_048_576
 MAX_FLEET_TILES: Final = 24
-"""Of progress in one message of a fleet's robot, of 64 x 64 cells each: 17 kB."""
+"""Of progress in one message of a fleet's robot, of 64 x 64 cells each: 17 kB; and of ground."""
+MAX_FLEET_PARTS: Final = 33
+"""Of a division, a robot each."""

@@ -4,6 +4,7 @@ from dataclasses import replace
 from random import Random
 
 from fasaco_edge.mission.core.events import MapReceived, MemberHeard
+from fasaco_edge.mission.fleet.ground import GroundTelling
 from fasaco_edge.mission.fleet.shared import Telling
 from tests.mission.world import CONFIG, Drive, building, pose_at, reachable_cells
 
@@ -20,6 +21,7 @@ class FleetRobot(Drive):
 
     def __init__(self, name, cell, rows, config=CONFIG, before=None):
         self.name, self.hangs, self.told, self.cannot = name, False, Telling(), ()
+        self.told_ground = GroundTelling()
         super().__init__(cell, config=replace(config, robot=name))
         if before is not None:
             self.mission.restore_ledger(before)
@@ -38,6 +40,9 @@ class FleetRobot(Drive):
             epoch=mission.shared.epoch,
             division=mission.fleet.number,
             tiles=tiles,
+            ground=self.told_ground.next(mission.area, MOST_TILES),
+            by=mission.fleet.by,
+            parts=mission.fleet.parts,
         )
 
     def tick(self, after=1.0):

@@ -7,20 +7,28 @@ import json
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from msgspec import structs
 
 from fasaco_edge.bus.arrival import Sample
 from fasaco_edge.config.config import DaemonConfig, FleetConfig
 from fasaco_edge.config.robot import RobotConfig
 from fasaco_edge.daemon.loop.fleet import LEAST_SPACING_S, TILES, FleetEar, FleetVoice
 from fasaco_edge.errors import FleetError, MalformedMessage
-from fasaco_edge.wire.documents.fleet import FleetMember, SweptTile, decode_member
+from fasaco_edge.mission.core.events import Part
+from fasaco_edge.wire.documents.fleet import CellTile, FleetMember, FleetPart, decode_member
 from fasaco_edge.wire.documents.json_text import encode_json
-from fasaco_edge.wire.limits import MAX_FLEET_TILES, MAX_JSON_BYTES
+from fasaco_edge.wire.limits import MAX_FLEET_PARTS, MAX_FLEET_TILES, MAX_JSON_BYTES
 from tests.mission.fleets import FleetRobot
 from tests.wire.schemas import check
 
-TILE = SweptTile(-1, 2, bytes(range(256)) * 2)
+TILE = CellTile(-1, 2, bytes(range(256)) * 2)
 MEMBER = FleetMember(1, "hall", 0.3, "map", "covering", 1.5, -2.0, 1.2, 7, 3, 500, (TILE,))
+MEMBER = structs.replace(
+    MEMBER,
+    ground=(TILE,),
+    by="r2",
+    parts=(FleetPart("r1", 3, -4, -1.5, 1.2), FleetPart("r2", 0, 9, 0.0, 2.0)),
+)
 CONFIG = DaemonConfig(robot=RobotConfig(name="r1"), fleet=FleetConfig("hall"))
 
 
@@ -53,6 +61,11 @@ def test_it_comes_back_as_it_was_and_is_that_of_the_schema():
         {"frame": "m" * 300},
         {"state": 5},
         {"swept": [[0, 0, "AAAA"]]},
+        {"ground": [[0, 0, "AAAA"]]},
+        {"parts": [["r1", 0, 0, 0.0, 0.0]]},
+        {"parts": [["r1", 0, 2**30, 0.0, 1.0]]},
+        {"parts": [["r1", 0, 0, 1e300, 1.0]]},
+        {"parts": [["r1", 0, 0, 0.0, 1.0]] * (MAX_FLEET_PARTS + 1)},
         {"swept": [[2**30, 0, "A" * 682 + "=="]]},
         {"swept": [[0, 0, "A" * 682 + "=="]] * (MAX_FLEET_TILES + 1)},
     ],
@@ -140,3 +153,14 @@ def test_a_robot_whose_cells_lie_at_another_angle_is_left_out():
     older = json.loads(said(cell_m=cell_m))
     older.pop("lattice_deg", None)
     assert heard(json.dumps(older).encode()).misfit == ""
+
+
+def test_a_division_comes_with_its_parts_and_one_that_lacks_them_is_read():
+    heard_now = heard(said())
+    assert heard_now.by == "r2"
+    assert heard_now.parts[0] == Part("r1", (3, -4), -1.5, 1.2)
+    assert heard_now.ground == (((-1, 2), TILE.cells),)
+    older = json.loads(said())
+    for member in ("ground", "by", "parts"):
+        del older[member]
+    assert heard(json.dumps(older).encode()).parts == ()

@@ -14,9 +14,16 @@ from fasaco_edge.bus.publisher import Publisher
 from fasaco_edge.bus.session import Bus
 from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.errors import FasacoError, FleetError
-from fasaco_edge.mission.core.events import MemberHeard
+from fasaco_edge.mission.core.events import MemberHeard, Part
+from fasaco_edge.mission.fleet.ground import GroundTelling
 from fasaco_edge.mission.fleet.shared import Telling
-from fasaco_edge.wire.documents.fleet import FLEET_VERSION, FleetMember, SweptTile, decode_member
+from fasaco_edge.wire.documents.fleet import (
+    FLEET_VERSION,
+    CellTile,
+    FleetMember,
+    FleetPart,
+    decode_member,
+)
 from fasaco_edge.wire.documents.json_text import encode_json
 from fasaco_edge.wire.limits import MAX_FLEET_TILES
 from fasaco_edge.wire.topics import FLEET
@@ -29,7 +36,8 @@ PERIOD_S, LEAST_PERIOD_S = 1.0, 0.25
 LEAST_SPACING_S, MOST_ROBOTS = 0.2, 64
 # A robot silent for this long makes room for another [s].
 FORGOTTEN_S = 60.0
-# Tiles in a message sent once a second, and in one on change: 12 kB a second in all.
+# Tiles of progress, and as many of ground, in a message sent once a second, and in one on change:
+# 17 kB a second in all.
 TILES, FEW_TILES = MAX_FLEET_TILES // 2, 2
 
 
@@ -91,7 +99,13 @@ class FleetEar:
             epoch=member.epoch,
             division=member.division,
             open_cells=member.open_cells,
-            tiles=tuple(((tile.row, tile.col), tile.cells) for tile in member.swept),
+            tiles=_placed(member.swept),
+            ground=_placed(member.ground),
+            by=member.by,
+            parts=tuple(
+                Part(part.robot, (part.row, part.col), part.handicap_s, part.step_s)
+                for part in member.parts
+            ),
         )
 
     def _is_due(self, key: str, now: float) -> bool:
@@ -120,7 +134,7 @@ class FleetVoice:
     def __init__(self, publisher: Publisher, config: DaemonConfig) -> None:
         assert config.fleet
         self._publisher, self._fleet, self._cell_m = publisher, config.fleet.name, config.cell_m
-        self._telling = Telling()
+        self._telling, self._telling_ground = Telling(), GroundTelling()
         self._said: tuple[object, ...] = ()
         self._epoch = 0
         self._said_at = float("-inf")
@@ -141,6 +155,7 @@ class FleetVoice:
             # Published changes are forgotten.
             self._epoch, self._telling, most = mission.shared.epoch, Telling(), TILES
         swept = self._telling.next(mission.ledger.snapshot().tiles, most)
+        ground = self._telling_ground.next(mission.area, most)
         member = FleetMember(
             version=FLEET_VERSION,
             fleet=self._fleet,
@@ -154,6 +169,16 @@ class FleetVoice:
             epoch=mission.shared.epoch,
             division=mission.fleet.number,
             open_cells=mission.open_cells(),
-            swept=tuple(SweptTile(*place, bits) for place, bits in swept),
+            swept=tuple(CellTile(*place, bits) for place, bits in swept),
+            ground=tuple(CellTile(*place, bits) for place, bits in ground),
+            by=mission.fleet.by,
+            parts=tuple(
+                FleetPart(part.robot, *part.seed, part.handicap_s, part.step_s)
+                for part in mission.fleet.parts
+            ),
         )
         self._publisher.put(encode_json(member))
+
+
+def _placed(tiles: tuple[CellTile, ...]) -> tuple[tuple[tuple[int, int], bytes], ...]:
+    return tuple(((tile.row, tile.col), tile.cells) for tile in tiles)

@@ -100,6 +100,23 @@ class CommandReceived:
 
 
 @dataclass(frozen=True, slots=True)
+class Part:
+    """What a division gives to a robot: the cells that are nearest to a seed.
+
+    Attributes:
+        robot: its name.
+        seed: cell (row, col).
+        handicap_s: added to the travel times from the seed [s].
+        step_s: its time to sweep one cell [s].
+    """
+
+    robot: str
+    seed: tuple[int, int]
+    handicap_s: float
+    step_s: float
+
+
+@dataclass(frozen=True, slots=True)
 class MemberHeard:
     """State of another robot of the fleet.
 
@@ -114,6 +131,9 @@ class MemberHeard:
         division: number of its newest division.
         open_cells: number of cells still to be swept, as it knows.
         tiles: places and bits of the cells it has swept; a subset of its tiles.
+        ground: places and bits of the cells it can reach; a subset of its tiles.
+        by: name of the robot that made that division.
+        parts: what that division gives to each robot.
     """
 
     robot: str
@@ -127,6 +147,9 @@ class MemberHeard:
     division: int = 0
     open_cells: int = 0
     tiles: tuple[tuple[tuple[int, int], bytes], ...] = ()
+    ground: tuple[tuple[tuple[int, int], bytes], ...] = ()
+    by: str = ""
+    parts: tuple[Part, ...] = ()
 
 
 Event = (

@@ -33,6 +33,7 @@ from fasaco_edge.mission.fleet.shared import SharedProgress
 from fasaco_edge.mission.line.layer import FloorToSweep, LineLayer
 from fasaco_edge.mission.map.inputs import InputMonitor
 from fasaco_edge.mission.map.map_state import MapState
+from fasaco_edge.mission.map.reachable_area import ReachableArea
 from fasaco_edge.mission.orders.order_state import OrderState
 from fasaco_edge.mission.orders.sequencer import Sequencer
 from fasaco_edge.planners.living_trail import LivingTrail
@@ -231,6 +232,11 @@ class Mission:
     def lattice(self) -> CoverageLattice | None:
         """The lattice over the newest map, in its own frame; None before there is a map."""
         return self._map.lattice
+
+    @property
+    def area(self) -> ReachableArea | None:
+        """The reachable area, in the lattice's frame."""
+        return self._map.area
 
     @property
     def ledger(self) -> CoverageLedger:

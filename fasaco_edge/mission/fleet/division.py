@@ -22,6 +22,8 @@ from fasaco_edge.kernels.fleet.split import ways_from
 MOST_CELLS, MOST_SEARCHED = 2_000, 3_000_000
 # Rounds of moving the seeds; updates of the handicaps, and the factor between successive ones.
 ROUNDS, CHANGES, DAMPING = 3, 30, 0.85
+# Seeds are kept unless others end before this share of their time.
+STABLE = 0.9
 
 Seconds = NDArray[np.float32]
 
@@ -69,7 +71,10 @@ class Division:
 
 
 def divide(
-    lattice: CoverageLattice, wanted: NDArray[np.bool_], robots: Sequence[Robot]
+    lattice: CoverageLattice,
+    wanted: NDArray[np.bool_],
+    robots: Sequence[Robot],
+    before: Division | None = None,
 ) -> Division:
     """Divide cells among robots; independent of the order in which these are given.
 
@@ -77,6 +82,7 @@ def divide(
         lattice: the cells where robots fit.
         wanted: bool (rows, cols), the cells to divide; all robots must be connected.
         robots: at least one.
+        before: the last division, whose seeds are kept unless others end much earlier.
     """
     robots = sorted(robots, key=lambda robot: robot.name)
     starts, steps_s = [robot.cell for robot in robots], [robot.step_s for robot in robots]
@@ -88,6 +94,13 @@ def divide(
     scale = np.count_nonzero(wanted) / len(cells)
     rounds = max(1, min(ROUNDS, MOST_SEARCHED // (len(robots) * lattice.steps.size)))
     best: tuple[float, list[Cell], NDArray[np.float32]] | None = None
+    kept = {} if before is None else dict(zip(before.names, before.seeds, strict=True))
+    if kept.keys() & {robot.name for robot in robots}:
+        seeds = [kept.get(robot.name, robot.cell) for robot in robots]
+        handicaps_s = _handicaps_s(_times_s(lattice, seeds, steps_s)[:, cells], np.array(steps_s))
+        owner = (_times_s(lattice, seeds, steps_s)[:, cells] + handicaps_s[:, None]).argmin(axis=0)
+        end_s = _end_s(from_starts_s, owner, scale * np.array(steps_s))
+        best = STABLE * end_s, seeds, handicaps_s
     for begin in (starts, _spread(lattice, cells, from_starts_s)):
         seeds = begin
         for _ in range(rounds):

@@ -1,7 +1,7 @@
 """Fleet layer: the other robots of the fleet, and this robot's part of the remaining area.
 
-There is no leader. Each robot computes the same division from all robots' announced states, on its
-own map. Divisions are numbered, and a robot that hears of a later one than its own divides again.
+There is no leader. Whoever sees a reason divides the remaining area anew and tells the others, who
+take over the division of the highest number, among those of one number that by the first name.
 While two robots disagree, cells may be swept twice; none is left out, because a robot that finishes
 takes over a part of the remaining area.
 """
@@ -18,9 +18,10 @@ from numpy.typing import NDArray
 from fasaco_edge.errors import FleetError
 from fasaco_edge.grid.geometry import Pose2D, Window
 from fasaco_edge.grid.lattice import Cell
-from fasaco_edge.mission.core.events import MemberHeard, State
+from fasaco_edge.mission.core.events import MemberHeard, Part, State
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
 from fasaco_edge.mission.fleet.division import Division, Robot, divide
+from fasaco_edge.mission.fleet.ground import SharedGround
 from fasaco_edge.mission.fleet.shared import MOST_ROBOTS
 from fasaco_edge.mission.map.map_state import MapState
 from fasaco_edge.mission.map.reachable_area import ReachableArea, anchor_cell
@@ -85,6 +86,9 @@ class FleetLayer:
     Attributes:
         members: the others, by name.
         number: number of the newest division.
+        by: name of the robot that made it.
+        ground: the cells that others can reach.
+        why: reason for it.
         step_s: this robot's time to sweep one cell [s].
     """
 
@@ -93,10 +97,13 @@ class FleetLayer:
     ) -> None:
         self.members: dict[str, Member] = {}
         self.number = 0
+        self.why = self.by = ""
+        self.ground = SharedGround()
         self._robot, self.step_s = robot, step_s
         self._map, self._ledger = map_state, ledger
         self._division: Division | None = None
         self._divided_at = self._looked_at = float("-inf")
+        # The owners of the cells of a joint area, and of those of this robot's own area.
         self._owners: tuple[ReachableArea | None, NDArray[np.int8]]
         self._owners = None, np.zeros((0, 0), np.int8)
         # Cells of an area that this robot tried in vain, while others are at work.
@@ -135,6 +142,7 @@ class FleetLayer:
         self.members[event.robot] = member
         if left_out:
             return ""
+        self.ground.hear(event.robot, event.ground, self.members)
         swept = event.robot, event.epoch, event.tiles
         try:
             is_open_again = self._ledger.shared.hear(*swept, self.members)
@@ -153,6 +161,10 @@ class FleetLayer:
         cells = self._untried(cells, area)
         part = cells & self._is_own(self._division, area)
         return part if (part & area.reachable).any() else cells
+
+    def within_part(self, cells: NDArray[np.bool_], area: ReachableArea) -> NDArray[np.bool_]:
+        """Return which cells are in this robot's part; all of them without a division."""
+        return cells if self._division is None else cells & self._is_own(self._division, area)
 
     def give_up(self, cells: NDArray[np.bool_], area: ReachableArea) -> None:
         """Leave cells that this robot tried in vain to the others."""
@@ -178,19 +190,47 @@ class FleetLayer:
         if not (at_once or now - self._looked_at >= LOOK_S):
             return self._why_by_taken()
         self._looked_at = now
-        robots, before = self._robots(area, cell, now), self._division
-        left = self._untried(open_cells(area.lattice.window) & area.reachable, area)
-        if not (why := self._why_anew(area, left, robots, now, at_once=at_once)):
-            return self._why_by_taken()
-        own = left if before is None else left & self._is_own(before, area)
-        heard = self._newest_heard()
-        self.number = min(max(self.number + (why != LATER), heard), MOST_NUMBER)
-        self._division = divide(area.lattice, left, robots) if len(robots) > 1 else None
+        joint, before = self.ground.joint(area), self._division
+        left = open_cells(joint.lattice.window) & joint.reachable
+        inside = area.lattice.window.slices_in(joint.lattice.window)
+        left[inside] = self._untried(left[inside], area)
+        if newer := self._newer():
+            self.why, self.number, self.by = LATER, newer.division, newer.by
+            self._division = _division_of(newer.parts)
+        else:
+            robots = self._robots(joint, cell, now)
+            if not (why := self._why_anew(joint, left, robots, now, at_once=at_once)):
+                return self._why_by_taken()
+            self.why, self.by = why, self._robot
+            self.number = min(max(self.number, self._newest_heard()) + 1, MOST_NUMBER)
+            several = len(robots) > 1
+            self._division = divide(joint.lattice, left, robots, before) if several else None
+        own = left if before is None else left & self._of_me(before, joint)
         self._divided_at, self._owners = now, (None, self._owners[1])
         self._taken = self._count_taken()
-        after = left if self._division is None else left & self._is_own(self._division, area)
+        after = left if self._division is None else left & self._of_me(self._division, joint)
         self._had_part, self._left = bool(after.any()), int(np.count_nonzero(left))
-        return why if (own != after).any() else ""
+        return self.why if (own != after)[inside].any() else ""
+
+    @property
+    def parts(self) -> tuple[Part, ...]:
+        """The newest division, as others are told."""
+        division = self._division
+        if division is None:
+            return ()
+        return tuple(
+            Part(robot.name, seed, handicap_s, robot.step_s)
+            for robot, seed, handicap_s in zip(
+                division.robots, division.seeds, division.handicaps_s, strict=True
+            )
+        )
+
+    def owns(self, cell: Cell) -> bool:
+        """Tell whether a cell is in this robot's part."""
+        area, division = self._map.area, self._division
+        if division is None or area is None or not area.contains(cell):
+            return division is None
+        return bool(self._is_own(division, area)[area.lattice.local(cell)])
 
     def part_cells(self) -> int | None:
         """Return the number of cells in this robot's part; None if all are."""
@@ -198,6 +238,20 @@ class FleetLayer:
             return None
         area = self._map.area
         return int(np.count_nonzero(self._is_own(self._division, area) & area.reachable))
+
+    def _newer(self) -> MemberHeard | None:
+        """Return the newest division of others that is newer than this robot's, if it is in it."""
+        most = self._newest_heard()
+        found = [
+            member.newest
+            for member in self.members.values()
+            if not member.left_out
+            and member.newest.division == most
+            and any(part.robot == self._robot for part in member.newest.parts)
+        ]
+        first = min(found, key=lambda heard: heard.by, default=None)
+        mine = -self.number, self.by
+        return first if first and (-first.division, first.by) < mine else None
 
     def _newest_heard(self) -> int:
         """Return the highest valid division number heard."""
@@ -232,7 +286,7 @@ class FleetLayer:
         known = set() if division is None else set(division.names)
         if len(names) == 1 and division is None:
             return ""
-        if gone := sorted(known - names):
+        if gone := sorted(name for name in known - names if self._is_gone(name, now)):
             self._note_left(gone, now)
             return f"{', '.join(gone)} no longer at work"
         if now - self._divided_at < HOLDS_S and not at_once:
@@ -241,10 +295,14 @@ class FleetLayer:
         new = names - known - {self._robot}
         if more := sorted(name for name in new if now - self.members[name].left_at >= EVEN_S):
             return f"shared with {', '.join(more)}"
-        if division is None:
-            return ""
-        is_later = self._newest_heard() > self.number
-        return LATER if is_later else self._why_by_parts(division, area, left, now)
+        return "" if division is None else self._why_by_parts(division, area, left, now)
+
+    def _is_gone(self, name: str, now: float) -> bool:
+        """Tell whether a robot of the division takes no part any more."""
+        member = self.members.get(name)
+        if member is None:
+            return name != self._robot and now - self._divided_at > GONE_S
+        return bool(member.absence(now))
 
     def _note_left(self, names: list[str], now: float) -> None:
         """Note robots that stop working soon after a division."""
@@ -256,7 +314,8 @@ class FleetLayer:
         self, division: Division, area: ReachableArea, left: NDArray[np.bool_], now: float
     ) -> str:
         """Return why the parts should change, or ""."""
-        cells = np.bincount(self._owners_on(division, area)[left], minlength=len(division.robots))
+        owners = self._owners_on(division, area)
+        cells = np.bincount(owners[left], minlength=len(division.robots))
         if not cells[division.names.index(self._robot)]:
             # If there was no part for it, there will be none soon after.
             is_other = self._had_part or cells.sum() > self._left
@@ -271,14 +330,22 @@ class FleetLayer:
         return cells & ~self._tried[1] if self._tried[0] is area else cells
 
     def _is_own(self, division: Division, area: ReachableArea) -> NDArray[np.bool_]:
-        own: NDArray[np.bool_] = self._owners_on(division, area) == division.names.index(
+        """Return which cells of this robot's area are in its part."""
+        joint = self.ground.joint(area)
+        return self._of_me(division, joint)[area.lattice.window.slices_in(joint.lattice.window)]
+
+    def _of_me(self, division: Division, joint: ReachableArea) -> NDArray[np.bool_]:
+        """Return which cells of a joint area are in this robot's part."""
+        own: NDArray[np.bool_] = self._owners_on(division, joint) == division.names.index(
             self._robot
         )
         return own
 
-    def _owners_on(self, division: Division, area: ReachableArea) -> NDArray[np.int8]:
-        if self._owners[0] is not area:
-            self._owners = area, division.owners(area.lattice)
+    def _owners_on(self, division: Division, joint: ReachableArea) -> NDArray[np.int8]:
+        if division is not self._division:
+            return division.owners(joint.lattice)
+        if self._owners[0] is not joint:
+            self._owners = joint, division.owners(joint.lattice)
         return self._owners[1]
 
     def _why_by_taken(self) -> str:
@@ -320,3 +387,12 @@ class FleetLayer:
         if now - self.members[name].heard_at <= GONE_S:
             raise FleetError(f"{robot}: {MOST_ROBOTS} others of a fleet are heard at most")
         del self.members[name]
+
+
+def _division_of(parts: tuple[Part, ...]) -> Division:
+    """Return a division as others tell of it."""
+    parts = tuple(sorted(parts, key=lambda part: part.robot))
+    robots = tuple(Robot(part.robot, part.seed, part.step_s) for part in parts)
+    return Division(
+        robots, tuple(part.seed for part in parts), tuple(part.handicap_s for part in parts)
+    )

@@ -227,7 +227,7 @@ class LineLayer:
         if area is None or area.lattice.window != floor.stands.lattice.window:
             return None
         window = area.lattice.window
-        asked = area.reachable & self._orders.asked_for(window)
+        asked = area.reachable & self._orders.asked_of_me(area)
         before, self._asked = self._asked, (window, asked, area.reachable)
         if before is None:
             return Window(0, 0, floor.geometry.rows, floor.geometry.cols)

@@ -200,6 +200,10 @@ class Sequencer:
         shared = self._ledger.shared
         return inside & ~shared.swept(window) if shared.version else inside
 
+    def asked_of_me(self, area: ReachableArea) -> NDArray[np.bool_]:
+        """Return which cells of an area this robot has to cover, covered or not: its part only."""
+        return self._fleet.within_part(self.asked_for(area.lattice.window), area)
+
     def note_path_end(self) -> bool:
         """Note the end of a path; return whether the cells it left over must wait for a retry."""
         run, cells = self._run, self._left_to_me()

@@ -13,7 +13,12 @@ from msgspec import Meta
 
 from fasaco_edge.errors import FleetError, MalformedMessage
 from fasaco_edge.wire.documents.json_text import Document
-from fasaco_edge.wire.limits import MAX_COORDINATE_M, MAX_FLEET_TILES, MAX_JSON_BYTES
+from fasaco_edge.wire.limits import (
+    MAX_COORDINATE_M,
+    MAX_FLEET_PARTS,
+    MAX_FLEET_TILES,
+    MAX_JSON_BYTES,
+)
 
 FLEET_VERSION: Final = 1
 # Bytes of a tile of 64 x 64 cells, a bit each.
@@ -22,11 +27,12 @@ TILE_BYTES: Final = 512
 Coordinate = Annotated[float, Meta(ge=-MAX_COORDINATE_M, le=MAX_COORDINATE_M)]
 Text = Annotated[str, Meta(max_length=256)]
 Whole = Annotated[int, Meta(ge=0, le=2**31 - 1)]
+Pace = Annotated[float, Meta(ge=1e-3, le=3600)]
 Place = Annotated[int, Meta(ge=-(2**24), le=2**24)]
 
 
-class SweptTile(msgspec.Struct, frozen=True, array_like=True):
-    """The swept cells of a tile of 64 x 64.
+class CellTile(msgspec.Struct, frozen=True, array_like=True):
+    """Some cells of a tile of 64 x 64: swept ones, or reachable ones.
 
     Attributes:
         row, col: of the tile; its first cell is at 64 times these.
@@ -36,6 +42,23 @@ class SweptTile(msgspec.Struct, frozen=True, array_like=True):
     row: Place
     col: Place
     cells: Annotated[bytes, Meta(min_length=TILE_BYTES, max_length=TILE_BYTES)]
+
+
+class FleetPart(msgspec.Struct, frozen=True, array_like=True):
+    """What a division gives to a robot: the cells to which it has the least travel time.
+
+    Attributes:
+        robot: its name.
+        row, col: the cell that travel times are counted from.
+        handicap_s: added to them [s].
+        step_s: its time to sweep one cell [s].
+    """
+
+    robot: Text
+    row: Place
+    col: Place
+    handicap_s: Annotated[float, Meta(ge=-1e9, le=1e9)]
+    step_s: Pace
 
 
 class FleetMember(Document, frozen=True):
@@ -54,6 +77,9 @@ class FleetMember(Document, frozen=True):
         open_cells: number of cells known to it that are still to sweep.
         swept: tiles swept in this epoch: changed ones first, then all in turn.
         lattice_deg: the angle of its cells' rows to the x axis of the map frame [deg].
+        ground: tiles of cells that it can reach: changed ones first, then all in turn.
+        by: name of the robot that made that division.
+        parts: what that division gives to each robot; none without one.
     """
 
     version: Annotated[int, Meta(ge=1)]
@@ -63,12 +89,15 @@ class FleetMember(Document, frozen=True):
     state: Text
     x: Coordinate
     y: Coordinate
-    step_s: Annotated[float, Meta(ge=1e-3, le=3600)]
+    step_s: Pace
     epoch: Annotated[int, Meta(ge=1, le=2**62)]
     division: Whole
     open_cells: Whole
-    swept: Annotated[tuple[SweptTile, ...], Meta(max_length=MAX_FLEET_TILES)]
+    swept: Annotated[tuple[CellTile, ...], Meta(max_length=MAX_FLEET_TILES)]
     lattice_deg: Annotated[float, Meta(ge=-90, le=90)] = 0.0
+    ground: Annotated[tuple[CellTile, ...], Meta(max_length=MAX_FLEET_TILES)] = ()
+    by: Text = ""
+    parts: Annotated[tuple[FleetPart, ...], Meta(max_length=MAX_FLEET_PARTS)] = ()
 
 
 class _Head(msgspec.Struct, frozen=True):

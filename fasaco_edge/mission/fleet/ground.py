@@ -1,0 +1,155 @@
+"""Shared ground: the cells that the robots of a fleet can reach, each on its own map.
+
+Cells that only others' maps show take part in the division, so that all robots divide nearly the
+same area. This robot's own map decides where it shows anything; paths are planned on it alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fasaco_edge.grid.changes import carried
+from fasaco_edge.grid.geometry import Window
+from fasaco_edge.grid.lattice import COVERABLE, UNKNOWN, Cell, CoverageLattice
+from fasaco_edge.mission.coverage.ledger import TILE
+from fasaco_edge.mission.fleet.shared import MOST_ROBOTS, MOST_TILES_OF_ONE, TILE_BYTES
+from fasaco_edge.mission.map.reachable_area import ReachableArea
+
+# Limit on the cells that the ground of others may add to the lattice; beyond it is left out.
+MOST_ADDED = 1_000_000
+
+Placed = tuple[Cell, bytes]
+
+
+class SharedGround:
+    """The cells that other robots can reach.
+
+    Attributes:
+        version: counter of changes.
+    """
+
+    def __init__(self) -> None:
+        self.version = 0
+        self._robots: dict[str, dict[Cell, bytes]] = {}
+        # The last joint area, and what it was made of.
+        self._joint: tuple[ReachableArea, int, ReachableArea] | None = None
+
+    def hear(self, robot: str, tiles: Iterable[Placed], members: Collection[str]) -> None:
+        """Take in a robot's tiles, each with TILE_BYTES of bits; the newest of a place counts."""
+        for gone in self._robots.keys() - set(members):
+            del self._robots[gone]
+        if len(self._robots) >= MOST_ROBOTS and robot not in self._robots:
+            return
+        known = self._robots.setdefault(robot, {})
+        for place, bits in tiles:
+            has_room = place in known or len(known) < MOST_TILES_OF_ONE
+            if has_room and known.get(place) != bits:
+                known[place] = bits
+                self.version += 1
+
+    def joint(self, area: ReachableArea) -> ReachableArea:
+        """Return an area with the ground of others, where its map shows nothing."""
+        if self._joint and self._joint[0] is area and self._joint[1] == self.version:
+            return self._joint[2]
+        joined = _joined(area, self._merged()) if self._robots else area
+        self._joint = area, self.version, joined
+        return joined
+
+    def _merged(self) -> dict[Cell, NDArray[np.uint8]]:
+        merged: dict[Cell, NDArray[np.uint8]] = {}
+        for tiles in self._robots.values():
+            for place, packed in tiles.items():
+                bits = np.frombuffer(packed, np.uint8)
+                merged[place] = merged[place] | bits if place in merged else bits
+        return merged
+
+
+class GroundTelling:
+    """Selects the tiles of the next report: changed ones first, then all others in turn."""
+
+    def __init__(self) -> None:
+        # The tiles reported, in the order of reporting.
+        self._told: dict[Cell, bytes] = {}
+        self._area: ReachableArea | None = None
+        self._tiles: dict[Cell, bytes] = {}
+
+    def next(self, area: ReachableArea | None, most: int) -> tuple[Placed, ...]:
+        """Return places and bits of a limited number of tiles."""
+        if area is not self._area and area is not None:
+            self._area, self._tiles = area, _tiles_of(area)
+            # What is no longer reachable is reported as empty.
+            nothing = bytes(TILE_BYTES)
+            self._tiles |= {place: nothing for place in self._told if place not in self._tiles}
+        tiles = self._tiles
+        new = [place for place, bits in tiles.items() if self._told.get(place) != bits]
+        chosen = [*sorted(new), *(place for place in self._told if place not in new)][:most]
+        for place in chosen:
+            self._told.pop(place, None)
+            self._told[place] = tiles[place]
+        return tuple((place, tiles[place]) for place in chosen)
+
+
+def _joined(area: ReachableArea, tiles: dict[Cell, NDArray[np.uint8]]) -> ReachableArea:
+    """Return an area with the cells of tiles where its lattice knows nothing."""
+    lattice, window = area.lattice, area.lattice.window
+    # The nearest tiles first: those far away may be of a robot that lies.
+    row, col = (window.row0 + window.row1) / 2, (window.col0 + window.col1) / 2
+    places = sorted(tiles, key=lambda at: (abs(at[0] * TILE - row) + abs(at[1] * TILE - col), at))
+    around = window
+    for place in places:
+        larger = Window.around(around, _window(place))
+        assert larger is not None
+        if larger.rows * larger.cols - window.rows * window.cols > MOST_ADDED:
+            break
+        around = larger
+    ground = np.zeros((around.rows, around.cols), np.bool_)
+    for place in places:
+        whole = _window(place)
+        if common := whole.intersection(around):
+            cells = np.unpackbits(tiles[place]).reshape(TILE, TILE).view(np.bool_)
+            ground[common.slices_in(around)] |= cells[common.slices_in(whole)]
+    inside = window.slices_in(around)
+    ground[inside] &= lattice.states == UNKNOWN
+    if not ground.any():
+        return area
+    own = np.zeros_like(ground)
+    own[inside] = lattice.coverable
+    # Between two cells of one's own map its own steps hold.
+    free = ground | own
+    steps = CoverageLattice.from_free(free).steps.copy()
+    between = CoverageLattice.from_free(own).steps
+    steps &= ~between
+    steps[inside] |= lattice.steps
+    states = np.zeros(ground.shape, np.uint8)
+    states[inside] = lattice.states
+    states[ground] = COVERABLE
+    whole_lattice = CoverageLattice(around, lattice.cell_m, states, steps)
+    reached = carried(area.reachable, window, around)
+    seeds = np.argwhere(reached)
+    if not len(seeds):
+        return ReachableArea(whole_lattice, reached)
+    first = int(seeds[0, 0]) + around.row0, int(seeds[0, 1]) + around.col0
+    return ReachableArea.around(whole_lattice, first)
+
+
+def _tiles_of(area: ReachableArea) -> dict[Cell, bytes]:
+    """Return the reachable cells as tiles of bits; no tile where there are none."""
+    window, found = area.lattice.window, {}
+    for row in range(window.row0 // TILE, -(-window.row1 // TILE)):
+        for col in range(window.col0 // TILE, -(-window.col1 // TILE)):
+            whole = _window((row, col))
+            if common := whole.intersection(window):
+                part = area.reachable[common.slices_in(window)]
+                if part.any():
+                    cells = np.zeros((TILE, TILE), np.bool_)
+                    cells[common.slices_in(whole)] = part
+                    found[row, col] = np.packbits(cells.reshape(-1)).tobytes()
+    return found
+
+
+def _window(place: Cell) -> Window:
+    row, col = place[0] * TILE, place[1] * TILE
+    return Window(row, col, row + TILE, col + TILE)

@@ -1,0 +1,93 @@
+"""Ground of a fleet: what others can reach counts where a robot's own map shows nothing."""
+
+import numpy as np
+import pytest
+
+from fasaco_edge.grid.lattice import BLOCKED, CoverageLattice
+from fasaco_edge.mission.fleet import ground as shared_ground
+from fasaco_edge.mission.fleet.division import Robot, divide
+from fasaco_edge.mission.fleet.ground import GroundTelling, SharedGround
+from fasaco_edge.mission.fleet.shared import TILE_BYTES
+from fasaco_edge.mission.map.reachable_area import ReachableArea
+from tests.mission.fleets import FleetDrive
+from tests.mission.world import building, reachable_cells
+
+CORRIDOR = ["." * 40] * 3
+
+
+def area_of(*rows, cell=(0, 0)):
+    drive = FleetDrive(rows, {"r1": cell})
+    drive.tick()
+    return drive.robots["r1"].mission.area
+
+
+def cells_of(area):
+    window = area.lattice.window
+    return {(row + window.row0, col + window.col0) for row, col in np.argwhere(area.reachable)}
+
+
+def test_what_another_can_reach_joins_on_where_the_own_map_shows_nothing():
+    own, other = area_of("....", "...."), area_of("...." + "." * 60, "...#" + "." * 60)
+    ground = SharedGround()
+    ground.hear("r2", GroundTelling().next(other, 10), {"r2"})
+    joint = ground.joint(own)
+    # The other's obstacle lies where the own map shows free floor.
+    assert cells_of(joint) == cells_of(own) | cells_of(other)
+    assert ground.joint(own) is joint
+    assert cells_of(own) == reachable_cells(building("....", "...."), (0, 0))
+
+
+def test_the_own_map_decides_where_it_shows_a_wall():
+    own, other = area_of("..#", "..#"), area_of("......", "......")
+    ground = SharedGround()
+    ground.hear("r2", GroundTelling().next(other, 10), {"r2"})
+    joint = ground.joint(own)
+    assert cells_of(joint) == cells_of(own)
+    assert (joint.lattice.states[:2, 2] == BLOCKED).all()
+
+
+def test_ground_that_is_lost_again_is_told_and_that_of_one_that_is_forgotten_is_dropped():
+    own, telling, ground = area_of("...."), GroundTelling(), SharedGround()
+    larger, smaller = area_of("." * 9), area_of("." * 6)
+    for told in (larger, smaller):
+        ground.hear("r2", telling.next(told, 10), {"r2"})
+    assert cells_of(ground.joint(own)) == cells_of(smaller)
+    ground.hear("r3", (), {"r3"})
+    ground.hear("r3", telling.next(own, 10), {"r3"})
+    assert cells_of(ground.joint(own)) == cells_of(own)
+
+
+def test_tiles_are_told_a_few_at_a_time_and_changed_ones_first():
+    area = ReachableArea.around(CoverageLattice.from_free(np.ones((64, 64 * 5), np.bool_)), (0, 0))
+    telling = GroundTelling()
+    assert telling.next(None, 3) == ()
+    assert [place for place, _ in telling.next(area, 3)] == [(0, 0), (0, 1), (0, 2)]
+    assert [place for place, _ in telling.next(area, 3)] == [(0, 3), (0, 4), (0, 0)]
+
+
+def test_ground_far_away_of_a_robot_that_lies_takes_no_memory():
+    own, ground = area_of("...."), SharedGround()
+    all_set = b"\xff" * TILE_BYTES
+    ground.hear("r2", [((2**20, 2**20), all_set), ((1, 0), all_set)], {"r2"})
+    joint = ground.joint(own)
+    assert joint.lattice.states.size <= own.lattice.states.size + shared_ground.MOST_ADDED
+
+
+@pytest.mark.parametrize("moved", [(0, 12), (1, 15)])
+def test_parts_stay_in_place_while_nothing_ends_much_earlier(moved):
+    lattice = CoverageLattice.from_free(np.ones((3, 40), np.bool_))
+    wanted = np.ones((3, 40), np.bool_)
+    robots = [Robot("r1", (0, 0), 1.0), Robot("r2", (0, 39), 1.0)]
+    first = divide(lattice, wanted, robots)
+    later = divide(lattice, wanted, [Robot("r1", moved, 1.0), robots[1]], first)
+    assert later.seeds == first.seeds
+
+
+def test_all_robots_take_over_one_division():
+    fleet = FleetDrive(CORRIDOR, {"r3": (0, 0), "r1": (0, 1), "r2": (0, 39)})
+    fleet.run(8)
+    layers = [robot.mission.fleet for robot in fleet.robots.values()]
+    assert len({layer.number for layer in layers}) == 1
+    assert len({layer.by for layer in layers}) == 1
+    assert len({layer.parts for layer in layers}) == 1
+    assert len(layers[0].parts) == 3
