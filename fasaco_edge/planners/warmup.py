@@ -137,7 +137,7 @@ def _take_windows(room: _TinyRoom) -> None:
     framed, walk = room.framed()
     windows = WindowSearch(room.costly, framed, lower_bound_of(room.costly))
     windows.load(walk)
-    for _ in windows.solve_whole(1, stream_of(0)):
+    for _ in windows.solve_whole(1, 0, stream_of(0)):
         pass
     windows.solve(1, stream_of(0))
     windows.walk()

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from fasaco_edge.grid.lattice import CoverageLattice
+from fasaco_edge.kernels.windows.order import LINES, PLACES
 from fasaco_edge.planners.bound import THOROUGH, LowerBound
 from fasaco_edge.planners.cost import CoverageCost
 from fasaco_edge.planners.paper.baselines import first_walks
@@ -40,7 +41,7 @@ def assert_sound(problem, framed, search):
 def test_a_window_of_the_whole_ground_is_solved_to_the_least_cost():
     random = np.random.default_rng(11)
     solved = 0
-    for _ in range(150):
+    for trial in range(150):
         problem = drawn_problem(random)
         least_us = least_cost_us(problem)
         if not least_us:
@@ -48,7 +49,7 @@ def test_a_window_of_the_whole_ground_is_solved_to_the_least_cost():
         search, framed, walk = search_of(problem)
         if not search.load(walk):
             continue
-        for _ in search.solve_whole(PLENTY, stream_of(1)):
+        for _ in search.solve_whole(PLENTY, trial & (LINES | PLACES), stream_of(1)):
             pass
         assert_sound(problem, framed, search)
         # A walk is read as one that takes no step three times: so is a best one, nearly always.
@@ -70,11 +71,27 @@ def test_a_whole_ground_with_few_states_becomes_one_walk_all_the_same():
         search, framed, walk = search_of(problem)
         assert search.load(walk)
         begun_us = search.best_us
-        for _ in search.solve_whole(8, stream_of(trial)):
+        for _ in search.solve_whole(8, trial & (LINES | PLACES), stream_of(trial)):
             pass
         assert_sound(problem, framed, search)
         better += search.best_us < 0.9 * begun_us
     assert better == 6
+
+
+def test_a_narrow_beam_finds_another_walk_from_each_corner():
+    floor = np.kron(np.random.default_rng(2).random((9, 11)) < 0.8, np.ones((3, 3), bool))
+    floor[:3, :3] = True
+    ground = CoverageLattice.from_free(floor)
+    problem = CoverageProblem.of(ground, (0, 0), end=(0, 0), cost=CoverageCost(1.0, 50.0))
+    costs = []
+    for mirrored in (0, LINES, PLACES, LINES | PLACES):
+        search, framed, walk = search_of(problem)
+        assert search.load(walk)
+        for _ in search.solve_whole(8, mirrored, stream_of(0)):
+            pass
+        assert_sound(problem, framed, search)
+        costs.append(search.best_us)
+    assert len(set(costs)) == 4
 
 
 @pytest.mark.parametrize("price", [0.5, 1.25, 5.0, 50.0])

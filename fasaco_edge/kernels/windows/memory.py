@@ -157,6 +157,7 @@ class Window(NamedTuple):
         row, col: its first ones.
         rows, cols: its size.
         width: of the framed ground.
+        mirrored: bits of ``kernels.windows.order``: the corner the program begins in.
     """
 
     row: int
@@ -164,6 +165,7 @@ class Window(NamedTuple):
     rows: int
     cols: int
     width: int
+    mirrored: int
 
 
 LAYER_STAMP, EXPANDED = 0, 1

@@ -1,6 +1,6 @@
 """A window of a walk, re-optimised exactly or nearly so by dynamic programming over its frontier.
 
-Cell by cell, row by row of the window's shorter side, the program chooses the cell's passages. A
+Cell by cell, line by line (``order``), the program chooses the cell's passages. A
 state is the information that the remaining cells need: the open ends of the walk so far at the
 frontier and at the window's rim, and which of them belong to the same piece; the walk outside the
 window joins the ends at its rim. Of equal states the cheapest is kept (Simpath; Inoue and Minato
@@ -47,6 +47,7 @@ from fasaco_edge.kernels.windows.memory import (
     Terms,
     Window,
 )
+from fasaco_edge.kernels.windows.order import cell_at, directions_of, shape_of
 from fasaco_edge.kernels.windows.parts import (
     FEW_CELLS,
     LEADS,
@@ -56,14 +57,6 @@ from fasaco_edge.kernels.windows.parts import (
     prepare_parts,
 )
 from fasaco_edge.kernels.windows.passages import BEGIN, END, NONE, SLOTS, Passages, across
-
-
-@inlined
-def _cell_at(window: Window, line: int, place: int) -> int:
-    """Return a cell by the program's line and place in it: lines run along the shorter side."""
-    if window.cols > window.rows:
-        return (window.row + place) * window.width + window.col + line
-    return (window.row + line) * window.width + window.col + place
 
 
 @lean_kernel
@@ -111,11 +104,11 @@ def begin_window(
     random: NDArray[np.uint64],
 ) -> None:
     """Begin to solve a window; see ``solve_window``, and above for ``ring_price``."""
-    lines, wide = max(window.rows, window.cols), min(window.rows, window.cols)
+    lines, wide = shape_of(window)
     at, count = program.at, 0
     for line in range(lines):
         for place in range(wide):
-            cell = _cell_at(window, line, place)
+            cell = cell_at(window, line, place)
             if ground.steps[cell]:
                 program.cells[count] = cell
                 program.inside[cell] = 1
@@ -139,15 +132,9 @@ def begin_window(
         return
     _join_outside(ground, passages, program, first, ids)
     program.cost[0, 0], program.closed[0, 0] = 0, 0
-    ahead, below = _directions(window)
+    ahead, below = directions_of(window)
     prepare_parts(ground, program, count, ahead, below, _begin_of(passages, program))
     at[STATES] = 1
-
-
-@inlined
-def _directions(window: Window) -> tuple[int, int]:
-    """Return the directions along a line, and from line to line."""
-    return (1, 0) if window.cols > window.rows else (0, 1)
 
 
 @inlined
@@ -161,16 +148,16 @@ def advance_window(
     ground: Ground, passages: Passages, terms: Terms, window: Window, program: Program, beam: int
 ) -> bool:
     """Decide one line of cells more; return whether there are more to decide."""
-    lines, wide = max(window.rows, window.cols), min(window.rows, window.cols)
+    lines, wide = shape_of(window)
     at = program.at
     line = at[LINE]
     if line == lines or not at[STATES]:
         return False
-    ahead, below = _directions(window)
+    ahead, below = directions_of(window)
     begin, end_id, count = _begin_of(passages, program), at[END_ID], at[COUNT]
     is_free = end_id >= 0 and terms.free_end
     for place in range(wide):
-        cell = _cell_at(window, line, place)
+        cell = cell_at(window, line, place)
         if not ground.steps[cell] or not at[STATES]:
             continue
         number = at[NUMBER]
@@ -198,7 +185,7 @@ def end_window(
     ground: Ground, passages: Passages, terms: Terms, window: Window, program: Program
 ) -> int:
     """Put the best state's passages back, if it is better; return as ``solve_window`` does."""
-    at, wide = program.at, min(window.rows, window.cols)
+    at, (_, wide) = program.at, shape_of(window)
     layer, end_id, count = at[LAYER], at[END_ID], at[COUNT]
     best, cost = -1, at[LIMIT]
     for state in range(at[STATES]):
@@ -278,12 +265,12 @@ def _list_frontier(
     ground: Ground, program: Program, window: Window, line: int, place: int, here: Here
 ) -> None:
     """Note which part each identifier of the frontier leads into, once the cell is decided."""
-    lines, wide = max(window.rows, window.cols), min(window.rows, window.cols)
+    lines, wide = shape_of(window)
     for column in range(wide):
         after = line + 1 if column <= place else line
         if after in (0, lines):
             continue
-        cell = _cell_at(window, after, column)
+        cell = cell_at(window, after, column)
         if ground.steps[cell] >> here.above & 1:
             for lane in range(2):
                 leads_to(program, 2 * column + lane, cell)
@@ -332,7 +319,7 @@ def _put_back(
     count: int,
 ) -> None:
     """Write the passages of a final state."""
-    ahead, below = _directions(window)
+    ahead, below = directions_of(window)
     behind, above = (ahead + 2) & 3, (below + 2) & 3
     taken, partner = program.taken, passages.partner
     for index in range(count, 0, -1):

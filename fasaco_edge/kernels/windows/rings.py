@@ -61,7 +61,7 @@ def join_rings(
         # All cells beside it are in the window, too.
         row = cell // aim.cols - 1 - index_of(draw(random), rows - 2)
         col = cell % aim.cols - 1 - index_of(draw(random), cols - 2)
-        window = laid_in(aim, row, col, rows, cols)
+        window = laid_in(aim, row, col, rows, cols, 0)
         tally[COST] += solve_window(
             ground, passages, terms, window, program, aim.beam, 0, ANY_PRICE, random
         )

@@ -112,18 +112,19 @@ def _draw_window(aim: Aim, swept: int, random: NDArray[np.uint64]) -> Window:
     area = area // 2 + index_of(draw(random), area)
     long = max(short, area // short)
     rows, cols = short, long
-    if draw(random) >> 40 & 1:
+    bits = draw(random) >> 40
+    if bits & 1:
         rows, cols = long, short
     cell = aim.cells[index_of(draw(random), aim.cells.size)]
     row = cell // aim.cols - index_of(draw(random), min(rows, aim.rows - 2 * aim.frame))
     col = cell % aim.cols - index_of(draw(random), min(cols, aim.cols - 2 * aim.frame))
-    return laid_in(aim, row, col, rows, cols)
+    return laid_in(aim, row, col, rows, cols, int(bits >> 1 & 3))
 
 
 @inlined
-def laid_in(aim: Aim, row: int, col: int, rows: int, cols: int) -> Window:
+def laid_in(aim: Aim, row: int, col: int, rows: int, cols: int, mirrored: int) -> Window:
     """Return a window as near to its drawn position as the ground allows."""
     rows, cols = min(rows, aim.rows - 2 * aim.frame), min(cols, aim.cols - 2 * aim.frame)
     row = min(max(row, aim.frame), aim.rows - aim.frame - rows)
     col = min(max(col, aim.frame), aim.cols - aim.frame - cols)
-    return Window(row, col, rows, cols, aim.cols)
+    return Window(row, col, rows, cols, aim.cols, mirrored)

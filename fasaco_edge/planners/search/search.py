@@ -21,6 +21,7 @@ import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 
+from fasaco_edge.kernels.windows.order import LINES, PLACES
 from fasaco_edge.planners.bound import GLANCE, THOROUGH, LowerBound
 from fasaco_edge.planners.cost import MICROSECONDS, SearchWork
 from fasaco_edge.planners.paper.baselines import first_walks
@@ -53,8 +54,10 @@ DEAR_PIECES, PIECES = 50, 5
 # This many windows without gain count as one perturbation.
 WINDOWS_A_PERTURBATION = 10
 # Beam of solving the whole ground, with expensive turns: WHOLE_STATES over its number of cells,
-# within the limits; then WIDER times that if there was no gain.
-WHOLE_STATES, LEAST_BEAM, MOST_BEAM, WIDER = 8_000, 8, 100, 4
+# within the limits. It is solved from each corner, and the cheapest walk kept: four narrow beams
+# find more than one of four times the width.
+WHOLE_STATES, LEAST_BEAM, MOST_BEAM = 8_000, 8, 100
+CORNERS = (0, LINES, PLACES, LINES | PLACES)
 
 # Cells that the bound solves in bands: per pause, and per call: some 3 % of the time with expensive
 # turns, 10 to 20 % otherwise.
@@ -208,11 +211,8 @@ class Search:
             self._tighten(THOROUGH)
         elif is_dear(self._problem.cost) and not self._is_proven() and self._walk.load_windows():
             beam = min(max(WHOLE_STATES // self._problem.cells, LEAST_BEAM), MOST_BEAM)
-            for states in (beam, WIDER * beam):
-                before_us = windows.best_us
-                yield from windows.solve_whole(states, self._random)
-                if windows.best_us < before_us:
-                    break
+            for mirrored in CORNERS:
+                yield from windows.solve_whole(beam, mirrored, self._random)
             self._walk.put_back_windows()
             yield from self._solve_windows()
 

@@ -123,10 +123,11 @@ class WindowSearch:
         terms, program, aim = self._terms, self._program, self._aim
         solve_windows(ground, passages, best, terms, program, aim, self._tally, expansions, random)
 
-    def solve_whole(self, beam: int, random: NDArray[np.uint64]) -> Iterator[None]:
+    def solve_whole(self, beam: int, mirrored: int, random: NDArray[np.uint64]) -> Iterator[None]:
         """Solve the whole ground as one window, with this beam; pause after each line.
 
-        Its rings are joined; a better result is kept.
+        Its rings are joined; a better result is kept. ``mirrored`` is the corner to begin in, as
+        in ``kernels.windows.order``.
         """
         framed, ground, passages, terms = (
             self._framed,
@@ -134,7 +135,7 @@ class WindowSearch:
             self._passages,
             self._terms,
         )
-        window = Window(FRAME, FRAME, framed.rows, framed.cols, framed.width)
+        window = Window(FRAME, FRAME, framed.rows, framed.cols, framed.width, mirrored)
         program = _program(self._size, beam, self._aim.cells.size)
         price = RING_TURNS * terms.turn
         begin_window(ground, passages, terms, window, program, 0, ANY_PRICE, price, random)
