@@ -32,7 +32,7 @@ from fasaco_edge.planners.search.current_walk import CurrentWalk
 from fasaco_edge.planners.search.effort import effort_for
 from fasaco_edge.planners.search.restarts import NEVER, Restarts, SearchSettings
 from fasaco_edge.planners.search.walk_region import stream_of
-from fasaco_edge.planners.search.windows import WindowSearch, is_dear, suits
+from fasaco_edge.planners.search.windows import WindowSearch, is_dear, suits, suits_whole
 from fasaco_edge.planners.walk_before import HELD_CELLS, completed, has_walk
 
 # Proposals between two pauses: about a millisecond.
@@ -53,7 +53,7 @@ EXPANSIONS_AT_ONCE = 30_000
 DEAR_PIECES, PIECES = 50, 5
 # This many windows without gain count as one perturbation.
 WINDOWS_A_PERTURBATION = 10
-# Beam of solving the whole ground, with expensive turns: WHOLE_STATES over its number of cells,
+# Beam of solving the whole ground, where turns cost enough: WHOLE_STATES over its number of cells,
 # within the limits. It is solved from each corner, and the cheapest walk kept: four narrow beams
 # find more than one of four times the width.
 WHOLE_STATES, LEAST_BEAM, MOST_BEAM = 8_000, 8, 100
@@ -204,12 +204,12 @@ class Search:
             self._walk.held = HELD_CELLS if self._walk.is_whole else 0
 
     def _begin_better(self) -> Iterator[None]:
-        """Improve the first walk; with expensive turns, also solve the ground as one window."""
+        """Improve the first walk; where turns cost enough, solve the ground as one window, too."""
         yield from self._improve()
         windows = self._window_search()
         if windows is None:
             self._tighten(THOROUGH)
-        elif is_dear(self._problem.cost) and not self._is_proven() and self._walk.load_windows():
+        elif suits_whole(self._problem.cost) and not self._is_proven() and self._walk.load_windows():
             beam = min(max(WHOLE_STATES // self._problem.cells, LEAST_BEAM), MOST_BEAM)
             for mirrored in CORNERS:
                 yield from windows.solve_whole(beam, mirrored, self._random)

@@ -39,6 +39,8 @@ WINDOW_CELLS, MOST_BEAM = 256, 300
 # Threshold of expensive turns, in steps per quarter-turn: above it windows are large; below it
 # small ones are as good, and faster.
 DEAR_STEPS = 10
+# Price of a turn, in steps, from which solving the whole ground pays; at 1.25 it gains nothing.
+WHOLE_STEPS = 2
 # Lattices with more cells take too much memory: about 75 bytes per cell.
 MOST_LATTICE = 250_000
 # Price of a second ring when solving a whole ground, in quarter-turns: any other continuation is
@@ -57,6 +59,11 @@ def suits(problem: CoverageProblem) -> bool:
 def is_dear(cost: CoverageCost) -> bool:
     """Return whether turns are so expensive that they dominate the cost."""
     return cost.quarter_turn_us >= DEAR_STEPS * cost.step_us
+
+
+def suits_whole(cost: CoverageCost) -> bool:
+    """Return whether turns are expensive enough to solve the whole ground as one window."""
+    return cost.quarter_turn_us >= WHOLE_STEPS * cost.step_us
 
 
 class WindowSearch:
