@@ -32,7 +32,7 @@ from fasaco_edge.planners.search.current_walk import CurrentWalk
 from fasaco_edge.planners.search.effort import effort_for
 from fasaco_edge.planners.search.restarts import NEVER, Restarts, SearchSettings
 from fasaco_edge.planners.search.walk_region import stream_of
-from fasaco_edge.planners.search.windows import WindowSearch, is_dear, suits, suits_whole
+from fasaco_edge.planners.search.windows import WindowSearch, is_dear, pays_whole, suits
 from fasaco_edge.planners.walk_before import HELD_CELLS, completed, has_walk
 
 # Proposals between two pauses: about a millisecond.
@@ -209,7 +209,7 @@ class Search:
         windows = self._window_search()
         if windows is None:
             self._tighten(THOROUGH)
-        elif suits_whole(self._problem.cost) and not self._is_proven() and self._walk.load_windows():
+        elif pays_whole(self._problem.cost) and not self._is_proven() and self._walk.load_windows():
             beam = min(max(WHOLE_STATES // self._problem.cells, LEAST_BEAM), MOST_BEAM)
             for mirrored in CORNERS:
                 yield from windows.solve_whole(beam, mirrored, self._random)

@@ -61,7 +61,7 @@ def is_dear(cost: CoverageCost) -> bool:
     return cost.quarter_turn_us >= DEAR_STEPS * cost.step_us
 
 
-def suits_whole(cost: CoverageCost) -> bool:
+def pays_whole(cost: CoverageCost) -> bool:
     """Return whether turns are expensive enough to solve the whole ground as one window."""
     return cost.quarter_turn_us >= WHOLE_STEPS * cost.step_us
 
