@@ -58,6 +58,11 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         "(default: %(default)g)",
     )
     parser.add_argument(
+        "--meets-others",
+        action="store_true",
+        help="stop before other robots on the bus, all of one size",
+    )
+    parser.add_argument(
         "--trail-out", type=Path, metavar="FILE.csv", help="write the driven positions, header x,y"
     )
     add_robot_on_bus(parser)
@@ -83,7 +88,13 @@ def run(args: argparse.Namespace) -> int:
     world = World(truth, Pose2D(x, y), config)
     here = robot_on_bus(args)
     result = run_simulation(
-        world, here.keys, here.bus, speed=args.speed, driver=args.driver, report=_report
+        world,
+        here.keys,
+        here.bus,
+        speed=args.speed,
+        driver=args.driver,
+        meets_others=args.meets_others,
+        report=_report,
     )
     if args.trail_out is not None:
         with writing(args.trail_out) as file:
@@ -93,6 +104,8 @@ def run(args: argparse.Namespace) -> int:
         f"{result.collisions} collisions, {result.stops} stops before a wall, "
         f"stood {result.longest_stand_s:.1f} s at most"
     )
+    if args.meets_others:
+        print(f"touched other robots {result.touches} times, stopped {result.meetings} times")
     if world.battery is not None:
         battery = world.battery
         print(f"charged {battery.charges} times, never below {battery.lowest:.1%}")

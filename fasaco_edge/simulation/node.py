@@ -21,7 +21,7 @@ from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.messages.battery import BatteryState, Power, encode_battery
 from fasaco_edge.wire.messages.maps import encode_occupancy_grid
 from fasaco_edge.wire.messages.paths import decode_path
-from fasaco_edge.wire.messages.poses import encode_pose_stamped
+from fasaco_edge.wire.messages.poses import decode_pose, encode_pose_stamped
 from fasaco_edge.wire.messages.twists import decode_velocity
 
 log = logging.getLogger(__name__)
@@ -73,6 +73,7 @@ class Progress:
         distance_m: distance driven [m].
         collisions: number of times a path led into an obstacle.
         stops: number of stops before an obstacle on its map.
+        touches, meetings: how often it touched another robot, and stopped before one.
         longest_stand_s: the longest time that it stood between two moves [s].
         refused: paths or velocities that were malformed, or in another frame.
         speed: simulated seconds per second, since the last report.
@@ -84,6 +85,8 @@ class Progress:
     distance_m: float
     collisions: int
     stops: int
+    touches: int
+    meetings: int
     longest_stand_s: float
     refused: int
     speed: float
@@ -96,6 +99,7 @@ def run_simulation(
     *,
     speed: float = 1.0,
     driver: Driver = "ideal",
+    meets_others: bool = False,
     should_stop: Callable[[], bool] = lambda: False,
     report: Callable[[Progress], None] = lambda _progress: None,
 ) -> Progress:
@@ -113,6 +117,7 @@ def run_simulation(
         speed: simulated seconds per second, above 0; a machine that cannot keep up
             runs slower.
         driver: ideal: it follows paths itself; follow: velocities drive it.
+        meets_others: whether other robots on the bus are obstacles.
         should_stop: asked some fifty times a second.
         report: called about twice a second, and at the end.
 
@@ -124,6 +129,8 @@ def run_simulation(
         raise BadConfiguration(f"speed must be above 0, got {speed}")
     with open_bus(settings) as bus, stop_event() as stop:
         robot = RobotOnBus(world, keys, bus, driver)
+        if meets_others:
+            bus.subscribe(keys.of_all(topics.POSE), robot.meet)
         robot.drive(speed, lambda: stop.is_set() or should_stop(), report)
         robot.publish(world.emission())
         report(last := robot.progress(time.monotonic()))
@@ -142,6 +149,7 @@ class RobotOnBus:
         self._map = bus.advertise(keys, topics.MAP)
         self._pose = bus.advertise(keys, topics.POSE)
         self._battery = bus.advertise(keys, topics.BATTERY)
+        self._keys = keys
         self._newest: LatestSlot[Sample] = LatestSlot()
         self._take = self._follow if driver == "ideal" else self._move
         bus.listen(keys, topics.PATH if driver == "ideal" else topics.CMD_VEL, self._newest.put)
@@ -177,6 +185,17 @@ class RobotOnBus:
             state = BatteryState(emission.battery.level, power, "", self._world.stamp_ns)
             self._battery.put(encode_battery(state))
 
+    def meet(self, sample: Sample) -> None:
+        """Take another robot's pose for its place; on a Zenoh thread."""
+        name = self._keys.robot_of(sample.key)
+        if name in ("", self._keys.robot):
+            return
+        try:
+            pose = decode_pose(sample.payload, sample.schema).pose
+        except MalformedMessage:
+            return
+        self._world.others = {**self._world.others, name: (pose.x, pose.y)}
+
     def _take_newest(self, timeout_s: float) -> None:
         """Wait for paths or velocities; a malformed one affects nothing else."""
         sample = self._newest.take(timeout_s)
@@ -211,6 +230,8 @@ class RobotOnBus:
             world.distance_m,
             world.collisions,
             world.stops,
+            world.touches,
+            world.meetings,
             world.longest_stand_s,
             self._refused,
             speed,

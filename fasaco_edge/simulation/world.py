@@ -38,6 +38,8 @@ TRACK_SPACING_M = 0.02
 RECENT_TRACK_POINTS = 500
 # Timeout of the velocity, after which a base stops by itself [s].
 DEAF_S = 0.5
+# Clearance to other robots, all of one size, on stopping [m].
+MEETING_M = 0.05
 # Clearance of the robot's own line to its path, where possible [m].
 MARGIN_M = 0.005
 
@@ -110,6 +112,11 @@ class World:
         self.distance_m = 0.0
         self.collisions = 0
         self.stops = 0
+        # The other robots in the building, by name, and how often it touched one, or stopped
+        # before one.
+        self.others: dict[str, Point] = {}
+        self.touches = self.meetings = 0
+        self._is_held = False
         # How often it had stopped when its path came.
         self._stopped_at = 0
         # For how many ticks the robot stands, once it has moved; and the most of them.
@@ -236,10 +243,17 @@ class World:
             self._go_on(driven(self._drive, goal, self.config))
 
     def _looks_ahead(self) -> bool:
-        """Tell whether the robot may drive on: it stops before obstacles on its own map."""
+        """Tell whether the robot may drive on: it stops before obstacles on its own map.
+
+        Before other robots it stops until they are gone.
+        """
         if self.activity is Activity.STOPPED:
             return False
         ahead = driven(self._drive, self._corners[-1], self.config)
+        was_held, self._is_held = self._is_held, self._meets(stopping_point(ahead, self.config))
+        if self._is_held:
+            self.meetings += not was_held
+            return False
         if ahead.speed == 0.0 or self._mapper.is_clear_at(stopping_point(ahead, self.config)):
             return True
         self.activity = Activity.STOPPED
@@ -254,8 +268,20 @@ class World:
         if ahead.moving or self._drive.moving:
             self._go_on(ahead)
 
+    def _meets(self, place: Point, margin_m: float = MEETING_M) -> bool:
+        """Tell whether a place is too near to another robot, and nearer than this robot is."""
+        here, least_m = (self.pose.x, self.pose.y), 2 * self.config.hull_radius_m + margin_m
+        return any(
+            math.dist(place, other) < min(least_m, math.dist(here, other) - 1e-9)
+            for other in self.others.values()
+        )
+
     def _go_on(self, ahead: DriveState) -> None:
-        """Come into a state that may be in a wall."""
+        """Come into a state that may be in a wall, or in another robot."""
+        if self._meets((ahead.pose.x, ahead.pose.y), 0.0):
+            self.touches += self._drive.moving
+            self._drive = DriveState(self.pose)
+            return
         if not _fits(self._truth, ahead.pose, self.config):
             self._collide()
             return

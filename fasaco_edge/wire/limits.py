@@ -41,3 +41,5 @@ MAX_FLEET_TILES: Final = 24
 """Of progress in one message of a fleet's robot, of 64 x 64 cells each: 17 kB; and of ground."""
 MAX_FLEET_PARTS: Final = 33
 """Of a division, a robot each."""
+MAX_FLEET_POINTS: Final = 64
+"""Of a robot's next metres."""

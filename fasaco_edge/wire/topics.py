@@ -190,7 +190,13 @@ FLEET = Topic(
     qos=Qos("data_low", why="the next one says it all again, within a second"),
     rate_hz=1.0,
     queues=Queues(daemon=64),
-    limits=("max_json_bytes", "max_fleet_tiles", "max_fleet_parts", "queue_fleet"),
+    limits=(
+        "max_json_bytes",
+        "max_fleet_tiles",
+        "max_fleet_parts",
+        "max_fleet_points",
+        "queue_fleet",
+    ),
 )
 ALIVE = Topic(
     name="alive",

@@ -43,6 +43,9 @@ class FleetRobot(Drive):
             ground=self.told_ground.next(mission.area, MOST_TILES),
             by=mission.fleet.by,
             parts=mission.fleet.parts,
+            radius_m=CONFIG.footprint.robot_radius_m,
+            ahead=tuple((x, y) for x, y in mission.next_metres().tolist()),
+            waits_for=mission.giving_way.waits_for,
         )
 
     def tick(self, after=1.0):

@@ -287,7 +287,7 @@ def test_what_this_robot_has_swept_itself_is_not_taken_from_it():
 
 
 def test_cells_are_taken_anew_from_this_robot_after_another_has_forgotten_some():
-    fleet = FleetDrive(HALL, TWO)
+    fleet = FleetDrive(HALL, {"r1": (0, 0), "r2": (0, 12)})
     fleet.run(4)
     ours, other = fleet.robots.values()
     report, ahead = replace(other.report(), tiles=()), ours.walk[::-1]
@@ -405,3 +405,21 @@ def tiles_of(cells):
     for cell in cells:
         ledger.credit(cell)
     return Telling().next(ledger.snapshot().tiles, 100)
+
+
+def test_robots_that_meet_in_a_corridor_pass_at_a_niche_and_touch_nobody():
+    rows = (
+        ["." * 8 + "#" * 24 + "." * 8] * 4
+        + ["." * 40]
+        + ["." * 8 + "#" * 11 + "..." + "#" * 10 + "." * 8] * 2
+    )
+    fleet = FleetDrive(rows, {"r1": (0, 0), "r2": (0, 39)})
+    fleet.robots["r1"].walk, fleet.robots["r2"].walk = [], []
+    least = math.inf
+    while not all(robot.mission.state == "done" for robot in fleet.robots.values()):
+        assert fleet.seconds < 2000
+        fleet.tick()
+        first, second = (robot.mission.pose.pose for robot in fleet.robots.values())
+        least = min(least, math.dist((first.x, first.y), (second.x, second.y)))
+    assert fleet.left_out() == set()
+    assert least >= 2 * CONFIG.footprint.robot_radius_m

@@ -17,7 +17,12 @@ from fasaco_edge.errors import FleetError, MalformedMessage
 from fasaco_edge.mission.core.events import Part
 from fasaco_edge.wire.documents.fleet import CellTile, FleetMember, FleetPart, decode_member
 from fasaco_edge.wire.documents.json_text import encode_json
-from fasaco_edge.wire.limits import MAX_FLEET_PARTS, MAX_FLEET_TILES, MAX_JSON_BYTES
+from fasaco_edge.wire.limits import (
+    MAX_FLEET_PARTS,
+    MAX_FLEET_POINTS,
+    MAX_FLEET_TILES,
+    MAX_JSON_BYTES,
+)
 from tests.mission.fleets import FleetRobot
 from tests.wire.schemas import check
 
@@ -28,6 +33,9 @@ MEMBER = structs.replace(
     ground=(TILE,),
     by="r2",
     parts=(FleetPart("r1", 3, -4, -1.5, 1.2), FleetPart("r2", 0, 9, 0.0, 2.0)),
+    radius_m=0.2,
+    ahead=((1.5, -2.0), (1.5, -1.75)),
+    waits_for="r3",
 )
 CONFIG = DaemonConfig(robot=RobotConfig(name="r1"), fleet=FleetConfig("hall"))
 
@@ -62,6 +70,9 @@ def test_it_comes_back_as_it_was_and_is_that_of_the_schema():
         {"state": 5},
         {"swept": [[0, 0, "AAAA"]]},
         {"ground": [[0, 0, "AAAA"]]},
+        {"radius_m": -0.1},
+        {"ahead": [[0.0, 1e9]]},
+        {"ahead": [[0.0, 0.0]] * (MAX_FLEET_POINTS + 1)},
         {"parts": [["r1", 0, 0, 0.0, 0.0]]},
         {"parts": [["r1", 0, 2**30, 0.0, 1.0]]},
         {"parts": [["r1", 0, 0, 1e300, 1.0]]},
@@ -161,6 +172,6 @@ def test_a_division_comes_with_its_parts_and_one_that_lacks_them_is_read():
     assert heard_now.parts[0] == Part("r1", (3, -4), -1.5, 1.2)
     assert heard_now.ground == (((-1, 2), TILE.cells),)
     older = json.loads(said())
-    for member in ("ground", "by", "parts"):
+    for member in ("ground", "by", "parts", "radius_m", "ahead", "waits_for"):
         del older[member]
     assert heard(json.dumps(older).encode()).parts == ()

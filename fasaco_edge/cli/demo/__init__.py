@@ -35,7 +35,7 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         default=1,
         metavar="N",
         help=f"how many share the building as a fleet, 1 to {MOST_ROBOTS}; they begin far from one "
-        "another, and pass through one another (default: %(default)s)",
+        "another, and stop before one another (default: %(default)s)",
     )
     parser.add_argument(
         "--speed",

@@ -82,6 +82,8 @@ class DemoRobot:
         robot += [f"--start-xy={self.start[0]!r},{self.start[1]!r}"]
         robot += ["--robot-radius", str(args.robot_radius), "--trail-out", str(self.trail)]
         robot += ["--battery-min", str(args.battery_min)]
+        if args.robots > 1:
+            robot.append("--meets-others")
         programs = [("daemon", daemon), ("robot", robot)]
         if args.driver == "follow":
             follower = ["follow", "--config", str(self.config), "--speed", str(args.speed)]

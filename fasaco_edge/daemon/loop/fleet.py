@@ -106,6 +106,9 @@ class FleetEar:
                 Part(part.robot, (part.row, part.col), part.handicap_s, part.step_s)
                 for part in member.parts
             ),
+            radius_m=member.radius_m,
+            ahead=member.ahead,
+            waits_for=member.waits_for,
         )
 
     def _is_due(self, key: str, now: float) -> bool:
@@ -124,7 +127,7 @@ class FleetEar:
 
 
 class FleetVoice:
-    """Publisher of this robot's message: once a second, and when state or division have changed.
+    """Publisher of this robot's message: once a second, on change, and more often near others.
 
     Args:
         publisher: of the robot's own key.
@@ -134,23 +137,27 @@ class FleetVoice:
     def __init__(self, publisher: Publisher, config: DaemonConfig) -> None:
         assert config.fleet
         self._publisher, self._fleet, self._cell_m = publisher, config.fleet.name, config.cell_m
+        self._radius_m = config.robot.radius_m
         self._telling, self._telling_ground = Telling(), GroundTelling()
         self._said: tuple[object, ...] = ()
         self._epoch = 0
-        self._said_at = float("-inf")
+        # When a message was published, and one with tiles in turn.
+        self._said_at = self._told_at = float("-inf")
 
     def publish(self, mission: Mission, now: float) -> None:
         """Publish a message if due; the caller catches failures."""
         stamped = mission.pose
         if stamped is None or not mission.ledger.frame:
             return
-        key = mission.state, mission.fleet.number, mission.shared.epoch
-        is_news = key != self._said
-        wait_s = LEAST_PERIOD_S if is_news else PERIOD_S
-        if now - self._said_at < wait_s:
+        way = mission.giving_way
+        key = mission.state, mission.fleet.number, mission.shared.epoch, way.waits_for
+        is_news, is_due = key != self._said, now - self._told_at >= PERIOD_S
+        if now - self._said_at < LEAST_PERIOD_S or not (is_news or is_due or way.is_near):
             return
         self._said, self._said_at = key, now
-        most = FEW_TILES if is_news else TILES
+        most = FEW_TILES if is_news else 0
+        if is_due:
+            self._told_at, most = now, TILES
         if mission.shared.epoch != self._epoch:
             # Published changes are forgotten.
             self._epoch, self._telling, most = mission.shared.epoch, Telling(), TILES
@@ -176,6 +183,9 @@ class FleetVoice:
                 FleetPart(part.robot, *part.seed, part.handicap_s, part.step_s)
                 for part in mission.fleet.parts
             ),
+            radius_m=self._radius_m,
+            ahead=tuple((round(x, 3), round(y, 3)) for x, y in mission.next_metres().tolist()),
+            waits_for=way.waits_for,
         )
         self._publisher.put(encode_json(member))
 

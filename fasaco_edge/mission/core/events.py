@@ -134,6 +134,9 @@ class MemberHeard:
         ground: places and bits of the cells it can reach; a subset of its tiles.
         by: name of the robot that made that division.
         parts: what that division gives to each robot.
+        radius_m: radius of its disc [m].
+        ahead: points (x, y) of its next metres [m].
+        waits_for: name of the robot that it waits for; "" for none.
     """
 
     robot: str
@@ -150,6 +153,9 @@ class MemberHeard:
     ground: tuple[tuple[tuple[int, int], bytes], ...] = ()
     by: str = ""
     parts: tuple[Part, ...] = ()
+    radius_m: float = 0.0
+    ahead: tuple[tuple[float, float], ...] = ()
+    waits_for: str = ""
 
 
 Event = (

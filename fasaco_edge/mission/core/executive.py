@@ -13,6 +13,7 @@ from fasaco_edge.grid.lattice import Cell
 from fasaco_edge.mission.config import MissionPolicy
 from fasaco_edge.mission.core.charging import Charging
 from fasaco_edge.mission.core.events import Decision, PathUpdate, State
+from fasaco_edge.mission.core.giving_way import GivingWay
 from fasaco_edge.mission.core.route import Route
 from fasaco_edge.mission.core.trail_layer import TrailLayer
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
@@ -57,6 +58,7 @@ class Executive:
     trail: TrailLayer
     fleet: FleetLayer
     charging: Charging
+    giving_way: GivingWay
     policy: MissionPolicy
     _state: State = field(default=State.WAITING_FOR_MAP, init=False)
     _reason: str = field(default="no map yet", init=False)
@@ -83,6 +85,8 @@ class Executive:
         """Return what is to be done at ``now`` [s]."""
         self._now = now
         self._consider_charging()
+        if held := self._give_way():
+            return held
         if resting := self._why_resting():
             return self._rest(*resting)
         route = self.route
@@ -124,6 +128,27 @@ class Executive:
             update = route.publish(route.path.ahead, "robot stands", now)
         is_free = self._state is State.COVERING and route.pending is None and not route.wanted
         return Decision(path=update, plan=route.request_improvement(now) if is_free else None)
+
+    def _give_way(self) -> Decision | None:
+        """Wait, or make way, for another robot of the fleet; None where there is no need.
+
+        A robot whose order is over makes way, too.
+        """
+        order, way = self.orders.order_state, self.giving_way
+        is_going = order.order is not None and not order.paused and not order.errand
+        if not (is_going and self.fleet.members) or self.monitor.trouble(self._now):
+            way.end()
+            return None
+        update = way.look(self._now)
+        if not way.waits_for:
+            return None
+        cell = self.map.robot_cell()
+        if self._state is not State.DONE and cell is not None:
+            self._state = State.COVERING if order.is_open else State.DONE
+            if reason := self._share(cell):
+                self.route.want(reason)
+        self._reason = way.reason
+        return Decision(path=update)
 
     def _why_resting(self) -> tuple[State, str] | None:
         """Return state and reason where there is nothing to decide; else None."""

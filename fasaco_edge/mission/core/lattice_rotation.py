@@ -73,7 +73,8 @@ class LatticeRotation:
                 return PoseReceived(_rotated_stamped(pose, -self.deg))
             case MemberHeard(x=x, y=y):
                 x, y = rotated_point(x, y, -self.deg)
-                return replace(event, x=x, y=y)
+                ahead = tuple(rotated_point(*point, -self.deg) for point in event.ahead)
+                return replace(event, x=x, y=y, ahead=ahead)
         return event
 
     def order(self, state: OrderState, rotated_by_deg: float) -> OrderState:

@@ -12,11 +12,13 @@ from dataclasses import replace
 from fasaco_edge.grid.geometry import StampedPose
 from fasaco_edge.grid.lattice import Cell, CoverageLattice
 from fasaco_edge.grid.occupancy import OccupancyGrid
+from fasaco_edge.grid.rotation import rotated_points
 from fasaco_edge.mission.config import MissionConfig
 from fasaco_edge.mission.core.charging import BatteryGauge, Charging
 from fasaco_edge.mission.core.event_handler import EventHandler
 from fasaco_edge.mission.core.events import Decision, Event, MapReceived, PathUpdate, PoseReceived
 from fasaco_edge.mission.core.executive import Executive
+from fasaco_edge.mission.core.giving_way import GivingWay
 from fasaco_edge.mission.core.lattice_angle import LatticeAngle
 from fasaco_edge.mission.core.lattice_rotation import LatticeRotation
 from fasaco_edge.mission.core.route import Route
@@ -30,6 +32,7 @@ from fasaco_edge.mission.coverage.swept_floor import SweptFloor
 from fasaco_edge.mission.coverage.unreached import Unreached
 from fasaco_edge.mission.fleet.layer import FleetLayer
 from fasaco_edge.mission.fleet.shared import SharedProgress
+from fasaco_edge.mission.fleet.traffic import Points
 from fasaco_edge.mission.line.layer import FloorToSweep, LineLayer
 from fasaco_edge.mission.map.inputs import InputMonitor
 from fasaco_edge.mission.map.map_state import MapState
@@ -83,7 +86,8 @@ class Mission:
         self._handler = EventHandler(
             *owners, self._line, self._trail, *measured, config.policy, self._rotation.deg
         )
-        decided_by = self._trail, self.fleet, self.charging
+        self.giving_way = GivingWay(config, self._map, self.route, self.fleet)
+        decided_by = self._trail, self.fleet, self.charging, self.giving_way
         self._executive = Executive(*owners, *decided_by, config.policy)
 
     def restore_ledger(self, before: LedgerSnapshot) -> None:
@@ -252,6 +256,11 @@ class Mission:
     def shared(self) -> SharedProgress:
         """The cells swept by other robots."""
         return self._ledger.shared
+
+    def next_metres(self) -> Points:
+        """Return the points of the path's next metres in the map frame [m], float64 (n, 2)."""
+        line = self.giving_way.line()[1:]
+        return rotated_points(line, self._rotation.deg) if len(line) else line
 
     def open_cells(self) -> int:
         """Return the number of cells still to be swept, by this robot or another."""

@@ -23,6 +23,7 @@ from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
 from fasaco_edge.mission.fleet.division import Division, Robot, divide
 from fasaco_edge.mission.fleet.ground import SharedGround
 from fasaco_edge.mission.fleet.shared import MOST_ROBOTS
+from fasaco_edge.mission.fleet.traffic import CLEARANCE_M, OLD_S, Neighbour
 from fasaco_edge.mission.map.map_state import MapState
 from fasaco_edge.mission.map.reachable_area import ReachableArea, anchor_cell
 
@@ -77,7 +78,8 @@ class Member:
             return "gone"
         if self.newest.state not in AT_WORK:
             return self.newest.state
-        return "stands" if now - self.moved_at > HANGING_S else ""
+        is_hanging = now - self.moved_at > HANGING_S and not self.newest.waits_for
+        return "stands" if is_hanging else ""
 
 
 class FleetLayer:
@@ -114,6 +116,42 @@ class FleetLayer:
         self._taken, self._counted = 0, 0
         # Whether the last division gave this robot a part; number of cells left at that time.
         self._had_part, self._left = False, 0
+        # Places of robots that stand in the way [m], by name.
+        self._avoided: dict[str, tuple[float, float]] = {}
+
+    def neighbours(self, now: float) -> dict[str, Neighbour]:
+        """Return the other robots in this robot's frame that are heard.
+
+        Where a silent one is, only this robot's map may show.
+        """
+        return {
+            name: Neighbour(member.newest, now - member.heard_at, now - member.moved_at)
+            for name, member in self.members.items()
+            if not member.left_out and now - member.heard_at < OLD_S
+        }
+
+    def avoid(self, robot: str) -> None:
+        """Plan around a robot where it stands now, until it moves."""
+        self._avoided[robot] = self.members[robot].place
+
+    def is_avoided(self, robot: str) -> bool:
+        """Tell whether paths are planned around a robot."""
+        return robot in self._avoided
+
+    def closed(self, area: ReachableArea, radius_m: float) -> NDArray[np.bool_] | None:
+        """Return the cells where robots stand in the way, bool (rows, cols); None for none."""
+        for name, place in list(self._avoided.items()):
+            if name not in self.members or self.members[name].place != place:
+                del self._avoided[name]
+        if not self._avoided:
+            return None
+        window, cell_m = area.lattice.window, area.lattice.cell_m
+        rows, cols = np.ogrid[window.row0 : window.row1, window.col0 : window.col1]
+        closed = np.zeros(area.reachable.shape, np.bool_)
+        for name, (x, y) in self._avoided.items():
+            clear_m = radius_m + self.members[name].newest.radius_m + CLEARANCE_M
+            closed |= np.hypot((cols + 0.5) * cell_m - x, (rows + 0.5) * cell_m - y) < clear_m
+        return closed
 
     @property
     def has_company(self) -> bool:

@@ -14,6 +14,7 @@ from fasaco_edge.mission.config import MissionConfig
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
 from fasaco_edge.mission.coverage.unreached import Unreached, UnreachedFinder
 from fasaco_edge.mission.fleet.layer import FleetLayer
+from fasaco_edge.mission.fleet.traffic import without
 from fasaco_edge.mission.map.map_state import MapState
 from fasaco_edge.mission.map.reachable_area import ReachableArea, anchor_cell
 from fasaco_edge.mission.orders.exploration import Exploration
@@ -143,9 +144,15 @@ class Sequencer:
         """
         area, state = self._map.area, self.order_state
         assert area is not None
-        lattice, home = area.lattice, self.goal()
+        lattice, home, reachable = area.lattice, self.goal(), area.reachable
+        closed = self._fleet.closed(area, self._config.footprint.robot_radius_m)
+        if closed is not None and area.contains(cell):
+            closed[lattice.local(cell)] = False
+            lattice = replace(lattice, steps=without(lattice.steps, closed))
+            reachable = ReachableArea.around(lattice, cell).reachable
         self._run.exploration.end_if_reached(state.current_zone, area)
         ends_home = home is not None and state.returns_home_next and area.contains(home)
+        ends_home = ends_home and home is not None and bool(reachable[lattice.local(home)])
         return CoverageProblem.of(
             lattice,
             cell,
@@ -155,7 +162,7 @@ class Sequencer:
             before=before,
             attempt=attempt,
             # An attempt starts on the path, which the robot may have left for another area.
-            reachable=area.reachable if area.contains(cell) else None,
+            reachable=reachable if area.contains(cell) else None,
         )
 
     def explore(self, cell: Cell) -> str:

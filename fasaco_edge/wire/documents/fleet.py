@@ -16,6 +16,7 @@ from fasaco_edge.wire.documents.json_text import Document
 from fasaco_edge.wire.limits import (
     MAX_COORDINATE_M,
     MAX_FLEET_PARTS,
+    MAX_FLEET_POINTS,
     MAX_FLEET_TILES,
     MAX_JSON_BYTES,
 )
@@ -25,6 +26,7 @@ FLEET_VERSION: Final = 1
 TILE_BYTES: Final = 512
 
 Coordinate = Annotated[float, Meta(ge=-MAX_COORDINATE_M, le=MAX_COORDINATE_M)]
+Point = tuple[Coordinate, Coordinate]
 Text = Annotated[str, Meta(max_length=256)]
 Whole = Annotated[int, Meta(ge=0, le=2**31 - 1)]
 Pace = Annotated[float, Meta(ge=1e-3, le=3600)]
@@ -80,6 +82,9 @@ class FleetMember(Document, frozen=True):
         ground: tiles of cells that it can reach: changed ones first, then all in turn.
         by: name of the robot that made that division.
         parts: what that division gives to each robot; none without one.
+        radius_m: radius of the robot's disc [m].
+        ahead: points x, y of the path's next metres [m], in the frame of the map.
+        waits_for: name of the robot that it waits or makes way for; "" for none.
     """
 
     version: Annotated[int, Meta(ge=1)]
@@ -98,6 +103,9 @@ class FleetMember(Document, frozen=True):
     ground: Annotated[tuple[CellTile, ...], Meta(max_length=MAX_FLEET_TILES)] = ()
     by: Text = ""
     parts: Annotated[tuple[FleetPart, ...], Meta(max_length=MAX_FLEET_PARTS)] = ()
+    radius_m: Annotated[float, Meta(ge=0, le=100)] = 0.0
+    ahead: Annotated[tuple[Point, ...], Meta(max_length=MAX_FLEET_POINTS)] = ()
+    waits_for: Text = ""
 
 
 class _Head(msgspec.Struct, frozen=True):

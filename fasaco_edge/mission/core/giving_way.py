@@ -1,0 +1,130 @@
+"""Giving way: the robot waits for others of its fleet, and makes way for them.
+
+Its path is set aside meanwhile, and taken up afterwards. What keeps it from going on is decided in
+``fleet.traffic``.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fasaco_edge.grid.lattice import Cell
+from fasaco_edge.mission.config import MissionConfig
+from fasaco_edge.mission.core.events import PathUpdate
+from fasaco_edge.mission.core.route import NO_CELLS, Route
+from fasaco_edge.mission.fleet.layer import FleetLayer
+from fasaco_edge.mission.fleet.traffic import (
+    AHEAD_M,
+    NEAR_M,
+    PATIENCE_S,
+    STANDS_S,
+    Obstruction,
+    Points,
+    obstruction,
+    refuge,
+    spaced,
+)
+from fasaco_edge.mission.map.map_state import MapState
+from fasaco_edge.mission.map.reachable_area import ReachableArea
+
+# A robot that made way, or waits, looks for another place no sooner than this [s].
+AGAIN_S = 2.0
+
+
+class GivingWay:
+    """Decides when the robot waits, where it makes way to, and when it goes on.
+
+    Attributes:
+        waits_for: name of the robot that it waits for; "" for none.
+        reason: that as text.
+        is_near: whether another robot is near.
+    """
+
+    def __init__(
+        self, config: MissionConfig, map_state: MapState, route: Route, fleet: FleetLayer
+    ) -> None:
+        self.waits_for = self.reason = ""
+        self.is_near = False
+        self._robot, self._radius_m = config.robot, config.footprint.robot_radius_m
+        self._cell_m = config.footprint.cell_m
+        self._map, self._route, self._fleet = map_state, route, fleet
+        self._since = self._sought_at = 0.0
+        self._refuge: Cell | None = None
+
+    def line(self) -> Points:
+        """Return the next metres, from the robot's place on, points (x, y) [m], float64 (n, 2)."""
+        pose = self._map.pose
+        if pose is None or self._map.lattice is None:
+            return np.zeros((0, 2))
+        count = int(AHEAD_M / self._cell_m) + 2
+        cells = self._cells()[1 : count + 1]
+        here = np.array([[pose.pose.x, pose.pose.y]])
+        return np.concatenate((here, self._map.lattice.centres(cells))) if len(cells) else here
+
+    def _cells(self) -> NDArray[np.int32]:
+        """Return the path ahead, also one that is set aside."""
+        if self._refuge is not None and len(self._route.path.ahead) > 1:
+            return self._route.path.ahead
+        aside = self._route.aside
+        return aside if self.waits_for and aside is not None else self._route.path.ahead
+
+    def end(self) -> None:
+        """Wait no longer."""
+        self.waits_for = self.reason = ""
+        self._refuge = None
+
+    def look(self, now: float) -> PathUpdate | None:
+        """Decide again; return the path to publish, if any. ``waits_for`` tells the result."""
+        area, cell, pose = self._map.area, self._map.robot_cell(), self._map.pose
+        neighbours = self._fleet.neighbours(now)
+        if area is None or cell is None or pose is None or not neighbours:
+            self.is_near = False
+            self.end()
+            return None
+        here = np.array((pose.pose.x, pose.pose.y))
+        self.is_near = any(
+            np.hypot(near.heard.x - here[0], near.heard.y - here[1]) < NEAR_M
+            for near in neighbours.values()
+        )
+        if not self.is_near:
+            self.end()
+            return None
+        if self._refuge is not None and cell != self._refuge:
+            is_stuck = now - self._sought_at > PATIENCE_S
+            if len(self._route.path.ahead) > 1 and not is_stuck:
+                return None
+        speed = self._cell_m / self._fleet.step_s
+        self._refuge = None
+        found = obstruction(
+            self._robot, self._radius_m, speed, spaced(self.line()), neighbours, self.waits_for
+        )
+        if found is None:
+            self.end()
+            return None
+        return self._hold(found, area, cell, now)
+
+    def _hold(
+        self, found: Obstruction, area: ReachableArea, cell: Cell, now: float
+    ) -> PathUpdate | None:
+        route = self._route
+        if found.robot != self.waits_for:
+            self._since = now
+        self.waits_for, self.reason = found.robot, found.reason
+        has_path = len(route.path.cells) > 0
+        route.set_aside()
+        waited_s, neighbours = now - self._since, self._fleet.neighbours(now)
+        stands_s = neighbours[found.robot].stands_s
+        if found.is_blocked and waited_s > PATIENCE_S and stands_s > STANDS_S:
+            self._fleet.avoid(found.robot)
+        is_due = found.is_on_path or waited_s > PATIENCE_S
+        if is_due and now - self._sought_at >= AGAIN_S:
+            self._sought_at = now
+            goal = refuge(area, cell, self._radius_m, neighbours, area.lattice.centres)
+            if goal is not None and goal != cell:
+                self._refuge = goal
+                return route.publish(area.shortest_path(cell, goal), self.reason, now)
+            if self._fleet.is_avoided(found.robot):
+                self.end()
+                return None
+        return route.publish(NO_CELLS, self.reason, now) if has_path else None

@@ -1,0 +1,107 @@
+"""Traffic of a fleet: who waits, who makes way, and that a narrow passage is no dead end."""
+
+import numpy as np
+import pytest
+
+from fasaco_edge.grid.lattice import CoverageLattice
+from fasaco_edge.mission.core.events import MemberHeard
+from fasaco_edge.mission.fleet.traffic import Neighbour, obstruction, refuge, spaced, without
+from fasaco_edge.mission.map.reachable_area import ReachableArea
+
+RADIUS_M, SPEED = 0.2, 0.25
+
+
+def heard(name, *points, waits_for=""):
+    (x, y), *ahead = points
+    return MemberHeard(
+        name, state="covering", x=x, y=y, radius_m=RADIUS_M, ahead=tuple(ahead), waits_for=waits_for
+    )
+
+
+def seen(name, line, other, waits_for="", stands_s=0.0):
+    return obstruction(
+        name,
+        RADIUS_M,
+        SPEED,
+        spaced(line),
+        {other.robot: Neighbour(other, 0.0, stands_s)},
+        waits_for,
+    )
+
+
+EAST = [(0.0, 0.0), (2.0, 0.0)]
+NORTH = [(1.0, -1.0), (1.0, 1.0)]
+
+
+def test_of_two_that_would_meet_one_waits():
+    first = seen("r1", EAST, heard("r2", *NORTH))
+    second = seen("r2", NORTH, heard("r1", *EAST))
+    assert first is None
+    assert second.reason == "waits for r1"
+
+
+def test_the_nearer_one_goes_first_whatever_its_name():
+    near = [(0.7, 0.0), (2.0, 0.0)]
+    assert seen("r9", near, heard("r2", *NORTH)) is None
+    assert seen("r2", NORTH, heard("r9", *near)).robot == "r9"
+
+
+@pytest.mark.parametrize(
+    "other",
+    [
+        heard("r1", (0.0, 3.0), (2.0, 3.0)),
+        heard("r1", (-1.0, 0.0), (-3.0, 0.0)),
+        heard("r1", (1.9, 1.0), (1.9, -1.0)),
+        heard("r1", (0.0, 0.45), (0.0, 3.0)),
+    ],
+    ids=["far away", "behind", "there later", "parting"],
+)
+def test_robots_that_do_not_meet_are_not_held_up(other):
+    assert seen("r2", EAST, other) is None
+
+
+def test_one_that_waits_on_the_others_path_makes_way():
+    other = heard("r1", (1.2, 0.0), (0.0, 0.0), waits_for="r2")
+    held = seen("r2", EAST, other, waits_for="r1")
+    assert held.is_on_path
+    assert held.reason == "makes way for r1"
+    # The other has the way, and does not make way at the same time.
+    first = seen("r1", [(0.8, 0.0), (0.0, 0.0)], heard("r2", *EAST, waits_for="r1"), "r2")
+    assert not first.is_on_path
+
+
+def test_one_that_has_nothing_to_do_makes_way_whatever_its_name():
+    assert seen("r1", [(1.0, 0.0)], heard("r2", *EAST)).is_on_path
+
+
+def test_one_that_stands_in_the_way_is_named():
+    held = seen("r1", EAST, heard("r2", (0.8, 0.0)))
+    assert held.is_blocked
+    assert held.reason == "r2 stands in the way"
+    assert seen("r1", EAST, heard("r2", (1.9, 0.0))) is None
+
+
+def test_a_refuge_lies_off_discs_and_paths_and_is_reached_past_none_of_them():
+    free = np.zeros((12, 24), np.bool_)
+    free[5], free[6:9, 4] = True, True  # a corridor with a niche
+    lattice = CoverageLattice.from_free(free, 0.25)
+    area = ReachableArea.around(lattice, (5, 8))
+    other = heard("r2", (3.2, 1.375), (0.1, 1.375))
+    here = refuge(area, (5, 8), RADIUS_M, {"r2": Neighbour(other, 0.0, 0.0)}, lattice.centres)
+    assert here in {(7, 4), (5, 2)}
+    # Behind the other there is a place, too, but no way to it.
+    free[6:9, 4] = False
+    lattice = CoverageLattice.from_free(free, 0.25)
+    area = ReachableArea.around(lattice, (5, 8))
+    other = heard("r2", (1.2, 1.375), (3.2, 1.375))
+    found = refuge(area, (5, 8), RADIUS_M, {"r2": Neighbour(other, 0.0, 0.0)}, lattice.centres)
+    assert found[1] > 13
+
+
+def test_closed_cells_have_no_steps_left():
+    lattice = CoverageLattice.from_free(np.ones((3, 4), np.bool_))
+    closed = np.zeros((3, 4), np.bool_)
+    closed[1, 2] = True
+    steps = without(lattice.steps, closed)
+    rest = CoverageLattice.from_free(~closed)
+    assert (steps == rest.steps).all()
