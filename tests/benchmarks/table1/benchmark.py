@@ -94,6 +94,7 @@ TABLE1 = Benchmark(
 examples:
   python -m tests.benchmarks table1
   python -m tests.benchmarks table1 --maps office flat --seeds 3 --json
+  python -m tests.benchmarks.table1.grids grid.yaml basement.yaml   # makes the next two
   python -m tests.benchmarks table1 --grids paper_simulated.npy paper_basement.npy
   python -m tests.benchmarks table1 --markdown RESULTS.md --png pictures --png-of walled_grid
 """,

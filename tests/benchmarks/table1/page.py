@@ -124,9 +124,19 @@ GRIDS = """\
 `grid` and `basement` of the authors' code (github.com/jynxmagic/FCPP-Survey, Apache-2.0): robot and
 tool of 0.3 m radius, so cells of 0.6 m, start at the map's origin, unknown pixels free, a cell
 occupied if one of its pixels is. On them that code gives the four baseline figures of Table I
-exactly. No setting tried gives the table's figures for the office, so the paper's office is missing
-here. The other grids are [this repository's maps](../../maps/README.md); they have nothing to do
-with the paper's maps of the same names.
+exactly. They are made from the published maps, which are not in this repository: fetch `grid.yaml`,
+`grid.png` (300 x 300 pixels), `basement.yaml` and `basement.png` (600 x 600) from the folder `maps`
+of github.com/nobleo/full_coverage_path_planner, on which that code builds; then
+
+```sh
+python -m tests.benchmarks.table1.grids grid.yaml basement.yaml
+```
+
+compares their pixels with the SHA-256 it knows, and says which grid of the paper each is. No
+setting tried gives the table's figures for the office, so the paper's office is missing here; its
+map, `maps/full_148a_map.yaml` of the authors' code, can be tried with `--cell` and `--start-xy`.
+The other grids are [this repository's maps](../../maps/README.md); they have nothing to do with the
+paper's maps of the same names.
 """
 
 
