@@ -96,6 +96,7 @@ FIGURES = (
         "floor that the tool can reach and is asked to sweep",
         _member("floor", "reachable_m2"),
     ),
+    Figure("battery_ratio", "gauge", "charge of the battery", _member("battery", "level")),
     Figure("path_revision", "gauge", "counts published paths", _member("path", "revision")),
     Figure("path_remaining_steps", "gauge", "still to drive", _member("path", "remaining_steps")),
     Figure("path_gap_ratio", "gauge", "cost above the lower bound", _member("path", "gap")),

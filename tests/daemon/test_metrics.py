@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import resource
@@ -18,12 +19,19 @@ from msgspec import structs
 from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.config.loading import inspect_config
 from fasaco_edge.config.metrics import Address, MetricsConfig
-from fasaco_edge.daemon.exposition import CONTENT_TYPE, exposition
+from fasaco_edge.daemon.exposition import CONTENT_TYPE, FIGURES, PREFIX, exposition
 from fasaco_edge.daemon.metrics import MetricsServer, serve_metrics
 from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.wire.documents.path_documents import PathReport
 from fasaco_edge.wire.documents.replies import STATES, CoverageReport, FloorReport
-from fasaco_edge.wire.documents.status import ErrorCounts, LoopTimes, Status, SupervisedRecorder
+from fasaco_edge.wire.documents.status import (
+    BatteryReport,
+    ErrorCounts,
+    LoopTimes,
+    Status,
+    SupervisedRecorder,
+)
+from tests.deploy.manual import MANUAL
 from tests.support.outsider import Outsider
 from tests.support.processes import daemon_process, free_endpoint
 
@@ -71,6 +79,37 @@ def parsed(text):
         assert (name, labels) not in samples, "no sample twice"
         samples[name, labels] = float(found[3])
     return samples
+
+
+@pytest.mark.parametrize("battery", [None, BatteryReport(level=None), BatteryReport(level=0.5)])
+def test_the_charge_is_told_where_it_is_known(battery):
+    told = parsed(exposition(structs.replace(STATUS, battery=battery), 0.5))
+    level = battery and battery.level
+    assert told.get(("fasaco_edge_battery_ratio", ())) == level
+
+
+def test_the_board_shows_figures_and_labels_that_there_are():
+    board = json.loads((MANUAL.parent / "grafana.json").read_text(encoding="utf-8"))
+    status = structs.replace(STATUS, battery=BatteryReport(level=0.5))
+    told = parsed(exposition(status, 0.5))
+    known = {name for name, _ in told} | {f"{PREFIX}_{figure.name}" for figure in FIGURES}
+    numbers = [panel["id"] for panel in board["panels"]]
+    assert len(set(numbers)) == len(numbers) > 10
+    shown = set()
+    for panel in board["panels"]:
+        for target in panel["targets"]:
+            names = re.findall(rf"{PREFIX}_\w+", target["expr"])
+            assert names
+            assert set(names) <= known, panel["title"]
+            shown |= set(names)
+            for label in re.findall(r"\{\{(\w+)\}\}", target["legendFormat"]):
+                has = [labels for name, labels in told if name == names[0]]
+                assert all(any(one.startswith(f"{label}=") for one in labels) for labels in has)
+            # A counter means something by its growth alone.
+            for name in names:
+                grows = f"increase({name}" in target["expr"] or f"rate({name}" in target["expr"]
+                assert grows == name.endswith("_total"), target["expr"]
+    assert len(shown) > 20
 
 
 def test_a_status_is_told_in_base_units():
