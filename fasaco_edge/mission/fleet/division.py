@@ -64,9 +64,14 @@ class Division:
 
     def owners(self, lattice: CoverageLattice) -> NDArray[np.int8]:
         """Return the index of each cell's robot, int8 (rows, cols)."""
-        times_s = _times_s(lattice, self.seeds, [robot.step_s for robot in self.robots])
-        times_s += np.array(self.handicaps_s, np.float32)[:, None]
-        owners: NDArray[np.int8] = times_s.argmin(axis=0).astype(np.int8)
+        first = np.full(lattice.steps.size, np.float32(np.inf))
+        owners = np.zeros(lattice.steps.size, np.int8)
+        # One robot at a time: large lattices would take much memory for many robots.
+        for index, (robot, seed) in enumerate(zip(self.robots, self.seeds, strict=True)):
+            times_s = _times_s(lattice, seed, robot.step_s) + np.float32(self.handicaps_s[index])
+            is_earlier = times_s < first
+            owners[is_earlier] = index
+            np.minimum(first, times_s, out=first)
         return owners.reshape(lattice.steps.shape)
 
 
@@ -90,21 +95,23 @@ def divide(
     cells = cells[:: -(-len(cells) // MOST_CELLS) or 1]
     if len(robots) == 1 or not len(cells):
         return Division(tuple(robots), tuple(starts), (0.0,) * len(robots))
-    from_starts_s = _times_s(lattice, starts, steps_s)[:, cells]
+    travel = _Travel(lattice, cells)
+    from_starts_s = travel.times_s(starts, steps_s)
     scale = np.count_nonzero(wanted) / len(cells)
     rounds = max(1, min(ROUNDS, MOST_SEARCHED // (len(robots) * lattice.steps.size)))
     best: tuple[float, list[Cell], NDArray[np.float32]] | None = None
     kept = {} if before is None else dict(zip(before.names, before.seeds, strict=True))
     if kept.keys() & {robot.name for robot in robots}:
         seeds = [kept.get(robot.name, robot.cell) for robot in robots]
-        handicaps_s = _handicaps_s(_times_s(lattice, seeds, steps_s)[:, cells], np.array(steps_s))
-        owner = (_times_s(lattice, seeds, steps_s)[:, cells] + handicaps_s[:, None]).argmin(axis=0)
+        times_s = travel.times_s(seeds, steps_s)
+        handicaps_s = _handicaps_s(times_s, np.array(steps_s))
+        owner = (times_s + handicaps_s[:, None]).argmin(axis=0)
         end_s = _end_s(from_starts_s, owner, scale * np.array(steps_s))
         best = STABLE * end_s, seeds, handicaps_s
-    for begin in (starts, _spread(lattice, cells, from_starts_s)):
+    for begin in (starts, _spread(travel, from_starts_s)):
         seeds = begin
         for _ in range(rounds):
-            times_s = _times_s(lattice, seeds, steps_s)[:, cells]
+            times_s = travel.times_s(seeds, steps_s)
             handicaps_s = _handicaps_s(times_s, np.array(steps_s))
             owner = (times_s + handicaps_s[:, None]).argmin(axis=0)
             end_s = _end_s(from_starts_s, owner, scale * np.array(steps_s))
@@ -115,16 +122,36 @@ def divide(
     return Division(tuple(robots), tuple(best[1]), tuple(best[2].tolist()))
 
 
-def _times_s(lattice: CoverageLattice, cells: Sequence[Cell], steps_s: Sequence[float]) -> Seconds:
-    """Return travel times from cells [s], float32 (k, rows * cols); huge where unreachable."""
-    times = np.full((len(cells), lattice.steps.size), np.float32(1e9))
-    for time, cell, step_s in zip(times, cells, steps_s, strict=True):
-        if lattice.contains(cell):
-            row, col = lattice.local(cell)
-            time[:] = ways_from(lattice.steps, row * lattice.steps.shape[1] + col) * np.float32(
-                step_s
-            )
+def _times_s(lattice: CoverageLattice, start: Cell, step_s: float) -> Seconds:
+    """Return travel times from a cell [s], float32 (rows * cols,); huge where unreachable."""
+    if not lattice.contains(start):
+        return np.full(lattice.steps.size, np.float32(1e9))
+    row, col = lattice.local(start)
+    ways = ways_from(lattice.steps, row * lattice.steps.shape[1] + col)
+    times: Seconds = ways.astype(np.float32) * np.float32(step_s)
     return times
+
+
+class _Travel:
+    """Travel times to some cells of a lattice; a cell that was asked for is not searched again.
+
+    Attributes:
+        lattice: the lattice.
+        cells: int64 (n,), flat.
+    """
+
+    def __init__(self, lattice: CoverageLattice, cells: NDArray[np.int64]) -> None:
+        self.lattice, self.cells = lattice, cells
+        self._known: dict[Cell, Seconds] = {}
+
+    def times_s(self, starts: Sequence[Cell], steps_s: Sequence[float]) -> Seconds:
+        """Return travel times from starts [s], float32 (k, n); huge where unreachable."""
+        for start in starts:
+            if start not in self._known:
+                self._known[start] = _times_s(self.lattice, start, 1.0)[self.cells]
+        found = np.array([self._known[start] for start in starts])
+        times: Seconds = found * np.array(steps_s, np.float32)[:, None]
+        return times
 
 
 def _handicaps_s(times_s: Seconds, steps_s: NDArray[np.float64]) -> Seconds:
@@ -152,22 +179,22 @@ def _end_s(from_starts_s: Seconds, owner: NDArray[np.int64], cell_s: NDArray[np.
     return max(ends_s)
 
 
-def _spread(
-    lattice: CoverageLattice, cells: NDArray[np.int64], from_starts_s: Seconds
-) -> list[Cell]:
+def _spread(travel: _Travel, from_starts_s: Seconds) -> list[Cell]:
     """Return seeds far from one another, each assigned to a robot near it."""
     count, nearest_s = len(from_starts_s), from_starts_s.min(axis=0)
+    places: list[Cell] = []
     seeds: list[int] = []
     for _ in range(count):
         seeds.append(int(nearest_s.argmax()))
-        (times_s,) = _times_s(lattice, [_cell(lattice, int(cells[seeds[-1]]))], [1.0])[:, cells]
+        places.append(_cell(travel.lattice, int(travel.cells[seeds[-1]])))
+        (times_s,) = travel.times_s(places[-1:], [1.0])
         nearest_s = np.minimum(nearest_s, times_s) if len(seeds) > 1 else times_s
     apart_s, order = from_starts_s[:, seeds].copy(), [0] * count
     for _ in range(count):
         robot, seed = divmod(int(apart_s.argmin()), count)
-        order[robot] = seeds[seed]
+        order[robot] = seed
         apart_s[robot], apart_s[:, seed] = np.inf, np.inf
-    return [_cell(lattice, int(cells[seed])) for seed in order]
+    return [places[seed] for seed in order]
 
 
 def _middles(
