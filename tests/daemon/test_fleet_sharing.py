@@ -6,7 +6,6 @@ import contextlib
 import signal
 import time
 
-import numpy as np
 import pytest
 
 pytest.importorskip("rerun")
@@ -15,43 +14,14 @@ from fasaco_edge.bus.session import BusSettings, open_bus
 from fasaco_edge.recording.read.run import RecordedSamples
 from fasaco_edge.replay.cycle_replay import CycleReplay, read_turns
 from fasaco_edge.replay.replay import read_run
-from tests.support.outsider import TIMEOUT_S, Outsider
+from tests.support.fleet_robots import FleetRobot
+from tests.support.outsider import TIMEOUT_S
 from tests.support.processes import daemon_process, free_endpoint
-from tests.support.rooms import TOOL_M, cells_of, coverable_cells, map_bytes, pose_bytes, room
-from tests.wire import oracle
+from tests.support.rooms import coverable_cells, room
 
 FLOOR = room(9.0, 6.0)
 STARTS = {"r1": (0.75, 0.75), "r2": (8.25, 5.25)}
 STEP_S = 0.05
-
-
-class Robot:
-    """Drives along the newest path, a cell at a time, as an outsider at its daemon's keys."""
-
-    def __init__(self, router: str, name: str) -> None:
-        self.seat = Outsider(router, name)
-        self.path = self.seat.listen("path")
-        self.at = np.array(STARTS[name])
-        self.seen = 0
-        self.ahead: list[np.ndarray] = []
-        self.swept = set()
-        self.seat.put("map", map_bytes(FLOOR))
-        self.go()
-
-    def go(self) -> None:
-        """Drive to the next centre of a cell, and report the pose."""
-        if len(self.path.heard) > self.seen:
-            self.seen = len(self.path.heard)
-            message = oracle.from_bytes("nav_msgs/msg/Path", self.path.heard[-1].payload)
-            xy = [(pose.pose.position.x, pose.pose.position.y) for pose in message.poses]
-            self.ahead = [np.array(point) for point in xy]
-        while self.ahead and np.hypot(*(self.ahead[0] - self.at)) < 0.01:
-            self.ahead.pop(0)
-        if self.ahead:
-            way = self.ahead[0] - self.at
-            self.at = self.at + way * min(TOOL_M / np.hypot(*way), 1.0)
-        self.swept.update(cells_of(self.at[None]))
-        self.seat.put("pose", pose_bytes(*self.at))
 
 
 @pytest.fixture
@@ -75,7 +45,7 @@ def test_two_daemons_share_a_room_and_one_takes_over_when_the_other_is_killed(ro
                     fleet={"name": "hall"},
                 )
             )
-        robots = {name: Robot(router, name) for name in STARTS}
+        robots = {name: FleetRobot(router, name, FLOOR, at) for name, at in STARTS.items()}
         for robot in robots.values():
             stack.enter_context(robot.seat)
             robot.seat.wait_status(lambda status: status["state"] == "covering")

@@ -1,4 +1,7 @@
-"""A Zenoh router in a process of its own, which ends with its input: ``router.py ENDPOINT``."""
+"""A Zenoh router in a process of its own, which ends with its input.
+
+``router.py ENDPOINT [OTHER ...]``: it listens at the first, and connects to other routers.
+"""
 
 from __future__ import annotations
 
@@ -10,9 +13,9 @@ from contextlib import contextmanager
 
 
 @contextmanager
-def router_process(endpoint: str) -> Iterator[subprocess.Popen[str]]:
-    """Run a router that listens; kill it in the end."""
-    command = [sys.executable, __file__, endpoint]
+def router_process(endpoint: str, *others: str) -> Iterator[subprocess.Popen[str]]:
+    """Run a router that listens, and connects to others; kill it in the end."""
+    command = [sys.executable, __file__, endpoint, *others]
     with subprocess.Popen(
         command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
     ) as process:
@@ -29,7 +32,8 @@ def main() -> None:
 
     config = {
         "mode": "router",
-        "listen": {"endpoints": sys.argv[1:]},
+        "listen": {"endpoints": sys.argv[1:2]},
+        "connect": {"endpoints": sys.argv[2:]},
         "scouting": {"multicast": {"enabled": False}},
     }
     with zenoh.open(zenoh.Config.from_json5(json.dumps(config))):
