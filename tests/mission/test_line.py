@@ -195,6 +195,19 @@ def test_before_the_first_path_no_floor_is_called_not_worth_the_way():
     assert [left.reason for left in floor_report(mission).left] == ["not planned yet"]
 
 
+def test_what_is_left_of_an_order_is_to_come_while_the_robot_is_at_home():
+    robot = Robot(Mission(CONFIG))
+    robot.tell(MapReceived(room(3.0, 2.4)))
+    robot.drive(10)
+    robot.tell(CommandReceived(1, "home"))
+    reasons = []
+    while robot.mission.state is not State.PAUSED:
+        robot.drive(is_checked=False)
+        reasons += [left.reason for left in floor_report(robot.mission).left]
+    assert reasons[-1] == "to come"
+    assert "beside the path, and not worth the way" not in reasons
+
+
 def test_the_status_says_what_floor_is_out_of_reach_and_why():
     # A closet without a door and a gap between two shelves, and a zone in the far corner.
     grid = room(4.8, 2.4)

@@ -119,3 +119,18 @@ def test_a_speed_of_next_to_nothing_leaves_no_end():
     view.news(1.0)
     tell(view, "status", {"state": "covering", "drive": {"speed_m_s": 1e-308}, "uptime_s": 2}, 2.0)
     assert heard(view, "state", 2.0)["to_go_s"] is None
+
+
+def test_a_robot_that_was_told_to_stand_has_no_time_to_go():
+    view = ServedView(Keys())
+    xy = np.stack([np.arange(5.0), np.zeros(5)], axis=-1)
+    status = {"state": "covering", "path": {"steps": 4}, "drive": {"speed_m_s": 0.25}}
+    tell(view, "status", status, 1.0)
+    view.take("path", Sample("", encode_path(xy, np.zeros(5), "map", 1)), 1.0)
+    view.news(1.0)
+    tell(view, "status", status | {"uptime_s": 1}, 2.0)
+    assert heard(view, "state", 2.0)["to_go_s"] > 10
+    view.take("path", Sample("", encode_path(xy[:0], np.zeros(0), "map", 2)), 3.0)
+    view.news(3.0)
+    tell(view, "status", status | {"state": "paused", "path": {"steps": 0}}, 4.0)
+    assert heard(view, "state", 4.0)["to_go_s"] is None

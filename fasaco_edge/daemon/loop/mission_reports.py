@@ -92,9 +92,11 @@ def floor_report(mission: Mission | None) -> FloorReport | None:
     swept_m2, to_sweep = round(mission.floor.swept_m2, 3), mission.floor_to_sweep()
     if to_sweep is None:
         return FloorReport(swept_m2)
-    # Before the first path no floor has been judged.
-    is_planned = mission.route.revision > 0
-    beside = "beside the path, and not worth the way" if is_planned else "not planned yet"
+    # Before the first path no floor has been judged; on the way home the line is set aside.
+    order, is_planned = mission.order_state, mission.route.revision > 0
+    is_aside = bool(order.errand) or (order.paused and not to_sweep.ahead_m2)
+    beside = "to come" if is_aside and order.is_open else "beside the path, and not worth the way"
+    beside = beside if is_planned else "not planned yet"
     left = _largest_first((to_sweep.ahead_m2, "on the path"), (to_sweep.left_m2, beside))
     beyond = _largest_first(*((m2, reason) for reason, m2 in to_sweep.beyond_m2.items()))
     return FloorReport(swept_m2, round(to_sweep.asked_m2, 3), left, beyond)

@@ -55,7 +55,7 @@ function showProgress(state) {
   const floor = state.floor, knows = floor && floor.reachable_m2;
   const share = knows ? floor.reached_m2 / floor.reachable_m2 : state.cells;
   find("share").textContent = share === null || share === undefined ? "–" : percent(share);
-  find("share-of").textContent = knows ? "of the floor in reach" : "of the cells in reach";
+  find("share-of").textContent = state.mission.zone ? "of this room" : knows ? "of the floor in reach" : "of the cells in reach";
   find("area").textContent = floor ? squares(knows ? floor.reached_m2 : floor.swept_m2) : "–";
   find("area-of").textContent = knows ? `of ${squares(floor.reachable_m2)}` : "swept";
   find("togo").textContent = state.to_go_s === null ? "–" : duration(state.to_go_s);
