@@ -15,6 +15,7 @@ from fasaco_edge.cli import run_command
 from fasaco_edge.cli.bench import EPILOG, add_benchmarks
 from tests.benchmarks.codec import CODEC
 from tests.benchmarks.fleet import FLEET
+from tests.benchmarks.fleets.benchmark import FLEET_ONLINE
 from tests.benchmarks.floor import FLOOR
 from tests.benchmarks.full import FULL
 from tests.benchmarks.ingest import INGEST
@@ -27,7 +28,8 @@ from tests.benchmarks.turns.benchmark import TURNS
 from tests.benchmarks.twins import TWINS
 
 BENCHMARKS: tuple[Benchmark[Any], ...] = (
-    TABLE1, QUALITY, TURNS, FLOOR, REPLAN, FULL, FLEET, ONLINE, SCALE, CODEC, INGEST, TWINS,
+    TABLE1, QUALITY, TURNS, FLOOR, REPLAN, FULL, FLEET, FLEET_ONLINE, ONLINE, SCALE, CODEC, INGEST,
+    TWINS,
 )  # fmt: skip
 
 

@@ -103,12 +103,12 @@ def demo_robots(args: argparse.Namespace, out: Path) -> list[DemoRobot]:
     if args.robots == 1:
         return [DemoRobot(Keys().robot, first, out)]
     lattice = CoverageLattice.from_map(truth, Footprint(args.cell, args.robot_radius))
-    starts = [first, *_apart(lattice, first, args.robots - 1)]
+    starts = [first, *apart(lattice, first, args.robots - 1)]
     names = [f"r{number}" for number in range(1, args.robots + 1)]
     return [DemoRobot(name, at, out / name) for name, at in zip(names, starts, strict=True)]
 
 
-def _apart(lattice: CoverageLattice, first: Point, count: int) -> list[Point]:
+def apart(lattice: CoverageLattice, first: Point, count: int) -> list[Point]:
     """Return places, each with the largest walking distance from all earlier ones."""
     from fasaco_edge.kernels.fleet.split import FAR, ways_from
 

@@ -1,0 +1,243 @@
+"""Robots of one fleet in a building that none of them knows, in simulated time.
+
+Real missions plan for simulated robots; all of it in one process, so that the same options give
+the same run. Robots hear of each other once a period, as far as ``hears`` lets them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from fasaco_edge.grid.geometry import Pose2D, Window
+from fasaco_edge.grid.lattice import Cell, Footprint
+from fasaco_edge.grid.occupancy import OccupancyGrid
+from fasaco_edge.kernels.floor.turning import proportional_turning
+from fasaco_edge.mission.config import MissionConfig, Sweeping
+from fasaco_edge.mission.core.events import (
+    Event,
+    MapReceived,
+    MemberHeard,
+    PlanReady,
+    PoseReceived,
+    State,
+)
+from fasaco_edge.mission.core.mission import Mission
+from fasaco_edge.mission.coverage.ledger import CoverageLedger
+from fasaco_edge.mission.fleet.ground import GroundTelling
+from fasaco_edge.mission.fleet.shared import Telling
+from fasaco_edge.planners.cost import CoverageCost, SearchWork
+from fasaco_edge.planners.line import LINES
+from fasaco_edge.planners.planner import WorkLimit
+from fasaco_edge.planners.search.near_optimal import NearOptimal
+from fasaco_edge.simulation.robot import SimulationConfig
+from fasaco_edge.simulation.world import World
+
+TOOL_M, RADIUS_M, OVERLAP = 0.3, 0.18, 0.08
+SPEED_M_S, TURN_S = 0.25, 1.5
+PROPOSALS = 1_000_000
+MOST_TILES = 4
+# A run that is not over by then has failed, in simulated time [s].
+LONGEST_S = 20_000.0
+
+
+@dataclass(frozen=True, slots=True)
+class Fleet:
+    """What robots do in a building.
+
+    Attributes:
+        truth: the building.
+        starts: where they start, x, y [m].
+        line: "cells" or "thorough", as ``planner.line``.
+        period_s: how often they tell each other of themselves [s].
+        speed_m_s: how fast they drive.
+        radius_m: of each.
+    """
+
+    truth: OccupancyGrid
+    starts: Sequence[tuple[float, float]]
+    line: str = "thorough"
+    period_s: float = 1.0
+    speed_m_s: float = SPEED_M_S
+    radius_m: float = RADIUS_M
+
+    @property
+    def cell_m(self) -> float:
+        """Edge of a cell [m]."""
+        return TOOL_M if self.line == "cells" else TOOL_M * (1.0 - OVERLAP)
+
+    def config(self, name: str) -> MissionConfig:
+        """Return the configuration of a mission."""
+        cell_m = self.cell_m
+        cost = CoverageCost.for_robot(cell_m, self.speed_m_s, TURN_S)
+        sweeping = None
+        if self.line != "cells":
+            turning = proportional_turning(TURN_S)
+            line = replace(LINES[self.line], speed_m_s=self.speed_m_s, turning=turning)
+            sweeping = Sweeping(TOOL_M, 25_000_000, line)
+        footprint = Footprint(cell_m, self.radius_m)
+        return MissionConfig(footprint, cost=cost, sweeping=sweeping, robot=name)
+
+
+@dataclass(slots=True)
+class FleetRobot:
+    """A robot, its mission, and what was noted of it."""
+
+    name: str
+    mission: Mission
+    world: World
+    ledger: CoverageLedger
+    telling: Telling = field(default_factory=Telling)
+    telling_ground: GroundTelling = field(default_factory=GroundTelling)
+    epoch: int = 0
+    done_s: float = 0.0
+    plans: int = 0
+    is_dead: bool = False
+    inbox: list[MemberHeard] = field(default_factory=list)
+
+    def report(self) -> MemberHeard | None:
+        """Return what it tells the others."""
+        mission = self.mission
+        if mission.pose is None or not mission.ledger.frame:
+            return None
+        if mission.shared.epoch != self.epoch:
+            self.epoch, self.telling = mission.shared.epoch, Telling()
+        return MemberHeard(
+            robot=self.name,
+            frame=mission.ledger.frame,
+            state=str(mission.state),
+            x=round(mission.pose.pose.x, 3),
+            y=round(mission.pose.pose.y, 3),
+            step_s=mission.fleet.step_s,
+            epoch=mission.shared.epoch,
+            division=mission.fleet.number,
+            open_cells=mission.open_cells(),
+            tiles=self.telling.next(mission.ledger.snapshot().tiles, MOST_TILES),
+            ground=self.telling_ground.next(mission.area, MOST_TILES),
+            by=mission.fleet.by,
+            parts=mission.fleet.parts,
+            radius_m=self.world.config.robot_radius_m,
+            ahead=tuple((x, y) for x, y in mission.next_metres().tolist()),
+            waits_for=mission.giving_way.waits_for,
+        )
+
+
+class FleetRun:
+    """Robots under way in a building.
+
+    Attributes:
+        robots: by number.
+        now: simulated time [s].
+        hears: whether a message from one comes to another.
+        unheard: how many cells were swept before it was heard that another had swept them.
+    """
+
+    def __init__(self, fleet: Fleet) -> None:
+        self.fleet = fleet
+        names = [f"r{number}" for number in range(1, len(fleet.starts) + 1)]
+        simulated = SimulationConfig(
+            speed_m_s=fleet.speed_m_s, robot_radius_m=fleet.radius_m, padding_m=0.01
+        )
+        self.robots = []
+        for name, (x, y) in zip(names, fleet.starts, strict=True):
+            mission = Mission(fleet.config(name))
+            mission.shared.begin(1)
+            world = World(fleet.truth, Pose2D(x, y), simulated)
+            self.robots.append(FleetRobot(name, mission, world, CoverageLedger(fleet.cell_m)))
+        self.now = 0.0
+        self.hears: Callable[[str, str], bool] = lambda speaker, listener: True
+        self.unheard = 0
+        self._swept_by: dict[Cell, set[str]] = {}
+        self._planner, self._limit = NearOptimal(), WorkLimit(SearchWork(proposals=PROPOSALS))
+        self._next_report = [
+            number * fleet.period_s / len(self.robots) for number in range(len(self.robots))
+        ]
+
+    @property
+    def alive(self) -> list[FleetRobot]:
+        """The robots that are not dead."""
+        return [robot for robot in self.robots if not robot.is_dead]
+
+    def run(self, act: Callable[[FleetRun], None] = lambda _: None) -> None:
+        """Let time pass until all are done."""
+        while not all(robot.mission.state is State.DONE for robot in self.alive):
+            if self.now > LONGEST_S:
+                raise RuntimeError(
+                    f"not done after {LONGEST_S:g} s: "
+                    + "; ".join(robot.mission.reason for robot in self.alive)
+                )
+            act(self)
+            self.tick()
+
+    def tick(self) -> None:
+        """Let one tick of the simulation pass."""
+        for robot in self.alive:
+            robot.world.others = {
+                other.name: (other.world.pose.x, other.world.pose.y)
+                for other in self.robots
+                if other is not robot
+            }
+            heard = robot.world.tick()
+            self.now = robot.world.stamp_ns * 1e-9
+            events: list[Event] = [*robot.inbox]
+            robot.inbox.clear()
+            if heard.map is not None:
+                events.append(MapReceived(heard.map))
+            if heard.pose is not None:
+                events.append(PoseReceived(heard.pose))
+                self._note(robot, heard.pose.pose)
+            if events:
+                self._step(robot, events)
+            if robot.mission.state is not State.DONE:
+                robot.done_s = self.now
+        if len(self.robots) > 1:
+            self._tell()
+
+    def _step(self, robot: FleetRobot, events: list[Event]) -> None:
+        decision = robot.mission.step(events, self.now)
+        while True:
+            if decision.path is not None:
+                xy = decision.path.xy
+                if xy is None:
+                    xy = (decision.path.cells[:, ::-1].astype(np.float64) + 0.5) * self.fleet.cell_m
+                robot.world.follow(xy)
+            if decision.plan is None:
+                return
+            robot.plans += 1
+            path = self._planner.plan(decision.plan.problem, self._limit)
+            ready = PlanReady(decision.plan.number, path, 0.0)
+            decision = robot.mission.step([ready], self.now)
+
+    def _tell(self) -> None:
+        for number, speaker in enumerate(self.robots):
+            due = self._next_report[number]
+            if speaker.mission.giving_way.is_near:
+                due -= self.fleet.period_s * 0.75
+            if speaker.is_dead or self.now < due:
+                continue
+            self._next_report[number] = self.now + self.fleet.period_s
+            report = speaker.report()
+            for listener in self.alive:
+                if report and listener is not speaker and self.hears(speaker.name, listener.name):
+                    listener.inbox.append(report)
+
+    def _note(self, robot: FleetRobot, pose: Pose2D) -> None:
+        """Note the cells that it sweeps."""
+        for cell in robot.ledger.record(pose):
+            by = self._swept_by.setdefault(cell, set())
+            if by and robot.name not in by:
+                swept = robot.mission.shared.swept(Window(*cell, cell[0] + 1, cell[1] + 1))
+                self.unheard += not swept[0, 0]
+            by.add(robot.name)
+
+    @property
+    def cells(self) -> int:
+        """Cells swept."""
+        return len(self._swept_by)
+
+    @property
+    def twice(self) -> int:
+        """Cells that two or more robots swept."""
+        return sum(len(by) > 1 for by in self._swept_by.values())
