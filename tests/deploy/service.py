@@ -18,12 +18,19 @@ QUIET = {"mission": {"lost_pose_s": 0.0}, "planner": {"spare_share": 0.0}}
 
 
 class Service:
-    """One unit, and what systemd and the journal say of it."""
+    """One unit, and what systemd and the journal say of it.
 
-    def __init__(self, lab: Lab, name: str = "fasaco-edge") -> None:
+    Args:
+        lab: where it is installed.
+        name: of the unit.
+        text: the unit; by default that of ``deploy`` by this name.
+    """
+
+    def __init__(self, lab: Lab, name: str = "fasaco-edge", text: str = "") -> None:
         self.lab = lab
         self.name = name
-        lab.write(f"/etc/systemd/system/{name}.service", (UNITS / f"{name}.service").read_text())
+        text = text or (UNITS / f"{name}.service").read_text()
+        lab.write(f"/etc/systemd/system/{name}.service", text)
         self._cursor = ""
         self._cursor = self._newest()
         self.configure()

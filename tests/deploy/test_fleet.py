@@ -1,0 +1,90 @@
+"""Two daemons of a fleet under systemd on one router: one is killed, and joins again."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from typing import Any
+
+import pytest
+
+from tests.deploy.lab import ENVIRONMENT, Lab
+from tests.deploy.service import QUIET, UNITS, Service, wait_for
+
+ROUTER = "tcp/127.0.0.1:17447"
+PYTHON = "/opt/fasaco-edge/current/bin/python3"
+# Units that share the cache of compiled kernels have one user.
+DROP_IN = "[Service]\nUser=fasaco-edge\nRestartSec=200ms\n"
+STARTS = {"r1": "2.0,-2.4", "r2": "6.45,3.45"}
+
+
+@pytest.fixture
+def services(lab: Lab) -> Iterator[dict[str, Service]]:
+    """A unit for each robot, installed and not started."""
+    unit, found = (UNITS / "fasaco-edge.service").read_text(), {}
+    with ExitStack() as stack:
+        for name in STARTS:
+            config = f"/etc/fasaco-edge/{name}.yaml"
+            bus = {"mode": "client", "listen": [], "connect": [ROUTER]}
+            sections = QUIET | {"robot": {"name": name}, "bus": bus, "fleet": {"name": "flat"}}
+            lab.write(config, json.dumps(sections))
+            text = unit.replace("/etc/fasaco-edge/config.yaml", config)
+            # systemd removes this folder when a unit ends.
+            text = text.replace("RuntimeDirectory=fasaco-edge", f"RuntimeDirectory=fasaco-{name}")
+            found[name] = Service(lab, f"fasaco-edge-{name}", text)
+            stack.callback(found[name].remove)
+            stack.callback(lab.run, "rm", "-rf", "/var/lib/private/fasaco-edge")
+            found[name].drop_in("fleet", DROP_IN)
+        yield found
+
+
+@contextmanager
+def running(lab: Lab, *words: str) -> Iterator[subprocess.Popen[bytes]]:
+    """Run a program inside as long as this lasts."""
+    with subprocess.Popen(
+        lab.words(*words), env=ENVIRONMENT, stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+    ) as process:  # fmt: skip
+        try:
+            yield process
+        finally:
+            process.terminate()
+            process.wait(10.0)
+
+
+def ask(lab: Lab, robot: str) -> dict[str, Any]:
+    words = ("fasaco-edge", "ask", "status", "--json", "--robot", robot, "--connect", ROUTER)
+    answer: dict[str, Any] = json.loads(lab.run(*words).stdout)
+    return answer
+
+
+def test_two_units_share_a_flat_and_one_that_is_killed_joins_again(
+    lab: Lab, services: dict[str, Service]
+) -> None:
+    with ExitStack() as stack:
+        router = stack.enter_context(running(lab, PYTHON, "-m", "tests.support.router", ROUTER))
+        assert router.stdout is not None
+        assert router.stdout.readline() == b"up\n"
+        for name, service in services.items():
+            service.start()
+            words = ("simulate", "flat", "--speed", "20", f"--start-xy={STARTS[name]}")
+            stack.enter_context(
+                running(lab, "fasaco-edge", *words, "--robot", name, "--connect", ROUTER)
+            )
+        first, second = services.values()
+        wait_for(lambda: ask(lab, "r1")["fleet"]["part_cells"], 20.0, "a part")
+        wait_for(lambda: ask(lab, "r2")["ledger"]["age_s"] is not None, 20.0, "progress on disk")
+        before = second.pid
+        second.signal("KILL")
+        wait_for(lambda: second.pid not in (0, before), 10.0, "another process")
+        wait_for(lambda: ask(lab, "r1")["fleet"]["members"][0]["heard_s"] < 1.5, 10.0, "joined")
+        for name in STARTS:
+            wait_for(lambda name=name: ask(lab, name)["state"] == "done", 60.0, "done")
+        for name in STARTS:
+            status = ask(lab, name)
+            coverage = status["coverage"]
+            assert coverage["remaining"] <= 0.02 * coverage["coverable"], coverage
+            assert status["fleet"]["members"][0]["swept_cells"] > 20, status
+        assert (first.show("NRestarts"), second.show("NRestarts")) == ("0", "1")
