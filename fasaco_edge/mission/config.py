@@ -84,7 +84,8 @@ class BatteryPolicy(msgspec.Struct, frozen=True, kw_only=True):
     """When a robot goes to charge and when it resumes; levels are shares of a full battery.
 
     Attributes:
-        low: level at which it goes to charge; higher where the path back needs more.
+        low: level at which it goes to charge; higher where the path back needs more, and where its
+            path leads away from a dock that is near.
         reserve: level to be left on arrival at the dock.
         enough: level at which it resumes; lower where the rest of the order needs less.
         silent_s: timeout for battery messages, after which their absence is reported [s].

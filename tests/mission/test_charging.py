@@ -13,6 +13,7 @@ from fasaco_edge.mission.orders.order_state import NO_ORDER, OrderState
 from tests.mission.world import CELL, CONFIG, Drive, building, patch, pose_at, with_policy
 
 ROOM = ("........",) * 6
+WALLED = ("##########", *("#" + row + "#" for row in ROOM), "##########")
 DOCK = Dock(x_m=0.5 * CELL, y_m=5.5 * CELL, approach_m=0.0)
 AT_DOCK = (5, 0)
 POLICY = BatteryPolicy()
@@ -21,10 +22,11 @@ POLICY = BatteryPolicy()
 class Battery(Drive):
     """A robot whose battery says once a tick how full it is."""
 
-    def __init__(self, level, cell=(0, 0), order_state=None, battery=POLICY, **policy):
+    def __init__(self, level, cell=(0, 0), order_state=None, battery=POLICY, rows=ROOM, **policy):
+        at = (-1, -1) if "#" in rows[0] else (0, 0)
         config = replace(with_policy(CONFIG, **{"dock": DOCK} | policy), battery=battery)
         self.level, self.power = level, "discharging"
-        events = MapReceived(building(*ROOM)), pose_at(*cell)
+        events = MapReceived(building(*rows, at=at)), pose_at(*cell)
         super().__init__(cell, *events, config=config, order_state=order_state)
 
     def tell(self, *events, after=1.0):
@@ -92,7 +94,7 @@ def test_the_way_back_counts_and_so_does_what_driving_drains():
 
 
 def test_it_goes_on_at_what_the_rest_needs_where_that_is_less():
-    drive = Battery(0.19)
+    drive = Battery(0.19, rows=WALLED)
     drive.mission.charging.gauge._drains.extend([0.001] * 5)
     drive.run(State.CHARGING)
     for _ in range(8):
@@ -101,6 +103,32 @@ def test_it_goes_on_at_what_the_rest_needs_where_that_is_less():
     drive.charge(to=0.4)
     assert drive.level < 0.36
     drive.finish()
+
+
+def test_what_lies_beyond_the_map_counts_as_rest():
+    levels = []
+    for door in "#", "?":
+        drive = Battery(0.19, rows=(*WALLED[:-1], "####" + door + "#####"))
+        drive.mission.charging.gauge._drains.extend([0.002] * 5)
+        drive.run(State.CHARGING)
+        for _ in range(8):
+            drive.go()
+        levels.append(drive.mission.charging.goes_on_at)
+    # One cell at the border of the map, and 20 behind it, at 1.2 times 0.002 each.
+    assert levels[1] - levels[0] == pytest.approx(0.048, abs=0.01)
+
+
+@pytest.mark.parametrize(("level", "goes"), [(0.38, True), (0.6, False)])
+def test_it_goes_while_the_dock_is_near_where_its_path_leads_away(level, goes):
+    # A corridor with the dock at its near end; the battery would be due at the far one.
+    dock = Dock(x_m=0.5 * CELL, y_m=1.5 * CELL, approach_m=0.0)
+    drive = Battery(level, rows=("." * 60,) * 2, dock=dock)
+    drive.mission.charging.gauge._drains.extend([0.002] * 5)
+    drive.run(State.COVERING)
+    for _ in range(8):
+        drive.go()
+        drive.level -= 0.002
+    assert (drive.mission.state is not State.COVERING) is goes, drive.mission.reason
 
 
 @pytest.mark.parametrize("lie", [0.0, 1.0])

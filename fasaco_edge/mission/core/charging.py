@@ -12,6 +12,8 @@ from collections import deque
 from dataclasses import dataclass, field
 from statistics import median
 
+import numpy as np
+
 from fasaco_edge.mission.config import BatteryPolicy, MissionConfig
 from fasaco_edge.mission.core.events import BatteryReceived
 from fasaco_edge.mission.core.route import Route
@@ -32,6 +34,13 @@ DOCK_EVERY_S = 5.0
 # Least difference between the levels of turning back and of resuming; factor on the time planned
 # for the rest, as lines are longer than walks over cells.
 BETWEEN, SPARE = 0.1, 1.2
+# Cells that each cell at the border of the map stands for, in the estimate of the rest.
+BEYOND_CELLS = 20
+# A robot may go to charge this much above the level of turning back, where the dock is near; number
+# of places on its path ahead that are compared.
+EARLY, PLACES_AHEAD = 0.25, 8
+# Lattices larger than this are not searched for so many ways [cells].
+MOST_CELLS = 200_000
 # The battery counts as full once its level has risen by less than RISE for this long [s].
 RISE, ALL_AFTER_S = 0.005, 1800.0
 
@@ -115,6 +124,8 @@ class Charging:
     _to_dock_s: float = field(default=0.0, init=False)
     _rest_s: float | None = field(default=None, init=False)
     _looked_at: float | None = field(default=None, init=False)
+    # Whether no place ahead is better to go and charge from than this one.
+    _is_best_here: bool = field(default=False, init=False)
     # The highest level since the robot is in its dock, and since when; None elsewhere.
     _best: tuple[float, float] | None = field(default=None, init=False)
 
@@ -135,6 +146,7 @@ class Charging:
         is_charging = self.orders.order_state.errand == "charge"
         self._rest_s = self._seconds_left() if is_charging else None
         self._to_dock_s = 0.0 if is_charging else self._seconds_to_dock()
+        self._is_best_here = not is_charging and self._finds_nothing_better()
 
     def silence(self, now: float) -> str:
         """Return why the battery level is unknown; "" where it is known or not needed."""
@@ -160,7 +172,8 @@ class Charging:
             or (not order.order and order.why not in (NO_ORDER, AT_HOME))
         ):
             return False
-        return self.orders.goal("charge") is not None and level <= self.turns_back_at
+        is_low = level <= self.turns_back_at or self._is_best_here
+        return self.orders.goal("charge") is not None and is_low
 
     @property
     def turns_back_at(self) -> float:
@@ -206,6 +219,38 @@ class Charging:
         but = ", but discharging" if self.gauge.power == "discharging" else ""
         return f"battery at {self.gauge.level:.0%}{but}, goes on at {self.goes_on_at:.0%}"
 
+    def _finds_nothing_better(self) -> bool:
+        """Tell whether the robot, which will have to charge soon, is best placed for it now.
+
+        It is where the way to the dock is shortest for what is driven between two charges, of all
+        places on its path until the level of turning back. A path that ends before shows nothing:
+        it may be the last.
+        """
+        level, drain, area = self.gauge.level, self.gauge.drain_per_s, self.map.area
+        goal = self.orders.goal("charge")
+        if level is None or drain is None or area is None or goal is None:
+            return False
+        assert self.policy is not None
+        spare, ahead = level - self.turns_back_at, self.route.path.ahead
+        if not 0.0 < spare <= min(EARLY, self.policy.enough - level):
+            return False
+        if area.lattice.states.size > MOST_CELLS:
+            return False
+        cost = self.config.cost
+        last = int(spare / (drain * cost.step_s)) if drain > 0.0 else len(ahead)
+        while last < len(ahead) and last > 0 and drain * cost.of_walk(ahead[: last + 1]) > spare:
+            last = int(0.9 * last)
+        if not 0 < last < len(ahead) - 1:
+            return False
+        rates = []
+        for index in np.linspace(0, last, PLACES_AHEAD).astype(int).tolist():
+            row, col = ahead[index].tolist()
+            way = area.shortest_path((row, col), goal)
+            then = level - drain * cost.of_walk(ahead[: index + 1])
+            used = self.policy.enough - then
+            rates.append(cost.of_walk(way) / used if len(way) else float("inf"))
+        return rates[0] <= min(rates)
+
     def _seconds_to_dock(self) -> float:
         cell, goal, area = self.map.robot_cell(), self.orders.goal("charge"), self.map.area
         if cell is None or goal is None or area is None:
@@ -221,4 +266,5 @@ class Charging:
             return None
         ends = [(int(row), int(col)) for row, col in (cells[0], cells[-1])]
         walks = area.shortest_path(goal, ends[0]), cells, area.shortest_path(ends[1], goal)
-        return sum(self.config.cost.of_walk(walk) for walk in walks)
+        beyond_s = self.config.cost.step_s * BEYOND_CELLS * self.orders.frontier_cells
+        return sum(self.config.cost.of_walk(walk) for walk in walks) + beyond_s

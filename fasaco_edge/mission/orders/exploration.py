@@ -18,6 +18,15 @@ from fasaco_edge.mission.orders.zones import in_zones
 SEEN_AROUND = 1
 
 
+def frontier(area: ReachableArea) -> NDArray[np.bool_]:
+    """Return the reachable cells that have an unknown neighbour, bool (rows, cols)."""
+    # Outside of the lattice all is unknown.
+    unknown = np.pad(area.lattice.states == UNKNOWN, 1, constant_values=True)
+    beside = unknown[:-2, 1:-1] | unknown[2:, 1:-1] | unknown[1:-1, :-2] | unknown[1:-1, 2:]
+    found: NDArray[np.bool_] = area.reachable & beside
+    return found
+
+
 def next_frontier(area: ReachableArea, polygon: Polygon, looked: Iterable[Cell]) -> Cell | None:
     """Return the frontier cell (row, col) nearest to a corner of the polygon [m], straight line.
 
@@ -29,10 +38,7 @@ def next_frontier(area: ReachableArea, polygon: Polygon, looked: Iterable[Cell])
         looked: cells already visited for this; their neighbourhoods are left out.
     """
     lattice, window = area.lattice, area.lattice.window
-    # Outside of the lattice all is unknown.
-    unknown = np.pad(lattice.states == UNKNOWN, 1, constant_values=True)
-    beside = unknown[:-2, 1:-1] | unknown[2:, 1:-1] | unknown[1:-1, :-2] | unknown[1:-1, 2:]
-    rows, cols = np.nonzero(area.reachable & beside)
+    rows, cols = np.nonzero(frontier(area))
     rows, cols = rows + window.row0, cols + window.col0
     for row, col in looked:
         away = np.maximum(abs(rows - row), abs(cols - col)) > SEEN_AROUND

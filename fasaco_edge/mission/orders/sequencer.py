@@ -17,7 +17,7 @@ from fasaco_edge.mission.fleet.layer import FleetLayer
 from fasaco_edge.mission.fleet.traffic import without
 from fasaco_edge.mission.map.map_state import MapState
 from fasaco_edge.mission.map.reachable_area import ReachableArea, anchor_cell
-from fasaco_edge.mission.orders.exploration import Exploration
+from fasaco_edge.mission.orders.exploration import Exploration, frontier
 from fasaco_edge.mission.orders.order import Errand
 from fasaco_edge.mission.orders.order_state import NO_ORDER, OrderState, Stage
 from fasaco_edge.mission.orders.zones import in_zones
@@ -198,6 +198,14 @@ class Sequencer:
         if area is None or decided is None:
             return False
         return bool((area.reachable & ~decided).any())
+
+    @property
+    def frontier_cells(self) -> int:
+        """Number of reachable cells asked for that border on what the map does not show yet."""
+        area = self._map.area
+        if area is None:
+            return 0
+        return int(np.count_nonzero(frontier(area) & self.asked_for(area.lattice.window)))
 
     def asked_for(self, window: Window) -> NDArray[np.bool_]:
         """Return which cells of ``window`` this robot has to cover, covered or not."""

@@ -15,7 +15,7 @@ does not stand meanwhile, unless planning is to take its time.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 
 from fasaco_edge.grid.geometry import StampedPose
 from fasaco_edge.grid.lattice import CoverageLattice
+from fasaco_edge.mission.config import NO_PATIENCE, BatteryPolicy, MissionPolicy
 from fasaco_edge.mission.core.events import (
     Decision,
     Event,
@@ -201,7 +202,7 @@ class Conditions:
         cost: what its walks are to have little of.
         seat: who plans.
         planning_takes_time: whether the robot drives on, or stands, while a plan is made.
-        plans_on_trail: see ``MissionConfig``.
+        plans_on_trail, policy, battery: see ``MissionConfig``.
     """
 
     senses: Senses
@@ -210,6 +211,8 @@ class Conditions:
     seat: PlannerSeat
     planning_takes_time: bool = False
     plans_on_trail: bool = False
+    policy: MissionPolicy = NO_PATIENCE
+    battery: BatteryPolicy | None = None
 
 
 class OnlineMission:
@@ -234,7 +237,11 @@ class OnlineMission:
         self.now = 0.0
         self._conditions = conditions
         config = MissionConfig(
-            building.footprint, cost=conditions.cost, plans_on_trail=conditions.plans_on_trail
+            building.footprint,
+            cost=conditions.cost,
+            policy=conditions.policy,
+            plans_on_trail=conditions.plans_on_trail,
+            battery=conditions.battery,
         )
         self._mission = Mission(config)
         # A plan that takes its time, and when it will be there.
@@ -284,13 +291,17 @@ class OnlineMission:
         self.now = until
         return False
 
+    def heard(self) -> Sequence[Event]:
+        """Return what else the mission hears of, beside map and pose."""
+        return ()
+
     def sense(self) -> None:
         """Look around, tell the mission, and do what it decides."""
         self.sight.look(self.robot.at)
         news = self.sight.news()
         pose = StampedPose(self.robot.pose(self.sight), self.building.truth.frame)
         events: list[Event] = [] if news is None else [news]
-        events.append(PoseReceived(pose))
+        events += [PoseReceived(pose), *self.heard()]
         if self._on_its_way is not None and self._on_its_way[1] <= self.now:
             events.append(self._on_its_way[0])
             self._on_its_way = None
