@@ -8,10 +8,12 @@ import time
 
 import numpy as np
 import pytest
+from PIL import Image
 
 pytest.importorskip("rerun")
 
 from fasaco_edge.cli import main
+from fasaco_edge.drawing import palette
 from fasaco_edge.errors import DifferentRuns, UnreadableRecording
 from fasaco_edge.review.comparison import side_by_side
 from fasaco_edge.review.figures import document_of
@@ -196,15 +198,28 @@ def test_parts_of_different_runs_are_refused(parts, other, capsys):
     assert "--against" in capsys.readouterr().err
 
 
-def test_two_runs_side_by_side(parts, other, capsys):
+def test_two_runs_side_by_side(parts, other, tmp_path, capsys):
     one, two = (document_of(read_review(files)) for files in (parts, other))
     both = side_by_side(one, two)
     assert both["difference"]["faults"] == 3
     assert both["difference"]["steps"] == 0
     assert "complete" not in both["difference"]
-    words = ["review", *map(str, parts), "--against", *map(str, other)]
+    one_alone, both_png = tmp_path / "one.png", tmp_path / "both.png"
+    words = ["review", *map(str, parts)]
+    assert main([*words, "--png", str(one_alone)]) == 0
+    words += ["--against", *map(str, other), "--png", str(both_png)]
+    capsys.readouterr()
     assert main(words) == 0
     table = capsys.readouterr().out
+    # Map beside map: the second begins where the first alone would end.
+    with Image.open(one_alone) as alone, Image.open(both_png) as drawn:
+        space = drawn.width - alone.width
+        assert 0.5 * alone.width < space < alone.width
+        left, right = (
+            np.asarray(drawn.convert("RGB").crop((at, 120, at + space, 900))) for at in (0, space)
+        )
+    assert (left != palette.PAPER).any(axis=2).mean() > 0.02
+    assert (right != palette.PAPER).any(axis=2).mean() > 0.02
     assert "messages refused" in table
     assert "+3" in table
 

@@ -80,7 +80,10 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--json", action="store_true", help="print JSON, described below")
     parser.add_argument(
-        "--png", type=Path, metavar="FILE", help="write a picture of the (first) run"
+        "--png",
+        type=Path,
+        metavar="FILE",
+        help="write a picture of the run, with --against of both",
     )
     parser.add_argument(
         "--html", type=Path, metavar="FILE", help="write a page, one file that needs no network"
@@ -134,7 +137,7 @@ def run(args: argparse.Namespace) -> int:
         from fasaco_edge.review.output.pictures import draw_review
 
         with writing(args.png) as file:
-            draw_review(review).save(file, "PNG")
+            draw_review(review, other).save(file, "PNG")
     if args.html:
         from fasaco_edge.review.output.page import page_of
 

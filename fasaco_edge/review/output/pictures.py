@@ -59,24 +59,30 @@ DRIVE_M = 0.04
 DONE = {True: "complete", False: "not complete", None: "recorded in part"}
 
 
-def draw_review(review: Review) -> Image.Image:
-    """Return a picture, RGB, of ``SIZE``."""
+def draw_review(review: Review, other: Review | None = None) -> Image.Image:
+    """Return a picture, RGB: map and charts; of two runs both maps, and their curves together.
+
+    One is of ``SIZE``, two are wider by a map.
+    """
+    reviews = [review] if other is None else [review, other]
+    labels = ["left", "right"]
     panels = [
-        coverage_panel([review], [""]),
-        replan_panel([review], [""]),
-        state_panel(review),
+        coverage_panel(reviews, labels),
+        replan_panel(reviews, labels),
+        *([state_panel(review)] if other is None else []),
     ]
     charts = draw_panels("", (), panels, columns=1)
-    sheet = Image.new("RGB", SIZE, palette.PAPER)
-    # The empty title above the charts may be cut off.
-    sheet.paste(charts, (SIZE[0] - charts.width, SIZE[1] - charts.height))
     space = SIZE[0] - charts.width
-    mission = draw_map(review, (space - AROUND[0], SIZE[1] - AROUND[1]))
-    if mission is not None:
-        # A caption of many lines leaves less space for the map.
-        mission.thumbnail((space, SIZE[1]))
-        place = ((space - mission.width) // 2, (SIZE[1] - mission.height) // 2)
-        sheet.paste(mission, place)
+    sheet = Image.new("RGB", (space * len(reviews) + charts.width, SIZE[1]), palette.PAPER)
+    # The empty title above the charts may be cut off.
+    sheet.paste(charts, (sheet.width - charts.width, SIZE[1] - charts.height))
+    for column, each in enumerate(reviews):
+        mission = draw_map(each, (space - AROUND[0], SIZE[1] - AROUND[1]))
+        if mission is not None:
+            # A caption of many lines leaves less space for the map.
+            mission.thumbnail((space, SIZE[1]))
+            left = column * space + (space - mission.width) // 2
+            sheet.paste(mission, (left, (SIZE[1] - mission.height) // 2))
     return sheet
 
 
