@@ -13,7 +13,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from fasaco_edge.errors import MalformedMessage
-from fasaco_edge.follow.goals import Goal, PathDriven
+from fasaco_edge.follow.goals import COAST_M, Goal, PathDriven
 from fasaco_edge.follow.nav2_requests import AskResult, Cancellations, Request, SendGoal
 from fasaco_edge.follow.pieces import STEP_M, Line, end_of_piece
 from fasaco_edge.follow.supervision import Patience, State, Supervision
@@ -172,9 +172,11 @@ class Nav2Follower(Supervision):
     def _drive(self, now: float) -> None:
         self._requests += self._requests_later
         self._requests_later.clear()
-        if self._path is not None and (self._pending is None or self._active is not None):
+        if self._path is not None:
             assert self._here is not None
-            self._path.advance(self._here, self._active)
+            # Also on a goal without an answer: that may be lost, and the robot drives it.
+            self._path.advance(self._here, self._active or self._pending)
+            self._believe_motion(self._path, now)
         if self._next is not None and self._pending is None and not self._join(self._next, now):
             return
         assert self._path is not None
@@ -186,6 +188,12 @@ class Nav2Follower(Supervision):
             self._watch(path, goal, now)
             if goal.end - path.way <= self._ahead and goal.end < whole:
                 self._send_next(path, goal)
+
+    def _believe_motion(self, path: PathDriven, now: float) -> None:
+        """Take a goal for accepted once the robot drives it."""
+        goal = self._pending
+        if goal is not None and self._active is None and path.way - goal.start > COAST_M:
+            self.take_accepted(goal.id, accepted=True, why="", now=now)
 
     def _begin(self, path: PathDriven, whole: float, now: float) -> None:
         """Send a goal if Nav2 has none."""

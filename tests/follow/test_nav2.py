@@ -220,6 +220,22 @@ def test_no_answer_to_a_goal_is_another_goal():
     assert again.id != goal.id
 
 
+def test_a_goal_that_the_robot_drives_is_accepted_though_the_answer_was_lost():
+    drive = Drive(*LONG)
+    (goal,) = drive.step(0.0)
+    asked = [drive.step(decimetre / 10) for decimetre in range(1, 30)]
+    assert [request for requests in asked for request in requests] == [AskResult(goal.id)]
+    drive.follower.take_accepted(goal.id, None, "did not answer", drive.now)
+    # It is neither canceled nor sent again from where the robot was.
+    assert drive.step(3.0) == []
+    assert drive.state is State.DRIVING
+    assert drive.follower.tally.errors == 0
+    drive.end(goal, ABORTED, 105)
+    drive.step(3.0)
+    (again,) = drive.step(3.0, after=RETRY_S + 0.1)
+    assert again.points[0][0] == pytest.approx(3.0)
+
+
 def test_a_goal_that_could_not_be_sent_is_not_canceled():
     drive = Drive(*LONG)
     (goal,) = drive.step(0.0)
