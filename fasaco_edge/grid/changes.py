@@ -107,8 +107,8 @@ class LatticeChange:
         stale |= new_cells(lattice.window, window)
         if window == lattice.window and not stale.any():
             return cls(lattice, lattice, np.empty((0, 2), np.int32))
-        states = carried(lattice.states, lattice.window, window).copy()
-        steps = carried(lattice.steps, lattice.window, window).copy()
+        states = carried_copy(lattice.states, lattice.window, window)
+        steps = carried_copy(lattice.steps, lattice.window, window)
         classify_cells(
             pixels_of(grids[1]),
             placement,
@@ -169,11 +169,21 @@ def carried(array: NDArray[Scalar], old: Window, new: Window, beyond: float = 0)
     """
     if new == old:
         return array
-    result = np.full((new.rows, new.cols, *array.shape[2:]), beyond, array.dtype)
+    result = np.empty((new.rows, new.cols, *array.shape[2:]), array.dtype)
+    for part in new.without(old):
+        result[part.slices_in(new)] = beyond
     common = new.intersection(old)
     if common is not None:
         result[common.slices_in(new)] = array[common.slices_in(old)]
     return result
+
+
+def carried_copy(
+    array: NDArray[Scalar], old: Window, new: Window, beyond: float = 0
+) -> NDArray[Scalar]:
+    """Return an array as ``carried`` does, but always a new one."""
+    result = carried(array, old, new, beyond)
+    return result.copy() if result is array else result
 
 
 def cells_near_changes(

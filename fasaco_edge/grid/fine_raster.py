@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from fasaco_edge.errors import MapTooLarge
 from fasaco_edge.grid.geometry import GridGeometry, Polygon, Pose2D, Window
 from fasaco_edge.grid.occupancy import OccupancyGrid
-from fasaco_edge.kernels.floor.bits import Bits, packed
+from fasaco_edge.kernels.floor.bits import ALL, NONE, WORD, Bits, packed
 from fasaco_edge.kernels.lattice.footprint import Placement
 from fasaco_edge.kernels.lattice.polygons import add_near, turn_inside
 
@@ -108,6 +108,36 @@ def blocked_pixels(
             blocked |= keep_out(strip)
         found.append(packed(blocked, beyond=True))
     return np.concatenate(found)
+
+
+def carried_bits(
+    bits: Bits, shift: tuple[int, int], shape: tuple[int, int], *, beyond: bool
+) -> Bits:
+    """Return bits, uint64 (rows, words), shifted onto a raster of another shape.
+
+    Args:
+        bits: the bits; those outside of the raster have the value ``beyond``.
+        shift: shift of pixels, in rows and columns.
+        shape: rows and words of the new raster.
+        beyond: value outside of the old raster.
+    """
+    fill = ALL if beyond else NONE
+    found = np.full(shape, fill)
+    jump, by = divmod(shift[1], WORD)
+    old = Window(shift[0], jump, shift[0] + bits.shape[0], jump + bits.shape[1])
+    # With one word more to the left, whose bits come in.
+    new = Window(0, -1, *shape)
+    common = new.intersection(old)
+    if common is None:
+        return found
+    words = np.full((common.rows, new.cols), fill)
+    words[:, common.col0 + 1 : common.col1 + 1] = bits[common.slices_in(old)]
+    moved = found[common.row0 : common.row1]
+    moved[:] = words[:, 1:]
+    if by:
+        moved <<= np.uint64(by)
+        moved |= words[:, :-1] >> np.uint64(WORD - by)
+    return found
 
 
 def strips(part: Window) -> Iterator[Window]:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.errors import StartBlocked, StartOutsideMap
-from fasaco_edge.grid.changes import carried
+from fasaco_edge.grid.changes import carried_copy
 from fasaco_edge.grid.fine_raster import (
     RobotDiscs,
     blocked_pixels,
@@ -146,11 +146,13 @@ class StandLattice:
         else:
             old, shift, stale = before
             there = old.lattice.window
-            stands = carried(old.stands, there, window, np.nan).copy()
-            bends = carried(old.bends, there, window, np.nan).copy()
-            steps = carried(old.lattice.steps, there, window).copy()
-            stands += np.array(shift)
-            bends += np.array(shift, np.float32)
+            stands = carried_copy(old.stands, there, window, np.nan)
+            bends = carried_copy(old.bends, there, window, np.nan)
+            steps = carried_copy(old.lattice.steps, there, window)
+            for axis, by in enumerate(shift):
+                if by:
+                    stands[..., axis] += by
+                    bends[..., axis] += np.float32(by)
         choose_stands(blocked, places, placement, stale, window.row0, window.col0, stands)
         blockers = np.zeros((2, 2), np.int64)
         link_stands(blocked, places, placement, stale, stands, steps, bends, blockers)
@@ -206,8 +208,8 @@ def states_of(stands: NDArray[np.float64], unknown: NDArray[np.bool_] | None) ->
     """
     states = np.full(stands.shape[:2], BLOCKED, np.uint8)
     if unknown is not None:
-        states[unknown] = UNKNOWN
-    states[~np.isnan(stands[..., 0])] = COVERABLE
+        np.copyto(states, np.uint8(UNKNOWN), where=unknown)
+    np.copyto(states, np.uint8(COVERABLE), where=~np.isnan(stands[..., 0]))
     return states
 
 

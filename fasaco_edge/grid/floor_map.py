@@ -18,6 +18,7 @@ from fasaco_edge.grid.fine_raster import (
     PolygonsOnRaster,
     RobotDiscs,
     blocked_pixels,
+    carried_bits,
     fine_geometry,
     stand_placement,
 )
@@ -31,7 +32,7 @@ from fasaco_edge.grid.lattice import (
     placement_of,
 )
 from fasaco_edge.grid.occupancy import OccupancyGrid
-from fasaco_edge.kernels.floor.bits import WORD, Bits, unpacked
+from fasaco_edge.kernels.floor.bits import ALL, WORD, Bits, packed, unpacked
 from fasaco_edge.kernels.floor.places import (
     disc_rows,
     keep_in_cells,
@@ -128,7 +129,9 @@ class FloorMap:
         if self.touched is None and old == new:
             return LatticeChange.to(before, self._with_states(plain))
         if old != new:
-            self.geometry = geometry
+            self._carry(geometry, (geometry.rows - grids[1].geometry.rows * parts) // 2)
+        if old != new and self._keep_out:
+            # Rounding may place a polygon differently on another raster.
             self._look(grids[1], parts, 0, geometry.rows)
         elif self.touched is not None:
             self._look(grids[1], parts, self.touched.row0, self.touched.row1)
@@ -232,6 +235,22 @@ class FloorMap:
         self.shift, self.touched = None, Window(0, 0, rows, cols)
         self._look(grid, parts, 0, rows)
         self._settle(plain, np.ones(plain.states.shape, np.bool_))
+
+    def _carry(self, geometry: GridGeometry, frame: int) -> None:
+        """Move what is known to a raster of another size, with a border of ``frame`` pixels.
+
+        What the new map shows differently is left to ``_look``.
+        """
+        assert self.shift is not None
+        shape = geometry.rows, -(-geometry.cols // WORD)
+        self.geometry = geometry
+        self.blocked = carried_bits(self.blocked, self.shift, shape, beyond=True)
+        border = np.ones((1, geometry.cols), np.bool_)
+        border[:, frame : geometry.cols - frame] = False
+        self.blocked |= packed(border, beyond=True)
+        self.blocked[:frame] = self.blocked[geometry.rows - frame :] = ALL
+        self.places = carried_bits(self.places, self.shift, shape, beyond=False)
+        self.places &= ~self.blocked
 
     def _look(self, grid: OccupancyGrid, parts: int, first: int, end: int) -> None:
         """Compute blocked pixels in rows of the raster, and the places there."""

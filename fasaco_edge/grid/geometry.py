@@ -125,6 +125,14 @@ class Window:
         Cells outside have the value ``beyond``.
         """
         rows, cols = cells[:, 0] - self.row0, cells[:, 1] - self.col0
+        if not len(rows) or (
+            rows.min() >= 0
+            and rows.max() < self.rows
+            and cols.min() >= 0
+            and cols.max() < self.cols
+        ):
+            # As nearly always; over paths of tens of thousands of cells.
+            return values.ravel().take(rows.astype(int) * self.cols + cols)
         inside = (rows >= 0) & (rows < self.rows) & (cols >= 0) & (cols < self.cols)
         found = rows.astype(values.dtype)
         found.fill(beyond)

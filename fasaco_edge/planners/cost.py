@@ -94,8 +94,9 @@ class CoverageCost:
 
 def count_turns(cells: NDArray[np.int32]) -> Turns:
     """Count the turns of a walk, int32 (n, 2), cells (row, col) joined by steps."""
-    moves = np.diff(cells, axis=0)
-    along = (moves[1:] * moves[:-1]).sum(axis=1)
+    # Column by column: numpy takes several times as long over rows of two.
+    up, right = np.diff(cells[:, 0]), np.diff(cells[:, 1])
+    along = up[1:] * up[:-1] + right[1:] * right[:-1]
     return Turns(int(np.count_nonzero(along == 0)), int(np.count_nonzero(along < 0)))
 
 

@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.grid.floor import Floor, StandLattice, straightened
-from fasaco_edge.grid.geometry import Window
 from fasaco_edge.kernels.floor import line as kernel
 from fasaco_edge.kernels.floor.anneal import anneal
 from fasaco_edge.kernels.floor.detour import find_patches, sweep_patches
@@ -24,7 +23,6 @@ from fasaco_edge.kernels.floor.sweeps import (
     NEVER,
     Scratch,
     Sweeps,
-    count_left,
     sweep_edges,
 )
 from fasaco_edge.kernels.floor.turning import Turning, proportional_turning
@@ -44,6 +42,10 @@ COOLED = (1.0, 0.0)
 TURNING = proportional_turning(1.5)
 # Seed of the random moves.
 SEED = 0x9E3779B97F4A7C15
+# Pixels that are counted at once.
+CACHED = 1 << 17
+# Number of ones in a byte.
+_ONES = np.unpackbits(np.arange(256, dtype=np.uint8)[:, None], axis=1).sum(axis=1, dtype=np.uint8)
 
 
 @dataclass(frozen=True, slots=True)
@@ -142,21 +144,27 @@ def line_over(
 
 def _sweeps(floor: Floor) -> Sweeps:
     counts = np.where(floor.reachable, 0, NEVER).astype(np.int16)
-    shape = floor.geometry.rows, floor.geometry.cols
-    sweeps = Sweeps(counts, np.zeros(blocks_of(shape), np.int32))
-    count_blocks(sweeps, Window(0, 0, *shape))
-    return sweeps
+    return Sweeps(counts, left_in_blocks(counts))
 
 
-def blocks_of(shape: tuple[int, int]) -> tuple[int, int]:
+def blocks_of(shape: tuple[int, ...]) -> tuple[int, int]:
     """Return the number of blocks (rows, cols) of a raster of a shape."""
     rows, cols = shape
     return (rows - 1 >> BLOCK) + 1, (cols - 1 >> BLOCK) + 1
 
 
-def count_blocks(sweeps: Sweeps, part: Window) -> None:
-    """Recount the unswept pixels in the blocks of a window."""
-    count_left(sweeps, part.row0, part.col0, part.row1, part.col1)
+def left_in_blocks(counts: NDArray[np.int16]) -> NDArray[np.int32]:
+    """Return the number of unswept pixels in each block, of sweep counts (rows, cols)."""
+    left = np.empty(blocks_of(counts.shape), np.int32)
+    side = 1 << BLOCK
+    # As many rows at once as fit in a cache; a byte has the pixels of a row of a block.
+    rows = max(CACHED // (side * counts.shape[1]), 1)
+    for first in range(0, len(left), rows):
+        part = counts[side * first : side * (first + rows)]
+        in_rows = _ONES.take(np.packbits(part == 0, axis=1))
+        begins = np.arange(0, len(part), side)
+        left[first : first + rows] = np.add.reduceat(in_rows, begins, axis=0, dtype=np.uint8)
+    return left
 
 
 def linked(

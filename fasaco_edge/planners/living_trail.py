@@ -145,11 +145,15 @@ class LivingTrail:
             return
         flat = self._writable().reshape(-1, 4)
         places = np.zeros(len(flat), np.bool_)
-        places[moves // 4] = True
+        places[moves >> 2] = True
         on_path = np.flatnonzero(places)
         then = flat.ravel().take(moves)
-        around = flat.take(on_path, axis=0)
-        flat[on_path] = self._faded(around, self._rules.alpha) * (around > 0)
+        # The four directions of a cell as one item.
+        cell = flat.view(np.complex128).ravel()
+        around = cell.take(on_path).view(np.float32)
+        faded = self._faded(around, self._rules.alpha)
+        faded *= around > 0
+        cell[on_path] = faded.view(np.complex128)
         alpha = np.float32(self._rules.alpha)
         kept = np.float32(1) - alpha
         flat.ravel()[moves] = kept * then + alpha * np.float32(amount)
@@ -203,10 +207,12 @@ class LivingTrail:
         """Return the steps between cells as indices of the flattened trail."""
         rows, cols = np.ascontiguousarray(cells.T)
         up, right = np.diff(rows), np.diff(cols)
-        is_step = (np.abs(up) + np.abs(right) == 1) & _inside(cells[:-1], self._window)
         row, col = rows[:-1] - self._window.row0, cols[:-1] - self._window.col0
+        is_step = (np.abs(up) + np.abs(right) == 1) & _inside(cells[:-1], self._window)
         place = row.astype(np.intp) * self._window.cols + col
-        moves = (4 * place + _DIRECTION.take(3 * up + right + 4, mode="clip"))[is_step]
+        moves = 4 * place + _DIRECTION.take(3 * up + right + 4, mode="clip")
+        if not is_step.all():
+            moves = moves[is_step]
         legal: NDArray[np.intp] = moves[self._tau.ravel().take(moves) > 0]
         return legal
 

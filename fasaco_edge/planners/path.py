@@ -12,6 +12,9 @@ from fasaco_edge.grid.lattice import CoverageLattice
 from fasaco_edge.kernels.lattice.reach import shortest_walk
 from fasaco_edge.planners.cost import NO_WORK, SearchWork, count_turns, gap_to
 
+# Rows that are compared first, where two walks may differ early.
+FIRST_PIECE = 256
+
 
 class Saved(NamedTuple):
     """Savings of a search against the walk that it began with [s].
@@ -119,5 +122,12 @@ def walk_figures(lattice: CoverageLattice, cells: NDArray[np.int32]) -> WalkFigu
 def common_beginning(first: NDArray[np.generic], second: NDArray[np.generic]) -> int:
     """Return the length of the common prefix of two arrays (n, 2) and (m, 2), in rows."""
     count = min(len(first), len(second))
-    differ = (first[:count] != second[:count]).any(axis=1)
-    return int(np.argmax(differ)) if differ.any() else count
+    # Piece by piece: most walks differ early, or not at all.
+    begin, piece = 0, FIRST_PIECE
+    while begin < count:
+        end = min(begin + piece, count)
+        differ = first[begin:end] != second[begin:end]
+        if differ.any():
+            return begin + int(np.argmax(differ)) // 2
+        begin, piece = end, 4 * piece
+    return count

@@ -269,7 +269,11 @@ class FramedGround:
     def framed(self, walk: NDArray[np.int32]) -> NDArray[np.int32]:
         """Convert flat indices of the lattice, int32 (n,), to those of the framed one."""
         row, col = np.divmod(walk, np.int32(self.cols))
-        return ((row + FRAME) * self.width + col + FRAME).astype(np.int32)
+        return self.framed_at(row, col)
+
+    def framed_at(self, rows: NDArray[np.int32], cols: NDArray[np.int32]) -> NDArray[np.int32]:
+        """Return cells by rows and columns of the lattice as flat indices of the framed one."""
+        return ((rows + FRAME) * self.width + cols + FRAME).astype(np.int32, copy=False)
 
     def unframed(self, walk: NDArray[np.int32]) -> NDArray[np.int32]:
         """Convert flat indices of the framed lattice, int32 (n,), to those of the lattice."""

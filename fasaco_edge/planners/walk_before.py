@@ -39,13 +39,21 @@ def completed(
     Returns:
         Framed cells, int32 (m,).
     """
+    return completed_from(problem, framed, framed_cells(problem, framed, before), held)
+
+
+def completed_from(
+    problem: CoverageProblem, framed: FramedGround, before: NDArray[np.int32], held: int
+) -> NDArray[np.int32]:
+    """Return what ``completed`` does, of ``framed_cells`` of the walk from before, int32 (n,)."""
     start = int(framed.framed(np.array([problem.flat_start], np.int32))[0])
-    cells = framed_cells(problem, framed, before)
-    kept = np.empty(cells.size + 2 * framed.ground.bound, np.int32)
-    length = keep_legal(framed.ground, cells, start, kept)
+    kept = np.empty(before.size + 2 * framed.ground.bound, np.int32)
+    length = keep_legal(framed.ground, before, start, kept)
     whole = np.empty(length + 2 * framed.ground.bound, np.int32)
     size = put_in_new(framed.ground, kept[:length], problem.end is None, held, whole)
     walk = whole[:size].copy()
+    if problem.end is None:
+        return walk
     return framed.framed(problem.led_to_end(framed.unframed(walk)))
 
 
@@ -56,4 +64,6 @@ def framed_cells(
     window = problem.lattice.window
     rows, cols = before[:, 0] - window.row0, before[:, 1] - window.col0
     inside = (rows >= 0) & (rows < window.rows) & (cols >= 0) & (cols < window.cols)
-    return framed.framed((rows[inside] * window.cols + cols[inside]).astype(np.int32))
+    if not inside.all():
+        rows, cols = rows[inside], cols[inside]
+    return framed.framed_at(rows, cols)

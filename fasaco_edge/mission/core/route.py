@@ -18,6 +18,7 @@ from fasaco_edge.mission.map.loop_closure import Motion, moved_cells
 from fasaco_edge.mission.map.map_state import MapState
 from fasaco_edge.mission.map.reachable_area import ReachableArea
 from fasaco_edge.mission.orders.sequencer import Sequencer
+from fasaco_edge.planners.path import FIRST_PIECE
 
 NO_CELLS: NDArray[np.int32] = np.empty((0, 2), np.int32)
 
@@ -207,11 +208,20 @@ class Route(PlanRequests):
         The robot drove on meanwhile, so it joins the plan at the first cell that still needs a
         visit. Empty if no path leads there: the robot was carried elsewhere.
         """
-        window = area.lattice.window
-        still_open = window.values_at(self._orders.open_cells(window), cells, True)
-        first = int(np.argmax(still_open)) if still_open.any() else len(cells) - 1
+        first = self._first_open(cells, area.lattice.window)
         lead = area.shortest_path(here, (int(cells[first, 0]), int(cells[first, 1])))
         return np.concatenate((lead[:-1], cells[first:])) if len(lead) else lead
+
+    def _first_open(self, cells: NDArray[np.int32], window: Window) -> int:
+        """Return the index of the first cell that needs a visit; that of the last if none does."""
+        is_open = self._orders.open_cells(window)
+        begin, piece = 0, FIRST_PIECE
+        while begin < len(cells):
+            found = window.values_at(is_open, cells[begin : begin + piece], True)
+            if found.any():
+                return begin + int(np.argmax(found))
+            begin, piece = begin + piece, 4 * piece
+        return len(cells) - 1
 
     def publish(
         self,

@@ -102,8 +102,10 @@ class TrailLayer:
 
 def _distinct(cells: NDArray[np.int32]) -> int:
     """Return how many distinct cells a path, int32 (n, 2), leads over."""
-    low = cells.min(axis=0)
-    rows, cols = (cells.max(axis=0) - low + 1).tolist()
-    seen = np.zeros((rows, cols), np.bool_)
-    seen[tuple((cells - low).T)] = True
+    # Column by column: numpy takes several times as long over rows of two.
+    rows, cols = np.ascontiguousarray(cells.T)
+    rows, cols = rows - rows.min(), cols - cols.min()
+    width = int(cols.max()) + 1
+    seen = np.zeros((int(rows.max()) + 1) * width, np.bool_)
+    seen[rows.astype(np.intp) * width + cols] = True
     return int(np.count_nonzero(seen))

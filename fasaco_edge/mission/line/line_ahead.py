@@ -19,6 +19,7 @@ from fasaco_edge.kernels.floor.capsule import is_clear
 from fasaco_edge.kernels.floor.line import LEAST_EDGE
 from fasaco_edge.mission.line.pieces import (
     MOVED,
+    NO_EDGES,
     POLISHED,
     RAW,
     Joiner,
@@ -26,6 +27,8 @@ from fasaco_edge.mission.line.pieces import (
     Piece,
     Points,
     Walk,
+    edges_between,
+    is_outside,
     kept_pieces,
 )
 from fasaco_edge.mission.line.place_on_line import PlaceOnLine
@@ -76,25 +79,22 @@ class LineAhead:
 
     def _move(self, shape: tuple[int, int], by: tuple[int, int]) -> None:
         """Move to a raster of another shape, (rows, cols), and shift."""
-        edges, before = _edges(self.line.points), self.tally.shape
+        points, before = self.line.points, self.tally.shape
         self.line = self.line.moved(by)
-        moved = _edges(self.line.points)
+        moved = self.line.points
         # Sweeps beyond a raster are not counted: such edges are subtracted before and added after.
-        beyond = self._is_beyond(edges, before) | self._is_beyond(moved, shape)
-        self.tally.exchange(edges[beyond], edges[:0])
+        beyond = self._is_beyond(points, before) | self._is_beyond(moved, shape)
+        is_edge = beyond[:-1] | beyond[1:]
+        self.tally.exchange(edges_between(points, is_edge), NO_EDGES)
         self.tally.move(shape, by)
-        self.tally.exchange(edges[:0], moved[beyond])
+        self.tally.exchange(NO_EDGES, edges_between(moved, is_edge))
         self._place.here = self._place.here + np.array(by)
         self._unchecked = self._unchecked and self._unchecked.moved(*by)
 
-    def _is_beyond(self, edges: NDArray[np.float64], shape: tuple[int, int]) -> NDArray[np.bool_]:
-        """Return which edges, float64 (n, 4), the tool sweeps beyond a raster of a shape, bool."""
-        low, high = np.minimum(edges[:, :2], edges[:, 2:]), np.maximum(edges[:, :2], edges[:, 2:])
+    def _is_beyond(self, points: Points, shape: tuple[int, int]) -> NDArray[np.bool_]:
+        """Return at which points the tool sweeps beyond a raster of a shape, bool (n,)."""
         margin = self._tool + 1.0
-        beyond: NDArray[np.bool_] = np.any(
-            (low < margin) | (high > np.array(shape) - 1.0 - margin), axis=1
-        )
-        return beyond
+        return is_outside(points, shape, margin)
 
     def lay(self, walk: NDArray[np.int32], pose: Pose2D) -> None:
         """Lay the line along a walk; it stays where it leads along the same cells.
@@ -214,8 +214,7 @@ class LineAhead:
             return
         if number > 0:
             self.tally.drive(self.line.points[: number + 1])
-            edges = _edges(self.line.points[: number + 1])
-            self.tally.exchange(edges, edges[:0])
+            self.tally.exchange(edges_between(self.line.points[: number + 1]), NO_EDGES)
             self.line = self.line.part(number)
             self.unpublished_from = max(self.unpublished_from - number, 0)
         # The nearest cell, or the next plan would begin behind the robot. At the last one the robot
@@ -316,7 +315,7 @@ class LineAhead:
                 new.state[at : at + 1 if at else 0] = RAW
                 new.state[at + inner : at + inner + 1 if at + inner + 1 < len(new) else 0] = RAW
             at += inner + 1
-        self.tally.exchange(_edges(old.points)[goes], _edges(new.points)[comes])
+        self.tally.exchange(edges_between(old.points, goes), edges_between(new.points, comes))
         self.line = new
 
     def _is_clear(self, a: Points, b: Points) -> bool:
@@ -330,20 +329,15 @@ class LineAhead:
         if len(points) < 2:
             return []
         margin = self._floor.discs.radius_m / self._floor.geometry.resolution + 1.0
-        low = np.minimum(points[:-1], points[1:]) - margin
-        high = np.maximum(points[:-1], points[1:]) + margin
-        near = (
-            (low[:, 0] < part.row1)
-            & (high[:, 0] > part.row0)
-            & (low[:, 1] < part.col1)
-            & (high[:, 1] > part.col0)
-        )
         # Edges off the raster are always included.
-        near |= ((low < 0.0) | (high > np.array(self.tally.shape) - 1.0)).any(axis=1)
+        outside = is_outside(points, self.tally.shape, margin)
+        near = outside[:-1] | outside[1:]
+        # Those with both ends on one side of the window are not near it.
+        close = np.ones(len(near), np.bool_)
+        for axis, low, high in ((0, part.row0, part.row1), (1, part.col0, part.col1)):
+            ends = points[:, axis]
+            below, above = ends + margin <= low, ends - margin >= high
+            close &= ~((below[:-1] & below[1:]) | (above[:-1] & above[1:]))
+        near |= close
         numbers: list[int] = np.flatnonzero(near).tolist()
         return numbers
-
-
-def _edges(points: Points) -> NDArray[np.float64]:
-    """Return the edges between points, float64 (n - 1, 4)."""
-    return np.concatenate([points[:-1], points[1:]], axis=1)

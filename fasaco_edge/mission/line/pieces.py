@@ -23,6 +23,7 @@ Walk = NDArray[np.int32]
 RAW, MOVED, POLISHED = range(3)
 # Least steps of a reused piece: shorter ones would consist mostly of joints.
 LEAST_STEPS = 8
+NO_EDGES = np.empty((0, 4))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -114,6 +115,25 @@ def kept_pieces(line: Line, before: Walk, after: Walk) -> list[Piece]:
             last = line.before(origin + steps)
             pieces.append(Piece(line.part(first, last).renumbered(begin - origin), first))
     return [piece for piece in pieces if len(piece.line)]
+
+
+def is_outside(points: Points, shape: tuple[int, int], margin: float) -> NDArray[np.bool_]:
+    """Return which points are closer than ``margin`` to the rim of a raster, bool (n,)."""
+    # Column by column: numpy takes several times as long over rows of two.
+    y, x = points[:, 0], points[:, 1]
+    outside: NDArray[np.bool_] = (
+        (y < margin) | (x < margin) | (y > shape[0] - 1.0 - margin) | (x > shape[1] - 1.0 - margin)
+    )
+    return outside
+
+
+def edges_between(points: Points, which: NDArray[np.bool_] | None = None) -> NDArray[np.float64]:
+    """Return the edges between points, or some of them, float64 (n, 4)."""
+    begins, ends = points[:-1], points[1:]
+    if which is not None:
+        numbers = np.flatnonzero(which)
+        begins, ends = begins[numbers], ends[numbers]
+    return np.concatenate([begins, ends], axis=1)
 
 
 @dataclass(slots=True, eq=False)

@@ -24,7 +24,7 @@ from fasaco_edge.kernels.floor.driven import (
 )
 from fasaco_edge.kernels.floor.sweeps import NEVER, Scratch, Sweeps, sweep_edges
 from fasaco_edge.mission.line.out_of_reach import Cause
-from fasaco_edge.planners.line import blocks_of, count_blocks, memory_for_moves
+from fasaco_edge.planners.line import blocks_of, left_in_blocks, memory_for_moves
 
 NO_MASK = np.zeros((0, 0), np.bool_)
 
@@ -67,8 +67,7 @@ class SweepTally:
             self._beyond_pixels -= _count_causes(lost)
         self._state = carried(self._state, old, new)
         counts = carried(self.sweeps.counts, old, new, NEVER)
-        self.sweeps = Sweeps(counts, np.zeros(blocks_of(shape), np.int32))
-        count_blocks(self.sweeps, new)
+        self.sweeps = Sweeps(counts, left_in_blocks(counts))
 
     def exchange(self, goes: NDArray[np.float64], comes: NDArray[np.float64]) -> None:
         """Subtract edges and add others, float64 (n, 4): y, x and y, x of their ends [pixels]."""

@@ -9,7 +9,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.grid.changes import LatticeChange, carried
+from fasaco_edge.grid.changes import LatticeChange, carried, carried_copy
 from fasaco_edge.grid.geometry import Pose2D, Window
 from fasaco_edge.grid.lattice import COVERABLE, Cell, CoverageLattice
 from fasaco_edge.kernels import COL_STEP, ROW_STEP
@@ -18,6 +18,11 @@ from fasaco_edge.kernels.lattice.reach import reachable_from, shortest_walk, upd
 # If the robot's own cell is not coverable (a small offset, a noisy scan), the nearest coverable
 # cell within this distance is taken.
 ANCHOR_CELLS = 1.5
+
+# Bit of a step in a step mask, by index 3 * rows + columns + 4.
+_BIT_OF_MOVE = np.zeros(9, np.uint8)
+for _direction, (_row, _col) in enumerate(zip(ROW_STEP, COL_STEP, strict=True)):
+    _BIT_OF_MOVE[3 * _row + _col + 4] = 1 << _direction
 
 # Above this changed share of the lattice, a full search is as fast.
 LOCAL_SHARE = 0.01
@@ -78,7 +83,7 @@ class ReachableArea:
         if is_local and (changed >= 0).all() and (changed < (new.rows, new.cols)).all():
             steps = carried(self.lattice.steps, old, new)
             steps.flags.writeable = False
-            reachable = carried(self.reachable, old, new).copy()
+            reachable = carried_copy(self.reachable, old, new)
             if update_reach(steps, lattice.steps, changed, reachable, *lattice.local(cell)):
                 return ReachableArea(lattice, reachable)
         return ReachableArea.around(lattice, cell)
@@ -127,12 +132,11 @@ class ReachableArea:
         if not lattice.contains(first) or lattice.states[lattice.local(first)] != COVERABLE:
             return 0
         allowed = lattice.window.values_at(lattice.steps, cells[:-1], 0)
-        # Column by column: this runs with every pose, over tens of thousands of cells.
+        # Column by column: this runs over tens of thousands of cells.
         row_moves, col_moves = np.diff(cells[:, 0]), np.diff(cells[:, 1])
-        legal = np.zeros(len(allowed), bool)
-        for direction, (row_step, col_step) in enumerate(zip(ROW_STEP, COL_STEP, strict=True)):
-            heading = (row_moves == row_step) & (col_moves == col_step)
-            legal |= heading & (allowed >> direction & 1).astype(bool)
+        is_step = np.abs(row_moves) + np.abs(col_moves) == 1
+        allowed &= _BIT_OF_MOVE.take(3 * row_moves + col_moves + 4, mode="clip")
+        legal = is_step & (allowed != 0)
         return 1 + int(np.argmin(legal)) if not legal.all() else len(cells)
 
     def shortest_path(self, start: Cell, goal: Cell) -> NDArray[np.int32]:

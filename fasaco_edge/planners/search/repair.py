@@ -27,7 +27,7 @@ from fasaco_edge.planners.problem import CoverageProblem, FramedGround
 from fasaco_edge.planners.search.effort import RepairEffort, repair_for
 from fasaco_edge.planners.search.regions import Neighbourhood, neighbourhoods, spot
 from fasaco_edge.planners.search.walk_region import WalkRegion, stream_of
-from fasaco_edge.planners.walk_before import HELD_CELLS, completed, framed_cells
+from fasaco_edge.planners.walk_before import HELD_CELLS, completed_from, framed_cells
 
 # Perturbations between two pauses.
 PERTURBATIONS_AT_ONCE = 10
@@ -143,10 +143,10 @@ class _Repair:
         self._problem = problem
         self._framed = FramedGround.of(problem)
         self._effort = effort
-        self._walk = completed(problem, self._framed, problem.before, HELD_CELLS)
+        before = framed_cells(problem, self._framed, problem.before)
+        self._walk = completed_from(problem, self._framed, before, HELD_CELLS)
         self.completed = problem.cells_of(self._framed.unframed(self._walk[: HELD_CELLS + 1]))
         self._first_walk_s = time.perf_counter() - began
-        before = framed_cells(problem, self._framed, problem.before)
         self._changed = _changed(self._framed, before, self._walk)
         self.completed_us = self._cost_us = problem.cost_us(self._walk)
         has_bound = problem.only_better or problem.cells <= BOUNDED_CELLS
