@@ -182,7 +182,7 @@ TURNS = Topic(
 FLEET = Topic(
     name="fleet",
     direction="out",
-    when="once a second, and when state or division have changed; only in a fleet",
+    when="once a second, on change, and four times a second near another robot; only in a fleet",
     speaker="robot",
     # Robots share an area by these messages; it is also received from the keys of other robots.
     listeners=("fleet", "viewer"),

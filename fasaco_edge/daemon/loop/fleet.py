@@ -25,7 +25,6 @@ from fasaco_edge.wire.documents.fleet import (
     decode_member,
 )
 from fasaco_edge.wire.documents.json_text import encode_json
-from fasaco_edge.wire.limits import MAX_FLEET_TILES
 from fasaco_edge.wire.topics import FLEET
 
 if TYPE_CHECKING:
@@ -37,8 +36,8 @@ LEAST_SPACING_S, MOST_ROBOTS = 0.2, 64
 # A robot silent for this long makes room for another [s].
 FORGOTTEN_S = 60.0
 # Tiles of progress, and as many of ground, in a message sent once a second, and in one on change:
-# 17 kB a second in all.
-TILES, FEW_TILES = MAX_FLEET_TILES // 2, 2
+# 20 kB a second in all.
+TILES, FEW_TILES = 10, 2
 
 
 class FleetEar:
