@@ -19,6 +19,7 @@ from fasaco_edge.config.robot import RobotConfig
 from fasaco_edge.config.ros import RosConfig
 from fasaco_edge.config.security import SecurityConfig
 from fasaco_edge.errors import BadConfiguration, OrderError
+from fasaco_edge.grid.geometry import FARTHEST_M
 from fasaco_edge.mission.config import BatteryPolicy, MissionPolicy
 from fasaco_edge.mission.orders.mask import INLINE, mask_polygons
 from fasaco_edge.mission.orders.order import OrderDocument, ZoneDocument, order_of
@@ -192,9 +193,17 @@ def _home(path: Path) -> Path:
 
 
 class FleetConfig(Section, frozen=True):
-    """Robots under one ``bus.base`` with this name and one map frame share the work in an area."""
+    """Robots under one ``bus.base`` with this name and one map frame share the work in an area.
+
+    With maps of their own they give one ``frame``, and where the origin of their map lies in it:
+    ``x_m``, ``y_m`` [m], ``yaw_deg`` [deg].
+    """
 
     name: Annotated[str, Meta(min_length=1, max_length=64)]
+    frame: Annotated[str, Meta(max_length=64)] = ""
+    x_m: Annotated[float, Meta(ge=-FARTHEST_M, le=FARTHEST_M)] = 0.0
+    y_m: Annotated[float, Meta(ge=-FARTHEST_M, le=FARTHEST_M)] = 0.0
+    yaw_deg: Annotated[float, Meta(ge=-360, le=360)] = 0.0
 
 
 class BatteryConfig(Section, BatteryPolicy, frozen=True, kw_only=True):

@@ -140,6 +140,11 @@ def _misfits(config: DaemonConfig) -> Iterator[BadConfiguration]:
             "battery.enough must be at least 0.1 above battery.low and battery.reserve, got "
             f"{battery.enough:g}, {battery.low:g} and {battery.reserve:g}"
         )
+    if (fleet := config.fleet) and not fleet.frame and (fleet.x_m or fleet.y_m or fleet.yaw_deg):
+        yield BadConfiguration(
+            "fleet.frame: expected the name of the frame that fleet.x_m, fleet.y_m and "
+            "fleet.yaw_deg are given in"
+        )
     if config.ros2:
         for error in config.ros2.faults():
             yield BadConfiguration(f"ros2.{error}")

@@ -105,6 +105,12 @@ def test_every_section_is_read(load):
         ("bus: {listen: [7447]}", "bus.listen[0]: expected str, in quotes, got 7447"),
         ("bus: {listen: []}", "bus.listen and bus.connect must not both be empty"),
         ("map: {free_at_most: 101}", "map.free_at_most: expected int <= 100, got 101"),
+        ("fleet: {name: hall, yaw_deg: 400}", "fleet.yaw_deg: expected float <= 360.0, got 400"),
+        (
+            "fleet: {name: hall, x_m: 3}",
+            "fleet.frame: expected the name of the frame that fleet.x_m, fleet.y_m and "
+            "fleet.yaw_deg are given in",
+        ),
         (
             "map: {free_at_most: 65}",
             "map.free_at_most must be below map.occupied_at_least, got 65 and 65",

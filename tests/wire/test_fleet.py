@@ -74,6 +74,8 @@ def test_it_comes_back_as_it_was_and_is_that_of_the_schema():
         {"ahead": [[0.0, 1e9]]},
         {"ahead": [[0.0, 0.0]] * (MAX_FLEET_POINTS + 1)},
         {"parts": [["r1", 0, 0, 0.0, 0.0]]},
+        {"origin": [0.0, 1e9, 0.0]},
+        {"origin": [0.0, 0.0, 361.0]},
         {"parts": [["r1", 0, 2**30, 0.0, 1.0]]},
         {"parts": [["r1", 0, 0, 1e300, 1.0]]},
         {"parts": [["r1", 0, 0, 0.0, 1.0]] * (MAX_FLEET_PARTS + 1)},
@@ -111,6 +113,19 @@ def test_cells_of_another_size_do_not_fit():
     cell_m = CONFIG.cell_m
     assert heard(said(cell_m=cell_m)).misfit == ""
     assert "its cells are 0.5 m wide" in heard(said(cell_m=0.5)).misfit
+
+
+def test_robots_of_a_frame_of_their_own_need_the_same_one():
+    config = structs.replace(CONFIG, fleet=FleetConfig("hall", frame="house"))
+    for frame, misfit in (
+        ("map", "its frame is 'map', that of this fleet is 'house'"),
+        ("house", ""),
+    ):
+        # Their maps may lie at any angle to each other, and so may their cells.
+        payload = said(cell_m=CONFIG.cell_m, frame=frame, lattice_deg=20.0, origin=[1.0, 2.0, 30.0])
+        event = FleetEar(config).event(Sample("fasaco/@v1/r2/fleet", payload))
+        assert event.misfit == misfit
+    assert event.frame == ""
 
 
 @pytest.mark.parametrize("robot", ["r1", "*", "r$*"])

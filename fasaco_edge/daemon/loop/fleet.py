@@ -5,6 +5,7 @@ Unused without a block ``fleet`` in the configuration.
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable
 from typing import TYPE_CHECKING
@@ -12,9 +13,11 @@ from typing import TYPE_CHECKING
 from fasaco_edge.bus.arrival import Sample
 from fasaco_edge.bus.publisher import Publisher
 from fasaco_edge.bus.session import Bus
-from fasaco_edge.config.config import DaemonConfig
+from fasaco_edge.config.config import DaemonConfig, FleetConfig
 from fasaco_edge.errors import FasacoError, FleetError
+from fasaco_edge.grid.geometry import Pose2D
 from fasaco_edge.mission.core.events import MemberHeard, Part
+from fasaco_edge.mission.fleet.frames import FleetFrames
 from fasaco_edge.mission.fleet.ground import GroundTelling
 from fasaco_edge.mission.fleet.shared import Telling
 from fasaco_edge.wire.documents.fleet import (
@@ -51,6 +54,10 @@ class FleetEar:
         assert config.fleet
         self._keys, self._fleet, self._cell_m = config.keys(), config.fleet.name, config.cell_m
         self._lattice_deg = config.lattice_deg or 0.0
+        self._frame, self._frames = config.fleet.frame, None
+        if self._frame:
+            origin = _origin(config.fleet)
+            self._frames = FleetFrames(_pose(*origin), self._lattice_deg, self._cell_m)
         self._heard_at: dict[str, float] = {}
 
     def listen(self, bus: Bus, post: Callable[[Sample], None]) -> None:
@@ -82,12 +89,14 @@ class FleetEar:
         misfit = ""
         if abs(member.cell_m - self._cell_m) > 1e-9:
             misfit = f"its cells are {member.cell_m:g} m wide, here they are {self._cell_m:g} m"
-        if abs(member.lattice_deg - self._lattice_deg) > 1e-9:
+        if self._frame and member.frame != self._frame:
+            misfit = f"its frame is {member.frame!r}, that of this fleet is {self._frame!r}"
+        if not self._frame and abs(member.lattice_deg - self._lattice_deg) > 1e-9:
             misfit = (
                 f"its cells lie at {member.lattice_deg:g} degrees to the map frame, here at "
                 f"{self._lattice_deg:g}"
             )
-        return MemberHeard(
+        heard = MemberHeard(
             robot=robot,
             misfit=misfit,
             frame=member.frame,
@@ -109,6 +118,9 @@ class FleetEar:
             ahead=member.ahead,
             waits_for=member.waits_for,
         )
+        if self._frames is None or misfit:
+            return heard
+        return self._frames.event(heard, _pose(*member.origin), member.lattice_deg)
 
     def _is_due(self, key: str, now: float) -> bool:
         """Tell whether a message on a key may be taken now; on a Zenoh thread."""
@@ -137,6 +149,7 @@ class FleetVoice:
         assert config.fleet
         self._publisher, self._fleet, self._cell_m = publisher, config.fleet.name, config.cell_m
         self._radius_m = config.robot.radius_m
+        self._frame, self._origin = config.fleet.frame, _origin(config.fleet)
         self._telling, self._telling_ground = Telling(), GroundTelling()
         self._said: tuple[object, ...] = ()
         self._epoch = 0
@@ -167,7 +180,7 @@ class FleetVoice:
             fleet=self._fleet,
             cell_m=self._cell_m,
             lattice_deg=mission.rotation.deg,
-            frame=mission.ledger.frame,
+            frame=self._frame or mission.ledger.frame,
             state=str(mission.state),
             x=round(stamped.pose.x, 3),
             y=round(stamped.pose.y, 3),
@@ -185,8 +198,17 @@ class FleetVoice:
             radius_m=self._radius_m,
             ahead=tuple((round(x, 3), round(y, 3)) for x, y in mission.next_metres().tolist()),
             waits_for=way.waits_for,
+            origin=self._origin,
         )
         self._publisher.put(encode_json(member))
+
+
+def _origin(fleet: FleetConfig) -> tuple[float, float, float]:
+    return fleet.x_m, fleet.y_m, fleet.yaw_deg
+
+
+def _pose(x: float, y: float, deg: float) -> Pose2D:
+    return Pose2D(x, y, math.radians(deg))
 
 
 def _placed(tiles: tuple[CellTile, ...]) -> tuple[tuple[tuple[int, int], bytes], ...]:

@@ -123,7 +123,7 @@ class MemberHeard:
     Attributes:
         robot: its name.
         misfit: why it cannot belong to this fleet; "" where it can.
-        frame: its map frame.
+        frame: its map frame; "" where all is given in this robot's frames.
         state: state of its mission.
         x, y: its position [m].
         step_s: its time to sweep one cell [s].

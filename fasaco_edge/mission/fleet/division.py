@@ -22,6 +22,8 @@ from fasaco_edge.kernels.fleet.split import ways_from
 MOST_CELLS, MOST_SEARCHED = 2_000, 3_000_000
 # Rounds of moving the seeds; updates of the handicaps, and the factor between successive ones.
 ROUNDS, CHANGES, DAMPING = 3, 30, 0.85
+# A seed on a cell that is not coverable counts as on the nearest one within this distance [cells].
+SNAP = 2
 # Seeds are kept unless others end before this share of their time.
 STABLE = 0.9
 
@@ -126,10 +128,26 @@ def _times_s(lattice: CoverageLattice, start: Cell, step_s: float) -> Seconds:
     """Return travel times from a cell [s], float32 (rows * cols,); huge where unreachable."""
     if not lattice.contains(start):
         return np.full(lattice.steps.size, np.float32(1e9))
-    row, col = lattice.local(start)
+    row, col = _on_ground(lattice, *lattice.local(start))
     ways = ways_from(lattice.steps, row * lattice.steps.shape[1] + col)
     times: Seconds = ways.astype(np.float32) * np.float32(step_s)
     return times
+
+
+def _on_ground(lattice: CoverageLattice, row: int, col: int) -> Cell:
+    """Return the coverable cell nearest to one, within SNAP cells; the cell itself for none.
+
+    Seeds that others tell may lie on cells that this robot's map shows otherwise.
+    """
+    if lattice.coverable[row, col]:
+        return row, col
+    top, left = max(row - SNAP, 0), max(col - SNAP, 0)
+    near = lattice.coverable[top : row + SNAP + 1, left : col + SNAP + 1]
+    cells = np.argwhere(near) + np.array((top, left))
+    if not len(cells):
+        return row, col
+    best = cells[((cells - (row, col)) ** 2).sum(axis=1).argmin()]
+    return int(best[0]), int(best[1])
 
 
 class _Travel:

@@ -168,7 +168,7 @@ class FleetLayer:
             return ""
         before, frame = self.members.get(event.robot), self._ledger.current.frame
         left_out = event.misfit
-        if not left_out and event.frame != frame:
+        if not left_out and event.frame not in ("", frame):
             left_out = f"its frame is {event.frame!r}, here it is {frame!r}"
         place, moved_at = (event.x, event.y), now
         if before is None:

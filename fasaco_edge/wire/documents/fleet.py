@@ -27,6 +27,7 @@ TILE_BYTES: Final = 512
 
 Coordinate = Annotated[float, Meta(ge=-MAX_COORDINATE_M, le=MAX_COORDINATE_M)]
 Point = tuple[Coordinate, Coordinate]
+Angle = Annotated[float, Meta(ge=-360, le=360)]
 Text = Annotated[str, Meta(max_length=256)]
 Whole = Annotated[int, Meta(ge=0, le=2**31 - 1)]
 Pace = Annotated[float, Meta(ge=1e-3, le=3600)]
@@ -84,6 +85,8 @@ class FleetMember(Document, frozen=True):
         parts: what that division gives to each robot; none without one.
         radius_m: radius of the robot's disc [m].
         ahead: points x, y of the path's next metres [m], in the frame of the map.
+        origin: where the origin of its map frame lies in the fleet's frame: x, y [m], the angle
+            [deg]; without a frame of the fleet's own 0.
         waits_for: name of the robot that it waits or makes way for; "" for none.
     """
 
@@ -106,6 +109,7 @@ class FleetMember(Document, frozen=True):
     radius_m: Annotated[float, Meta(ge=0, le=100)] = 0.0
     ahead: Annotated[tuple[Point, ...], Meta(max_length=MAX_FLEET_POINTS)] = ()
     waits_for: Text = ""
+    origin: tuple[Coordinate, Coordinate, Angle] = (0.0, 0.0, 0.0)
 
 
 class _Head(msgspec.Struct, frozen=True):
