@@ -34,6 +34,8 @@ AHEAD_M, AHEAD_S = 0.5, 3.0
 EARLY_M = 0.05
 # A path that begins further away is not driven [m]; largest progress of the robot on it by then.
 BEGINNING_M = 1.0
+# A goal without an answer is not driven before the robot has moved by this much on it [m].
+DRIVES_M = 0.15
 # A goal that Nav2 reports as done is not done at this distance from its end [m].
 DONE_M = 0.5
 # Pause after an error before the next goal [s], doubled each time up to the maximum.
@@ -192,7 +194,11 @@ class Nav2Follower(Supervision):
     def _believe_motion(self, path: PathDriven, now: float) -> None:
         """Take a goal for accepted once the robot drives it."""
         goal = self._pending
-        if goal is not None and self._active is None and path.way - goal.start > COAST_M:
+        if goal is None or self._active is not None:
+            return
+        # Of a short one half: it may have ended before the robot is further.
+        least = min(max(0.5 * (goal.end - goal.start), DRIVES_M), COAST_M)
+        if path.way - goal.start > least:
             self.take_accepted(goal.id, accepted=True, why="", now=now)
 
     def _begin(self, path: PathDriven, whole: float, now: float) -> None:

@@ -236,6 +236,16 @@ def test_a_goal_that_the_robot_drives_is_accepted_though_the_answer_was_lost():
     assert again.points[0][0] == pytest.approx(3.0)
 
 
+def test_a_short_goal_that_was_driven_though_the_answer_was_lost_ends_at_once():
+    drive = Drive((0.0, 0.0), (0.4, 0.0))
+    (goal,) = drive.step(0.0)
+    asked = [request for x in (0.1, 0.2, 0.3, 0.4) for request in drive.step(x)]
+    assert asked == [AskResult(goal.id)]
+    drive.end(goal, SUCCEEDED)
+    assert drive.step(0.4) == []
+    assert drive.state is State.DRIVEN
+
+
 def test_a_goal_that_could_not_be_sent_is_not_canceled():
     drive = Drive(*LONG)
     (goal,) = drive.step(0.0)
