@@ -17,19 +17,19 @@ def places(image, colour, tolerance=6):
     return np.argwhere(difference <= tolerance)[:, ::-1]
 
 
-def walk(label, *cells):
-    return LabelledWalk(label, "", np.array(cells, np.int32))
+def walk(label, lattice, *cells):
+    return LabelledWalk(label, "", lattice, np.array(cells, np.int32))
 
 
-def there_and_back(label, row):
+def there_and_back(label, lattice, row):
     out = [(row, col) for col in range(8)]
-    return walk(label, *out, *out[-2::-1])
+    return walk(label, lattice, *out, *out[-2::-1])
 
 
 def test_each_walk_has_its_place():
     lattice = CoverageLattice.from_free(np.ones((8, 8), bool))
-    walks = [there_and_back(str(row), row) for row in (0, 7, 7)]
-    picture = draw_walks(lattice, walks, title="three", lines=LINES)
+    walks = [there_and_back(str(row), lattice, row) for row in (0, 7, 7)]
+    picture = draw_walks(walks, title="three", lines=LINES)
     again = places(picture, palette.RECOVERED[0])
     middle = np.array(picture.size) / 2
     left, top = again[:, 0] < middle[0], again[:, 1] < middle[1]
@@ -45,7 +45,7 @@ def test_each_walk_has_its_place():
 def test_the_end_is_marked_where_it_is_not_the_start(last, marked):
     lattice = CoverageLattice.from_free(np.ones((2, 3), bool))
     cells = [(0, 0), (0, 1), (0, 0)] if last == (0, 0) else [(0, 0), (0, 1)]
-    picture = draw_walks(lattice, [walk("only", *cells)], title="one", lines=LINES)
+    picture = draw_walks([walk("only", lattice, *cells)], title="one", lines=LINES)
     marks = places(picture, palette.END)
     in_key = marks[:, 1] > picture.height - 90
     assert bool(in_key.any()) is marked

@@ -65,7 +65,7 @@ def _draw(folder: Path, name: str, grid: NamedGrid, ants: int) -> GridPictures:
     walks = [_walk(problem, variant, ants, snapshots) for variant in DRAWN]
     files = GridPictures(name, folder / f"{name}.png", folder / f"{name}_pheromone.png")
     start_to_start = f"{problem.cells} cells, start to start, {ants} ants, seed {SEED}"
-    _save(draw_walks(grid.lattice, walks, title=name, lines=[start_to_start]), files.walks)
+    _save(draw_walks(walks, title=name, lines=[start_to_start]), files.walks)
     last = snapshots[len(VARIANTS["falling"].velocities) - 1]
     picture = draw_pheromone(
         grid.lattice,
@@ -88,7 +88,7 @@ def _walk(
     caption = (
         f"{figures.steps} steps, {figures.revisits} revisits, {figures.turns_90} quarter-turns"
     )
-    return LabelledWalk(DRAWN[variant], caption, path.cells)
+    return LabelledWalk(DRAWN[variant], caption, problem.lattice, path.cells)
 
 
 def _save(picture: Image.Image, file: Path) -> None:

@@ -1,4 +1,4 @@
-"""Pictures of Table I: walks side by side on one sheet, and a colony's pheromone."""
+"""Pictures of benchmarks: walks side by side on one sheet, and a colony's pheromone."""
 
 from __future__ import annotations
 
@@ -26,28 +26,30 @@ TIMES = ("2 times", "3 times", "4 times or more")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LabelledWalk:
-    """A walk, int32 (n, 2) as in ``draw_walk``, and two lines to stand over it."""
+    """A walk over a lattice, int32 (n, 2) as in ``draw_walk``, and two lines to stand over it."""
 
     label: str
     caption: str
+    lattice: CoverageLattice
     cells: NDArray[np.int32]
 
 
 def draw_walks(
-    lattice: CoverageLattice, walks: Sequence[LabelledWalk], *, title: str, lines: Sequence[str]
+    walks: Sequence[LabelledWalk], *, title: str, lines: Sequence[str], columns: int = COLUMNS
 ) -> Image.Image:
-    """Return a picture, RGB, of walks, at least one, over the same lattice.
+    """Return a picture, RGB, of walks, at least one, at one scale.
 
     Args:
-        lattice: the planning grid.
-        walks: what to show, to the right first, then down.
+        walks: what to show, to the right first, then down; all in cells of one size.
         title: heading.
         lines: caption below it.
+        columns: most walks in a row.
     """
-    centres = np.concatenate([lattice.centres(walk.cells) for walk in walks])
-    view = View.over(bounds_around(centres, lattice.cell_m), lattice.cell_m, PANEL_PX, PANEL_PX)
-    panels = _arranged([_panel(view, lattice, walk) for walk in walks])
-    scale = view.scale * lattice.cell_m
+    cell_m = walks[0].lattice.cell_m
+    centres = np.concatenate([walk.lattice.centres(walk.cells) for walk in walks])
+    view = View.over(bounds_around(centres, cell_m), cell_m, PANEL_PX, PANEL_PX)
+    panels = _arranged([_panel(view, walk) for walk in walks], columns)
+    scale = view.scale * cell_m
     sheet = Sheet(title, lines, _key(walks), ("start", "end"), scale, framed=False, unit="cells")
     return sheet.around(panels)
 
@@ -65,10 +67,10 @@ def _key(walks: Sequence[LabelledWalk]) -> tuple[KeyEntry, ...]:
     )
 
 
-def _panel(view: View, lattice: CoverageLattice, walk: LabelledWalk) -> Image.Image:
+def _panel(view: View, walk: LabelledWalk) -> Image.Image:
     plot = Plot(view)
-    plot.ground(lattice)
-    plot_walk(plot, lattice, walk.cells)
+    plot.ground(walk.lattice)
+    plot_walk(plot, walk.lattice, walk.cells)
     return _headed(plot.finished(), walk.label, walk.caption)
 
 
@@ -84,9 +86,9 @@ def _headed(plot: Image.Image, label: str, caption: str) -> Image.Image:
     return panel
 
 
-def _arranged(panels: Sequence[Image.Image]) -> Image.Image:
+def _arranged(panels: Sequence[Image.Image], columns: int) -> Image.Image:
     width, height = max(p.width for p in panels), max(p.height for p in panels)
-    columns = min(COLUMNS, len(panels))
+    columns = min(columns, len(panels))
     rows = -(-len(panels) // columns)
     size = (columns * (width + GAP_PX) - GAP_PX, rows * (height + GAP_PX) - GAP_PX)
     together = Image.new("RGB", size, palette.PAPER)

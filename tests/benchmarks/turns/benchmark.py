@@ -71,6 +71,13 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         help="processor time to plan for [s] (default: 0.02 0.1 1; there are goals for 10, too)",
     )
     parser.add_argument("--seed", type=int, default=0, help="(default: %(default)s)")
+    parser.add_argument(
+        "--png",
+        type=Path,
+        metavar="FILE",
+        help="draw the walks after the last budget: over the smallest ground, a middle one and the "
+        "largest, side by side",
+    )
 
 
 def _plan_of(args: argparse.Namespace) -> TurnsPlan:
@@ -82,6 +89,7 @@ def _plan_of(args: argparse.Namespace) -> TurnsPlan:
         prices=tuple(args.prices),
         budgets=tuple(args.budgets),
         seed=args.seed,
+        png=args.png,
     )
 
 
