@@ -16,12 +16,14 @@ from numpy.typing import NDArray
 from fasaco_edge.errors import MapTooLarge
 from fasaco_edge.grid.geometry import GridGeometry, Polygon, Pose2D, Window
 from fasaco_edge.grid.occupancy import OccupancyGrid
-from fasaco_edge.kernels.floor.bits import ALL, NONE, WORD, Bits, packed
+from fasaco_edge.kernels.floor.bits import Bits, packed
 from fasaco_edge.kernels.lattice.footprint import Placement
 from fasaco_edge.kernels.lattice.polygons import add_near, turn_inside
 
 # Pixels are divided to this size or smaller: the strip left along a wall is a few of them wide.
 FINE_M = 0.025
+# Decimals of a polygon's corner [pixels].
+DECIMALS = 6
 # Approximate number of pixels processed at once in arrays of a byte or more per pixel.
 STRIP = 1 << 20
 
@@ -42,28 +44,35 @@ class RobotDiscs:
 
 
 def fine_geometry(
-    coarse: GridGeometry, discs: RobotDiscs, most_pixels: int
+    coarse: GridGeometry, discs: RobotDiscs, most_pixels: int, chunk: int = 1
 ) -> tuple[GridGeometry, int]:
     """Return the fine raster of a map with a border, and the number of parts per pixel edge.
 
     The number is reduced if the raster would exceed ``most_pixels``.
 
+    Args:
+        coarse: the map.
+        discs: robot and tool.
+        most_pixels: limit on the pixels.
+        chunk: the raster spans whole chunks of so many pixels of the map if the limit allows it:
+            a map that grows within them keeps its raster.
+
     Raises:
         MapTooLarge: it would exceed the limit even with undivided pixels.
     """
+    # Maps on the same pixels get the same raster, whatever the rounding of their origins.
+    shown = coarse.snapped(chunk), coarse.snapped()
     for parts in range(max(1, math.ceil(coarse.resolution / FINE_M - 1e-3)), 0, -1):
         unit = coarse.resolution / parts
         frame = math.ceil((max(discs.tool_m / 2, discs.radius_m) / unit + 2) / parts) * parts
-        rows, cols = coarse.rows * parts + 2 * frame, coarse.cols * parts + 2 * frame
-        if rows * cols <= most_pixels:
-            break
-    else:
-        raise MapTooLarge(
-            f"a raster of {rows} x {cols} pixels of {unit:g} m exceeds {most_pixels} pixels"
-        )
-    # Maps on the same pixels get the same raster, whatever the rounding of their origins.
-    x, y = coarse.snapped().to_map(-frame / parts, -frame / parts)
-    return GridGeometry(rows, cols, unit, Pose2D(x, y, coarse.origin.yaw)), parts
+        for part in shown:
+            rows, cols = part.rows * parts + 2 * frame, part.cols * parts + 2 * frame
+            if rows * cols <= most_pixels:
+                x, y = part.to_map(-frame / parts, -frame / parts)
+                return GridGeometry(rows, cols, unit, Pose2D(x, y, coarse.origin.yaw)), parts
+    raise MapTooLarge(
+        f"a raster of {rows} x {cols} pixels of {unit:g} m exceeds {most_pixels} pixels"
+    )
 
 
 def free_pixels(
@@ -71,15 +80,15 @@ def free_pixels(
 ) -> NDArray[np.bool_]:
     """Return the known free pixels in rows ``first`` to ``end`` of a map's fine raster."""
     rows, cols = grid.cells.shape
-    frame = (geometry.rows - rows * parts) // 2
+    row0, col0 = geometry.corner_of(grid.geometry.snapped())
     free = np.zeros((end - first, geometry.cols), np.bool_)
-    low, high = max(first - frame, 0), min(end - frame, rows * parts)
+    low, high = max(first - row0, 0), min(end - row0, rows * parts)
     if low >= high:
         return free
     part = grid.cells[low // parts : -(-high // parts)]
     known = np.repeat((part >= 0) & (part <= free_at_most), parts, axis=1)
     rows_of = np.arange(low, high) // parts - low // parts
-    free[low + frame - first : high + frame - first, frame : frame + cols * parts] = known[rows_of]
+    free[low + row0 - first : high + row0 - first, col0 : col0 + cols * parts] = known[rows_of]
     return free
 
 
@@ -108,36 +117,6 @@ def blocked_pixels(
             blocked |= keep_out(strip)
         found.append(packed(blocked, beyond=True))
     return np.concatenate(found)
-
-
-def carried_bits(
-    bits: Bits, shift: tuple[int, int], shape: tuple[int, int], *, beyond: bool
-) -> Bits:
-    """Return bits, uint64 (rows, words), shifted onto a raster of another shape.
-
-    Args:
-        bits: the bits; those outside of the raster have the value ``beyond``.
-        shift: shift of pixels, in rows and columns.
-        shape: rows and words of the new raster.
-        beyond: value outside of the old raster.
-    """
-    fill = ALL if beyond else NONE
-    found = np.full(shape, fill)
-    jump, by = divmod(shift[1], WORD)
-    old = Window(shift[0], jump, shift[0] + bits.shape[0], jump + bits.shape[1])
-    # With one word more to the left, whose bits come in.
-    new = Window(0, -1, *shape)
-    common = new.intersection(old)
-    if common is None:
-        return found
-    words = np.full((common.rows, new.cols), fill)
-    words[:, common.col0 + 1 : common.col1 + 1] = bits[common.slices_in(old)]
-    moved = found[common.row0 : common.row1]
-    moved[:] = words[:, 1:]
-    if by:
-        moved <<= np.uint64(by)
-        moved |= words[:, :-1] >> np.uint64(WORD - by)
-    return found
 
 
 def strips(part: Window) -> Iterator[Window]:
@@ -187,7 +166,10 @@ class PolygonsOnRaster:
         """Convert polygons (x, y) [m], one or more, to the raster of a geometry."""
         ends = np.cumsum([len(polygon) for polygon in polygons])
         points = np.array([corner for polygon in polygons for corner in polygon], np.float64)
-        cols, rows = geometry.to_pixels(points[:, 0], points[:, 1])
+        # How the corner of a raster is rounded must not move an edge off or onto those of pixels.
+        cols, rows = (
+            np.round(each, DECIMALS) for each in geometry.to_pixels(points[:, 0], points[:, 1])
+        )
         begins = np.concatenate([[0], ends[:-1]])
         low = [np.floor(np.minimum.reduceat(each, begins)) - 1 for each in (rows, cols)]
         high = [np.ceil(np.maximum.reduceat(each, begins)) + 1 for each in (rows, cols)]

@@ -2,6 +2,9 @@
 
 If the new map lies on the raster of the previous one, only cells near changed pixels are
 recomputed, see ``grid.changes``. The result equals that of the new map alone.
+
+The raster spans whole chunks of the map's pixels, so a growing map seldom moves it; and if it does,
+by whole words of its bits.
 """
 
 from __future__ import annotations
@@ -13,12 +16,11 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.grid.changes import LatticeChange, cells_near_changes, new_cells
+from fasaco_edge.grid.changes import LatticeChange, carried, cells_near_changes, new_cells
 from fasaco_edge.grid.fine_raster import (
     PolygonsOnRaster,
     RobotDiscs,
     blocked_pixels,
-    carried_bits,
     fine_geometry,
     stand_placement,
 )
@@ -32,7 +34,7 @@ from fasaco_edge.grid.lattice import (
     placement_of,
 )
 from fasaco_edge.grid.occupancy import OccupancyGrid
-from fasaco_edge.kernels.floor.bits import ALL, WORD, Bits, packed, unpacked
+from fasaco_edge.kernels.floor.bits import WORD, Bits, unpacked
 from fasaco_edge.kernels.floor.places import (
     disc_rows,
     keep_in_cells,
@@ -43,6 +45,10 @@ from fasaco_edge.kernels.lattice.footprint import Placement
 
 # A step may bend over places this far from the centres of its two cells; one pixel for rounding.
 REACH_CELLS, REACH_PX = 2.5, 2.0
+# The raster spans whole chunks of so many pixels of the map: for a map of 5 cm pixels 3.2 m.
+CHUNK = WORD
+# All bits of a word: what lies beyond a raster is blocked.
+BLOCKED_WORD = (1 << WORD) - 1
 
 
 class FloorMap:
@@ -113,8 +119,8 @@ class FloorMap:
             MapTooLarge: the raster would have too many pixels; nothing has changed.
         """
         before = self.stands.lattice
-        geometry, parts = fine_geometry(grids[1].geometry, self.discs, self._most_pixels)
-        (old_raster, old), (raster, new) = (grid.geometry.on_raster() for grid in grids)
+        geometry, parts = self._geometry_of(grids[1])
+        old_raster, raster = (grid.geometry.on_raster()[0] for grid in grids)
         if old_raster != raster or geometry.resolution != self.geometry.resolution:
             self._see(grids[1], plain)
             return self._compared(before)
@@ -123,15 +129,16 @@ class FloorMap:
         wide = wide._replace(radius=wide.radius + REACH_CELLS * scale + REACH_PX)
         near = cells_near_changes(grids, plain.window, wide, self._footprint.thresholds, within)
         self.revision += 1
-        self.shift = (old.row0 - new.row0) * parts, (old.col0 - new.col0) * parts
+        self.shift = geometry.corner_of(self.geometry)
         # A map that grows on two sides has new cells all along these, and little new floor.
-        self.touched = self._pixels_of(near, plain.window, geometry)
-        if self.touched is None and old == new:
+        self.touched = Window.around(
+            self._pixels_of(near, plain.window, geometry), self._forgotten(grids, geometry, parts)
+        )
+        is_same = geometry == self.geometry
+        if self.touched is None and is_same and plain.window == before.window:
             return LatticeChange.to(before, self._with_states(plain))
-        if old != new:
-            self._carry(geometry, (geometry.rows - grids[1].geometry.rows * parts) // 2)
-        if old != new and self._keep_out:
-            # Rounding may place a polygon differently on another raster.
+        # Rounding may place a polygon differently on another raster.
+        if not is_same and (not self._move(geometry, self.shift) or self._keep_out):
             self._look(grids[1], parts, 0, geometry.rows)
         elif self.touched is not None:
             self._look(grids[1], parts, self.touched.row0, self.touched.row1)
@@ -146,7 +153,7 @@ class FloorMap:
         Equals a new computation, but only cells near the polygons are recomputed. To be called on a
         floor without keep-out polygons.
         """
-        geometry, parts = fine_geometry(grid.geometry, self.discs, self._most_pixels)
+        geometry, parts = self._geometry_of(grid)
         if geometry != self.geometry:
             return FloorMap(grid, plain, self._footprint, self.discs, self._most_pixels, polygons)
         other = copy(self)
@@ -229,28 +236,52 @@ class FloorMap:
         return self._pixels_of(cells, self.stands.lattice.window, self.geometry)
 
     def _see(self, grid: OccupancyGrid, plain: CoverageLattice) -> None:
-        self.geometry, parts = fine_geometry(grid.geometry, self.discs, self._most_pixels)
+        self.geometry, parts = self._geometry_of(grid)
         rows, cols = self.geometry.rows, self.geometry.cols
         self.revision += 1
         self.shift, self.touched = None, Window(0, 0, rows, cols)
         self._look(grid, parts, 0, rows)
         self._settle(plain, np.ones(plain.states.shape, np.bool_))
 
-    def _carry(self, geometry: GridGeometry, frame: int) -> None:
-        """Move what is known to a raster of another size, with a border of ``frame`` pixels.
+    def _geometry_of(self, grid: OccupancyGrid) -> tuple[GridGeometry, int]:
+        return fine_geometry(grid.geometry, self.discs, self._most_pixels, CHUNK)
 
-        What the new map shows differently is left to ``_look``.
+    def _forgotten(
+        self, grids: tuple[OccupancyGrid, OccupancyGrid], geometry: GridGeometry, parts: int
+    ) -> Window | None:
+        """Return a window of the raster around free pixels that the new map does not show.
+
+        They may lie beyond its cells.
         """
-        assert self.shift is not None
-        shape = geometry.rows, -(-geometry.cols // WORD)
-        self.geometry = geometry
-        self.blocked = carried_bits(self.blocked, self.shift, shape, beyond=True)
-        border = np.ones((1, geometry.cols), np.bool_)
-        border[:, frame : geometry.cols - frame] = False
-        self.blocked |= packed(border, beyond=True)
-        self.blocked[:frame] = self.blocked[geometry.rows - frame :] = ALL
-        self.places = carried_bits(self.places, self.shift, shape, beyond=False)
-        self.places &= ~self.blocked
+        old, new = (grid.geometry.on_raster()[1] for grid in grids)
+        lost = []
+        for part in old.without(new):
+            values = grids[0].cells[part.slices_in(old)]
+            free = Window.of((values >= 0) & (values <= self.discs.free_at_most))
+            lost.append(free and free.moved(part.row0 - new.row0, part.col0 - new.col0))
+        around = Window.around(*lost)
+        if around is None:
+            return None
+        (row, col), margin = geometry.corner_of(grids[1].geometry.snapped()), self._margin(geometry)
+        low, high = (around.row0, around.col0), (around.row1, around.col1)
+        return Window(
+            low[0] * parts + row - margin,
+            low[1] * parts + col - margin,
+            high[0] * parts + row + margin,
+            high[1] * parts + col + margin,
+        ).intersection(Window(0, 0, geometry.rows, geometry.cols))
+
+    def _move(self, geometry: GridGeometry, by: tuple[int, int]) -> bool:
+        """Move the bits to a larger raster, shifted by rows and columns; False if impossible."""
+        (rows, cols), whole = self.blocked.shape, Window(0, 0, geometry.rows, geometry.cols)
+        before, self.geometry = Window(0, 0, self.geometry.rows, self.geometry.cols), geometry
+        if by[1] % WORD or not whole.contains(before.moved(*by)):
+            return False
+        old = Window(0, 0, rows, cols).moved(by[0], by[1] // WORD)
+        new = Window(0, 0, geometry.rows, -(-geometry.cols // WORD))
+        self.blocked = carried(self.blocked, old, new, BLOCKED_WORD)
+        self.places = carried(self.places, old, new)
+        return True
 
     def _look(self, grid: OccupancyGrid, parts: int, first: int, end: int) -> None:
         """Compute blocked pixels in rows of the raster, and the places there."""
@@ -309,9 +340,12 @@ class FloorMap:
         cells = Window.of(stale)
         if cells is None:
             return None
-        reach = max(self.discs.radius_m, self.discs.tool_m / 2)
-        margin = int(reach / geometry.resolution) + 2
-        return self._box_around(cells.moved(window.row0, window.col0), geometry, margin)
+        cells = cells.moved(window.row0, window.col0)
+        return self._box_around(cells, geometry, self._margin(geometry))
+
+    def _margin(self, geometry: GridGeometry) -> int:
+        """Return how far robot and tool reach from a pixel, in pixels."""
+        return int(max(self.discs.radius_m, self.discs.tool_m / 2) / geometry.resolution) + 2
 
     def _box_around(self, cells: Window, geometry: GridGeometry, margin: int) -> Window | None:
         """Return the bounding box in pixels of a window of cells; None for none."""

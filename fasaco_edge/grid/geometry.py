@@ -100,6 +100,19 @@ class Window:
             min(-(-self.col1 // chunk) * chunk, cols),
         )
 
+    def rounded_out(self, chunk: int) -> Window:
+        """Return it rounded outward to whole chunks of an unbounded grid."""
+        return Window(
+            self.row0 // chunk * chunk,
+            self.col0 // chunk * chunk,
+            -(-self.row1 // chunk) * chunk,
+            -(-self.col1 // chunk) * chunk,
+        )
+
+    def contains(self, other: Window) -> bool:
+        """Tell whether another rectangle, not empty, lies inside."""
+        return self.intersection(other) == other
+
     def moved(self, rows: int, cols: int) -> Window:
         """Return the rectangle moved by ``rows`` and ``cols``."""
         return Window(self.row0 + rows, self.col0 + cols, self.row1 + rows, self.col1 + cols)
@@ -214,18 +227,24 @@ class GridGeometry:
         raster = Raster(self.resolution, self.origin.yaw, right / RASTER_STEPS, up / RASTER_STEPS)
         return raster, window
 
-    def snapped(self) -> GridGeometry:
+    def snapped(self, chunk: int = 1) -> GridGeometry:
         """Return this grid moved exactly onto its raster, see ``on_raster``.
 
         Grids on the same pixels become equal, even if the origin of one was rounded, as float32 or
-        by a transform.
+        by a transform. The grid is extended to whole chunks of so many pixels of the raster.
         """
         raster, window = self.on_raster()
+        window = window.rounded_out(chunk)
         cos, sin = math.cos(raster.yaw), math.sin(raster.yaw)
         u = (window.col0 + raster.right) * raster.resolution
         v = (window.row0 + raster.up) * raster.resolution
         origin = Pose2D(cos * u - sin * v, sin * u + cos * v, raster.yaw)
-        return GridGeometry(self.rows, self.cols, raster.resolution, origin)
+        return GridGeometry(window.rows, window.cols, raster.resolution, origin)
+
+    def corner_of(self, other: GridGeometry) -> tuple[int, int]:
+        """Return the pixel (row, col) at the corner of a grid whose pixels' edges lie on these."""
+        col, row = self.to_pixels(other.origin.x, other.origin.y)
+        return round(row), round(col)
 
     def bounds(self, window: Window | None = None) -> Bounds:
         """Return the bounds of the grid, or of a window of its pixels, in the map frame."""

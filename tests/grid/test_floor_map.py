@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from fasaco_edge.errors import MapTooLarge
+from fasaco_edge.grid import floor_map
 from fasaco_edge.grid.changes import LatticeChange
 from fasaco_edge.grid.fine_raster import RobotDiscs
 from fasaco_edge.grid.floor_map import FloorMap
@@ -67,8 +68,10 @@ def assert_touched(floor, before):
     assert not different.any()
 
 
+@pytest.mark.parametrize("chunk", [64, 32, 1])
 @pytest.mark.parametrize("yaw", [0.0, 0.3])
-def test_changes_lead_where_a_new_look_does(yaw):
+def test_changes_lead_where_a_new_look_does(yaw, chunk, monkeypatch):
+    monkeypatch.setattr(floor_map, "CHUNK", chunk)
     rng = np.random.default_rng(7)
     whole = room(6.0, 5.0, yaw)
     known = part_of(whole, 3, 4, 90, 99)
@@ -76,12 +79,13 @@ def test_changes_lead_where_a_new_look_does(yaw):
     seen = 0
     for number in range(24):
         if number % 6 == 5:
-            low, high = rng.integers(0, 8, 2), rng.integers(0, 8, 2)
+            most = 8 if number % 4 else 35
+            low, high = rng.integers(0, most, 2), rng.integers(0, most, 2)
             cells = whole.cells.copy()
             new = part_of(OccupancyGrid(whole.geometry, cells), *low, *(cells.shape - high))
         else:
             cells = known.cells.copy()
-            for row, col in rng.integers(0, 80, (int(rng.integers(1, 3)), 2)):
+            for row, col in rng.integers(0, min(cells.shape), (int(rng.integers(1, 3)), 2)):
                 size = rng.integers(1, 9, 2)
                 cells[row : row + size[0], col : col + size[1]] = rng.choice([0, 50, 100, -1])
             new = OccupancyGrid(known.geometry, cells)
@@ -133,11 +137,41 @@ def test_a_map_on_another_raster_is_looked_at_as_a_whole():
 
 
 def test_pixels_that_move_say_by_how_much():
-    whole = room(3.0, 2.0)
-    first, grown = part_of(whole, 2, 3, 30, 40), part_of(whole, 1, 0, 30, 40)
+    """And they move with what is known of them, by whole words."""
+    whole = room(9.0, 2.0)
+    # The first one begins in column 69 of the raster, the other in column 42.
+    first, grown = part_of(whole, 2, 30, 40, 150), part_of(whole, 1, 3, 40, 150)
     floor = over(first)
     floor.change((first, grown), CoverageLattice.from_map(grown, FOOTPRINT))
-    assert floor.shift == (2, 6)  # pixels of 0.05 m have two parts
+    assert floor.shift == (0, 128)  # pixels of 0.05 m have two parts
+    assert_same(floor, over(grown))
+
+
+def test_a_map_that_grows_a_little_keeps_its_raster():
+    """Else all that lies on the raster would move with each map."""
+    whole = room(3.0, 2.0)
+    known = part_of(whole, 10, 35, 20, 45)  # in rows 29 and columns 74 of the raster
+    floor = over(known)
+    blocked, geometry = floor.blocked, floor.geometry
+    for by in range(1, 8):
+        grown = part_of(whole, 10 - by, 35 - by, 20 + by, 45 + by)
+        floor.change((known, grown), CoverageLattice.from_map(grown, FOOTPRINT))
+        assert floor.shift == (0, 0)
+        assert floor.geometry == geometry
+        assert floor.blocked is blocked
+        assert_same(floor, over(grown))
+        known = grown
+
+
+def test_what_a_map_shows_no_more_is_not_free():
+    """Also where it lies beyond the cells of the new map, but on the raster still."""
+    whole = room(6.0, 5.0)
+    less = part_of(whole, 20, 30, 70, 80)
+    floor = over(whole)
+    pixels = pixels_of(floor)
+    floor.change((whole, less), CoverageLattice.from_map(less, FOOTPRINT))
+    assert_same(floor, over(less))
+    assert_touched(floor, pixels)
 
 
 def test_where_a_map_grows_on_two_sides_by_what_is_unknown_little_is_touched():

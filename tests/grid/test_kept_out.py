@@ -5,7 +5,7 @@ import time
 import numpy as np
 import pytest
 
-from fasaco_edge.grid.fine_raster import PolygonsOnRaster
+from fasaco_edge.grid.fine_raster import DECIMALS, PolygonsOnRaster
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D, Window
 
 ROWS, COLS = 120, 170
@@ -40,7 +40,8 @@ def test_corners_lie_where_those_of_one_polygon_do_bit_for_bit():
     polygons = polygons_of(5)
     together = PolygonsOnRaster.of(polygons, geometry)
     for polygon, corners in zip(polygons, together.corners, strict=True):
-        assert corners.tolist() == [list(geometry.to_pixels(x, y)) for x, y in polygon]
+        expected = [np.round(geometry.to_pixels(x, y), DECIMALS).tolist() for x, y in polygon]
+        assert corners.tolist() == expected
 
 
 def test_a_part_costs_what_is_near_it():
@@ -52,3 +53,14 @@ def test_a_part_costs_what_is_near_it():
     for row in range(100):
         assert not far.touched(Window(row, 0, row + 20, COLS)).any()
     assert time.thread_time() - started < 0.5
+
+
+def test_where_the_raster_begins_does_not_decide_what_an_edge_touches():
+    """A zone drawn along edges of pixels, on rasters that begin elsewhere."""
+    zone = ((1.1, 0.7), (1.6, 0.7), (1.6, 1.3), (1.1, 1.3))
+    shown = []
+    for col in range(12):
+        geometry = GridGeometry(80, 80, 0.025, Pose2D(0.025 * (col + 8), 0.3))
+        touched = PolygonsOnRaster.of([zone], geometry).touched(Window(0, 0, 80, 80 - col))
+        shown.append(touched[:, 12 - col : 72 - col])
+    assert all((each == shown[0]).all() for each in shown)
