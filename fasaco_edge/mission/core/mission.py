@@ -128,7 +128,8 @@ class Mission:
         self.state, self.reason = self._executive.status()
         path = decided.path or happened.path or begun
         self._trail.finish(path)
-        path = self._line.finish(path, now)
+        is_urgent = decided.plan is not None and not self.route.is_improving
+        path = self._line.finish(path, now, is_urgent=is_urgent)
         if path is not None:
             path = self._rotation.path(path, self.lattice)
         return replace(happened, plan=decided.plan, path=path)
