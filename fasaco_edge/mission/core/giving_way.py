@@ -6,6 +6,9 @@ Its path is set aside meanwhile, and taken up afterwards. What keeps it from goi
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -19,6 +22,7 @@ from fasaco_edge.mission.fleet.traffic import (
     NEAR_M,
     PATIENCE_S,
     STANDS_S,
+    Neighbour,
     Obstruction,
     Points,
     obstruction,
@@ -28,6 +32,8 @@ from fasaco_edge.mission.fleet.traffic import (
 from fasaco_edge.mission.map.map_state import MapState
 from fasaco_edge.mission.map.reachable_area import ReachableArea
 
+# A robot that stands on its path this near to another one is blocked by it [m]; motion that counts.
+BESIDE_M, MOVED_M = 0.4, 0.1
 # A robot that made way, or waits, looks for another place no sooner than this [s].
 AGAIN_S = 2.0
 
@@ -51,6 +57,8 @@ class GivingWay:
         self._map, self._route, self._fleet = map_state, route, fleet
         self._since = self._sought_at = 0.0
         self._refuge: Cell | None = None
+        # Its place, and when it came there.
+        self._place, self._came_at = (math.inf, math.inf), 0.0
 
     def line(self) -> Points:
         """Return the next metres, from the robot's place on, points (x, y) [m], float64 (n, 2)."""
@@ -82,10 +90,11 @@ class GivingWay:
             self.is_near = False
             self.end()
             return None
-        here = np.array((pose.pose.x, pose.pose.y))
+        here = pose.pose.x, pose.pose.y
+        if math.dist(here, self._place) > MOVED_M:
+            self._place, self._came_at = here, now
         self.is_near = any(
-            np.hypot(near.heard.x - here[0], near.heard.y - here[1]) < NEAR_M
-            for near in neighbours.values()
+            math.dist((near.heard.x, near.heard.y), here) < NEAR_M for near in neighbours.values()
         )
         if not self.is_near:
             self.end()
@@ -99,10 +108,23 @@ class GivingWay:
         found = obstruction(
             self._robot, self._radius_m, speed, spaced(self.line()), neighbours, self.waits_for
         )
+        if found is None and now - self._came_at > PATIENCE_S and len(self.line()) > 1:
+            # It should drive: its line passes nearer than its cells, or it is stopped by a sensor.
+            found = self._beside(here, neighbours)
         if found is None:
             self.end()
             return None
         return self._hold(found, area, cell, now)
+
+    def _beside(
+        self, here: tuple[float, float], neighbours: Mapping[str, Neighbour]
+    ) -> Obstruction | None:
+        """Return the robot that this one stands beside; None for none."""
+        for name, near in sorted(neighbours.items()):
+            reach_m = self._radius_m + near.heard.radius_m + BESIDE_M
+            if math.dist(here, (near.heard.x, near.heard.y)) < reach_m:
+                return Obstruction(name, is_blocked=True)
+        return None
 
     def _hold(
         self, found: Obstruction, area: ReachableArea, cell: Cell, now: float
@@ -117,7 +139,7 @@ class GivingWay:
         stands_s = neighbours[found.robot].stands_s
         if found.is_blocked and waited_s > PATIENCE_S and stands_s > STANDS_S:
             self._fleet.avoid(found.robot)
-        is_due = found.is_on_path or waited_s > PATIENCE_S
+        is_due = found.is_on_path or max(waited_s, now - self._came_at) > PATIENCE_S
         if is_due and now - self._sought_at >= AGAIN_S:
             self._sought_at = now
             goal = refuge(area, cell, self._radius_m, neighbours, area.lattice.centres)
