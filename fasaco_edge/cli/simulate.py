@@ -34,8 +34,8 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         "--driver",
         choices=("ideal", "follow"),
         default="ideal",
-        help="ideal: it follows paths by itself; follow: `fasaco-edge follow` drives it "
-        "(default: %(default)s)",
+        help="ideal: it follows paths by itself; follow: `fasaco-edge follow`, started with the "
+        "same --speed, drives it (default: %(default)s)",
     )
     parser.add_argument(
         "--start-xy", type=pair_of_floats, metavar="X,Y", help="where the robot starts [m]"
