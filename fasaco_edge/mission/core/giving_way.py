@@ -57,7 +57,7 @@ class GivingWay:
         self._map, self._route, self._fleet = map_state, route, fleet
         self._since = self._sought_at = 0.0
         self._refuge: Cell | None = None
-        # Its place, and when it came there.
+        # Its place, and since when it has had a path there.
         self._place, self._came_at = (math.inf, math.inf), 0.0
 
     def line(self) -> Points:
@@ -91,7 +91,7 @@ class GivingWay:
             self.end()
             return None
         here = pose.pose.x, pose.pose.y
-        if math.dist(here, self._place) > MOVED_M:
+        if math.dist(here, self._place) > MOVED_M or len(self._cells()) < 2:
             self._place, self._came_at = here, now
         self.is_near = any(
             math.dist((near.heard.x, near.heard.y), here) < NEAR_M for near in neighbours.values()
