@@ -1,0 +1,160 @@
+"""``bench fleet``: how much sooner several robots are done in one building, planned offline."""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections.abc import Generator, Sequence
+from dataclasses import asdict, dataclass
+
+import numpy as np
+
+from fasaco_edge.bench.benchmark import (
+    Benchmark,
+    Report,
+    Say,
+    add_grid_options,
+    grid_names,
+    positive,
+    seconds_above_zero,
+)
+from fasaco_edge.grid.lattice import Cell, CoverageLattice
+from fasaco_edge.planners.cost import CoverageCost
+from fasaco_edge.planners.fleet.division import divide
+from fasaco_edge.planners.fleet.sharing import Fleet
+from fasaco_edge.planners.grids import read_grid
+from fasaco_edge.planners.planner import TimeBudget
+from fasaco_edge.planners.problem import CoverageProblem
+from fasaco_edge.planners.warmup import warm_up
+
+MAPS = ("flat", "office", "basement")
+# Cost of a step of the built-in maps' robot [s].
+STEP_S = 1.2
+HEADER = ("building", "robots", "cells", "longest", "of an even share", "bound", "twice", "CPU s")
+
+
+@dataclass(frozen=True, slots=True)
+class SharedWalks:
+    """A building that robots share, each on a walk that returns to its start.
+
+    Attributes:
+        building, robots: the question.
+        cells: to cover.
+        longest_steps: steps of the longest walk.
+        bound_steps: the lower bound of it.
+        passed_twice: share of the cells that two or more robots pass.
+        cpu_s: processor time [s].
+    """
+
+    building: str
+    robots: int
+    cells: int
+    longest_steps: int
+    bound_steps: int
+    passed_twice: float
+    cpu_s: float
+
+    @property
+    def ratio(self) -> float:
+        """The longest walk's steps over an even share of the cells."""
+        return self.longest_steps * self.robots / self.cells
+
+
+def _add_options(parser: argparse.ArgumentParser) -> None:
+    add_grid_options(parser, MAPS)
+    parser.add_argument(
+        "--robots", type=positive, nargs="+", default=[1, 2, 4, 8], metavar="N",
+        help="how many share it (default: 1 2 4 8)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--budget", type=seconds_above_zero, default=1.0, metavar="S",
+        help="search time of a plan [s] (default: 1)",
+    )  # fmt: skip
+    parser.add_argument("--seed", type=int, default=0, help="of starts and search (default: 0)")
+
+
+def _measure(args: argparse.Namespace, say: Say) -> Generator[SharedWalks, None, None]:
+    warm_up()
+    for name in grid_names(args, MAPS):
+        grid = read_grid(name)
+        to_cover = CoverageProblem.of(grid.lattice, grid.start).to_cover
+        for robots in args.robots:
+            say(f"{name}, {robots} robots")
+            starts = [grid.start, *_starts(grid.lattice, to_cover, robots - 1, args.seed)]
+            fleet = Fleet(starts, CoverageCost(STEP_S, 0.0), seed=args.seed)
+            began = time.process_time()
+            division = divide(grid.lattice, fleet, TimeBudget(args.budget))
+            cpu_s = time.process_time() - began
+            times = np.zeros(to_cover.shape, np.int64)
+            corner = grid.lattice.window.row0, grid.lattice.window.col0
+            for walk in division.walks:
+                times[tuple((np.unique(walk, axis=0) - np.array(corner)).T)] += 1
+            yield SharedWalks(
+                building=grid.name,
+                robots=robots,
+                cells=division.cells,
+                longest_steps=max(len(walk) for walk in division.walks) - 1,
+                bound_steps=division.lower_bound_steps,
+                passed_twice=round(np.count_nonzero(times > 1) / division.cells, 4),
+                cpu_s=round(cpu_s, 3),
+            )
+
+
+def _starts(
+    lattice: CoverageLattice, to_cover: np.ndarray[tuple[int, int], np.dtype[np.bool_]],
+    count: int, seed: int,
+) -> list[Cell]:  # fmt: skip
+    """Return cells drawn at random, the same for one seed."""
+    cells = np.argwhere(to_cover) + np.array((lattice.window.row0, lattice.window.col0))
+    random = np.random.Generator(np.random.PCG64((seed, count)))
+    chosen = random.choice(cells, min(count, len(cells)), replace=False)
+    return [(row, col) for row, col in chosen.tolist()]
+
+
+def _report(args: argparse.Namespace, plans: Sequence[SharedWalks]) -> Report:
+    return Report(
+        title=f"robots that share a building and return, {args.budget:g} s of search",
+        header=HEADER,
+        rows=tuple(
+            (
+                plan.building,
+                str(plan.robots),
+                str(plan.cells),
+                f"{plan.longest_steps} steps",
+                f"{plan.ratio:.3f}",
+                f"{plan.bound_steps * plan.robots / plan.cells:.3f}",
+                f"{plan.passed_twice:.1%}",
+                f"{plan.cpu_s:.2f}",
+            )
+            for plan in plans
+        ),
+        figures={
+            "budget_s": args.budget,
+            "plans": [{**asdict(plan), "ratio": round(plan.ratio, 4)} for plan in plans],
+        },
+        remarks=(
+            "longest: of the robots' walks. bound: no division has a shorter longest walk. twice: "
+            "cells that two or more robots pass.",
+        ),
+    )
+
+
+def _count(args: argparse.Namespace) -> int:
+    return len(grid_names(args, MAPS)) * len(args.robots)
+
+
+FLEET = Benchmark(
+    name="fleet",
+    summary="several robots in one building: the longest walk against an even share",
+    description="Plan one walk for each of several robots that share a building, as `plan --robots`"
+    " does: the first robot starts where one alone would, the others anywhere.",
+    add_options=_add_options,
+    count=_count,
+    measure=_measure,
+    report=_report,
+    epilog="""\
+examples:
+  fasaco-edge bench fleet
+  fasaco-edge bench fleet --maps warehouse --robots 2 3 --budget 10 --json
+""",
+)
