@@ -29,7 +29,7 @@ from fasaco_edge.mission.core.mission import Mission
 from fasaco_edge.mission.coverage.floor_tiles import PIXEL_M
 from fasaco_edge.mission.line.out_of_reach import Cause
 from fasaco_edge.mission.line.pieces import POLISHED
-from fasaco_edge.mission.line.polisher import AHEAD_M, Polisher
+from fasaco_edge.mission.line.polisher import AHEAD_M
 from fasaco_edge.mission.line.tally import SweepTally
 from fasaco_edge.mission.orders.order import read_order
 from fasaco_edge.planners.cost import CoverageCost, SearchWork
@@ -370,29 +370,6 @@ def assert_clear(robot, grid):
             off = np.abs(blocked - (row, col)) - 0.5
             nearest = np.hypot(*np.clip(off, 0.0, None).T).min() * geometry.resolution
             assert nearest > RADIUS_M - 1e-3
-
-
-def test_nothing_is_polished_before_a_needed_plan_is_requested(monkeypatch):
-    """It would delay the plan by as long, some milliseconds; the next pose has time for it."""
-    polished = []
-
-    def polish(self, *args, **kwargs):
-        polished.append(True)
-        return before(self, *args, **kwargs)
-
-    before = Polisher.polish
-    monkeypatch.setattr(Polisher, "polish", polish)
-    grid = room(3.0, 2.4)
-    robot = Robot(Mission(CONFIG))
-    robot.tell(MapReceived(grid))
-    robot.drive(4)
-    polished.clear()
-    crate = MapReceived(with_obstacle(grid, 32, 44))
-    decision = robot.mission.step([crate], robot.now)
-    assert decision.plan is not None
-    assert not polished
-    robot.mission.step([], robot.now + 0.1)
-    assert polished
 
 
 def test_what_comes_into_the_way_is_driven_round_at_once():

@@ -128,8 +128,7 @@ class Mission:
         self.state, self.reason = self._executive.status()
         path = decided.path or happened.path or begun
         self._trail.finish(path)
-        is_urgent = decided.plan is not None and not self.route.is_improving
-        path = self._line.finish(path, now, is_urgent=is_urgent)
+        path = self._line.finish(path, now)
         if path is not None:
             path = self._rotation.path(path, self.lattice)
         return replace(happened, plan=decided.plan, path=path)

@@ -114,16 +114,8 @@ class LineLayer:
         row, col = path.cells[path.index].tolist() if is_on_it else (0, 0)
         self._map.follow_path((row, col) if is_on_it else None)
 
-    def finish(
-        self, update: PathUpdate | None, now: float, *, is_urgent: bool = False
-    ) -> PathUpdate | None:
-        """Return the update to publish after a step, with or without a new path.
-
-        Args:
-            update: the new path; None for none.
-            now: time [s].
-            is_urgent: whether the step requests a plan that is needed, and nothing may delay it.
-        """
+    def finish(self, update: PathUpdate | None, now: float) -> PathUpdate | None:
+        """Return the update to publish after a step, with or without a new path."""
         ahead, stamped = self._ahead, self._map.pose
         if ahead is None or stamped is None or self._polisher is None or self._map.floor is None:
             return update
@@ -143,8 +135,8 @@ class LineLayer:
             reason = "line blocked"
         if touched is not None or self._is_settled is None:
             self._is_settled = not self._orders.is_exploring
-        # Urgent updates and requests go out first; the rest comes with the next pose.
-        is_waited_for = is_urgent or update is not None or reason or is_further
+        # Urgent updates are published first; the rest comes with the next pose.
+        is_waited_for = update is not None or reason or is_further
         if not is_waited_for:
             self._explain()
             # On the way home or to its dock the robot sweeps nothing beside its path.
