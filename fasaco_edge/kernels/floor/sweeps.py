@@ -286,18 +286,3 @@ def sweep_edges(
     for number in range(len(edges)):
         edge = edges[number]
         sweep(sweeps, edge[0], edge[1], edge[2], edge[3], radius, times, scratch)
-
-
-@lean_kernel
-def count_left(sweeps: Sweeps, row0: int, col0: int, row1: int, col1: int) -> None:
-    """Recount the unswept pixels in the blocks of a part of the raster."""
-    counts, left = sweeps.counts, sweeps.left
-    rows, cols = counts.shape
-    side = 1 << BLOCK
-    for i in range(row0 >> BLOCK, (row1 + side - 1) >> BLOCK):
-        for j in range(col0 >> BLOCK, (col1 + side - 1) >> BLOCK):
-            found = 0
-            for y in range(i << BLOCK, min((i + 1) << BLOCK, rows)):
-                for x in range(j << BLOCK, min((j + 1) << BLOCK, cols)):
-                    found += counts[y, x] == 0
-            left[i, j] = found

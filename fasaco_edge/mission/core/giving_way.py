@@ -114,7 +114,7 @@ class GivingWay:
         if found is None:
             self.end()
             return None
-        return self._hold(found, area, cell, now)
+        return self._hold(found, neighbours, area, cell, now)
 
     def _beside(
         self, here: tuple[float, float], neighbours: Mapping[str, Neighbour]
@@ -127,7 +127,12 @@ class GivingWay:
         return None
 
     def _hold(
-        self, found: Obstruction, area: ReachableArea, cell: Cell, now: float
+        self,
+        found: Obstruction,
+        neighbours: Mapping[str, Neighbour],
+        area: ReachableArea,
+        cell: Cell,
+        now: float,
     ) -> PathUpdate | None:
         route = self._route
         if found.robot != self.waits_for:
@@ -135,7 +140,7 @@ class GivingWay:
         self.waits_for, self.reason = found.robot, found.reason
         has_path = len(route.path.cells) > 0
         route.set_aside()
-        waited_s, neighbours = now - self._since, self._fleet.neighbours(now)
+        waited_s = now - self._since
         stands_s = neighbours[found.robot].stands_s
         if found.is_blocked and waited_s > PATIENCE_S and stands_s > STANDS_S:
             self._fleet.avoid(found.robot)

@@ -129,8 +129,8 @@ def obstruction(
                 found = found or Obstruction(other, is_blocked=True)
             continue
         at_s = np.arange(len(line)) * SPACING_M / speed_m_s
-        their_speed = max(speed_m_s, 0.05)
-        there_s = np.arange(len(theirs)) * SPACING_M / their_speed - near.age_s
+        # The other one is taken to be as fast.
+        there_s = np.arange(len(theirs)) * SPACING_M / speed_m_s - near.age_s
         slack_s = 2 * SLACK_S if waits_for == other else SLACK_S
         meets = is_close & (np.abs(at_s[:, None] - there_s[None]) < slack_s) & (there_s > -1.0)
         # Robots that part from each other are too near only now.
