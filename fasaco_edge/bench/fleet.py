@@ -8,6 +8,7 @@ from collections.abc import Generator, Sequence
 from dataclasses import asdict, dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fasaco_edge.bench.benchmark import (
     Benchmark,
@@ -18,11 +19,11 @@ from fasaco_edge.bench.benchmark import (
     positive,
     seconds_above_zero,
 )
-from fasaco_edge.grid.lattice import Cell, CoverageLattice
+from fasaco_edge.grid.lattice import Cell
 from fasaco_edge.planners.cost import CoverageCost
-from fasaco_edge.planners.fleet.division import divide
+from fasaco_edge.planners.fleet.division import Division, divide
 from fasaco_edge.planners.fleet.sharing import Fleet
-from fasaco_edge.planners.grids import read_grid
+from fasaco_edge.planners.grids import NamedGrid, read_grid
 from fasaco_edge.planners.planner import TimeBudget
 from fasaco_edge.planners.problem import CoverageProblem
 from fasaco_edge.planners.warmup import warm_up
@@ -41,7 +42,8 @@ class SharedWalks:
         building, robots: the question.
         cells: to cover.
         longest_steps: steps of the longest walk.
-        bound_steps: the lower bound of it.
+        steps: of all walks.
+        bound_steps: the lower bound of the longest walk.
         passed_twice: share of the cells that two or more robots pass.
         cpu_s: processor time [s].
     """
@@ -50,6 +52,7 @@ class SharedWalks:
     robots: int
     cells: int
     longest_steps: int
+    steps: int
     bound_steps: int
     passed_twice: float
     cpu_s: float
@@ -58,6 +61,41 @@ class SharedWalks:
     def ratio(self) -> float:
         """The longest walk's steps over an even share of the cells."""
         return self.longest_steps * self.robots / self.cells
+
+    @property
+    def bound_ratio(self) -> float:
+        """Its lower bound over an even share of the cells."""
+        return self.bound_steps * self.robots / self.cells
+
+
+def plan_shared(grid: NamedGrid, fleet: Fleet, budget_s: float) -> tuple[SharedWalks, Division]:
+    """Plan one walk for each robot; return the figures, and the walks."""
+    began = time.process_time()
+    division = divide(grid.lattice, fleet, TimeBudget(budget_s))
+    cpu_s = time.process_time() - began
+    window = grid.lattice.window
+    times = np.zeros(grid.lattice.states.shape, np.int64)
+    for walk in division.walks:
+        times[tuple((np.unique(walk, axis=0) - (window.row0, window.col0)).T)] += 1
+    steps = [len(walk) - 1 for walk in division.walks]
+    shared = SharedWalks(
+        building=grid.name,
+        robots=len(steps),
+        cells=division.cells,
+        longest_steps=max(steps),
+        steps=sum(steps),
+        bound_steps=division.lower_bound_steps,
+        passed_twice=round(np.count_nonzero(times > 1) / division.cells, 4),
+        cpu_s=round(cpu_s, 3),
+    )
+    return shared, division
+
+
+def drawn_starts(cells: NDArray[np.int64], count: int, seed: int) -> list[Cell]:
+    """Return some of cells, int64 (n, 2), drawn at random, the same for one seed."""
+    random = np.random.Generator(np.random.PCG64((seed, count)))
+    chosen = random.choice(cells, min(count, len(cells)), replace=False)
+    return [(row, col) for row, col in chosen.tolist()]
 
 
 def _add_options(parser: argparse.ArgumentParser) -> None:
@@ -78,37 +116,13 @@ def _measure(args: argparse.Namespace, say: Say) -> Generator[SharedWalks, None,
     for name in grid_names(args, MAPS):
         grid = read_grid(name)
         to_cover = CoverageProblem.of(grid.lattice, grid.start).to_cover
+        window = grid.lattice.window
+        cells = np.argwhere(to_cover) + np.array((window.row0, window.col0))
         for robots in args.robots:
             say(f"{name}, {robots} robots")
-            starts = [grid.start, *_starts(grid.lattice, to_cover, robots - 1, args.seed)]
+            starts = [grid.start, *drawn_starts(cells, robots - 1, args.seed)]
             fleet = Fleet(starts, CoverageCost(STEP_S, 0.0), seed=args.seed)
-            began = time.process_time()
-            division = divide(grid.lattice, fleet, TimeBudget(args.budget))
-            cpu_s = time.process_time() - began
-            times = np.zeros(to_cover.shape, np.int64)
-            corner = grid.lattice.window.row0, grid.lattice.window.col0
-            for walk in division.walks:
-                times[tuple((np.unique(walk, axis=0) - np.array(corner)).T)] += 1
-            yield SharedWalks(
-                building=grid.name,
-                robots=robots,
-                cells=division.cells,
-                longest_steps=max(len(walk) for walk in division.walks) - 1,
-                bound_steps=division.lower_bound_steps,
-                passed_twice=round(np.count_nonzero(times > 1) / division.cells, 4),
-                cpu_s=round(cpu_s, 3),
-            )
-
-
-def _starts(
-    lattice: CoverageLattice, to_cover: np.ndarray[tuple[int, int], np.dtype[np.bool_]],
-    count: int, seed: int,
-) -> list[Cell]:  # fmt: skip
-    """Return cells drawn at random, the same for one seed."""
-    cells = np.argwhere(to_cover) + np.array((lattice.window.row0, lattice.window.col0))
-    random = np.random.Generator(np.random.PCG64((seed, count)))
-    chosen = random.choice(cells, min(count, len(cells)), replace=False)
-    return [(row, col) for row, col in chosen.tolist()]
+            yield plan_shared(grid, fleet, args.budget)[0]
 
 
 def _report(args: argparse.Namespace, plans: Sequence[SharedWalks]) -> Report:
@@ -122,7 +136,7 @@ def _report(args: argparse.Namespace, plans: Sequence[SharedWalks]) -> Report:
                 str(plan.cells),
                 f"{plan.longest_steps} steps",
                 f"{plan.ratio:.3f}",
-                f"{plan.bound_steps * plan.robots / plan.cells:.3f}",
+                f"{plan.bound_ratio:.3f}",
                 f"{plan.passed_twice:.1%}",
                 f"{plan.cpu_s:.2f}",
             )

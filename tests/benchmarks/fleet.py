@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import argparse
+import itertools
 import math
 import statistics
-import time
 from collections.abc import Generator, Iterator, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 from numpy.random import PCG64
@@ -21,12 +21,11 @@ from fasaco_edge.bench.benchmark import (
     add_grid_options,
     positive,
 )
+from fasaco_edge.bench.fleet import SharedWalks, drawn_starts, plan_shared
 from fasaco_edge.grid.lattice import Cell
 from fasaco_edge.planners.cost import CoverageCost
-from fasaco_edge.planners.fleet.division import Division, divide
 from fasaco_edge.planners.fleet.sharing import Fleet
 from fasaco_edge.planners.grids import NamedGrid, read_grid
-from fasaco_edge.planners.planner import TimeBudget
 from fasaco_edge.planners.warmup import warm_up
 from tests.benchmarks.buildings import building
 from tests.benchmarks.harness import WrongWalkError, check_names, grid_name
@@ -48,29 +47,22 @@ HEADER = (
 
 
 @dataclass(frozen=True, slots=True)
-class Shared:
-    """A building that robots share.
+class Judged:
+    """Walks over a building that robots share, found legal and complete.
 
     Attributes:
-        grid, robots, starts, seed: the question; ``starts`` is spread or together.
-        cells: to cover.
-        longest: steps of the longest walk, over an even share of the cells.
-        steps: of all walks, over the cells.
-        passed_twice: share of the cells that two or more robots pass.
-        bound: the lower bound of the longest walk, over an even share of the cells.
-        cpu_s: processor time.
+        starts, seed: the question; ``starts`` is spread or together.
+        walks: their figures.
     """
 
-    grid: str
-    robots: int
     starts: str
     seed: int
-    cells: int
-    longest: float
-    steps: float
-    passed_twice: float
-    bound: float
-    cpu_s: float
+    walks: SharedWalks
+
+    @property
+    def steps_ratio(self) -> float:
+        """The steps of all walks over the cells."""
+        return self.walks.steps / self.walks.cells
 
 
 def _add_options(parser: argparse.ArgumentParser) -> None:
@@ -91,37 +83,29 @@ def _names(args: argparse.Namespace) -> Sequence[str]:
     return (*args.grids, *args.maps)
 
 
-def _grids(args: argparse.Namespace) -> Iterator[tuple[str, NamedGrid]]:
+def _grids(args: argparse.Namespace) -> Iterator[NamedGrid]:
     for name in _names(args):
-        yield grid_name(name), read_grid(name)
+        yield replace(read_grid(name), name=grid_name(name))
     for seed in range(0 if _names(args) else args.generated):
-        yield f"building {seed}", building(args.cells, seed)
+        yield replace(building(args.cells, seed), name=f"building {seed}")
 
 
-def _measure(args: argparse.Namespace, say: Say) -> Generator[Shared, None, None]:
+def _measure(args: argparse.Namespace, say: Say) -> Generator[Judged, None, None]:
     check_names(_names(args))
     warm_up()
     cost = CoverageCost(STEP_S, QUARTER_TURN_S if args.cost == "turns" else 0.0)
-    for name, grid in _grids(args):
-        lattice = grid.lattice
-        first = lattice.local(grid.start)
-        reached = reachable(lattice.steps, first)
-        for robots in args.robots:
-            for how in args.starts:
-                for seed in range(args.seeds):
-                    say(f"{name}, {robots} robots, {how}, seed {seed}")
-                    starts = starts_of(reached, robots, how, seed)
-                    there = (lattice.window.row0, lattice.window.col0)
-                    placed = [(row + there[0], col + there[1]) for row, col in starts]
-                    fleet = Fleet(placed, cost, seed=seed, threads=args.threads)
-                    began = time.process_time()
-                    division = divide(lattice, fleet, TimeBudget(args.budget))
-                    cpu_s = time.process_time() - began
-                    walks = [walk - there for walk in division.walks]
-                    yield _judged(
-                        (name, robots, how, seed), lattice.steps, reached, walks, starts,
-                        division, cpu_s,
-                    )  # fmt: skip
+    for grid in _grids(args):
+        window = grid.lattice.window
+        reached = reachable(grid.lattice.steps, grid.lattice.local(grid.start))
+        for robots, how, seed in itertools.product(args.robots, args.starts, range(args.seeds)):
+            say(f"{grid.name}, {robots} robots, {how}, seed {seed}")
+            starts = starts_of(reached, robots, how, seed)
+            placed = [(row + window.row0, col + window.col0) for row, col in starts]
+            fleet = Fleet(placed, cost, seed=seed, threads=args.threads)
+            shared, division = plan_shared(grid, fleet, args.budget)
+            walks = [walk - (window.row0, window.col0) for walk in division.walks]
+            judge_walks(grid.lattice.steps, reached, walks, starts)
+            yield Judged(how, seed, shared)
 
 
 def starts_of(reached: NDArray[np.bool_], robots: int, how: str, seed: int) -> list[Cell]:
@@ -134,79 +118,75 @@ def starts_of(reached: NDArray[np.bool_], robots: int, how: str, seed: int) -> l
         seed: of the places.
     """
     cells = np.argwhere(reached)
-    random = Random(PCG64((seed, robots)))
     if how == SPREAD:
-        chosen = cells[random.choice(len(cells), robots, replace=False)]
-    else:
-        away = np.abs(cells - cells[random.integers(len(cells))]).sum(axis=1)
-        chosen = cells[np.argsort(away, kind="stable")[:robots]]
+        return drawn_starts(cells, robots, seed)
+    random = Random(PCG64((seed, robots)))
+    away = np.abs(cells - cells[random.integers(len(cells))]).sum(axis=1)
+    chosen = cells[np.argsort(away, kind="stable")[:robots]]
     return [(row, col) for row, col in chosen.tolist()]
 
 
-def _judged(
-    question: tuple[str, int, str, int],
+def judge_walks(
     steps: NDArray[np.uint8],
     reached: NDArray[np.bool_],
     walks: Sequence[NDArray[np.int32]],
     starts: Sequence[Cell],
-    division: Division,
-    cpu_s: float,
-) -> Shared:
-    """Return the figures, counted by the judge of walks.
+) -> None:
+    """Judge closed walks that shall cover all cells together.
 
     Raises:
         WrongWalkError: a walk is not legal, or together they leave cells out.
     """
     nothing = np.zeros_like(reached)
-    passed = np.zeros(reached.shape, np.int64)
-    lengths = []
+    passed = np.zeros_like(reached)
     for walk, start in zip(walks, starts, strict=True):
         verdict = check_walk(steps, nothing, walk, start, start)
         if not verdict.legal:
-            raise WrongWalkError(f"{question}: {verdict.problems}")
-        rows, cols = np.unique(walk, axis=0).T
-        passed[rows, cols] += 1
-        lengths.append(verdict.steps)
-    if (reached & (passed == 0)).any():
-        raise WrongWalkError(f"{question}: {np.count_nonzero(reached & (passed == 0))} left out")
-    name, robots, how, seed = question
-    cells = int(np.count_nonzero(reached))
-    return Shared(
-        grid=name,
-        robots=robots,
-        starts=how,
-        seed=seed,
-        cells=cells,
-        longest=max(lengths) * robots / cells,
-        steps=sum(lengths) / cells,
-        passed_twice=np.count_nonzero(passed > 1) / cells,
-        bound=division.lower_bound_steps * robots / cells,
-        cpu_s=cpu_s,
-    )
+            raise WrongWalkError(f"{len(walks)} robots, from {start}: {verdict.problems}")
+        passed[tuple(walk.T)] = True
+    if left := np.count_nonzero(reached & ~passed):
+        raise WrongWalkError(f"{len(walks)} robots leave {left} cells out")
 
 
-def _report(args: argparse.Namespace, plans: Sequence[Shared]) -> Report:
+def _report(args: argparse.Namespace, plans: Sequence[Judged]) -> Report:
     rows = []
-    for robots in args.robots:
-        for how in args.starts:
-            some = [plan for plan in plans if (plan.robots, plan.starts) == (robots, how)]
-            if not some:
-                continue
-            middle = [
-                statistics.median(getattr(plan, name) for plan in some)
-                for name in ("longest", "steps", "passed_twice", "bound", "cpu_s")
-            ]
-            longest, steps, twice, bound, cpu_s = middle
-            worst = max(plan.longest for plan in some)
-            figures = f"{longest:.3f}", f"{worst:.3f}", f"{steps:.3f}", f"{twice:.1%}"
-            rows.append(
-                (str(robots), how, str(len(some)), *figures, f"{bound:.3f}", f"{cpu_s:.2f}")
-            )
+    for robots, how in itertools.product(args.robots, args.starts):
+        some = [plan for plan in plans if (plan.walks.robots, plan.starts) == (robots, how)]
+        if not some:
+            continue
+        longest = [plan.walks.ratio for plan in some]
+        steps, twice, bound, cpu_s = map(
+            statistics.median,
+            zip(
+                *(
+                    (plan.steps_ratio, plan.walks.passed_twice, plan.walks.bound_ratio,
+                     plan.walks.cpu_s)
+                    for plan in some
+                ),
+                strict=True,
+            ),
+        )  # fmt: skip
+        figures = f"{statistics.median(longest):.3f}", f"{max(longest):.3f}", f"{steps:.3f}"
+        rows.append(
+            (str(robots), how, str(len(some)), *figures, f"{twice:.1%}", f"{bound:.3f}",
+             f"{cpu_s:.2f}")
+        )  # fmt: skip
     return Report(
         title=f"buildings shared by robots that return, {args.budget:g} s, {args.cost}",
         header=HEADER,
         rows=tuple(rows),
-        figures={"budget_s": args.budget, "plans": [asdict(plan) for plan in plans]},
+        figures={
+            "budget_s": args.budget,
+            "plans": [
+                {
+                    "starts": plan.starts,
+                    "seed": plan.seed,
+                    **asdict(plan.walks),
+                    "ratio": round(plan.walks.ratio, 4),
+                }
+                for plan in plans
+            ],
+        },
         goals=(),
         remarks=(
             "longest: steps of the longest walk, over an even share of the cells; worst: of all "

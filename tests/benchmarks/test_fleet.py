@@ -13,8 +13,10 @@ def test_two_robots_share_a_building_about_evenly(capsys):
     words = ["--generated", "1", "--cells", "1000", "--robots", "2", "--budget", "1", "--json"]
     assert main(["fleet", *words]) == 0
     (plan,) = json.loads(capsys.readouterr().out)["plans"]
-    assert plan["bound"] <= plan["longest"] < 1.3
-    assert plan["steps"] <= plan["longest"]
+    assert plan["bound_steps"] <= plan["longest_steps"]
+    assert plan["ratio"] == pytest.approx(plan["longest_steps"] * 2 / plan["cells"], abs=1e-3)
+    assert plan["ratio"] < 1.3
+    assert plan["steps"] <= 2 * plan["longest_steps"]
     assert plan["passed_twice"] < 0.2
 
 

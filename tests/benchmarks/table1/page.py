@@ -18,7 +18,7 @@ from fasaco_edge.planners.path import walk_figures
 from fasaco_edge.planners.planner import ColonySnapshot
 from fasaco_edge.planners.problem import CoverageProblem
 from tests.benchmarks.harness import grid_name
-from tests.benchmarks.table1.pictures import LabelledWalk, draw_pheromone, draw_walks
+from tests.benchmarks.pictures import LabelledWalk, draw_pheromone, draw_walks
 from tests.benchmarks.table1.runs import VARIANTS, pose
 
 DRAWN = {

@@ -35,7 +35,7 @@ from fasaco_edge.planners.planner import SearchProgress
 from fasaco_edge.planners.problem import CoverageProblem
 from fasaco_edge.planners.warmup import warm_up
 from tests.benchmarks.harness import WrongWalkError, grid_name, judged, planner_for
-from tests.benchmarks.table1.pictures import LabelledWalk, draw_walks
+from tests.benchmarks.pictures import LabelledWalk, draw_walks
 
 # Of the instances, in steps a quarter-turn.
 TOUR_PRICE = 50.0

@@ -6,7 +6,7 @@ import pytest
 from fasaco_edge.drawing import palette
 from fasaco_edge.grid.lattice import CoverageLattice
 from fasaco_edge.planners.planner import ColonySnapshot
-from tests.benchmarks.table1.pictures import LabelledWalk, draw_pheromone, draw_walks
+from tests.benchmarks.pictures import LabelledWalk, draw_pheromone, draw_walks
 
 LINES = ["a caption"]
 
