@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any, Generic, TypeVar
 
 from fasaco_edge import __version__
+from fasaco_edge.planners.own.loading import SHAPE, is_place
 
 Sample = TypeVar("Sample")
 
@@ -160,6 +161,25 @@ def add_grid_options(parser: argparse.ArgumentParser, default_maps: tuple[str, .
         help="map_server YAMLs or names from `maps`, in cells of 0.3 m for a robot of 0.18 m "
         f"radius (default, without --grids: {' '.join(default_maps)})",
     )
+
+
+def add_own_planners(parser: argparse.ArgumentParser) -> None:
+    """Declare ``--planner``."""
+    parser.add_argument(
+        "--planner",
+        nargs="+",
+        type=_place,
+        default=[],
+        metavar="PLACE",
+        help=f"planners of your own, {SHAPE}, as rows beside the others; they run with your "
+        "rights, see fasaco_edge/README.md",
+    )
+
+
+def _place(text: str) -> str:
+    if not is_place(text):
+        raise argparse.ArgumentTypeError(f"must be {SHAPE}, got {text!r}")
+    return text
 
 
 def grid_names(args: argparse.Namespace, default_maps: tuple[str, ...]) -> tuple[str, ...]:

@@ -17,13 +17,16 @@ from fasaco_edge.bench.fleet import FLEET
 from fasaco_edge.bench.footprint import FOOTPRINT
 from fasaco_edge.bench.jitter import JITTER
 from fasaco_edge.bench.latency import LATENCY
+from fasaco_edge.bench.planners import PLANNERS
 from fasaco_edge.bench.speed import SPEED
 from fasaco_edge.cli.console import terminal
 from fasaco_edge.cli.console.arguments import Command, Exit, add_common, add_json
 from fasaco_edge.cli.console.streams import print_json
 
 WIDTH = 80
-BENCHMARKS: tuple[Benchmark[Any], ...] = (SPEED, FOOTPRINT, LATENCY, JITTER, FLEET)
+BENCHMARKS: tuple[Benchmark[Any], ...] = (
+    PLANNERS, SPEED, FOOTPRINT, LATENCY, JITTER, FLEET,
+)  # fmt: skip
 
 EPILOG = """\
 Each benchmark has --help, prints a table or --json, and can be

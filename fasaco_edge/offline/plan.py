@@ -7,7 +7,6 @@ import operator
 import time
 from collections.abc import Callable
 from dataclasses import replace
-from types import FunctionType
 
 import msgspec
 import numpy as np
@@ -17,7 +16,6 @@ from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.grid.lattice import Cell
 from fasaco_edge.offline.ground import Ground
 from fasaco_edge.offline.maps import Map
-from fasaco_edge.offline.own_planner import OwnPlanner
 from fasaco_edge.offline.result import Plan
 from fasaco_edge.offline.settings import (
     ANYWHERE,
@@ -32,6 +30,8 @@ from fasaco_edge.offline.settings import (
 )
 from fasaco_edge.planners.bound import lower_bound_of
 from fasaco_edge.planners.line import LINES
+from fasaco_edge.planners.own.loading import UserCode, user_code
+from fasaco_edge.planners.own.planner import OwnPlanner
 from fasaco_edge.planners.path import CoveragePath
 from fasaco_edge.planners.planner import (
     CoveragePlanner,
@@ -59,7 +59,7 @@ def plan(
     line: str | None = None,
     align: str | float | None = None,
     search: Search | None = None,
-    planner: FunctionType | None = None,
+    planner: object = None,
     stop: StoppingCriterion | None = None,
     watch: Callable[[SearchProgress], None] = lambda _: None,
     observe: Observer = ignore,
@@ -81,8 +81,9 @@ def plan(
         align: what the rows of cells are parallel to, with a line over the floor: "walls", "axes"
             or an angle [deg]; None for walls.
         search: settings of the search; None for the defaults.
-        planner: a function of your own instead of a search: takes a ``GridProblem`` and returns
-            the walk's cells (row, col) in order; of ``search`` it uses only the seed.
+        planner: a planner of your own instead of a search: a function that takes a ``GridProblem``
+            and returns the walk's cells (row, col) in order, a class whose objects have such a
+            method ``plan``, or an object of one; of ``search`` it uses only the seed.
         stop: stopping criterion.
         watch: called with the progress of the search.
         observe: called with the colony's pheromone: a ``ColonySnapshot`` after each cohort, or
@@ -106,13 +107,14 @@ def plan(
     start = None if start is None else _cell("start", start, "be a cell (row, col)")
     start_xy = None if start_xy is None else _point("start_xy", start_xy)
     robot = checked(robot)
+    own = None
     if planner is not None:
-        require(isinstance(planner, FunctionType), "planner", "be a function", planner)
+        own = planner if isinstance(planner, UserCode) else user_code(planner)
         search = replace(search, local_search=False)
     line = line or default_line(search, has_floor=map.grid is not None)
     ground = _ground(map, robot, start, start_xy, line, align)
     problem = _problem(ground, robot, end)
-    path, ended_by, wall_s, cpu_s = _search(problem, search, planner, stop, watch, observe)
+    path, ended_by, wall_s, cpu_s = _search(problem, search, own, stop, watch, observe)
     xy = ground.line(path.cells, line, robot, ends=problem.end is not None)
     return Plan(map, robot, line, search, ground, problem, path, xy, ended_by, wall_s, cpu_s)
 
@@ -203,7 +205,7 @@ def _problem(ground: Ground, robot: RobotConfig, end: str | Cell) -> CoveragePro
 def _search(
     problem: CoverageProblem,
     search: Search,
-    function: FunctionType | None,
+    own: UserCode | None,
     stop: StoppingCriterion | None,
     watch: Callable[[SearchProgress], None],
     observe: Observer,
@@ -213,11 +215,11 @@ def _search(
     A planner without a lower bound is given one, for its path and for the target gap.
     """
     planner: CoveragePlanner
-    if function is None:
+    if own is None:
         colony, improves = search.colony(), search.has_local_search
         planner = planner_of(search.planner, colony, search.threads, improves)
     else:
-        planner = OwnPlanner(function, search.seed)
+        planner = OwnPlanner(own, search.seed)
     bound = None if search.has_local_search else lower_bound_of(problem)
     criteria: dict[str, StoppingCriterion] = {}
     if stop is not None:

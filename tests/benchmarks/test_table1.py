@@ -25,6 +25,7 @@ from tests.benchmarks.table1.paper import (
     verdict,
 )
 from tests.benchmarks.table1.runs import VARIANTS, Run
+from tests.offline.test_plan import OWN_PLANNER
 
 SMALL = ["--ants", "16", "--seeds", "2"]
 COUNTS = ("n_r_paper", "revisits", "recovered_cells", "turns_90", "cpu_s")
@@ -68,6 +69,18 @@ def test_every_variant_runs_with_every_seed(made):
         assert run.cpu_s > 0
     fixed = [run.walk for run in runs if (run.grid, run.variant) == ("office", "zigzag")]
     assert fixed[0] == fixed[1]
+
+
+def test_a_planner_of_one_s_own_is_a_row(tmp_path, capsys):
+    (tmp_path / "mine.py").write_text(OWN_PLANNER)
+    own = ["--planner", f"{tmp_path / 'mine.py'}:depth_first"]
+    assert main(["table1", "--maps", "office", *SMALL, *own, "--json"]) == 0
+    *_, row = json.loads(capsys.readouterr().out)["grids"][0]["rows"]
+    assert row["planner"] == "mine.py:depth_first"
+    assert row["n_r_paper"]["median"] == 333
+    assert main(["table1", "--maps", "office", *SMALL, *own]) == 0
+    said = capsys.readouterr().out
+    assert re.search(r"yours +\n +mine.py:depth_first +333 ", said)
 
 
 def test_figures(capsys):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import subprocess
 import sys
 
@@ -11,7 +12,8 @@ import pytest
 import fasaco_edge as fe
 from fasaco_edge.cli import main
 from fasaco_edge.errors import BadConfiguration, IllegalWalk, PlannerFailed
-from tests.offline.test_plan import OWN_PLANNER, OWN_TABLE
+from fasaco_edge.planners.registry import PLANNER_NAMES
+from tests.offline.test_plan import OWN_PLAN, OWN_PLANNER
 from tests.support.processes import ENVIRONMENT
 
 #   . # .
@@ -42,7 +44,7 @@ def plan(function, **options):
     return fe.plan(fe.load_map(FREE), start=(1, 0), planner=function, **options)
 
 
-def test_the_guide_s_planner_runs_and_stands_in_its_table(mine, capsys):
+def test_the_guide_s_planner_runs_and_is_drawn(mine, capsys):
     picture, walk = mine.with_suffix(".png"), mine.with_suffix(".csv")
     words = ["--end", "home", "--png", str(picture), "--path-out", str(walk)]
     assert main(["plan", "office", "--planner", f"{mine}:depth_first", *words]) == 0
@@ -51,19 +53,76 @@ def test_the_guide_s_planner_runs_and_stands_in_its_table(mine, capsys):
     cells = np.loadtxt(walk, int, delimiter=",", skiprows=1)
     assert len(cells) == 2 * len(np.unique(cells, axis=0)) - 1
     assert picture.exists()
-    table = subprocess.run(
-        [sys.executable, "-c", OWN_TABLE],
+    said = subprocess.run(
+        [sys.executable, "-c", OWN_PLAN],
         cwd=mine.parent,
         env=ENVIRONMENT,
         capture_output=True,
         text=True,
         check=True,
         timeout=600,
-    ).stdout.splitlines()
-    assert [row.split()[0] for row in table[1:]] == [
-        *("mine.py:depth_first", "fasaco", "aco", "spiral-stc", "zigzag", "stc")
-    ]
-    assert int(table[1].split()[1]) == len(cells) - 1
+    ).stdout.split()
+    assert said[:2] == ["mine.py:depth_first", str(len(cells) - 1)]
+    assert picture.exists()
+
+
+def test_a_module_of_one_s_own_is_found_by_its_name(mine, monkeypatch, capsys):
+    package = mine.parent / "lab_of_mine"
+    package.mkdir()
+    (package / "__init__.py").write_text("")
+    (package / "walks.py").write_text(
+        f"{OWN_PLANNER}\n\nclass Deep:\n    def plan(self, problem):\n"
+        "        return depth_first(problem)\n\n\nclass NoPlan: ...\n\n\n"
+        "class Needy:\n    def __init__(self, depth): ...\n\n    plan = Deep.plan\n"
+    )
+    monkeypatch.syspath_prepend(str(mine.parent))
+    for name in ("Deep", "depth_first"):
+        words = ["plan", "office", "--planner", f"lab_of_mine.walks:{name}", "--json"]
+        assert main(words) == 0
+        assert json.loads(capsys.readouterr().out)["planner"] == f"lab_of_mine.walks:{name}"
+    for place, code, said in (
+        ("lab_of_mine.walks:Wide", 78, "has no 'Wide'\n  hint: it has depth_first, Deep, NoPlan"),
+        ("lab_of_mine.walks:NoPlan", 78, "must be a function, or a class with plan(self, problem)"),
+        ("lab_of_mine.walks:Needy", 1, "Needy: TypeError:"),
+        ("lab_of_mine.no:Deep", 78, "finds no module 'lab_of_mine.no'"),
+        ("lab_of_yours:Deep", 78, "finds no module 'lab_of_yours'"),
+        ("json:loads", 1, "planner json:loads: TypeError"),
+    ):
+        assert main(["plan", "office", "--planner", place]) == code
+        assert said in capsys.readouterr().err
+
+
+def test_what_is_no_place_of_a_planner_is_told(capsys):
+    with pytest.raises(SystemExit):
+        main(["plan", "office", "--planner", "lab-of-mine:Deep"])
+    assert "FILE.py:NAME or MODULE:NAME, got 'lab-of-mine:Deep'" in capsys.readouterr().err
+
+
+def test_from_python_a_class_and_its_object_are_planners_too():
+    class Walk:
+        def plan(self, problem):
+            return WALK
+
+    for planner in (Walk, Walk()):
+        assert plan(planner).figures["planner"] == "test_own_planner.py:Walk"
+    with pytest.raises(BadConfiguration, match="must be a function, or a class with plan"):
+        plan(WALK)
+
+
+def test_bench_has_it_as_a_row_beside_the_others(mine, capsys):
+    np.save(mine.parent / "room.npy", np.ones((4, 5), bool))
+    words = ["--grids", str(mine.parent / "room.npy"), "--seeds", "2", "--budget", "0.1", "--json"]
+    assert main(["bench", "planners", "--planner", f"{mine}:depth_first", *words]) == 0
+    (grid,) = json.loads(capsys.readouterr().out)["grids"]
+    rows = {row["planner"]: row for row in grid["rows"]}
+    assert list(rows) == ["mine.py:depth_first", "fasaco + search", *PLANNER_NAMES]
+    # There and back along a tree over 20 cells; a closed walk over them.
+    assert rows["mine.py:depth_first"]["steps"]["median"] == 38
+    assert rows["fasaco + search"]["steps"]["median"] == grid["bound_steps"] == 20
+    assert all(row["runs"] == 2 for row in rows.values())
+    mine.write_text("def depth_first(problem):\n    return [problem.start]\n")
+    assert main(["bench", "planners", "--planner", f"{mine}:depth_first", *words]) == 1
+    assert "its walk leaves 19 of 20 cells" in capsys.readouterr().err
 
 
 def test_what_a_planner_gets_cannot_be_written_and_is_what_it_says():
@@ -144,7 +203,7 @@ def test_a_planner_that_ends_everything_is_no_plan(mine, text, said, capsys):
     [
         ("def walk(problem:\n", "walk", PlannerFailed, "mine.py:1: def walk"),
         ("import nowhere_to_be_found\n", "walk", PlannerFailed, "mine.py:1, in <module>: import"),
-        ("def one(problem): ...\n", "two", BadConfiguration, "has no function 'two'"),
+        ("def one(problem): ...\n", "two", BadConfiguration, "has no 'two'"),
         (None, "walk", BadConfiguration, "cannot read"),
     ],
 )

@@ -19,7 +19,7 @@ from tests.benchmarks.judge import check_walk
 from tests.support.processes import ENVIRONMENT
 
 ROOT = Path(__file__).parents[2]
-*EXAMPLES, OWN_PLANNER, OWN_TABLE = re.findall(
+*EXAMPLES, OWN_PLANNER, OWN_PLAN = re.findall(
     r"```python\n(.*?)```", (ROOT / "fasaco_edge/README.md").read_text(), re.S
 )
 QUICK = fe.Search(budget_s=0.05)

@@ -24,6 +24,7 @@ from fasaco_edge.offline.settings import (
     WALLS,
     Search,
 )
+from fasaco_edge.planners.own.loading import SHAPE, is_place
 from fasaco_edge.planners.paper.colony import VISIBILITIES
 from fasaco_edge.planners.registry import PLANNER_NAMES, PLANNERS
 
@@ -67,7 +68,7 @@ fasaco searches until its budget ends, the walk is proven optimal, or all ants h
 walked: a complete walk within milliseconds, then better ones by local search, restarted
 from walks of the colony's ants (up to 8,000 cells; larger maps have local search only).
 --no-local-search is the paper's colony alone. The colony's options apply to fasaco; aco
-takes all but the velocities, the other planners none; a function of your own gets the seed.
+takes all but the velocities, the other planners none; a planner of your own gets the seed.
 """
 
 ROBOT, SEARCH = RobotConfig(), Search()
@@ -203,9 +204,10 @@ def _add_planner(group: argparse._ArgumentGroup) -> None:
     group.add_argument(
         "--planner",
         type=_planner,
-        metavar=f"{'|'.join(PLANNER_NAMES)}|FILE.py:FUNCTION",
+        metavar=f"{'|'.join(PLANNER_NAMES)}|FILE.py:NAME|MODULE:NAME",
         help="; ".join(f"{name}: {entry.about}" for name, entry in PLANNERS.items())
-        + "; or a function of your own, which is run with your rights, see fasaco_edge/README.md "
+        + "; or a function or class of your own, in a file or an installed module, which is run "
+        + "with your rights, see fasaco_edge/README.md "
         + f"(default: {SEARCH.planner})",
     )
     group.add_argument("--ants", type=int, metavar="N", help=f"(default: {SEARCH.ants})")
@@ -288,11 +290,10 @@ def _add_output(group: argparse._ArgumentGroup) -> None:
 
 
 def _planner(text: str) -> str:
-    """Read the name of a planner, or where a function is."""
-    file, _, function = text.rpartition(":")
-    if text not in PLANNER_NAMES and not (file.endswith(".py") and function.isidentifier()):
+    """Read the name of a planner, or the place of one of the user's own."""
+    if text not in PLANNER_NAMES and not is_place(text):
         names = ", ".join(PLANNER_NAMES)
-        raise argparse.ArgumentTypeError(f"must be {names} or FILE.py:FUNCTION, got {text!r}")
+        raise argparse.ArgumentTypeError(f"must be {names}, {SHAPE}, got {text!r}")
     return text
 
 

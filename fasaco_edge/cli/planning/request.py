@@ -6,7 +6,6 @@ import argparse
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from types import FunctionType
 from typing import Any
 
 import msgspec
@@ -16,7 +15,7 @@ from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.config.loading import load_config
 from fasaco_edge.config.robot import RobotConfig
 from fasaco_edge.offline.settings import CELLS, Search, default_line, require
-from fasaco_edge.offline.user_function import load_function
+from fasaco_edge.planners.own.loading import UserCode, load
 
 # Members of ``RobotConfig`` and ``Search`` by the options for them.
 ROBOT_OPTIONS = {
@@ -47,7 +46,7 @@ class PlanRequest:
     robot: RobotConfig
     search: Search
     line: str
-    own: FunctionType | None
+    own: UserCode | None
     sources: tuple[Path, ...] = ()
 
 
@@ -61,7 +60,7 @@ def read_request(args: argparse.Namespace) -> PlanRequest:
     config = None if args.config is None else load_config(args.config)
     given, own = _given(args, SEARCH_OPTIONS), None
     if ":" in given.get("planner", ""):
-        own = load_function(given.pop("planner"))
+        own = load(given.pop("planner"))
     search = replace(_search(config), **given)
     if args.no_local_search or own:
         search = replace(search, local_search=False)
@@ -80,7 +79,7 @@ def read_request(args: argparse.Namespace) -> PlanRequest:
         allowed = 0.0 <= args.overlap <= 0.5
         require(allowed, "--overlap", "be in [0, 0.5], of the tool's width", args.overlap)
     changes = _given(args, ROBOT_OPTIONS) | turning_of(args, robot)
-    named = args.config, Path(own.__code__.co_filename) if own else None
+    named = args.config, Path(own.file) if own and own.file else None
     sources = tuple(file for file in named if file is not None)
     return PlanRequest(msgspec.structs.replace(robot, **changes), search, line, own, sources)
 

@@ -11,9 +11,11 @@ from fasaco_edge.bench.benchmark import (
     Report,
     Say,
     add_grid_options,
+    add_own_planners,
     grid_names,
     positive,
 )
+from fasaco_edge.planners.own.loading import load
 from tests.benchmarks.table1.page import draw, write_page
 from tests.benchmarks.table1.report import report
 from tests.benchmarks.table1.runs import VARIANTS, Run, check_drawn, measure
@@ -27,6 +29,7 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--seeds", type=positive, default=10, metavar="N", help="0 to N - 1 (default: %(default)s)"
     )
+    add_own_planners(parser)
     parser.add_argument("--markdown", type=Path, metavar="FILE", help="write the page of results")
     parser.add_argument(
         "--png", type=Path, metavar="DIR", help="draw walks and pheromone of each grid"
@@ -40,12 +43,12 @@ def _names(args: argparse.Namespace) -> tuple[str, ...]:
 
 def _count(args: argparse.Namespace) -> int:
     seeds: int = args.seeds
-    return len(_names(args)) * seeds * len(VARIANTS)
+    return len(_names(args)) * seeds * (len(VARIANTS) + len(args.planner))
 
 
 def _measure(args: argparse.Namespace, say: Say) -> Generator[Run, None, None]:
     check_drawn(args.png_of, _names(args))
-    return measure(_names(args), args.ants, args.seeds, say)
+    return measure(_names(args), args.ants, args.seeds, say, [*map(load, args.planner)])
 
 
 def _report(args: argparse.Namespace, runs: Sequence[Run]) -> Report:
@@ -71,6 +74,8 @@ def _command(args: argparse.Namespace) -> str:
     maps = args.maps or (() if args.grids else DEFAULT_MAPS)
     if maps:
         words.append(f"--maps {' '.join(Path(name).name for name in maps)}")
+    if args.planner:
+        words.append(f"--planner {' '.join(Path(place).name for place in args.planner)}")
     words.append(f"--markdown {args.markdown.name}")
     if args.png:
         words.append(f"--png {args.png.name}")
@@ -96,6 +101,7 @@ examples:
   python -m tests.benchmarks table1 --maps office flat --seeds 3 --json
   python -m tests.benchmarks.table1.grids grid.yaml basement.yaml   # makes the next two
   python -m tests.benchmarks table1 --grids paper_simulated.npy paper_basement.npy
+  python -m tests.benchmarks table1 --seeds 3 --planner mine.py:depth_first
   python -m tests.benchmarks table1 --markdown RESULTS.md --png pictures --png-of walled_grid
 """,
 )

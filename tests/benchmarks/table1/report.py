@@ -17,7 +17,7 @@ from tests.benchmarks.table1.paper import (
     paper_map,
     verdict,
 )
-from tests.benchmarks.table1.runs import FALLING, RISING, VARIANTS, Run
+from tests.benchmarks.table1.runs import FALLING, RISING, VARIANTS, Run, Variant
 
 # The bars for the colony are those of as many ants as the paper's.
 GOAL_ANTS = 1000
@@ -82,6 +82,11 @@ class GridRuns:
         """The map of Table I that this grid is."""
         return paper_map(self.name, self.cells)
 
+    @property
+    def own(self) -> tuple[str, ...]:
+        """The user's own planners."""
+        return tuple(dict.fromkeys(run.variant for run in self.runs if run.variant not in VARIANTS))
+
     def values(self, figure: str, variant: str) -> dict[int, float]:
         """Return a figure of each of a variant's runs, by seed."""
         mine = (run for run in self.runs if run.variant == variant)
@@ -110,10 +115,12 @@ def report(ants: int, seeds: int, runs: Sequence[Run]) -> Report:
         for name in cells
     ]
     findings = [finding for grid in grids for finding in grid.findings()]
+    rows = (*OTHERS, *(grids[0].own if grids else ()))
+    labels = (OTHERS.get(variant, variant) for variant in rows)
     return Report(
         title=f"Table I, n_r_paper: {ants} ants, {seeds} seeds, start to start",
-        header=("", *(label.replace(", ", "\n") for label in OTHERS.values())),
-        rows=tuple(_summary(grid) for grid in grids),
+        header=("", *(label.replace(", ", "\n").replace(":", ":\n") for label in labels)),
+        rows=tuple(_summary(grid, rows) for grid in grids),
         figures={
             "ants": ants,
             "seeds": seeds,
@@ -131,8 +138,8 @@ def report(ants: int, seeds: int, runs: Sequence[Run]) -> Report:
     )
 
 
-def _summary(grid: GridRuns) -> tuple[str, ...]:
-    medians = (_count(grid.spread("n_r_paper", variant), in_short=True) for variant in OTHERS)
+def _summary(grid: GridRuns, rows: Sequence[str]) -> tuple[str, ...]:
+    medians = (_count(grid.spread("n_r_paper", variant), in_short=True) for variant in rows)
     return grid.name, *medians
 
 
@@ -143,16 +150,17 @@ def _figures(grid: GridRuns) -> dict[str, Any]:
         "cells": grid.cells,
         "paper_map": known and known.name,
         "optimum_revisits": known and known.optimum,
-        "rows": [_row_figures(grid, variant) for variant in VARIANTS],
+        "rows": [_row_figures(grid, variant) for variant in (*VARIANTS, *grid.own)],
     }
 
 
 def _row_figures(grid: GridRuns, variant: str) -> dict[str, Any]:
     paper = grid.known and grid.known.figures(variant)
+    known = VARIANTS.get(variant, Variant(variant, variant))
     return {
         "variant": variant,
-        "planner": VARIANTS[variant].planner,
-        "velocities": list(VARIANTS[variant].velocities),
+        "planner": known.planner,
+        "velocities": list(known.velocities),
         "runs": len(grid.values("cpu_s", variant)),
         **{
             figure: document(grid.spread(figure, variant))
@@ -172,6 +180,7 @@ def _table(grid: GridRuns) -> ResultTable:
         optimum = ("proven optimum", str(known.optimum))
         others.append(optimum + ("-",) * (len(others[0]) - len(optimum)))
     blank = ("",) * (len(others[0]) - 1)
+    own = [_row(grid, variant, variant) for variant in grid.own]
     return ResultTable(
         f"{grid.name}: {grid.cells} cells{is_known}",
         (*HEADER, *PAPER_HEADER) if known else HEADER,
@@ -181,6 +190,8 @@ def _table(grid: GridRuns) -> ResultTable:
             *others,
             ("beyond", *blank),
             *beyond,
+            *([("yours", *blank)] if own else []),
+            *own,
         ),
     )
 

@@ -5,10 +5,13 @@ from __future__ import annotations
 import time
 from collections.abc import Generator, Sequence
 from dataclasses import dataclass, replace
+from typing import Self
 
 from fasaco_edge.bench.benchmark import Say
 from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.planners.grids import NamedGrid, read_grid
+from fasaco_edge.planners.own.loading import UserCode
+from fasaco_edge.planners.own.planner import OwnPlanner
 from fasaco_edge.planners.paper.colony import ColonyConfig
 from fasaco_edge.planners.path import CoveragePath, WalkFigures, walk_figures
 from fasaco_edge.planners.planner import Observer, ignore, never
@@ -28,6 +31,7 @@ class Variant:
         velocities: of its cohorts [cells/move]; () where there are no ants.
         q0, visibility: of the colony; the faithful rows have the defaults.
         closed: whether its walk ends where it began, as all the faithful ones do.
+        own: the user's code in place of a planner of the registry.
     """
 
     name: str
@@ -36,11 +40,20 @@ class Variant:
     q0: float = 0.7
     visibility: str = "neighbour"
     closed: bool = True
+    own: UserCode | None = None
+
+    @classmethod
+    def of(cls, own: UserCode) -> Self:
+        """Return the row of a planner of the user's own."""
+        return cls(own.name, own.name, own=own)
 
     def plan(
         self, problem: CoverageProblem, ants: int, seed: int, observe: Observer = ignore
     ) -> CoveragePath:
         """Return its walk; by one thread."""
+        posed = replace(problem, end=problem.start if self.closed else None)
+        if self.own is not None:
+            return OwnPlanner(self.own, seed).plan(posed, never, observe)
         colony = ColonyConfig(
             ants=ants,
             velocities=self.velocities or (1,),
@@ -48,7 +61,6 @@ class Variant:
             seed=seed,
             visibility=self.visibility,
         )
-        posed = replace(problem, end=problem.start if self.closed else None)
         return planner_of(self.planner, colony).plan(posed, never, observe)
 
 
@@ -112,13 +124,17 @@ def pose(grid: NamedGrid) -> CoverageProblem:
     return CoverageProblem.of(grid.lattice, grid.start, end=grid.start)
 
 
-def measure(grids: Sequence[str], ants: int, seeds: int, say: Say) -> Generator[Run, None, None]:
-    """Yield every variant's run on each grid with each seed, kernels warm.
+def measure(
+    grids: Sequence[str], ants: int, seeds: int, say: Say, own: Sequence[UserCode] = ()
+) -> Generator[Run, None, None]:
+    """Yield every variant's run on each grid with each seed, kernels warm; then the user's own.
 
     Raises:
-        FasacoError: a grid cannot be read or planned on, or the colony is impossible.
+        FasacoError: a grid cannot be read or planned on, the colony is impossible, or a planner
+            of the user's own fails.
     """
     check_names(grids)
+    variants = (*VARIANTS.values(), *map(Variant.of, own))
     # Read first: a wrong name should not be found out after minutes.
     read = [read_grid(grid) for grid in grids]
     ColonyConfig(ants=ants)
@@ -126,11 +142,11 @@ def measure(grids: Sequence[str], ants: int, seeds: int, say: Say) -> Generator[
     warm_up()
     for grid in read:
         problem = pose(grid)
-        for variant in VARIANTS.values():
+        for variant in variants:
             variant.plan(problem, max(len(variant.velocities), 1), 0)
         for seed in range(seeds):
             say(f"{grid_name(grid.name)}: seed {seed}")
-            for variant in VARIANTS.values():
+            for variant in variants:
                 yield _timed(grid, problem, variant, ants, seed)
 
 

@@ -5,14 +5,13 @@ from __future__ import annotations
 import time
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from types import FunctionType
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.errors import IllegalWalk
 from fasaco_edge.grid.lattice import Cell
-from fasaco_edge.offline.user_function import RAISED, failure, name_of
+from fasaco_edge.planners.own.loading import RAISED, UserCode, failure
 from fasaco_edge.planners.path import CoveragePath
 from fasaco_edge.planners.planner import Observer, StoppingCriterion
 from fasaco_edge.planners.problem import CoverageProblem
@@ -57,32 +56,32 @@ class GridProblem:
 
 @dataclass(frozen=True, slots=True)
 class OwnPlanner:
-    """A user's function as a planner.
+    """A user's code as a planner.
 
     Attributes:
-        function: takes a ``GridProblem`` and returns, or yields, cells (row, col) in order.
-        seed: passed to the function.
+        code: the code.
+        seed: passed to it.
     """
 
-    function: FunctionType
+    code: UserCode
     seed: int = 0
 
     def plan(
         self, problem: CoverageProblem, stop: StoppingCriterion, observe: Observer
     ) -> CoveragePath:
-        """Return the function's walk; it is neither stopped nor observed.
+        """Return the code's walk; it is neither stopped nor observed.
 
         Raises:
-            PlannerFailed: the function raised.
+            PlannerFailed: the code raised.
             IllegalWalk: the result is not a walk, or does not solve the problem.
         """
-        name = name_of(self.function)
+        name = self.code.name
         posed, began = _posed(problem, self.seed), time.perf_counter()
         try:
             # The user's code runs up to here, also inside the returned iterable.
-            walk = _in_bounds(self.function(posed), MOST_STEPS_PER_CELL * posed.to_cover.size)
+            walk = _in_bounds(self.code.walk(posed), MOST_STEPS_PER_CELL * posed.to_cover.size)
         except RAISED as error:
-            raise failure(error, name, self.function.__code__.co_filename) from error
+            raise failure(error, name, self.code.file) from error
         taken_s = time.perf_counter() - began
         cells = _checked(posed, walk, name)
         window = problem.lattice.window
@@ -109,7 +108,7 @@ def _posed(problem: CoverageProblem, seed: int) -> GridProblem:
 
 
 def _in_bounds(walk: Iterable[Cell], most: int) -> list[Cell | str]:
-    """Return the cells that a function returned or yielded, at most one more than ``most``.
+    """Return the cells that the code returned or yielded, at most one more than ``most``.
 
     As plain integers; the first item that is no cell is returned as text, and ends the list.
     """

@@ -1,0 +1,223 @@
+"""``bench planners``: the walks of all planners, and of the user's own, side by side."""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections.abc import Generator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from fasaco_edge.bench.benchmark import (
+    Benchmark,
+    Report,
+    ResultTable,
+    Say,
+    add_grid_options,
+    add_own_planners,
+    grid_names,
+    positive,
+    seconds_above_zero,
+)
+from fasaco_edge.drawing.spread import Spread, document
+from fasaco_edge.planners.own.loading import UserCode, load
+from fasaco_edge.planners.paper.colony import ColonyConfig, parse_velocities
+from fasaco_edge.planners.registry import PLANNERS as REGISTRY
+
+if TYPE_CHECKING:
+    from fasaco_edge.planners.grids import NamedGrid
+    from fasaco_edge.planners.path import WalkFigures
+    from fasaco_edge.planners.planner import CoveragePlanner
+    from fasaco_edge.planners.problem import CoverageProblem
+
+DEFAULT_MAPS = ("office", "flat")
+# The row of the planner that missions use: colony and local search.
+WITH_SEARCH = "fasaco + search"
+SEARCH_Q0, SEARCH_VISIBILITY = 0.98, "fewest-open"
+HEADER = ("planner", "steps", "revisits", "n_r_paper", "turns\n90", "CPU\n[s]")
+FIGURES = ("steps", "revisits", "recovered_cells", "n_r_paper", "turns_90")
+
+
+@dataclass(frozen=True, slots=True)
+class Run:
+    """One walk of a planner on a grid.
+
+    Attributes:
+        grid: name of the grid.
+        cells: cells to cover.
+        planner: the row's name.
+        walk: figures of the walk.
+        cpu_s: time of the planning thread on a processor [s].
+        bound_steps: lower bound on the steps.
+    """
+
+    grid: str
+    cells: int
+    planner: str
+    walk: WalkFigures
+    cpu_s: float
+    bound_steps: int
+
+
+def _add_options(parser: argparse.ArgumentParser) -> None:
+    add_own_planners(parser)
+    add_grid_options(parser, DEFAULT_MAPS)
+    parser.add_argument("--ants", type=positive, default=1000, help="(default: %(default)s)")
+    parser.add_argument("--velocities", default="8:1", help="as in `plan` (default: %(default)s)")
+    parser.add_argument(
+        "--seeds", type=positive, default=3, metavar="N", help="0 to N - 1 (default: %(default)s)"
+    )
+    parser.add_argument(
+        "--budget",
+        type=seconds_above_zero,
+        default=1.0,
+        metavar="S",
+        help=f"of {WITH_SEARCH} [s]; the others walk to their end (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--end",
+        choices=("home", "anywhere"),
+        default="home",
+        help="where each walk ends; home as in the paper's Table I (default: %(default)s)",
+    )
+
+
+def _count(args: argparse.Namespace) -> int:
+    rows = len(args.planner) + len(REGISTRY) + 1
+    runs: int = args.seeds * rows
+    return runs * len(grid_names(args, DEFAULT_MAPS))
+
+
+def _measure(args: argparse.Namespace, say: Say) -> Generator[Run, None, None]:
+    # Here, so that to list the benchmarks does not load the compiler.
+    from fasaco_edge.planners.bound import lower_bound_of  # noqa: PLC0415
+    from fasaco_edge.planners.grids import read_grid  # noqa: PLC0415
+    from fasaco_edge.planners.problem import CoverageProblem  # noqa: PLC0415
+    from fasaco_edge.planners.warmup import warm_up  # noqa: PLC0415
+
+    # Read first: a wrong name should not be found out after minutes.
+    own = [load(place) for place in args.planner]
+    colony = ColonyConfig(ants=args.ants, velocities=parse_velocities(args.velocities))
+    grids = [read_grid(name) for name in grid_names(args, DEFAULT_MAPS)]
+    say("loading kernels")
+    warm_up()
+    for grid in grids:
+        end = grid.start if args.end == "home" else None
+        problem = CoverageProblem.of(grid.lattice, grid.start, end=end)
+        bound = lower_bound_of(problem).steps
+        for seed in range(args.seeds):
+            for name, planner in _rows(own, replace(colony, seed=seed)):
+                say(f"{Path(grid.name).stem}: {name}, seed {seed}")
+                yield _run(grid, problem, name, planner, args.budget, bound)
+
+
+def _rows(
+    own: Sequence[UserCode], colony: ColonyConfig
+) -> Generator[tuple[str, CoveragePlanner], None, None]:
+    from fasaco_edge.planners.own.planner import OwnPlanner  # noqa: PLC0415
+    from fasaco_edge.planners.registry import planner_of  # noqa: PLC0415
+
+    for code in own:
+        yield code.name, OwnPlanner(code, colony.seed)
+    # As missions have it: ants that see what would be cut off.
+    seeing = replace(colony, q0=SEARCH_Q0, visibility=SEARCH_VISIBILITY)
+    yield WITH_SEARCH, planner_of("fasaco", seeing, local_search=True)
+    for name in REGISTRY:
+        yield name, planner_of(name, colony)
+
+
+def _run(
+    grid: NamedGrid,
+    problem: CoverageProblem,
+    name: str,
+    planner: CoveragePlanner,
+    budget_s: float,
+    bound: int,
+) -> Run:
+    from fasaco_edge.planners.path import walk_figures  # noqa: PLC0415
+    from fasaco_edge.planners.planner import TimeBudget, ignore, never  # noqa: PLC0415
+
+    stop = TimeBudget(budget_s) if name == WITH_SEARCH else never
+    cpu = time.thread_time()
+    path = planner.plan(problem, stop, ignore)
+    cpu_s = time.thread_time() - cpu
+    walk = walk_figures(grid.lattice, path.cells)
+    return Run(grid.name, problem.cells, name, walk, cpu_s, bound)
+
+
+def _report(args: argparse.Namespace, runs: Sequence[Run]) -> Report:
+    grids = list(dict.fromkeys(run.grid for run in runs))
+    figures = [_figures([run for run in runs if run.grid == grid]) for grid in grids]
+    tables = [_table(grid) for grid in figures] or [ResultTable("no walks", HEADER, ())]
+    first, *others = tables
+    return Report(
+        title=first.title,
+        header=HEADER,
+        rows=first.rows,
+        figures={
+            "ants": args.ants,
+            "velocities": args.velocities,
+            "seeds": args.seeds,
+            "end": args.end,
+            "budget_s": args.budget,
+            "grids": figures,
+        },
+        remarks=(
+            "medians over the seeds, below them their range; n_r_paper: revisits including the "
+            "way home, as in the paper's Table I",
+        ),
+        further=tuple(others),
+    )
+
+
+def _figures(runs: Sequence[Run]) -> dict[str, Any]:
+    """Sum up the runs on one grid, as JSON values."""
+    rows = []
+    for name in dict.fromkeys(run.planner for run in runs):
+        mine = [run for run in runs if run.planner == name]
+        counts = {what: Spread.of([getattr(run.walk, what) for run in mine]) for what in FIGURES}
+        counts["cpu_s"] = Spread.of([run.cpu_s for run in mine])
+        spreads = {what: document(spread) for what, spread in counts.items()}
+        rows.append({"planner": name, "runs": len(mine), **spreads})
+    return {
+        "grid": runs[0].grid,
+        "cells": runs[0].cells,
+        "bound_steps": runs[0].bound_steps,
+        "rows": rows,
+    }
+
+
+def _table(grid: dict[str, Any]) -> ResultTable:
+    columns = ("steps", "revisits", "n_r_paper", "turns_90")
+    rows = tuple(
+        (row["planner"], *(_range(row[what]) for what in columns), f"{row['cpu_s']['median']:.3f}")
+        for row in grid["rows"]
+    )
+    name = Path(grid["grid"]).stem
+    title = f"{name}: {grid['cells']} cells, at least {grid['bound_steps']} steps"
+    return ResultTable(title, HEADER, rows)
+
+
+def _range(spread: dict[str, float]) -> str:
+    median, low, high = (spread[name] for name in ("median", "low", "high"))
+    return f"{median:g}" if low == high else f"{median:g}\n{low:g}-{high:g}"
+
+
+PLANNERS = Benchmark(
+    name="planners",
+    summary="the walks of all planners, and of your own, side by side",
+    description="Plan with every planner, and with those of your own, on each grid with each "
+    "seed, on one thread with warm kernels. fasaco is the paper's colony, fasaco + search what "
+    "`plan` and missions use. A turn costs nothing, as the paper counts.",
+    add_options=_add_options,
+    count=_count,
+    measure=_measure,
+    report=_report,
+    epilog="""\
+examples:
+  fasaco-edge bench planners --planner mine.py:depth_first
+  fasaco-edge bench planners --planner mine.py:depth_first lab.planners:Spiral --maps basement
+  fasaco-edge bench planners --grids grid.npy --seeds 10 --json
+""",
+)
