@@ -45,9 +45,13 @@ class Follower(Supervision):
         self._before: Route | None = None
         self._is_new = False
         self._driven_at = -float("inf")
+        self._stepped_at: float | None = None
 
     def step(self, now: float) -> Command | None:
         """Return the command to send now; None for none."""
+        if self._stepped_at is not None:
+            self._pursuit.passed(now - self._stepped_at)
+        self._stepped_at = now
         try:
             self.state, self.detail = self._trouble(now)
             command = self._steer(now) if self.state is State.DRIVING else None

@@ -11,6 +11,7 @@ from fasaco_edge.bus.arrival import Sample
 from fasaco_edge.bus.mailbox import LatestSlot
 from fasaco_edge.bus.session import Bus
 from fasaco_edge.errors import FasacoError
+from fasaco_edge.follow.clock import Clock, RealClock, SimulatedClock
 from fasaco_edge.follow.settings import FollowSettings, PoseSource
 from fasaco_edge.follow.supervision import LINK_S, Patience, Supervision
 from fasaco_edge.wire import topics
@@ -34,7 +35,8 @@ class Inputs:
     """Subscribes, and passes the inputs since the last cycle to a follower."""
 
     def __init__(self, settings: FollowSettings, bus: Bus) -> None:
-        self._pace = settings.pace
+        real = settings.pace == 1.0
+        self._clock: Clock = RealClock() if real else SimulatedClock(settings.pace)
         self._decoder = PoseDecoder(settings.pose_schema, settings.frames)
         self._poses = deque[tuple[Sample, PoseSource, float]](maxlen=MOST_POSES)
         self._path: LatestSlot[Sample] = LatestSlot()
@@ -51,7 +53,7 @@ class Inputs:
 
     def now(self) -> float:
         """Return the time by the clock of the robot's seconds [s]."""
-        return time.monotonic() * self._pace
+        return self._clock.at(time.monotonic())
 
     def feed(self, follower: Supervision) -> None:
         """Pass the inputs to a follower."""
@@ -62,7 +64,8 @@ class Inputs:
         if heard_at is not None:
             follower.heard_status(heard_at)
         while self._poses:
-            sample, source, at = self._poses.popleft()
+            sample, source, came_at = self._poses.popleft()
+            at = self._clock.at(came_at)
             try:
                 pose = self._decoder.decode(
                     sample.payload,
@@ -74,7 +77,7 @@ class Inputs:
                 follower.refuse_pose(error)
                 continue
             if pose is not None:
-                follower.take_pose(pose, at)
+                follower.take_pose(pose, self._clock.hear(pose.stamp_ns, came_at))
             if (link := self._decoder.oldest_link) is not None:
                 follower.heard_link(link)
         if (path := self._path.take(0.0)) is not None:
@@ -82,7 +85,7 @@ class Inputs:
 
     def _pose_taker(self, source: PoseSource) -> Callable[[Sample], None]:
         def take(sample: Sample) -> None:
-            self._poses.append((sample, source, self.now()))
+            self._poses.append((sample, source, time.monotonic()))
 
         return take
 

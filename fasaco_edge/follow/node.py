@@ -28,6 +28,8 @@ log = logging.getLogger(__name__)
 # Retry period while nobody listens at the endpoint [s].
 RETRY_S = 1.0
 REPORT_EVERY_S = 1.0
+# A cycle may run this much early [s].
+LEAST_S = 1e-6
 
 
 class Out(Protocol):
@@ -128,12 +130,16 @@ class FollowerNode:
         self._inputs = Inputs(settings, bus)
         self._states = StateLog()
         self._reported_at = -math.inf
+        self._due = -math.inf
 
     def turn(self) -> None:
         """Take the inputs, and send the resulting command."""
         follower = self._follower
         self._inputs.feed(follower)
-        command = follower.step(self._inputs.now())
+        now = self._inputs.now()
+        if self._settings.pace != 1.0 and not self._is_due(now):
+            return
+        command = follower.step(now)
         if command is not None:
             self._send(command)
         if self._states.note(follower.state, follower.detail):
@@ -143,6 +149,14 @@ class FollowerNode:
     def end(self) -> None:
         """Have the robot stand."""
         self._send(STAND)
+
+    def _is_due(self, now: float) -> bool:
+        """Tell whether a cycle is due in simulated time: that may be slower than it should be."""
+        if now < self._due - LEAST_S:
+            return False
+        due = self._due + 1.0 / RATE_HZ
+        self._due = due if due > now else now + 1.0 / RATE_HZ
+        return True
 
     def _send(self, command: Command) -> None:
         """Send a command; in a dry run none."""

@@ -25,10 +25,18 @@ ARRIVED_M = 0.005
 ALIGNED_RAD, MISALIGNED_RAD = 0.03, 0.2
 # Near a half turn, the robot keeps its direction of turning [rad].
 BACK_RAD = 2.8
+# A cycle counts as at most this many periods long; share of the largest delay of a cycle that is
+# still expected a cycle later.
+MOST_PERIODS = 4.0
+FORGETTING = 0.98
 
 
 class Pursuit:
     """Drives along routes, from one command to the next.
+
+    On a busy computer a command comes late, and the robot drives on with the last one. It then
+    brakes by as much as it could have since; and it brakes early by the way that it would drive on
+    in such a delay.
 
     Args:
         limits: of the base.
@@ -39,7 +47,14 @@ class Pursuit:
         self._limits = limits
         self._period = period
         self._is_turning = True
+        # Time since the last command, and the delay to expect of the next one [s].
+        self._seconds, self._late = period, 0.0
         self.last = STAND
+
+    def passed(self, seconds: float) -> None:
+        """Note the time since the last command [s]."""
+        self._seconds = min(max(seconds, self._period), MOST_PERIODS * self._period)
+        self._late = max(self._seconds - self._period, FORGETTING * self._late)
 
     def stand(self) -> None:
         """Note that the robot was commanded to stop at once."""
@@ -47,20 +62,19 @@ class Pursuit:
 
     def brake(self) -> Command:
         """Return the next command of braking."""
-        speed = max(self.last.speed - self._limits.acceleration * self._period, 0.0)
-        self._is_turning, self.last = True, Command(speed, self._toward(0.0))
+        self._is_turning, self.last = True, Command(self._braked(), self._toward(0.0))
         return self.last
 
     def steer(self, pose: Pose2D, route: Route) -> Command:
         """Return the next command; ``STAND`` once the route is driven."""
-        limits, period = self._limits, self._period
+        limits = self._limits
         here = (pose.x, pose.y)
         route.pass_bends(here)
         while (leg := route.leg) is not None:
             along, _ = leg.placed(here)
             horizon = limits.speed**2 / limits.acceleration + limits.speed
             to_stop = route.to_stop(along, horizon)
-            rests = self.last.speed <= limits.acceleration * period
+            rests = self._braked() == 0.0
             if to_stop > ARRIVED_M or not rests:
                 break
             route.next_leg(here)
@@ -84,12 +98,11 @@ class Pursuit:
     def _turned(self, error: float) -> Command:
         """Turn on the spot, once at rest."""
         limits, period = self._limits, self._period
-        speed = max(self.last.speed - limits.acceleration * period, 0.0)
+        speed = self._braked()
         goal = 0.0
         if speed == 0.0:
-            rate = min(
-                stopping_rate(abs(error), limits.turn_acceleration, period), limits.turn_rate
-            )
+            left = max(abs(error) - abs(self.last.turn_rate) * self._late, 0.0)
+            rate = min(stopping_rate(left, limits.turn_acceleration, period), limits.turn_rate)
             side = self.last.turn_rate if abs(error) > BACK_RAD and self.last.turn_rate else error
             goal = math.copysign(rate, side)
         return Command(speed, self._toward(goal))
@@ -98,11 +111,16 @@ class Pursuit:
         limits, period = self._limits, self._period
         curvature = 2.0 * math.sin(error) / max(ahead, LOOKAHEAD_M)
         most = min(limits.speed, limits.turn_rate / max(abs(curvature), 1e-9))
-        goal = min(most, stopping_rate(max(to_stop, 0.0), limits.acceleration, period))
-        speed = limited(self.last.speed, goal, limits.acceleration * period)
+        left = max(to_stop - self.last.speed * self._late, 0.0)
+        goal = min(most, stopping_rate(left, limits.acceleration, period))
+        speed = min(max(goal, self._braked()), self.last.speed + limits.acceleration * period)
         return Command(speed, self._toward(speed * curvature))
 
+    def _braked(self) -> float:
+        """Return the lowest speed that the base can have come to [m/s]."""
+        return max(self.last.speed - self._limits.acceleration * self._seconds, 0.0)
+
     def _toward(self, turn_rate: float) -> float:
-        return limited(
-            self.last.turn_rate, turn_rate, self._limits.turn_acceleration * self._period
-        )
+        last = self.last.turn_rate
+        seconds = self._seconds if abs(turn_rate) < abs(last) else self._period
+        return limited(last, turn_rate, self._limits.turn_acceleration * seconds)

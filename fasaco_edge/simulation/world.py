@@ -172,6 +172,13 @@ class World:
         self._told = speed_m_s, turn_rad_s, self._ticks
         self._path, self._corners = None, []
 
+    @property
+    def unanswered_s(self) -> float:
+        """For how long it has been moving, or is told to, since the newest velocity [s]."""
+        if self._told is None or not (self._drive.moving or any(self._told[:2])):
+            return 0.0
+        return (self._ticks - self._told[2]) * self.config.tick_s
+
     def tick(self) -> Emission:
         """Let one time step pass; return the messages published after it."""
         self._move()

@@ -34,10 +34,10 @@ def path_message(xy, frame="map"):
 
 
 class ClosedLoop:
-    """A follower drives a world; poses and commands take a while."""
+    """A follower drives a world; poses and commands take a while, and cycles come late."""
 
     def __init__(self, truth: OccupancyGrid, start: Pose2D, *, delay_s=0.02, jitter_s=0.0,
-                 noise=0.0, turn_gain=1.0, pose_hz=10.0, seed=0):  # fmt: skip
+                 noise=0.0, turn_gain=1.0, pose_hz=10.0, late_s=0.0, seed=0):  # fmt: skip
         self.world = World(truth, start, CONFIG)
         self.follower = Follower(LIMITS)
         self.follower.take_planner("a1", 0.0)
@@ -45,7 +45,7 @@ class ClosedLoop:
         self.states: Counter[State] = Counter()
         self.truth_at: list[Pose2D] = []
         self._delay_s, self._jitter_s, self._noise = delay_s, jitter_s, noise
-        self._turn_gain = turn_gain
+        self._turn_gain, self._late_s = turn_gain, late_s
         self._rng = np.random.default_rng(seed)
         self._poses, self._commands = deque(), deque()
         self._tick, self._pose_ticks = 0, CONFIG.period_ticks(pose_hz)
@@ -81,6 +81,9 @@ class ClosedLoop:
             self.follower.take_pose(stamped, at)
         if self.now >= self._due:
             self._due += PERIOD_S
+            if self._late_s:
+                # As of the node: cycles that were missed are not made up for.
+                self._due = self.now + PERIOD_S + self._rng.uniform(0.0, self._late_s)
             self.follower.heard_status(self.now)
             command = self.follower.step(self.now)
             self.states[self.follower.state] += 1

@@ -46,6 +46,17 @@ def test_it_stays_on_the_path_and_takes_no_longer_than_the_ideal_driver(conditio
     assert seconds < 1.05 * ideal_seconds(ROOM, START, LANES)
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_cycles_that_come_late_do_not_carry_it_past_its_stops(seed):
+    """It braked by a twentieth of a second's worth each cycle, whatever time had passed."""
+    loop = ClosedLoop(ROOM, START, late_s=0.12, seed=seed)
+    loop.send(LANES)
+    seconds = driven(loop)
+    assert distances_to(LANES, trail(loop)).max() < 0.02
+    assert loop.world.collisions == 0
+    assert seconds < 1.15 * ideal_seconds(ROOM, START, LANES)
+
+
 def test_a_path_that_crosses_and_touches_itself_is_driven_in_its_order():
     """Each stretch is driven once, in the order of the path: nowhere is it left for another."""
     path = np.array(

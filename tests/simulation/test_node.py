@@ -1,5 +1,6 @@
 """The simulated robot on a real bus; a session in the test stands for the planner."""
 
+import itertools
 import json
 import os
 import signal
@@ -200,6 +201,46 @@ def test_velocities_drive_it_and_it_stops_by_itself_without_them(planner):
     assert still.activity is Activity.IDLE
     # Half a second at full speed, and the way to rest.
     assert still.distance_m - result.distance_m < 0.25 * 0.55 + 0.25**2 / 1.0 + 0.01
+
+
+def test_a_fast_robot_waits_for_what_drives_it(planner):
+    """At forty times the speed the robot drives 1 m in 0.1 s, and is given the time for a command.
+
+    Without that the robot drove on for half a second by each velocity, past its stops.
+    """
+    world = World(building(6.0, 4.0), Pose2D(1.0, 1.0), SimulationConfig())
+    velocities = planner.bus.advertise(planner.keys, topics.CMD_VEL)
+    speed = encode_velocity(Velocity(0.25, 0.0))
+    gone = []
+
+    def told_ten_times():
+        if not gone or world.stamp_ns > gone[-1]:
+            time.sleep(0.1)
+            gone.append(world.stamp_ns)
+            velocities.put(speed)
+        return len(gone) >= 10 and world.distance_m > 0.0
+
+    ends = time.monotonic() + 60
+    result = run_simulation(
+        world,
+        planner.keys,
+        planner.settings,
+        speed=40.0,
+        driver="follow",
+        should_stop=lambda: told_ten_times() or time.monotonic() > ends,
+    )
+    moved_s = [(after - before) * 1e-9 for before, after in itertools.pairwise(gone)]
+    assert max(moved_s[2:]) <= 0.13, moved_s
+    # Nobody tells it any more: it goes on without, and comes to rest.
+    still = run_simulation(
+        world,
+        planner.keys,
+        planner.settings,
+        speed=40.0,
+        driver="follow",
+        should_stop=lambda: world.stamp_ns * 1e-9 > result.sim_s + 2.0,
+    )
+    assert still.activity is Activity.IDLE
 
 
 def test_it_runs_outside_the_main_thread_and_leaves_signals_alone(planner):
