@@ -141,8 +141,9 @@ class ReviewDocument(msgspec.Struct):
         plan_ms_p50, plan_ms_p99, plan_ms_max: their times, including unused ones [ms].
         attempts, attempts_used: plans made to improve the path; those that did.
         pheromone: fields (number of recorded fields), cells_share (cells that the last field spans
-            over those where the robot would fit, reachable or not), branching (at the end: mean
-            number of directions of a cell within reach of its strongest).
+            over those that have a stand, a place from which the robot sweeps them, reachable or
+            not, by the last status), branching (at the end: mean number of directions of a cell
+            within reach of its strongest).
         memory_mb_max, recorder_memory_mb_max: most memory of daemon and recorder [MB].
         processor_percent_max, threads_max: of the daemon: processor time over half a minute [% of a
             core], threads.

@@ -172,9 +172,10 @@ def _pheromone(review: Review) -> PheromoneFigures:
         float(points[-1, 1]) if (points := plots.get(entity)) is not None else None
         for entity in (entities.TRAIL_CELLS, entities.BRANCHING)
     )
-    counts = review.counts
-    fitting = counts.coverable + (counts.unreachable or 0) if counts is not None else 0
-    share = spanned / fitting if spanned is not None and fitting else None
+    # Along the track, cells count in whose centre the robot fits; more have a stand.
+    counted = [each.status.coverage for each in review.data.statuses if each.status.coverage]
+    stands = counted[-1].coverable + counted[-1].unreachable if counted else 0
+    share = spanned / stands if spanned is not None and stands else None
     return PheromoneFigures(review.record.field_count, _rounded(share), _rounded(branching))
 
 

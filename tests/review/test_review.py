@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import struct
+from dataclasses import replace
 from itertools import groupby, pairwise
 
 import numpy as np
@@ -17,7 +18,7 @@ from fasaco_edge.review.instant import scene_at
 from fasaco_edge.review.output.page import page_of
 from fasaco_edge.review.output.panels import TimeAxis, branching_panel, covered_share, saved_panel
 from fasaco_edge.review.output.pictures import FIELDS, draw_fields
-from fasaco_edge.review.review import read_review
+from fasaco_edge.review.review import CoverageCounts, read_review
 from tests.benchmarks.judge import check_walk
 from tests.review.naive import nearest_rank, passed_cells, quarter_turns
 from tests.support.processes import fasaco_edge
@@ -201,6 +202,13 @@ def test_the_living_trail_spans_the_building(told):
     assert pheromone["fields"] > 10
     assert 0.95 <= pheromone["cells_share"] <= 1.0
     assert 1.0 <= pheromone["branching"] <= 4.0
+
+
+def test_the_living_trail_s_share_is_of_cells_that_have_a_stand(review, told):
+    """By the track fewer cells are counted, those in whose centre the robot fits."""
+    assert review.counts is not None
+    fewer = CoverageCounts(covered=10, coverable=10, recovered=0, unreachable=0, source="trail")
+    assert document(replace(review, counts=fewer))["pheromone"] == told["pheromone"]
 
 
 def test_the_trail_is_shown_at_some_moments_and_how_decided_it_was(review):
