@@ -162,6 +162,7 @@ def _misfits(config: DaemonConfig) -> Iterator[BadConfiguration]:
                 f"{footprint.radius():.3g} m, got {radius_m:g}"
             )
     yield from _refused("planner.", config.planner.colony)
+    yield from _refused("", config.planner.check_own)
     yield from _refused("", config.mission.check_zones)
 
 

@@ -120,7 +120,7 @@ class Loop:
             self._reload_config(batch)
         now = time.monotonic()
         events, faults = self._bus.inbox.decode(batch)
-        self._count_faults(faults)
+        self._count_faults([*faults, *batch.planner_faults])
         self._note(batch)
         commands = self._bus.commands.take(batch.questions, now)
         decision = self._step(events, commands, batch, now)

@@ -17,6 +17,7 @@ from fasaco_edge.bus.mailbox import Mailbox
 from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.daemon.claim import ClaimState
 from fasaco_edge.daemon.ledger.writer import LedgerKeeper
+from fasaco_edge.daemon.loop.inbox import PlannerFault
 from fasaco_edge.daemon.memory import floor_pixels
 from fasaco_edge.errors import CommandError, FasacoError, PatchWithoutBase
 from fasaco_edge.grid.occupancy import MapPatch, without_base
@@ -288,6 +289,7 @@ class Loader:
     def _load(self) -> tuple[Mission, PlanningWorker]:
         from fasaco_edge.daemon.loop.worker import PlanningWorker  # noqa: PLC0415
         from fasaco_edge.mission.core.mission import Mission  # noqa: PLC0415
+        from fasaco_edge.planners.own.process import OwnProcess  # noqa: PLC0415
         from fasaco_edge.planners.registry import planner_of  # noqa: PLC0415
         from fasaco_edge.planners.warmup import warm_up  # noqa: PLC0415
 
@@ -295,11 +297,16 @@ class Loader:
         release_unused()
         planner = self._config.planner
         chosen = planner_of(planner.name, planner.colony(), planner.threads, planner.local_search)
+        if planner.own:
+            chosen = OwnProcess(planner.own, planner.seed, chosen, self._tell)
         worker = PlanningWorker(chosen, planner.budget_s, self._mailbox.post)
         first = (
             OrderState.autostart() if self._config.mission.autostart else OrderState.idle(NO_ORDER)
         )
         return Mission(mission_config(self._config, chosen), first), worker
+
+    def _tell(self, error: FasacoError) -> None:
+        self._mailbox.post("planner_fault", PlannerFault(error))
 
     def _report(self, stage: str) -> None:
         self.stage = f"kernels: {stage}"

@@ -17,7 +17,7 @@ from types import ModuleType
 from typing import Any
 
 from fasaco_edge.errors import BadConfiguration, PlannerFailed
-from fasaco_edge.host.files import check_plain, why_not_trusted
+from fasaco_edge.host.files import UntrustedFileError, check_plain, read_trusted, why_not_trusted
 from fasaco_edge.text import shown
 
 # Exceptions of the user's code: ``sys.exit()`` there must not look as if a plan had been made.
@@ -142,18 +142,25 @@ def _imported(name: str, said: str, place: str, *, is_trusted: bool) -> ModuleTy
             if spec is None:
                 raise _not_found(said, ".".join(parts[:count]))
             file = spec.origin or ""
-            why = why_not_trusted(Path(file).absolute()) if is_trusted and spec.has_location else ""
-            if why:
-                raise BadConfiguration(
-                    f"{said}: {why}", hint="install it where only root may write"
-                )
+            if is_trusted and spec.has_location:
+                _check_trusted(Path(file).absolute())
         return importlib.import_module(name)
     except BadConfiguration:
         raise
+    except UntrustedFileError as error:
+        raise BadConfiguration(
+            f"{said}: {error}", hint="install it where only root may write"
+        ) from error
     except RAISED as error:
         if isinstance(error, ModuleNotFoundError) and error.name in (name, parts[0]):
             raise _not_found(said, str(error.name)) from error
         raise failure(error, place, file) from error
+
+
+def _check_trusted(file: Path) -> None:
+    if why := why_not_trusted(file.parent):
+        raise UntrustedFileError(why)
+    read_trusted(file)
 
 
 def _not_found(said: str, name: str) -> BadConfiguration:

@@ -1,57 +1,18 @@
-"""Planner of the user's own: the input of its function, and checks of the returned walk."""
+"""Planner of the user's own, in this process."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.errors import IllegalWalk
-from fasaco_edge.grid.lattice import Cell
-from fasaco_edge.planners.own.loading import RAISED, UserCode, failure
+from fasaco_edge.planners.own.loading import UserCode
+from fasaco_edge.planners.own.problem import posed, walked
 from fasaco_edge.planners.path import CoveragePath
 from fasaco_edge.planners.planner import Observer, StoppingCriterion
 from fasaco_edge.planners.problem import CoverageProblem
-from fasaco_edge.text import shown
-
-# Offsets (row, col) to the neighbours: east, north, west, south.
-MOVES = ((0, 1), (1, 0), (0, -1), (-1, 0))
-# Limit on steps per cell: sound planners take a few; an endless walk would fill the memory.
-MOST_STEPS_PER_CELL = 200
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class GridProblem:
-    """Input of a planner; cells (row, col) are array indices, row 0 has the smallest y.
-
-    Attributes:
-        steps: bool (rows, cols, 4), read-only: whether the robot can go from a cell to its
-            neighbour in the east (col + 1), north (row + 1), west, south.
-        to_cover: bool (rows, cols), read-only: the cells to visit, all reachable.
-        start: the start cell.
-        end: the end cell; None for anywhere.
-        cell_m: edge of a cell [m].
-        step_s, quarter_turn_s: durations of a step and of a turn by 90 degrees [s].
-        seed: seed for a randomised planner.
-    """
-
-    steps: NDArray[np.bool_]
-    to_cover: NDArray[np.bool_]
-    start: Cell
-    end: Cell | None
-    cell_m: float
-    step_s: float
-    quarter_turn_s: float
-    seed: int
-
-    def neighbours(self, cell: Cell) -> list[Cell]:
-        """Return the neighbours that one step leads to, counter-clockwise from east."""
-        row, col = cell
-        ways = zip(MOVES, self.steps[row, col], strict=True)
-        return [(row + up, col + right) for (up, right), is_open in ways if is_open]
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,106 +36,23 @@ class OwnPlanner:
             PlannerFailed: the code raised.
             IllegalWalk: the result is not a walk, or does not solve the problem.
         """
-        name = self.code.name
-        posed, began = _posed(problem, self.seed), time.perf_counter()
-        try:
-            # The user's code runs up to here, also inside the returned iterable.
-            walk = _in_bounds(self.code.walk(posed), MOST_STEPS_PER_CELL * posed.to_cover.size)
-        except RAISED as error:
-            raise failure(error, name, self.code.file) from error
-        taken_s = time.perf_counter() - began
-        cells = _checked(posed, walk, name)
-        window = problem.lattice.window
-        cells += np.array((window.row0, window.col0), np.int32)
-        cost_s = problem.cost.of_walk(cells)
-        return CoveragePath(cells, name, self.seed, cost_s=cost_s, first_walk_s=taken_s)
+        given, began = posed(problem, self.seed), time.perf_counter()
+        cells = walked(self.code, given)
+        return path_of(problem, cells, self.code.name, self.seed, time.perf_counter() - began)
 
 
-def _posed(problem: CoverageProblem, seed: int) -> GridProblem:
-    lattice, cost = problem.lattice, problem.cost
-    bits = lattice.steps[..., np.newaxis] >> np.arange(len(MOVES), dtype=np.uint8)
-    steps = (bits & 1).astype(np.bool_)
-    steps.setflags(write=False)
-    return GridProblem(
-        steps,
-        problem.to_cover,
-        lattice.local(problem.start),
-        None if problem.end is None else lattice.local(problem.end),
-        lattice.cell_m,
-        cost.step_s,
-        cost.quarter_turn_s,
-        seed,
-    )
+def path_of(
+    problem: CoverageProblem, cells: NDArray[np.int32], name: str, seed: int, taken_s: float
+) -> CoveragePath:
+    """Return a walk as a path of a problem.
 
-
-def _in_bounds(walk: Iterable[Cell], most: int) -> list[Cell | str]:
-    """Return the cells that the code returned or yielded, at most one more than ``most``.
-
-    As plain integers; the first item that is no cell is returned as text, and ends the list.
+    Args:
+        problem: which the walk solves.
+        cells: int32 (n, 2): the walk, in array indices.
+        name, seed: of the planner.
+        taken_s: how long it took [s].
     """
-    found: list[Cell | str] = []
-    for _, given in zip(range(most + 1), walk, strict=False):
-        cell = _cell(given)
-        found.append(shown(given) if cell is None else cell)
-        if cell is None:
-            break
-    return found
-
-
-def _checked(problem: GridProblem, walk: list[Cell | str], name: str) -> NDArray[np.int32]:
-    """Return a walk, int32 (n, 2).
-
-    Raises:
-        IllegalWalk: it is not a walk, or does not solve the problem; the message names the step.
-    """
-
-    def no(why: str) -> IllegalWalk:
-        return IllegalWalk(f"planner {name}: {why}")
-
-    if len(walk) > MOST_STEPS_PER_CELL * problem.to_cover.size:
-        raise no(f"its walk does not end: more than {len(walk) - 1} cells")
-    before: Cell | None = None
-    seen = np.zeros(problem.to_cover.shape, np.bool_)
-    for number, cell in enumerate(walk):
-        if isinstance(cell, str):
-            raise no(f"cell {number} of its walk must be (row, col), got {cell}")
-        if before is None and cell != problem.start:
-            raise no(f"its walk must begin in the start cell {problem.start}, begins in {cell}")
-        if before is not None and cell not in problem.neighbours(before):
-            raise no(
-                f"step {number} of its walk, {before} to {cell}, {_why_not(problem, before, cell)}"
-            )
-        seen[cell] = True
-        before = cell
-    if before is None:
-        raise no("its walk is empty; it has the start cell at least")
-    if problem.end not in (None, before):
-        raise no(f"its walk must end in cell {problem.end}, ends in {before}")
-    left = problem.to_cover & ~seen
-    if left.any():
-        first = tuple(np.argwhere(left)[0].tolist())
-        total = np.count_nonzero(problem.to_cover)
-        raise no(f"its walk leaves {np.count_nonzero(left)} of {total} cells, the first is {first}")
-    return np.array(walk, np.int32)
-
-
-def _cell(given: object) -> Cell | None:
-    """Return an item as a cell of plain integers; None if it is not a cell."""
-    if not isinstance(given, Sequence | np.ndarray):
-        return None
-    try:
-        row, col = (int(at) for at in given)
-        return (row, col) if row == given[0] and col == given[1] else None
-    except (TypeError, ValueError, OverflowError):
-        return None
-
-
-def _why_not(problem: GridProblem, here: Cell, there: Cell) -> str:
-    rows, cols = problem.to_cover.shape
-    if not (0 <= there[0] < rows and 0 <= there[1] < cols):
-        return f"leaves the grid of {rows} x {cols} cells"
-    if abs(there[0] - here[0]) + abs(there[1] - here[1]) != 1:
-        return "is not to a neighbour in the same row or column"
-    if not problem.steps[there].any():
-        return "is to a cell that is not free"
-    return "is not possible: the robot does not fit between the two"
+    window = problem.lattice.window
+    cells = cells + np.array((window.row0, window.col0), np.int32)
+    cost_s = problem.cost.of_walk(cells)
+    return CoveragePath(cells, name, seed, cost_s=cost_s, first_walk_s=taken_s)
