@@ -30,6 +30,12 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         "options; - reads JSON from standard input",
     )
     parser.add_argument(
+        "--fleet",
+        metavar="NAME",
+        help="record all robots of this fleet (`fleet: {name: NAME}`) into one file, also those "
+        "that come later; its layout shows all of them",
+    )
+    parser.add_argument(
         "--pose-schema",
         choices=POSE_SCHEMAS,
         default=POSE_STAMPED,
@@ -119,6 +125,11 @@ def run(args: argparse.Namespace) -> int:
         config, bus = config_of_options(args)
     else:
         config, bus = read_config(args.config)
+    if args.fleet is not None:
+        from fasaco_edge.recording.fleet.recorder import file_name, run_fleet_recorder
+
+        budget = budget_of(config, file_name(args.fleet))
+        return run_fleet_recorder(config, bus, args.fleet, args.out, budget, args.serve)
     return run_recorder(config, bus, args.out, budget_of(config), args.serve)
 
 
@@ -158,7 +169,8 @@ def read_config(file: Path) -> tuple[DaemonConfig, BusSettings]:
 
 COMMAND = Command(
     description="Record map, coverage, pheromone, path, pose, states and latencies of one "
-    "robot, and byte for byte what its mission receives, until SIGTERM or SIGINT. Open the "
+    "robot, and byte for byte what its mission receives, or all robots of a fleet on one map, "
+    "until SIGTERM or SIGINT. Open the "
     "result with `rerun FILE.rrd`, play it again with `fasaco-edge replay FILE.rrd`.",
     run=run,
     add_options=_add_options,

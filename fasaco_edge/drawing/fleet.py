@@ -15,14 +15,6 @@ from fasaco_edge.drawing.sheet import KeyEntry, Sheet
 from fasaco_edge.grid.lattice import CoverageLattice
 from fasaco_edge.grid.occupancy import OccupancyGrid
 
-ROBOTS = (
-    palette.BLUE,
-    palette.ORANGE,
-    palette.GREEN,
-    palette.PURPLE,
-    palette.SKY,
-    palette.VERMILION,
-)
 # How much of its colour a robot's cells have; those that two robots pass have none.
 TINT = 0.35
 
@@ -91,9 +83,11 @@ def draw_fleet_mission(
     key = [KeyEntry("disc", palette.START, "start"), KeyEntry("square", palette.END, "end")]
     times = np.zeros(unswept.mask.shape, np.int8)
     for number, (name, layer) in enumerate(zip(trails, swept, strict=True)):
-        plot.paint(layer, _tint(number))
+        plot.paint(layer, robot_tint(number))
         times += layer.mask
-        key.append(KeyEntry("tile", _tint(number), f"swept by {name} ({layer.area_m2:,.1f} m2)"))
+        key.append(
+            KeyEntry("tile", robot_tint(number), f"swept by {name} ({layer.area_m2:,.1f} m2)")
+        )
     twice = MapLayer(unswept.geometry, times > 1)
     plot.paint(twice, palette.RULE)
     key.append(KeyEntry("tile", palette.RULE, f"by two or more ({twice.area_m2:,.1f} m2)"))
@@ -114,21 +108,22 @@ def _tints(lattice: CoverageLattice, walks: Sequence[NDArray[np.int32]]) -> NDAr
     passed = np.zeros(lattice.states.shape, np.int32)
     for number, walk in enumerate(walks):
         rows, cols = np.unique(walk - (window.row0, window.col0), axis=0).T
-        colours[rows, cols] = _tint(number)
+        colours[rows, cols] = robot_tint(number)
         passed[rows, cols] += 1
     colours[passed > 1] = palette.RULE
     return colours
 
 
-def _tint(number: int) -> palette.Colour:
-    colour = np.array(ROBOTS[number % len(ROBOTS)])
+def robot_tint(number: int) -> palette.Colour:
+    """Return the tint of the floor that the robot with a number sweeps."""
+    colour = np.array(palette.ROBOTS[number % len(palette.ROBOTS)][1])
     red, green, blue = np.rint(255 - TINT * (255 - colour)).astype(int).tolist()
     return red, green, blue
 
 
 def _key(walks: Sequence[NDArray[np.int32]]) -> list[KeyEntry]:
     key = [
-        KeyEntry("tile", _tint(number), f"robot {number + 1} ({len(walk) - 1:,} steps)")
+        KeyEntry("tile", robot_tint(number), f"robot {number + 1} ({len(walk) - 1:,} steps)")
         for number, walk in enumerate(walks)
     ]
     return [*key, KeyEntry("tile", palette.RULE, "passed by two or more")]

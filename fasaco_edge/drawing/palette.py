@@ -35,6 +35,20 @@ PURPLE: Colour = (204, 121, 167)
 SKY: Colour = (86, 180, 233)
 ORANGE: Colour = (230, 159, 0)
 
+BROWN: Colour = (140, 86, 75)
+VIOLET: Colour = (117, 80, 200)
+# The robots of a fleet by number, and what these colours are called.
+ROBOTS: tuple[tuple[str, Colour], ...] = (
+    ("blue", BLUE),
+    ("orange", ORANGE),
+    ("green", GREEN),
+    ("pink", PURPLE),
+    ("sky", SKY),
+    ("red", VERMILION),
+    ("brown", BROWN),
+    ("violet", VIOLET),
+)
+
 # Matplotlib's plasma (CC0) at nine even places of its first four fifths: perceptually
 # uniform, and without the yellow end that is lost on white.
 _GRADIENT = np.array(

@@ -89,6 +89,13 @@ def test_robots_of_a_fleet_cover_a_building_together(tmp_path, building):
         starts.append(trail[0])
         assert any(file.startswith(f"{out}/{name}/") for file in summary["recording"])
     assert math.dist(*starts) > 2.0
+    (file,) = summary["fleet_recording"]
+    reviewed = json.loads(fasaco_edge("review", file, "--json").out)
+    assert [robot["name"] for robot in reviewed["robots"]] == ["r1", "r2"]
+    assert [robot["state"] for robot in reviewed["robots"]] == ["done", "done"]
+    # Cells, of which some reach into walls, against floor.
+    assert reviewed["swept_m2"] == pytest.approx(summary["swept_m2"], rel=0.15)
+    assert 0 < reviewed["makespan_s"] < summary["wall_s"]
     with Image.open(summary["picture"]) as picture:
         assert min(picture.size) > 200
     assert not [pid for pid in processes_of(out) if is_running(pid)]

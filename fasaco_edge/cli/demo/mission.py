@@ -22,7 +22,7 @@ from fasaco_edge.bus.mailbox import LatestSlot
 from fasaco_edge.bus.session import Bus, open_bus
 from fasaco_edge.bus.settings import BusSettings
 from fasaco_edge.cli.console.terminal import err
-from fasaco_edge.cli.demo.robots import DemoRobot
+from fasaco_edge.cli.demo.robots import DemoRobot, fleet_recorder
 from fasaco_edge.errors import ProcessEnded
 from fasaco_edge.host.processes import python_program
 from fasaco_edge.watch import phrases
@@ -35,6 +35,8 @@ PLAIN_LINE_EVERY_S = 5.0
 STOP_TIMEOUT_S = 8.0
 # "Done" has to hold for some maps [simulated s]: the last one may still be on its way.
 SETTLE_SIM_S = 3.0
+# Programs that hear the robots, by the names of their logs.
+LAST = ("daemon", "fleet")
 
 
 class DemoView:
@@ -150,6 +152,9 @@ class DemoMission:
             bus.listen(Keys(robot.name), topics.STATUS, newest.put)
             for name, words in robot.programs(self._args, self._endpoint):
                 self._spawn(robot.folder / f"{name}.log", words)
+        if len(self._robots) > 1:
+            out = self._robots[0].folder.parent
+            self._spawn(out / "fleet.log", fleet_recorder(out, self._endpoint))
 
     def _spawn(self, log: Path, words: list[str]) -> None:
         program = python_program("fasaco_edge", *words)
@@ -169,8 +174,8 @@ class DemoMission:
 
     def _stop(self) -> None:
         """End the robots first, so that the recordings hold their last messages."""
-        for is_daemon in (False, True):
-            ending = [one for log, one in self._processes if (log.stem == "daemon") == is_daemon]
+        for is_last in (False, True):
+            ending = [one for log, one in self._processes if (log.stem in LAST) == is_last]
             for process in ending:
                 process.send_signal(signal.SIGTERM)
             for process in ending:

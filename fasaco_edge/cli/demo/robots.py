@@ -91,6 +91,11 @@ class DemoRobot:
         return programs
 
 
+def fleet_recorder(out: Path, endpoint: str) -> list[str]:
+    """Return the words after `fasaco-edge` of the program that records all robots in one file."""
+    return ["record", "--fleet", FLEET, "--out", str(out), "--connect", endpoint]
+
+
 def demo_robots(args: argparse.Namespace, out: Path) -> list[DemoRobot]:
     """Return the robots: one, as anybody's first; or several, far from one another, by number.
 

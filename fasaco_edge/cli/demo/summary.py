@@ -88,6 +88,7 @@ class Summary:
     errors: int
     wall_s: float
     recording: list[str]
+    fleet_recording: list[str]
     picture: str
 
 
@@ -132,6 +133,7 @@ def summarise(
         errors=sum(status.errors.total for status in ending.statuses),
         wall_s=round(ending.wall_s, 1),
         recording=[str(file) for robot in robots for file in sorted(robot.folder.glob("*.rrd"))],
+        fleet_recording=[str(file) for file in sorted(out.glob("*-fleet-*.rrd"))],
         picture=str(out / "mission.png"),
     )
     _draw(args, truth, summary)
@@ -150,10 +152,9 @@ def print_summary(summary: Summary, *, as_json: bool) -> None:
     ending = "every reachable cell is covered" if summary.complete else "NOT ALL WAS COVERED"
     console.print(f"{summary.map}: {ending}", style="bold")
     console.print(terminal.figures(_rows(summary)))
-    for file in (*summary.recording, summary.picture):
+    for file in (*summary.recording, *summary.fleet_recording, summary.picture):
         console.print(file, soft_wrap=True)
-    if summary.recording:
-        files = " ".join(summary.recording)
+    if files := " ".join(summary.fleet_recording or summary.recording):
         console.print(f"review it:   fasaco-edge review {files}", soft_wrap=True)
         console.print(f"look at it:  rerun {files}", soft_wrap=True)
 

@@ -27,8 +27,9 @@ if TYPE_CHECKING:
 DESCRIPTION = """\
 Report what happened in a recorded mission, on one screen; with --long all figures, orders,
 commands, replans, floor left and why, worst moments and faults. With --at and --point it answers a
-question: what was at a time, why a spot was not swept. Parts of one run are read together. Files
-are only read; of files that a crash cut short, the whole part is used.
+question: what was at a time, why a spot was not swept. Of a fleet's recording it reports makespan,
+balance, floor swept twice, waiting and messages. Parts of one run are read together. Files are only
+read; of files that a crash cut short, the whole part is used.
 """
 
 
@@ -113,6 +114,12 @@ def run(args: argparse.Namespace) -> int:
     for file in recordings:
         with open_part(file):  # what is none is told before all else is loaded
             pass
+    from fasaco_edge.recording.fleet.notes import is_fleet_recording
+
+    if is_fleet_recording(args.recordings[0]):
+        from fasaco_edge.cli.review.fleet import print_fleet
+
+        return print_fleet(args)
     import msgspec
 
     from fasaco_edge.cli.review.screen import print_comparison, print_review

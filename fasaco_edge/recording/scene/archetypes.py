@@ -81,7 +81,7 @@ def map_archetype(grid: OccupancyGrid) -> rr.GridMap:
     """Return an occupancy grid in rviz's colours: free white, occupied black, unknown grey."""
     # -1 becomes 255, unknown in the colour map.
     pixels = grid.cells.view(np.uint8)
-    return _grid(grid.geometry, pixels, rr.components.Colormap.RvizMap, MAP_ORDER)
+    return grid_archetype(grid.geometry, pixels, rr.components.Colormap.RvizMap, MAP_ORDER)
 
 
 def coverage_archetype(grid: OccupancyGrid) -> rr.GridMap:
@@ -90,7 +90,7 @@ def coverage_archetype(grid: OccupancyGrid) -> rr.GridMap:
     tints[CoverageValue.COVERED] = (*COVERED_COLOUR, 120)
     tints[CoverageValue.RECOVERED] = (*RECOVERED_COLOUR, 140)
     tints[CoverageValue.BLOCKED] = (*BLOCKED_COLOUR, 40)
-    return _grid(grid.geometry, tints[grid.cells.view(np.uint8)], None, COVERAGE_ORDER)
+    return grid_archetype(grid.geometry, tints[grid.cells.view(np.uint8)], None, COVERAGE_ORDER)
 
 
 def floor_archetype(grid: OccupancyGrid) -> rr.GridMap:
@@ -98,12 +98,14 @@ def floor_archetype(grid: OccupancyGrid) -> rr.GridMap:
     tints = np.zeros((256, 4), np.uint8)
     tints[:101, :3] = SWEPT_COLOUR
     tints[:101, 3] = np.linspace(0, 150, 101)
-    return _grid(grid.geometry, tints[grid.cells.view(np.uint8)], None, FLOOR_ORDER)
+    return grid_archetype(grid.geometry, tints[grid.cells.view(np.uint8)], None, FLOOR_ORDER)
 
 
 def pheromone_archetype(message: PheromoneMessage) -> rr.GridMap:
     """Return a pheromone field unchanged: one byte per cell, log scale, 0 black."""
-    return _grid(message.geometry, message.levels, rr.components.Colormap.Inferno, MAP_ORDER)
+    return grid_archetype(
+        message.geometry, message.levels, rr.components.Colormap.Inferno, MAP_ORDER
+    )
 
 
 def cohort_archetype(message: PheromoneMessage) -> rr.Points3D:
@@ -197,10 +199,12 @@ def pose_archetype(pose: Pose2D) -> rr.Transform3D:
     )
 
 
-def body_archetypes(radius_m: float) -> tuple[rr.Ellipsoids3D, rr.LineStrips3D]:
+def body_archetypes(
+    radius_m: float, colour: Colour = ROBOT_COLOUR
+) -> tuple[rr.Ellipsoids3D, rr.LineStrips3D]:
     """Return a robot of ``radius_m`` [m] around its own origin: the body, and its heading."""
     body = rr.Ellipsoids3D(
-        half_sizes=[[radius_m, radius_m, 0.01]], colors=[ROBOT_COLOUR], fill_mode="solid"
+        half_sizes=[[radius_m, radius_m, 0.01]], colors=[colour], fill_mode="solid"
     )
     heading = rr.LineStrips3D(
         [[[0.0, 0.0, 0.03], [1.6 * radius_m, 0.0, 0.03]]], colors=[HEADING_COLOUR], radii=-2.5
@@ -233,12 +237,13 @@ def coverage_fractions(grid: OccupancyGrid) -> tuple[float, float]:
     return (covered / coverable, recovered / coverable) if coverable else (0.0, 0.0)
 
 
-def _grid(
+def grid_archetype(
     geometry: GridGeometry,
     pixels: NDArray[np.uint8],
     colormap: rr.components.Colormap | None,
     order: float,
 ) -> rr.GridMap:
+    """Return pixels, uint8 (rows, cols) or (rows, cols, 4) in RGBA, as a layer of the map."""
     origin = geometry.origin
     # All components with every message: size and origin change while the map grows, and
     # a component once logged as static would hide later ones.

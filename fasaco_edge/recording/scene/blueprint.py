@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 from fasaco_edge.grid.geometry import Bounds
 from fasaco_edge.recording import entities
@@ -29,7 +30,9 @@ def build_blueprint(bounds: Bounds | None) -> rrb.Blueprint:
     bounds = bounds or NO_MAP
     return rrb.Blueprint(
         rrb.Horizontal(
-            rrb.Vertical(_map_view(bounds), rrb.Horizontal(_states(), _log()), row_shares=[5, 2]),
+            rrb.Vertical(
+                _map_view(bounds), rrb.Horizontal(_states(), log_view()), row_shares=[5, 2]
+            ),
             rrb.Vertical(
                 _pheromone_view(bounds), _branching(), _saved(), _plan(), row_shares=[10, 3, 3, 3]
             ),
@@ -50,10 +53,13 @@ def _map_view(bounds: Bounds) -> rrb.Spatial3DView:
         origin=f"/{entities.WORLD}",
         name="Map, coverage and path",
         contents=["/world/**", f"- /{entities.PHEROMONE}/**", f"- /{entities.DIRECTIONS}/**"],
-        eye_controls=_eye_above(bounds, MARGIN, VIEW_ASPECT),
+        eye_controls=eye_above(bounds, MARGIN, VIEW_ASPECT),
         line_grid=False,
         background=MAP_BACKGROUND,
-        overrides={entities.DRIVEN_PATH: _last(TRAIL_S), entities.MAP_CHANGE: _last(CHANGE_S)},
+        overrides={
+            entities.DRIVEN_PATH: last_seconds(TRAIL_S),
+            entities.MAP_CHANGE: last_seconds(CHANGE_S),
+        },
     )
 
 
@@ -66,13 +72,20 @@ def _pheromone_view(bounds: Bounds) -> rrb.Spatial3DView:
             f"/{entities.DIRECTIONS}/**",
             f"/{entities.ROBOT}/**",
         ],
-        eye_controls=_eye_above(bounds, PHEROMONE_MARGIN, PHEROMONE_ASPECT),
+        eye_controls=eye_above(bounds, PHEROMONE_MARGIN, PHEROMONE_ASPECT),
         line_grid=False,
         background=PHEROMONE_BACKGROUND,
     )
 
 
-def _plot(name: str, origin: str, legend: rrb.PlotLegend, top: float = 0.0) -> rrb.TimeSeriesView:
+def plot_view(
+    name: str,
+    origin: str,
+    legend: rrb.PlotLegend,
+    top: float = 0.0,
+    contents: Sequence[str] = ("$origin/**",),
+) -> rrb.TimeSeriesView:
+    """Return a view of curves over the whole time, from 0 to ``top`` if that is given."""
     axis = rrb.ScalarAxis(range=(0.0, top)) if top else None
     # The whole mission, whatever its length: the default is a minute.
     whole = rrb.TimeAxis(
@@ -81,39 +94,45 @@ def _plot(name: str, origin: str, legend: rrb.PlotLegend, top: float = 0.0) -> r
         )
     )
     return rrb.TimeSeriesView(
-        origin=f"/{origin}", name=name, axis_x=whole, axis_y=axis, plot_legend=legend
+        origin=f"/{origin}",
+        contents=list(contents),
+        name=name,
+        axis_x=whole,
+        axis_y=axis,
+        plot_legend=legend,
     )
 
 
 def _figures() -> rrb.Vertical:
     left, right = (rrb.PlotLegend(c) for c in (rrb.Corner2D.LeftTop, rrb.Corner2D.RightTop))
     return rrb.Vertical(
-        _plot("Coverage [share of the cells known]", "metrics/coverage", left, 1.1),
-        _plot("Latency [ms]", entities.LATENCY, right),
-        _plot("Memory [MB], processor [% of a core], battery [%]", "metrics/resources", right),
+        plot_view("Coverage [share of the cells known]", "metrics/coverage", left, 1.1),
+        plot_view("Latency [ms]", entities.LATENCY, right),
+        plot_view("Memory [MB], processor [% of a core], battery [%]", "metrics/resources", right),
     )
 
 
 def _plan() -> rrb.TimeSeriesView:
     none = rrb.PlotLegend(visible=False)
-    return _plot("Plan: time above the bound [share]", entities.GAP, none)
+    return plot_view("Plan: time above the bound [share]", entities.GAP, none)
 
 
 def _saved() -> rrb.TimeSeriesView:
     legend = rrb.PlotLegend(rrb.Corner2D.LeftTop)
-    return _plot("Saved by search, all plans [s]", entities.SAVED, legend)
+    return plot_view("Saved by search, all plans [s]", entities.SAVED, legend)
 
 
 def _branching() -> rrb.TimeSeriesView:
     none = rrb.PlotLegend(visible=False)
-    return _plot("Trail: directions in reach of the best", entities.BRANCHING, none)
+    return plot_view("Trail: directions in reach of the best", entities.BRANCHING, none)
 
 
 def _states() -> rrb.StateTimelineView:
     return rrb.StateTimelineView(origin="/state", name="States")
 
 
-def _log() -> rrb.TextLogView:
+def log_view() -> rrb.TextLogView:
+    """Return a view of all logs."""
     # A column of times would be a digit wide; the cursor shows the time.
     columns = rrb.TextLogColumns(
         timeline_columns=[rrb.encodings.TimelineColumn(entities.WALL_CLOCK, visible=False)],
@@ -126,7 +145,8 @@ def _card() -> rrb.TextDocumentView:
     return rrb.TextDocumentView(origin=f"/{entities.RUN_CARD}", name="Run")
 
 
-def _eye_above(bounds: Bounds, margin: float, aspect: float) -> rrb.EyeControls3D:
+def eye_above(bounds: Bounds, margin: float, aspect: float) -> rrb.EyeControls3D:
+    """Return an eye that looks down on ``bounds`` from above, in a view of ``aspect``."""
     x0, y0, x1, y1 = bounds
     x, y = (x0 + x1) / 2, (y0 + y1) / 2
     reach = max((y1 - y0) / 2, (x1 - x0) / 2 / aspect, 0.5)
@@ -140,7 +160,8 @@ def _eye_above(bounds: Bounds, margin: float, aspect: float) -> rrb.EyeControls3
     )
 
 
-def _last(seconds: float) -> rrb.VisibleTimeRanges:
+def last_seconds(seconds: float) -> rrb.VisibleTimeRanges:
+    """Return the time up to the cursor from so many seconds before."""
     return rrb.VisibleTimeRanges(
         timeline=entities.WALL_CLOCK,
         start=rrb.TimeRangeBoundary.cursor_relative(seconds=-seconds),

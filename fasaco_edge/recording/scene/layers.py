@@ -11,7 +11,7 @@ otherwise the newest waits for tokens, and those before it are skipped.
 from __future__ import annotations
 
 import zlib
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import TypeVar
 
@@ -110,6 +110,13 @@ def changed_bounds(before: OccupancyGrid, after: OccupancyGrid) -> Bounds | None
     return after.geometry.bounds(found)
 
 
+def is_far_from(framed: Bounds, bounds: Bounds, share: float) -> bool:
+    """Tell whether bounds have moved away from ``framed`` by more than a share of its size."""
+    size = max(framed[2] - framed[0], framed[3] - framed[1])
+    moved = max(abs(a - b) for a, b in zip(framed, bounds, strict=True))
+    return moved > share * size
+
+
 BURST_S = 60.0
 # In the file [bytes/s].
 RATES = {
@@ -138,14 +145,22 @@ class _Layer:
 class Layers:
     """Decides when each layer is drawn; on the writer's thread, by its clock."""
 
-    def __init__(self) -> None:
-        self._layers = {name: _Layer(BURST_S * rate) for name, rate in RATES.items()}
+    def __init__(self, rates: Mapping[str, float] = RATES) -> None:
+        self._rates = dict(rates)
+        self._layers = {name: _Layer(BURST_S * rate) for name, rate in rates.items()}
+
+    def limit(self, rates: Mapping[str, float]) -> None:
+        """Set the rates of layers; those that are new are added."""
+        self._rates |= rates
+        for name, rate in rates.items():
+            layer = self._layers.setdefault(name, _Layer(BURST_S * rate))
+            layer.allowance = min(layer.allowance, BURST_S * rate)
 
     def draw(self, name: str, size: int, draw: Callable[[], None], now_ns: int) -> None:
         """Call ``draw`` now or later, in place of a waiting drawing.
 
         Args:
-            name: one of ``RATES``.
+            name: of the layer, one of those with a rate.
             size: approximate size in the file [bytes].
             draw: draws, at any later time.
             now_ns: monotonic time [ns].
@@ -166,7 +181,7 @@ class Layers:
                 draw()
 
     def _catch_up(self, name: str, now_ns: int) -> None:
-        layer, rate = self._layers[name], RATES[name]
+        layer, rate = self._layers[name], self._rates[name]
         if layer.waiting is None:
             return
         gained = rate * (now_ns - layer.at_ns) / 1e9

@@ -106,14 +106,20 @@ class RunDescription:
             x, y = self.anchor
             rows.append(("drawn from", f"x {x:.0f} m, y {y:.0f} m of the map's frame"))
         rows += sorted(flat_settings(self.config), key=_rank)
-        table = "\n".join(f"| {_cell(name)} | {_cell(value)} |" for name, value in rows)
+        table = "\n".join(
+            f"| {markdown_cell(name)} | {markdown_cell(value)} |" for name, value in rows
+        )
         return f"{self._head()}\n\n{LEGEND}\n\n| setting | value |\n|---|---|\n{table}\n"
 
     def _head(self) -> str:
         """Return the most important settings in a line."""
         settings = {name.rpartition(".")[2]: value for name, value in flat_settings(self.config)}
-        facts = [f"{text} {_cell(settings[name])}{m}" for name, text, m in HEAD if name in settings]
-        robot, version = _cell(self.robot), _cell(self.version or "unknown")
+        facts = [
+            f"{text} {markdown_cell(settings[name])}{m}"
+            for name, text, m in HEAD
+            if name in settings
+        ]
+        robot, version = markdown_cell(self.robot), markdown_cell(self.version or "unknown")
         return ", ".join([f"**{robot}**", f"version {version}", *facts])
 
 
@@ -133,6 +139,6 @@ def _rank(setting: tuple[str, object]) -> tuple[int, str]:
     return (FIRST.index(name) if name in FIRST else len(FIRST), name)
 
 
-def _cell(value: object) -> str:
+def markdown_cell(value: object) -> str:
     """Return a value escaped for Markdown: no link, no picture, no HTML, no further cell."""
     return MARK_UP.sub(r"\\\g<0>", one_line(str(value)))

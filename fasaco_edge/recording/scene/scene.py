@@ -18,7 +18,13 @@ from fasaco_edge.recording.scene.blueprint import build_blueprint
 from fasaco_edge.recording.scene.curves import NOISE, SHARE_SPACING_NS, Curves, StatusFigures
 from fasaco_edge.recording.scene.drawings import DrivenPathDrawing, PathDrawing
 from fasaco_edge.recording.scene.flows import flows_of, fork_at
-from fasaco_edge.recording.scene.layers import Anchor, Layers, changed_bounds, size_in_file
+from fasaco_edge.recording.scene.layers import (
+    Anchor,
+    Layers,
+    changed_bounds,
+    is_far_from,
+    size_in_file,
+)
 from fasaco_edge.recording.scene.runcard import RunDescription
 from fasaco_edge.recording.sdk import rr
 from fasaco_edge.recording.write.writer import RecordingWriter
@@ -269,7 +275,7 @@ class Scene:
         self._known = bounds = union_bounds(self._known, known_bounds(grid))
         if bounds is None:
             return
-        if self._framed is None or _is_far(self._framed, bounds):
+        if self._framed is None or is_far_from(self._framed, bounds, REFRAME_FRACTION):
             self._framed = bounds
             self._writer.show(build_blueprint(bounds))
 
@@ -308,9 +314,3 @@ class Scene:
             last = errors.last or "no text"
             self.add_line(entities.MISSION_LOG, f"error {errors.total}: {last}", "ERROR")
         self._errors = errors.total
-
-
-def _is_far(framed: Bounds, bounds: Bounds) -> bool:
-    size = max(framed[2] - framed[0], framed[3] - framed[1])
-    moved = max(abs(a - b) for a, b in zip(framed, bounds, strict=True))
-    return moved > REFRAME_FRACTION * size

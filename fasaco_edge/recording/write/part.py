@@ -107,14 +107,14 @@ class Part:
         """Whether the file was unlinked: its data are gone when it is closed."""
         return os.fstat(self._lock).st_nlink == 0
 
-    def write_blob(self, blob: bytes, wall_ns: int) -> None:
-        """Write bytes at ``wall_ns`` [ns], without batching."""
+    def write_blob(self, blob: bytes, wall_ns: int, entity: str = entities.INPUTS) -> None:
+        """Write bytes of an entity at ``wall_ns`` [ns], without batching."""
         time = rr.TimeColumn(entities.WALL_CLOCK, timestamp=np.array([wall_ns], "datetime64[ns]"))
         columns = rr.DynamicArchetype.columns(
             archetype=entities.INPUTS_ARCHETYPE,
             components={entities.INPUTS_COMPONENT: rr.components.BlobBatch([blob])},
         )
-        rr.send_columns(entities.INPUTS, indexes=[time], columns=columns, recording=self.stream)
+        rr.send_columns(entity, indexes=[time], columns=columns, recording=self.stream)
 
     def flush(self, timeout_s: float) -> Flush:
         """Wait up to ``timeout_s`` [s] until all logged data are passed to the disk."""

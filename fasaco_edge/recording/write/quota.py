@@ -188,13 +188,13 @@ class DiskBudget:
             LOG.info("deleted for the quota: %s", ", ".join(path.name for path in deleted))
 
 
-def budget_of(config: DaemonConfig) -> DiskBudget:
-    """Return the budget of a configuration.
+def budget_of(config: DaemonConfig, name: str = "") -> DiskBudget:
+    """Return the budget of a configuration, for the recordings of its robot or those of ``name``.
 
     Raises:
         BadConfiguration: a size is impossible, or the robot's name is no key.
     """
-    limits, robot = config.recording, config.keys().robot
+    limits, robot = config.recording, name or config.keys().robot
     return DiskBudget(
         limits.part_mb * MEGABYTE,
         limits.least_free_mb * MEGABYTE,

@@ -81,7 +81,7 @@ def run_recorder(
         BadConfiguration: the folder cannot be made or written to.
     """
     return_soon()
-    repairs = _repaired(out)
+    repairs = repaired(out)
     with stop_event() as stop, open_bus(bus_settings) as bus:
         recorder = Recorder(config, bus, out, budget, serve)
         for line in repairs:
@@ -306,7 +306,12 @@ def _is_rival(payload: bytes) -> bool:
         return False  # its reader reports that
 
 
-def _repaired(folder: Path) -> list[str]:
+def repaired(folder: Path) -> list[str]:
+    """Repair the recordings in a folder; return what was repaired, in words.
+
+    Raises:
+        BadConfiguration: the folder cannot be read or written to.
+    """
     try:
         repairs = repair_folder(folder)
     except OSError as error:

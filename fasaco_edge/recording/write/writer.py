@@ -12,6 +12,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from fasaco_edge.errors import BadConfiguration
+from fasaco_edge.recording import entities
 from fasaco_edge.recording.sdk import rr, rrb
 from fasaco_edge.recording.write.part import Flush, Part
 from fasaco_edge.recording.write.quota import DiskBudget
@@ -149,11 +150,11 @@ class RecordingWriter:
             stream.log(entity, archetype)
         self._unflushed_bytes += size
 
-    def write_blob(self, blob: bytes) -> bool:
-        """Write bytes at the time set, without waiting for a flush; False on failure."""
+    def write_blob(self, blob: bytes, entity: str = entities.INPUTS) -> bool:
+        """Write bytes of an entity at the time set, at once; False on failure."""
         if self._part is None or self.state is not WriterState.RECORDING:
             return False
-        self._part.write_blob(blob, self.wall_ns)
+        self._part.write_blob(blob, self.wall_ns, entity)
         self._unflushed_bytes += len(blob)
         return True
 

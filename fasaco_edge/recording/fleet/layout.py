@@ -1,0 +1,70 @@
+"""The layout of a fleet's recording: one map of all robots, who does what, curves, states, log."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from fasaco_edge.grid.geometry import Bounds
+from fasaco_edge.recording import entities
+from fasaco_edge.recording.scene.blueprint import (
+    MAP_BACKGROUND,
+    MARGIN,
+    eye_above,
+    last_seconds,
+    log_view,
+    plot_view,
+)
+from fasaco_edge.recording.sdk import rrb
+
+# Width over height of the map view at 1280 x 720.
+MAP_ASPECT = 1.62
+TRAIL_S = 300.0
+
+
+def robot_entity(robot: str, name: str) -> str:
+    """Return an entity of a robot."""
+    return f"{entities.ROBOTS}/{robot}/{name}"
+
+
+def build_layout(robots: Sequence[str], bounds: Bounds) -> rrb.Blueprint:
+    """Return the layout for robots, its eye over ``bounds`` (x_min, y_min, x_max, y_max) [m]."""
+
+    def each(name: str) -> list[str]:
+        return [f"/{robot_entity(robot, name)}" for robot in robots]
+
+    def plot(title: str, name: str, *, top: float = 0.0) -> rrb.TimeSeriesView:
+        legend = rrb.PlotLegend(rrb.Corner2D.LeftTop)
+        return plot_view(title, "", legend, top, contents=each(f"metrics/{name}"))
+
+    trails = {robot_entity(robot, "world/trail"): last_seconds(TRAIL_S) for robot in robots}
+    worlds = [f"{world}/**" for world in each("world")]
+    map_view = rrb.Spatial3DView(
+        origin="/",
+        name="Robots, paths, swept floor, shares",
+        contents=[*worlds, f"/{entities.FLEET_SHARES}", f"/{entities.FLEET_TWICE}"],
+        eye_controls=eye_above(bounds, MARGIN, MAP_ASPECT),
+        line_grid=False,
+        background=MAP_BACKGROUND,
+        overrides=trails,
+    )
+    states = rrb.StateTimelineView(origin="/", name="States", contents=each("state"))
+    card = rrb.TextDocumentView(origin=f"/{entities.RUN_CARD}", name="Who does what")
+    return rrb.Blueprint(
+        rrb.Horizontal(
+            rrb.Vertical(map_view, rrb.Horizontal(states, log_view()), row_shares=[5, 2]),
+            rrb.Vertical(
+                card,
+                plot("Swept [m2]", "swept_m2"),
+                plot("Cells left, as each knows", "left_cells"),
+                plot("Planning [ms]", "plan_ms"),
+                plot("Messages to the fleet [kB/s]", "kb_s"),
+                row_shares=[5, 4, 3, 3, 3],
+            ),
+            column_shares=[18, 10],
+        ),
+        rrb.TimePanel(state="collapsed", timeline=entities.WALL_CLOCK),
+        rrb.BlueprintPanel(state="collapsed"),
+        rrb.SelectionPanel(state="collapsed"),
+        auto_views=False,
+        auto_layout=False,
+    )

@@ -1,0 +1,325 @@
+"""The recorder of a whole fleet, a process that records all its robots into one file.
+
+Robots are recorded from the first message that they send to the fleet, also those that come later.
+Of each the newest status, path and pose are heard; maps are asked for in turn, one at a time, so
+that a network carries no more than one. What a robot sends harms no other: each has its own queues,
+its own decoders, and its own share of what is drawn.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import time
+from collections import Counter
+from datetime import UTC, datetime
+from functools import partial
+from pathlib import Path
+
+from fasaco_edge.bus.arrival import Arrival, Sample
+from fasaco_edge.bus.latched import Subscription
+from fasaco_edge.bus.session import Bus, open_bus
+from fasaco_edge.bus.settings import BusSettings
+from fasaco_edge.config.config import DaemonConfig
+from fasaco_edge.errors import FasacoError
+from fasaco_edge.host.processes import memory_limit, release_unused, return_soon, stop_event
+from fasaco_edge.recording import entities
+from fasaco_edge.recording.fleet.inbox import FleetInbox, Heard
+from fasaco_edge.recording.fleet.layout import build_layout
+from fasaco_edge.recording.fleet.members import JOINED, Members, RecordedMember
+from fasaco_edge.recording.fleet.notes import NOTES_VERSION, Note, NoteBatch, encode_notes
+from fasaco_edge.recording.fleet.scene import FleetScene
+from fasaco_edge.recording.scene.blueprint import NO_MAP
+from fasaco_edge.recording.write.inbox import RunClock, afforded_bytes
+from fasaco_edge.recording.write.quota import DiskBudget, next_run
+from fasaco_edge.recording.write.recorder import EXIT_STALLED, repaired
+from fasaco_edge.recording.write.streams import serve_live
+from fasaco_edge.recording.write.writer import RecordingWriter
+from fasaco_edge.text import one_line
+from fasaco_edge.wire.documents.fleet import decode_member
+from fasaco_edge.wire.documents.json_text import decode_tolerant
+from fasaco_edge.wire.documents.status import Status
+from fasaco_edge.wire.keys import Keys
+from fasaco_edge.wire.messages.maps import decode_occupancy_grid
+from fasaco_edge.wire.messages.paths import decode_path
+from fasaco_edge.wire.messages.poses import PoseDecoder
+from fasaco_edge.wire.topics import FLEET, MAP, PATH, POSE, STATUS
+
+TAKE_TIMEOUT_S = 0.1
+NOTE_NS, WRITE_NS = 1_000_000_000, 5_000_000_000
+# How long a robot is asked for its map before it is the next one's turn.
+MAP_TURN_NS = 2_000_000_000
+# A robot's rate of messages is plotted over this time.
+RATE_NOTES = 5
+
+
+def run_fleet_recorder(
+    config: DaemonConfig,
+    bus_settings: BusSettings,
+    fleet: str,
+    out: Path,
+    budget: DiskBudget,
+    serve: tuple[str, int] | None = None,
+) -> int:
+    """Record a fleet until SIGTERM or SIGINT; return the process's exit code.
+
+    Args:
+        config: for the prefix of all keys, and the type of poses whose samples name none.
+        bus_settings: how to join the bus.
+        fleet: name of the fleet.
+        out, budget, serve: as of ``run_recorder``.
+
+    Raises:
+        BusUnavailable: nothing listens at the endpoints.
+        BadConfiguration: the folder cannot be made or written to.
+    """
+    return_soon()
+    repairs = repaired(out)
+    with stop_event() as stop, open_bus(bus_settings) as bus:
+        recorder = FleetRecorder(config, bus, fleet, out, budget, serve)
+        for line in repairs:
+            recorder.note_line(line)
+        recorder.listen()
+        release_unused()
+        while not stop.is_set():
+            recorder.step(TAKE_TIMEOUT_S)
+        code = 0 if recorder.end() else EXIT_STALLED
+    if recorder.hangs:
+        # All recoverable data are saved; rerun's own exit would never end.
+        os._exit(code)
+    return code
+
+
+class FleetRecorder:
+    """Connects the bus to the writer: ``step`` takes samples, writes and draws them."""
+
+    def __init__(
+        self,
+        config: DaemonConfig,
+        bus: Bus,
+        fleet: str,
+        out: Path,
+        budget: DiskBudget,
+        serve: tuple[str, int] | None,
+    ) -> None:
+        self._bus, self._fleet, self._keys = bus, fleet, config.keys()
+        self._schema = config.pose.schema
+        clock = RunClock()
+        self._clock = clock
+        self._began_ns = clock.now_ns()
+        began = datetime.fromtimestamp(self._began_ns / 1e9, UTC)
+        name = next_run(out, file_name(fleet), began)
+        self._writer = RecordingWriter(out, name, budget, build_layout((), NO_MAP))
+        self._writer.at(self._began_ns)
+        if serve is not None:
+            self._writer.serve(serve_live(name, *serve))
+        self._title = f"fleet {fleet} {began:%Y-%m-%d %H:%M:%S} UTC"
+        self._writer.describe(self._title, {"fleet": fleet, "began": f"{began:%Y-%m-%d %H:%M:%S}"})
+        self._members = Members()
+        self._scene = FleetScene(self._writer, self._members)
+        self._inbox = FleetInbox(afforded_bytes(memory_limit()), clock.arrival)
+        self._poses: dict[str, PoseDecoder] = {}
+        self._subscriptions: dict[str, list[Subscription]] = {}
+        self._map_turn: tuple[str, Subscription, int] | None = None
+        self._notes: list[Note] = []
+        self._rates: dict[str, list[int]] = {}
+        self._next_note_ns = self._next_write_ns = self._began_ns
+        self._noted_ns = self._began_ns
+        self._part = 0
+        self._faults: Counter[str] = Counter()
+
+    def listen(self) -> None:
+        """Subscribe to what all robots tell their fleets."""
+
+        def post(sample: Sample) -> None:
+            self._inbox.post(self._keys.robot_of(sample.key), FLEET.name, sample)
+
+        self._bus.subscribe(self._keys.of_all(FLEET), post)
+
+    def step(self, timeout_s: float) -> None:
+        """Write and draw what arrives within ``timeout_s`` [s], and what is due."""
+        for heard in self._inbox.take(timeout_s):
+            self._writer.message(heard.arrival.wall_ns)
+            self._attempt(heard)
+            self._writer.sync(time.monotonic_ns())
+        now_ns = self._clock.now_ns()
+        self._writer.at(now_ns)
+        if now_ns >= self._next_note_ns:
+            self._next_note_ns = now_ns + NOTE_NS
+            self._note(now_ns)
+        if now_ns >= self._next_write_ns:
+            self._next_write_ns = now_ns + WRITE_NS
+            self._write()
+        self._ask_for_maps(now_ns)
+        self._scene.catch_up()
+        self._writer.sync(time.monotonic_ns())
+
+    def end(self) -> bool:
+        """Write what waits, and the footer; False if the disk fails."""
+        for heard in self._inbox.take(0.0):
+            self._attempt(heard)
+        now_ns = self._clock.now_ns()
+        self._writer.at(now_ns)
+        self._note(now_ns)
+        self._write()
+        self._scene.finish()
+        return self._writer.close()
+
+    @property
+    def hangs(self) -> bool:
+        """Whether rerun would hang when the interpreter exits."""
+        return self._writer.hangs
+
+    def note_line(self, line: str) -> None:
+        """Log a fault from before the recording began."""
+        self._scene.add_line(line, "WARN")
+
+    def _attempt(self, heard: Heard) -> None:
+        """Take in a sample; what cannot be used is logged with its robot's name."""
+        try:
+            self._take(heard.robot, heard.arrival)
+        except FasacoError as error:
+            what = f"{heard.robot}: {heard.arrival.topic}"
+            self._faults[what] += 1
+            count = self._faults[what]
+            # A robot may send nothing else: log the 1st, 2nd, 4th, 8th ...
+            if count & (count - 1) == 0:
+                self._scene.add_line(one_line(f"{what}: {count} refused: {error}"), "WARN")
+
+    def _take(self, robot: str, arrival: Arrival) -> None:
+        if arrival.topic == FLEET.name:
+            self._take_fleet(robot, arrival)
+            return
+        member = self._members.get(robot)
+        if member is None:
+            return
+        sample = arrival.sample
+        if arrival.topic == POSE.name:
+            stamped = self._poses[robot].decode(sample.payload, sample.schema)
+            if stamped is not None:
+                member.move(stamped.pose, self._ms(arrival.wall_ns))
+                self._scene.add_pose(member, stamped.pose)
+        elif arrival.topic == PATH.name:
+            self._scene.add_path(member, decode_path(sample.payload).xy)
+        elif arrival.topic == MAP.name:
+            self._end_map_turn(robot)
+            self._scene.add_map(member, decode_occupancy_grid(sample.payload))
+        elif arrival.topic == STATUS.name:
+            status = decode_tolerant(sample.payload, Status)
+            # A second daemon of the robot's name does not plan.
+            if status.claim.stand == "plans":
+                member.note_status(status)
+
+    def _take_fleet(self, robot: str, arrival: Arrival) -> None:
+        said = decode_member(arrival.sample.payload, self._fleet)
+        if said is None or not robot:
+            if self._members.get(robot) is None:
+                self._inbox.forget(robot)
+            return
+        known, before = {member.name for member in self._members}, self._members.get(robot)
+        if before is None or before.is_moved_by(said):
+            # Notes are of the robots and frames that their batch names.
+            self._write()
+        member, news = self._members.hear(robot, said, arrival.wall_ns)
+        if news == JOINED:
+            for gone in known - {one.name for one in self._members}:
+                self._leave(gone)
+            self._join(member)
+        elif news:
+            self._scene.add_line(one_line(f"{robot}: {news}"), "WARN")
+
+    def _join(self, member: RecordedMember) -> None:
+        """Hear a robot from now on."""
+        keys = Keys(member.name, self._keys.base)
+        self._poses[member.name] = PoseDecoder(self._schema)
+        self._subscriptions[member.name] = [
+            self._bus.listen(keys, topic, partial(self._inbox.post, member.name, topic.name))
+            for topic in (STATUS, PATH, POSE)
+        ]
+        self._scene.add_line(f"{member.name}: joined, cells of {member.seat.cell_m:g} m")
+        self._scene.join(member)
+
+    def _leave(self, robot: str) -> None:
+        for subscription in self._subscriptions.pop(robot, ()):
+            self._bus.unsubscribe(subscription)
+        self._end_map_turn(robot)
+        self._inbox.forget(robot)
+        self._scene.leave(robot)
+
+    def _ask_for_maps(self, now_ns: int) -> None:
+        """Ask the robots for their maps, one after another."""
+        if self._map_turn is not None and now_ns < self._map_turn[2]:
+            return
+        names = [member.name for member in self._members]
+        if not names:
+            return
+        last = "" if self._map_turn is None else self._map_turn[0]
+        self._end_map_turn(last)
+        after = (names.index(last) + 1) % len(names) if last in names else 0
+        name = names[after]
+        post = partial(self._inbox.post, name, MAP.name)
+        subscription = self._bus.listen(Keys(name, self._keys.base), MAP, post)
+        self._subscriptions[name].append(subscription)
+        self._map_turn = name, subscription, now_ns + MAP_TURN_NS
+
+    def _end_map_turn(self, robot: str) -> None:
+        """Hear no more maps of a robot until its next turn."""
+        if self._map_turn is None or self._map_turn[0] != robot:
+            return
+        subscription, subscribed = self._map_turn[1], self._subscriptions.get(robot, [])
+        if subscription in subscribed:
+            subscribed.remove(subscription)
+            self._bus.unsubscribe(subscription)
+
+    def _note(self, now_ns: int) -> None:
+        """Note what was heard since the last note, and show it."""
+        passed_s = max(1e-9 * (now_ns - self._noted_ns), 1e-3)
+        self._noted_ns = now_ns
+        for member in self._members:
+            traffic = self._inbox.traffic(member.name)
+            note = member.note(self._ms(now_ns), now_ns, (traffic.messages, traffic.bytes))
+            self._notes.append(note)
+            rates = self._rates.setdefault(member.name, [])
+            rates.append(traffic.bytes)
+            del rates[:-RATE_NOTES]
+            figures = {
+                "left_cells": float(note.open_cells),
+                "kb_s": round(sum(rates) / len(rates) / passed_s / 1000, 2),
+            }
+            if note.plans_ms:
+                figures["plan_ms"] = max(note.plans_ms)
+            if note.swept:
+                figures["swept_m2"] = member.swept.count * member.seat.cell_m**2
+                self._scene.add_cells(member)
+            self._scene.add_figures(member, figures)
+            self._scene.enter(member, member.state(now_ns), _why(member))
+        if len(self._members):
+            self._scene.add_division()
+            self._scene.describe(self._title)
+
+    def _write(self) -> None:
+        """Write the notes gathered; in a new part all that is in force with them."""
+        if self._part != self._writer.part_number:
+            self._part = self._writer.part_number
+            at_ms = self._notes[0].at_ms if self._notes else self._ms(self._writer.wall_ns)
+            self._notes = [*(member.in_force(at_ms) for member in self._members), *self._notes]
+        if not self._notes:
+            return
+        robots = [member.noted() for member in self._members]
+        batch = NoteBatch(NOTES_VERSION, self._began_ns, self._fleet, robots, self._notes)
+        self._notes = []
+        if not self._writer.write_blob(encode_notes(batch), entities.FLEET_NOTES):
+            # All of it is in the next part, but for what only happens once.
+            self._part = 0
+
+    def _ms(self, wall_ns: int) -> int:
+        return max(wall_ns - self._began_ns, 0) // 1_000_000
+
+
+def _why(member: RecordedMember) -> str:
+    return f"for {member.newest.waits_for}" if member.newest.waits_for else ""
+
+
+def file_name(fleet: str) -> str:
+    """Return the name of a fleet's recordings: letters, digits, ``_`` and ``-``."""
+    return "fleet-" + re.sub(r"[^A-Za-z0-9_-]", "_", fleet)

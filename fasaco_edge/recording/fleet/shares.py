@@ -1,0 +1,98 @@
+"""Who does what: the shares of a division, and the cells that several robots swept.
+
+A cell belongs to the robot whose seed has the shortest travel time to it, plus its handicap, as the
+robots themselves reckon; here over the cells that they tell to be within reach.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fasaco_edge.grid.geometry import GridGeometry, Window
+from fasaco_edge.recording.fleet.cells import (
+    FAR,
+    Cells,
+    Seat,
+    distances,
+    mask_of,
+    together,
+    window_of,
+)
+from fasaco_edge.recording.fleet.members import Members, RecordedMember
+
+NOBODY = -1
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Shares:
+    """Owners of the cells that are left.
+
+    Attributes:
+        geometry: of the cells, in the fleet's frame.
+        owners: number of the robot of each cell, int16 (rows, cols); NOBODY for none.
+        cells: number of cells of each robot, by its name.
+    """
+
+    geometry: GridGeometry
+    owners: NDArray[np.int16]
+    cells: Counter[str]
+
+
+def union_on(seat: Seat, members: Members, what: str) -> Cells:
+    """Return cells of all robots on one robot's lattice, int64 (n, 2); ``what``: of which set."""
+    return together(member.seat.carried(getattr(member, what).cells(), seat) for member in members)
+
+
+def shares_of(members: Members) -> Shares | None:
+    """Return the shares by the division in force; None before there is one."""
+    telling = members.dividing()
+    if telling is None:
+        return None
+    ground = union_on(telling.seat, members, "ground")
+    window = window_of(ground)
+    if window is None:
+        return None
+    known = mask_of(ground, window)
+    owners = _owners(telling, members, known, window)
+    owners[mask_of(union_on(telling.seat, members, "swept"), window)] = NOBODY
+    names = {member.number: member.name for member in members}
+    counted = zip(*np.unique(owners[owners != NOBODY], return_counts=True), strict=True)
+    cells = Counter({names[int(number)]: int(count) for number, count in counted})
+    return Shares(telling.seat.geometry(window), owners, cells)
+
+
+def _owners(
+    telling: RecordedMember, members: Members, known: NDArray[np.bool_], window: Window
+) -> NDArray[np.int16]:
+    first = np.full(known.shape, np.float32(np.inf))
+    owners = np.full(known.shape, NOBODY, np.int16)
+    for part in sorted(telling.newest.parts, key=lambda part: part.robot):
+        member = members.get(part.robot)
+        if member is None:
+            continue
+        away = distances(known, (part.row - window.row0, part.col - window.col0))
+        times_s = away * np.float32(part.step_s) + np.float32(part.handicap_s)
+        is_earlier = (times_s < first) & (away < FAR)
+        owners[is_earlier] = member.number
+        first[is_earlier] = times_s[is_earlier]
+    return owners
+
+
+def swept_twice(members: Members) -> tuple[GridGeometry, NDArray[np.bool_]] | None:
+    """Return the cells that two or more robots swept, and where they lie; None for none."""
+    seats = [member.seat for member in members]
+    if len(seats) < 2:
+        return None
+    each = [member.seat.carried(member.swept.cells(), seats[0]) for member in members]
+    cells, counts = np.unique(
+        np.concatenate([np.unique(one, axis=0) for one in each]), axis=0, return_counts=True
+    )
+    twice = cells[counts > 1]
+    window = window_of(twice)
+    if window is None:
+        return None
+    return seats[0].geometry(window), mask_of(twice, window)
