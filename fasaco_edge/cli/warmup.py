@@ -19,7 +19,7 @@ from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.host.processes import available_memory, end_with_parent, python_program
 from fasaco_edge.kernels import cache, release
 
-# The compiler has 850 MB in the end.
+# The compiler has 930 MB in the end.
 TWO_NEED_BYTES = 2_000_000_000
 EPILOG = """\
 An installation from a release folder ships compiled kernels and compiles nothing, as long as

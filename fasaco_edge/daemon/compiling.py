@@ -27,8 +27,11 @@ MODULE = "fasaco_edge.daemon.compiling"
 # Startup time requested for each stage; longer than any takes on a small computer [s].
 STAGE_S = 600.0
 LOOK_S = 0.02
-# A stage may add 250 MB to this, within the unit's limit (MemoryHigh=).
-MOST_MB = 220.0
+# Beside the daemon's 45 MB within the unit's limit (MemoryHigh=); a seventh of it are pages of
+# libraries, which other processes have, too, or the system takes back.
+MOST_MB = 240.0
+# Fifteen, as measured; a disk that keeps no file as it was written does not go on for ever.
+MOST_RESTARTS = 300
 # Lines that the process prints: one of these words, a tab and a text.
 REASON, STAGE, WARNING = "reason", "stage", "warning"
 
@@ -71,7 +74,7 @@ class KernelCompiler:
         if (code := self._process.returncode) != 0:
             raise ProcessEnded(
                 f"the kernels were not compiled: the compiler {_ended(code)}",
-                hint="check that 500 MB of memory are free, then try `fasaco-edge warmup`",
+                hint="check that 300 MB of memory are free, then try `fasaco-edge warmup`",
             )
         if self._stages:
             LOG.info("kernels compiled in %.0f s", time.monotonic() - self._started)
@@ -111,11 +114,14 @@ def main() -> None:
     folder = cache_folder()
     if folder is None:
         return
+    restarts = int(sys.argv[1]) if sys.argv[1:] else 0
     if why := missing_from(folder):
-        if not sys.argv[1:]:
+        if not restarts:
             _say(REASON, why)
+        from fasaco_edge.kernels.code_files import after_each_kept  # noqa: PLC0415
         from fasaco_edge.planners.warmup import warm_up  # noqa: PLC0415
 
+        after_each_kept(lambda: _stay_small(restarts))
         warm_up(_begin_stage)
 
 
@@ -131,18 +137,23 @@ def _say(word: str, text: str) -> None:
 
 
 def _begin_stage(stage: str) -> None:
-    """Report a stage; restart the process for it where memory has grown too much.
-
-    The compiler would keep 570 MB in the end; what it has compiled is loaded in a second.
-    """
-    from fasaco_edge.kernels.jit import FAULTS  # noqa: PLC0415
+    """Report a stage; end where what is compiled cannot be kept."""
+    from fasaco_edge.kernels.code_files import FAULTS  # noqa: PLC0415
 
     if FAULTS.failure:
         # Kernels compiled here would be lost: the daemon compiles them with its first map.
         sys.exit(0)
     _say(STAGE, stage)
-    if resident_mb() > MOST_MB and sys.argv[1:] != [stage]:
-        os.execv(sys.executable, python_program(MODULE, stage))
+
+
+def _stay_small(restarts: int) -> None:
+    """Restart this process where its memory has grown too much.
+
+    The compiler would keep 930 MB in the end. Called after each file that is written: the next
+    process loads it and goes on from there.
+    """
+    if resident_mb() > MOST_MB and restarts < MOST_RESTARTS:
+        os.execv(sys.executable, python_program(MODULE, str(restarts + 1)))
 
 
 if __name__ == "__main__":

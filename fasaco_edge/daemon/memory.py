@@ -6,9 +6,10 @@ A daemon whose maps have at most P pixels, on a lattice of at most C cells, take
 
 and, where it lays a line over the floor, ``FLOOR_BYTES * P + STAND_BYTES * C`` more: its fine
 raster has no more pixels than a map may have (``grid.fine_raster``). This holds for any input at
-any rate and resolution. ``MemoryHigh=`` of the unit is this sum for the default configuration,
-``MemoryMax=`` a tenth more; under another limit the daemon limits the map size to fit
-(``afforded``). One test checks the systemd units against these constants, another measures memory.
+any rate and resolution. A limit on the memory, ``MemoryMax=`` of the unit, limits the maps: the
+sum is at most that limit without its last tenth, from where on the system throttles the service
+(``afforded``). Without a limit maps may be as large as the configuration says. One test checks the
+systemd units against these constants, another measures memory.
 
 A pixel is a byte, held in up to ten copies if updates are as large as the map:
 
@@ -41,7 +42,7 @@ from msgspec import structs
 
 from fasaco_edge.bus.access import HEADER_BYTES
 from fasaco_edge.bus.mailbox import Queue
-from fasaco_edge.config.config import DaemonConfig
+from fasaco_edge.config.config import DaemonConfig, MapConfig
 from fasaco_edge.wire.limits import MAX_POSE_BYTES
 from fasaco_edge.wire.topics import QUEUE_LENGTHS
 
@@ -68,7 +69,7 @@ SPARE = 1.1
 # for a mask, of which the base has some to spare.
 MASK_COPIES = 2
 PILLOW_BYTES = 6 * MB
-LEAST_MASK_BYTES = 10 * MB
+LEAST_MASK_BYTES = 14 * MB
 
 # The smallest limits ever applied: a small flat.
 LEAST_PIXELS, LEAST_CELLS = 250_000, 10_000
@@ -101,6 +102,13 @@ def needed_bytes(config: DaemonConfig) -> int:
     maps = config.map
     pixel_bytes, cell_bytes = unit_bytes(config)
     return BASE_BYTES + pixel_bytes * maps.max_pixels + cell_bytes * maps.max_lattice_cells
+
+
+def has_default_sizes(config: DaemonConfig) -> bool:
+    """Return whether largest map and lattice are the defaults, which follow a limit on memory."""
+    maps, default = config.map, MapConfig()
+    sizes = maps.max_pixels, maps.max_lattice_cells
+    return sizes == (default.max_pixels, default.max_lattice_cells)
 
 
 def unit_bytes(config: DaemonConfig) -> tuple[int, int]:
@@ -143,9 +151,9 @@ def afforded(config: DaemonConfig, limit: int | None) -> DaemonConfig:
 
     None is no limit. Both shrink alike; a small flat is always tried.
     """
-    if limit is None or needed_bytes(config) <= limit:
+    if limit is None or needed_bytes(config) <= (high := int(limit / SPARE)):
         return config
-    maps, spare = config.map, limit - BASE_BYTES
+    maps, spare = config.map, high - BASE_BYTES
     least_pixels = min(LEAST_PIXELS, maps.max_pixels)
     least_cells = min(LEAST_CELLS, maps.max_lattice_cells)
     pixel_bytes, cell_bytes = unit_bytes(config)

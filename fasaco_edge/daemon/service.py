@@ -22,7 +22,7 @@ from fasaco_edge.daemon.loop.inbox import Inbox, make_mailbox
 from fasaco_edge.daemon.loop.loop import BusPorts, Host, Loop
 from fasaco_edge.daemon.loop.outbox import Outbox
 from fasaco_edge.daemon.loop.turn_log import TurnLog
-from fasaco_edge.daemon.memory import afforded, needed_bytes
+from fasaco_edge.daemon.memory import afforded, has_default_sizes, needed_bytes
 from fasaco_edge.daemon.metrics import serve_metrics
 from fasaco_edge.daemon.notify import ServiceManager, Watchdog
 from fasaco_edge.daemon.reload import Reload
@@ -152,7 +152,9 @@ def _afforded(config: DaemonConfig) -> DaemonConfig:
     limit = memory_limit()
     smaller = afforded(config, limit)
     if limit is not None and smaller is not config:
-        LOG.warning(
+        # Without sizes in the configuration, nobody expects more than the memory is enough for.
+        LOG.log(
+            logging.INFO if has_default_sizes(config) else logging.WARNING,
             "memory is limited to %.0f MB, maps of map.max_pixels %d and map.max_lattice_cells %d "
             "may need %.0f: no more than %d and %d are taken",
             limit / 1e6,

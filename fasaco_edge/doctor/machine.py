@@ -12,7 +12,7 @@ import time
 from importlib import metadata
 from pathlib import Path
 
-from fasaco_edge.daemon.memory import afforded, limits_mib, needed_bytes
+from fasaco_edge.daemon.memory import afforded, has_default_sizes, limits_mib
 from fasaco_edge.doctor.finding import CheckContext, Finding, fail, ok, warn
 
 MACHINES = ("x86_64", "aarch64")
@@ -26,6 +26,8 @@ STA_UNSYNC = 0x40
 TIME_ERROR = 5
 # Memory above that of a daemon with a plan of a large building.
 WANTED_MB = 350
+# Fewer than a map of 100 m x 100 m has, at 5 cm, deserve a word.
+WANTED_PIXELS = 4_000_000
 PI_CMDLINES = ("boot/firmware/cmdline.txt", "boot/cmdline.txt")
 
 
@@ -149,11 +151,13 @@ def memory(context: CheckContext) -> Finding:
     if free_mb < WANTED_MB:
         to_do = "stop other programs, or plan with larger cells (robot.tool_width_m)"
         return warn(f"{found}; the daemon may need {WANTED_MB} MB", to_do, details)
-    if limit and limit < needed_bytes(context.config):
+    smaller = afforded(context.config, limit).map
+    if limit and smaller is not context.config.map:
         high, most = limits_mib(context.config)
-        smaller = afforded(context.config, limit).map
         found += f"; the unit's limit is {limit / 1e6:.0f} MB: maps of no more than "
         found += f"{smaller.max_pixels} pixels and {smaller.max_lattice_cells} cells are accepted"
+        if has_default_sizes(context.config) and smaller.max_pixels >= WANTED_PIXELS:
+            return ok(found, details)
         to_do = f"systemctl edit fasaco-edge: MemoryHigh={high}M, MemoryMax={most}M"
         return warn(found, to_do, details)
     return ok(found, details)

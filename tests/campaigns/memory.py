@@ -44,7 +44,7 @@ from tests.support.processes import Daemon, daemon_process
 from tests.support.rooms import map_bytes, pose_bytes, room
 from tests.support.service_manager import Group, Manager, memory_group, unit_limit, why_not
 
-SIDES = (1000, 2000, 4000, 5000, 8000)
+SIDES = (1000, 2000, 2300, 5000, 8000)
 RESOLUTIONS = (0.0001, 0.02, 0.05)
 RATES = (1.0, 10.0, 20.0)
 KINDS = ("maps", "moving", "updates", "mappers", "grey", "colour")
@@ -129,13 +129,18 @@ def mask_file(flood: Flood, folder: Path) -> Path:
 
 
 def pour_with_mask(
-    flood: Flood, config: Path, daemon: Daemon, outsider: Outsider, seconds: float
+    flood: Flood,
+    config: Path,
+    daemon: Daemon,
+    outsider: Outsider,
+    seconds: float,
+    limit: int | None,
 ) -> bool:
     """Send the largest maps, and let a mask be read meanwhile; return whether it was taken."""
     document = yaml.safe_load(config.read_text())
     document["mission"]["keep_out_mask"] = str(mask_file(flood, config.parent))
     config.write_text(yaml.safe_dump(document))
-    largest = isqrt(afforded(load_config(config), None).map.max_pixels)
+    largest = isqrt(afforded(load_config(config), limit).map.max_pixels)
     reload = threading.Timer(seconds / 2, daemon.process.send_signal, [signal.SIGHUP])
     reload.start()
     pour(replace(flood, kind="updates", side=largest), daemon, outsider, seconds)
@@ -228,7 +233,7 @@ def run_flood(
             before = settled(outsider, daemon)
             if flood.kind in MASKS:
                 sent = 1
-                has_mask = pour_with_mask(flood, file, daemon, outsider, seconds)
+                has_mask = pour_with_mask(flood, file, daemon, outsider, seconds, limit)
             else:
                 sent = pour(flood, daemon, outsider, seconds)
             status = settled(outsider, daemon, before)

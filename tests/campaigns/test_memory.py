@@ -28,8 +28,8 @@ limited = pytest.mark.skipif(bool(why_not()), reason=why_not())
         (Flood("maps", 2000, 0.0003, 5.0), "refused", "must be 0.0012 m or larger"),
         (Flood("maps", 2000, 0.05, 5.0), "refused", "exceeds 60000 cells"),
         (Flood("grey", 900, 0.02, 10.0), "taken", ""),
-        (Flood("grey", 2000, 0.02, 10.0), "refused", "take 11.9 MB to read, more than the 10.0"),
-        (Flood("colour", 4000, 0.02, 10.0), "refused", "take 71.7 MB to read, more than the 10.0"),
+        (Flood("grey", 2700, 0.02, 10.0), "refused", "take 15.2 MB to read, more than the 14.0"),
+        (Flood("colour", 4000, 0.02, 10.0), "refused", "take 71.7 MB to read, more than the 14.0"),
     ],
     ids=lambda value: value.kind if isinstance(value, Flood) else None,
 )

@@ -1,90 +1,43 @@
-"""A service's kernels: whatever has become of the cache, the start gets ready without help."""
+"""The kernel compiler stays small: it goes on in a fresh process where it has grown."""
 
 from __future__ import annotations
 
-import os
 import shutil
-import signal
 import subprocess
+import sys
 from pathlib import Path
 
-import pytest
+from fasaco_edge.daemon.compiling import MODULE, REASON, STAGE
+from fasaco_edge.kernels.cache import missing_from, own_folder
+from fasaco_edge.planners.warmup import STAGES
+from tests.support.processes import ENVIRONMENT
 
-from fasaco_edge.kernels.cache import cache_folder, missing_from
-from tests.daemon.test_service import Manager, service
-from tests.kernels.harm import HARMS, kernel_files, mark_of, other_pickle
-from tests.support.outsider import Outsider
-from tests.support.processes import ENVIRONMENT, PROGRAM, free_endpoint
-from tests.support.rooms import map_bytes, pillared_room, pose_bytes
-
-
-@pytest.fixture
-def warmed(tmp_path):
-    """A cache of its own with all kernels in it."""
-    ours = cache_folder()
-    if missing_from(ours):
-        subprocess.run([*PROGRAM, "warmup"], check=True, capture_output=True, env=ENVIRONMENT)
-    shutil.copytree(ours, tmp_path / "cache" / ours.name)
-    (tmp_path / "cache").chmod(0o700)
-    return tmp_path / "cache"
+GROWN = f"import {MODULE} as compiling; compiling.MOST_MB = 0.0; compiling.main()"
+# Small kernels that Python calls: what is loaded needs no others.
+LOST = ("lattice.reach.update_reach-*", "bound.lines.lines_of-*")
 
 
-def env_of(cache: Path) -> dict[str, str]:
-    return {"NUMBA_CACHE_DIR": str(cache)}
+def lose_some(folder: Path) -> None:
+    """Remove a kernel of each of ``LOST``, and the list of them all."""
+    for pattern in (*LOST, "complete-*"):
+        min(folder.glob(pattern), key=lambda file: file.stat().st_size).unlink()
 
 
-def test_a_harmed_cache_is_mended_before_the_service_is_ready(tmp_path, warmed):
-    *files, note = kernel_files(warmed)
-    # Small ones, soon compiled: what is done is the same for each.
-    small = sorted(files, key=lambda file: file.stat().st_size)[: len(HARMS)]
-    for file, harm in zip(small, HARMS.values(), strict=True):
-        harm(file)
-    other_pickle(note)
-    with service(tmp_path, env=env_of(warmed)) as (running, _):
-        assert "compiling the kernels, for a minute or more: the list of them is damaged" in (
-            running.log_text()
-        )
-        assert missing_from(note.parent) == ""
-        assert not mark_of(note).exists()
-
-
-def test_a_cache_that_cannot_be_trusted_is_left_alone_and_the_first_path_comes(tmp_path, warmed):
-    (folder,) = warmed.iterdir()
-    folder.chmod(0o777)
-    temporary = tmp_path / "tmp"
-    temporary.mkdir()
-    temporary.chmod(0o1777)
-    mine = temporary / f"fasaco-edge-{os.geteuid()}-{folder.name}"
-    shutil.copytree(folder, mine)  # compiled by a start before
-    mine.chmod(0o700)
-    env = env_of(warmed) | {"TMPDIR": str(temporary)}
-    with service(tmp_path, env=env) as (running, _), Outsider(running.endpoint) as outsider:
-        path = outsider.listen("path")
-        outsider.put("map", map_bytes(pillared_room()))
-        outsider.put("pose", pose_bytes(1.0, 1.0))
-        path.wait(lambda heard: len(heard.payload) > 100)
-        said = f"{folder} may be written by everybody: compiled kernels are kept in {mine}"
-        assert running.log_text().count(said) == 1
-
-
-def test_a_compiler_that_is_killed_is_an_error_with_its_reason(tmp_path):
-    manager = Manager(tmp_path)
-    env = env_of(tmp_path / "cache") | {"NOTIFY_SOCKET": manager.address}
-    command = [*PROGRAM, "run", "--state", str(tmp_path / "state"), "--config"]
-    config = tmp_path / "daemon.yaml"
-    config.write_text(f"bus: {{listen: [{free_endpoint()}]}}\n")
-    process = subprocess.Popen(
-        [*command, str(config)], stderr=subprocess.PIPE, text=True, env=ENVIRONMENT | env
+def test_it_goes_on_in_a_fresh_process_after_a_kernel_that_made_it_large(tmp_path):
+    warm = own_folder()
+    assert warm is not None
+    folder = shutil.copytree(warm, tmp_path / warm.name)
+    folder.chmod(0o700)
+    lose_some(folder)
+    done = subprocess.run(
+        [sys.executable, "-c", GROWN],
+        env=ENVIRONMENT | {"NUMBA_CACHE_DIR": str(folder)},
+        capture_output=True,
+        text=True,
+        check=True,
     )
-    try:
-        manager.wait("STATUS=compiling kernels: ", 60.0)
-        children = Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text()
-        os.kill(int(children.split()[0]), signal.SIGKILL)
-        _, said = process.communicate(timeout=60)
-    finally:
-        process.kill()
-        process.wait()
-        manager.close()
-    assert process.returncode == 1
-    assert "the compiler was killed by SIGKILL, probably out of memory" in said
-    assert "Traceback" not in said
+    said = [line.partition("\t")[0::2] for line in done.stdout.splitlines()]
+    assert [word for word, _ in said].count(REASON) == 1
+    assert said.count((STAGE, STAGES[0])) > 1
+    assert said[-1] == (STAGE, STAGES[-1])
+    assert missing_from(folder) == ""

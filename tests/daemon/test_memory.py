@@ -39,14 +39,31 @@ from tests.support.service_manager import unit_limit
 
 ROOT = Path(__file__).parents[2]
 DEFAULT = DaemonConfig()
+LARGE_MAPS = ROOT / "deploy" / "drop-ins" / "large-maps.conf"
 CELLS = DaemonConfig(planner=PlannerConfig(line="cells"))
 
 
-def test_the_unit_has_what_the_daemon_needs():
+def test_the_drop_in_for_large_maps_has_what_the_daemon_needs_for_them():
     high, most = limits_mib(DEFAULT)
-    assert (unit_limit("MemoryHigh"), unit_limit("MemoryMax")) == (high * MIB, most * MIB)
+    unit = LARGE_MAPS
+    assert (unit_limit("MemoryHigh", unit), unit_limit("MemoryMax", unit)) == (
+        high * MIB,
+        most * MIB,
+    )
     assert needed_bytes(DEFAULT) <= high * MIB < most * MIB
-    assert afforded(DEFAULT, unit_limit()) == DEFAULT
+    assert afforded(DEFAULT, most * MIB) == DEFAULT
+
+
+def test_under_the_units_limit_maps_are_as_large_as_the_guide_says():
+    smaller = afforded(DEFAULT, unit_limit())
+    assert needed_bytes(smaller) <= unit_limit("MemoryHigh") * 1.02 < unit_limit()
+    pixels, cells = smaller.map.max_pixels // 100_000 / 10, smaller.map.max_lattice_cells // 1000
+    guide = " ".join((ROOT / "deploy" / "README.md").read_text().split())
+    assert f"up to {pixels} million pixels" in guide
+    assert f"up to {cells},000 cells" in guide
+    assert f"MemoryMax={unit_limit() // MIB}M" in guide
+    contract = " ".join((ROOT / "protocol" / "README.md").read_text().split())
+    assert f"{pixels} million pixels and {cells},000 cells" in contract
 
 
 def test_the_guides_say_the_formula():

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from fasaco_edge import host
-from fasaco_edge.kernels import cache, jit, release, sealed
+from fasaco_edge.kernels import cache, code_files, compiler, jit, release, sealed
 from fasaco_edge.kernels.cache import note_complete
 from fasaco_edge.kernels.release import KERNEL_SUFFIX
 from tests.kernels.harm import kernel_files
@@ -26,7 +26,7 @@ logging.basicConfig(handlers=[handler := logging.Handler()])
 said = []
 handler.emit = lambda record: said.append(record.getMessage())
 
-from fasaco_edge.kernels import cache, jit
+from fasaco_edge.kernels import cache, code_files, jit
 
 more = []
 
@@ -43,13 +43,13 @@ def tell(x=1, note=True):
     missing = cache.missing_from(folder)
     assert eight(x) == 8 * x
     if note:
-        jit.note_all_compiled()
+        code_files.note_all_compiled()
     stats = [seven.stats, eight.stats, *more]
     loaded, compiled = (
         sum(sum(getattr(stat, kind).values()) for stat in stats)
         for kind in ("cache_hits", "cache_misses")
     )
-    place = (folder := jit.kernel_folder()) and str(folder)
+    place = (folder := code_files.kernel_folder()) and str(folder)
     print(json.dumps([missing, passed_over, loaded, compiled, said, place]))
 """
 
@@ -175,6 +175,6 @@ def package_in(folder: Path) -> Path:
     for part in (package.parent / "__init__.py", package / "__init__.py"):
         part.touch()
     shutil.copytree(Path(host.__file__).parent, package.parent / "host")
-    for module in (jit, cache, release, sealed):
+    for module in (jit, code_files, compiler, cache, release, sealed):
         shutil.copy(module.__file__, package)
     return package

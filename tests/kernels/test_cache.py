@@ -262,7 +262,7 @@ except OSError:
     pass
 seven.tell()
 import os
-print(sorted(os.listdir(seven.jit.kernel_folder())), file=open("{installed.root}/left", "w"))
+print(sorted(os.listdir(seven.code_files.kernel_folder())), file=open("{installed.root}/left", "w"))
 print(__import__("json").dumps(["", "", *[0, 0], seven.said, None]))
 """
     told = installed.tell(fill, words=disk)

@@ -241,7 +241,7 @@ seven.tell(note=False)
 
 def after_seven(gone):
     """A process that loads one kernel, then loses files, then needs the other, which calls it."""
-    head = "from pathlib import Path\njit_folder = Path(seven.jit.kernel_folder())\n"
+    head = "from pathlib import Path\njit_folder = Path(seven.code_files.kernel_folder())\n"
     return head + SEVEN_THEN_EIGHT.format(gone=gone)
 
 

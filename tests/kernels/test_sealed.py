@@ -57,7 +57,9 @@ def test_a_harmed_file_that_nobody_writes_again_is_cleared_away(tmp_path, harm):
 
 def test_a_kernel_that_is_lost_while_it_runs_is_not_noted_as_there(installed):
     """The disk gives a file once, and not again: what the next process compiles is missing."""
-    lose = "for file in seven.jit.kernel_folder().glob('seven.eight-*'): file.write_bytes(b'')"
+    lose = (
+        "for file in seven.code_files.kernel_folder().glob('seven.eight-*'): file.write_bytes(b'')"
+    )
     told = installed.tell(f"seven.eight(1)\n{lose}\nseven.tell()")
     assert "could not be read again" in told.warnings[0]
     second = installed.tell()
