@@ -20,7 +20,7 @@ Sample = tuple[Labels, float | UnsetType | None]
 
 
 class Figure(NamedTuple):
-    """A metric: name, type ("gauge" or "counter"), help text, and its samples from a status.
+    """A metric: name, type (gauge, counter or summary), help text, and its samples from a status.
 
     A sample whose value is None or unset is left out.
     """
@@ -110,7 +110,7 @@ FIGURES = (
     Figure("latency_seconds", "gauge", "how long a stage took last", _latencies),
     Figure("cycles_total", "counter", "cycles of the loop", _member("loop_ms", "turns")),
     Figure("cycles_late_total", "counter", "cycles longer than 100 ms", _member("loop_ms", "late")),
-    Figure("cycle_seconds", "gauge", "cycles of the loop since the start, by quantile", _times),
+    Figure("cycle_seconds", "summary", "cycles of the loop since the start, by quantile", _times),
     Figure("errors_total", "counter", "refused, not published or failed", _errors),
     Figure("ledger_age_seconds", "gauge", "since progress was written", _member("ledger", "age_s")),
     Figure(

@@ -68,7 +68,7 @@ def parsed(text):
         if line.startswith("# TYPE "):
             _, _, of, kind = line.split(" ")
             assert of == name
-            assert kind in ("gauge", "counter")
+            assert kind in ("gauge", "counter", "summary")
             assert (kind == "counter") == name.endswith("_total")
             kinds[name] = kind
             continue
@@ -77,6 +77,8 @@ def parsed(text):
         assert found[1] == name
         labels = tuple(sorted(re.findall(LABEL, found[2] or "")))
         assert (name, labels) not in samples, "no sample twice"
+        # Prometheus knows quantiles of summaries alone.
+        assert (kinds[name] == "summary") == ("quantile=" in line)
         samples[name, labels] = float(found[3])
     return samples
 
@@ -105,6 +107,9 @@ def test_the_board_shows_figures_and_labels_that_there_are():
             for label in re.findall(r"\{\{(\w+)\}\}", target["legendFormat"]):
                 has = [labels for name, labels in told if name == names[0]]
                 assert all(any(one.startswith(f"{label}=") for one in labels) for labels in has)
+            # The first of its kind has nothing to grow from.
+            if "errors_total" in target["expr"]:
+                assert re.match(r"\((\S+) unless \1 offset 5m\) or increase", target["expr"])
             # A counter means something by its growth alone.
             for name in names:
                 grows = f"increase({name}" in target["expr"] or f"rate({name}" in target["expr"]
