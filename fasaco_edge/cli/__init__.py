@@ -87,7 +87,10 @@ def run_command(parser: argparse.ArgumentParser, words: Sequence[str]) -> int:
     os.umask(os.umask(0o022) | 0o022)
     open_missing_streams()
     clean_streams()
-    args = parser.parse_args(with_negative_pairs(words))
+    args, unknown = parser.parse_known_args(with_negative_pairs(words))
+    if unknown:
+        told = f"{parser.prog} {words[0]} --help lists what there is"
+        parser.error(f"unrecognized arguments: {' '.join(unknown)}; {told}")
     begin_logging(args.log_level)
     if args.with_parent is not None:
         end_with_parent(args.with_parent)

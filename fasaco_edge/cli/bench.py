@@ -29,6 +29,11 @@ BENCHMARKS: tuple[Benchmark[Any], ...] = (
 )  # fmt: skip
 
 EPILOG = """\
+examples:
+  fasaco-edge bench speed                              is this computer fast enough?
+  fasaco-edge bench footprint                          memory and processor of a daemon here
+  fasaco-edge bench planners --planner mine.py:walk    your planner beside the others
+
 Each benchmark has --help, prints a table or --json, and can be
 interrupted (Ctrl-C): it then reports what it has measured so far. Figures are
 medians with their range; run them on a quiet machine.
@@ -155,7 +160,8 @@ def _table(title: str) -> Table:
 
 
 COMMAND = Command(
-    description="Measure this installation on this machine.",
+    description="Measure planning, the daemon's memory and delays on this machine, or compare "
+    "planners. Each benchmark says what is good and whether that is met.",
     run=run,
     add_options=add_benchmarks,
     epilog=EPILOG,

@@ -121,7 +121,8 @@ def _print(args: argparse.Namespace, planned: Plan) -> None:
 
 
 COMMAND = Command(
-    description="Plan a walk over all cells the robot can reach, and say how good it is.",
+    description="Plan a walk over all cells that the robot can reach, and the line along it that "
+    "it drives; print how good they are. Files are written only where an option names them.",
     run=run,
     add_options=add_options,
     epilog=EPILOG,

@@ -23,7 +23,8 @@ EPILOG = f"""\
 examples:
   fasaco-edge serve                                    http://127.0.0.1:{PORT}, to look only
   fasaco-edge serve --allow-commands                   who is on this computer may command, too
-  fasaco-edge serve --listen 0.0.0.0:{PORT} --tokens /etc/fasaco-edge/page-tokens
+  fasaco-edge serve --listen 0.0.0.0:{PORT} --tokens page-tokens
+                                                       for phones: prints a link for each role
   fasaco-edge serve --connect tcp/192.168.1.20:7447 --robot hall2
 
 The page shows map, swept floor, path, zones and robot, and starts, pauses and sends home where that

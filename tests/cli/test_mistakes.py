@@ -146,6 +146,7 @@ def test_a_mistake_is_told_with_a_hint(folder, capsys, words, code, said):
         ("plan office --end there", "--end: must be anywhere, home or row,column, got 'there'"),
         ("plan office --end home --return-home", "not allowed with argument --end"),
         ("plan office --cell wide", "argument --cell: invalid float value: 'wide'"),
+        ("review a.rrd --format csv", "--format csv; fasaco-edge review --help lists what"),
         ("plan office --planner best", "argument --planner: must be fasaco, aco"),
         ("record", "the following arguments are required: --out"),
         ("record --out . --pose-schema tf", "argument --pose-schema: invalid choice: 'tf'"),

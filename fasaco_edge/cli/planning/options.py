@@ -29,19 +29,18 @@ from fasaco_edge.planners.paper.colony import VISIBILITIES
 from fasaco_edge.planners.registry import PLANNER_NAMES, PLANNERS
 
 EPILOG = """\
-examples:
-  fasaco-edge plan basement --png basement.png
-  fasaco-edge plan site.yaml --cell 0.35 --robot-radius 0.2 --start-xy 1.5,-2 --json
-  fasaco-edge plan site.yaml --xy-out line.csv --png line.png
-  fasaco-edge plan site.yaml --line quick --align axes --xy-out line.csv
-  fasaco-edge plan site.yaml --line cells --path-out path.csv
+your building and robot:
+  fasaco-edge plan site.yaml --cell 0.35 --robot-radius 0.2 --start-xy 1.5,-2 --png line.png
+  fasaco-edge plan site.yaml --config robot.yaml --xy-out line.csv
   fasaco-edge plan scan.png --resolution 0.05 --unknown-free --png line.png
-  fasaco-edge plan site.yaml --config robot.yaml --json
-  fasaco-edge plan grid.npy --start 8,8 --planner aco --end home --path-out path.csv
-  fasaco-edge plan office --planner mine.py:depth_first --png mine.png
+  fasaco-edge plan site.yaml --line quick --align axes --xy-out line.csv
   fasaco-edge plan office --turn-s 2 --budget 0.1 --end 12,3
-  fasaco-edge plan basement --no-local-search --seed 7 --pheromone-png trail.png
   fasaco-edge plan office --robots 0,0 10,5 5,8 --end home --png fleet.png
+the paper's planners, and your own:
+  fasaco-edge plan basement --no-local-search --seed 7 --pheromone-png trail.png
+  fasaco-edge plan grid.npy --start 8,8 --planner aco --end home --path-out path.csv
+  fasaco-edge plan site.yaml --line cells --path-out path.csv
+  fasaco-edge plan office --planner mine.py:depth_first --png mine.png
 
 figures:
   revisits         steps + 1 - distinct cells
@@ -210,7 +209,9 @@ def _add_planner(group: argparse._ArgumentGroup) -> None:
         + "with your rights, see fasaco_edge/README.md "
         + f"(default: {SEARCH.planner})",
     )
-    group.add_argument("--ants", type=int, metavar="N", help=f"(default: {SEARCH.ants})")
+    group.add_argument(
+        "--ants", type=int, metavar="N", help=f"ants in all (default: {SEARCH.ants})"
+    )
     group.add_argument(
         "--velocities",
         metavar="V",
@@ -237,7 +238,12 @@ def _add_planner(group: argparse._ArgumentGroup) -> None:
     ):
         told = f"{what} (default: {getattr(SEARCH, name):g})"
         group.add_argument(f"--{name}", type=float, help=told)
-    group.add_argument("--seed", type=int, metavar="N", help=f"(default: {SEARCH.seed})")
+    group.add_argument(
+        "--seed",
+        type=int,
+        metavar="N",
+        help=f"of all draws: the same seed, the same walk (default: {SEARCH.seed})",
+    )
     group.add_argument(
         "--threads",
         type=int,

@@ -33,6 +33,17 @@ read; of files that a crash cut short, the whole part is used.
 """
 
 
+EXAMPLES = """\
+examples:
+  fasaco-edge review run00001-*.rrd                    one screen: swept, left over, troubles
+  fasaco-edge review night.rrd --at 1:00 --png at.png  why did the robot turn round there?
+  fasaco-edge review night.rrd --point 2.55,0.24       why is this spot (x, y) [m] not swept?
+  fasaco-edge review night.rrd --against last.rrd --png both.png
+  fasaco-edge review night.rrd --export night --export-as parquet
+  fasaco-edge review night.rrd --html night.html       everything, as a page to pass on
+"""
+
+
 def _time(text: str) -> float:
     """Read ``H:MM:SS``, ``MM:SS`` or seconds."""
     parts = text.split(":")
@@ -215,7 +226,7 @@ def _read(paths: Sequence[Path], name: str) -> Review:
 
 def _epilog() -> str:
     """Return what the JSON document holds: one way to say it, for help and for readers."""
-    lines = ["the JSON document holds, with times in seconds since the recording began:"]
+    lines = [EXAMPLES, "the JSON document holds, with times in seconds since the recording began:"]
     for line in explanations():
         lines += textwrap.wrap(line, 96, initial_indent="  ", subsequent_indent="      ")
     lines += textwrap.wrap(
