@@ -18,6 +18,7 @@ SETTINGS = {
     "tool width": "robot.tool_width_m",
     "robot radius": "robot.radius_m",
     "planner": "planner.name",
+    "own planner": "planner.own",
     "seed": "planner.seed",
     "turn time": "robot.quarter_turn_s",
     "turn rate": "robot.turn_deg_s",

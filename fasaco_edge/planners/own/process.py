@@ -78,19 +78,18 @@ class OwnProcess:
         return self._instead.plan(problem, stop, observe)
 
     def _planned(self, problem: CoverageProblem, stop: StoppingCriterion) -> CoveragePath:
-        began = time.monotonic()
+        began, most_s = time.monotonic(), FIRST_S if self._other is None else MOST_S
         try:
-            until = began + (FIRST_S if self._other is None else MOST_S)
             other = self._other or self._start()
             question = pickle.dumps(posed(problem, self._seed))
-            exchange = _Exchange(other, until, stop)
+            exchange = _Exchange(other, began + most_s, stop)
             exchange.send(LENGTH.pack(len(question)) + question)
             (size,) = LENGTH.unpack(exchange.receive(LENGTH.size))
             if not 0 < size <= MOST_BYTES:
                 raise EOFError
             answer = exchange.receive(size)
         except TimeoutError:
-            raise self._given_up(f"no walk within {MOST_S:g} s") from None
+            raise self._given_up(f"no walk within {most_s:g} s") from None
         except (OSError, EOFError) as error:
             why = f"; {error.strerror}" if isinstance(error, OSError) and error.strerror else ""
             raise self._given_up(f"its process has ended{why}") from error

@@ -86,7 +86,7 @@ def screen_rows(review: Review, document: ReviewDocument) -> list[tuple[str, str
     by_name = {figure.name: figure.text for figure in figures(document)}
     config, grid = document.config, document.map
     sides = "" if grid is None else "{:.1f} x {:.1f} m, ".format(*grid.sides_m)
-    planner = f"{config.get('planner.name', 'planner not recorded')}"
+    planner = config.get("planner.own") or config.get("planner.name", "planner not recorded")
     reached = [
         f"{percent} % {by_name[f'{percent} % of cells covered after']}" for percent in MILESTONES
     ]
