@@ -203,8 +203,9 @@ def print_answer(reply: Reply) -> None:
 def show(name: str, reply: Reply) -> None:
     """Print the answer to question ``name``."""
     if reply.schema:
-        rows = [(title, str(value)) for title, value in _figures(reply).items()]
-        out().print(figures(rows))
+        # A path that no plan made has none of a plan's figures.
+        known = {title: value for title, value in _figures(reply).items() if value is not None}
+        out().print(figures([(title, str(value)) for title, value in known.items()]))
     elif name in ("status", "mission"):
         show_mission(reply)
     else:

@@ -40,6 +40,7 @@ def test_every_question_has_an_answer_people_can_read(endpoint, capsys, name):
     assert main(["ask", name, "--connect", endpoint]) == 0
     told = capsys.readouterr()
     assert SAID[name] in told.out
+    assert "None" not in told.out
     assert told.err == ""
 
 
