@@ -1,4 +1,7 @@
-"""``bench fleet``: how much sooner several robots are done in one building, planned offline."""
+"""``bench fleet``: how much sooner several robots are done in one building.
+
+Planned offline here; by real daemons in ``bench.fleet_online``.
+"""
 
 from __future__ import annotations
 
@@ -19,6 +22,12 @@ from fasaco_edge.bench.benchmark import (
     positive,
     seconds_above_zero,
 )
+from fasaco_edge.bench.fleet_online import (
+    OnlineRun,
+    add_online_options,
+    measure_online,
+    report_online,
+)
 from fasaco_edge.grid.lattice import Cell
 from fasaco_edge.planners.cost import CoverageCost
 from fasaco_edge.planners.fleet.division import Division, divide
@@ -28,7 +37,7 @@ from fasaco_edge.planners.planner import TimeBudget
 from fasaco_edge.planners.problem import CoverageProblem
 from fasaco_edge.planners.warmup import warm_up
 
-MAPS = ("flat", "office", "basement")
+MAPS, ONLINE_MAPS = ("flat", "office", "basement"), ("flat",)
 # Cost of a step of the built-in maps' robot [s].
 STEP_S = 1.2
 HEADER = ("building", "robots", "cells", "longest", "of an even share", "bound", "twice", "CPU s")
@@ -109,9 +118,13 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         help="search time of a plan [s] (default: 1)",
     )  # fmt: skip
     parser.add_argument("--seed", type=int, default=0, help="of starts and search (default: 0)")
+    add_online_options(parser)
 
 
-def _measure(args: argparse.Namespace, say: Say) -> Generator[SharedWalks, None, None]:
+def _measure(args: argparse.Namespace, say: Say) -> Generator[SharedWalks | OnlineRun, None, None]:
+    if args.online:
+        yield from measure_online(args, grid_names(args, ONLINE_MAPS), say)
+        return
     warm_up()
     for name in grid_names(args, MAPS):
         grid = read_grid(name)
@@ -125,7 +138,10 @@ def _measure(args: argparse.Namespace, say: Say) -> Generator[SharedWalks, None,
             yield plan_shared(grid, fleet, args.budget)[0]
 
 
-def _report(args: argparse.Namespace, plans: Sequence[SharedWalks]) -> Report:
+def _report(args: argparse.Namespace, samples: Sequence[SharedWalks | OnlineRun]) -> Report:
+    plans = [sample for sample in samples if isinstance(sample, SharedWalks)]
+    if args.online:
+        return report_online(args, [run for run in samples if isinstance(run, OnlineRun)])
     return Report(
         title=f"robots that share a building and return, {args.budget:g} s of search",
         header=HEADER,
@@ -154,6 +170,9 @@ def _report(args: argparse.Namespace, plans: Sequence[SharedWalks]) -> Report:
 
 
 def _count(args: argparse.Namespace) -> int:
+    if args.online:
+        runs: int = len(grid_names(args, ONLINE_MAPS)) * len(args.robots) * args.repeats
+        return runs
     return len(grid_names(args, MAPS)) * len(args.robots)
 
 
@@ -161,7 +180,8 @@ FLEET = Benchmark(
     name="fleet",
     summary="several robots in one building: the longest walk against an even share",
     description="Plan one walk for each of several robots that share a building, as `plan --robots`"
-    " does: the first robot starts where one alone would, the others anywhere.",
+    " does: the first robot starts where one alone would, the others anywhere. With --online real "
+    "daemons and simulated robots cover a building that none of them knows.",
     add_options=_add_options,
     count=_count,
     measure=_measure,
@@ -170,5 +190,7 @@ FLEET = Benchmark(
 examples:
   fasaco-edge bench fleet
   fasaco-edge bench fleet --maps warehouse --robots 2 3 --budget 10 --json
+  fasaco-edge bench fleet --online --robots 1 2 4
+  fasaco-edge bench fleet --online --maps office --robots 3 --kill-after 120 --split-after 60
 """,
 )

@@ -32,6 +32,8 @@ Driver = Literal["ideal", "follow"]
 CYCLE_S = 0.02
 # Waits are no shorter than this, or a fast simulation would do nothing but wake up [s].
 WAIT_S = 0.004
+# A robot that is silent for this long is no obstacle any more, in real time [s].
+CARRIED_AWAY_S = 10.0
 REPORT_EVERY_S = 0.5
 # A robot that moves faster than in life waits for a new velocity after this long [simulated s], but
 # not longer than that [s]: whatever drives it gets the time that it would have.
@@ -153,6 +155,7 @@ class RobotOnBus:
         self._pose = bus.advertise(keys, topics.POSE)
         self._battery = bus.advertise(keys, topics.BATTERY)
         self._keys = keys
+        self._met_at: dict[str, float] = {}
         self._newest: LatestSlot[Sample] = LatestSlot()
         self._is_driven = driver == "follow"
         self._took_at = time.monotonic()
@@ -181,6 +184,7 @@ class RobotOnBus:
                 self.publish(world.tick())
                 pace.ticked(now_s)
             if now_s - self._reported_s >= REPORT_EVERY_S:
+                self._part(now_s)
                 report(self.progress(now_s))
 
     def publish(self, emission: Emission) -> None:
@@ -204,7 +208,15 @@ class RobotOnBus:
             pose = decode_pose(sample.payload, sample.schema).pose
         except MalformedMessage:
             return
+        self._met_at[name] = time.monotonic()
         self._world.others = {**self._world.others, name: (pose.x, pose.y)}
+
+    def _part(self, now_s: float) -> None:
+        """Drop other robots that are silent: somebody has carried them away."""
+        places, met_at = self._world.others, self._met_at
+        here = {name: at for name, at in places.items() if now_s - met_at[name] < CARRIED_AWAY_S}
+        if len(here) < len(places):
+            self._world.others = here
 
     def _waits(self, now_s: float, patience_s: float) -> bool:
         """Tell whether time stands still until a velocity comes."""

@@ -20,7 +20,7 @@ from fasaco_edge.grid.map_files import find_map
 from fasaco_edge.host.files import make_own_folder
 
 RUNS = Path("runs")
-MOST_ROBOTS = 6
+MOST_ROBOTS = 8
 SPEED, FLEET_SPEED = 20.0, 5.0
 
 
@@ -68,6 +68,27 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         help="how long the robot's battery lasts [simulated min], charged where it started; 0 for "
         "ever (default: %(default)g)",
     )
+    fleet = parser.add_argument_group("of several robots")
+    fleet.add_argument(
+        "--kill-after",
+        type=float,
+        metavar="S",
+        help="kill the last robot's daemon after so many simulated seconds: the others take over",
+    )
+    fleet.add_argument(
+        "--split-after",
+        type=float,
+        metavar="S",
+        help="split the network after so many simulated seconds, for 15 real ones: every second "
+        "robot hears none of the others",
+    )
+    fleet.add_argument(
+        "--record",
+        choices=("all", "fleet"),
+        default="all",
+        help="recordings of each robot and of the fleet, or of the fleet alone, with less load "
+        "(default: %(default)s)",
+    )
     parser.add_argument("--cell", type=float, default=DEFAULT_CELL_M, metavar="M", help="[m]")
     parser.add_argument(
         "--robot-radius", type=float, default=DEFAULT_RADIUS_M, metavar="M", help="[m]"
@@ -90,6 +111,8 @@ def run(args: argparse.Namespace) -> int:
         args.speed = SPEED if args.robots == 1 else FLEET_SPEED
     if not args.speed > 0:
         raise BadConfiguration(f"--speed must be above 0, got {args.speed}")
+    if args.robots == 1 and (args.kill_after is not None or args.split_after is not None):
+        raise BadConfiguration("--kill-after, --split-after: a fleet has --robots of 2 or more")
     out: Path = args.out or RUNS / f"{datetime.now():%Y-%m-%dT%H-%M-%S}"
     with naming(out):
         if args.out is None:

@@ -22,6 +22,7 @@ from fasaco_edge.bus.mailbox import LatestSlot
 from fasaco_edge.bus.session import Bus, open_bus
 from fasaco_edge.bus.settings import BusSettings
 from fasaco_edge.cli.console.terminal import err
+from fasaco_edge.cli.demo.mishaps import Mishaps
 from fasaco_edge.cli.demo.robots import DemoRobot, fleet_recorder
 from fasaco_edge.errors import ProcessEnded
 from fasaco_edge.host.processes import python_program
@@ -37,6 +38,7 @@ STOP_TIMEOUT_S = 8.0
 SETTLE_SIM_S = 3.0
 # Programs that hear the robots, by the names of their logs.
 LAST = ("daemon", "fleet")
+AT_WORK = ("planning", "covering", "degraded")
 
 
 class DemoView:
@@ -88,12 +90,16 @@ class Ending:
         wall_s: how long it took [s].
         replan_ms: time of every plan heard of [ms].
         timed_out: whether time ran out first.
+        makespan_s: from when the first robot worked until the last was done, in simulated time.
+        killed: name of the robot that was killed; "" for none.
     """
 
     statuses: tuple[Status, ...]
     wall_s: float
     replan_ms: tuple[float, ...]
     timed_out: bool
+    makespan_s: float = 0.0
+    killed: str = ""
 
 
 class DemoMission:
@@ -102,6 +108,14 @@ class DemoMission:
     def __init__(self, args: argparse.Namespace, robots: Sequence[DemoRobot]) -> None:
         self._args, self._robots = args, robots
         self._endpoint = f"tcp/127.0.0.1:{_free_port()}"
+        # Another router for every second robot, if the network is to be split.
+        self._far = self._endpoint
+        if args.split_after is not None:
+            self._far = f"tcp/127.0.0.1:{_free_port()}"
+        self._mishaps = Mishaps(
+            args.kill_after, args.split_after, (self._endpoint, self._far), err().print
+        )
+        self._killed = ""
         self._processes: list[tuple[Path, subprocess.Popen[bytes]]] = []
         self._stack = ExitStack()
         self._newest = [LatestSlot[Sample]() for _ in robots]
@@ -110,6 +124,9 @@ class DemoMission:
         with ExitStack() as stack:
             # The router that all meet at.
             bus = stack.enter_context(open_bus(BusSettings("router", (), (self._endpoint,))))
+            if self._far != self._endpoint:
+                stack.enter_context(open_bus(BusSettings("router", (), (self._far,))))
+            stack.enter_context(self._mishaps)
             stack.callback(self._stop)
             self._start(bus)
             self._stack = stack.pop_all()
@@ -122,6 +139,7 @@ class DemoMission:
         """Show the mission until all is covered; return how it ended."""
         started = time.monotonic()
         done_since: float | None = None
+        worked_at: list[float] = []
         statuses = [Status() for _ in self._robots]
         plans: dict[tuple[int, int], float] = {}
         settle_s = max(SETTLE_SIM_S / self._args.speed, 1.5)
@@ -137,20 +155,39 @@ class DemoMission:
                             plans[number, status.plan.plans] = status.latency_ms.plan
                         view.show(number, status, now - started)
                         statuses[number] = status
-                done = all(status.state == "done" for status in statuses)
+                        worked_at += [now] if status.state in AT_WORK else []
+                if worked_at:
+                    self._let_happen(now, worked_at[0])
+                done = all(
+                    status.state == "done" or robot.name == self._killed
+                    for robot, status in zip(self._robots, statuses, strict=True)
+                )
                 done_since = (done_since or now) if done else None
                 if done_since is not None and now - done_since >= settle_s:
                     break
         timed_out = done_since is None
         wall_s = time.monotonic() - started
-        return Ending(tuple(statuses), wall_s, tuple(plans.values()), timed_out)
+        worked_s = worked_at[-1] - worked_at[0] if worked_at else 0.0
+        return Ending(
+            tuple(statuses), wall_s, tuple(plans.values()), timed_out,
+            makespan_s=worked_s * self._args.speed, killed=self._killed,
+        )  # fmt: skip
+
+    def _let_happen(self, now: float, began: float) -> None:
+        """Let mishaps happen that are due; of the last robot's processes none is missed then."""
+        last = self._robots[-1]
+        victim = [one for log, one in self._processes if log.parent == last.folder]
+        if self._mishaps.step(now, (now - began) * self._args.speed, victim):
+            self._killed = last.name
+            err().print(f"{last.name} is killed")
 
     def _start(self, bus: Bus) -> None:
-        for robot, newest in zip(self._robots, self._newest, strict=True):
+        for number, (robot, newest) in enumerate(zip(self._robots, self._newest, strict=True)):
+            endpoint = self._far if number % 2 else self._endpoint
             robot.folder.mkdir(exist_ok=True)
-            robot.write_config(self._args, self._endpoint)
+            robot.write_config(self._args, endpoint)
             bus.listen(Keys(robot.name), topics.STATUS, newest.put)
-            for name, words in robot.programs(self._args, self._endpoint):
+            for name, words in robot.programs(self._args, endpoint):
                 self._spawn(robot.folder / f"{name}.log", words)
         if len(self._robots) > 1:
             out = self._robots[0].folder.parent
@@ -165,7 +202,7 @@ class DemoMission:
 
     def _check_processes(self) -> None:
         for log, process in self._processes:
-            if process.poll() is not None:
+            if process.poll() is not None and log.parent.name != self._killed:
                 last = deque(log.read_text(errors="replace").splitlines(), maxlen=5)
                 raise ProcessEnded(
                     f"the {log.stem} ended with {process.returncode}:\n  " + "\n  ".join(last),

@@ -74,7 +74,9 @@ class DemoRobot:
 
     def programs(self, args: argparse.Namespace, endpoint: str) -> list[tuple[str, list[str]]]:
         """Return the programs to start: for each its name, and the words after `fasaco-edge`."""
-        daemon = ["run", "--config", str(self.config), "--record", str(self.folder)]
+        daemon = ["run", "--config", str(self.config)]
+        if args.record == "all":
+            daemon += ["--record", str(self.folder)]
         # Its own progress, from the beginning: no other daemon's, nor an earlier demo's.
         daemon += ["--state", str(self.folder / "state"), "--fresh"]
         robot = ["simulate", str(find_map(args.map)), "--driver", args.driver]

@@ -87,6 +87,8 @@ class Summary:
     plan_ms_p99: float | None
     errors: int
     wall_s: float
+    makespan_s: float
+    killed: str
     recording: list[str]
     fleet_recording: list[str]
     picture: str
@@ -99,7 +101,11 @@ def summarise(
     truth = _truth(args, robots)
     covered = truth.reachable & (truth.visits > 0)
     reachable, done = int(truth.reachable.sum()), int(covered.sum())
-    reports = [status.coverage for status in ending.statuses if status.coverage is not None]
+    reports = [
+        status.coverage
+        for robot, status in zip(robots, ending.statuses, strict=True)
+        if status.coverage is not None and robot.name != ending.killed
+    ]
     if args.line != "cells" and reports:
         # Along a line the robot passes beside the centres of cells: use the daemon's own count, of
         # several that which has most left.
@@ -132,6 +138,8 @@ def summarise(
         plan_ms_p99=_percentile(ending.replan_ms, 99),
         errors=sum(status.errors.total for status in ending.statuses),
         wall_s=round(ending.wall_s, 1),
+        makespan_s=round(ending.makespan_s, 1),
+        killed=ending.killed,
         recording=[str(file) for robot in robots for file in sorted(robot.folder.glob("*.rrd"))],
         fleet_recording=[str(file) for file in sorted(out.glob("*-fleet-*.rrd"))],
         picture=str(out / "mission.png"),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import random
 import statistics
 from collections.abc import Generator, Sequence
 from dataclasses import asdict, dataclass
@@ -72,6 +73,10 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--robots", type=positive, nargs="+", default=[2, 4, 8], metavar="N")
     parser.add_argument("--line", choices=("cells", "thorough"), default="cells")
     parser.add_argument(
+        "--loss", type=float, default=0.0, metavar="P",
+        help="chance that a message is lost, for each listener (default: 0)",
+    )  # fmt: skip
+    parser.add_argument(
         "--period", type=float, default=1.0, metavar="S", help="between messages (default: 1)"
     )
 
@@ -87,7 +92,8 @@ def _measure(args: argparse.Namespace, say: Say) -> Generator[FleetFigures, None
                 continue
             say(f"{name}, {robots} robots")
             starts = [first, *apart(lattice, first, robots - 1)]
-            run = _run(Fleet(truth, starts, args.line, args.period, radius_m=radius_m))
+            fleet = Fleet(truth, starts, args.line, args.period, radius_m=radius_m)
+            run = _run(fleet, args.loss)
             yield _figures(name, run, alone)
 
 
@@ -104,8 +110,11 @@ def _buildings(
         yield made.name, made.truth, first, RADIUS_SHARE * TOOL_M
 
 
-def _run(fleet: Fleet) -> FleetRun:
+def _run(fleet: Fleet, loss: float = 0.0) -> FleetRun:
     run = FleetRun(fleet)
+    if loss:
+        chance = random.Random(1)
+        run.hears = lambda _speaker, _listener: chance.random() >= loss
     run.run()
     return run
 
@@ -175,7 +184,8 @@ FLEET_ONLINE = Benchmark(
     name="fleet-online",
     summary="fleets in buildings that no robot knows, against one robot",
     description="Let simulated robots with scanners, discs and messages share a building that "
-    "none of them knows, each with its own mission, in simulated time.",
+    "none of them knows, each with its own mission, in simulated time and one process, so that "
+    "the same options give the same run. Of real daemons it is `fasaco-edge bench fleet --online`.",
     add_options=_add_options,
     count=_count,
     measure=_measure,
@@ -185,5 +195,6 @@ examples:
   python -m tests.benchmarks fleet-online
   python -m tests.benchmarks fleet-online --maps --generated 5 --cells 2000 --robots 4 --json
   python -m tests.benchmarks fleet-online --maps flat --generated 0 --robots 3 --line thorough
+  python -m tests.benchmarks fleet-online --robots 4 --loss 0.3
 """,
 )

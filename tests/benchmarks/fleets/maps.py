@@ -1,0 +1,33 @@
+"""Generated buildings as maps, for real daemons: ``bench fleet --online`` takes them.
+
+python -m tests.benchmarks.fleets.maps DIR --generated 3 --cells 1000
+fasaco-edge bench fleet --online --maps DIR/*.yaml --robots 1 2 4 --robot-radius 0.135
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from maps.map_writer import write_map
+from tests.benchmarks.buildings import building
+from tests.benchmarks.fleets.run import TOOL_M
+from tests.benchmarks.online.buildings import of_grid
+
+
+def main() -> None:
+    """Write the maps."""
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("--generated", type=int, default=3, metavar="N", help="(default: 3)")
+    parser.add_argument("--cells", type=int, default=1_000, help="of each (default: 1000)")
+    args = parser.parse_args()
+    args.folder.mkdir(parents=True, exist_ok=True)
+    for seed in range(args.generated):
+        file = args.folder / f"building{seed}.yaml"
+        write_map(of_grid(building(args.cells, seed), TOOL_M).truth, file)
+        print(file)
+
+
+if __name__ == "__main__":
+    main()

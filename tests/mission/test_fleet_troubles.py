@@ -1,0 +1,82 @@
+"""Fleets of one and of many, and robots whose frame changes: nobody stops for another's fault."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from tests.mission.fleets import FleetDrive
+from tests.mission.world import CONFIG, MapReceived, building, pose_at
+from tests.mission.world import Drive as Alone
+
+HALL = ["." * 16] * 10
+
+
+def test_a_fleet_of_one_drives_as_a_robot_without_a_fleet():
+    fleet = FleetDrive(HALL, {"r1": (0, 0)})
+    fleet.finish()
+    (member,) = fleet.robots.values()
+    alone = Alone((0, 0), config=replace(CONFIG, robot="r1"))
+    alone.tell(MapReceived(building(*HALL)), pose_at(0, 0))
+    driven = []
+    while alone.mission.state != "done":
+        assert len(driven) < 1000
+        if alone.request is not None:
+            alone.plan()
+        if alone.walk:
+            alone.cell = alone.walk.pop(0)
+            driven.append(alone.cell)
+        alone.tell(pose_at(*alone.cell), after=1.0)
+    # The walk begins where it stands.
+    assert [cell for cell in member.driven if cell != (0, 0)] == driven
+    assert fleet.left_out() == set()
+
+
+class Crowd(FleetDrive):
+    """Robots that take all messages of a second at once, as a daemon does."""
+
+    def tick(self, copies=1, random=None):
+        self.seconds += 1
+        for robot in self.robots.values():
+            robot.tick()
+            self.swept.add(robot.cell)
+        reports = {robot.name: robot.report() for robot in self.robots.values()}
+        for robot in self.robots.values():
+            heard = [report for name, report in reports.items() if name != robot.name]
+            robot.tell(*heard, after=0.0)
+
+
+def test_a_fleet_of_32_in_one_room_sweeps_it():
+    starts = {f"r{number:02}": divmod(number, 8) for number in range(32)}
+    fleet = Crowd(HALL, starts)
+    fleet.finish(most=400)
+    assert fleet.left_out() == set()
+    # Five cells are left for each; most of the time goes into making room.
+    alone = FleetDrive(HALL, {"r1": (0, 0)})
+    alone.finish()
+    assert fleet.seconds < alone.seconds
+
+
+@pytest.mark.parametrize("again", [True, False], ids=["comes back", "stays"])
+def test_a_robot_whose_frame_changes_is_left_out_by_name_until_it_fits_again(again):
+    fleet = FleetDrive(HALL, {"r1": (0, 0), "r2": (9, 15)})
+    fleet.run(15)
+    ours, other = fleet.robots.values()
+    assert ours.mission.fleet.has_company
+    fleet.hears = lambda speaker, listener: False
+    for _ in range(5):
+        ours.tell(replace(other.report(), frame="elsewhere"))
+        fleet.tick()
+    member = ours.mission.fleet.members["r2"]
+    assert "its frame is 'elsewhere'" in member.absence(fleet.seconds)
+    assert not ours.mission.fleet.has_company
+    assert ours.mission.state == "covering"
+    if again:
+        fleet.hears = lambda speaker, listener: True
+        fleet.run(4)
+        assert ours.mission.fleet.has_company
+        fleet.finish()
+        assert fleet.left_out() == set()
+    else:
+        fleet.finish_one(ours)
