@@ -33,6 +33,8 @@ RATES = {
 }  # fmt: skip
 FLEET_RATES = {entities.FLEET_SHARES: 1_000, entities.FLEET_TWICE: 1_000, entities.RUN_CARD: 800}
 CHUNK_BYTES = 1_200
+# Of a layer of cells in four bytes each, beyond that.
+GRID_BYTES = 1_200
 # The view follows the growing map in steps of this share of its size.
 REFRAME = 0.15
 MAP_ORDER, SHARE_ORDER, SWEPT_ORDER, TWICE_ORDER = 0.0, 1.0, 2.0, 3.0
@@ -164,7 +166,9 @@ class FleetScene:
 
     def add_cells(self, member: RecordedMember) -> None:
         """Draw the cells a robot has swept."""
-        self._draw(member, "swept", member.swept.count // 8, lambda: self._draw_swept(member))
+        self._draw(
+            member, "swept", GRID_BYTES + member.swept.count // 8, lambda: self._draw_swept(member)
+        )
 
     def add_division(self) -> None:
         """Draw who is to sweep what is left, and what two robots swept."""
