@@ -7,6 +7,7 @@ becomes a small one, which gets its settings through a pipe.
 from __future__ import annotations
 
 import argparse
+import math
 import os
 import sys
 from typing import TYPE_CHECKING, NoReturn
@@ -48,6 +49,10 @@ With `ros2.follow: nav2` in the configuration nothing is driven here: the path g
 controller, piece by piece, as goals of /follow_path (nav2_msgs/FollowPath), which end for the same
 reasons. What Nav2 says of them is said here. Were this program or its computer to die, Nav2 would
 drive to the end of the goal that it has, at most 20 m.
+
+With `ros2.dock: nav2` Nav2's docking server moves the robot into its dock, from before it, and out
+again before the next path, as goals of /dock_robot and /undock_robot (nav2_msgs/DockRobot,
+UndockRobot). Nothing is driven here until it is done; errors are tried again after 10 s to 5 min.
 
 examples:
   fasaco-edge follow --config /etc/fasaco-edge/config.yaml --dry-run
@@ -169,6 +174,7 @@ def settings_of(args: argparse.Namespace) -> FollowSettings:
         cmd_key=ros.output_key(ros.velocities(schema)) if ros else here.keys.of(topics.CMD_VEL),
         ros=_ros_node(ros, schema) if ros else {},
         nav2=_nav2(config) if ros and ros.follow == "nav2" else {},
+        dock=_dock(config) if ros and ros.dock == "nav2" else {},
         pace=args.speed,
         dry_run=args.dry_run,
     )
@@ -203,6 +209,21 @@ def _nav2(config: DaemonConfig) -> dict[str, object]:
     names = (nav2.controller, nav2.goal_checker, nav2.progress_checker, nav2.path_handler)
     near_m = nav2.near_m if nav2.near_m is not None else NEAR_SHARE * config.robot.tool_width_m
     return {"action": ros.action, "release": nav2.release, "plugins": names, "near_m": near_m}
+
+
+def _dock(config: DaemonConfig) -> dict[str, object]:
+    assert config.ros2
+    assert config.mission.dock is not None  # as checked with the configuration
+    ros, nav2, dock = config.ros2, config.ros2.nav2, config.mission.dock
+    return {
+        "dock_action": ros.dock_action,
+        "undock_action": ros.undock_action,
+        "id": nav2.dock_id,
+        "type": nav2.dock_type,
+        "frame": ros.frames.map,
+        "pose": (dock.x_m, dock.y_m, math.radians(dock.yaw_deg)),
+        "approach_m": dock.approach_m,
+    }
 
 
 COMMAND = Command(

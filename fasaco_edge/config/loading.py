@@ -13,6 +13,7 @@ from msgspec import structs
 from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.config.endpoints import endpoint_faults
 from fasaco_edge.config.reading import Fault, read_text, section_faults, with_credentials
+from fasaco_edge.config.ros import RosConfig
 from fasaco_edge.config.security import security_faults
 from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.mission.orders.mask import INLINE, inline_mask
@@ -146,8 +147,7 @@ def _misfits(config: DaemonConfig) -> Iterator[BadConfiguration]:
             "fleet.yaw_deg are given in"
         )
     if config.ros2:
-        for error in config.ros2.faults():
-            yield BadConfiguration(f"ros2.{error}")
+        yield from _ros_misfits(config, config.ros2)
     yield from _refused("bus.", lambda: Keys(base=config.bus.base))
     yield from _refused("robot.name: ", lambda: Keys(robot=config.robot.name))
     yield from _refused("robot: ", config.robot.cost)
@@ -164,6 +164,13 @@ def _misfits(config: DaemonConfig) -> Iterator[BadConfiguration]:
     yield from _refused("planner.", config.planner.colony)
     yield from _refused("", config.planner.check_own)
     yield from _refused("", config.mission.check_zones)
+
+
+def _ros_misfits(config: DaemonConfig, ros: RosConfig) -> Iterator[BadConfiguration]:
+    for error in ros.faults():
+        yield BadConfiguration(f"ros2.{error}")
+    if ros.dock == "nav2" and not config.mission.dock:
+        yield BadConfiguration("mission.dock must be given where ros2.dock is nav2, got null")
 
 
 def _refused(before: str, make: Callable[[], object]) -> Iterator[BadConfiguration]:

@@ -60,6 +60,9 @@ class Nav2Config(Section, frozen=True):
     ``controller``, ``goal_checker``, ``progress_checker`` and ``path_handler`` name its plugins, ""
     for the only one there is; ``release`` is whose goals a server behind a bridge takes. A goal
     does not come nearer to itself than ``near_m`` [m]; without it, than 0.75 of the tool's width.
+
+    Its docking server, where ``dock`` is ``nav2``: ``dock_id`` names a dock of its database, "" for
+    the pose ``mission.dock``; ``dock_type`` is its plugin, "" for the only one there is.
     """
 
     action: str = "/follow_path"
@@ -69,6 +72,10 @@ class Nav2Config(Section, frozen=True):
     progress_checker: str = ""
     path_handler: str = ""
     near_m: Annotated[float, Meta(ge=0.05, le=10)] | None = None
+    dock_action: str = "/dock_robot"
+    undock_action: str = "/undock_robot"
+    dock_id: str = ""
+    dock_type: str = ""
 
 
 class RosConfig(Section, frozen=True):
@@ -78,7 +85,8 @@ class RosConfig(Section, frozen=True):
     stands between. ``domain`` and ``node`` are for rmw_zenoh alone: a bridge has its own.
     ``pose`` is the type of the pose's topic, or "tf"; the mission's commands are services
     below ``services``. ``follow`` says what ``fasaco-edge follow`` does: drive the base itself, or
-    hand the path to Nav2's controller.
+    hand the path to Nav2's controller. ``dock`` says who moves the robot from before its dock into
+    it, and out: the base by itself, or Nav2's docking server, told by ``fasaco-edge follow``.
     """
 
     kind: Literal["bridge", "rmw_zenoh"]
@@ -95,6 +103,7 @@ class RosConfig(Section, frozen=True):
     ] = "tf"
     frames: RosFrames = RosFrames()
     follow: Literal["own", "nav2"] = "own"
+    dock: Literal["base", "nav2"] = "base"
     nav2: Nav2Config = Nav2Config()
 
     @property
@@ -122,6 +131,16 @@ class RosConfig(Section, frozen=True):
     def action(self) -> str:
         """Name of the action of Nav2's controller."""
         return self._name(self.nav2.action)
+
+    @property
+    def dock_action(self) -> str:
+        """Name of the action of Nav2's docking server that docks."""
+        return self._name(self.nav2.dock_action)
+
+    @property
+    def undock_action(self) -> str:
+        """Name of the one that undocks."""
+        return self._name(self.nav2.undock_action)
 
     def velocities(self, schema: str) -> RosTopic:
         """Return the follower's topic of velocities, of type ``schema``."""
@@ -178,14 +197,17 @@ class RosConfig(Section, frozen=True):
             yield BadConfiguration(f"node must be letters, digits and _, got {self.node!r}")
         if self.kind == "bridge" and (self.domain != 0 or self.node != DEFAULT_NODE):
             yield BadConfiguration("domain and node are for kind rmw_zenoh: a bridge has its own")
-        if not _TOPIC.fullmatch(self.nav2.action):
-            yield BadConfiguration(
-                f"nav2.action must be like /follow_path, got {self.nav2.action!r}"
-            )
-        for key in ("controller", "goal_checker", "progress_checker", "path_handler"):
+        for key in ("action", "dock_action", "undock_action"):
+            name = getattr(self.nav2, key)
+            if not _TOPIC.fullmatch(name):
+                like = Nav2Config.__struct_defaults__[Nav2Config.__struct_fields__.index(key)]
+                yield BadConfiguration(f"nav2.{key} must be like {like}, got {name!r}")
+        plugins = ("controller", "goal_checker", "progress_checker", "path_handler")
+        for key in (*plugins, "dock_id", "dock_type"):
             name = getattr(self.nav2, key)
             if not name.isprintable() or len(name.encode()) > MAX_STRING_BYTES:
-                yield BadConfiguration(f"nav2.{key} must be the name of a plugin, got {name!r}")
+                of = "dock" if key == "dock_id" else "plugin"
+                yield BadConfiguration(f"nav2.{key} must be the name of a {of}, got {name!r}")
         yield from self._topic_faults()
         for key in ("map", "robot"):
             frame = getattr(self.frames, key)

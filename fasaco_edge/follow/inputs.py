@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import threading
 import time
 from collections import deque
@@ -43,6 +44,7 @@ class Inputs:
         # Ids of the daemons that plan, and when one of them was heard; on Zenoh's threads.
         self._planners: set[str] = set()
         self._heard_at: float | None = None
+        self._status = b""
         self._lock = threading.Lock()
         keys = Keys(settings.robot, settings.base)
         for source in settings.poses:
@@ -54,6 +56,15 @@ class Inputs:
     def now(self) -> float:
         """Return the time by the clock of the robot's seconds [s]."""
         return self._clock.at(time.monotonic())
+
+    @property
+    def daemon_state(self) -> str:
+        """The daemon's state by its newest status; "" for none."""
+        try:
+            state = json.loads(self._status)["state"]
+        except (ValueError, KeyError, TypeError):
+            return ""
+        return state if isinstance(state, str) else ""
 
     def feed(self, follower: Supervision) -> None:
         """Pass the inputs to a follower."""
@@ -96,6 +107,6 @@ class Inputs:
             with self._lock:
                 (self._planners.add if is_there else self._planners.discard)(planner)
 
-    def _on_status(self, _sample: Sample) -> None:
+    def _on_status(self, sample: Sample) -> None:
         with self._lock:
-            self._heard_at = self.now()
+            self._heard_at, self._status = self.now(), sample.payload

@@ -1,7 +1,4 @@
-"""Nav2's controller on the bus: the follower's requests as queries, their replies by cycle.
-
-rmw_zenoh shows the server's types and keys in its graph; a bridge does not, and is queried by name.
-"""
+"""Nav2's controller on the bus: the follower's requests as queries, their replies by cycle."""
 
 from __future__ import annotations
 
@@ -14,10 +11,11 @@ from functools import partial
 from fasaco_edge.bus.queries import Reply
 from fasaco_edge.bus.session import Bus
 from fasaco_edge.errors import MalformedMessage
+from fasaco_edge.follow.action_client import ActionClient
 from fasaco_edge.follow.inputs import Inputs, patience_of
 from fasaco_edge.follow.nav2 import Nav2Follower
 from fasaco_edge.follow.nav2_requests import AskResult, CancelGoal, Request, SendGoal
-from fasaco_edge.follow.node import StateLog
+from fasaco_edge.follow.node import StateLog, docking_of
 from fasaco_edge.follow.settings import FollowSettings
 from fasaco_edge.wire.messages.follow_path import (
     GOAL_ID_BYTES,
@@ -28,24 +26,11 @@ from fasaco_edge.wire.messages.follow_path import (
     encode_goal,
     encode_goal_id,
 )
-from fasaco_edge.wire.ros_actions import (
-    RELEASES,
-    Call,
-    Release,
-    bridge_keys,
-    release_of,
-    served_keys,
-    server_tokens,
-)
-from fasaco_edge.wire.ros_keys import RosNode, attachment, gid_of
+from fasaco_edge.wire.ros_actions import FOLLOW_PATH, RELEASES, Call, Release, release_of
+from fasaco_edge.wire.ros_keys import RosNode
 
-# Timeout of a reply [s]; of a result, as long as driving to the end of a goal. After it the query
-# is repeated.
-ANSWER_S, RESULT_S = 5.0, 300.0
 # A server that ends a query for a result sooner, without a reply, is gone [s].
 GONE_S = 290.0
-# Period of searching the graph for the action's server [s].
-LOOK_EVERY_S = 2.0
 # Timeout for goals to end at the exit [s].
 END_S = 1.0
 
@@ -60,7 +45,6 @@ class Nav2Node:
 
     def __init__(self, bus: Bus, settings: FollowSettings, report: Callable[[str], None]) -> None:
         nav2, ros = settings.nav2, settings.ros
-        self._bus = bus
         self._report = report
         self._is_dry = settings.dry_run
         self._action: str = nav2["action"]
@@ -74,27 +58,26 @@ class Nav2Node:
         self._states = StateLog()
         # Replies of Nav2, from Zenoh's threads.
         self._answers = deque[Callable[[], None]]()
-        self._sequence = 0
-        self._gid = b""
-        self._roll = None
+        self._client = ActionClient(bus, ros, self._action, FOLLOW_PATH)
+        self._docking = docking_of(bus, settings)
         if ros["kind"] == "rmw_zenoh":
-            node = RosNode(self._domain, bus.id, ros["namespace"], ros["node"])
-            bus.token(node.token)
-            self._gid = gid_of(node.token)
-            self._roll = bus.roll(server_tokens(self._domain, self._action))
+            bus.token(RosNode(self._domain, bus.id, ros["namespace"], ros["node"]).token)
 
     def turn(self) -> None:
         """Take the inputs, and send the resulting requests."""
-        if self._roll is not None:
-            self._roll.ask(LOOK_EVERY_S)
+        self._client.look()
         self._take_answers()
         self._inputs.feed(self._follower)
+        if self._docking is not None:
+            self._docking.turn(self._inputs, self._follower)
         for request in self._follower.step(self._inputs.now()):
             self._ask(request)
         self._states.note(self._follower.state, self._follower.detail)
 
     def end(self) -> None:
         """Stop the robot."""
+        if self._docking is not None:
+            self._docking.end()
         requests = self._follower.end()
         for request in requests:
             self._ask(request)
@@ -114,7 +97,7 @@ class Nav2Node:
                 self._report(f"a goal of {count} poses, to {x:.2f}, {y:.2f} in {request.frame!r}")
             return
         goal_id = request.id
-        keys = self._keys()
+        keys = self._client.keys()
         if isinstance(request, SendGoal):
             call: Call = "send_goal"
             release, why = self._release_at(keys)
@@ -130,14 +113,11 @@ class Nav2Node:
         if call not in keys:
             self._answers.append(partial(self._take, request, [], time.monotonic()))
             return
-        self._sequence += 1
-        beside = attachment(self._sequence, time.time_ns(), self._gid) if self._gid else b""
         asked_at = time.monotonic()
-        self._bus.ask(
+        self._client.ask(
             keys[call],
+            call,
             payload,
-            beside,
-            RESULT_S if call == "get_result" else ANSWER_S,
             lambda replies: self._answers.append(partial(self._take, request, replies, asked_at)),
         )
 
@@ -165,14 +145,9 @@ class Nav2Node:
             elif isinstance(request, AskResult):
                 follower.take_ending(request.id, None, str(error), now)
 
-    def _keys(self) -> dict[Call, str]:
-        if self._roll is None:
-            return bridge_keys(self._action)
-        return served_keys(self._domain, self._action, self._roll.there())
-
     def _release_at(self, keys: dict[Call, str]) -> tuple[Release | None, str]:
         """Return the ROS release of the server's goals; or why none can be sent."""
-        if self._roll is None:
+        if not self._client.is_seen:
             return self._release, ""
         if len(keys) < 3:
             return None, f"no server of {self._action} in domain {self._domain}"

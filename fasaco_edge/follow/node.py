@@ -7,7 +7,7 @@ import math
 import threading
 import time
 from collections.abc import Callable
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 from fasaco_edge.bus.session import Bus, open_bus
 from fasaco_edge.bus.settings import BusSettings
@@ -22,6 +22,9 @@ from fasaco_edge.wire import topics
 from fasaco_edge.wire.messages.twists import Velocity, encode_velocity
 from fasaco_edge.wire.schemas import TWIST_STAMPED
 from fasaco_edge.wire.topic_types import VOLATILE
+
+if TYPE_CHECKING:
+    from fasaco_edge.follow.docking_node import DockingNode
 
 log = logging.getLogger(__name__)
 
@@ -81,6 +84,16 @@ def native_node(bus: Bus, settings: FollowSettings, report: Callable[[str], None
     return FollowerNode(settings, bus, out, report)
 
 
+def docking_of(bus: Bus, settings: FollowSettings) -> DockingNode | None:
+    """Return what has Nav2 dock the robot; None where the base docks by itself, or in a dry run."""
+    if not settings.dock or settings.dry_run:
+        return None
+    # A follower without a dock does not load it.
+    from fasaco_edge.follow.docking_node import DockingNode  # noqa: PLC0415
+
+    return DockingNode(bus, settings)
+
+
 def _joined(settings: FollowSettings, stop: threading.Event) -> Bus | None:
     """Join the bus, once somebody listens there; None if ``stop`` is set before."""
     told = False
@@ -128,6 +141,7 @@ class FollowerNode:
             moves=not settings.dry_run,
         )
         self._inputs = Inputs(settings, bus)
+        self._docking = docking_of(bus, settings)
         self._states = StateLog()
         self._reported_at = -math.inf
         self._due = -math.inf
@@ -139,6 +153,8 @@ class FollowerNode:
         now = self._inputs.now()
         if self._settings.pace != 1.0 and not self._is_due(now):
             return
+        if self._docking is not None:
+            self._docking.turn(self._inputs, follower)
         command = follower.step(now)
         if command is not None:
             self._send(command)
@@ -148,6 +164,8 @@ class FollowerNode:
 
     def end(self) -> None:
         """Have the robot stand."""
+        if self._docking is not None:
+            self._docking.end()
         self._send(STAND)
 
     def _is_due(self, now: float) -> bool:

@@ -48,6 +48,8 @@ class FollowSettings:
         ros: kind, domain, namespace, name of the node and topic, if ``cmd_key`` is ROS 2's.
         nav2: if Nav2's controller drives: name of its action, release, names of plugins, and least
             distance of goals to themselves [m].
+        dock: if Nav2's docking server docks: names of its actions, dock, its type, frame, pose x,
+            y [m], yaw [rad], and how far in front of it paths end [m].
         pace: simulated seconds in a second.
         dry_run: report commands instead of sending them.
     """
@@ -69,6 +71,7 @@ class FollowSettings:
     frame: str = "base_link"
     ros: Mapping[str, Any] = field(default_factory=dict)
     nav2: Mapping[str, Any] = field(default_factory=dict)
+    dock: Mapping[str, Any] = field(default_factory=dict)
     secured: Mapping[str, Any] = field(default_factory=dict, repr=False)
     pace: float = 1.0
     dry_run: bool = False

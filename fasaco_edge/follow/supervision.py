@@ -28,6 +28,7 @@ class State(enum.Enum):
     BAD_PATH = "path refused"
     PATH_ELSEWHERE = "path elsewhere"
     OFF_PATH = "off the path"
+    DOCK = "left to the docking server"
     NOT_MOVING = "does not move as told"
     NO_POSE = "no pose"
     OLD_POSE = "pose too old"
@@ -76,6 +77,8 @@ class Supervision:
     def __init__(self, patience: Patience) -> None:
         self.state, self.detail = State.NO_DAEMON, ""
         self._patience = patience
+        self._held = ""
+        self._newest: Pose2D | None = None
         self._frame, self._stamp_ns = "", 0
         self._repeats = False
         self._link: Link | None = None
@@ -94,6 +97,7 @@ class Supervision:
             return
         self._pose_fault = None
         self._frame, self._stamp_ns = stamped.frame, stamped.stamp_ns
+        self._newest = stamped.pose
         self._moved_to(stamped.pose, now)
 
     def heard_link(self, link: Link) -> None:
@@ -128,6 +132,20 @@ class Supervision:
             self._path_of = ""
         elif planner and not self._path_of:
             self._path_of = planner
+
+    def hold(self, why: str) -> None:
+        """Have the robot stand, whatever its path; "" lets it drive."""
+        self._held = why
+
+    @property
+    def newest_pose(self) -> Pose2D | None:
+        """The newest pose; None before there is one."""
+        return self._newest
+
+    @property
+    def has_path(self) -> bool:
+        """Whether there is a path to follow."""
+        return self._has_path
 
     def heard_status(self, now: float) -> None:
         """Note a heartbeat of the daemon."""
@@ -172,6 +190,8 @@ class Supervision:
             return State.SILENT_DAEMON, f"for {silent_s:.1f} s"
         if not self._has_path:
             return self._path_state, self._path_detail
+        if self._held:
+            return State.DOCK, self._held
         return self._trouble_of_poses(now) or (State.DRIVING, "")
 
     def _trouble_of_poses(self, now: float) -> tuple[State, str] | None:

@@ -45,6 +45,8 @@ class DrivenBase:
         self.heard: list[tuple[float, Command]] = []
         self.pose = Pose2D(0.0, 0.0)
         self.frame = "map"
+        # What the daemon says of itself.
+        self.status = b"{}"
         self.says_poses = self.says_status = True
         self.last_pose_at = 0.0
         self._path = self.bus.advertise(self.keys, topics.PATH)
@@ -128,7 +130,7 @@ class DrivenBase:
                 self.last_pose_at = now
             if self.says_status and self._token is not None and now - told > 0.5:
                 told = now
-                self._status.put(b"{}")
+                self._status.put(self.status)
 
 
 @contextmanager

@@ -17,6 +17,7 @@ import threading
 import time
 from typing import Any
 
+from tests.support.dock_server import DockingServer
 from tests.support.nav2_server import (
     ABORTED,
     CANCELED,
@@ -55,6 +56,7 @@ class Nav2Robot:
         self.counts = {"goals": 0, "preempted": 0, "canceled": 0}
         self._random = random.Random(wanted.get("seed", 0))
         self._server = self._serve()
+        self._docks = DockingServer(self, wanted, self._faults()) if "dock" in wanted else None
         self._path: list[tuple[float, float]] = []
         self._progress = (0.0, 0.0, 0.0)
         self._session = open_session(wanted["endpoint"])
@@ -79,6 +81,8 @@ class Nav2Robot:
                 next_restart = self._after("restart_every_s")
                 self._restart()
             self._tick(dt, now, abort=abort)
+            if self._docks is not None:
+                self._docks.tick(dt)
             count += 1
             if count % 2 == 0:
                 self._publish()
@@ -88,9 +92,12 @@ class Nav2Robot:
         mean_s = self.wanted.get(name)
         return time.monotonic() + (self._random.uniform(0.5, 1.5) * mean_s if mean_s else math.inf)
 
-    def _serve(self) -> ActionServer:
+    def _faults(self) -> Faults:
         wanted = self.wanted
-        faults = Faults(wanted.get("delay_s", 0.0), wanted.get("lost", 0.0), wanted.get("seed", 0))
+        return Faults(wanted.get("delay_s", 0.0), wanted.get("lost", 0.0), wanted.get("seed", 0))
+
+    def _serve(self) -> ActionServer:
+        wanted, faults = self.wanted, self._faults()
         action = wanted.get("action", "/follow_path")
         release = wanted.get("release", "jazzy")
         return ActionServer(wanted["endpoint"], wanted["domain"], release, faults, action)
@@ -108,6 +115,8 @@ class Nav2Robot:
         for name, count in self._server.counts.items():
             self.counts[name] += count
         self._server.close()
+        if self._docks is not None:
+            self.refused += self._docks.close()
 
     def _tick(self, dt: float, now: float, *, abort: bool) -> None:
         """One cycle of ControllerServer::computeControl."""
@@ -216,7 +225,11 @@ def main() -> None:
     thread.join()
     names = ("x", "y", "driven_m", "driving_s", "standing_s", "errors", "restarts", "refused")
     names += ("counts", "trail")
-    print(json.dumps({name: getattr(robot, name) for name in names}), flush=True)
+    docked = robot._docks.log if robot._docks is not None else []
+    print(
+        json.dumps({"docking": docked, **{name: getattr(robot, name) for name in names}}),
+        flush=True,
+    )
 
 
 if __name__ == "__main__":

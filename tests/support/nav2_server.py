@@ -94,12 +94,14 @@ class Handle:
 
 
 class ActionServer:
-    """The services of ``follow_path``, and which goal is to be driven."""
+    """The services of ``follow_path``, and which goal is to be driven; others as subclasses."""
+
+    node = "controller_server"
 
     def __init__(
         self, endpoint: str, domain: int | None, release: str, faults: Faults, action: str
     ) -> None:
-        self.store = store_of(release)
+        self.store = self.store_of(release)
         self.release = release
         self.lock = threading.RLock()
         self.current: Handle | None = None
@@ -116,13 +118,13 @@ class ActionServer:
         session_id = str(self._session.zid())
         mangled = action.replace("/", "%")
         for number, ((call, kind), type_hash) in enumerate(
-            zip(TYPES, HASHES[release], strict=True), start=1
+            zip(*self.services(release), strict=True), start=1
         ):
             key = f"{action.strip('/')}/_action/{call}"
             if domain is not None:
                 key = f"{domain}/{key}/{kind}/{type_hash}"
                 token = (
-                    f"@ros2_lv/{domain}/{session_id}/0/{number}/SS/%/%/controller_server/"
+                    f"@ros2_lv/{domain}/{session_id}/0/{number}/SS/%/%/{self.node}/"
                     f"{mangled}%_action%{call}/{kind}/{type_hash}/::,10:,:,:,,"
                 )
                 self._declared.append(self._session.liveliness().declare_token(token))
@@ -133,6 +135,14 @@ class ActionServer:
                     complete=True,
                 )
             )  # fmt: skip
+
+    def store_of(self, release: str) -> Any:
+        """Return the types."""
+        return store_of(release)
+
+    def services(self, release: str) -> tuple[Any, Any]:
+        """Return calls with their types, and hashes."""
+        return TYPES, HASHES[release]
 
     def close(self) -> None:
         """Go, as a process that ends; goals are forgotten."""

@@ -1,0 +1,69 @@
+"""A client of a ROS 2 action on the bus: its services' keys, and requests to them.
+
+rmw_zenoh shows the server's types and keys in its graph; a bridge does not, and is queried by name.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from fasaco_edge.bus.queries import Reply
+from fasaco_edge.bus.session import Bus
+from fasaco_edge.wire.ros_actions import Call, bridge_keys, served_keys, server_tokens
+from fasaco_edge.wire.ros_keys import RosNode, attachment, gid_of
+
+# Timeout of a reply [s]; of a result, as long as driving to the end of a goal. After it the query
+# is repeated.
+ANSWER_S, RESULT_S = 5.0, 300.0
+# Period of searching the graph for the action's server [s].
+LOOK_EVERY_S = 2.0
+
+
+class ActionClient:
+    """Sends requests to the server of an action.
+
+    Args:
+        bus: the session.
+        ros: how ROS comes to Zenoh, as in ``FollowSettings``.
+        action: its name.
+        types: its types.
+    """
+
+    def __init__(
+        self, bus: Bus, ros: Mapping[str, Any], action: str, types: tuple[str, ...]
+    ) -> None:
+        self._bus = bus
+        self._domain: int = ros["domain"]
+        self._action, self._types = action, types
+        self._sequence = 0
+        self._gid = b""
+        self._roll = None
+        if ros["kind"] == "rmw_zenoh":
+            node = RosNode(self._domain, bus.id, ros["namespace"], ros["node"])
+            self._gid = gid_of(f"{node.token}/{action}")
+            self._roll = bus.roll(server_tokens(self._domain, action))
+
+    @property
+    def is_seen(self) -> bool:
+        """Whether the graph shows servers, and their types."""
+        return self._roll is not None
+
+    def look(self) -> None:
+        """Search the graph for the server, at intervals."""
+        if self._roll is not None:
+            self._roll.ask(LOOK_EVERY_S)
+
+    def keys(self) -> dict[Call, str]:
+        """Return the keys of the server's services; of one that is not seen, none."""
+        if self._roll is None:
+            return bridge_keys(self._action)
+        return served_keys(self._domain, self._action, self._roll.there(), self._types)
+
+    def ask(self, key: str, call: Call, payload: bytes, end: Callable[[list[Reply]], None]) -> None:
+        """Send a request; ``end`` gets the replies, on a Zenoh thread."""
+        self._sequence += 1
+        beside = attachment(self._sequence, time.time_ns(), self._gid) if self._gid else b""
+        timeout_s = RESULT_S if call == "get_result" else ANSWER_S
+        self._bus.ask(key, payload, beside, timeout_s, end)

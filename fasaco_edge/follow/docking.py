@@ -1,0 +1,200 @@
+"""Docking and undocking by Nav2's docking server: the daemon's state and poses in, requests out.
+
+The path ends in front of the dock. There the daemon says that the robot charges, and the docking
+server moves it in; before the next path is driven, it moves it out again. No clock, no session.
+"""
+
+from __future__ import annotations
+
+import enum
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from fasaco_edge.follow.nav2_requests import Cancellations
+from fasaco_edge.grid.geometry import Pose2D
+from fasaco_edge.wire.messages.docking import ERRORS, DockEnding
+from fasaco_edge.wire.messages.follow_path import UNKNOWN
+
+# A robot is in its dock this near to the dock's pose [m].
+DOCKED_M = 0.1
+# Pause after an error before the next goal [s], doubled each time up to the maximum.
+RETRY_S, MOST_RETRY_S = 10.0, 300.0
+# Period of querying the result again, as a reply may be lost; after the second a goal is given up.
+RESULT_EVERY_S, GIVE_UP_S = 20.0, 1200.0
+# The daemon's states in which the robot drives, or has charged; in others it docks on.
+DRIVES = ("planning", "covering", "returning")
+LEAVES = (*DRIVES, "paused", "idle", "done")
+
+
+class Move(enum.Enum):
+    """What the docking server does."""
+
+    DOCK = "docking"
+    UNDOCK = "undocking"
+
+
+@dataclass(frozen=True, slots=True)
+class Start:
+    """A request to move the robot into the dock, or out of it."""
+
+    move: Move
+    id: bytes
+
+
+@dataclass(frozen=True, slots=True)
+class Ask:
+    """A query for the result; the reply comes when the goal has ended."""
+
+    move: Move
+    id: bytes
+
+
+@dataclass(frozen=True, slots=True)
+class Cancel:
+    """A request to cancel a goal."""
+
+    move: Move
+    id: bytes
+
+
+DockRequest = Start | Ask | Cancel
+
+
+@dataclass(slots=True)
+class _Goal:
+    move: Move
+    id: bytes
+    sent_at: float
+    asked_at: float = -math.inf
+    is_accepted: bool = False
+    is_cancelled: bool = False
+
+
+class Docking:
+    """Decides when the docking server moves the robot.
+
+    Args:
+        dock: the robot's pose in the dock.
+        approach: how far in front of it paths end [m].
+        new_id: makes the id of a goal.
+
+    Attributes:
+        holds: why the robot must not drive along its path now; "" if it may.
+        trouble: the last error, "" for none.
+    """
+
+    def __init__(self, dock: Pose2D, approach: float, new_id: Callable[[], bytes]) -> None:
+        self.holds = self.trouble = ""
+        self._dock, self._approach, self._new_id = dock, approach, new_id
+        # Whether the robot is in the dock; None before its first pose.
+        self._is_docked: bool | None = None
+        self._goal: _Goal | None = None
+        self._cancellations = {move: Cancellations() for move in Move}
+        self._retry_at, self._retry_s = -math.inf, RETRY_S
+
+    def step(
+        self, now: float, state: str, here: Pose2D | None, *, drives: bool
+    ) -> list[DockRequest]:
+        """Return the requests to the docking server now.
+
+        Args:
+            now: the time [s].
+            state: of the daemon, "" before one was heard.
+            here: the robot's pose; None without one.
+            drives: whether there is a path to drive.
+        """
+        requests: list[DockRequest] = []
+        if here is not None:
+            far = math.hypot(here.x - self._dock.x, here.y - self._dock.y)
+            if self._is_docked is None:
+                # A robot that was switched on in its dock.
+                self._is_docked = far <= max(DOCKED_M, 0.5 * self._approach)
+            elif self._goal is None and far > self._approach + 2.0 * DOCKED_M:
+                self._is_docked = False
+            if state == "charging" and far <= DOCKED_M:
+                self._is_docked = True
+        if (goal := self._goal) is not None:
+            requests += self._watch(goal, now, state)
+        elif here is not None and now >= self._retry_at:
+            if state == "charging" and not self._is_docked:
+                requests.append(self._start(Move.DOCK, now))
+            elif self._is_docked and drives and state in DRIVES:
+                requests.append(self._start(Move.UNDOCK, now))
+        is_in = bool(self._is_docked) and drives
+        self.holds = self._goal.move.value if self._goal else "in its dock" if is_in else ""
+        for move, cancellations in self._cancellations.items():
+            requests += [Cancel(move, one.id) for one in cancellations.due(now)]
+        return requests
+
+    def end(self) -> list[DockRequest]:
+        """Return the requests that end all goals."""
+        if (goal := self._goal) is None:
+            return []
+        self._goal = None
+        return [Cancel(goal.move, goal.id)]
+
+    def take_accepted(self, goal_id: bytes, accepted: bool | None, why: str, now: float) -> None:
+        """Take in whether the server accepted a goal; None without an answer."""
+        goal = self._goal
+        if goal is None or goal.id != goal_id:
+            return
+        self._cancellations[goal.move].take_accepted(goal_id, accepted)
+        if accepted:
+            # Its result is queried at the next step.
+            goal.is_accepted, goal.asked_at = True, -math.inf
+            return
+        if accepted is None:
+            self._cancellations[goal.move].add(goal_id, is_known=False)
+        self._fail(why or "refused: is the docking server active?", now)
+
+    def take_ending(self, goal_id: bytes, ending: DockEnding | None, why: str, now: float) -> None:
+        """Take in how a goal ended; None if the server will not answer."""
+        goal = self._goal
+        if goal is None or goal.id != goal_id:
+            return
+        self._cancellations[goal.move].drop(goal_id)
+        if ending is None:
+            self._cancellations[goal.move].add(goal_id)
+            self._fail(why, now)
+        elif ending.is_done:
+            self._goal, self.trouble = None, ""
+            self._is_docked = goal.move is Move.DOCK
+            self._retry_at, self._retry_s = now, RETRY_S
+        elif goal.is_cancelled:
+            self._goal = None
+        elif ending.status == UNKNOWN:
+            self._fail("it knows nothing of its goal: was it started anew?", now)
+        else:
+            what = ERRORS.get(ending.code, "no code")
+            code = f"{ending.code} " if ending.code else ""
+            self._fail(code + what + (f": {ending.message}" if ending.message else ""), now)
+
+    def take_cancelled(self, goal_id: bytes, code: int | None) -> None:
+        """Take in the result of a request to cancel; None without an answer."""
+        for cancellations in self._cancellations.values():
+            cancellations.take_answer(goal_id, code)
+
+    def _start(self, move: Move, now: float) -> Start:
+        self._goal = _Goal(move, self._new_id(), now, asked_at=now)
+        return Start(move, self._goal.id)
+
+    def _watch(self, goal: _Goal, now: float, state: str) -> list[DockRequest]:
+        """Query the result again, cancel what is not wanted any more, give up what never ends."""
+        if goal.move is Move.DOCK and state in LEAVES and not goal.is_cancelled:
+            goal.is_cancelled = True
+            self._cancellations[goal.move].add(goal.id, is_known=goal.is_accepted)
+        if now - goal.sent_at > GIVE_UP_S:
+            self._cancellations[goal.move].add(goal.id)
+            self._fail("did not end", now)
+        elif goal.is_accepted and now - goal.asked_at > RESULT_EVERY_S:
+            goal.asked_at = now
+            return [Ask(goal.move, goal.id)]
+        return []
+
+    def _fail(self, why: str, now: float) -> None:
+        assert self._goal is not None
+        self.trouble = f"{self._goal.move.value}: {why}"
+        self._goal = None
+        self._retry_at = now + self._retry_s
+        self._retry_s = min(2.0 * self._retry_s, MOST_RETRY_S)
