@@ -98,6 +98,22 @@ def test_a_refuge_lies_off_discs_and_paths_and_is_reached_past_none_of_them():
     assert found[1] > 13
 
 
+def test_a_refuge_is_sought_no_farther_than_the_cells_around_the_robot():
+    free = np.zeros((12, 100), np.bool_)
+    free[5, 20:91] = free[5:11, 90] = free[10, 8:91] = True
+    # At the other edge of these cells lies a room, connected far away only.
+    free[6:11, 8:19] = True
+    lattice = CoverageLattice.from_free(free, 0.25)
+    area = ReachableArea.around(lattice, (5, 40))
+    # Others, beside the corridor, are to drive all along it.
+    near = {
+        f"r{x}": Neighbour(heard(f"r{x}", (x, 2.0), (x, 1.375), (x + 1.0, 1.375)), 0.0, 0.0)
+        for x in range(5, 24)
+    }
+    assert area.reachable[7, 16]
+    assert refuge(area, (5, 40), RADIUS_M, near, lattice.centres) is None
+
+
 def test_closed_cells_have_no_steps_left():
     lattice = CoverageLattice.from_free(np.ones((3, 4), np.bool_))
     closed = np.zeros((3, 4), np.bool_)

@@ -187,13 +187,21 @@ def refuge(
             is_passable |= apart[:, 0] > apart[here, 0].max() + 1e-6
     closed = np.zeros(steps.shape, np.bool_)
     closed[tuple(at[~is_passable].T)] = True
-    steps = without(steps, closed)
+    steps = _inside(without(steps, closed))
     away = ways_from(steps, (row - rows.start) * steps.shape[1] + col - cols.start)
     away = np.where(is_free, away.reshape(steps.shape)[tuple(at.T)], FAR)
     if not len(away) or away.min() >= FAR:
         return None
     best = at[int(away.argmin())] + corner
     return int(best[0]), int(best[1])
+
+
+def _inside(steps: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """Return the step masks of a part of a lattice without those that lead out of it."""
+    edges = ((EAST, np.s_[:, -1]), (WEST, np.s_[:, 0]), (NORTH, np.s_[-1]), (SOUTH, np.s_[0]))
+    for direction, edge in edges:
+        steps[edge] &= np.uint8(0xFF ^ (1 << direction))
+    return steps
 
 
 def without(steps: NDArray[np.uint8], closed: NDArray[np.bool_]) -> NDArray[np.uint8]:
