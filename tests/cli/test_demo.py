@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 import json
 import math
 from itertools import pairwise
@@ -12,9 +13,13 @@ import pytest
 from PIL import Image
 
 from fasaco_edge.cli.console.arguments import Exit
+from fasaco_edge.cli.demo import COMMAND
+from fasaco_edge.cli.demo.mission import DemoMission
+from fasaco_edge.cli.demo.robots import demo_robots
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D
 from fasaco_edge.grid.map_files import read_map
 from fasaco_edge.grid.occupancy import OccupancyGrid
+from fasaco_edge.review.review import read_review
 from fasaco_edge.simulation.robot import SimulationConfig
 from maps.map_writer import write_map
 from tests.support.processes import fasaco_edge, is_running
@@ -31,6 +36,31 @@ def building(tmp_path):
     geometry = GridGeometry(*pixels.shape, RESOLUTION_M, Pose2D(-1.0, -0.4))
     write_map(OccupancyGrid(geometry, pixels), tmp_path / "rooms.yaml")
     return tmp_path / "rooms.yaml"
+
+
+class SlowRecorder:
+    """A bus on which the recorder is heard at the third question."""
+
+    def __init__(self, order):
+        self.order = order
+
+    def listen(self, *_):
+        pass
+
+    def alive(self, key):
+        assert key == "fasaco/@v1/robot/recorder/alive"
+        self.order.append("asked")
+        return {key} if self.order.count("asked") > 2 else set()
+
+
+def test_the_robot_starts_once_its_recorder_listens(tmp_path, monkeypatch):
+    """Floor that it swept before would be told as not swept by a review."""
+    parser, order = argparse.ArgumentParser(), []
+    COMMAND.add_options(parser)
+    args = parser.parse_args(["--driver", "follow"])
+    monkeypatch.setattr(DemoMission, "_spawn", lambda self, log, words: order.append(log.stem))
+    DemoMission(args, demo_robots(args, tmp_path))._start(SlowRecorder(order))
+    assert order == ["daemon", "follower", *["asked"] * 3, "robot"]
 
 
 def test_a_demo_covers_every_cell_that_can_be_reached(tmp_path, building):
@@ -57,6 +87,9 @@ def test_a_demo_covers_every_cell_that_can_be_reached(tmp_path, building):
     driven = sum(math.dist(a, b) for a, b in pairwise(trail))
     assert summary["driven_m"] == pytest.approx(driven, abs=0.1)
     check_clearance(grid, trail)
+    # The recorder listens before the robot moves: nothing that it swept is missing.
+    (recording,) = out.glob("*.rrd")
+    assert math.dist(read_review([recording]).data.track[0, :2], trail[0]) < 0.01
 
     assert summary["recording"]
     for file in summary["recording"]:

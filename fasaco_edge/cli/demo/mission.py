@@ -34,6 +34,7 @@ from fasaco_edge.wire.keys import Keys
 
 PLAIN_LINE_EVERY_S = 5.0
 STOP_TIMEOUT_S = 8.0
+RECORDERS_WITHIN_S = 60.0
 # "Done" has to hold for some maps [simulated s]: the last one may still be on its way.
 SETTLE_SIM_S = 3.0
 # Programs that hear the robots, by the names of their logs.
@@ -182,16 +183,34 @@ class DemoMission:
             err().print(f"{last.name} is killed")
 
     def _start(self, bus: Bus) -> None:
+        robots: list[tuple[Path, list[str]]] = []
         for number, (robot, newest) in enumerate(zip(self._robots, self._newest, strict=True)):
             endpoint = self._far if number % 2 else self._endpoint
             robot.folder.mkdir(exist_ok=True)
             robot.write_config(self._args, endpoint)
             bus.listen(Keys(robot.name), topics.STATUS, newest.put)
             for name, words in robot.programs(self._args, endpoint):
-                self._spawn(robot.folder / f"{name}.log", words)
+                log = robot.folder / f"{name}.log"
+                if name == "robot":
+                    robots.append((log, words))
+                else:
+                    self._spawn(log, words)
         if len(self._robots) > 1:
             out = self._robots[0].folder.parent
             self._spawn(out / "fleet.log", fleet_recorder(out, self._endpoint))
+        if self._args.record == "all":
+            self._await_recorders(bus)
+        for log, words in robots:
+            self._spawn(log, words)
+
+    def _await_recorders(self, bus: Bus) -> None:
+        """Wait until all recorders listen, for a while: a robot is quicker there."""
+        keys = {Keys(robot.name).of(topics.RECORDER_ALIVE) for robot in self._robots}
+        until = time.monotonic() + RECORDERS_WITHIN_S
+        while keys and time.monotonic() < until:
+            self._check_processes()
+            keys = {key for key in keys if not bus.alive(key)}
+            time.sleep(0.05)
 
     def _spawn(self, log: Path, words: list[str]) -> None:
         program = python_program("fasaco_edge", *words)
