@@ -8,6 +8,8 @@ import statistics
 from collections.abc import Generator, Sequence
 from dataclasses import asdict, dataclass
 
+import numpy as np
+
 from fasaco_edge.bench.benchmark import Benchmark, Goal, Report, Say, positive
 from fasaco_edge.cli.demo.robots import apart
 from fasaco_edge.grid.lattice import CoverageLattice, Footprint
@@ -24,7 +26,10 @@ Point = tuple[float, float]
 
 # What a fleet is to reach: its time against one robot's, and the cells swept by two or more.
 TIME_GOALS, TWICE_GOAL = {2: 0.56, 4: 0.31, 8: 0.19}, 0.03
-HEADER = ("robots", "runs", "time", "worst", "driven", "twice", "ends", "stood s", "touches")
+HEADER = (
+    "robots", "runs", "time", "worst", "driven", "twice", "ends", "stood s", "touches",
+    "plan ms", "step ms",
+)  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,6 +49,9 @@ class FleetFigures:
         longest_stand_s: the longest stand of a robot under way.
         touches, meetings: how often robots touched, and stopped before one another.
         plans, divisions: how many were made.
+        plan_ms, step_ms: 99th percentile of the processor time of a plan, and of a step of the
+            mission [ms].
+        plan_alone_ms, step_alone_ms: the same of one robot.
     """
 
     building: str
@@ -62,6 +70,10 @@ class FleetFigures:
     meetings: int
     plans: int
     divisions: int
+    plan_ms: float
+    step_ms: float
+    plan_alone_ms: float
+    step_alone_ms: float
 
 
 def _add_options(parser: argparse.ArgumentParser) -> None:
@@ -140,7 +152,17 @@ def _figures(name: str, run: FleetRun, alone: FleetRun) -> FleetFigures:
         meetings=sum(robot.world.meetings for robot in run.robots),
         plans=sum(robot.plans for robot in run.robots),
         divisions=max(robot.mission.fleet.number for robot in run.robots),
+        plan_ms=_p99(run, "plan_ms"),
+        step_ms=_p99(run, "step_ms"),
+        plan_alone_ms=_p99(alone, "plan_ms"),
+        step_alone_ms=_p99(alone, "step_ms"),
     )
+
+
+def _p99(run: FleetRun, name: str) -> float:
+    """Return the 99th percentile of the times of all robots [ms]."""
+    times = [ms for robot in run.robots for ms in getattr(robot, name)]
+    return round(float(np.percentile(times, 99)), 2)
 
 
 def _report(args: argparse.Namespace, runs: Sequence[FleetFigures]) -> Report:
@@ -149,14 +171,20 @@ def _report(args: argparse.Namespace, runs: Sequence[FleetFigures]) -> Report:
         some = [run for run in runs if run.robots == robots]
         if not some:
             continue
-        time, driven, twice, ends = (
+        time, driven, twice, ends, *slow = (
             statistics.fmean(getattr(run, name) for run in some)
-            for name in ("time_ratio", "driven_ratio", "twice", "first_end")
-        )
+            for name in (
+                "time_ratio", "driven_ratio", "twice", "first_end", "plan_ms", "plan_alone_ms",
+                "step_ms", "step_alone_ms",
+            )
+        )  # fmt: skip
         worst = max(run.time_ratio for run in some)
         stood_s, touches = max(run.longest_stand_s for run in some), sum(r.touches for r in some)
         figures = f"{time:.3f}", f"{worst:.3f}", f"{driven:.3f}", f"{twice:.1%}", f"{ends:.2f}"
-        rows.append((str(robots), str(len(some)), *figures, f"{stood_s:.0f}", str(touches)))
+        slower = f"{slow[0]:.1f} ({slow[1]:.1f})", f"{slow[2]:.1f} ({slow[3]:.1f})"
+        rows.append(
+            (str(robots), str(len(some)), *figures, f"{stood_s:.0f}", str(touches), *slower)
+        )
         if robots in TIME_GOALS:
             goals.append(Goal(f"{robots} robots: time", round(time, 4), TIME_GOALS[robots]))
         goals.append(Goal(f"{robots} robots: swept twice", round(twice, 4), TWICE_GOAL))
@@ -169,7 +197,8 @@ def _report(args: argparse.Namespace, runs: Sequence[FleetFigures]) -> Report:
         remarks=(
             "means but for worst, stood and touches. time, driven: against one robot's. twice: "
             "share of the cells that two or more swept, also by only driving through. ends: when "
-            "the first robot is done, against the last.",
+            "the first robot is done, against the last. plan, step: processor time of a plan and "
+            "of a step of the mission, 99th percentile (of one robot).",
         ),
     )
 

@@ -1,14 +1,16 @@
 """Generated buildings as maps, for real daemons: ``bench fleet --online`` takes them.
 
-python -m tests.benchmarks.fleets.maps DIR --generated 3 --cells 1000
+    python -m tests.benchmarks.fleets.maps DIR --generated 3 --cells 1000
 fasaco-edge bench fleet --online --maps DIR/*.yaml --robots 1 2 4 --robot-radius 0.135
 """
 
 from __future__ import annotations
 
 import argparse
+from dataclasses import replace
 from pathlib import Path
 
+from fasaco_edge.grid.geometry import Pose2D
 from maps.map_writer import write_map
 from tests.benchmarks.buildings import building
 from tests.benchmarks.fleets.run import TOOL_M
@@ -24,8 +26,12 @@ def main() -> None:
     args = parser.parse_args()
     args.folder.mkdir(parents=True, exist_ok=True)
     for seed in range(args.generated):
+        made = of_grid(building(args.cells, seed), TOOL_M)
+        # The simulated robot starts at the origin.
+        y, x = ((at + 0.5) * TOOL_M for at in made.start)
+        geometry = replace(made.truth.geometry, origin=Pose2D(-x, -y))
         file = args.folder / f"building{seed}.yaml"
-        write_map(of_grid(building(args.cells, seed), TOOL_M).truth, file)
+        write_map(replace(made.truth, geometry=geometry), file)
         print(file)
 
 

@@ -6,8 +6,11 @@ the same run. Robots hear of each other once a period, as far as ``hears`` lets 
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
+from typing import TypeVar
 
 import numpy as np
 
@@ -41,6 +44,16 @@ PROPOSALS = 1_000_000
 MOST_TILES = 4
 # A run that is not over by then has failed, in simulated time [s].
 LONGEST_S = 20_000.0
+
+
+Result = TypeVar("Result")
+
+
+def _timed(times_ms: list[float], call: Callable[[], Result]) -> Result:
+    began = time.process_time()
+    result = call()
+    times_ms.append(1e3 * (time.process_time() - began))
+    return result
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,7 +96,10 @@ class Fleet:
 
 @dataclass(slots=True)
 class FleetRobot:
-    """A robot, its mission, and what was noted of it."""
+    """A robot, its mission, and what was noted of it.
+
+    ``step_ms``, ``plan_ms``: processor time of each step of the mission, and of each plan [ms].
+    """
 
     name: str
     mission: Mission
@@ -95,6 +111,8 @@ class FleetRobot:
     done_s: float = 0.0
     plans: int = 0
     is_dead: bool = False
+    step_ms: list[float] = field(default_factory=list)
+    plan_ms: list[float] = field(default_factory=list)
     inbox: list[MemberHeard] = field(default_factory=list)
 
     def report(self) -> MemberHeard | None:
@@ -196,7 +214,7 @@ class FleetRun:
             self._tell()
 
     def _step(self, robot: FleetRobot, events: list[Event]) -> None:
-        decision = robot.mission.step(events, self.now)
+        decision = _timed(robot.step_ms, partial(robot.mission.step, events, self.now))
         while True:
             if decision.path is not None:
                 xy = decision.path.xy
@@ -206,9 +224,10 @@ class FleetRun:
             if decision.plan is None:
                 return
             robot.plans += 1
-            path = self._planner.plan(decision.plan.problem, self._limit)
+            problem = decision.plan.problem
+            path = _timed(robot.plan_ms, partial(self._planner.plan, problem, self._limit))
             ready = PlanReady(decision.plan.number, path, 0.0)
-            decision = robot.mission.step([ready], self.now)
+            decision = _timed(robot.step_ms, partial(robot.mission.step, [ready], self.now))
 
     def _tell(self) -> None:
         for number, speaker in enumerate(self.robots):
