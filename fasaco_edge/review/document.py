@@ -113,6 +113,9 @@ class ReviewDocument(msgspec.Struct):
             disc touches wherever the robot's disc can be; the part that the tool passed over along
             the recorded poses [m2].
         patches_over_4_dm2, largest_patch_m2: connected patches of it that were not swept [m2].
+        swept_before_m2: floor that had been swept when the recording began, about, by the daemon;
+            poses of it are missing, so that it counts as not swept where the robot did not come by
+            again [m2].
         left: the largest patches that were not swept: m2, and a place in the middle (x, y) [m].
         ledger_swept_m2: floor that the daemon counted as swept at the end, reachable or not [m2].
         left_by_reason: reachable floor not swept at the end, by the daemon's reasons [m2].
@@ -181,6 +184,7 @@ class ReviewDocument(msgspec.Struct):
     unreachable_cells: int | None = None
     reachable_m2: float | None = None
     swept_m2: float | None = None
+    swept_before_m2: float = 0.0
     patches_over_4_dm2: int | None = None
     largest_patch_m2: float | None = None
     left: list[LeftPatch] = []

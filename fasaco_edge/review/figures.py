@@ -124,6 +124,7 @@ def _add_coverage(document: ReviewDocument, review: Review) -> None:
         document.covered_cells, document.coverable_cells = counts.covered, counts.coverable
         document.recovered_cells, document.unreachable_cells = counts.recovered, counts.unreachable
         document.coverage_from = counts.source
+    document.swept_before_m2 = round(review.data.swept_before_m2, 3)
     if (floor := review.floor) is not None:
         figures = floor.figures
         document.reachable_m2 = _rounded(figures.reachable_m2)

@@ -7,6 +7,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,6 +32,10 @@ from fasaco_edge.wire.schemas import POSE_STAMPED
 
 # The mission's reasons for requesting a better path, and for accepting one.
 SPARE, BETTER = "spare time", "better further on"
+
+
+# Less is in the noise of poses and times [m2].
+SURELY_SWEPT_M2 = 0.1
 
 
 @dataclass(frozen=True, slots=True)
@@ -148,6 +153,25 @@ class RunData:
     def restored_cells(self) -> int:
         """Cells that were covered before a restart."""
         return max((each.status.ledger.restored_cells for each in self.statuses), default=0)
+
+    @property
+    def swept_before_m2(self) -> float:
+        """Floor of the order that had been swept when the recording began [m2], about.
+
+        What the first report of the floor has beyond what the tool can have passed over since. An
+        order that began later has none.
+        """
+        reports = [(each.at_s, each.status.floor) for each in self.statuses]
+        swept = [(at_s, floor.swept_m2) for at_s, floor in reports if floor is not None]
+        anew = any(later < m2 - SURELY_SWEPT_M2 for (_, m2), (_, later) in pairwise(swept))
+        if not swept or anew:
+            return 0.0
+        at_s, m2 = swept[0]
+        driven = self.track[self.times <= at_s, :2]
+        tool_m = known_settings(self.config).robot.tool_width_m or 0.0
+        length_m = float(np.hypot(*np.diff(driven, axis=0).T).sum()) if len(driven) > 1 else 0.0
+        before_m2 = m2 - tool_m * (length_m + tool_m)
+        return before_m2 if before_m2 > SURELY_SWEPT_M2 else 0.0
 
     @property
     def ledger_floor(self) -> FloorReport | None:

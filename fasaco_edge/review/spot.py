@@ -257,6 +257,12 @@ class _Judge:
         elif seen_s is not None and seen_s > nearest_s:
             why = "seen late"
             words = f"the map showed it free from {clock(seen_s)} on, and then no path led there"
+        elif before_m2 := self._data.swept_before_m2:
+            words = (
+                f"no path of the recording led over it; when that began, {before_m2:.1f} m2 had "
+                "been swept, perhaps this among them"
+            )
+            return self._spot("not known", f"{words}; {by}", swept=None)
         else:
             why = "not worth it"
             words = "no path led over it: a detour was not worth the way, or did not fit"

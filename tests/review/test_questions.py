@@ -9,6 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from msgspec import structs
 from PIL import Image
 
 pytest.importorskip("rerun")
@@ -16,13 +17,15 @@ pytest.importorskip("rerun")
 from fasaco_edge.cli import main
 from fasaco_edge.drawing import palette
 from fasaco_edge.recording import entities
+from fasaco_edge.review.figures import document_of
 from fasaco_edge.review.instant import direction, heading_from, scene_at
 from fasaco_edge.review.output.page import page_of
-from fasaco_edge.review.output.rows import instant_rows
+from fasaco_edge.review.output.rows import instant_rows, screen_rows
 from fasaco_edge.review.review import read_review
 from fasaco_edge.review.spot import explain, is_inside, spots_left
 from fasaco_edge.wire import topics
 from fasaco_edge.wire.documents.json_text import encode_json
+from fasaco_edge.wire.documents.replies import FloorReport
 from fasaco_edge.wire.messages.paths import encode_path
 from tests.support.recordings import bus_on_free_port, read_column, recorder_process
 from tests.support.rooms import UNKNOWN, WALL, fill, map_bytes, pose_bytes, room
@@ -176,6 +179,32 @@ def test_why_a_spot_is_not_swept(review, place, why, words):
     assert spot.why == why
     assert words in spot.words
     assert spot.swept is (why == "swept")
+
+
+def with_floor(review, *swept_m2):
+    """Return the review with statuses that report so much swept floor."""
+    first, last = review.data.statuses[0], review.data.statuses[-1]
+    times = np.linspace(first.at_s, last.at_s, len(swept_m2))
+    said = [
+        replace(last, at_s=at_s, status=structs.replace(last.status, floor=FloorReport(m2)))
+        for at_s, m2 in zip(times, swept_m2, strict=True)
+    ]
+    return replace(review, data=replace(review.data, statuses=said))
+
+
+def test_what_may_have_been_swept_before_the_recording_is_not_called_left(review):
+    """A recorder that joins later has no poses of it."""
+    late = with_floor(review, 2.0, 2.3)
+    (spot,) = explain(late, [(0.9, 0.7)])
+    assert (spot.why, spot.swept) == ("not known", None)
+    assert "when that began, 1.9 m2 had been swept" in spot.words
+    assert document_of(late).swept_before_m2 == pytest.approx(1.9, abs=0.05)
+    assert ", and 1.9 m2 before it began" in dict(screen_rows(late, document_of(late)))["swept"]
+    # The floor of an order before this one is none of it.
+    for told in (with_floor(review, 2.0, 0.0, 0.3), with_floor(review, 0.0, 0.3)):
+        (spot,) = explain(told, [(0.9, 0.7)])
+        assert (spot.why, spot.swept) == ("not worth it", False)
+        assert document_of(told).swept_before_m2 == 0.0
 
 
 def test_by_how_much_it_was_missed(review):

@@ -107,7 +107,7 @@ def screen_rows(review: Review, document: ReviewDocument) -> list[tuple[str, str
     charges = [f"{at} for {seconds}, {levels}" for at, seconds, levels in charge_rows(document)]
     return [
         ("run", f"{_began(document.began)}, {sides}{planner}, {document.robot or 'robot'}"),
-        ("swept", by_name["reachable floor swept"]),
+        ("swept", by_name["reachable floor swept"] + _before(document)),
         ("covered", by_name["covered"]),
         ("cells after", ", ".join(reached)),
         ("left", _some(left)),
@@ -155,6 +155,11 @@ def _ending(document: ReviewDocument) -> str:
         return "not recorded whether it was completed"
     how = "ended" if document.is_ended else "broke off"
     return f"not complete: the recording {how} while the mission was {document.state}"
+
+
+def _before(document: ReviewDocument) -> str:
+    m2 = document.swept_before_m2
+    return f", and {m2:.1f} m2 before it began" if m2 else ""
 
 
 def card_rows(document: ReviewDocument) -> list[tuple[str, str]]:
