@@ -15,7 +15,7 @@ from fasaco_edge.cli.console.arguments import Exit
 from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.errors import FleetError, UnreadableRecording
 from fasaco_edge.recording import entities
-from fasaco_edge.recording.fleet import members
+from fasaco_edge.recording.fleet import members, scene
 from fasaco_edge.recording.fleet.notes import is_fleet_recording, read_notes
 from fasaco_edge.recording.fleet.recorder import FleetRecorder
 from fasaco_edge.recording.write.quota import DiskBudget
@@ -52,6 +52,10 @@ class Studio:
     def joined(self, *names):
         """Tell whether robots are recorded."""
         return {member.name for member in self.recorder._members} >= set(names)
+
+    def shows(self, name):
+        """Tell whether a robot's map is drawn."""
+        return self.recorder._scene._drawn[name].known is not None
 
     def parts(self):
         """End the recording; return its parts."""
@@ -130,6 +134,22 @@ def test_one_that_floods_lies_or_sends_rubbish_harms_no_other(studio):
     assert by_name["good"].swept_m2 == pytest.approx(2 * CELL_M**2, abs=0.01)
     assert by_name["bad"].swept_m2 <= 0.1
     assert by_name["bad"].kb_s > 5 * by_name["good"].kb_s
+
+
+def test_maps_of_many_robots_leave_room_in_a_part(studio, monkeypatch):
+    monkeypatch.setattr(scene, "MOST_PIXELS", 4_000)
+    robots = [Teller(studio.bus, f"r{number}") for number in range(5)]
+    for robot in robots:
+        robot.tell()
+    studio.until(lambda: studio.joined(*(robot.name for robot in robots)))
+    for robot in robots:
+        robot.show(room(12.0, 12.0))
+    for robot in robots:
+        studio.until(lambda name=robot.name: studio.shows(name))
+    (part,) = studio.parts()
+    for robot in robots:
+        (data,) = read_column(part, f"robots/{robot.name}/world/map", "GridMap:data").values[-1]
+        assert len(data) <= 4 * 1_000
 
 
 def test_a_frame_that_changes_is_told_and_begins_anew(studio):

@@ -14,7 +14,7 @@ from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.scene import archetypes
 from fasaco_edge.recording.scene.blueprint import build_blueprint
-from fasaco_edge.recording.scene.layers import BURST_S, RATES, Layers, size_in_file
+from fasaco_edge.recording.scene.layers import BURST_S, RATES, Layers, coarser, size_in_file
 from fasaco_edge.recording.write.quota import DiskBudget
 from fasaco_edge.recording.write.writer import RecordingWriter
 
@@ -32,6 +32,16 @@ class Canvas:
     def draw(self, name: str, size: int, at_s: float, layer: str = entities.MAP) -> None:
         now_ns = round(at_s * SECOND_NS)
         self.layers.draw(layer, size, lambda: self.drawn.append((name, size)), now_ns)
+
+
+def test_a_coarser_map_shows_the_most_occupied_of_each_of_its_pixels():
+    cells = np.full((5, 7), -1, np.int8)
+    cells[0, 0], cells[1, 1], cells[4, 6] = 0, 100, 0
+    grid = OccupancyGrid(GridGeometry(5, 7, 0.1, Pose2D(1.0, 2.0)), cells)
+    assert coarser(grid, 35) is grid
+    coarse = coarser(grid, 10)
+    assert coarse.cells.tolist() == [[100, -1, -1, -1], [-1] * 4, [-1, -1, -1, 0]]
+    assert coarse.geometry == GridGeometry(3, 4, 0.2, Pose2D(1.0, 2.0))
 
 
 def test_as_long_as_there_is_room_all_is_drawn_at_once():

@@ -18,12 +18,13 @@ from fasaco_edge.grid.occupancy import OccupancyGrid, known_bounds
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.fleet.card import RobotRow, card_of, colour_of
 from fasaco_edge.recording.fleet.cells import mask_of, window_of
+from fasaco_edge.recording.fleet.inbox import LEAST_SHARING
 from fasaco_edge.recording.fleet.layout import build_layout, robot_entity
 from fasaco_edge.recording.fleet.members import GONE, Members, RecordedMember
 from fasaco_edge.recording.fleet.shares import shares_of, swept_twice
 from fasaco_edge.recording.scene import archetypes as draw
 from fasaco_edge.recording.scene.blueprint import NO_MAP
-from fasaco_edge.recording.scene.layers import Anchor, Layers, is_far_from, size_in_file
+from fasaco_edge.recording.scene.layers import Anchor, Layers, coarser, is_far_from, size_in_file
 from fasaco_edge.recording.sdk import rr
 from fasaco_edge.recording.write.writer import RecordingWriter
 
@@ -35,6 +36,9 @@ FLEET_RATES = {entities.FLEET_SHARES: 1_000, entities.FLEET_TWICE: 1_000, entiti
 CHUNK_BYTES = 1_200
 # Of a layer of cells in four bytes each, beyond that.
 GRID_BYTES = 1_200
+# Of all maps. Each part of a recording begins with all of them, four bytes a pixel: they must not
+# fill it.
+MOST_PIXELS = 2_000_000
 # The view follows the growing map in steps of this share of its size.
 REFRAME = 0.15
 MAP_ORDER, SHARE_ORDER, SWEPT_ORDER, TWICE_ORDER = 0.0, 1.0, 2.0, 3.0
@@ -146,6 +150,7 @@ class FleetScene:
 
     def add_map(self, member: RecordedMember, grid: OccupancyGrid) -> None:
         """Draw a robot's map; what it does not know is clear, so that the others' maps show."""
+        grid = coarser(grid, MOST_PIXELS // max(len(self._drawn), LEAST_SHARING))
         x, y = self._here(member, grid.geometry.origin.x, grid.geometry.origin.y)
         yaw = grid.geometry.origin.yaw + member.seat.frame.yaw
         placed = replace(grid, geometry=replace(grid.geometry, origin=Pose2D(x, y, yaw)))
