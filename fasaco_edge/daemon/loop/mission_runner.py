@@ -289,7 +289,6 @@ class Loader:
     def _load(self) -> tuple[Mission, PlanningWorker]:
         from fasaco_edge.daemon.loop.worker import PlanningWorker  # noqa: PLC0415
         from fasaco_edge.mission.core.mission import Mission  # noqa: PLC0415
-        from fasaco_edge.planners.own.process import OwnProcess  # noqa: PLC0415
         from fasaco_edge.planners.registry import planner_of  # noqa: PLC0415
         from fasaco_edge.planners.warmup import warm_up  # noqa: PLC0415
 
@@ -298,6 +297,8 @@ class Loader:
         planner = self._config.planner
         chosen = planner_of(planner.name, planner.colony(), planner.threads, planner.local_search)
         if planner.own:
+            from fasaco_edge.planners.own.process import OwnProcess  # noqa: PLC0415
+
             chosen = OwnProcess(planner.own, planner.seed, chosen, self._tell)
         worker = PlanningWorker(chosen, planner.budget_s, self._mailbox.post)
         first = (

@@ -33,7 +33,7 @@ from fasaco_edge.planners.problem import CoverageProblem
 from fasaco_edge.text import lines
 
 # How long a plan may take [s], and the first one, with the imports.
-MOST_S, FIRST_S = 5.0, 20.0
+MOST_S, FIRST_S = 5.0, 60.0
 # The stopping criterion is called this often: the daemon's watchdog counts these calls [s].
 PERIOD_S = 0.1
 # Limits on a walk, as on a path in a message [bytes], and on a text.
