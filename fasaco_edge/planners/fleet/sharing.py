@@ -1,12 +1,13 @@
 """Fleet search: walks of similar cost for several robots that share a connected ground.
 
-1. One tour over everything reachable, by the project's search.
-2. The tour is split in two, for two groups of robots, and each part again, until every robot has
-   one (``kernels.fleet.split``): that adds hardly a step, and balances the parts except for the
-   paths from the starts.
+1. The ground is parted: each robot gets connected cells around its start, about as many as the
+   others (``kernels.fleet.parts``), and a tour over them by the project's search.
+2. In every other attempt instead: one tour over everything, split in two, for two groups of robots,
+   and each part again, until every robot has one (``kernels.fleet.split``). That adds hardly a
+   step, but balances only what is beside the paths from the starts.
 3. In rounds, pairs of robots with adjacent parts merge their tours, improve the result by local
    search, and split it again; or one hands some cells to the other. Without a gain the groups grow,
-   and finally everything restarts with another tour.
+   and finally everything restarts with other parts.
 
 The objective is the makespan: the cost of the longest walk.
 """
@@ -26,6 +27,7 @@ from numpy.typing import NDArray
 from fasaco_edge.grid.lattice import Cell, CoverageLattice
 from fasaco_edge.kernels import EAST, NORTH
 from fasaco_edge.planners.cost import MICROSECONDS, CoverageCost, SearchWork
+from fasaco_edge.planners.fleet.parts import can_part, owners_of_parts
 from fasaco_edge.planners.fleet.tours import Tour, TourGround
 from fasaco_edge.planners.paper.colony import ColonyConfig
 from fasaco_edge.planners.planner import AnyOf, SearchProgress, StoppingCriterion, WorkLimit
@@ -33,14 +35,14 @@ from fasaco_edge.planners.problem import CoverageProblem
 from fasaco_edge.planners.search.near_optimal import NearOptimal
 from fasaco_edge.planners.search.walk_region import stream_of
 
-# Proposals per cell of the common tour; perturbations of a walk with a free end.
+# Proposals per cell of the first tours; perturbations of a walk with a free end.
 TOUR_PROPOSALS = 1_000
 OPEN = SearchWork(perturbations=200)
 # Probability that of a pair only some cells change owner; their number is drawn up to FEW or more.
 SHIFTED, FEW = 0.5, 6
 # After this many rounds without a gain the worst robot's group grows by one.
 GAINLESS_PAIRS = 4
-# After this many rounds without a gain a new common tour is planned.
+# After this many rounds without a gain everything restarts.
 GAINLESS_ROUNDS = 40
 # Upper limit of a seed.
 SEEDS = 2**63
@@ -140,27 +142,56 @@ class Sharing:
         return self._best.worst_us <= self._least_us
 
     def _begin(self, stop: StoppingCriterion, attempt: int) -> None:
-        """Plan the common tour, another one at each attempt, and split it for the robots."""
-        start = self._fleet.starts[0]
-        problem = CoverageProblem.of(
-            self._lattice, start, end=start, cost=self._fleet.cost, reachable=self._reached
+        """Find first tours, others at each attempt."""
+        if attempt % 2 == 0 and can_part(len(self._starts), self.cells):
+            self._begin_with_parts(stop, attempt)
+        else:
+            self._begin_with_tour(stop, attempt)
+        self._costs_us = [self._ground.cost_us(tour) for tour in self._tours]
+
+    def _begin_with_parts(self, stop: StoppingCriterion, attempt: int) -> None:
+        """Part the ground, and plan a tour of each robot over its part."""
+        seed, shape = (self._fleet.seed, attempt), self._reached.shape
+        self._owner = owners_of_parts(
+            self._lattice, self._reached, self._starts, self._ground.distances, seed
         )
-        planner = NearOptimal(ColonyConfig(seed=(self._fleet.seed + attempt) % SEEDS))
-        tour = planner.plan(problem, partial(self._is_tour_over, stop))
-        robots = range(len(self._starts))
-        tours = self._ground.parted(self._ground.tour_of(tour.cells), robots)
-        self._costs_us = [self._ground.cost_us(tours[robot]) for robot in robots]
+        self._tours = []
+        for robot, flat in enumerate(self._starts):
+            mine = (self._owner == robot).reshape(shape)
+            alone = np.array([flat], np.int32)
+            is_covered = not np.delete(mine.ravel(), flat).any()
+            self._tours.append(alone if is_covered else self._tour(robot, ~mine, stop, attempt))
+
+    def _begin_with_tour(self, stop: StoppingCriterion, attempt: int) -> None:
+        """Plan a tour over everything, and split it for the robots."""
+        tour, robots = self._tour(0, None, stop, attempt), range(len(self._starts))
+        tours = self._ground.parted(tour, robots)
         self._tours = [tours[robot] for robot in robots]
         for robot in reversed(robots):
             self._owner[tours[robot]] = robot
 
-    def _is_tour_over(self, stop: StoppingCriterion, progress: SearchProgress) -> bool:
-        """Ask ``stop`` about the common tour, of which each robot gets a share."""
-        if progress.work.proposals >= TOUR_PROPOSALS * self.cells:
-            return True
-        robots = len(self._starts)
-        share = replace(progress, cost_s=progress.cost_s / robots, steps=progress.steps // robots)
-        return stop(replace(share, lower_bound_cost_s=0.0))
+    def _tour(
+        self,
+        robot: int,
+        covered: NDArray[np.bool_] | None,
+        stop: StoppingCriterion,
+        attempt: int,
+    ) -> Tour:
+        """Return a tour from a robot's start over all cells but those covered."""
+        start = self._fleet.starts[robot]
+        problem = CoverageProblem.of(
+            self._lattice,
+            start,
+            covered=covered,
+            end=start,
+            cost=self._fleet.cost,
+            reachable=self._reached,
+        )
+        planner = NearOptimal(ColonyConfig(seed=(self._fleet.seed + attempt) % SEEDS))
+        robots = len(self._starts) if covered is None else 1
+        cells = int(np.count_nonzero(problem.to_cover))
+        tour = planner.plan(problem, partial(_is_tour_over, stop, cells, robots))
+        return self._ground.tour_of(tour.cells)
 
     def _balance(self, size: int, pool: ThreadPoolExecutor) -> None:
         """Redistribute cells in groups of robots with adjacent parts.
@@ -308,3 +339,13 @@ class Sharing:
         planner = NearOptimal(ColonyConfig(seed=self._fleet.seed))
         found = planner.plan(replace(problem, is_full=True), AnyOf(WorkLimit(OPEN), stop))
         return found.cells
+
+
+def _is_tour_over(
+    stop: StoppingCriterion, cells: int, robots: int, progress: SearchProgress
+) -> bool:
+    """Ask ``stop`` about a tour over cells, of which each of the robots gets a share."""
+    if progress.work.proposals >= TOUR_PROPOSALS * cells:
+        return True
+    share = replace(progress, cost_s=progress.cost_s / robots, steps=progress.steps // robots)
+    return stop(replace(share, lower_bound_cost_s=0.0))
