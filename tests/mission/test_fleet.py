@@ -102,6 +102,22 @@ def test_a_network_that_is_split_and_heals_unites_what_was_swept():
     assert fleet.seconds < 0.6 * alone(HALL)
 
 
+def test_a_newer_division_without_this_robot_hides_no_other():
+    # r1 has lost the network: it takes the others for gone, and divides for itself alone. Meanwhile
+    # r2 and r3 have both divided anew; r3 has to take over what r2 has made.
+    fleet = FleetDrive(HALL, THREE)
+    fleet.run(20)
+    robots = fleet.robots
+    number = robots["r3"].mission.fleet.number
+    shifted = tuple(replace(part, handicap_s=1.5) for part in robots["r2"].report().parts)
+    alone = replace(robots["r1"].report(), division=number + 2, by="r1", parts=())
+    of_r2 = replace(robots["r2"].report(), division=number + 1, by="r2", parts=shifted)
+    robots["r3"].tell(alone, of_r2)
+    robots["r3"].tick()
+    assert (robots["r3"].mission.fleet.number, robots["r3"].mission.fleet.by) == (number + 1, "r2")
+    assert robots["r3"].mission.fleet.parts == shifted
+
+
 def sweeps_everything_again(robot):
     """Order everything, whoever has covered it."""
     zone = {"name": "hall", "polygon": rectangle(0, 0, 12, 24)}

@@ -278,27 +278,34 @@ class FleetLayer:
         return int(np.count_nonzero(self._is_own(self._division, area) & area.reachable))
 
     def _newer(self) -> MemberHeard | None:
-        """Return the newest division of others that is newer than this robot's, if it is in it."""
-        most = self._newest_heard()
+        """Return the newest division of others that is newer than this robot's, if it is in it.
+
+        Newer ones without this robot do not hide it: a robot that takes others for gone makes them.
+        """
+        most = self._most_valid()
         found = [
             member.newest
             for member in self.members.values()
             if not member.left_out
-            and member.newest.division == most
+            and member.newest.division <= most
             and any(part.robot == self._robot for part in member.newest.parts)
         ]
-        first = min(found, key=lambda heard: heard.by, default=None)
+        first = min(found, key=lambda heard: (-heard.division, heard.by), default=None)
         mine = -self.number, self.by
         return first if first and (-first.division, first.by) < mine else None
 
     def _newest_heard(self) -> int:
         """Return the highest valid division number heard."""
-        numbers = [
-            member.newest.division for member in self.members.values() if not member.left_out
-        ]
-        first = min((number for number in numbers if number), default=0)
-        most = (self.number or min(first, MOST_FIRST)) + MOST_AHEAD
-        return max((number for number in numbers if number <= most), default=0)
+        most = self._most_valid()
+        return max((number for number in self._numbers() if number <= most), default=0)
+
+    def _most_valid(self) -> int:
+        """Return the highest division number that is no error."""
+        first = min((number for number in self._numbers() if number), default=0)
+        return (self.number or min(first, MOST_FIRST)) + MOST_AHEAD
+
+    def _numbers(self) -> list[int]:
+        return [m.newest.division for m in self.members.values() if not m.left_out]
 
     def _robots(self, area: ReachableArea, cell: Cell, now: float) -> list[Robot]:
         """Return the robots at work in the area that this robot can reach."""
