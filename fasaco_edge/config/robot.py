@@ -73,6 +73,8 @@ class RobotConfig(Section, frozen=True):
     of driving [m/s2], and the largest bend that is steered while driving [deg]. ``overlap`` is by
     what share of the tool's width lanes overlap where a line is driven (``planner.line``).
     ``footprint`` stands in place of ``radius_m``: the disc around it is planned with.
+    ``tool_ahead_m`` is from where the robot turns about to the centre of its tool, ahead; below 0
+    behind.
     """
 
     name: str = "robot"
@@ -86,6 +88,7 @@ class RobotConfig(Section, frozen=True):
     acceleration_m_s2: Annotated[float, Meta(ge=0.01, le=100)] = 0.5
     steered_deg: Annotated[float, Meta(ge=0, le=45)] = 1.0
     overlap: Annotated[float, Meta(ge=0, le=0.5)] = 0.08
+    tool_ahead_m: Annotated[float, Meta(ge=-5, le=5)] = 0.0
 
     def __post_init__(self) -> None:
         """Have the radius of the disc around the footprint, where there is one."""
@@ -98,10 +101,16 @@ class RobotConfig(Section, frozen=True):
         """What is assumed of the robot's shape; "" where it is the disc that was given."""
         if not self.footprint:
             return ""
+        tool = (
+            f"lines are planned as if its tool were {abs(self.tool_ahead_m):g} m further "
+            f"{'back' if self.tool_ahead_m > 0.0 else 'ahead'}, where it turns about"
+            if self.tool_ahead_m
+            else "its tool is where it turns about"
+        )
         return (
             f"the robot is planned with the disc around its footprint, of radius "
             f"{self.radius_m:.3g} m: it may turn on the spot anywhere, passages narrower than "
-            f"{2.0 * self.radius_m:.3g} m are left out, and its tool is where it turns about"
+            f"{2.0 * self.radius_m:.3g} m are left out, and {tool}"
         )
 
     def cost(self, cell_m: float | None = None) -> CoverageCost:

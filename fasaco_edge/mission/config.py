@@ -108,11 +108,14 @@ class Sweeping:
         tool_m: width of the tool [m]; cells may be narrower, so that lanes overlap.
         most_pixels: limit on the pixels of the fine raster.
         line: prices for polishing the line.
+        ahead_m: from where the robot turns about to the tool's centre, ahead [m]: where it has
+            swept is known by that, lines are planned as if it were 0.
     """
 
     tool_m: float
     most_pixels: int
     line: LineConfig
+    ahead_m: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)

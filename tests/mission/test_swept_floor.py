@@ -14,6 +14,7 @@ from fasaco_edge.mission.coverage.floor_tiles import (
     PIXEL_M,
     pixels_under,
 )
+from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
 from fasaco_edge.mission.coverage.steady_track import PoseScatter, SteadyTrack
 from fasaco_edge.mission.coverage.swept_floor import (
     ANYWHERE,
@@ -29,6 +30,24 @@ from tests.support.examples import examples
 
 TOOL = 0.3
 AROUND = Window(-80, -80, 80, 120)
+
+
+@pytest.mark.parametrize("yaw", [0.0, math.pi / 2, math.pi])
+@pytest.mark.parametrize("ahead_m", [0.2, -0.2])
+def test_a_tool_ahead_of_the_axle_sweeps_there(ahead_m, yaw):
+    """Also where the robot turns on the spot: its tool swings round."""
+    offset, ledger = MissionLedger(0.3, TOOL, ahead_m), MissionLedger(0.3, TOOL)
+    ux, uy = math.cos(yaw), math.sin(yaw)
+    for way in np.arange(0.0, 1.01, 0.02):
+        offset.record(Pose2D(way * ux, way * uy, yaw))
+        x, y = (way + ahead_m) * ux, (way + ahead_m) * uy
+        ledger.record(Pose2D(x, y, yaw))
+    for turned in np.arange(0.0, math.pi / 2, 0.05):
+        offset.record(Pose2D(ux, uy, yaw + turned))
+        x, y = ux + ahead_m * math.cos(yaw + turned), uy + ahead_m * math.sin(yaw + turned)
+        ledger.record(Pose2D(x, y, yaw + turned))
+    swept = offset.floor.swept_in(AROUND)
+    assert (swept == ledger.floor.swept_in(AROUND)).all()
 
 
 def drive(*points, tool_m=TOOL):

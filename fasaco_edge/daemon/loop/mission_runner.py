@@ -343,4 +343,5 @@ def _sweeping(config: DaemonConfig) -> Sweeping | None:
     if line is None:
         return None
     line = replace(line, speed_m_s=robot.speed_m_s, turning=robot.turning())
-    return Sweeping(robot.tool_width_m, floor_pixels(config.map.max_pixels), line)
+    most_pixels = floor_pixels(config.map.max_pixels)
+    return Sweeping(robot.tool_width_m, most_pixels, line, robot.tool_ahead_m)

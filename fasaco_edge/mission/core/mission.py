@@ -73,7 +73,8 @@ class Mission:
         config = self._rotation.config(self._config)
         self._map = MapState(config)
         cell_m, sweeping = config.footprint.cell_m, config.sweeping
-        self._ledger = MissionLedger(cell_m, sweeping.tool_m if sweeping else cell_m)
+        tool_m, ahead_m = (sweeping.tool_m, sweeping.ahead_m) if sweeping else (cell_m, 0.0)
+        self._ledger = MissionLedger(cell_m, tool_m, ahead_m)
         monitor = InputMonitor(config)
         self.fleet = FleetLayer(config.robot, config.cost.step_s, self._map, self._ledger)
         self._orders = Sequencer(config, self._map, self._ledger, self.fleet)

@@ -21,6 +21,7 @@ as wrong as in another building, and may be rejected.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from enum import Enum, auto
@@ -129,12 +130,15 @@ class _Covered:
     cells: CoverageLedger
     floor: SweptFloor
 
-    def record(self, pose: Pose2D, place_of: PlaceOf | None) -> LedgerFullError | None:
-        """Record driving to ``pose``; return a fault if tiles were dropped."""
+    def record(
+        self, pose: Pose2D, tool: Pose2D, place_of: PlaceOf | None
+    ) -> LedgerFullError | None:
+        """Record driving to ``pose`` with the tool's centre at ``tool``; return a fault if tiles
+        were dropped."""
         cells, floor = self.cells, self.floor
         before = cells.dropped, floor.dropped
         cells.record(pose, place_of)
-        floor.record(pose)
+        floor.record(tool)
         if cells.dropped != before[0]:
             return _full(MOST_TILES, f"{TILE} x {TILE} cells", DROPPED_TILES)
         if floor.dropped != before[1]:
@@ -161,9 +165,15 @@ class MissionLedger:
         shared: cells swept by other robots.
     """
 
-    def __init__(self, cell_m: float, tool_m: float) -> None:
-        """Start empty; ``cell_m``: edge of a cell, ``tool_m``: width of the tool [m]."""
-        self._cell_m, self._tool_m = cell_m, tool_m
+    def __init__(self, cell_m: float, tool_m: float, ahead_m: float = 0.0) -> None:
+        """Start empty.
+
+        Args:
+            cell_m: edge of a cell [m].
+            tool_m: width of the tool [m].
+            ahead_m: from where the robot turns about to the tool's centre, ahead [m].
+        """
+        self._cell_m, self._tool_m, self._ahead_m = cell_m, tool_m, ahead_m
         self._covered = self._nothing("")
         self.first_plan_reason = "first plan"
         self.shared = SharedProgress()
@@ -223,7 +233,11 @@ class MissionLedger:
 
         ``place_of``: see ``CoverageLedger.record``.
         """
-        faults = [covered.record(pose, place_of) for covered in self._all]
+        tool = pose
+        if ahead_m := self._ahead_m:
+            x = pose.x + ahead_m * math.cos(pose.yaw)
+            tool = Pose2D(x, pose.y + ahead_m * math.sin(pose.yaw), pose.yaw)
+        faults = [covered.record(pose, tool, place_of) for covered in self._all]
         return faults[0]
 
     def credit(self, cell: Cell) -> None:
