@@ -11,7 +11,6 @@ from __future__ import annotations
 import json
 import re
 import reprlib
-from html import escape
 
 MOST = 2_000
 """What is shown of a text at most [characters]; longer texts are cut."""
@@ -77,6 +76,9 @@ def element(name: str, *parts: object, **attributes: object) -> Html:
 
 
 def _escaped(part: object, most: int) -> str:
+    # Loads a table of two thousand names, of no use to a follower.
+    from html import escape  # noqa: PLC0415
+
     return escape(one_line(str(part), most), quote=True)
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import secrets
 import stat
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -29,7 +28,7 @@ def whole(file: Path) -> Iterator[Path]:
         yield file
         return
     # Nobody else can have put something there; by the ending some formats are told.
-    new = target.with_name(f".{secrets.token_hex(8)}{target.suffix}")
+    new = target.with_name(f".{os.urandom(8).hex()}{target.suffix}")
     try:
         yield new
         if mode is not None:
