@@ -164,6 +164,11 @@ def _misfits(config: DaemonConfig) -> Iterator[BadConfiguration]:
     yield from _refused("planner.", config.planner.colony)
     yield from _refused("", config.planner.check_own)
     yield from _refused("", config.mission.check_zones)
+    mask = config.mission.keep_out_mask
+    if config.mission.keep_out_topic and mask and not mask.startswith(INLINE):
+        yield BadConfiguration(
+            f"mission.keep_out_mask must be left out beside mission.keep_out_topic, got {mask!r}"
+        )
 
 
 def _ros_misfits(config: DaemonConfig, ros: RosConfig) -> Iterator[BadConfiguration]:

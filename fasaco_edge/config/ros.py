@@ -38,6 +38,7 @@ class RosTopicNames(Section, frozen=True):
     map: str = "/map"
     map_updates: str = "/map_updates"
     battery: str = "/battery_state"
+    keep_out_mask: str = "/keepout_filter_mask"
     pose: str = "/pose"
     tf: str = "/tf"
     tf_static: str = "/tf_static"
@@ -114,6 +115,11 @@ class RosConfig(Section, frozen=True):
         return {ROS_TOPICS[name].topic: self._topic(name) for name in names}
 
     @property
+    def keep_out_mask(self) -> RosTopic:
+        """The topic of a keep-out mask, to which the daemon subscribes if it is to take one."""
+        return self._topic("keep_out_mask")
+
+    @property
     def outputs(self) -> dict[str, RosTopic]:
         """What the daemon publishes, by the native topic that is like it."""
         names = ("coverage_path", "coverage_grid", "diagnostics")
@@ -165,7 +171,8 @@ class RosConfig(Section, frozen=True):
         """Return what those may do that have the role ``ros``."""
         said = [*map(self.output_key, self.outputs.values()), *self._driven_by]
         said += map(self.input_key, self.commands.values())
-        return ros_rights([*map(self.input_key, self.inputs.values())], said, self._graph)
+        heard = [*self.inputs.values(), self.keep_out_mask]
+        return ros_rights([*map(self.input_key, heard)], said, self._graph)
 
     def driver_rights(self) -> Role:
         """Return what those may do that have the role ``driver``."""

@@ -12,6 +12,7 @@ from msgspec import structs
 
 from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.config.loading import load_config, with_mask
+from fasaco_edge.daemon.mask_topic import MaskTopic
 from fasaco_edge.daemon.memory import mask_bytes
 from fasaco_edge.daemon.notify import ServiceManager
 from fasaco_edge.errors import BadConfiguration
@@ -62,10 +63,12 @@ class Reload:
 
     Attributes:
         asked: set by the signal.
+        mask: a keep-out mask that comes as a message; None for none.
     """
 
     def __init__(self, read: Callable[[], DaemonConfig], manager: ServiceManager) -> None:
         self.asked = threading.Event()
+        self.mask: MaskTopic | None = None
         self._read = read
         self._manager = manager
         self._reading: Future[DaemonConfig] | None = None
@@ -80,15 +83,25 @@ class Reload:
         """Whether there is a result to take."""
         return self._reading is not None and self._reading.done()
 
-    def begin(self, ended: Callable[[], None]) -> None:
-        """Begin to read; ``ended`` is called afterwards, on the reading thread."""
+    @property
+    def is_wanted(self) -> bool:
+        """Whether the signal or a mask has come."""
+        return self.asked.is_set() or (self.mask is not None and self.mask.has_come)
+
+    def begin(self, running: DaemonConfig, ended: Callable[[], None]) -> None:
+        """Begin to read; ``ended`` is called afterwards, on the reading thread.
+
+        A mask alone changes the running configuration, whatever the file says by now.
+        """
+        read = self._read if self.asked.is_set() else lambda: running
         self.asked.clear()
         self._manager.reloading()
         reading = self._reading = Future()
 
         def run() -> None:
             try:
-                reading.set_result(self._read())
+                config = read()
+                reading.set_result(self.mask.added_to(config) if self.mask else config)
             except BaseException as error:
                 reading.set_exception(error)
             ended()

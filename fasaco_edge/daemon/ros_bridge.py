@@ -8,6 +8,7 @@ attachments and tokens.
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from functools import partial
 
 from fasaco_edge.bus.arrival import Sample
@@ -70,6 +71,15 @@ class RosBridge:
         subscription = self._bus.subscribe(key, post, topic.latched, topic.depth, in_order=in_order)
         self._announce("MS", topic)
         return subscription
+
+    def subscribe_mask(self, take: Callable[[Sample], None]) -> None:
+        """Subscribe to the keep-out mask; ``take`` is called on a Zenoh thread."""
+        topic = self._config.keep_out_mask
+        key = self._config.input_key(topic)
+        self._bus.subscribe(
+            key, lambda sample: take(sample.as_type(topic.schema)), topic.latched, topic.depth
+        )
+        self._announce("MS", topic)
 
     def diagnose(self, status: Status) -> None:
         """Publish a status as diagnostics."""

@@ -22,6 +22,7 @@ from fasaco_edge.daemon.loop.inbox import Inbox, make_mailbox
 from fasaco_edge.daemon.loop.loop import BusPorts, Host, Loop
 from fasaco_edge.daemon.loop.outbox import Outbox
 from fasaco_edge.daemon.loop.turn_log import TurnLog
+from fasaco_edge.daemon.mask_topic import MaskTopic
 from fasaco_edge.daemon.memory import afforded, has_default_sizes, needed_bytes
 from fasaco_edge.daemon.metrics import serve_metrics
 from fasaco_edge.daemon.notify import ServiceManager, Watchdog
@@ -198,6 +199,8 @@ def _serve(
     max_pixels = config.map.max_pixels
     mailbox = make_mailbox(max_pixels)
     ros = RosBridge(bus, config.ros2, mailbox, max_pixels) if config.ros2 else None
+    if config.mission.keep_out_topic:
+        reload.mask = MaskTopic(bus, config, ros, lambda: mailbox.post("reloaded", None))
     recorder = RecorderSupervisor(config, bus, record_to) if record_to else None
     ports = BusPorts(
         mailbox=mailbox,

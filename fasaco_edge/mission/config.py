@@ -60,6 +60,7 @@ class MissionPolicy(msgspec.Struct, frozen=True, kw_only=True):
         zones: named zones that orders refer to.
         keep_out: polygons (x, y) [m] in the map frame that the robot never touches.
         keep_out_mask: file of a mask with further keep-out areas, see ``orders.mask``; "" for none.
+        keep_out_topic: whether the mask comes as a message; there is no mission before it has come.
         home: where the robot returns to; None for the dock, or else where an order began.
         dock: where it charges; None where it does not.
     """
@@ -72,8 +73,14 @@ class MissionPolicy(msgspec.Struct, frozen=True, kw_only=True):
     zones: Annotated[tuple[StandingZone, ...], Meta(max_length=MOST_ZONES)] = ()
     keep_out: Annotated[tuple[Polygon, ...], Meta(max_length=MOST_KEEP_OUT)] = ()
     keep_out_mask: str = ""
+    keep_out_topic: bool = False
     home: Place | None = None
     dock: Dock | None = None
+
+    @property
+    def waits_for_mask(self) -> bool:
+        """Whether the mask is still to come."""
+        return self.keep_out_topic and not self.keep_out_mask
 
     def place(self, errand: Errand) -> Place | None:
         """Return the destination of an errand; None for the place where the order began."""

@@ -70,6 +70,17 @@ BATTERY = Topic(
     is_input=True,
     limits=("max_pose_bytes", "queue_battery"),
 )
+KEEP_OUT_MASK = Topic(
+    name="keep_out_mask",
+    direction="in",
+    when="areas that the robot must not touch are new, or have changed; only where the "
+    "configuration says `mission.keep_out_topic`",
+    speaker="mapper",
+    listeners=("robot",),
+    schemas=(schemas.OCCUPANCY_GRID,),
+    qos=Qos("data_low", cache=1),
+    limits=("max_grid_cells", "max_grid_tilt"),
+)
 PATH = Topic(
     name="path",
     direction="out",
@@ -238,7 +249,7 @@ RECORDER_ALIVE = Topic(
 # A recorder subscribes in this order, to the turn log last: once the daemon sees that subscriber,
 # the recorder receives everything else, too.
 TOPICS = (
-    *(MAP, MAP_UPDATE, POSE, BATTERY),
+    *(MAP, MAP_UPDATE, POSE, BATTERY, KEEP_OUT_MASK),
     *(PATH, COVERAGE, FLOOR, PHEROMONE, DIRECTIONS, STATUS, COMMAND, TURNS, FLEET, ALIVE, CLAIM),
     *(RECORDER, RECORDER_ALIVE),
     CMD_VEL,
@@ -289,6 +300,7 @@ _ROS_ROWS = (
     RosRow("map", "map", "in", MAP.schemas, latched=True, depth=1),
     RosRow("map_updates", "map_update", "in", MAP_UPDATE.schemas, latched=False, depth=256),
     RosRow("battery", "battery", "in", BATTERY.schemas, latched=False, depth=16),
+    RosRow("keep_out_mask", "keep_out_mask", "in", MAP.schemas, latched=True, depth=1),
     RosRow("pose", "pose", "in", POSE.schemas, latched=False, depth=POSE_DEPTH),
     RosRow("tf", "pose", "in", TF, latched=False, depth=TF_DEPTH),
     RosRow("tf_static", TF_STATIC, "in", TF, latched=True, depth=TF_DEPTH),

@@ -35,7 +35,7 @@ def reloaded(written: DaemonConfig) -> DaemonConfig:
 def taken_by(reload: Reload) -> DaemonConfig:
     """Return what is taken once it is read."""
     ended = threading.Event()
-    reload.begin(ended.set)
+    reload.begin(RUNNING, ended.set)
     assert reload.is_reading
     assert not reload.asked.is_set()
     assert ended.wait(TIMEOUT_S)
@@ -94,6 +94,7 @@ def test_what_is_wrong_is_kept_out(caplog):
         raise BadConfiguration("planner.ants: expected int, got 'many'")
 
     reload = Reload(read, ServiceManager({}))
+    reload.asked.set()
     with pytest.raises(BadConfiguration):
         taken_by(reload)
     assert "configuration refused" in caplog.text

@@ -57,8 +57,9 @@ def test_topics_are_those_of_the_table() -> None:
     """What the daemon has by default, what keys.yaml says, and what the README shows."""
     config = RosConfig(kind="rmw_zenoh")
     by_pose = RosConfig(kind="rmw_zenoh", pose=schemas.ODOMETRY)
+    maps_and_battery, poses = list(by_pose.inputs.values())[:3], list(by_pose.inputs.values())[3:]
     ours = [
-        *by_pose.inputs.values(),
+        *(*maps_and_battery, config.keep_out_mask, *poses),
         *(config.inputs["pose"], config.inputs["tf_static"]),
         *config.outputs.values(),
         config.velocities(schemas.TWIST),

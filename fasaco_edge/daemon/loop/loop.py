@@ -170,9 +170,9 @@ class Loop:
         Maps wait meanwhile: reading a keep-out mask uses their share of the memory.
         """
         reload, mailbox = self._host.reload, self._bus.mailbox
-        if reload.asked.is_set() and not reload.is_reading and not self._runner.loading:
+        if reload.is_wanted and not reload.is_reading and not self._runner.loading:
             mailbox.hold()
-            reload.begin(partial(mailbox.post, "reloaded", None))
+            reload.begin(self.config, partial(mailbox.post, "reloaded", None))
 
     def _reload_config(self, batch: Batch) -> None:
         """Apply the configuration that was read; restart the mission if it has changed."""
@@ -237,6 +237,8 @@ class Loop:
         mission, events, faults = self._runner.mission_for(events, self._bus.claim.state)
         self._count_faults(faults)
         if mission is None:
+            if self.config.mission.waits_for_mask:
+                self._status.waits = "no keep-out mask yet"
             return Decision(answers=self._runner.answer(commands, self._status.yield_reason))
         self._status.waits = "no map yet"
         if not self._has_begun:

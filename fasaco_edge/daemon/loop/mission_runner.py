@@ -173,7 +173,8 @@ class MissionRunner:
         if self.mission is not None:
             return self.mission, events, []
         faults = self._held.take(events)
-        if self._loader is None and self._held.has_map and not claim.is_waiting:
+        may_load = not claim.is_waiting and not self.config.mission.waits_for_mask
+        if self._loader is None and self._held.has_map and may_load:
             self._loader = self._load(self.config, self._mailbox)
         loaded = self._loader.poll() if self._loader and claim is ClaimState.PLANS else None
         held = self._held.events

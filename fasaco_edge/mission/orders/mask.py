@@ -20,6 +20,7 @@ from fasaco_edge.errors import BadConfiguration, MapFileError
 from fasaco_edge.grid.geometry import GridGeometry, Polygon, Pose2D
 from fasaco_edge.grid.map_files import read_map_rows
 from fasaco_edge.grid.map_images import MAX_PIXELS
+from fasaco_edge.grid.occupancy import OccupancyGrid
 
 # A hand-drawn outline needs one rectangle for each step of its staircase.
 MOST_RECTANGLES = 2_000
@@ -53,11 +54,28 @@ def inline_mask(file: Path, occupied_at_least: int, most_bytes: int | None = Non
     except (MapFileError, ValueError) as error:
         hint = getattr(error, "hint", "")
         raise BadConfiguration(f"mission.keep_out_mask: {error}", hint=hint) from error
-    bits, shape = np.concatenate(packed), (place.rows, place.cols)
+    return _inline(place, np.concatenate(packed), f"mission.keep_out_mask: {file}")
+
+
+def inline_grid(grid: OccupancyGrid, occupied_at_least: int) -> str:
+    """Return the inline form of a mask that came as a message, the input of ``mask_polygons``.
+
+    Raises:
+        BadConfiguration: its outlines are too fine, or it is too wide.
+    """
+    place = grid.geometry
+    try:
+        _check_width(place.cols)
+    except ValueError as error:
+        raise BadConfiguration(f"keep_out_mask: {error}") from error
+    return _inline(place, np.packbits(grid.cells >= occupied_at_least), "keep_out_mask")
+
+
+def _inline(place: GridGeometry, bits: NDArray[np.uint8], what: str) -> str:
+    shape = (place.rows, place.cols)
     if len(_rectangles(bits, *shape)) > MOST_RECTANGLES:
         raise BadConfiguration(
-            f"mission.keep_out_mask: {file}: its outlines take more than {MOST_RECTANGLES} "
-            "rectangles",
+            f"{what}: its outlines take more than {MOST_RECTANGLES} rectangles",
             hint="draw with straight edges, or larger pixels; or give mission.keep_out polygons",
         )
     deflated = base64.b64encode(zlib.compress(bits.data, 9)).decode()

@@ -1,0 +1,109 @@
+"""A keep-out mask as a message: it holds before the robot drives, and as soon as it changes."""
+
+from __future__ import annotations
+
+import pytest
+
+from fasaco_edge.daemon.reload import Reload
+from tests.daemon.test_mission import planned
+from tests.daemon.test_ros2 import BRIDGE, RMW, ros2
+from tests.support.outsider import Outsider
+from tests.support.processes import daemon_process
+from tests.support.rooms import FREE, WALL, cells_of, fill, lanes, map_bytes, pose_bytes, room
+from tests.support.ros_robot import GRID, ros_robot
+
+ROOM = room(4.0, 3.0)
+BLANK = fill(ROOM, 0.0, 0.0, 4.0, 3.0, FREE)
+# A square of 4 x 4 cells, and the robot's rim.
+MASK = fill(BLANK, 0.9, 0.9, 2.1, 2.1, WALL)
+AROUND = {(row, col) for row in range(2, 8) for col in range(2, 8)}
+MISSION = {"keep_out_topic": True}
+
+
+def put_mask(outsider, pixels, **keys):
+    outsider.put("keep_out_mask", map_bytes(pixels, **keys), schema=GRID)
+
+
+def give(outsider):
+    """Give map and pose, without waiting for a path."""
+    outsider.put("map", map_bytes(ROOM))
+    outsider.put("pose", pose_bytes(*lanes(1)[0]))
+
+
+def driven(heard):
+    return set(cells_of(planned(heard)[0]))
+
+
+def test_there_is_no_mission_before_the_mask_has_come(tmp_path):
+    with (
+        daemon_process(tmp_path, mission=dict(MISSION)) as running,
+        Outsider(running.endpoint) as outsider,
+    ):
+        paths = outsider.listen("path")
+        give(outsider)
+        status = outsider.wait_status(lambda status: "mask" in status["reason"])
+        assert (status["state"], status["reason"]) == ("waiting for map", "no keep-out mask yet")
+        assert paths.heard == []
+        put_mask(outsider, MASK)
+        cells = driven(paths.wait(lambda heard: len(planned(heard)[0]) > 0))
+        assert cells
+        assert not cells & AROUND
+        assert outsider.ask_status()["mission"]["keep_out"] == 1
+        # Another mask takes its place; what was kept out is covered now.
+        since = len(paths.heard)
+        put_mask(outsider, BLANK)
+        paths.wait(lambda heard: bool(driven(heard) & AROUND), since=since)
+
+
+def test_one_that_cannot_be_read_leaves_the_last_one_in_force(tmp_path):
+    with (
+        daemon_process(tmp_path, mission=dict(MISSION)) as running,
+        Outsider(running.endpoint) as outsider,
+    ):
+        give(outsider)
+        put_mask(outsider, MASK)
+        outsider.wait_status(lambda status: status["state"] == "covering")
+        for payload in (b"rubbish", map_bytes(MASK)[:-5]):
+            outsider.put("keep_out_mask", payload, schema=GRID)
+            total = outsider.ask_status()["errors"]["total"]
+            status = outsider.wait_status(lambda status: status["errors"]["total"] > 0)
+            assert "keep_out_mask" in status["errors"]["last"], total
+        assert outsider.ask_status()["state"] == "covering"
+        assert not driven(outsider.listen("path").wait(lambda heard: True)) & AROUND
+
+
+@pytest.mark.parametrize("naming", [RMW, BRIDGE], ids=["rmw_zenoh", "bridge"])
+def test_navs_mask_is_taken_however_early_it_was_published(naming, tmp_path):
+    """map_server publishes it once, transient local."""
+    with (
+        daemon_process(tmp_path, mission=dict(MISSION), ros2=ros2(naming)) as running,
+        ros_robot(running.endpoint, naming) as robot,
+        Outsider(running.endpoint) as outsider,
+    ):
+        robot.put("keepout_filter_mask", GRID, map_bytes(MASK), latched=True)
+        give(outsider)
+        cells = driven(outsider.listen("path").wait(lambda heard: len(planned(heard)[0]) > 0))
+        assert cells
+        assert not cells & AROUND
+
+
+def test_a_mask_alone_does_not_read_the_file_again():
+    class Mask:
+        has_come = True
+
+        def added_to(self, config):
+            self.has_come = False
+            return config
+
+    from fasaco_edge.config.config import DaemonConfig
+    from fasaco_edge.daemon.notify import ServiceManager
+    from tests.daemon.test_reload import taken_by
+
+    def read():
+        raise AssertionError("the file may hold what nobody has put in force yet")
+
+    reload = Reload(read, ServiceManager({}))
+    reload.mask = Mask()
+    assert reload.is_wanted
+    assert taken_by(reload) == DaemonConfig()
+    assert not reload.is_wanted
