@@ -70,14 +70,15 @@ class RepairEffort:
 
     Attributes:
         rules: rules of perturbations.
-        perturbations: number of perturbations in each neighbourhood.
+        proposals: number of proposals in each neighbourhood, after which no perturbation begins:
+            a number of perturbations takes three times as long in one than in another.
         held: number of these that leave the walk just ahead of the robot as it is.
         steady_us: a walk that keeps the robot's next cells is preferred up to this extra cost
             [us].
     """
 
     rules: PerturbationRules
-    perturbations: int
+    proposals: int
     held: int
     steady_us: int
 
@@ -98,7 +99,7 @@ def repair_for(cost: CoverageCost) -> RepairEffort:
         strict=True,
     )
     if not cost.quarter_turn_us:
-        return RepairEffort(rules, 50, 40, 0)
+        return RepairEffort(rules, 30_000, 24_000, 0)
     unit = (cost.step_us + cost.quarter_turn_us) * 2 // 5
-    rules = rules._replace(proposals=40, radius=6, temperature_us=unit * 3 // 2, loops_of_256=128)
-    return RepairEffort(rules, 80, 60, 2 * cost.step_us)
+    rules = rules._replace(proposals=40, radius=5, temperature_us=unit * 3 // 2, loops_of_256=128)
+    return RepairEffort(rules, 95_000, 70_000, 2 * cost.step_us)

@@ -30,7 +30,11 @@ from fasaco_edge.planners.search.walk_region import WalkRegion, stream_of
 from fasaco_edge.planners.walk_before import HELD_CELLS, completed_from, framed_cells
 
 # Perturbations between two pauses.
-PERTURBATIONS_AT_ONCE = 10
+PERTURBATIONS_AT_ONCE = 8
+# Perturbations of a neighbourhood, which would be without end where nothing can be proposed.
+MOST_PERTURBATIONS = 100
+# Share of a repair's proposals that a second one for the path ahead has.
+FEW = 0.2
 
 # With nothing to repair: stride between the first spots of two attempts, approximate cells of a
 # spot, and passes over all spots without gain after which the search ends.
@@ -90,7 +94,7 @@ def _steady(
     except NothingToCover:
         return path
     effort = repair_for(problem.cost)
-    few = replace(effort, perturbations=PERTURBATIONS_AT_ONCE, held=0)
+    few = replace(effort, proposals=int(FEW * effort.proposals), held=0)
     repair = _Repair(rest, path.seed, few, path.work)
     _run(repair, stop)
     other = repair.path(path.planner, path.seed)
@@ -190,8 +194,10 @@ class _Repair:
             region.hold(held)
             region.touch_up(place.changed, self._effort.rules, self._random)
             yield
-        for done in range(0, self._effort.perturbations, PERTURBATIONS_AT_ONCE):
-            if self._is_proven():
+        before = region.work.proposals
+        for _ in range(0, MOST_PERTURBATIONS, PERTURBATIONS_AT_ONCE):
+            done = region.work.proposals - before
+            if done >= self._effort.proposals or self._is_proven():
                 return
             region.hold(HELD_CELLS if place.is_first and done < self._effort.held else 0)
             region.perturb(self._effort.rules, PERTURBATIONS_AT_ONCE, self._random)
