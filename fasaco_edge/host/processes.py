@@ -32,9 +32,10 @@ def python_program(module: str, *words: str) -> list[str]:
     return [sys.executable, shut, "-m", module, *words]
 
 
-# Options of mallopt(3) and what they are set to.
-_TRIM_THRESHOLD = (-1, 256 * 1024)
-_MMAP_THRESHOLD = (-3, 256 * 1024)
+# Options of mallopt(3) and what they are set to. A block that the system maps anew costs a page
+# fault each 4 KB: with thresholds of 256 KB replans of 100,000 cells took 60 ms in place of 38.
+_TRIM_THRESHOLD = (-1, 2 << 20)
+_MMAP_THRESHOLD = (-3, 1 << 20)
 _ARENA_MAX = (-8, 2)
 
 
