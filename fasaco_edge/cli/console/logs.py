@@ -10,7 +10,6 @@ from __future__ import annotations
 import faulthandler
 import logging
 import os
-import socket
 import sys
 import time
 from collections.abc import Callable, Mapping
@@ -120,6 +119,9 @@ class JournalHandler(logging.Handler):
     def __init__(self, address: str = SOCKET) -> None:
         super().__init__()
         self._address = address
+        # Half a megabyte, which a process without a journal does not need.
+        import socket
+
         self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM | socket.SOCK_CLOEXEC)
         self._socket.settimeout(PATIENCE_S)
 
