@@ -31,6 +31,10 @@ class MaskTopic:
         config: of the daemon.
         ros: its side towards ROS 2; None without one.
         came: called for each mask, on a Zenoh thread.
+
+    Attributes:
+        map_frame: the frame of the map, which must be the mask's; until it is known, "", a mask
+            waits.
     """
 
     def __init__(
@@ -39,6 +43,7 @@ class MaskTopic:
         self._max_pixels = config.map.max_pixels
         self._occupied_at_least = config.map.occupied_at_least
         self._came = came
+        self.map_frame = ""
         self._lock = threading.Lock()
         self._newest: Sample | None = None
         self._inline = ""
@@ -48,8 +53,8 @@ class MaskTopic:
 
     @property
     def has_come(self) -> bool:
-        """Whether there is a mask that was not put into a configuration yet."""
-        return self._newest is not None
+        """Whether there is a mask that can be put into a configuration."""
+        return self._newest is not None and bool(self.map_frame)
 
     def added_to(self, config: DaemonConfig) -> DaemonConfig:
         """Return a configuration with the newest mask.
@@ -58,7 +63,9 @@ class MaskTopic:
             BadConfiguration: that is malformed, or too fine; the one before stays.
         """
         with self._lock:
-            newest, self._newest = self._newest, None
+            newest = self._newest if self.map_frame else None
+            if newest is not None:
+                self._newest = None
         if newest is not None:
             self._inline = self._read(newest)
         if not self._inline or not config.mission.keep_out_topic:
@@ -74,6 +81,11 @@ class MaskTopic:
             )
         try:
             grid = decode_occupancy_grid(sample.payload, self._max_pixels)
+            if grid.frame != self.map_frame:
+                raise BadConfiguration(
+                    f"keep_out_mask: in frame {grid.frame!r}, the map in {self.map_frame!r}",
+                    hint="publish map and mask in the same frame",
+                )
             return inline_grid(grid, self._occupied_at_least)
         except FasacoError as error:
             if isinstance(error, BadConfiguration):

@@ -170,6 +170,8 @@ class Loop:
         Maps wait meanwhile: reading a keep-out mask uses their share of the memory.
         """
         reload, mailbox = self._host.reload, self._bus.mailbox
+        if reload.mask is not None:
+            reload.mask.map_frame = self._runner.map_frame
         if reload.is_wanted and not reload.is_reading and not self._runner.loading:
             mailbox.hold()
             reload.begin(self.config, partial(mailbox.post, "reloaded", None))

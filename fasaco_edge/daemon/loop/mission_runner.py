@@ -158,6 +158,14 @@ class MissionRunner:
         return self.mission.order_state if self.mission else self._keeper.order_state
 
     @property
+    def map_frame(self) -> str:
+        """The frame of the map, "" before there is one."""
+        if self.mission is not None:
+            return self.mission.grid.frame if self.mission.grid is not None else ""
+        frames = [event.grid.frame for event in self._held.events if isinstance(event, MapReceived)]
+        return frames[-1] if frames else ""
+
+    @property
     def loading(self) -> str:
         """The stage that startup is loading; "" for none."""
         return self._loader.stage if self._loader else ""
