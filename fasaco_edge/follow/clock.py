@@ -12,7 +12,7 @@ from typing import Protocol
 # A simulation's time goes on this far without a pose [s]: poses come ten times a second.
 LEAD_S = 0.09
 # After this long without a pose the simulation has stopped, and time goes on [s, real].
-SILENT_S = 0.5
+SILENT_S = 2.0
 # Stamps that go back, or forward by more than this, are those of another simulation [s].
 JUMP_S = 5.0
 
