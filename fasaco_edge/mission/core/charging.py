@@ -38,7 +38,7 @@ BETWEEN, SPARE = 0.1, 1.2
 BEYOND_CELLS = 20
 # A robot may go to charge this much above the level of turning back, where the dock is near; number
 # of places on its path ahead that are compared.
-EARLY, PLACES_AHEAD = 0.12, 8
+EARLY, PLACES_AHEAD = 0.2, 8
 # Lattices larger than this are not searched for so many ways [cells].
 MOST_CELLS = 200_000
 # The battery counts as full once its level has risen by less than RISE for this long [s].
