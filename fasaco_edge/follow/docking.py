@@ -112,8 +112,6 @@ class Docking:
                 self._is_docked = far <= max(DOCKED_M, 0.5 * self._approach)
             elif self._goal is None and far > self._approach + 2.0 * DOCKED_M:
                 self._is_docked = False
-            if state == "charging" and far <= DOCKED_M:
-                self._is_docked = True
         if (goal := self._goal) is not None:
             requests += self._watch(goal, now, state)
         elif here is not None and now >= self._retry_at:

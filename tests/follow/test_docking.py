@@ -102,6 +102,14 @@ def test_one_that_passes_its_dock_later_does_not():
         assert robot.docking.holds == ""
 
 
+def test_a_robot_at_the_docks_place_need_not_be_docked(robot):
+    """Whoever put it there: the server knows, and says so where it is."""
+    robot.arrive()
+    robot.here = Pose2D(DOCK.x + 0.05, DOCK.y, 1.5)
+    (start,) = robot.step()
+    assert start.move is Move.DOCK
+
+
 def test_what_was_done_already_is_done(robot):
     robot.arrive()
     robot.ends(robot.started(), DockEnding(ABORTED, success=True))

@@ -78,7 +78,7 @@ def test_goals_are_read_by_others():
         assert (pose.header.frame_id, pose.pose.position.x, pose.pose.position.y) == ("map", 1, -2)
         assert pose.pose.orientation.z == pytest.approx(math.sin(math.pi / 4))
         assert (goal.dock_type, goal.max_staging_time) == ("charging_dock", 1000.0)
-        assert goal.navigate_to_staging_pose is False
+        assert goal.navigate_to_staging_pose is True
     goal = dock_store("Undock").deserialize_cdr(encode_undock(GOAL, "x"), "look_alike/msg/Send")
     assert (goal.dock_type, goal.max_undocking_time) == ("x", 30.0)
 

@@ -73,7 +73,7 @@ class DockEnding:
 def encode_dock(
     goal_id: bytes, dock: Pose2D, frame: str, dock_id: str = "", dock_type: str = ""
 ) -> bytes:
-    """Return the request of DockRobot's ``send_goal``, for a robot that stands before its dock.
+    """Return the request of DockRobot's ``send_goal``.
 
     Args:
         goal_id: unique bytes.
@@ -93,8 +93,8 @@ def encode_dock(
     write_pose(writer, dock, "dock_pose.pose")
     writer.string(dock_type, "dock_type")
     writer.words(_TIME, ("max_staging_time",), STAGING_S)
-    # The path has led it there.
-    writer.octets(b"\0")
+    # The server drives there only from further away than its tolerance, 0.5 m.
+    writer.octets(b"\1")
     return writer.payload()
 
 
