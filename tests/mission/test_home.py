@@ -65,6 +65,16 @@ def test_it_drives_home_stands_there_and_goes_on_where_it_was(policy, there):
     assert len(drive.visited) == 48
 
 
+def test_the_way_home_begins_at_the_robot_wherever_its_line_is_on_its_path():
+    """A polished line takes short cuts; the robot drove 20 m to a home that was 3 m away."""
+    drive = covering(home=HOME)
+    assert drive.cell != (5, 7)
+    drive.mission._map.follow_path((5, 7))
+    path = drive.command("home").path
+    assert tuple(path.cells[0].tolist()) == drive.cell
+    assert len(path.cells) == 1 + abs(drive.cell[0] - 5) + abs(drive.cell[1] - 0)
+
+
 def test_the_way_home_ends_with_the_heading_of_that_place():
     drive = covering(home=HOME)
     assert drive.command("home").path.end_yaw == math.pi / 2

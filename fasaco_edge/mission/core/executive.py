@@ -321,7 +321,8 @@ class Executive:
             self.monitor.clear_doubt()
             if goal is None or area is None or not area.contains(goal):
                 return self._rest(State.BLOCKED, f"no way {to}: waits for a map that shows one")
-            update = self._lead(area.shortest_path(cell, goal), f"drives {to}", errand)
+            here = self.map.cell_at_pose() or cell
+            update = self._lead(area.shortest_path(here, goal), f"drives {to}", errand)
         self._state, self._reason = State.RETURNING, f"on the way {to}"
         return Decision(path=update)
 

@@ -122,10 +122,11 @@ class LineLayer:
         touched, self._touched = self._touched, None
         self._take_floor(touched)
         reason, path = "", self._route.path
+        is_errand = bool(self._orders.order_state.errand)
         # Its cell may be ahead of its place on the line, which may skip cells.
         is_further = path.index > ahead.cell
         if update is not None:
-            ahead.lay(update.cells, stamped.pose)
+            ahead.lay(update.cells, stamped.pose, keeps=not is_errand)
         elif self._is_dropped or (is_further and touched is not None):
             ahead.lay(path.ahead, stamped.pose)
             why = "map on another raster" if self._is_dropped else "robot further on its path"
@@ -140,7 +141,6 @@ class LineLayer:
         if not is_waited_for:
             self._explain()
             # On the way home or to its dock the robot sweeps nothing beside its path.
-            is_errand = bool(self._orders.order_state.errand)
             if not is_errand and self._polisher.polish(
                 ahead, self._map.floor, is_settled=self._is_settled
             ):

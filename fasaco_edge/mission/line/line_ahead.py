@@ -96,18 +96,20 @@ class LineAhead:
         margin = self._tool + 1.0
         return is_outside(points, shape, margin)
 
-    def lay(self, walk: NDArray[np.int32], pose: Pose2D) -> None:
+    def lay(self, walk: NDArray[np.int32], pose: Pose2D, *, keeps: bool = True) -> None:
         """Lay the line along a walk; it stays where it leads along the same cells.
 
         Args:
             walk: int32 (n, 2), cells (row, col), each a legal step from the previous one.
             pose: pose of the robot, in or near the first cell.
+            keeps: False for a walk that is only a way: a polished line reaches its cells in
+                another order, and by far longer ways.
         """
         self._see(pose)
         # A plan's cells are read-only; for those kernels would be compiled again, in the loop.
         walk = walk.copy()
         ahead, line = self._walk[self.cell :], self.line.renumbered(-self.cell)
-        is_beginning = common_beginning(walk, ahead) == len(walk)
+        is_beginning = keeps and common_beginning(walk, ahead) == len(walk)
         if len(walk) < len(ahead) > 1 and len(line) and is_beginning:
             self._walk, self.line, self.cell, self._cut = ahead, line, 0, len(walk)
             if self._unchecked is not None:
@@ -116,7 +118,7 @@ class LineAhead:
         if self.is_cut and self.is_followed and np.array_equal(walk, ahead):
             self._walk, self.line, self.cell, self._cut = ahead, line, 0, None
         else:
-            pieces = kept_pieces(line, ahead, walk) if len(line) and len(walk) else []
+            pieces = kept_pieces(line, ahead, walk) if keeps and len(line) and len(walk) else []
             self._walk, self.cell, self._cut = walk, 0, None
             self._join(pieces)
         unchecked, self._unchecked = self._unchecked, None

@@ -219,6 +219,17 @@ class MapState:
         is_docked = math.hypot(pose.x - dock.x_m, pose.y - dock.y_m) <= IN_DOCK_M
         return anchor_cell(lattice, dock.stand) if is_docked else None
 
+    def cell_at_pose(self) -> Cell | None:
+        """Return the coverable cell at the robot's pose; where there is none, ``robot_cell``.
+
+        A polished line takes short cuts: the cell of its path may be metres from the robot.
+        """
+        if self.lattice is None or self.pose is None:
+            return None
+        own = anchor_cell(self.lattice, self.pose.pose)
+        is_reachable = own is not None and self.area is not None and self.area.contains(own)
+        return own if is_reachable else self.robot_cell()
+
     def follow_path(self, cell: Cell | None) -> None:
         """Note the robot's cell on its path; None while it is off its line."""
         self.path_cell = cell
