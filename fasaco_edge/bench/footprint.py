@@ -18,7 +18,7 @@ from fasaco_edge.bench.benchmark import (
     seconds_above_zero,
 )
 from fasaco_edge.bench.processes import DaemonProcess, warm_kernels
-from fasaco_edge.bench.robot import MapSource, building, robot_pose, with_crate
+from fasaco_edge.bench.robot import MapSource, building, robot_beside, robot_pose, with_crate
 from fasaco_edge.drawing.spread import Spread, document, median, text
 from fasaco_edge.host.processes import cpu_seconds, has_loaded, own_mb, resident_mb
 from fasaco_edge.host.processes import peak_mb as peak_mb_of
@@ -31,6 +31,7 @@ MEASURES = (
     ("idle_percent", "share of a core before the first map [%]", 2),
     ("warm_mb", "memory after map and plan [MB]", 1),
     ("warm_own_mb", "of it its own [MB]", 1),
+    ("mission_percent", "share of a core in a mission [%]", 2),
     ("peak_mb", "peak memory [MB]", 1),
 )
 # Measure, what it is, the most that its median may be, unit.
@@ -39,7 +40,10 @@ GOALS = (
     ("idle_mb", "memory before the first map", 45.0, "MB"),
     ("idle_percent", "share of a core, idle", 0.5, "%"),
     ("warm_mb", "memory after map and plan", 150.0, "MB"),
+    ("mission_percent", "share of a core in a mission", 2.0, "%"),
 )
+# Maps come twice a second in a mission, and something has changed on one of so many.
+MAP_EVERY_S, MAPS_A_CHANGE = 0.5, 20
 # The compiler and the recorder's library, by what a process has mapped of them.
 PACKAGES = {"numba": ("numba", "llvmlite"), "rerun": ("rerun_sdk", "rerun_bindings")}
 
@@ -56,6 +60,8 @@ class DaemonStart:
         idle_percent: of a core, that it took until then [%].
         warm_mb: resident after a map and a plan [MB].
         warm_own_mb: of that without pages of files [MB].
+        mission_percent: of a core, that it takes while a robot drives its path and sends ten poses
+            and two maps a second [%].
         peak_mb: the most it was ever resident with [MB].
         idle, warm: which of ``PACKAGES`` were loaded at these two points.
     """
@@ -67,6 +73,7 @@ class DaemonStart:
     idle_percent: float
     warm_mb: float
     warm_own_mb: float
+    mission_percent: float
     peak_mb: float
     idle: frozenset[str]
     warm: frozenset[str]
@@ -91,6 +98,13 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         help="how long a daemon without a map is measured [s] (default: %(default)g)",
     )
     parser.add_argument(
+        "--mission",
+        type=seconds_above_zero,
+        default=20.0,
+        metavar="S",
+        help="how long a daemon in a mission is measured [s] (default: %(default)g)",
+    )
+    parser.add_argument(
         "--ants", type=positive, default=200, help="ants of the plan (default: %(default)s)"
     )
 
@@ -112,26 +126,41 @@ def _start(args: argparse.Namespace) -> DaemonStart:
         time.sleep(args.settle)
         idle_mb, idle_own_mb = resident_mb(daemon.pid), own_mb(daemon.pid)
         idle = _loaded(daemon.pid)
-        began_s, cpu_s = time.monotonic(), cpu_seconds(daemon.pid)
-        time.sleep(args.idle)
-        share = (cpu_seconds(daemon.pid) - cpu_s) / (time.monotonic() - began_s)
+        share = _share_of_core(daemon.pid, args.idle)
         stamp_ns = time.time_ns()
         source.put_pose(robot_pose(stamp_ns))
         source.put_map(with_crate(building(), 0, stamp_ns))
         source.wait_path(stamp_ns)
         time.sleep(args.settle)
+        warm_mb, warm_own_mb, warm = (
+            resident_mb(daemon.pid),
+            own_mb(daemon.pid),
+            _loaded(daemon.pid),
+        )
+        with robot_beside(
+            daemon, bus, map_every_s=MAP_EVERY_S, maps_a_crate=MAPS_A_CHANGE, source=source
+        ):
+            mission = _share_of_core(daemon.pid, args.mission)
         return DaemonStart(
             ready_s=ready_s,
             status_s=status_s,
             idle_mb=idle_mb,
             idle_own_mb=idle_own_mb,
             idle_percent=100.0 * share,
-            warm_mb=resident_mb(daemon.pid),
-            warm_own_mb=own_mb(daemon.pid),
+            warm_mb=warm_mb,
+            warm_own_mb=warm_own_mb,
+            mission_percent=100.0 * mission,
             peak_mb=peak_mb_of(daemon.pid),
             idle=idle,
-            warm=_loaded(daemon.pid),
+            warm=warm,
         )
+
+
+def _share_of_core(pid: int, for_s: float) -> float:
+    """Return the share of a core that a process takes for some time."""
+    began_s, cpu_s = time.monotonic(), cpu_seconds(pid)
+    time.sleep(for_s)
+    return (cpu_seconds(pid) - cpu_s) / (time.monotonic() - began_s)
 
 
 def _loaded(pid: int) -> frozenset[str]:
@@ -183,7 +212,9 @@ FOOTPRINT = Benchmark(
     description="Start a real daemon on a free port of loopback several times; time it from exec "
     "to its liveliness token and to the first status it answers with; read its resident memory "
     "and its share of a core before the first map, and its memory after one map of 1000 x 1000 "
-    "pixels and its plan; look at what it has loaded at both points.",
+    "pixels and its plan; look at what it has loaded at both points. Then let a robot drive, which "
+    "sends ten poses and two maps a second, one in twenty with something changed: its share of a "
+    "core in a mission.",
     add_options=_add_options,
     count=lambda args: int(args.starts),
     measure=_measure,

@@ -35,7 +35,7 @@ HALL_PX, WALL_PX, DOOR_PX, CRATE_PX = 200, 4, 30, 16
 CRATE_PLACES, CRATE_STEP_PX = 12, 12
 POSES_HZ = 10
 SPEED_M_S = 0.5
-# Period at which a crate moves [s]: each time the rest of the path is replanned.
+# Period of maps [s], each with the crate at another place: the rest of the path is replanned.
 MAP_EVERY_S = 1.0
 # The first path needs the kernels; on a slow computer their loading takes long.
 PATH_TIMEOUT_S = 300.0
@@ -150,13 +150,19 @@ class MapSource:
 class CoveringRobot:
     """Drives; takes paths on Zenoh's threads, and is ticked by one.
 
+    Args:
+        source: publishes its poses and maps.
+        map_every_s: period of maps [s].
+        maps_a_crate: so many maps show the crate at one place.
+
     Attributes:
         paths: how many it was given.
     """
 
-    def __init__(self, source: MapSource) -> None:
+    def __init__(self, source: MapSource, map_every_s: float, maps_a_crate: int) -> None:
         self.paths = 0
         self._source = source
+        self._map_every_s, self._maps_a_crate = map_every_s, maps_a_crate
         self._building = building()
         self._at = np.array([2.5, 2.5])
         self._ahead: NDArray[np.float64] = np.empty((0, 2))
@@ -179,8 +185,9 @@ class CoveringRobot:
         self._source.put_pose(StampedPose(Pose2D(x, y), stamp_ns=time.time_ns()))
         if now >= self._map_due:
             self._maps += 1
-            self._map_due = now + MAP_EVERY_S
-            self._source.put_map(with_crate(self._building, self._maps, time.time_ns()))
+            self._map_due = now + self._map_every_s
+            number = self._maps // self._maps_a_crate
+            self._source.put_map(with_crate(self._building, number, time.time_ns()))
 
     def _drive(self, metres: float) -> None:
         while len(self._ahead) and metres > 0.0:
@@ -193,10 +200,23 @@ class CoveringRobot:
 
 
 @contextmanager
-def robot_beside(daemon: DaemonProcess, bus: Bus) -> Iterator[CoveringRobot]:
-    """Let a robot drive for the block, from the moment it has its first path."""
-    source = MapSource(daemon, bus)
-    robot = CoveringRobot(source)
+def robot_beside(
+    daemon: DaemonProcess,
+    bus: Bus,
+    *,
+    map_every_s: float = MAP_EVERY_S,
+    maps_a_crate: int = 1,
+    source: MapSource | None = None,
+) -> Iterator[CoveringRobot]:
+    """Let a robot drive for the block, from the moment it has its first path.
+
+    Args:
+        daemon, bus: whose robot it is, and a session with it.
+        map_every_s, maps_a_crate: see ``CoveringRobot``.
+        source: what publishes; None for a new one.
+    """
+    source = source or MapSource(daemon, bus)
+    robot = CoveringRobot(source, map_every_s, maps_a_crate)
     bus.subscribe(daemon.keys.of(topics.PATH), robot.take_path)
     stamp_ns = time.time_ns()
     source.put_pose(robot_pose(stamp_ns))

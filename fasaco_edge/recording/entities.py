@@ -56,6 +56,7 @@ PLANS: Final = "metrics/plans"
 ERRORS: Final = "metrics/errors"
 MEMORY: Final = "metrics/resources/memory"
 PROCESSOR: Final = "metrics/resources/processor"
+RECORDER_CPU_S: Final = "metrics/recorder_cpu_s"
 BATTERY: Final = "metrics/resources/battery"
 THREADS: Final = "metrics/threads"
 

@@ -31,6 +31,7 @@ ANOTHER_PROBLEM = ("tool width", "robot radius", "line", "width of lanes", "buil
 ANYWAY = (
     *("faults", "faults_by_code", "recorder_lost", "samples_missing"),
     *("memory_mb_max", "recorder_memory_mb_max", "processor_percent_max", "threads_max"),
+    *("processor_s", "recorder_processor_s"),
 )
 # Maps of one building from two missions differ a little: its sides [m], and its cells [share].
 SIDE_M, CELLS_SHARE = 1.0, 0.15
@@ -61,6 +62,8 @@ NUMBERS = (
     ("attempts that found one", "attempts_used", ""),
     ("memory of the daemon, most", "memory_mb_max", "MB"),
     ("memory of the recorder, most", "recorder_memory_mb_max", "MB"),
+    ("processor time of the daemon", "processor_s", "s"),
+    ("processor time of the recorder", "recorder_processor_s", "s"),
     ("processor time, most", "processor_percent_max", "% of a core"),
     ("messages refused", "faults", ""),
     ("lost by the recorder", "recorder_lost", "samples"),

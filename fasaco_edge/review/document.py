@@ -148,6 +148,7 @@ class ReviewDocument(msgspec.Struct):
             not, by the last status), branching (at the end: mean number of directions of a cell
             within reach of its strongest).
         memory_mb_max, recorder_memory_mb_max: most memory of daemon and recorder [MB].
+        processor_s, recorder_processor_s: processor time of daemon and recorder in all [s].
         processor_percent_max, threads_max: of the daemon: processor time over half a minute [% of a
             core], threads.
         restored_cells: cells that were covered before a restart.
@@ -217,6 +218,8 @@ class ReviewDocument(msgspec.Struct):
     pheromone: PheromoneFigures = PheromoneFigures(0, None, None)
     memory_mb_max: float | None = None
     recorder_memory_mb_max: float | None = None
+    processor_s: float | None = None
+    recorder_processor_s: float | None = None
     processor_percent_max: float | None = None
     threads_max: float | None = None
     restored_cells: int = 0

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from bisect import bisect_right
+from collections.abc import Sequence
 from dataclasses import replace
 from datetime import UTC, datetime
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 from fasaco_edge.drawing.spread import percentile
@@ -85,7 +87,17 @@ def document_of(review: Review) -> ReviewDocument:
     for member, entity in PLOTTED.items():
         if (points := record.plots.get(entity)) is not None:
             setattr(document, member, _rounded(float(points[:, 1].max())))
+    document.processor_s = _rounded(_used([each.status.cpu_s for each in data.statuses]))
+    of_recorder = record.plots.get(entities.RECORDER_CPU_S)
+    if of_recorder is not None:
+        document.recorder_processor_s = _rounded(_used(of_recorder[:, 1].tolist()))
     return document
+
+
+def _used(counts: Sequence[float]) -> float | None:
+    """Return how much a count has grown, that begins at 0 again with each process; None of none."""
+    grown = (now - before if now >= before else now for before, now in pairwise(counts))
+    return sum(grown) if len(counts) > 1 and counts[-1] else None
 
 
 def charges_of(review: Review) -> list[Charge]:

@@ -98,10 +98,18 @@ def test_speed_needs_no_checkout(tmp_path):
 
 
 def test_footprint(capsys):
-    words = ("--starts", "1", "--settle", "0.1", "--idle", "1", "--ants", "8")
+    words = ("--starts", "1", "--settle", "0.1", "--idle", "1", "--mission", "1", "--ants", "8")
     document = figures(capsys, "footprint", *words)
     assert document["starts"] == 1
-    for name in ("ready_s", "status_s", "idle_mb", "idle_percent", "warm_mb", "peak_mb"):
+    for name in (
+        "ready_s",
+        "status_s",
+        "idle_mb",
+        "idle_percent",
+        "warm_mb",
+        "mission_percent",
+        "peak_mb",
+    ):
         assert_ordered(document[name])
     assert document["ready_s"]["median"] <= document["status_s"]["median"]
     # Memory does not depend on how busy the machine is.
@@ -112,7 +120,7 @@ def test_footprint(capsys):
     assert document["warm_mb"]["median"] <= document["peak_mb"]["median"]
     assert document["loaded"]["warm"] == {"numba": True, "rerun": False}
     assert document["loaded"]["idle"]["rerun"] is False
-    assert [goal["limit"] for goal in document["goals"]] == [1.5, 45.0, 0.5, 150.0, 0.0]
+    assert [goal["limit"] for goal in document["goals"]] == [1.5, 45.0, 0.5, 150.0, 2.0, 0.0]
 
 
 def test_jitter(capsys):

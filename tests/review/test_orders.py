@@ -112,6 +112,7 @@ def run(**changes):
         *("driven_m", "paths", "replans", "first_plan_ms", "replan_ms_p50", "replan_ms_p99"),
         *("replan_ms_max", "plans", "plans_unused", "plan_ms_max", "attempts", "attempts_used"),
         *("memory_mb_max", "recorder_memory_mb_max", "processor_percent_max", "threads_max"),
+        *("processor_s", "recorder_processor_s"),
         *("faults", "recorder_lost", "samples_missing"),
     )
     return ReviewDocument(**(base | dict.fromkeys(names, 3) | changes))

@@ -14,6 +14,7 @@ pytest.importorskip("rerun")
 
 from fasaco_edge.errors import UnreadableRecording
 from fasaco_edge.review.drive import walk_figures
+from fasaco_edge.review.figures import _used
 from fasaco_edge.review.instant import scene_at
 from fasaco_edge.review.output.page import page_of
 from fasaco_edge.review.output.panels import TimeAxis, branching_panel, covered_share, saved_panel
@@ -180,6 +181,15 @@ def test_what_it_took_is_told(told, recording):
     assert told["memory_mb_max"] == pytest.approx(most, rel=0.11)
     assert told["threads_max"] >= recording.status["threads"] > 1
     assert told["restored_cells"] == 0
+    used = [status["cpu_s"] for _, status in recording.statuses]
+    assert told["processor_s"] == pytest.approx(used[-1] - used[0], abs=0.05)
+    assert 0.0 < told["recorder_processor_s"] < 60.0
+
+
+def test_what_a_process_used_begins_at_nothing_with_each_of_them():
+    assert _used([2.0, 5.0, 1.0, 4.0]) == 3.0 + 1.0 + 3.0
+    assert _used([0.0, 0.0]) is None  # a daemon that does not tell it
+    assert _used([]) is None
 
 
 def test_states_are_those_heard(told, review, recording):

@@ -15,7 +15,13 @@ from fasaco_edge.recording import entities
 from fasaco_edge.recording.scene import archetypes as draw
 from fasaco_edge.recording.scene.archetypes import log_styles
 from fasaco_edge.recording.scene.blueprint import build_blueprint
-from fasaco_edge.recording.scene.curves import NOISE, SHARE_SPACING_NS, Curves, StatusFigures
+from fasaco_edge.recording.scene.curves import (
+    COUNT_SPACING_NS,
+    NOISE,
+    SHARE_SPACING_NS,
+    Curves,
+    StatusFigures,
+)
 from fasaco_edge.recording.scene.drawings import DrivenPathDrawing, PathDrawing
 from fasaco_edge.recording.scene.flows import flows_of, fork_at
 from fasaco_edge.recording.scene.layers import (
@@ -228,6 +234,8 @@ class Scene:
         """Show the recorder's own state and memory."""
         self.enter(entities.RECORDER_STATE, report.state, report.reason)
         self._curves.draw(f"{entities.MEMORY}/recorder", report.rss_mb, NOISE)
+        if report.cpu_s:
+            self._curves.draw(entities.RECORDER_CPU_S, report.cpu_s, spacing_ns=COUNT_SPACING_NS)
 
     def enter(self, entity: str, state: str, reason: str = "") -> None:
         """Show that ``entity`` is in ``state`` from now on; log it if there is a reason."""

@@ -292,6 +292,7 @@ class Recorder:
             lost=self._writer.lost + self._inbox.lost.total(),
             malformed=self._malformed,
             rss_mb=resident_mb(),
+            cpu_s=round(time.process_time(), 3),
             pid=os.getpid(),
         )
         self._scene.add_report(self._report)

@@ -114,11 +114,20 @@ def screen_rows(review: Review, document: ReviewDocument) -> list[tuple[str, str
         ("not reached", _some(unreached)),
         ("driven", f"{amount(document.driven_m, 'm')}, {count(document.steps, 'steps')}"),
         ("replans", replans),
+        *([("processor", _processor(document))] if document.processor_s else []),
         ("commands", _some(commands)),
         *([("charges", _some(charges))] if charges else []),
         ("troubles", _some(troubles)),
         ("refused", f"{document.faults} messages; lost {count(document.recorder_lost, '')}"),
     ]
+
+
+def _processor(document: ReviewDocument) -> str:
+    daemon, recorder = document.processor_s or 0.0, document.recorder_processor_s
+    told = f"daemon {amount(daemon, 's')}"
+    if document.duration_s:
+        told += f" ({100 * daemon / document.duration_s:.1f} % of a core)"
+    return told if recorder is None else f"{told}, recorder {amount(recorder, 's')}"
 
 
 def _some(texts: Sequence[str]) -> str:

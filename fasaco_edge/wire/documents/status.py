@@ -202,6 +202,7 @@ class Recorder(Document, frozen=True):
         lost: samples that were not written, or may not have been.
         malformed: malformed samples.
         rss_mb: memory of the process [MB].
+        cpu_s: processor time the process has used [s].
     """
 
     state: Annotated[str, allowed(enum=RECORDER_STATES)] = ""
@@ -212,6 +213,7 @@ class Recorder(Document, frozen=True):
     lost: Count = 0
     malformed: Count = 0
     rss_mb: Amount = 0.0
+    cpu_s: Amount = 0.0
     pid: Ordinal = 0
 
 
@@ -227,6 +229,7 @@ class SupervisedRecorder(Document, frozen=True):
         lost: samples that were not written, or may not have been.
         malformed: malformed samples.
         rss_mb: memory of the process [MB].
+        cpu_s: processor time the process has used [s].
     """
 
     state: Annotated[str, allowed(enum=SUPERVISED_STATES)] = ""
@@ -238,6 +241,7 @@ class SupervisedRecorder(Document, frozen=True):
     lost: Count | UnsetType = UNSET
     malformed: Count | UnsetType = UNSET
     rss_mb: Amount | UnsetType = UNSET
+    cpu_s: Amount | UnsetType = UNSET
     pid: Ordinal | UnsetType = UNSET
 
 
