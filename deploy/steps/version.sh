@@ -42,9 +42,9 @@ build_version() {
     chmod a+x "$place/deploy/install.sh" "$place/deploy/uninstall.sh"
 }
 
-# The release's own pip; nobody's settings of pip decide what is installed here.
+# The release's own pip; nobody's settings of pip decide what is installed here, nor need root have a home.
 pip() {
-    PIP_CONFIG_FILE=/dev/null "$PREFIX/$NAME/bin/python" -I "$SCRATCH/pip/pip" \
+    HOME=$SCRATCH PIP_CONFIG_FILE=/dev/null "$PREFIX/$NAME/bin/python" -I "$SCRATCH/pip/pip" \
         --isolated --quiet --disable-pip-version-check "$@"
 }
 

@@ -1,11 +1,13 @@
-"""Install, warm up, plan and drive a mission on emulated arm64, and compare with this machine.
+"""Install, start, upgrade, plan and drive a mission on emulated arm64, and compare with this one.
 
     python -m tests.campaigns.arm64 FOLDER [--without-recording] [--only mission]
 
 Needs root and, the first time, the network: FOLDER then holds a tree of Debian for arm64 and the
-release folder that is installed in it, 2 GB. Everything runs under emulation (QEMU, Cortex-A72):
-the seconds say nothing of a real one, the results do. A plan has to be the same, bit for bit, as
-this machine's. Exit code 1 where something differs or fails, 77 where it cannot run.
+release folders that are installed in it, 3 GB. The first release has no compiled kernels; they are
+compiled there, which takes an hour, and come with the second one, that it is upgraded to.
+Everything runs under emulation (QEMU, Cortex-A72): the seconds say nothing of a real one, the
+results do. A plan has to be the same, bit for bit, as this machine's. Exit code 1 where something
+differs or fails, 77 where it cannot run.
 """
 
 from __future__ import annotations
@@ -20,9 +22,41 @@ from collections.abc import Callable
 from pathlib import Path
 
 from tests.deploy.emulated import Tree, make_release, why_not
+from tests.deploy.installed import CHECKOUT
+from tests.support.rooms import map_bytes, pillared_room, pose_bytes
 
 CANNOT_RUN = 77
 PROGRAM = "/usr/local/bin/fasaco-edge"
+CURRENT = "/opt/fasaco-edge/current"
+KERNELS = "srv/kernels"
+SHARE = "fasaco_edge/_share/kernels"
+# From the start to READY=1, and from a first map and pose to the first path [s].
+COLD = """\
+import os, socket, subprocess, sys, time
+sys.path.insert(0, "/srv/checkout")
+from pathlib import Path
+from tests.support.outsider import Outsider
+manager = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+manager.bind("/tmp/cold/notify")
+began = time.monotonic()
+daemon = subprocess.Popen(
+    ["/usr/local/bin/fasaco-edge", "run", "--state", "/tmp/cold/state"],
+    env=os.environ | {"NOTIFY_SOCKET": "/tmp/cold/notify"},
+)
+while b"READY=1" not in manager.recv(4096):
+    pass
+ready = time.monotonic() - began
+with Outsider("tcp/127.0.0.1:7447") as outsider:
+    path = outsider.listen("path")
+    began = time.monotonic()
+    for key in ("map", "pose"):
+        outsider.put(key, Path("/srv/samples", key).read_bytes())
+    path.wait(lambda heard: len(heard.payload) > 100)
+    first = time.monotonic() - began
+daemon.terminate()
+daemon.wait()
+print(f"{ready:.1f} s to READY, {first:.1f} s from the first map to the first path")
+"""
 # A fixed amount of work each: ants walk to their end, no clock decides.
 PLANS = {
     "colony alone": ("basement", "--no-local-search", "--ants", "60", "--turn-s", "1.5"),
@@ -61,7 +95,9 @@ def main() -> int:
     steps: dict[str, Callable[[Tree], str]] = {
         "install": lambda tree: install(tree, args.folder, args.without_recording),
         "doctor": doctor,
-        "warmup": warmup,
+        "kernels": kernels,
+        "upgrade": lambda tree: upgrade(tree, args.folder, args.without_recording),
+        "cold": cold,
         "plans": plans,
         "mission": mission,
     }
@@ -81,14 +117,22 @@ def install(tree: Tree, folder: Path, without_recording: bool) -> str:
     releases = folder / "releases"
     if not releases.exists():
         make_release(releases)
-    release = next(releases.glob("fasaco-edge-*"))
-    shutil.copytree(release, tree.root / "srv/release", dirs_exist_ok=True)
-    words = ["--without-recording"] if without_recording else []
-    _checked(tree, "/srv/release/install.sh", "--no-start", *words)
-    again = _checked(tree, "/srv/release/install.sh", "--no-start", *words).stdout
+    _lay(tree, releases, "first")
+    _install(tree, "first", without_recording)
+    again = _install(tree, "first", without_recording)
     assert again.startswith("nothing to do"), again
     sizes = _checked(tree, "du", "-sm", "/opt/fasaco-edge/").stdout.split()[0]
     return f"{sizes} MB, a second time there is nothing to do"
+
+
+def _lay(tree: Tree, releases: Path, name: str) -> None:
+    release = next(releases.glob("fasaco-edge-*"))
+    shutil.copytree(release, tree.root / "srv" / name, dirs_exist_ok=True)
+
+
+def _install(tree: Tree, name: str, without_recording: bool, *words: str) -> str:
+    more = ["--without-recording"] if without_recording and not words else []
+    return _checked(tree, f"/srv/{name}/install.sh", "--no-start", *more, *words).stdout
 
 
 def doctor(tree: Tree) -> str:
@@ -96,10 +140,52 @@ def doctor(tree: Tree) -> str:
     return "\n" + _checked(tree, PROGRAM, "doctor", codes=(0, 1)).stdout
 
 
-def warmup(tree: Tree) -> str:
-    """Compile the kernels, and load them."""
-    told = [_checked(tree, PROGRAM, "warmup").stderr.strip().splitlines()[-1] for _ in range(2)]
-    return "; then ".join(told)
+def kernels(tree: Tree) -> str:
+    """Compile the kernels for a release, unless they are there."""
+    if not (tree.root / KERNELS / "manifest.json").exists():
+        shutil.rmtree(tree.root / KERNELS, ignore_errors=True)
+        _checked(tree, PROGRAM, "warmup", "--for-release", f"/{KERNELS}")
+    files = list((tree.root / KERNELS).glob("*.kernel"))
+    return f"{len(files)} files, {sum(file.stat().st_size for file in files) / 1e6:.1f} MB"
+
+
+def upgrade(tree: Tree, folder: Path, without_recording: bool) -> str:
+    """Upgrade to a release that brings these kernels along, roll back, and upgrade again."""
+    releases = folder / "with-kernels"
+    if not releases.exists():
+        make_release(releases, tree.root / KERNELS)
+    _lay(tree, releases, "second")
+    took = []
+    for words in ((), ("--rollback",), ()):
+        started = time.monotonic()
+        _install(tree, "second", without_recording, *words)
+        took.append(f"{time.monotonic() - started:.0f}")
+    told = _checked(tree, PROGRAM, "warmup", "--check").stderr.strip()
+    assert "_share/kernels" in told, told
+    return f"upgrade, rollback, upgrade again in {', '.join(took)} s; {told}"
+
+
+def cold(tree: Tree) -> str:
+    """Start with nothing compiled but what came along; then change a byte of that."""
+    shutil.copytree(CHECKOUT / "tests", tree.root / "srv/checkout/tests", dirs_exist_ok=True)
+    samples = tree.root / "srv/samples"
+    samples.mkdir(exist_ok=True)
+    (samples / "map").write_bytes(map_bytes(pillared_room()))
+    (samples / "pose").write_bytes(pose_bytes(1.0, 1.0))
+    start = ("rm -rf /root/.cache/fasaco-edge /tmp/cold && mkdir /tmp/cold && exec "
+             f"{CURRENT}/bin/python -c '{COLD}'")  # fmt: skip
+    told = _checked(tree, "bash", "-c", start).stdout.strip()
+    left = list((tree.root / "root/.cache").glob("fasaco-edge/*/*.kernel"))
+    assert not left, f"{len(left)} kernels were compiled"
+    share = _checked(tree, "bash", "-c", f"ls {CURRENT}/lib/*/site-packages/{SHARE}/*.kernel")
+    file = share.stdout.split()[0]
+    kept = _checked(tree, "bash", "-c", f"cp {file} /tmp/kept && printf x >>{file}")
+    assert not kept.stdout
+    said = _checked(tree, PROGRAM, "warmup", "--check", codes=(1,)).stderr
+    _checked(tree, "cp", "/tmp/kept", file)
+    assert "are not used" in said, said
+    assert "is damaged" in said, said
+    return f"{told}, nothing compiled; with a byte of a kernel changed it says so"
 
 
 def plans(tree: Tree) -> str:
@@ -152,7 +238,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "--only",
         action="append",
-        choices=("install", "doctor", "warmup", "plans", "mission"),
+        choices=("install", "doctor", "kernels", "upgrade", "cold", "plans", "mission"),
         help="this step alone; may be repeated",
     )
     return parser
