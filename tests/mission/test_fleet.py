@@ -14,7 +14,8 @@ from fasaco_edge.errors import FleetError
 from fasaco_edge.grid.geometry import Pose2D, Window
 from fasaco_edge.mission.coverage.ledger import CoverageLedger
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
-from fasaco_edge.mission.fleet.layer import GONE_S, MANY_TAKEN
+from fasaco_edge.mission.fleet.layer import MANY_TAKEN
+from fasaco_edge.mission.fleet.members import GONE_S
 from fasaco_edge.mission.fleet.shared import (
     MOST_ROBOTS,
     MOST_TILES,

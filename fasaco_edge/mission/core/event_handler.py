@@ -135,7 +135,7 @@ class EventHandler:
             case CommandReceived():
                 self._obey(event)
             case MemberHeard():
-                if reason := self.fleet.hear(event, self._now):
+                if reason := self.fleet.others.hear(event, self._now):
                     self.route.want(reason)
 
     def _map_changed(self) -> None:

@@ -85,7 +85,7 @@ class GivingWay:
     def look(self, now: float) -> PathUpdate | None:
         """Decide again; return the path to publish, if any. ``waits_for`` tells the result."""
         area, cell, pose = self._map.area, self._map.robot_cell(), self._map.pose
-        neighbours = self._fleet.neighbours(now)
+        neighbours = self._fleet.others.neighbours(now)
         if area is None or cell is None or pose is None or not neighbours:
             self.is_near = False
             self.end()
@@ -143,7 +143,7 @@ class GivingWay:
         waited_s = now - self._since
         stands_s = neighbours[found.robot].stands_s
         if found.is_blocked and waited_s > PATIENCE_S and stands_s > STANDS_S:
-            self._fleet.avoid(found.robot)
+            self._fleet.others.avoid(found.robot)
         is_due = found.is_on_path or max(waited_s, now - self._came_at) > PATIENCE_S
         if is_due and now - self._sought_at >= AGAIN_S:
             self._sought_at = now
@@ -151,7 +151,7 @@ class GivingWay:
             if goal is not None and goal != cell:
                 self._refuge = goal
                 return route.publish(area.shortest_path(cell, goal), self.reason, now)
-            if self._fleet.is_avoided(found.robot):
+            if self._fleet.others.is_avoided(found.robot):
                 self.end()
                 return None
         return route.publish(NO_CELLS, self.reason, now) if has_path else None

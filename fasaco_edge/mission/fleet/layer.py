@@ -1,4 +1,4 @@
-"""Fleet layer: the other robots of the fleet, and this robot's part of the remaining area.
+"""Fleet layer: this robot's part of the area that remains for a fleet.
 
 There is no leader. Whoever sees a reason divides the remaining area anew and tells the others, who
 take over the division of the highest number, among those of one number that by the first name.
@@ -8,27 +8,20 @@ takes over a part of the remaining area.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.errors import FleetError
 from fasaco_edge.grid.geometry import Pose2D, Window
 from fasaco_edge.grid.lattice import Cell
-from fasaco_edge.mission.core.events import MemberHeard, Part, State
+from fasaco_edge.mission.core.events import MemberHeard, Part
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
 from fasaco_edge.mission.fleet.division import Division, Robot, divide
-from fasaco_edge.mission.fleet.ground import SharedGround
-from fasaco_edge.mission.fleet.shared import MOST_ROBOTS
-from fasaco_edge.mission.fleet.traffic import CLEARANCE_M, OLD_S, Neighbour
+from fasaco_edge.mission.fleet.members import GONE_S, Member, Members
 from fasaco_edge.mission.map.map_state import MapState
 from fasaco_edge.mission.map.reachable_area import ReachableArea, anchor_cell
 
-# Timeouts of a silent robot, and of one that should move; motion that counts [s], [s], [m].
-GONE_S, HANGING_S, STANDING_M = 5.0, 8.0, 0.05
 # Period of checks; least life of a division while no robot leaves: in general, and for balance [s].
 LOOK_S, HOLDS_S, EVEN_S = 1.0, 2.0, 10.0
 # Parts are rebalanced only above this ratio and this difference [s].
@@ -41,55 +34,16 @@ MANY_TAKEN = 30
 MOST_NUMBER, MOST_AHEAD, MOST_FIRST = 2**31 - 1, 2**10, 2**24
 LATER = "another robot has a newer division"
 
-AT_WORK = (State.PLANNING, State.COVERING, State.DEGRADED)
 OpenCells = Callable[[Window], NDArray[np.bool_]]
 
 
-@dataclass(slots=True)
-class Member:
-    """State of another robot.
-
-    Attributes:
-        newest: its newest message.
-        heard_at: time of that [s].
-        left_out: why it does not belong to this fleet; "" where it does.
-        place: its position, to STANDING_M, x, y [m].
-        moved_at: time of the last motion [s].
-        left_at: when it last left a new division [s].
-    """
-
-    newest: MemberHeard
-    heard_at: float
-    left_out: str
-    place: tuple[float, float]
-    moved_at: float
-    left_at: float = float("-inf")
-
-    def has_moved(self, heard: MemberHeard) -> bool:
-        """Tell whether it has moved or has started to work."""
-        has_begun = self.newest.state not in AT_WORK and heard.state in AT_WORK
-        return has_begun or math.dist(self.place, (heard.x, heard.y)) > STANDING_M
-
-    def absence(self, now: float) -> str:
-        """Return why it takes no part now; "" if it does."""
-        if self.left_out:
-            return self.left_out
-        if now - self.heard_at > GONE_S:
-            return "gone"
-        if self.newest.state not in AT_WORK:
-            return self.newest.state
-        is_hanging = now - self.moved_at > HANGING_S and not self.newest.waits_for
-        return "stands" if is_hanging else ""
-
-
 class FleetLayer:
-    """Tracks the other robots; inactive without a fleet.
+    """Divides the remaining area among the robots; inactive without a fleet.
 
     Attributes:
-        members: the others, by name.
+        others: the other robots.
         number: number of the newest division.
         by: name of the robot that made it.
-        ground: the cells that others can reach.
         why: reason for it.
         step_s: this robot's time to sweep one cell [s].
     """
@@ -97,10 +51,9 @@ class FleetLayer:
     def __init__(
         self, robot: str, step_s: float, map_state: MapState, ledger: MissionLedger
     ) -> None:
-        self.members: dict[str, Member] = {}
+        self.others = Members(robot, ledger)
         self.number = 0
         self.why = self.by = ""
-        self.ground = SharedGround()
         self._robot, self.step_s = robot, step_s
         self._map, self._ledger = map_state, ledger
         self._division: Division | None = None
@@ -116,78 +69,16 @@ class FleetLayer:
         self._taken, self._counted = 0, 0
         # Whether the last division gave this robot a part; number of cells left at that time.
         self._had_part, self._left = False, 0
-        # Places of robots that stand in the way [m], by name.
-        self._avoided: dict[str, tuple[float, float]] = {}
 
-    def neighbours(self, now: float) -> dict[str, Neighbour]:
-        """Return the other robots in this robot's frame that are heard.
-
-        Where a silent one is, only this robot's map may show.
-        """
-        return {
-            name: Neighbour(member.newest, now - member.heard_at, now - member.moved_at)
-            for name, member in self.members.items()
-            if not member.left_out and now - member.heard_at < OLD_S
-        }
-
-    def avoid(self, robot: str) -> None:
-        """Plan around a robot where it stands now, until it moves."""
-        self._avoided[robot] = self.members[robot].place
-
-    def is_avoided(self, robot: str) -> bool:
-        """Tell whether paths are planned around a robot."""
-        return robot in self._avoided
-
-    def closed(self, area: ReachableArea, radius_m: float) -> NDArray[np.bool_] | None:
-        """Return the cells where robots stand in the way, bool (rows, cols); None for none."""
-        for name, place in list(self._avoided.items()):
-            if name not in self.members or self.members[name].place != place:
-                del self._avoided[name]
-        if not self._avoided:
-            return None
-        window, cell_m = area.lattice.window, area.lattice.cell_m
-        rows, cols = np.ogrid[window.row0 : window.row1, window.col0 : window.col1]
-        closed = np.zeros(area.reachable.shape, np.bool_)
-        for name, (x, y) in self._avoided.items():
-            clear_m = radius_m + self.members[name].newest.radius_m + CLEARANCE_M
-            closed |= np.hypot((cols + 0.5) * cell_m - x, (rows + 0.5) * cell_m - y) < clear_m
-        return closed
+    @property
+    def members(self) -> dict[str, Member]:
+        """The other robots, by name."""
+        return self.others.known
 
     @property
     def has_company(self) -> bool:
         """Whether other robots are at work on the remaining area."""
         return self._division is not None
-
-    def hear(self, event: MemberHeard, now: float) -> str:
-        """Take in another robot's message; return why it requires a plan, or "".
-
-        Raises:
-            FleetError: there is no room for its data.
-        """
-        if not self._robot:
-            return ""
-        before, frame = self.members.get(event.robot), self._ledger.current.frame
-        left_out = event.misfit
-        if not left_out and event.frame not in ("", frame):
-            left_out = f"its frame is {event.frame!r}, here it is {frame!r}"
-        place, moved_at = (event.x, event.y), now
-        if before is None:
-            self._make_room(event.robot, now)
-        elif not before.has_moved(event):
-            place, moved_at = before.place, before.moved_at
-        left_at = float("-inf") if before is None else before.left_at
-        member = Member(event, now, left_out, place, moved_at, left_at)
-        self.members[event.robot] = member
-        if left_out:
-            return ""
-        self.ground.hear(event.robot, event.ground, self.members)
-        swept = event.robot, event.epoch, event.tiles
-        try:
-            is_open_again = self._ledger.shared.hear(*swept, self.members)
-        except FleetError as error:
-            self.members[event.robot] = replace(member, left_out=str(error))
-            raise
-        return f"{event.robot}: cells must be swept again" if is_open_again else ""
 
     def mine(self, cells: NDArray[np.bool_], area: ReachableArea) -> NDArray[np.bool_]:
         """Return which cells are this robot's to sweep; all of them if its part has none.
@@ -228,7 +119,7 @@ class FleetLayer:
         if not (at_once or now - self._looked_at >= LOOK_S):
             return self._why_by_taken()
         self._looked_at = now
-        joint, before = self.ground.joint(area), self._division
+        joint, before = self.others.ground.joint(area), self._division
         left = open_cells(joint.lattice.window) & joint.reachable
         inside = area.lattice.window.slices_in(joint.lattice.window)
         left[inside] = self._untried(left[inside], area)
@@ -297,15 +188,14 @@ class FleetLayer:
     def _newest_heard(self) -> int:
         """Return the highest valid division number heard."""
         most = self._most_valid()
-        return max((number for number in self._numbers() if number <= most), default=0)
+        return max(
+            (number for number in self.others.division_numbers() if number <= most), default=0
+        )
 
     def _most_valid(self) -> int:
         """Return the highest division number that is no error."""
-        first = min((number for number in self._numbers() if number), default=0)
+        first = min((number for number in self.others.division_numbers() if number), default=0)
         return (self.number or min(first, MOST_FIRST)) + MOST_AHEAD
-
-    def _numbers(self) -> list[int]:
-        return [m.newest.division for m in self.members.values() if not m.left_out]
 
     def _robots(self, area: ReachableArea, cell: Cell, now: float) -> list[Robot]:
         """Return the robots at work in the area that this robot can reach."""
@@ -332,7 +222,8 @@ class FleetLayer:
         if len(names) == 1 and division is None:
             return ""
         if gone := sorted(name for name in known - names if self._is_gone(name, now)):
-            self._note_left(gone, now)
+            if now - self._divided_at < EVEN_S:
+                self.others.note_left(set(gone), now)
             return f"{', '.join(gone)} no longer at work"
         if now - self._divided_at < HOLDS_S and not at_once:
             return ""
@@ -348,12 +239,6 @@ class FleetLayer:
         if member is None:
             return name != self._robot and now - self._divided_at > GONE_S
         return bool(member.absence(now))
-
-    def _note_left(self, names: list[str], now: float) -> None:
-        """Note robots that stop working soon after a division."""
-        if now - self._divided_at < EVEN_S:
-            for name in self.members.keys() & set(names):
-                self.members[name] = replace(self.members[name], left_at=now)
 
     def _why_by_parts(
         self, division: Division, area: ReachableArea, left: NDArray[np.bool_], now: float
@@ -376,7 +261,7 @@ class FleetLayer:
 
     def _is_own(self, division: Division, area: ReachableArea) -> NDArray[np.bool_]:
         """Return which cells of this robot's area are in its part."""
-        joint = self.ground.joint(area)
+        joint = self.others.ground.joint(area)
         return self._of_me(division, joint)[area.lattice.window.slices_in(joint.lattice.window)]
 
     def _of_me(self, division: Division, joint: ReachableArea) -> NDArray[np.bool_]:
@@ -419,19 +304,6 @@ class FleetLayer:
         if self._division is not None:
             swept = swept & self._is_own(self._division, area)
         return int(np.count_nonzero(swept))
-
-    def _make_room(self, robot: str, now: float) -> None:
-        """Make room for another robot: the longest silent one is removed, if it is gone.
-
-        Otherwise one robot too many would displace another in turn, and each time cause a new
-        division.
-        """
-        if len(self.members) < MOST_ROBOTS:
-            return
-        name = min(self.members, key=lambda name: (self.members[name].heard_at, name))
-        if now - self.members[name].heard_at <= GONE_S:
-            raise FleetError(f"{robot}: {MOST_ROBOTS} others of a fleet are heard at most")
-        del self.members[name]
 
 
 def _division_of(parts: tuple[Part, ...]) -> Division:

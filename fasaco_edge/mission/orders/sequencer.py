@@ -145,7 +145,7 @@ class Sequencer:
         area, state = self._map.area, self.order_state
         assert area is not None
         lattice, home, reachable = area.lattice, self.goal(), area.reachable
-        closed = self._fleet.closed(area, self._config.footprint.robot_radius_m)
+        closed = self._fleet.others.closed(area, self._config.footprint.robot_radius_m)
         if closed is not None and area.contains(cell):
             closed[lattice.local(cell)] = False
             lattice = replace(lattice, steps=without(lattice.steps, closed))
