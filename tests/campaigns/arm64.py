@@ -172,7 +172,7 @@ def cold(tree: Tree) -> str:
     samples.mkdir(exist_ok=True)
     (samples / "map").write_bytes(map_bytes(pillared_room()))
     (samples / "pose").write_bytes(pose_bytes(1.0, 1.0))
-    start = ("rm -rf /root/.cache/fasaco-edge /tmp/cold && mkdir /tmp/cold && exec "
+    start = ("rm -rf ~/.cache/fasaco-edge /tmp/cold && mkdir /tmp/cold && exec "
              f"{CURRENT}/bin/python -c '{COLD}'")  # fmt: skip
     told = _checked(tree, "bash", "-c", start).stdout.strip()
     left = list((tree.root / "root/.cache").glob("fasaco-edge/*/*.kernel"))
