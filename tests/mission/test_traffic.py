@@ -8,7 +8,7 @@ from fasaco_edge.mission.core.events import MemberHeard
 from fasaco_edge.mission.fleet.traffic import Neighbour, obstruction, refuge, spaced, without
 from fasaco_edge.mission.map.reachable_area import ReachableArea
 
-RADIUS_M, SPEED = 0.2, 0.25
+RADIUS_M, PACE_S_M = 0.2, 4.0
 
 
 def heard(name, *points, waits_for=""):
@@ -18,13 +18,13 @@ def heard(name, *points, waits_for=""):
     )
 
 
-def seen(name, line, other, waits_for="", stands_s=0.0):
+def seen(name, line, other, waits_for="", stands_s=0.0, pace_s_m=PACE_S_M):
     return obstruction(
         name,
         RADIUS_M,
-        SPEED,
+        PACE_S_M,
         spaced(line),
-        {other.robot: Neighbour(other, 0.0, stands_s)},
+        {other.robot: Neighbour(other, 0.0, stands_s, pace_s_m)},
         waits_for,
     )
 
@@ -60,6 +60,33 @@ def test_robots_that_do_not_meet_are_not_held_up(other):
     assert seen("r2", EAST, other) is None
 
 
+def test_the_other_one_drives_at_its_own_pace():
+    # It comes across 1 m away: as fast as this one both meet, at a tenth of the pace it is late.
+    line, other = [(0.5, 0.0), (2.5, 0.0)], heard("r1", (1.0, -1.2), (1.0, 1.2))
+    assert seen("r2", line, other, "r1").reason == "waits for r1"
+    assert seen("r2", line, other, "r1", pace_s_m=40.0) is None
+
+
+def test_who_waits_goes_on_waiting_until_there_is_more_time():
+    line, other = [(0.5, 0.0), (2.5, 0.0)], heard("r1", (1.0, -1.6), (1.0, 1.2))
+    assert seen("r2", line, other) is None
+    assert seen("r2", line, other, "r1").reason == "waits for r1"
+
+
+def test_one_that_stops_for_this_robot_is_waited_for_by_the_second_alone():
+    # Face to face, each waits for the other: the first by name is blocked, and plans around.
+    there = [(0.6, 0.0), (0.6, 2.0)]
+    held = seen("r2", EAST, heard("r1", *there, waits_for="r2"), "r1")
+    assert held.reason == "waits for r1"
+    assert seen("r1", EAST, heard("r2", *there, waits_for="r1"), "r2").is_blocked
+
+
+def test_one_on_the_path_of_a_robot_that_waits_for_a_third_stays():
+    other = heard("r1", (1.2, 0.0), (0.0, 0.0), waits_for="r3")
+    held = seen("r2", [(0.0, 0.0)], other)
+    assert held is None
+
+
 def test_one_that_waits_on_the_others_path_makes_way():
     other = heard("r1", (1.2, 0.0), (0.0, 0.0), waits_for="r2")
     held = seen("r2", EAST, other, waits_for="r1")
@@ -87,14 +114,18 @@ def test_a_refuge_lies_off_discs_and_paths_and_is_reached_past_none_of_them():
     lattice = CoverageLattice.from_free(free, 0.25)
     area = ReachableArea.around(lattice, (5, 8))
     other = heard("r2", (3.2, 1.375), (0.1, 1.375))
-    here = refuge(area, (5, 8), RADIUS_M, {"r2": Neighbour(other, 0.0, 0.0)}, lattice.centres)
+    here = refuge(
+        area, (5, 8), RADIUS_M, {"r2": Neighbour(other, 0.0, 0.0, PACE_S_M)}, lattice.centres
+    )
     assert here in {(7, 4), (5, 2)}
     # Behind the other there is a place, too, but no way to it.
     free[6:9, 4] = False
     lattice = CoverageLattice.from_free(free, 0.25)
     area = ReachableArea.around(lattice, (5, 8))
     other = heard("r2", (1.2, 1.375), (3.2, 1.375))
-    found = refuge(area, (5, 8), RADIUS_M, {"r2": Neighbour(other, 0.0, 0.0)}, lattice.centres)
+    found = refuge(
+        area, (5, 8), RADIUS_M, {"r2": Neighbour(other, 0.0, 0.0, PACE_S_M)}, lattice.centres
+    )
     assert found[1] > 13
 
 
@@ -107,7 +138,9 @@ def test_a_refuge_is_sought_no_farther_than_the_cells_around_the_robot():
     area = ReachableArea.around(lattice, (5, 40))
     # Others, beside the corridor, are to drive all along it.
     near = {
-        f"r{x}": Neighbour(heard(f"r{x}", (x, 2.0), (x, 1.375), (x + 1.0, 1.375)), 0.0, 0.0)
+        f"r{x}": Neighbour(
+            heard(f"r{x}", (x, 2.0), (x, 1.375), (x + 1.0, 1.375)), 0.0, 0.0, PACE_S_M
+        )
         for x in range(5, 24)
     }
     assert area.reachable[7, 16]

@@ -83,38 +83,57 @@ class GivingWay:
         self._refuge = None
 
     def look(self, now: float) -> PathUpdate | None:
-        """Decide again; return the path to publish, if any. ``waits_for`` tells the result."""
+        """Decide again; return the path to publish, if any. ``waits_for`` tells the result.
+
+        The first case that holds:
+
+        | case | this robot |
+        |---|---|
+        | it has no place, or no other robot is within NEAR_M | goes on |
+        | it is on its way to a refuge, for PATIENCE_S at most | goes there |
+        | another robot keeps it from going on (``traffic.obstruction``) | waits or makes way |
+        | it has stood on its path for PATIENCE_S beside another robot | is blocked by that |
+        | none of these | goes on |
+        """
         area, cell, pose = self._map.area, self._map.robot_cell(), self._map.pose
         neighbours = self._fleet.others.neighbours(now)
-        if area is None or cell is None or pose is None or not neighbours:
-            self.is_near = False
+        here = (math.inf, math.inf) if pose is None else (pose.pose.x, pose.pose.y)
+        self.is_near = area is not None and cell is not None and _is_near(here, neighbours)
+        self._note_place(here, now)
+        if area is None or cell is None or not self.is_near:
             self.end()
             return None
-        here = pose.pose.x, pose.pose.y
+        if self._is_underway(cell, now):
+            return None
+        self._refuge = None
+        if found := self._obstruction(here, neighbours, now):
+            return self._hold(found, neighbours, area, cell, now)
+        self.end()
+        return None
+
+    def _note_place(self, here: tuple[float, float], now: float) -> None:
+        """Note where the robot is, and since when it has had a path there."""
         if math.dist(here, self._place) > MOVED_M or len(self._cells()) < 2:
             self._place, self._came_at = here, now
-        self.is_near = any(
-            math.dist((near.heard.x, near.heard.y), here) < NEAR_M for near in neighbours.values()
-        )
-        if not self.is_near:
-            self.end()
-            return None
-        if self._refuge is not None and cell != self._refuge:
-            is_stuck = now - self._sought_at > PATIENCE_S
-            if len(self._route.path.ahead) > 1 and not is_stuck:
-                return None
-        speed = self._cell_m / self._fleet.step_s
-        self._refuge = None
+
+    def _is_underway(self, cell: Cell, now: float) -> bool:
+        """Tell whether the robot drives to its refuge."""
+        is_there = self._refuge is None or cell == self._refuge
+        is_stuck = now - self._sought_at > PATIENCE_S
+        return not is_there and not is_stuck and len(self._route.path.ahead) > 1
+
+    def _obstruction(
+        self, here: tuple[float, float], neighbours: Mapping[str, Neighbour], now: float
+    ) -> Obstruction | None:
+        """Return what keeps the robot from going on; None for nothing."""
+        line, pace_s_m = self.line(), self._fleet.step_s / self._cell_m
         found = obstruction(
-            self._robot, self._radius_m, speed, spaced(self.line()), neighbours, self.waits_for
+            self._robot, self._radius_m, pace_s_m, spaced(line), neighbours, self.waits_for
         )
-        if found is None and now - self._came_at > PATIENCE_S and len(self.line()) > 1:
+        if found is None and now - self._came_at > PATIENCE_S and len(line) > 1:
             # It should drive: its line passes nearer than its cells, or it is stopped by a sensor.
-            found = self._beside(here, neighbours)
-        if found is None:
-            self.end()
-            return None
-        return self._hold(found, neighbours, area, cell, now)
+            return self._beside(here, neighbours)
+        return found
 
     def _beside(
         self, here: tuple[float, float], neighbours: Mapping[str, Neighbour]
@@ -155,3 +174,9 @@ class GivingWay:
                 self.end()
                 return None
         return route.publish(NO_CELLS, self.reason, now) if has_path else None
+
+
+def _is_near(here: tuple[float, float], neighbours: Mapping[str, Neighbour]) -> bool:
+    return any(
+        math.dist((near.heard.x, near.heard.y), here) < NEAR_M for near in neighbours.values()
+    )

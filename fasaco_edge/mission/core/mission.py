@@ -76,7 +76,13 @@ class Mission:
         tool_m, ahead_m = (sweeping.tool_m, sweeping.ahead_m) if sweeping else (cell_m, 0.0)
         self._ledger = MissionLedger(cell_m, tool_m, ahead_m)
         monitor = InputMonitor(config)
-        self.fleet = FleetLayer(config.robot, config.cost.step_s, self._map, self._ledger)
+        self.fleet = FleetLayer(
+            config.robot,
+            config.cost.step_s,
+            config.footprint.cell_m,
+            self._map,
+            self._ledger,
+        )
         self._orders = Sequencer(config, self._map, self._ledger, self.fleet)
         self.route = Route(config.spare_share, self._map, self._orders)
         owners = self._map, self._ledger, monitor, self._orders, self.route

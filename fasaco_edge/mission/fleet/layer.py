@@ -49,9 +49,14 @@ class FleetLayer:
     """
 
     def __init__(
-        self, robot: str, step_s: float, map_state: MapState, ledger: MissionLedger
+        self,
+        robot: str,
+        step_s: float,
+        cell_m: float,
+        map_state: MapState,
+        ledger: MissionLedger,
     ) -> None:
-        self.others = Members(robot, ledger)
+        self.others = Members(robot, ledger, cell_m)
         self.number = 0
         self.why = self.by = ""
         self._robot, self.step_s = robot, step_s

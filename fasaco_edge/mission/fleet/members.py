@@ -68,10 +68,10 @@ class Members:
         ground: the cells that they can reach.
     """
 
-    def __init__(self, robot: str, ledger: MissionLedger) -> None:
+    def __init__(self, robot: str, ledger: MissionLedger, cell_m: float) -> None:
         self.known: dict[str, Member] = {}
         self.ground = SharedGround()
-        self._robot, self._ledger = robot, ledger
+        self._robot, self._ledger, self._cell_m = robot, ledger, cell_m
         # Places of robots that stand in the way [m], by name.
         self._avoided: dict[str, tuple[float, float]] = {}
 
@@ -81,7 +81,12 @@ class Members:
         Where a silent one is, only this robot's map may show.
         """
         return {
-            name: Neighbour(member.newest, now - member.heard_at, now - member.moved_at)
+            name: Neighbour(
+                member.newest,
+                now - member.heard_at,
+                now - member.moved_at,
+                member.newest.step_s / self._cell_m,
+            )
             for name, member in self.known.items()
             if not member.left_out and now - member.heard_at < OLD_S
         }

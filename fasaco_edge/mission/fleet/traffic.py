@@ -46,11 +46,13 @@ class Neighbour(NamedTuple):
         heard: its message.
         age_s: age of the message [s].
         stands_s: how long it has stood [s].
+        pace_s_m: its time for a metre [s/m].
     """
 
     heard: MemberHeard
     age_s: float
     stands_s: float
+    pace_s_m: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,63 +89,109 @@ def spaced(points: Sequence[tuple[float, float]] | Points) -> Points:
 def obstruction(
     name: str,
     radius_m: float,
-    speed_m_s: float,
+    pace_s_m: float,
     line: Points,
     neighbours: Mapping[str, Neighbour],
     waits_for: str,
 ) -> Obstruction | None:
     """Return what keeps a robot from going on; None for nothing.
 
+    For each other robot the first case that holds:
+
+    | the other robot | this robot | decision |
+    |---|---|---|
+    | its path leads over this one; waits for this one or nobody | waits for it, or has no path; \
+not if each waits for the other and this one is first by name | makes way |
+    | has stopped, WAIT_M / 2 ahead or less; waits for this one | waits for it; is second by name \
+| goes on waiting |
+    | has stopped, WAIT_M / 2 ahead or less | comes nearer to it | is blocked, unless it waits for \
+another robot |
+    | drives; both come too near within SLACK_S of each other | is WAIT_M from there or less, and \
+NEARER_M farther than the other, or about as far and second by name | waits |
+    | drives; both come too near within twice SLACK_S | is WAIT_M from there or less; waits for it \
+| goes on waiting |
+
     Args:
         name: its name.
         radius_m: of its disc [m].
-        speed_m_s: its speed [m/s].
+        pace_s_m: its time for a metre [s/m].
         line: points every SPACING_M from its place along its path, float64 (n, 2), n >= 1.
         neighbours: the other robots, by name.
         waits_for: name of the robot that it waits for already; "" for none.
     """
-    found: Obstruction | None = None
+    blocked: Obstruction | None = None
     for other, near in sorted(neighbours.items()):
         heard, clear_m = near.heard, radius_m + near.heard.radius_m + CLEARANCE_M
         if math.dist(line[0], (heard.x, heard.y)) > NEAR_M + 2 * clear_m:
             continue
         theirs = spaced([(heard.x, heard.y), *heard.ahead])
-        apart = np.hypot(*(line[:, None] - theirs[None]).transpose(2, 0, 1))
-        is_close = apart < clear_m
-        is_first = name < other
-        over = np.flatnonzero(is_close[0, : int(OVER_M / SPACING_M) + 1])
-        has_stopped = heard.waits_for != "" or len(theirs) == 1
-        is_over = len(over) > 0 and len(theirs) > 1
-        # The other cannot go on because of this robot, which waits or has no business of its own.
-        is_for_me = heard.waits_for in ("", name)
-        has_way = is_first and waits_for == other and heard.waits_for == name
-        if is_over and is_for_me and (waits_for == other or len(line) == 1) and not has_way:
+        apart_m = np.hypot(*(line[:, None] - theirs[None]).transpose(2, 0, 1))
+        is_held, is_first = waits_for == other, name < other
+        holds_it = heard.waits_for == name
+        is_over = _is_over(apart_m, clear_m)
+        is_its_turn = is_held and holds_it and is_first
+        # The other cannot go on because of this robot, which waits or has no path.
+        is_in_its_way = is_over and (holds_it or not heard.waits_for)
+        if is_in_its_way and (is_held or len(line) == 1) and not is_its_turn:
             return Obstruction(other, is_on_path=True)
-        if has_stopped:
-            # Only its disc is in the way, where this robot comes nearer to it.
-            first = np.flatnonzero(is_close[:, 0])
-            comes = len(first) > 0 and first[0] * SPACING_M <= WAIT_M / 2
-            if comes and apart[:, 0].min() < apart[0, 0] - 1e-3:
-                if heard.waits_for == name and not is_first and waits_for == other:
-                    return Obstruction(other, is_on_path=is_over)
-                found = found or Obstruction(other, is_blocked=True)
+        if heard.waits_for or len(theirs) == 1:
+            if not _comes_to(apart_m, clear_m):
+                continue
+            if is_held and holds_it and not is_first:
+                return Obstruction(other, is_on_path=is_over)
+            blocked = blocked or Obstruction(other, is_blocked=True)
             continue
-        at_s = np.arange(len(line)) * SPACING_M / speed_m_s
-        # The other one is taken to be as fast.
-        there_s = np.arange(len(theirs)) * SPACING_M / speed_m_s - near.age_s
-        slack_s = 2 * SLACK_S if waits_for == other else SLACK_S
-        meets = is_close & (np.abs(at_s[:, None] - there_s[None]) < slack_s) & (there_s > -1.0)
-        # Robots that part from each other are too near only now.
-        if not meets.any() or (meets[0, 0] and apart.min() >= apart[0, 0] - 1e-3):
+        slack_s = 2 * SLACK_S if is_held else SLACK_S
+        meeting = _meeting(apart_m, clear_m, pace_s_m, near, slack_s)
+        if meeting is None or meeting.mine_m > WAIT_M:
             continue
-        mine_m = np.flatnonzero(meets.any(axis=1))[0] * SPACING_M
-        theirs_m = np.flatnonzero(meets.any(axis=0))[0] * SPACING_M
-        if mine_m > WAIT_M:
-            continue
-        yields = mine_m > theirs_m if abs(mine_m - theirs_m) > NEARER_M else not is_first
-        if yields or waits_for == other:
+        sooner_m = meeting.mine_m - meeting.theirs_m
+        yields = sooner_m > 0.0 if abs(sooner_m) > NEARER_M else not is_first
+        if yields or is_held:
             return Obstruction(other, is_on_path=is_over)
-    return found
+    return blocked
+
+
+class _Meeting(NamedTuple):
+    """Where two robots come too near each other: length of either's path until then [m]."""
+
+    mine_m: float
+    theirs_m: float
+
+
+def _is_over(apart_m: Points, clear_m: float) -> bool:
+    """Tell whether the first OVER_M of the other's path lead over this robot.
+
+    Args:
+        apart_m: distances of the points of this robot's path to those of the other's, (n, m).
+        clear_m: least distance that robots keep.
+    """
+    first = apart_m[0, : int(OVER_M / SPACING_M) + 1]
+    return apart_m.shape[1] > 1 and bool((first < clear_m).any())
+
+
+def _comes_to(apart_m: Points, clear_m: float) -> bool:
+    """Tell whether this robot soon comes too near to the place of the other one."""
+    first = np.flatnonzero(apart_m[:, 0] < clear_m)
+    comes = len(first) > 0 and first[0] * SPACING_M <= WAIT_M / 2
+    return bool(comes and apart_m[:, 0].min() < apart_m[0, 0] - 1e-3)
+
+
+def _meeting(
+    apart_m: Points, clear_m: float, pace_s_m: float, near: Neighbour, slack_s: float
+) -> _Meeting | None:
+    """Return where two robots that drive come too near each other at about the same time."""
+    mine, theirs = apart_m.shape
+    at_s = np.arange(mine) * SPACING_M * pace_s_m
+    there_s = np.arange(theirs) * SPACING_M * near.pace_s_m - near.age_s
+    is_meeting = (apart_m < clear_m) & (np.abs(at_s[:, None] - there_s[None]) < slack_s)
+    is_meeting &= there_s > -1.0
+    # Robots that part from each other are too near only now.
+    is_parting = is_meeting[0, 0] and apart_m.min() >= apart_m[0, 0] - 1e-3
+    if is_parting or not is_meeting.any():
+        return None
+    mine_m = float(np.flatnonzero(is_meeting.any(axis=1))[0] * SPACING_M)
+    return _Meeting(mine_m, float(np.flatnonzero(is_meeting.any(axis=0))[0] * SPACING_M))
 
 
 def refuge(
