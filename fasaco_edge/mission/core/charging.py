@@ -17,6 +17,7 @@ import numpy as np
 from fasaco_edge.mission.config import BatteryPolicy, MissionConfig
 from fasaco_edge.mission.core.events import BatteryReceived
 from fasaco_edge.mission.core.route import Route
+from fasaco_edge.mission.line.way import way_s
 from fasaco_edge.mission.map.map_state import MapState
 from fasaco_edge.mission.orders.order_state import AT_HOME, NO_ORDER
 from fasaco_edge.mission.orders.sequencer import Sequencer
@@ -124,6 +125,8 @@ class Charging:
     _to_dock_s: float = field(default=0.0, init=False)
     _rest_s: float | None = field(default=None, init=False)
     _looked_at: float | None = field(default=None, init=False)
+    # Stamp of the pose by then [ns].
+    _looked_at_ns: int = field(default=0, init=False)
     # Whether no place ahead is better to go and charge from than this one.
     _is_best_here: bool = field(default=False, init=False)
     # The highest level since the robot is in its dock, and since when; None elsewhere.
@@ -140,13 +143,25 @@ class Charging:
             return
         if self._looked_at is None:
             self.gauge.begin(now)
-        elif self.gauge.drain_per_s is None or now - self._looked_at < DOCK_EVERY_S:
+        elif self.gauge.drain_per_s is None or self._since_look_s(now) < DOCK_EVERY_S:
             return
-        self._looked_at = now
+        self._looked_at, self._looked_at_ns = now, self._stamp_ns
         is_charging = self.orders.order_state.errand == "charge"
         self._rest_s = self._seconds_left() if is_charging else None
         self._to_dock_s = 0.0 if is_charging else self._seconds_to_dock()
         self._is_best_here = not is_charging and self._finds_nothing_better()
+
+    @property
+    def _stamp_ns(self) -> int:
+        return self.map.pose.stamp_ns if self.map.pose is not None else 0
+
+    def _since_look_s(self, now: float) -> float:
+        """Return how long ago the time to the dock was computed [s].
+
+        By our clock or the robot's, whichever says longer, as simulated time may run faster.
+        """
+        assert self._looked_at is not None
+        return max(now - self._looked_at, 1e-9 * (self._stamp_ns - self._looked_at_ns))
 
     def silence(self, now: float) -> str:
         """Return why the battery level is unknown; "" where it is known or not needed."""
@@ -252,10 +267,15 @@ class Charging:
         return rates[0] <= min(rates)
 
     def _seconds_to_dock(self) -> float:
-        cell, goal, area = self.map.robot_cell(), self.orders.goal("charge"), self.map.area
+        """Return how long the way to the dock takes as it would be driven [s]."""
+        cell, goal, area = self.map.cell_at_pose(), self.orders.goal("charge"), self.map.area
         if cell is None or goal is None or area is None:
             return 0.0
-        return self.config.cost.of_walk(area.shortest_path(cell, goal))
+        walk, sweeping, floor = area.shortest_path(cell, goal), self.config.sweeping, self.map.floor
+        if sweeping is None or floor is None or not len(walk):
+            return self.config.cost.of_walk(walk)
+        assert self.map.pose is not None
+        return way_s(walk, self.map.pose.pose, floor, sweeping)
 
     def _seconds_left(self) -> float | None:
         """Return the time for the rest of the order, from the dock and back; None if unknown."""

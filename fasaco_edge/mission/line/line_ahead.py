@@ -7,15 +7,12 @@ the line gives its place on the walk.
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.grid.fine_raster import map_to_raster, raster_to_map
 from fasaco_edge.grid.floor_map import FloorMap
 from fasaco_edge.grid.geometry import Pose2D, Window
-from fasaco_edge.kernels.floor.capsule import is_clear
 from fasaco_edge.kernels.floor.line import LEAST_EDGE
 from fasaco_edge.mission.line.pieces import (
     MOVED,
@@ -33,6 +30,7 @@ from fasaco_edge.mission.line.pieces import (
 )
 from fasaco_edge.mission.line.place_on_line import PlaceOnLine
 from fasaco_edge.mission.line.tally import SweepTally
+from fasaco_edge.mission.line.way import is_clear_between, shortened
 from fasaco_edge.planners.path import common_beginning
 
 # Value of ``unpublished_from`` if all of the line is published.
@@ -102,8 +100,8 @@ class LineAhead:
         Args:
             walk: int32 (n, 2), cells (row, col), each a legal step from the previous one.
             pose: pose of the robot, in or near the first cell.
-            keeps: False for a walk that is only a way: a polished line reaches its cells in
-                another order, and by far longer ways.
+            keeps: False for a walk that is only a way, see ``way``: a polished line reaches its
+                cells in another order, and by far longer ways.
         """
         self._see(pose)
         # A plan's cells are read-only; for those kernels would be compiled again, in the loop.
@@ -121,6 +119,11 @@ class LineAhead:
             pieces = kept_pieces(line, ahead, walk) if keeps and len(line) and len(walk) else []
             self._walk, self.cell, self._cut = walk, 0, None
             self._join(pieces)
+            if not keeps and len(self.line):
+                kept = shortened(self.line.points, self._floor)
+                line = self.line
+                way = Line(line.points[kept], line.cells[kept], line.state[kept])
+                self._take([Piece(way, -1)])
         unchecked, self._unchecked = self._unchecked, None
         if unchecked is not None:
             self.check(unchecked)
@@ -321,10 +324,7 @@ class LineAhead:
         self.line = new
 
     def _is_clear(self, a: Points, b: Points) -> bool:
-        if math.isnan(b[0]):
-            return False
-        radius = self._floor.discs.radius_m / self._floor.geometry.resolution
-        return bool(is_clear(self._floor.blocked, a[0], a[1], b[0], b[1], radius))
+        return is_clear_between(self._floor, a, b)
 
     def _edges_near(self, points: Points, part: Window) -> list[int]:
         """Return the edges between points that bring the robot near a window of the raster."""
