@@ -319,6 +319,20 @@ def test_in_its_dock_it_need_not_stand_where_paths_lead():
     assert drive.mission.state is State.CHARGING
 
 
+@pytest.mark.parametrize(
+    ("off_deg", "state"),
+    [(0.0, State.CHARGING), (20.0, State.CHARGING), (-340.0, State.CHARGING),
+     (45.0, State.RETURNING), (-90.0, State.RETURNING), (180.0, State.RETURNING)],
+)  # fmt: skip
+def test_at_its_docks_place_it_is_in_its_dock_only_with_the_docks_heading(off_deg, state):
+    dock = Dock(x_m=0.5 * CELL, y_m=5.5 * CELL, yaw_deg=180.0, approach_m=4 * CELL)
+    drive = Battery(0.15, cell=(5, 7), dock=dock)
+    drive.run(State.RETURNING)
+    yaw = math.pi + math.radians(off_deg)
+    drive.tell(PoseReceived(StampedPose(Pose2D(dock.x_m, dock.y_m, yaw))))
+    assert drive.mission.state is state
+
+
 def test_out_of_a_dock_where_no_path_leads_it_goes_on_from_before_it():
     dock = Dock(x_m=-1.5 * CELL, y_m=2.5 * CELL, yaw_deg=180.0, approach_m=2 * CELL)
     drive = Battery(0.15, dock=dock)

@@ -40,6 +40,9 @@ BESIDE_S = 2.0
 ARRIVAL_S = 2.0
 # Tolerances to the dock's pose, and to the pose in front of the dock [m].
 DOCKED_M, NEAR_M = 0.1, 0.5
+# Largest difference between a docked robot's heading and the dock's [rad]: contacts allow less, a
+# localiser errs by some ten degrees; a robot that passes the dock, or still turns, differs by more.
+DOCKED_RAD = math.radians(30.0)
 PLACES: dict[Errand, str] = {"home": "home", "charge": "to the dock"}
 
 # The states of a robot that drives, or soon will.
@@ -356,7 +359,9 @@ class Executive:
         place, stamped = self.policy.dock or self.policy.home, self.map.pose
         if place is None or stamped is None:
             return False
-        if math.hypot(stamped.pose.x - place.x_m, stamped.pose.y - place.y_m) <= DOCKED_M:
+        pose, yaw = stamped.pose, place.stand.yaw
+        is_there = math.hypot(pose.x - place.x_m, pose.y - place.y_m) <= DOCKED_M
+        if is_there and abs(math.remainder(pose.yaw - yaw, math.tau)) <= DOCKED_RAD:
             return True
         charges = self._state is State.CHARGING or self.charging.gauge.power == "charging"
         return charges and self._is_near_dock()
