@@ -13,6 +13,12 @@ GAIN_M = 0.3
 # Where the path returns to itself, the next goal begins this far before the end of the last one
 # [m]: the part skipped there is less than half of a tool.
 TIP_M = 0.1
+# It begins earlier where it can: where the path returns to itself only further back, by one of
+# these shares of the usual distance.
+SHARES = (1.0, 0.6, 0.35, 0.2)
+# One that begins early reaches as far beyond the last one as it begins before its end, up to this
+# [m].
+AMPLE_M = 2.0
 # Two paths nearer than this to each other are the same [m].
 SAME_M = 0.03
 # The robot is searched this far ahead along a goal [m].
@@ -75,11 +81,28 @@ class PathDriven:
             ahead: distance before its end at which the piece begins if possible [m].
             near: least distance of a piece to itself [m].
         """
-        for before_m in (ahead, TIP_M, 0.0):
+        for before_m in (*(share * ahead for share in SHARES), TIP_M, 0.0):
             start = max(goal.end - before_m, goal.start)
-            if end_of_piece(self.line, start, near) >= goal.end + GAIN_M:
+            # One that begins early reaches less far: it has to last while the one after it comes.
+            gain_m = max(min(before_m, AMPLE_M), GAIN_M)
+            if end_of_piece(self.line, start, near) >= goal.end + gain_m:
                 return start
         return math.inf
+
+    def heading_after(self, goal: Goal) -> float | None:
+        """Return the heading in which the line leads on after a goal [rad]; None at its end."""
+        if self.line.length(goal.end + STEP_M) < goal.end + STEP_M:
+            return None
+        (x, y), (to_x, to_y) = self.line.at(goal.end), self.line.at(goal.end + STEP_M)
+        return math.atan2(to_y - y, to_x - x)
+
+    def is_near_end(self, here: Point, goal: Goal, within: float) -> bool:
+        """Tell whether the robot is within a distance of the end of its goal [m].
+
+        Nav2 ends a goal by this distance, also where the robot has cut a bend before the end.
+        """
+        is_last_part = goal.end - self.way <= COAST_M
+        return is_last_part and math.dist(here, self.line.at(goal.end)) <= within
 
     def shift_to(self, line: Line, way: float, goal: Goal) -> float | None:
         """Return the offset of a goal's rest along another line [m].

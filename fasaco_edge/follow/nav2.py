@@ -3,7 +3,8 @@
 A goal is a piece of the path that begins at the robot. The next one is sent before the robot
 reaches the end: Nav2 switches to it without a stop. Where the path returns to itself, that piece
 begins only shortly before the end: a controller continues at the nearest part of a path, and would
-skip the rest of the last goal. No clock, no session.
+skip the rest of the last goal. The last pose of a goal has the heading in which the path leads on:
+the robot turns while the next goal is under way. No clock, no session.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from fasaco_edge.errors import MalformedMessage
-from fasaco_edge.follow.goals import COAST_M, Goal, PathDriven
+from fasaco_edge.follow.goals import COAST_M, TIP_M, Goal, PathDriven
 from fasaco_edge.follow.nav2_requests import AskResult, Cancellations, Request, SendGoal
 from fasaco_edge.follow.pieces import STEP_M, Line, end_of_piece
 from fasaco_edge.follow.supervision import Patience, State, Supervision
@@ -214,7 +215,9 @@ class Nav2Follower(Supervision):
         """Send the next goal, once the robot is near enough to its begin."""
         if goal.next_start is None:
             goal.next_start = path.start_after(goal, self._ahead, self._near)
-        if goal.next_start - path.way <= EARLY_M:
+        assert self._here is not None
+        is_there = path.is_near_end(self._here, goal, TIP_M + EARLY_M)
+        if goal.next_start - path.way <= EARLY_M or (is_there and goal.next_start < math.inf):
             self._send(path, max(goal.next_start, path.way))
 
     def _send(self, path: PathDriven, start: float) -> None:
@@ -223,7 +226,8 @@ class Nav2Follower(Supervision):
         goal = self._pending = Goal(self._new_id(), start, end)
         self.tally.goals += 1
         points = path.line.poses(goal.start, goal.end)
-        self._requests.append(SendGoal(goal.id, points, self._path_frame))
+        yaw = path.heading_after(goal)
+        self._requests.append(SendGoal(goal.id, points, self._path_frame, yaw))
 
     def _join(self, line: Line, now: float) -> bool:
         """Switch to a new path; if it is the same ahead, Nav2 keeps its goal.

@@ -105,7 +105,9 @@ class Nav2Node:
                 follower.take_unsent(goal_id, why, now)
                 return
             plugins = self._plugins[: RELEASES[release]]
-            payload = encode_goal(goal_id, request.points, request.frame, 0, plugins)
+            payload = encode_goal(
+                goal_id, request.points, request.frame, 0, plugins, request.end_yaw
+            )
         elif isinstance(request, AskResult):
             call, payload = "get_result", encode_goal_id(goal_id)
         else:

@@ -16,11 +16,16 @@ MOST_CANCELLED = 8
 
 @dataclass(frozen=True, slots=True)
 class SendGoal:
-    """A request to follow points [m] in a frame."""
+    """A request to follow points [m] in a frame.
+
+    Attributes:
+        end_yaw: heading at the last one [rad]; None for that of the way there.
+    """
 
     id: bytes
     points: list[Point]
     frame: str
+    end_yaw: float | None = None
 
 
 @dataclass(frozen=True, slots=True)

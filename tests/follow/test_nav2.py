@@ -134,6 +134,42 @@ def test_where_the_path_turns_back_the_next_goal_begins_just_before_the_end():
     assert back.points[-1] == (0.0, 0.0)
 
 
+def test_a_goal_ends_with_the_heading_in_which_the_path_leads_on():
+    drive = Drive((0.0, 0.0), (3.0, 0.0), (3.0, 4.0), (3.0, 2.0))
+    goal = drive.begun()
+    # The robot turns back there, and does while the next goal is under way.
+    assert goal.points[-1] == (3.0, 4.0)
+    assert goal.end_yaw == pytest.approx(-math.pi / 2)
+    for place in ((1.5, 0.0), (3.0, 0.0), (3.0, 1.5), (3.0, 3.0)):
+        drive.step(*place)
+    (back,) = drive.step(3.0, 3.9)
+    assert back.points[-1] == (3.0, 2.0)
+    assert back.end_yaw is None
+
+
+def test_where_the_path_returns_to_itself_further_back_the_next_goal_begins_earlier():
+    # A circle of 1.9 m: the goal ends where it closes; the next one begins on its far side.
+    angles = [math.tau * part / 24 for part in range(25)]
+    circle = [(3.0 + 0.3 * math.sin(angle), 0.3 - 0.3 * math.cos(angle)) for angle in angles]
+    drive = Drive((0.0, 0.0), *circle, (6.0, 0.0))
+    goal = drive.begun()
+    assert math.dist(goal.points[-1], (3.0, 0.0)) < 0.4
+    places = [(x / 20, 0.0) for x in range(1, 60)] + circle
+    ((at, ahead),) = [(place, request) for place in places for request in drive.step(*place)]
+    assert math.dist(ahead.points[0], at) < 0.05
+    assert math.dist(at, (3.0, 0.6)) < 0.3
+    assert ahead.points[-1] == (6.0, 0.0)
+
+
+def test_where_the_robot_has_cut_the_last_bend_the_next_goal_is_sent_all_the_same():
+    # Nav2 is done 0.1 m from the end, wherever that is along the goal.
+    drive = Drive((0.0, 0.0), (3.0, 0.0), (3.0, 0.2), (3.0, -3.0))
+    drive.begun()
+    assert drive.step(2.7, 0.0, after=1.0) == []
+    (back,) = drive.step(2.9, 0.11)
+    assert back.points[-1] == (3.0, -3.0)
+
+
 def test_where_the_rest_is_short_the_next_goal_waits_for_the_end():
     drive = Drive((0.0, 0.0), (3.0, 0.0), (2.8, 0.0))
     goal = drive.begun()

@@ -3,8 +3,9 @@
 ``python -m tests.support.nav2_robot JSON``: endpoint, domain (null behind a bridge), release, start
 (x, y [m]), and what goes wrong. Publishes its pose; prints what it did, as JSON, once its standard
 input ends. Controller as nav2_regulated_pure_pursuit_controller: it goes on at the pose of the path
-that is nearest, within half a costmap; goal checker as PositionGoalChecker; progress checker as
-SimpleProgressChecker.
+that is nearest, within half a costmap, and turns at the goal to its heading; goal checker as
+SimpleGoalChecker, stateful; progress checker as SimpleProgressChecker. The figures are those of
+deploy/turtlebot.md.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ import random
 import sys
 import threading
 import time
+from collections import deque
 from typing import Any
 
 from tests.support.dock_server import DockingServer
@@ -30,7 +32,7 @@ from tests.support.nav2_server import (
 
 PERIOD_S = 0.05
 SEARCH_M = 2.5
-TOLERANCE_M = 0.1
+TOLERANCE_M, TOLERANCE_RAD = 0.1, 0.5
 LOOK_AHEAD_M = 0.15
 TURN_RAD_S = 3.0
 PROGRESS_M, PROGRESS_S = 0.5, 10.0
@@ -49,6 +51,12 @@ class Nav2Robot:
         # Between goals, not counting what follows an abort, a restart or the last goal.
         self.standing_s = self.driving_s = self._idle_s = 0.0
         self._counts_idle = False
+        # Of each pause between goals: where the goal ended, how long before it the robot came how
+        # near to that; how long the pause was, how long before it the next goal was asked for, and
+        # how long that was under way.
+        self.pauses: list[dict[str, Any]] = []
+        self._ended: dict[str, Any] = {}
+        self._approach = deque[tuple[float, float]](maxlen=100)
         self.trail: list[tuple[float, float]] = []
         self.errors: list[int] = []
         self.restarts = 0
@@ -58,6 +66,8 @@ class Nav2Robot:
         self._server = self._serve()
         self._docks = DockingServer(self, wanted, self._faults()) if "dock" in wanted else None
         self._path: list[tuple[float, float]] = []
+        # Heading of the goal, and whether the robot has come to its place.
+        self._end_yaw, self._is_there = 0.0, False
         self._progress = (0.0, 0.0, 0.0)
         self._session = open_session(wanted["endpoint"])
         key = "pose"
@@ -138,10 +148,18 @@ class Nav2Robot:
         elif now - self._progress[2] > PROGRESS_S:
             self._abort(handle, 105, "failed to make progress")
             return
-        self._drive(dt)
-        if math.dist((self.x, self.y), self._path[-1]) <= TOLERANCE_M:
+        if self._is_there:
+            self._turn(self._end_yaw, dt)
+        else:
+            self._drive(dt)
+        self._approach.append((now, math.dist((self.x, self.y), self._path[-1])))
+        far = math.dist((self.x, self.y), self._path[-1])
+        self._is_there = self._is_there or far <= TOLERANCE_M
+        off = abs(math.remainder(self._end_yaw - self.yaw, math.tau))
+        if self._is_there and off <= TOLERANCE_RAD:
             server.end(handle, SUCCEEDED)
             self._idle_s, self._counts_idle = 0.0, True
+            self._ended = {"end": self._path[-1], "at": now, "approach": list(self._approach)}
 
     def _begin(self, handle: Handle, now: float) -> None:
         """Check what the controller server checks of a goal."""
@@ -161,9 +179,26 @@ class Nav2Robot:
                 for pose in poses
             )
             self._path = [(pose.position.x, pose.position.y) for pose in poses]
+            last = poses[-1].orientation
+            self._end_yaw, self._is_there = 2.0 * math.atan2(last.z, last.w), False
             self._progress = (self.x, self.y, now)
-            self.standing_s += self._idle_s if self._counts_idle else 0.0
+            if self._counts_idle:
+                self.standing_s += self._idle_s
+                self._note_pause(handle)
+            self._approach.clear()
             self._idle_s, self._counts_idle = 0.0, False
+
+    def _note_pause(self, handle: Handle) -> None:
+        ended_at = self._ended["at"]
+        self.pauses.append(
+            {
+                "end": self._ended["end"],
+                "approach": [(ended_at - at, far) for at, far in self._ended["approach"]],
+                "pause_s": self._idle_s,
+                "asked_s": ended_at - handle.asked_at,
+                "delay_s": handle.delay_s,
+            }
+        )
 
     def _abort(self, handle: Handle, code: int, text: str) -> None:
         self.errors.append(code)
@@ -181,11 +216,7 @@ class Nav2Robot:
                 nearest, best = index, far
         del path[:nearest]
         carrot = next((p for p in path if math.dist(here, p) >= LOOK_AHEAD_M), path[-1])
-        turn = math.remainder(
-            math.atan2(carrot[1] - self.y, carrot[0] - self.x) - self.yaw, math.tau
-        )
-        most = TURN_RAD_S * dt
-        self.yaw += min(max(turn, -most), most)
+        turn = self._turn(math.atan2(carrot[1] - self.y, carrot[0] - self.x), dt)
         # On the spot, as with use_rotate_to_heading.
         step = self.wanted.get("speed", 1.0) * dt if abs(turn) < 0.785 else 0.0
         step = min(step, math.dist(here, carrot))
@@ -194,6 +225,13 @@ class Nav2Robot:
         self.driven_m += step
         if not self.trail or math.dist(self.trail[-1], (self.x, self.y)) > 0.05:
             self.trail.append((self.x, self.y))
+
+    def _turn(self, yaw: float, dt: float) -> float:
+        """Turn towards a heading; return by how much it was away."""
+        turn = math.remainder(yaw - self.yaw, math.tau)
+        most = TURN_RAD_S * dt
+        self.yaw += min(max(turn, -most), most)
+        return turn
 
     def _publish(self) -> None:
         types = self._server.store.types
@@ -224,7 +262,7 @@ def main() -> None:
     stop.set()
     thread.join()
     names = ("x", "y", "driven_m", "driving_s", "standing_s", "errors", "restarts", "refused")
-    names += ("counts", "trail")
+    names += ("counts", "trail", "pauses")
     docked = robot._docks.log if robot._docks is not None else []
     print(
         json.dumps({"docking": docked, **{name: getattr(robot, name) for name in names}}),

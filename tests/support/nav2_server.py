@@ -90,6 +90,9 @@ class Handle:
     ended_at: float = 0.0
     code: int = 0
     text: str = ""
+    # When its request was sent, as good as, and how long it took from then on [s].
+    asked_at: float = 0.0
+    delay_s: float = 0.0
     waiting: list[tuple[Any, bytes]] = field(default_factory=list)
 
 
@@ -182,9 +185,11 @@ class ActionServer:
         if self._domain is not None and not self._is_taken(beside):
             return
 
+        asked_at = time.monotonic()
+
         def work() -> None:
             try:
-                answer(query, request, beside)
+                answer(query, request, beside, asked_at)
             except Exception as error:  # whatever rosbags raises: it cannot be deserialised
                 self.refused.append(f"{key}: {error!r}")
 
@@ -212,13 +217,14 @@ class ActionServer:
         timer.daemon = True
         timer.start()
 
-    def _send_goal(self, query: Any, request: bytes, beside: bytes) -> None:
+    def _send_goal(self, query: Any, request: bytes, beside: bytes, asked_at: float) -> None:
         message = self._read("Send", request)
         goal_id = bytes(message.goal_id.uuid)
         with self.lock:
             accepted = goal_id not in self._goals
             if accepted:
-                handle = self._goals[goal_id] = Handle(goal_id, message)
+                handle = self._goals[goal_id] = Handle(goal_id, message, asked_at=asked_at)
+                handle.delay_s = time.monotonic() - asked_at
                 replaced, self.pending = self.pending, handle
                 self.counts["goals"] += 1
         stamp = self.store.types["builtin_interfaces/msg/Time"](sec=1, nanosec=0)
@@ -226,7 +232,7 @@ class ActionServer:
         if accepted and replaced is not None:
             self.end(replaced, ABORTED)
 
-    def _get_result(self, query: Any, request: bytes, beside: bytes) -> None:
+    def _get_result(self, query: Any, request: bytes, beside: bytes, _: float) -> None:
         goal_id = bytes(self._read("Ask", request).goal_id.uuid)
         with self.lock:
             handle = self._goals.get(goal_id)
@@ -236,7 +242,7 @@ class ActionServer:
         kept = handle is not None and time.monotonic() - handle.ended_at < RESULT_KEPT_S
         self._reply(query, self._ended(handle if kept else None), beside)
 
-    def _cancel_goal(self, query: Any, request: bytes, beside: bytes) -> None:
+    def _cancel_goal(self, query: Any, request: bytes, beside: bytes, _: float) -> None:
         info = self._read("Cancel", request).goal_info
         handle = self._goals.get(bytes(info.goal_id.uuid))
         assert (info.stamp.sec, info.stamp.nanosec) == (0, 0)

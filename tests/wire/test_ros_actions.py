@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import pytest
 from rosbags.interfaces import Nodetype
 from rosbags.typesys import Stores, get_typestore
@@ -140,6 +142,9 @@ def test_goals_are_read_by_others(release):
     # Each faces the next one, the last one as the one before it.
     turns = [round(pose.pose.orientation.z, 4) for pose in goal.path.poses]
     assert turns == [0.0, -0.7071, -0.7071]
+    payload = encode_goal(GOAL, POINTS, "map", 5, names, end_yaw=math.pi / 2)
+    goal = store_of(release).deserialize_cdr(payload, "look_alike/msg/Send")
+    assert goal.path.poses[-1].pose.orientation.z == pytest.approx(math.sqrt(0.5))
     assert [getattr(goal, name) for name in PATH_IDS[release]] == names
 
 

@@ -61,7 +61,12 @@ class Ending:
 
 
 def encode_goal(
-    goal_id: bytes, points: Sequence[Point], frame: str, stamp_ns: int, plugins: Sequence[str]
+    goal_id: bytes,
+    points: Sequence[Point],
+    frame: str,
+    stamp_ns: int,
+    plugins: Sequence[str],
+    end_yaw: float | None = None,
 ) -> bytes:
     """Return the request of ``send_goal``.
 
@@ -71,6 +76,7 @@ def encode_goal(
         frame: of the points.
         stamp_ns: of the path [ns]; 0 for the newest transform.
         plugins: as many names as the server's release has, see ``ros_actions.RELEASES``.
+        end_yaw: heading of the last pose [rad]; None for that of the one before it.
 
         Raises:
             MalformedMessage: one of them is not allowed in a message.
@@ -86,6 +92,8 @@ def encode_goal(
         if index + 1 < len(points):
             to = points[index + 1]
             yaw = math.atan2(to[1] - y, to[0] - x)
+        elif end_yaw is not None:
+            yaw = end_yaw
         write_header(writer, frame, stamp_ns)
         write_pose(writer, Pose2D(x, y, yaw), f"poses[{index}].pose")
     for name in plugins:
