@@ -222,12 +222,14 @@ def joined(
     path: NDArray[np.float64],
     track: NDArray[np.float64],
     is_clear: Callable[[Point, Point], bool],
+    *,
+    goes_back: bool = True,
 ) -> NDArray[np.float64] | None:
     """Return the corners to drive through from the track's last point to the path's end.
 
     Straight to the first waypoint not yet driven through, or to the one before it. If
-    neither way is clear, back along the track until one is; if none ever is, to the
-    nearest waypoint of the first metres that can be reached.
+    neither way is clear, and the robot ``goes_back``, back along the track until one is; if none
+    ever is, to the nearest waypoint of the first metres that can be reached.
 
     Args:
         path: waypoints [m], float64 (n, 2).
@@ -242,13 +244,15 @@ def joined(
     if passed == len(path):
         return path[:0]
     targets = [target for target in (passed, passed - 1) if target >= 0]
+    if not goes_back:
+        track = track[-1:]
     near_points = min(BACK_POINTS, len(track))
     back = [*range(1, near_points + 1), *range(near_points + BACK_STRIDE, len(track), BACK_STRIDE)]
     ways = [(gone_back, target) for gone_back in back for target in targets]
     way = np.cumsum(np.hypot(*np.diff(path, axis=0).T))
     head = path[: 1 + int(np.searchsorted(way, JOIN_WITHIN_M, side="right"))]
     nearest = np.argsort(np.hypot(*(head - track[-1]).T), kind="stable")
-    ways += [(1, target) for target in nearest.tolist()]
+    ways += [(1, target) for target in nearest.tolist() if goes_back]
     for gone_back, target in ways:
         if is_clear(track[-gone_back].tolist(), path[target].tolist()):
             return corners(np.vstack((track[: -gone_back - 1 : -1], path[target:])))[1:]

@@ -211,9 +211,12 @@ class World:
         if self._path is None:
             return
         track, is_clear = self._recent_track(), self._mapper.is_clear
-        route = joined(self._path, track, partial(is_clear, margin_m=MARGIN_M))
-        if route is None:
-            route = joined(self._path, track, is_clear)
+        # Straight on, even within the margin, before back along the track.
+        for goes_back, margin_m in ((False, MARGIN_M), (False, 0.0), (True, MARGIN_M), (True, 0.0)):
+            has_room = partial(is_clear, margin_m=margin_m)
+            route = joined(self._path, track, has_room, goes_back=goes_back)
+            if route is not None:
+                break
         if route is None:
             self._corners, self.activity = [], Activity.NO_WAY
             return

@@ -114,3 +114,15 @@ def test_an_empty_path_leaves_nothing_to_drive():
 def test_a_single_waypoint_is_driven_to():
     assert route(centres((3, 3)), track(at(0, 0))) == points((3, 3))
     assert route(centres((3, 3)), track(at(0, 0), at(3, 3))) == []
+
+
+def test_one_that_does_not_go_back_drives_straight_or_not_at_all():
+    path, came = centres((0, 0), (0, 3)), track(at(1, 0), at(0, 0), at(0, 1))
+    found = joined(path, came, clear, goes_back=False)
+    assert np.round(found, 6).tolist() == points((0, 3))
+
+    def from_the_row_before(start, _end):
+        return abs(start[1] - at(1, 0)[1]) < 0.01
+
+    assert joined(path, came, from_the_row_before, goes_back=False) is None
+    assert joined(path, came, from_the_row_before) is not None
