@@ -171,6 +171,17 @@ class StandLattice:
         at: NDArray[np.float64] = self.stands[row, col]
         return at
 
+    def stands_of(self, cells: NDArray[np.int32]) -> NDArray[np.float64]:
+        """Return the stands of cells (row, col), int32 (n, 2): float64 (n, 2); NaN if outside."""
+        window: Window = self.lattice.window
+        rows, cols = cells[:, 0] - window.row0, cells[:, 1] - window.col0
+        is_outside = (rows < 0) | (rows >= window.rows) | (cols < 0) | (cols >= window.cols)
+        at: NDArray[np.float64] = self.stands[
+            rows.clip(0, window.rows - 1), cols.clip(0, window.cols - 1)
+        ]
+        at[is_outside] = np.nan
+        return at
+
     def points(self, walk: NDArray[np.int32]) -> NDArray[np.float64]:
         """Return the line along a walk, cells (row, col), int32 (n, 2): float64 (m, 2), y, x.
 

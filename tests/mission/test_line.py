@@ -417,6 +417,40 @@ def test_a_plan_goes_on_from_the_cell_that_the_robot_is_nearest_to():
         assert math.dist(stand, robot.at) < 0.65 * CELL_M
 
 
+def test_the_cell_on_the_path_stays_near_the_robot_where_the_line_is_polished():
+    """It was up to 12 m away: points took the cells of those that they replaced."""
+    robot = Robot(Mission(CONFIG))
+    robot.tell(MapReceived(room(6.0, 4.8)))
+    for _ in range(200):
+        robot.tell()
+    apart = []
+    for _ in range(600):
+        robot.drive(is_checked=False)
+        path = robot.mission.route.path
+        stand = robot.mission._map.place_of(tuple(path.cells[path.index].tolist()))
+        apart.append(math.dist(stand, robot.at))
+    assert np.median(apart) < 0.5 * CELL_M
+    assert max(apart) < 4.0 * CELL_M
+
+
+def test_a_path_that_ends_where_it_was_cut_off_is_whole_again():
+    """Its line waited for a plan that had come, was not polished, and could be of one point."""
+    grid = room(6.0, 0.4)
+    robot = Robot(Mission(CONFIG))
+    robot.at = 2.3, 1.2
+    robot.tell(MapReceived(grid))
+    robot.drive(12)
+    ahead = robot.mission._line._ahead
+    cells = len(robot.mission.route.path.cells)
+    wall = grid.cells.copy()
+    wall[:, -30:] = 100
+    robot.tell(MapReceived(OccupancyGrid(grid.geometry, wall)))
+    assert len(robot.mission.route.path.cells) < cells
+    assert not robot.mission.route.wanted
+    assert not ahead.is_cut
+    robot.finish()
+
+
 def test_a_robot_that_stands_gets_its_line_again():
     robot = Robot(Mission(CONFIG))
     robot.tell(MapReceived(room(6.0, 3.0)))

@@ -37,8 +37,12 @@ def polished(walk):
 
 def join(walk, pieces, is_clear=lambda a, b: True):
     here = Line(stand(walk[0])[None], np.array([0]), np.array([POLISHED], np.uint8))
-    joiner = Joiner(here, walk, 0, stand, over, is_clear, lambda cell: False)
+    joiner = Joiner(here, walk, 0, stand, over, is_clear, lambda cell: False, no_way)
     return joiner.joined(pieces)
+
+
+def no_way(a, b):
+    return np.empty((0, 2))
 
 
 def whole(pieces):
@@ -117,7 +121,7 @@ def test_a_stand_is_left_out_only_where_the_way_from_beside_it_is_clear():
     def is_clear(a, b):
         return {tuple(a.tolist()), tuple(b.tolist())} != blocked
 
-    joiner = Joiner(here, walk, 0, stand, over, is_clear, lambda cell: False)
+    joiner = Joiner(here, walk, 0, stand, over, is_clear, lambda cell: False, no_way)
     found = whole(joiner.joined([Piece(line, 0)]))
     ways = pairwise(found.points)
     assert all(is_clear(a, b) for a, b in ways)
@@ -134,7 +138,9 @@ def test_where_no_stand_comes_between_the_line_goes_on():
         return points[[0, -1]][1:], numbers[[0, -1]][1:]
 
     here = polished(walk[:1])
-    joiner = Joiner(here, walk, 0, stand, without_corners, lambda a, b: True, lambda cell: False)
+    joiner = Joiner(
+        here, walk, 0, stand, without_corners, lambda a, b: True, lambda cell: False, no_way
+    )
     pieces = [Piece(line.part(0, 2), 0), Piece(line.part(4, 6), 4)]
     assert whole(joiner.joined(pieces)).cells.tolist()[:4] == [0, 1, 4, 5]
 
@@ -143,5 +149,21 @@ def test_a_walk_of_one_cell_is_a_line_of_one_stand():
     walk = cells((0, 0))
     here = polished(walk)
     # Not even its own stand can be driven to from where the robot is.
-    joiner = Joiner(here, walk, 0, stand, over, lambda a, b: False, lambda cell: False)
+    joiner = Joiner(here, walk, 0, stand, over, lambda a, b: False, lambda cell: False, no_way)
     assert whole(joiner.joined([])).points.tolist() == [[0.0, 0.0]]
+
+
+def test_behind_a_pillar_the_line_begins_with_the_way_round_it():
+    walk = cells(*lane(0, range(6)))
+    here = Line(np.array([[-9.0, 0.0]]), np.array([0]), np.array([POLISHED], np.uint8))
+
+    def is_clear(a, b):  # the robot's place sees a corner alone
+        return (a != here.points[0]).any()
+
+    joiner = Joiner(
+        here, walk, 0, stand, over, is_clear, lambda cell: False, lambda a, b: a[None] + (0.0, -5.0)
+    )
+    line = whole(joiner.joined([]))
+    assert line.points[:3].tolist() == [[-9.0, 0.0], [-9.0, -5.0], [0.0, 0.0]]
+    assert line.cells[:3].tolist() == [0, 0, 0]
+    assert (line.points[2:] == stand(walk)).all()

@@ -15,7 +15,7 @@ from fasaco_edge.grid.map_files import find_map, read_map
 from fasaco_edge.mission.config import Sweeping
 from fasaco_edge.mission.core.charging import SPARE
 from fasaco_edge.mission.line.line_ahead import LineAhead
-from fasaco_edge.mission.line.way import is_clear_between, way_s
+from fasaco_edge.mission.line.way import corners_between, is_clear_between, way_s
 from fasaco_edge.mission.map.reachable_area import ReachableArea, anchor_cell
 from fasaco_edge.planners.line import LineConfig
 from tests.follow.closed_loop import CONFIG, ClosedLoop
@@ -36,7 +36,7 @@ def flat():
     cell_m = ROBOT.tool_width_m * (1.0 - ROBOT.overlap)
     footprint = Footprint(cell_m, ROBOT.radius_m)
     plain = CoverageLattice.from_map(truth, footprint)
-    discs = RobotDiscs(ROBOT.tool_width_m, ROBOT.radius_m)
+    discs = RobotDiscs(ROBOT.radius_m, ROBOT.tool_width_m)
     floor = FloorMap(truth, plain, footprint, discs, 10_000_000)
     lattice = floor.stands.lattice
     area = ReachableArea.around(lattice, anchor_cell(lattice, HOME))
@@ -82,3 +82,28 @@ def test_the_follower_drives_it_in_the_time_that_it_is_priced_at(flat, number):
     took_s = loop.run(lambda: math.dist((loop.world.pose.x, loop.world.pose.y), home) < 0.05)
     assert took_s < SPARE * priced_s
     assert took_s > 0.7 * priced_s - 5.0
+
+
+def test_a_way_leads_round_what_is_between_two_places(flat):
+    _, floor, area, cells = flat
+    rng = np.random.default_rng(4)
+    found = 0
+    for number in rng.permutation(len(cells))[:200].tolist():
+        row, col = cells[number]
+        other = row + 2, col + 3
+        a, b = (floor.stands.stands_of(np.array([cell]))[0] for cell in (cells[number], other))
+        if not area.contains(other) or is_clear_between(floor, a, b):
+            continue
+        corners = corners_between(floor, a, b)
+        points = np.stack([a, *corners, b])
+        if len(corners):
+            assert all(is_clear_between(floor, *edge) for edge in pairwise(points))
+            found += 1
+    assert found > 5
+
+
+def test_there_is_no_way_to_nowhere_nor_far_away(flat):
+    _, floor, _, cells = flat
+    here = floor.stands.stand(np.array(cells[0]))
+    assert not len(corners_between(floor, here, np.array([np.nan, np.nan])))
+    assert not len(corners_between(floor, here, here + 1000.0))

@@ -73,6 +73,11 @@ class Route(PlanRequests):
         return np.concatenate((self.path.ahead, self._kept.ahead))
 
     @property
+    def is_cut(self) -> bool:
+        """Whether a part of the path is kept beyond its end, for the next plan."""
+        return len(self._kept.cells) > 0
+
+    @property
     def held(self) -> PathProgress:
         """The path; for a stopped robot the kept part of the last one."""
         return self.path if len(self.path.cells) else self._kept
@@ -183,7 +188,8 @@ class Route(PlanRequests):
                 self.want("the map changed while planning", request.changed)
             return None
         if np.array_equal(cells, self.path.ahead):
-            # The follower has this path already.
+            # The follower has this path already; one that ended at a cut is complete now.
+            self._kept = PathProgress(NO_CELLS)
             self.unchanged += 1
             self.published_at = now
             return None

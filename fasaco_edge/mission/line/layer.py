@@ -126,10 +126,10 @@ class LineLayer:
         # Its cell may be ahead of its place on the line, which may skip cells.
         is_further = path.index > ahead.cell
         if update is not None:
-            ahead.lay(update.cells, stamped.pose, keeps=not is_errand)
-        elif self._is_dropped or (is_further and touched is not None):
+            is_cut = self._route.is_cut
+            ahead.lay(update.cells, stamped.pose, is_cut=is_cut, keeps=not is_errand)
+        elif why := self._why_anew(ahead, is_further and touched is not None):
             ahead.lay(path.ahead, stamped.pose)
-            why = "map on another raster" if self._is_dropped else "robot further on its path"
             update = self._route.publish(path.ahead, why, now) if len(path.ahead) else None
         self._is_dropped = False
         if touched is not None and ahead.check(touched):
@@ -151,6 +151,15 @@ class LineLayer:
             return None
         ahead.note_published()
         return replace(update, xy=ahead.xy())
+
+    def _why_anew(self, ahead: LineAhead, is_further: bool) -> str:
+        """Return why to lay the line along the same path again; "" to leave it."""
+        if self._is_dropped:
+            return "map on another raster"
+        # The next plan ended where the path was cut off.
+        if ahead.is_cut and not self._route.is_cut and len(self._route.path.cells):
+            return "path complete"
+        return "robot further on its path" if is_further else ""
 
     @property
     def to_sweep(self) -> FloorToSweep | None:

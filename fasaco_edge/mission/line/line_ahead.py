@@ -14,6 +14,7 @@ from fasaco_edge.grid.fine_raster import map_to_raster, raster_to_map
 from fasaco_edge.grid.floor_map import FloorMap
 from fasaco_edge.grid.geometry import Pose2D, Window
 from fasaco_edge.kernels.floor.line import LEAST_EDGE
+from fasaco_edge.mission.line.alignment import aligned, by_distance
 from fasaco_edge.mission.line.pieces import (
     MOVED,
     NO_EDGES,
@@ -30,11 +31,13 @@ from fasaco_edge.mission.line.pieces import (
 )
 from fasaco_edge.mission.line.place_on_line import PlaceOnLine
 from fasaco_edge.mission.line.tally import SweepTally
-from fasaco_edge.mission.line.way import is_clear_between, shortened
+from fasaco_edge.mission.line.way import corners_between, is_clear_between, shortened
 from fasaco_edge.planners.path import common_beginning
 
 # Value of ``unpublished_from`` if all of the line is published.
 ALL_PUBLISHED = 1 << 60
+# So many of the nearest cells are tried for one that the robot can drive to straight.
+TRIED = 8
 
 
 class LineAhead:
@@ -94,12 +97,21 @@ class LineAhead:
         margin = self._tool + 1.0
         return is_outside(points, shape, margin)
 
-    def lay(self, walk: NDArray[np.int32], pose: Pose2D, *, keeps: bool = True) -> None:
+    def lay(
+        self,
+        walk: NDArray[np.int32],
+        pose: Pose2D,
+        *,
+        is_cut: bool = False,
+        keeps: bool = True,
+    ) -> None:
         """Lay the line along a walk; it stays where it leads along the same cells.
 
         Args:
             walk: int32 (n, 2), cells (row, col), each a legal step from the previous one.
             pose: pose of the robot, in or near the first cell.
+            is_cut: whether the walk ends where the previous one was cut off; the line beyond is
+                kept for the next walk.
             keeps: False for a walk that is only a way, see ``way``: a polished line reaches its
                 cells in another order, and by far longer ways.
         """
@@ -107,7 +119,7 @@ class LineAhead:
         # A plan's cells are read-only; for those kernels would be compiled again, in the loop.
         walk = walk.copy()
         ahead, line = self._walk[self.cell :], self.line.renumbered(-self.cell)
-        is_beginning = keeps and common_beginning(walk, ahead) == len(walk)
+        is_beginning = is_cut and common_beginning(walk, ahead) == len(walk)
         if len(walk) < len(ahead) > 1 and len(line) and is_beginning:
             self._walk, self.line, self.cell, self._cut = ahead, line, 0, len(walk)
             if self._unchecked is not None:
@@ -149,6 +161,7 @@ class LineAhead:
             raw=stands.line,
             is_clear=self._is_clear,
             is_swept=lambda cell: not tally.is_open(stands.stand(cell)),
+            way=lambda a, b: corners_between(self._floor, a, b),
         )
         joined = joiner.joined(pieces)
         if beyond is not None and joined:
@@ -222,10 +235,9 @@ class LineAhead:
             self.tally.exchange(edges_between(self.line.points[: number + 1]), NO_EDGES)
             self.line = self.line.part(number)
             self.unpublished_from = max(self.unpublished_from - number, 0)
-        # The nearest cell, or the next plan would begin behind the robot. At the last one the robot
-        # has arrived, which is checked below.
+        # At the last cell the robot has arrived, which is checked below.
         first, second = self.line.cells[:2].tolist()
-        nearest = first + int(self._place.along * (second - first) + 0.5)
+        nearest = self._nearest(max(first, self.cell), second + 1)
         self.cell = max(self.cell, min(nearest, len(self._walk) - 2))
         left_m = float(self.lengths()[-1])
         if self._place.has_arrived(self.line.points, left_m, self._tool, self.tally.unit_m):
@@ -264,13 +276,32 @@ class LineAhead:
             return points[:1]
         return np.concatenate([points[:count], end[None]])
 
-    def put(self, first: int, end: int, points: Points, cells: NDArray[np.int64]) -> None:
-        """Replace the points from ``first`` to ``end`` by polished ones, and update the counts."""
+    def put(self, first: int, end: int, points: Points) -> None:
+        """Replace the points from ``first`` to ``end`` by polished ones, and update the counts.
+
+        The first and the last one stay, and keep their cells.
+        """
         line = self.line
+        begin, last = int(line.cells[first]), int(line.cells[end - 1])
+        cells = begin + aligned(points, self._stands(begin, last + 1))
         state = line.state[first:end].min(initial=POLISHED)
         part = Line(points, cells, np.full(len(points), state, np.uint8))
         self.line = line.part(0, first).joined(part, line.part(end))
         self.unpublished_from = min(self.unpublished_from, first)
+
+    def _nearest(self, begin: int, end: int) -> int:
+        """Return which cell of the walk from ``begin`` to ``end`` is nearest to the robot.
+
+        The nearest whose stand it can drive to straight, as the next walk begins there.
+        """
+        stands, here = self._stands(begin, end), self._place.here
+        nearest: list[int] = by_distance(here, stands)[:TRIED].tolist()
+        seen = (number for number in nearest if self._is_clear(here, stands[number]))
+        return begin + next(seen, nearest[0])
+
+    def _stands(self, begin: int, end: int) -> Points:
+        """Return the stands of the walk's cells from ``begin`` to ``end``; of one at least."""
+        return self._floor.stands.stands_of(self._walk[begin : max(end, begin + 1)])
 
     def first_below(self, state: int) -> int:
         """Return the index of the first point below MOVED, or POLISHED; the count if none."""

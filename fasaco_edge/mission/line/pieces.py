@@ -148,6 +148,8 @@ class Joiner:
         raw: returns the line over the stands of a walk, points and cells from 0.
         is_clear: tells whether the robot can drive straight between two points.
         is_swept: tells whether a cell's stand needs no sweep.
+        way: returns the corners of a way round what is between two points, float64 (n, 2); none
+            if there is no way.
     """
 
     here: Line
@@ -157,6 +159,7 @@ class Joiner:
     raw: Callable[[Walk], tuple[Points, Numbers]]
     is_clear: Callable[[Points, Points], bool]
     is_swept: Callable[[Walk], bool]
+    way: Callable[[Points, Points], Points]
     _done: list[Piece] = field(default_factory=list, init=False)
 
     def joined(self, pieces: list[Piece]) -> list[Piece]:
@@ -205,7 +208,21 @@ class Joiner:
                 is_way = start >= until or self.is_clear(last, self.stand(self.walk[start]))
                 if is_way and self._append(start, until):
                     return
+            if is_here and at < until and self._lead_in(at) and self._append(at, until):
+                return
             self._drop_last()
+
+    def _lead_in(self, at: int) -> bool:
+        """Lead from the robot's position to a cell whose stand it does not see, if there is a way.
+
+        A polished line passes where no stand can be seen from.
+        """
+        stand = self.stand(self.walk[at])
+        corners = self.way(self.here.points[-1], stand)
+        if not len(corners):
+            return False
+        self._done.append(Piece(Line.raw(corners, np.full(len(corners), at)), -1))
+        return True
 
     def _append(self, first: int, until: int) -> bool:
         """Append the stands of cells up to ``until``, excluding it; return whether that is clear.

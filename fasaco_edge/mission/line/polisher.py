@@ -125,14 +125,11 @@ class Polisher:
 
     def _put(self, ahead: LineAhead, first: int, last: int, piece: Line, line: kernel.Line) -> int:
         """Replace a piece by its polished version; return the new index of its last point."""
-        numbers = np.array(numbers_along(line))
-        # Inserted points belong to the cell of the previous point.
-        cells = np.where(numbers < len(piece), piece.cells[np.minimum(numbers, len(piece) - 1)], -1)
-        points, cells = line.points[numbers], np.maximum.accumulate(cells)
+        points = line.points[numbers_along(line)]
         if np.array_equal(points, piece.points):
             return last
         begin = max(common_beginning(points, piece.points) - 1, 0)
-        ahead.put(first + begin, last + 1, points[begin:], cells[begin:])
+        ahead.put(first + begin, last + 1, points[begin:])
         return first + len(points) - 1
 
     def _polish(

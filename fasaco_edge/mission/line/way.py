@@ -7,21 +7,27 @@ needs twice as long for its corners as for its length.
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.grid.fine_raster import map_to_raster
 from fasaco_edge.grid.floor_map import FloorMap
-from fasaco_edge.grid.geometry import Pose2D
+from fasaco_edge.grid.geometry import Pose2D, Window
+from fasaco_edge.grid.lattice import CoverageLattice
+from fasaco_edge.kernels.floor.bits import unpacked
 from fasaco_edge.kernels.floor.capsule import is_clear
 from fasaco_edge.kernels.floor.turning import turn_seconds
+from fasaco_edge.kernels.lattice.reach import shortest_walk
 from fasaco_edge.mission.config import Sweeping
 from fasaco_edge.mission.line.pieces import Points
 
 # A point is connected straight to one of so many next ones, the farthest possible: each is a corner
 # of the walk, so this spans a hall.
 MOST_SKIPPED = 40
+# How far a detour may lead away [m], and how far from a point it may begin at a place [pixels].
+DETOUR_M, BESIDE_PX = 2.0, 2.0
 
 
 def is_clear_between(floor: FloorMap, a: Points, b: Points) -> bool:
@@ -47,6 +53,57 @@ def shortened(points: Points, floor: FloorMap) -> NDArray[np.intp]:
             farthest -= 1
         kept.append(farthest)
     return np.array(kept, np.intp)
+
+
+def corners_between(floor: FloorMap, a: Points, b: Points) -> Points:
+    """Return the corners of a short way between two points round what is between them.
+
+    Args:
+        floor: the floor.
+        a, b: points, (2,): y, x [pixels]; the robot can be at either.
+
+    Returns:
+        float64 (n, 2), both points excluded; n is 0 if no way is found within ``DETOUR_M`` around
+        them, or they are farther apart than that.
+    """
+    margin = math.ceil(DETOUR_M / floor.geometry.resolution)
+    none = np.empty((0, 2))
+    if np.isnan([a, b]).any() or np.abs(b - a).max() > margin:
+        return none
+    low, high = np.floor(np.minimum(a, b)) - margin, np.ceil(np.maximum(a, b)) + margin + 1.0
+    whole = Window(0, 0, floor.geometry.rows, floor.geometry.cols)
+    part = Window(int(low[0]), int(low[1]), int(high[0]), int(high[1])).intersection(whole)
+    if part is None:
+        return none
+    places = unpacked(floor.places[part.row0 : part.row1], floor.geometry.cols)
+    places = places[:, part.col0 : part.col1]
+    corner = np.array((part.row0, part.col0))
+    ends = [_place_beside(floor, places, point, corner) for point in (a, b)]
+    if ends[0] is None or ends[1] is None:
+        return none
+    steps = CoverageLattice.from_free(places).steps
+    walk = shortest_walk(steps, ends[0], ends[1])
+    if not len(walk):
+        return none
+    points = np.concatenate([a[None], (walk + corner).astype(np.float64), b[None]])
+    points = points[shortened(points, floor)]
+    is_way = all(is_clear_between(floor, *ends) for ends in pairwise(points))
+    return points[1:-1] if is_way else none
+
+
+def _place_beside(
+    floor: FloorMap, places: NDArray[np.bool_], point: Points, corner: NDArray[np.int64]
+) -> tuple[int, int] | None:
+    """Return a place nearest to a point, from which it can be reached straight; None for none."""
+    near = np.argwhere(places)
+    apart = ((near + corner - point) ** 2).sum(axis=1)
+    near = near[apart <= BESIDE_PX**2]
+    order = np.argsort(apart[apart <= BESIDE_PX**2], kind="stable")
+    for row, col in near[order].tolist():
+        place = np.array((row, col), np.float64) + corner
+        if is_clear_between(floor, point, place):
+            return row, col
+    return None
 
 
 def way_s(walk: NDArray[np.int32], pose: Pose2D, floor: FloorMap, sweeping: Sweeping) -> float:
