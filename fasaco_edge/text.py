@@ -88,3 +88,8 @@ def _bounded(text: str, most: int) -> str:
 
 def _visible(match: re.Match[str]) -> str:
     return ascii(match[0])[1:-1]
+
+
+def is_reported(count: int) -> bool:
+    """Tell whether the so many-th of the same fault gets a line: the 1st, 2nd, 4th, 8th ..."""
+    return count & (count - 1) == 0

@@ -118,6 +118,7 @@ def _add_room(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Record."""
+    from fasaco_edge.recording.write.process import Output
     from fasaco_edge.recording.write.quota import budget_of
     from fasaco_edge.recording.write.recorder import run_recorder
 
@@ -129,8 +130,8 @@ def run(args: argparse.Namespace) -> int:
         from fasaco_edge.recording.fleet.recorder import file_name, run_fleet_recorder
 
         budget = budget_of(config, file_name(args.fleet))
-        return run_fleet_recorder(config, bus, args.fleet, args.out, budget, args.serve)
-    return run_recorder(config, bus, args.out, budget_of(config), args.serve)
+        return run_fleet_recorder(config, bus, args.fleet, Output(args.out, budget, args.serve))
+    return run_recorder(config, bus, Output(args.out, budget_of(config), args.serve))
 
 
 def config_of_options(args: argparse.Namespace) -> tuple[DaemonConfig, BusSettings]:

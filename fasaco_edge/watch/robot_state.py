@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 from fasaco_edge.bus.arrival import Sample
 from fasaco_edge.errors import FasacoError, MalformedMessage
 from fasaco_edge.grid.geometry import Pose2D
+from fasaco_edge.text import is_reported
 from fasaco_edge.watch.events import BAD, GOOD, ORDER, EventLog, differences
 from fasaco_edge.wire.documents.json_text import decode_document, decode_json
 from fasaco_edge.wire.documents.settings import KnownSettings, known_settings
@@ -101,8 +102,8 @@ class RobotState:
     def note_unreadable(self, topic: str, error: FasacoError, now: float) -> None:
         """Note that a sample of ``topic`` could not be read."""
         self._malformed += 1
-        # A faulty publisher may send only malformed ones: note the 1st, 2nd, 4th, 8th ...
-        if self._malformed & (self._malformed - 1) == 0:
+        # A faulty publisher may send only malformed ones.
+        if is_reported(self._malformed):
             text = f"{topic} cannot be read ({self._malformed} so far): {error}"
             self.events.add(now, text, BAD)
 

@@ -18,6 +18,7 @@ from fasaco_edge.recording import entities
 from fasaco_edge.recording.fleet import members, scene
 from fasaco_edge.recording.fleet.notes import is_fleet_recording, read_notes
 from fasaco_edge.recording.fleet.recorder import FleetRecorder
+from fasaco_edge.recording.write.process import Output
 from fasaco_edge.recording.write.quota import DiskBudget
 from fasaco_edge.review.fleet import review_fleet
 from tests.support import viewer
@@ -70,7 +71,7 @@ def studio(tmp_path):
         open_bus(BusSettings(connect=(endpoint,))) as heard,
         open_bus(BusSettings(connect=(endpoint,))) as told,
     ):
-        recorder = FleetRecorder(DaemonConfig(), heard, "house", tmp_path / "out", BUDGET, None)
+        recorder = FleetRecorder(DaemonConfig(), heard, "house", Output(tmp_path / "out", BUDGET))
         recorder.listen()
         time.sleep(0.3)
         yield Studio(told, recorder, tmp_path / "out")

@@ -24,6 +24,7 @@ from fasaco_edge.recording.scene.runcard import RunDescription
 from fasaco_edge.recording.scene.scene import Scene
 from fasaco_edge.recording.write import input_log, recorder
 from fasaco_edge.recording.write.input_log import InputLog
+from fasaco_edge.recording.write.process import Output
 from fasaco_edge.recording.write.quota import DiskBudget
 from fasaco_edge.recording.write.writer import RecordingWriter, WriterState
 from fasaco_edge.wire import topics
@@ -168,7 +169,7 @@ def test_of_a_path_there_is_a_digest_and_of_a_status_what_is_new(tmp_path):
 def test_what_waits_at_the_end_is_an_input_and_drawn_as_far_as_there_is_time(tmp_path, monkeypatch):
     monkeypatch.setattr(recorder, "LAST_DRAWN_NS", 0)
     with bus_on_free_port() as (bus, _):
-        one = recorder.Recorder(DaemonConfig(), bus, tmp_path, DiskBudget(10**9, 0), None)
+        one = recorder.Recorder(DaemonConfig(), bus, Output(tmp_path, DiskBudget(10**9, 0)))
         poses = hear(one, bus, 300)
         assert one.end()
     (path,) = parts(tmp_path)
@@ -185,7 +186,7 @@ def test_a_recorder_reports_while_it_catches_up(tmp_path, monkeypatch):
     monkeypatch.setattr(recorder, "REPORT_PERIOD_NS", 0)
     reports = []
     with bus_on_free_port() as (bus, _):
-        one = recorder.Recorder(DaemonConfig(), bus, tmp_path, DiskBudget(10**9, 0), None)
+        one = recorder.Recorder(DaemonConfig(), bus, Output(tmp_path, DiskBudget(10**9, 0)))
         hear(one, bus, 50)
         bus.listen(Keys(), topics.RECORDER, lambda sample: reports.append(sample.payload))
         one.step(0.0)

@@ -32,13 +32,14 @@ RUN = """
 import json, pathlib, sys
 from fasaco_edge.bus.settings import BusSettings
 from fasaco_edge.config.config import DaemonConfig
+from fasaco_edge.recording.write.process import Output
 from fasaco_edge.recording.write.quota import DiskBudget
 from fasaco_edge.recording.write.recorder import run_recorder
 told = json.loads(sys.argv[1])
 bus = BusSettings(connect=(told.pop("endpoint"),))
 out, serve = pathlib.Path(told.pop("out")), told.pop("serve", None)
 budget = DiskBudget(**{"part_bytes": 64_000_000, "least_free_bytes": 50_000_000} | told)
-sys.exit(run_recorder(DaemonConfig(), bus, out, budget, serve))
+sys.exit(run_recorder(DaemonConfig(), bus, Output(out, budget, serve)))
 """
 TIMEOUT_S = 120.0
 

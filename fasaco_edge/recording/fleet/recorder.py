@@ -8,21 +8,18 @@ its own decoders, and its own share of what is drawn.
 
 from __future__ import annotations
 
-import os
 import re
 import time
 from collections import Counter
-from datetime import UTC, datetime
 from functools import partial
-from pathlib import Path
 
 from fasaco_edge.bus.arrival import Arrival, Sample
 from fasaco_edge.bus.latched import Subscription
-from fasaco_edge.bus.session import Bus, open_bus
+from fasaco_edge.bus.session import Bus
 from fasaco_edge.bus.settings import BusSettings
 from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.errors import FasacoError
-from fasaco_edge.host.processes import memory_limit, release_unused, return_soon, stop_event
+from fasaco_edge.host.processes import memory_limit
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.fleet.inbox import FleetInbox, Heard
 from fasaco_edge.recording.fleet.layout import build_layout
@@ -30,12 +27,9 @@ from fasaco_edge.recording.fleet.members import JOINED, Members, RecordedMember
 from fasaco_edge.recording.fleet.notes import NOTES_VERSION, Note, NoteBatch, encode_notes
 from fasaco_edge.recording.fleet.scene import FleetScene
 from fasaco_edge.recording.scene.blueprint import NO_MAP
-from fasaco_edge.recording.write.inbox import RunClock, afforded_bytes
-from fasaco_edge.recording.write.quota import DiskBudget, next_run
-from fasaco_edge.recording.write.recorder import EXIT_STALLED, repaired
-from fasaco_edge.recording.write.streams import serve_live
-from fasaco_edge.recording.write.writer import RecordingWriter
-from fasaco_edge.text import one_line
+from fasaco_edge.recording.write.inbox import afforded_bytes
+from fasaco_edge.recording.write.process import Output, record
+from fasaco_edge.text import is_reported, one_line
 from fasaco_edge.wire.documents.fleet import decode_member
 from fasaco_edge.wire.documents.json_text import decode_tolerant
 from fasaco_edge.wire.documents.status import Status
@@ -45,7 +39,6 @@ from fasaco_edge.wire.messages.paths import decode_path
 from fasaco_edge.wire.messages.poses import PoseDecoder
 from fasaco_edge.wire.topics import FLEET, MAP, PATH, POSE, STATUS
 
-TAKE_TIMEOUT_S = 0.1
 NOTE_NS, WRITE_NS = 1_000_000_000, 5_000_000_000
 # How long a robot is asked for its map before it is the next one's turn.
 MAP_TURN_NS = 2_000_000_000
@@ -54,70 +47,35 @@ RATE_NOTES = 5
 
 
 def run_fleet_recorder(
-    config: DaemonConfig,
-    bus_settings: BusSettings,
-    fleet: str,
-    out: Path,
-    budget: DiskBudget,
-    serve: tuple[str, int] | None = None,
+    config: DaemonConfig, bus_settings: BusSettings, fleet: str, output: Output
 ) -> int:
-    """Record a fleet until SIGTERM or SIGINT; return the process's exit code.
+    """Record a fleet until SIGTERM or SIGINT; return the process's exit code, see ``record``.
 
     Args:
         config: for the prefix of all keys, and the type of poses whose samples name none.
         bus_settings: how to join the bus.
         fleet: name of the fleet.
-        out, budget, serve: as of ``run_recorder``.
-
-    Raises:
-        BusUnavailable: nothing listens at the endpoints.
-        BadConfiguration: the folder cannot be made or written to.
+        output: where and how to write.
     """
-    return_soon()
-    repairs = repaired(out)
-    with stop_event() as stop, open_bus(bus_settings) as bus:
-        recorder = FleetRecorder(config, bus, fleet, out, budget, serve)
-        for line in repairs:
-            recorder.note_line(line)
-        recorder.listen()
-        release_unused()
-        while not stop.is_set():
-            recorder.step(TAKE_TIMEOUT_S)
-        code = 0 if recorder.end() else EXIT_STALLED
-    if recorder.hangs:
-        # All recoverable data are saved; rerun's own exit would never end.
-        os._exit(code)
-    return code
+    return record(
+        output.folder, bus_settings, lambda bus: FleetRecorder(config, bus, fleet, output)
+    )
 
 
 class FleetRecorder:
     """Connects the bus to the writer: ``step`` takes samples, writes and draws them."""
 
-    def __init__(
-        self,
-        config: DaemonConfig,
-        bus: Bus,
-        fleet: str,
-        out: Path,
-        budget: DiskBudget,
-        serve: tuple[str, int] | None,
-    ) -> None:
+    def __init__(self, config: DaemonConfig, bus: Bus, fleet: str, output: Output) -> None:
         self._bus, self._fleet, self._keys = bus, fleet, config.keys()
         self._schema = config.pose.schema
-        clock = RunClock()
-        self._clock = clock
-        self._began_ns = clock.now_ns()
-        began = datetime.fromtimestamp(self._began_ns / 1e9, UTC)
-        name = next_run(out, file_name(fleet), began)
-        self._writer = RecordingWriter(out, name, budget, build_layout((), NO_MAP))
-        self._writer.at(self._began_ns)
-        if serve is not None:
-            self._writer.serve(serve_live(name, *serve))
-        self._title = f"fleet {fleet} {began:%Y-%m-%d %H:%M:%S} UTC"
-        self._writer.describe(self._title, {"fleet": fleet, "began": f"{began:%Y-%m-%d %H:%M:%S}"})
+        recording = output.begin(file_name(fleet), build_layout((), NO_MAP))
+        self._writer, self._clock = recording.writer, recording.clock
+        self._began_ns = recording.began_ns
+        self._title = f"fleet {fleet} {recording.began} UTC"
+        self._writer.describe(self._title, {"fleet": fleet, "began": recording.began})
         self._members = Members()
         self._scene = FleetScene(self._writer, self._members)
-        self._inbox = FleetInbox(afforded_bytes(memory_limit()), clock.arrival)
+        self._inbox = FleetInbox(afforded_bytes(memory_limit()), self._clock.arrival)
         self._poses: dict[str, PoseDecoder] = {}
         self._subscriptions: dict[str, list[Subscription]] = {}
         self._map_turn: tuple[str, Subscription, int] | None = None
@@ -170,7 +128,7 @@ class FleetRecorder:
         """Whether rerun would hang when the interpreter exits."""
         return self._writer.hangs
 
-    def note_line(self, line: str) -> None:
+    def note(self, line: str) -> None:
         """Log a fault from before the recording began."""
         self._scene.add_line(line, "WARN")
 
@@ -182,8 +140,8 @@ class FleetRecorder:
             what = f"{heard.robot}: {heard.arrival.topic}"
             self._faults[what] += 1
             count = self._faults[what]
-            # A robot may send nothing else: log the 1st, 2nd, 4th, 8th ...
-            if count & (count - 1) == 0:
+            # A robot may send nothing else.
+            if is_reported(count):
                 self._scene.add_line(one_line(f"{what}: {count} refused: {error}"), "WARN")
 
     def _take(self, robot: str, arrival: Arrival) -> None:

@@ -10,34 +10,24 @@ import os
 import time
 from collections import deque
 from collections.abc import Callable
-from datetime import UTC, datetime
 from functools import partial
-from pathlib import Path
 
 from fasaco_edge.bus.arrival import Arrival, Sample
 from fasaco_edge.bus.publisher import Publisher
-from fasaco_edge.bus.session import Bus, open_bus
+from fasaco_edge.bus.session import Bus
 from fasaco_edge.bus.settings import BusSettings
 from fasaco_edge.config.config import DaemonConfig
-from fasaco_edge.errors import BadConfiguration, FasacoError, MalformedMessage
-from fasaco_edge.host.processes import (
-    memory_limit,
-    release_unused,
-    resident_mb,
-    return_soon,
-    stop_event,
-)
+from fasaco_edge.errors import FasacoError, MalformedMessage
+from fasaco_edge.host.processes import memory_limit, resident_mb
 from fasaco_edge.mission.orders.order import read_command
 from fasaco_edge.recording import entities
-from fasaco_edge.recording.read.repair import repair_folder
 from fasaco_edge.recording.scene.blueprint import build_blueprint
 from fasaco_edge.recording.scene.runcard import RunDescription
 from fasaco_edge.recording.scene.scene import Scene
-from fasaco_edge.recording.write.inbox import QUEUE_BYTES, Inbox, RunClock, afforded_bytes
+from fasaco_edge.recording.write.inbox import QUEUE_BYTES, Inbox, afforded_bytes
 from fasaco_edge.recording.write.input_log import InputLog
-from fasaco_edge.recording.write.quota import DiskBudget, next_run
-from fasaco_edge.recording.write.streams import serve_live
-from fasaco_edge.recording.write.writer import RecordingWriter
+from fasaco_edge.recording.write.process import Output, record
+from fasaco_edge.text import is_reported
 from fasaco_edge.wire import topics
 from fasaco_edge.wire.documents.json_text import decode_json, decode_tolerant, encode_json
 from fasaco_edge.wire.documents.path_documents import PathAttachment, TrailAttachment
@@ -48,78 +38,36 @@ from fasaco_edge.wire.messages.paths import decode_path
 from fasaco_edge.wire.messages.pheromone import decode_pheromone
 from fasaco_edge.wire.messages.poses import DEFAULT_FRAMES, PoseDecoder
 
-TAKE_TIMEOUT_S = 0.05
 REPORT_PERIOD_NS = 1_000_000_000
 # The daemon publishes a status once a second.
 SILENCE_NS = 3_500_000_000
 # Timeout for drawing the waiting samples at the end [ns].
 LAST_DRAWN_NS = 300_000_000
-EXIT_STALLED = 1
 
 
-def run_recorder(
-    config: DaemonConfig,
-    bus_settings: BusSettings,
-    out: Path,
-    budget: DiskBudget,
-    serve: tuple[str, int] | None = None,
-) -> int:
-    """Record until SIGTERM or SIGINT; return the process's exit code.
+def run_recorder(config: DaemonConfig, bus_settings: BusSettings, output: Output) -> int:
+    """Record a robot until SIGTERM or SIGINT; return the process's exit code, see ``record``.
+
+    Importing this module raises MissingExtra where rerun is not installed.
 
     Args:
         config: configuration of the daemon: robot, keys, poses and ROS 2 topics.
         bus_settings: how to join the bus.
-        out: folder for the recordings; made if missing.
-        budget: of the disk.
-        serve: address and port to serve live viewers at; None for nowhere.
-
-    Importing this module raises MissingExtra where rerun is not installed. After a disk
-    failed, the process ends here (``os._exit``), because rerun would never let it.
-
-    Raises:
-        BusUnavailable: nothing listens at the endpoints.
-        BadConfiguration: the folder cannot be made or written to.
+        output: where and how to write.
     """
-    return_soon()
-    repairs = repaired(out)
-    with stop_event() as stop, open_bus(bus_settings) as bus:
-        recorder = Recorder(config, bus, out, budget, serve)
-        for line in repairs:
-            recorder.note(line)
-        recorder.listen()
-        release_unused()
-        while not stop.is_set():
-            recorder.step(TAKE_TIMEOUT_S)
-        code = 0 if recorder.end() else EXIT_STALLED
-    if recorder.hangs:
-        # All recoverable data are saved; rerun's own exit would never end.
-        os._exit(code)
-    return code
+    return record(output.folder, bus_settings, lambda bus: Recorder(config, bus, output))
 
 
 class Recorder:
     """Connects the bus to the writer: ``step`` takes samples, writes them, and reports."""
 
-    def __init__(
-        self,
-        config: DaemonConfig,
-        bus: Bus,
-        out: Path,
-        budget: DiskBudget,
-        serve: tuple[str, int] | None,
-    ) -> None:
+    def __init__(self, config: DaemonConfig, bus: Bus, output: Output) -> None:
         self._config = config
         self._bus = bus
-        self._clock = RunClock()
-        began_ns = self._clock.now_ns()
-        began = datetime.fromtimestamp(began_ns / 1e9, UTC)
-        name = next_run(out, config.robot.name, began)
-        self._writer = RecordingWriter(out, name, budget, build_blueprint(None))
-        self._writer.at(began_ns)
-        if serve is not None:
-            self._writer.serve(serve_live(name, *serve))
-        self._inputs = InputLog(self._writer, began_ns)
-        description = RunDescription(config.robot.name, f"{began:%Y-%m-%d %H:%M:%S} UTC")
+        recording = output.begin(config.robot.name, build_blueprint(None))
+        self._writer, self._clock = recording.writer, recording.clock
+        self._inputs = InputLog(self._writer, recording.began_ns)
+        description = RunDescription(config.robot.name, f"{recording.began} UTC")
         self._scene = Scene(self._writer, description)
         capacity = afforded_bytes(memory_limit())
         self._inbox = Inbox(capacity, self._clock.arrival)
@@ -241,8 +189,8 @@ class Recorder:
                 draw(arrival.sample)
         except FasacoError as error:
             self._malformed += 1
-            # A faulty publisher may send only malformed ones: log the 1st, 2nd, 4th, 8th ...
-            if self._malformed & (self._malformed - 1) == 0:
+            # A faulty publisher may send only malformed ones.
+            if is_reported(self._malformed):
                 line = f"{self._malformed} malformed, the last on {arrival.sample.key}: {error}"
                 self._scene.add_line(entities.BUS_LOG, line, "WARN")
 
@@ -305,16 +253,3 @@ def _is_rival(payload: bytes) -> bool:
         return decode_tolerant(payload, Status).claim.stand != "plans"
     except MalformedMessage:
         return False  # its reader reports that
-
-
-def repaired(folder: Path) -> list[str]:
-    """Repair the recordings in a folder; return what was repaired, in words.
-
-    Raises:
-        BadConfiguration: the folder cannot be read or written to.
-    """
-    try:
-        repairs = repair_folder(folder)
-    except OSError as error:
-        raise BadConfiguration(f"cannot record into {folder}: {error}") from error
-    return [str(repair) for repair in repairs]
