@@ -162,11 +162,12 @@ def test_where_the_path_returns_to_itself_further_back_the_next_goal_begins_earl
 
 
 def test_where_the_robot_has_cut_the_last_bend_the_next_goal_is_sent_all_the_same():
-    # Nav2 is done 0.1 m from the end, wherever that is along the goal.
-    drive = Drive((0.0, 0.0), (3.0, 0.0), (3.0, 0.2), (3.0, -3.0))
-    drive.begun()
-    assert drive.step(2.7, 0.0, after=1.0) == []
-    (back,) = drive.step(2.9, 0.11)
+    # Nav2 is done by the distance to the end, wherever along the goal the robot is.
+    drive = Drive((0.0, 0.0), (3.0, 0.0), (3.1, 0.1), (3.0, 0.2), (3.0, -3.0))
+    assert drive.begun().points[-1] == (3.0, 0.2)
+    for x in (1.0, 2.0, 2.8, 2.9):
+        assert drive.step(x) == []
+    (back,) = drive.step(2.98, 0.06)
     assert back.points[-1] == (3.0, -3.0)
 
 
