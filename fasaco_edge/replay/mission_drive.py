@@ -13,7 +13,8 @@ from fasaco_edge.daemon.claim import ClaimState
 from fasaco_edge.daemon.ledger.writer import LedgerKeeper, LedgerWriter
 from fasaco_edge.daemon.loop.fleet import FleetEar
 from fasaco_edge.daemon.loop.inbox import Batch, Inbox, make_mailbox
-from fasaco_edge.daemon.loop.mission_runner import Loader, MissionRunner
+from fasaco_edge.daemon.loop.loader import Loader
+from fasaco_edge.daemon.loop.mission_runner import MissionRunner
 from fasaco_edge.errors import BadConfiguration, FasacoError
 from fasaco_edge.mission.core.events import CommandReceived, Decision, PlanReady
 from fasaco_edge.mission.coverage.ledger import LedgerSnapshot
