@@ -14,6 +14,7 @@ from fasaco_edge.mission.config import MissionPolicy
 from fasaco_edge.mission.core.charging import Charging
 from fasaco_edge.mission.core.events import Decision, PathUpdate, State
 from fasaco_edge.mission.core.giving_way import GivingWay
+from fasaco_edge.mission.core.in_dock import InDock
 from fasaco_edge.mission.core.route import Route
 from fasaco_edge.mission.core.trail_layer import TrailLayer
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
@@ -38,11 +39,6 @@ BESIDE_S = 2.0
 # An errand ends once the robot was in the last cell for this long [s]: its path leads to the centre
 # and ends with a turn.
 ARRIVAL_S = 2.0
-# Tolerances to the dock's pose, and to the pose in front of the dock [m].
-DOCKED_M, NEAR_M = 0.1, 0.5
-# Largest difference between a docked robot's heading and the dock's [rad]: contacts allow less, a
-# localiser errs by some ten degrees; a robot that passes the dock, or still turns, differs by more.
-DOCKED_RAD = math.radians(30.0)
 PLACES: dict[Errand, str] = {"home": "home", "charge": "to the dock"}
 
 # The states of a robot that drives, or soon will.
@@ -62,6 +58,7 @@ class Executive:
     fleet: FleetLayer
     charging: Charging
     giving_way: GivingWay
+    dock: InDock
     policy: MissionPolicy
     _state: State = field(default=State.WAITING_FOR_MAP, init=False)
     _reason: str = field(default="no map yet", init=False)
@@ -345,35 +342,11 @@ class Executive:
 
         After a restart it may be there until the first battery message: no path may lead it out.
         """
-        if self._is_docked():
+        if self.dock.holds(is_charging=self._state is State.CHARGING):
             return State.CHARGING, self.charging.why(self._now)
-        if not self.charging.gauge.power and self._is_near_dock():
+        if not self.charging.gauge.power and self.dock.is_near():
             return State.BLOCKED, "near the dock: waits for the battery to say if it charges"
         return None
-
-    def _is_docked(self) -> bool:
-        """Tell whether the robot is in its dock, including where its base moved it into the dock.
-
-        The cell there need not be coverable.
-        """
-        place, stamped = self.policy.dock or self.policy.home, self.map.pose
-        if place is None or stamped is None:
-            return False
-        pose, yaw = stamped.pose, place.stand.yaw
-        is_there = math.hypot(pose.x - place.x_m, pose.y - place.y_m) <= DOCKED_M
-        if is_there and abs(math.remainder(pose.yaw - yaw, math.tau)) <= DOCKED_RAD:
-            return True
-        charges = self._state is State.CHARGING or self.charging.gauge.power == "charging"
-        return charges and self._is_near_dock()
-
-    def _is_near_dock(self) -> bool:
-        """Tell whether the robot is near enough to the dock to have been moved in by its base."""
-        place, stamped = self.policy.dock or self.policy.home, self.map.pose
-        if place is None or stamped is None:
-            return False
-        pose, stand = stamped.pose, place.stand
-        reach_m = math.hypot(place.x_m - stand.x, place.y_m - stand.y) + NEAR_M
-        return math.hypot(pose.x - stand.x, pose.y - stand.y) <= reach_m
 
     def _arrive(self) -> Decision:
         """End an errand on arrival."""

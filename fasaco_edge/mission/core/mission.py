@@ -19,6 +19,7 @@ from fasaco_edge.mission.core.event_handler import EventHandler
 from fasaco_edge.mission.core.events import Decision, Event, MapReceived, PathUpdate, PoseReceived
 from fasaco_edge.mission.core.executive import Executive
 from fasaco_edge.mission.core.giving_way import GivingWay
+from fasaco_edge.mission.core.in_dock import InDock
 from fasaco_edge.mission.core.lattice_angle import LatticeAngle
 from fasaco_edge.mission.core.lattice_rotation import LatticeRotation
 from fasaco_edge.mission.core.route import Route
@@ -95,7 +96,8 @@ class Mission:
         )
         self.giving_way = GivingWay(config, self._map, self.route, self.fleet)
         decided_by = self._trail, self.fleet, self.charging, self.giving_way
-        self._executive = Executive(*owners, *decided_by, config.policy)
+        in_dock = InDock(self._map, self._gauge, config.policy)
+        self._executive = Executive(*owners, *decided_by, in_dock, config.policy)
 
     def restore_ledger(self, before: LedgerSnapshot) -> None:
         """Continue a ledger from before a restart, unless the map contradicts it.
