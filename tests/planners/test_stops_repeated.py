@@ -4,11 +4,18 @@ import numpy as np
 import pytest
 
 from fasaco_edge.grid.lattice import CoverageLattice
+from fasaco_edge.planners.cost import CoverageCost, SearchWork
 from fasaco_edge.planners.paper.fasaco import Fasaco
 from fasaco_edge.planners.planner import StopAt, StopRecorder, WorkLimit, never
 from fasaco_edge.planners.problem import CoverageProblem
-from fasaco_edge.planners.search.near_optimal import NearOptimal, is_poor
+from fasaco_edge.planners.search.near_optimal import (
+    SHORT_SEARCH,
+    SHORT_SEARCH_PER_CELL,
+    NearOptimal,
+    is_poor,
+)
 from fasaco_edge.planners.search.repair import repaired
+from fasaco_edge.planners.search.search import PROPOSALS_AT_ONCE
 
 
 def poor_problem(seed=0, visits=1000):
@@ -68,3 +75,19 @@ def test_one_that_was_never_stopped_is_not_stopped():
     path = NearOptimal().plan(problem, stop)
     assert stop.stops == []
     assert np.array_equal(NearOptimal().plan(problem, StopAt(())).cells, path.cells)
+
+
+def test_the_search_after_a_poor_repair_is_short():
+    """A robot of a fleet that gets another share had to wait as long as for its first plan."""
+    free = np.random.default_rng(0).random((24, 24)) > 0.15
+    lattice, west = CoverageLattice.from_free(free), np.arange(24) < 12
+    cells = np.argwhere(lattice.coverable)
+    start, cost = tuple(cells[len(cells) // 2].tolist()), CoverageCost(1.2, 1.5)
+    share = CoverageProblem.of(lattice, start, covered=free & ~west, cost=cost)
+    before = NearOptimal().plan(share, WorkLimit(SearchWork(proposals=100_000))).cells
+    other = CoverageProblem.of(lattice, start, covered=free & west, cost=cost, before=before)
+    assert is_poor(other, repaired(other, "fasaco", 0, never))
+    path = NearOptimal().plan(other, WorkLimit(SearchWork(proposals=2_000_000)))
+    most = SHORT_SEARCH + SHORT_SEARCH_PER_CELL * other.cells
+    assert most <= path.work.proposals < most + 2 * PROPOSALS_AT_ONCE
+    assert not is_poor(other, path)

