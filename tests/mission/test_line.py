@@ -28,8 +28,8 @@ from fasaco_edge.mission.core.events import (
 from fasaco_edge.mission.core.mission import Mission
 from fasaco_edge.mission.coverage.floor_tiles import PIXEL_M
 from fasaco_edge.mission.line.out_of_reach import Cause
-from fasaco_edge.mission.line.pieces import POLISHED
 from fasaco_edge.mission.line.polisher import AHEAD_M
+from fasaco_edge.mission.line.polyline import POLISHED
 from fasaco_edge.mission.line.tally import SweepTally
 from fasaco_edge.mission.orders.order import read_order
 from fasaco_edge.planners.cost import CoverageCost, SearchWork
@@ -628,7 +628,7 @@ def test_a_line_on_a_map_that_grows_becomes_better_and_never_worse():
     robot.tell(MapReceived(grid))
     assert robot.mission._orders.is_exploring
     ahead, line = robot.mission._line._ahead, CONFIG.sweeping.line
-    while (first := ahead.first_below(POLISHED)) < len(ahead.line) and (
+    while (first := ahead.line.first_below(POLISHED)) < len(ahead.line) and (
         ahead.lengths()[first] <= AHEAD_M
     ):
         robot.tell()

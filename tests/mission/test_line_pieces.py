@@ -7,7 +7,8 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from fasaco_edge.mission.line.pieces import POLISHED, RAW, Joiner, Line, Piece, kept_pieces
+from fasaco_edge.mission.line.pieces import Joiner, Piece, kept_pieces
+from fasaco_edge.mission.line.polyline import POLISHED, RAW, Line
 
 
 def cells(*places):

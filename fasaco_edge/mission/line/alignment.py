@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.mission.line.pieces import Numbers, Points
+from fasaco_edge.mission.line.polyline import Numbers, Points
 
 # Squared distance to a cell without a stand [pixels2]: more than any other.
 NOWHERE_PX2 = 1e12

@@ -7,6 +7,8 @@ the line gives its place on the walk.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -15,21 +17,20 @@ from fasaco_edge.grid.floor_map import FloorMap
 from fasaco_edge.grid.geometry import Pose2D, Window
 from fasaco_edge.kernels.floor.line import LEAST_EDGE
 from fasaco_edge.mission.line.alignment import aligned, by_distance
-from fasaco_edge.mission.line.pieces import (
-    MOVED,
+from fasaco_edge.mission.line.pieces import Joiner, Piece, kept_pieces
+from fasaco_edge.mission.line.place_on_line import PlaceOnLine
+from fasaco_edge.mission.line.polyline import (
     NO_EDGES,
     POLISHED,
     RAW,
-    Joiner,
     Line,
-    Piece,
     Points,
     Walk,
     edges_between,
+    edges_near,
     is_outside,
-    kept_pieces,
+    lengths,
 )
-from fasaco_edge.mission.line.place_on_line import PlaceOnLine
 from fasaco_edge.mission.line.tally import SweepTally
 from fasaco_edge.mission.line.way import corners_between, is_clear_between, shortened
 from fasaco_edge.planners.path import common_beginning
@@ -84,18 +85,14 @@ class LineAhead:
         self.line = self.line.moved(by)
         moved = self.line.points
         # Sweeps beyond a raster are not counted: such edges are subtracted before and added after.
-        beyond = self._is_beyond(points, before) | self._is_beyond(moved, shape)
+        margin = self._tool + 1.0
+        beyond = is_outside(points, before, margin) | is_outside(moved, shape, margin)
         is_edge = beyond[:-1] | beyond[1:]
         self.tally.exchange(edges_between(points, is_edge), NO_EDGES)
         self.tally.move(shape, by)
         self.tally.exchange(NO_EDGES, edges_between(moved, is_edge))
         self._place.here = self._place.here + np.array(by)
         self._unchecked = self._unchecked and self._unchecked.moved(*by)
-
-    def _is_beyond(self, points: Points, shape: tuple[int, int]) -> NDArray[np.bool_]:
-        """Return at which points the tool sweeps beyond a raster of a shape, bool (n,)."""
-        margin = self._tool + 1.0
-        return is_outside(points, shape, margin)
 
     def lay(
         self,
@@ -210,9 +207,10 @@ class LineAhead:
         if self._cut is not None:
             self._unchecked = Window.around(self._unchecked, touched)
             line = line.part(0, line.before(self._cut - 1))
+        margin = self._floor.discs.radius_m / self._floor.geometry.resolution + 1.0
         blocked = [
             number
-            for number in self._edges_near(line.points, touched)
+            for number in edges_near(line.points, touched, self.tally.shape, margin)
             if not self._is_clear(line.points[number], line.points[number + 1])
         ]
         if not blocked:
@@ -239,7 +237,7 @@ class LineAhead:
         first, second = self.line.cells[:2].tolist()
         nearest = self._nearest(max(first, self.cell), second + 1)
         self.cell = max(self.cell, min(nearest, len(self._walk) - 2))
-        left_m = float(self.lengths()[-1])
+        left_m = float(self.lengths(self._tool * self.tally.unit_m)[-1])
         if self._place.has_arrived(self.line.points, left_m, self._tool, self.tally.unit_m):
             self.cell = len(self._walk) - 1
 
@@ -303,31 +301,21 @@ class LineAhead:
         """Return the stands of the walk's cells from ``begin`` to ``end``; of one at least."""
         return self._floor.stands.stands_of(self._walk[begin : max(end, begin + 1)])
 
-    def first_below(self, state: int) -> int:
-        """Return the index of the first point below MOVED, or POLISHED; the count if none."""
-        below = self.line.state < state
-        return int(np.argmax(below)) if below.any() else len(below)
-
-    def raw_until(self, first: int) -> int:
-        """Return the index of the first moved point from ``first`` on; the count if none."""
-        moved = self.line.state[first:] >= MOVED
-        return first + int(np.argmax(moved)) if moved.any() else len(self.line)
-
     def note(self, first: int, end: int, state: int) -> None:
         """Mark points as MOVED or POLISHED."""
-        line, states = self.line, self.line.state.copy()
-        states[first:end] = np.maximum(states[first:end], state)
-        self.line = Line(line.points, line.cells, states)
+        self.line = self.line.marked(first, end, state)
 
     def note_published(self) -> None:
         """Note that all of the line is published."""
         self.unpublished_from = ALL_PUBLISHED
 
-    def lengths(self) -> NDArray[np.float64]:
-        """Return the distance along the line to each point, float64 (n,) [m]; the first is 0."""
-        edges = np.hypot(*np.diff(self.line.points, axis=0).T)
-        edges[:1] *= 1.0 - self._place.along
-        return np.concatenate([[0.0], np.cumsum(edges)]) * self.tally.unit_m
+    def lengths(self, within_m: float = math.inf) -> NDArray[np.float64]:
+        """Return the distance along the line to each point, float64 (n,) [m]; the first is 0.
+
+        To the first points alone if the last of them is farther than ``within_m`` [m].
+        """
+        unit_m = self.tally.unit_m
+        return lengths(self.line.points, within_m / unit_m, self._place.along) * unit_m
 
     def _take(self, pieces: list[Piece]) -> None:
         """Replace the line; what differs is counted and polished again.
@@ -356,21 +344,3 @@ class LineAhead:
 
     def _is_clear(self, a: Points, b: Points) -> bool:
         return is_clear_between(self._floor, a, b)
-
-    def _edges_near(self, points: Points, part: Window) -> list[int]:
-        """Return the edges between points that bring the robot near a window of the raster."""
-        if len(points) < 2:
-            return []
-        margin = self._floor.discs.radius_m / self._floor.geometry.resolution + 1.0
-        # Edges off the raster are always included.
-        outside = is_outside(points, self.tally.shape, margin)
-        near = outside[:-1] | outside[1:]
-        # Those with both ends on one side of the window are not near it.
-        close = np.ones(len(near), np.bool_)
-        for axis, low, high in ((0, part.row0, part.row1), (1, part.col0, part.col1)):
-            ends = points[:, axis]
-            below, above = ends + margin <= low, ends - margin >= high
-            close &= ~((below[:-1] & below[1:]) | (above[:-1] & above[1:]))
-        near |= close
-        numbers: list[int] = np.flatnonzero(near).tolist()
-        return numbers

@@ -1,4 +1,4 @@
-"""Pieces of a line: points with the cells that they stand for, and their joining to a line.
+"""Pieces of a line, and their joining to a line.
 
 A line along a new walk reuses the pieces of the previous line that lead along the same cells,
 forward or backward; between them it goes over stands.
@@ -10,68 +10,13 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fasaco_edge.kernels.floor.line import LEAST_EDGE
 from fasaco_edge.kernels.floor.runs import AFTER, BACKWARD, BEFORE, STEPS, common_runs
+from fasaco_edge.mission.line.polyline import Line, Numbers, Points, Walk
 
-Points = NDArray[np.float64]
-Numbers = NDArray[np.int64]
-Walk = NDArray[np.int32]
-
-# States of points: at a stand; moved; polished with all moves.
-RAW, MOVED, POLISHED = range(3)
 # Least steps of a reused piece: shorter ones would consist mostly of joints.
 LEAST_STEPS = 8
-NO_EDGES = np.empty((0, 4))
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Line:
-    """A polyline.
-
-    Attributes:
-        points: float64 (n, 2): y, x [pixels of the fine raster].
-        cells: int64 (n,), ascending: index in the walk of each point's cell.
-        state: uint8 (n,): RAW, MOVED or POLISHED.
-    """
-
-    points: Points = field(default_factory=lambda: np.empty((0, 2)))
-    cells: Numbers = field(default_factory=lambda: np.empty(0, np.int64))
-    state: NDArray[np.uint8] = field(default_factory=lambda: np.empty(0, np.uint8))
-
-    def __len__(self) -> int:
-        return len(self.points)
-
-    @classmethod
-    def raw(cls, points: Points, cells: Numbers) -> Line:
-        """Return a line of points that have not been moved yet."""
-        return cls(points, cells, np.full(len(points), RAW, np.uint8))
-
-    def part(self, begin: int, end: int | None = None) -> Line:
-        """Return the points from ``begin`` to ``end``."""
-        return Line(self.points[begin:end], self.cells[begin:end], self.state[begin:end])
-
-    def joined(self, *others: Line) -> Line:
-        """Return this line with others appended."""
-        lines = self, *others
-        return Line(
-            np.concatenate([line.points for line in lines]),
-            np.concatenate([line.cells for line in lines]),
-            np.concatenate([line.state for line in lines]),
-        )
-
-    def renumbered(self, by: int) -> Line:
-        """Return this line with cell indices shifted."""
-        return Line(self.points, self.cells + by, self.state)
-
-    def moved(self, by: tuple[int, int]) -> Line:
-        """Return this line shifted by rows and columns of the raster."""
-        return Line(self.points + np.array(by), self.cells, self.state)
-
-    def before(self, cell: int) -> int:
-        """Return the number of points of cells before ``cell``."""
-        return int(np.searchsorted(self.cells, cell))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -115,25 +60,6 @@ def kept_pieces(line: Line, before: Walk, after: Walk) -> list[Piece]:
             last = line.before(origin + steps)
             pieces.append(Piece(line.part(first, last).renumbered(begin - origin), first))
     return [piece for piece in pieces if len(piece.line)]
-
-
-def is_outside(points: Points, shape: tuple[int, int], margin: float) -> NDArray[np.bool_]:
-    """Return which points are closer than ``margin`` to the rim of a raster, bool (n,)."""
-    # Column by column: numpy takes several times as long over rows of two.
-    y, x = points[:, 0], points[:, 1]
-    outside: NDArray[np.bool_] = (
-        (y < margin) | (x < margin) | (y > shape[0] - 1.0 - margin) | (x > shape[1] - 1.0 - margin)
-    )
-    return outside
-
-
-def edges_between(points: Points, which: NDArray[np.bool_] | None = None) -> NDArray[np.float64]:
-    """Return the edges between points, or some of them, float64 (n, 4)."""
-    begins, ends = points[:-1], points[1:]
-    if which is not None:
-        numbers = np.flatnonzero(which)
-        begins, ends = begins[numbers], ends[numbers]
-    return np.concatenate([begins, ends], axis=1)
 
 
 @dataclass(slots=True, eq=False)

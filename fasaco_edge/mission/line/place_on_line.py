@@ -9,7 +9,7 @@ import math
 
 import numpy as np
 
-from fasaco_edge.mission.line.pieces import Points
+from fasaco_edge.mission.line.polyline import Points
 
 # The robot is searched for this far ahead on its line [m]: farther on, the next lane may be as
 # near.

@@ -13,7 +13,7 @@ from fasaco_edge.kernels.floor import line as kernel
 from fasaco_edge.kernels.floor.anneal import anneal
 from fasaco_edge.kernels.floor.polish import polish
 from fasaco_edge.mission.line.line_ahead import LineAhead
-from fasaco_edge.mission.line.pieces import MOVED, POLISHED, Line
+from fasaco_edge.mission.line.polyline import MOVED, POLISHED, Line
 from fasaco_edge.planners.line import (
     FARTHEST_M,
     SEED,
@@ -37,6 +37,8 @@ ANNEALED_M, ANNEALED_PIECE_M, ANNEALED_PIECES = 2.0, 4.0, 2
 # Moves for each of them; and, on a complete map, the temperature of the farthest piece, as a share
 # of the full one.
 ANNEAL_MOVES, HOTTEST = 300, 0.3
+# The second and third pass look so far ahead [m].
+SEEN_M = 20.0
 # Changes farther ahead are published once the robot is this close to them [m].
 PUBLISHED_M = 1.5
 # Limit on the moves per call, which bounds a cycle of the loop.
@@ -65,22 +67,22 @@ class Polisher:
         """
         if self._config.price_s_m2 == 0.0 or len(ahead.line) < 3 or ahead.is_cut:
             return False
-        lengths = ahead.lengths()
-        begin = ahead.first_below(MOVED)
-        if begin < len(lengths):
+        begin = ahead.line.first_below(MOVED)
+        if begin < len(ahead.line):
+            lengths = ahead.lengths()
             begins_m = lengths[begin]
             first, last = _piece(lengths, begin, MOVED_M)
-            last = max(min(last, ahead.raw_until(begin) + 1, len(lengths) - 1), first)
+            last = max(min(last, ahead.line.raw_until(begin) + 1, len(lengths) - 1), first)
             end = self._polish(ahead, floor, first, last, lengths, NO_DETOURS)
             # The last point of the line is fixed.
             end += end >= len(ahead.line) - 1
             ahead.note(min(begin, first), max(end, begin + 1), MOVED)
-            is_all = ahead.first_below(MOVED) == len(ahead.line)
+            is_all = ahead.line.first_below(MOVED) == len(ahead.line)
             if is_all or begins_m > NEAR_M:
                 return is_all or self._is_due(ahead)
-            lengths = ahead.lengths()
-        begin = ahead.first_below(POLISHED)
-        if begin >= len(ahead.line) - 1 or lengths[begin] > AHEAD_M:
+        lengths = ahead.lengths(SEEN_M)
+        begin = ahead.line.first_below(POLISHED)
+        if begin >= len(lengths) - 1 or lengths[begin] > AHEAD_M:
             self._anneal(ahead, floor, lengths, HOTTEST if is_settled else 0.0)
             return self._is_due(ahead)
         first, last = _piece(lengths, begin, PIECE_M)
@@ -91,7 +93,7 @@ class Polisher:
 
     def _is_due(self, ahead: LineAhead) -> bool:
         """Tell whether the robot is near an unpublished change."""
-        lengths, unpublished = ahead.lengths(), ahead.unpublished_from
+        lengths, unpublished = ahead.lengths(PUBLISHED_M), ahead.unpublished_from
         return unpublished < len(lengths) and bool(lengths[unpublished] < PUBLISHED_M)
 
     def _anneal(

@@ -21,7 +21,7 @@ from fasaco_edge.kernels.floor.capsule import is_clear
 from fasaco_edge.kernels.floor.turning import turn_seconds
 from fasaco_edge.kernels.lattice.reach import shortest_walk
 from fasaco_edge.mission.config import Sweeping
-from fasaco_edge.mission.line.pieces import Points
+from fasaco_edge.mission.line.polyline import Points
 
 # A point is connected straight to one of so many next ones, the farthest possible: each is a corner
 # of the walk, so this spans a hall.
