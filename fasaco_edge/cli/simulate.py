@@ -94,8 +94,11 @@ def run(args: argparse.Namespace) -> int:
         speed=args.speed,
         driver=args.driver,
         meets_others=args.meets_others,
+        waits=True,
         report=_report,
     )
+    if result is None:
+        return 0
     if args.trail_out is not None:
         with writing(args.trail_out) as file:
             np.savetxt(file, world.track, "%.4f", ",", header="x,y", comments="")
@@ -127,7 +130,7 @@ def _report(progress: Progress) -> None:
 COMMAND = Command(
     description="A differential-drive robot with a 360-degree scanner in a building unknown to "
     "it. It publishes the map it has scanned so far and its pose, and follows the "
-    "newest path, until SIGTERM or SIGINT.",
+    "newest path, until SIGTERM or SIGINT. Without a daemon or router it waits for one.",
     run=run,
     add_options=_add_options,
 )

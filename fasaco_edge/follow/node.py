@@ -9,9 +9,9 @@ import time
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Protocol
 
-from fasaco_edge.bus.session import Bus, open_bus
+from fasaco_edge.bus.joining import join
+from fasaco_edge.bus.session import Bus
 from fasaco_edge.bus.settings import BusSettings
-from fasaco_edge.errors import BusUnavailable
 from fasaco_edge.follow.estimate import STAND, Command, Limits
 from fasaco_edge.follow.follower import RATE_HZ, Follower
 from fasaco_edge.follow.inputs import Inputs, patience_of
@@ -28,8 +28,6 @@ if TYPE_CHECKING:
 
 log = logging.getLogger(__name__)
 
-# Retry period while nobody listens at the endpoint [s].
-RETRY_S = 1.0
 REPORT_EVERY_S = 1.0
 # A cycle may run this much early [s].
 LEAST_S = 1e-6
@@ -66,7 +64,7 @@ def run_follower(
         node_of: makes the node that runs the cycles.
         report: called each second with the command in a dry run.
     """
-    bus = _joined(settings, stop)
+    bus = join(BusSettings("client", settings.connect, secured=settings.secured), stop)
     if bus is None:
         return
     with bus:
@@ -92,20 +90,6 @@ def docking_of(bus: Bus, settings: FollowSettings) -> DockingNode | None:
     from fasaco_edge.follow.docking_node import DockingNode  # noqa: PLC0415
 
     return DockingNode(bus, settings)
-
-
-def _joined(settings: FollowSettings, stop: threading.Event) -> Bus | None:
-    """Join the bus, once somebody listens there; None if ``stop`` is set before."""
-    told = False
-    while not stop.is_set():
-        try:
-            return open_bus(BusSettings("client", settings.connect, secured=settings.secured))
-        except BusUnavailable as error:
-            if not told:
-                log.warning("waiting for the bus at %s: %s", ", ".join(settings.connect), error)
-                told = True
-            stop.wait(RETRY_S)
-    return None
 
 
 def _take_turns(node: Node, period_s: float, stop: threading.Event) -> None:

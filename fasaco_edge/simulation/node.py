@@ -5,10 +5,12 @@ from __future__ import annotations
 import logging
 import time
 from collections.abc import Callable
+from contextlib import ExitStack
 from dataclasses import dataclass
 from typing import Literal
 
 from fasaco_edge.bus.arrival import Sample
+from fasaco_edge.bus.joining import join
 from fasaco_edge.bus.mailbox import LatestSlot
 from fasaco_edge.bus.session import Bus, open_bus
 from fasaco_edge.bus.settings import BusSettings
@@ -105,15 +107,17 @@ def run_simulation(
     speed: float = 1.0,
     driver: Driver = "ideal",
     meets_others: bool = False,
+    waits: bool = False,
     should_stop: Callable[[], bool] = lambda: False,
     report: Callable[[Progress], None] = lambda _progress: None,
-) -> Progress:
+) -> Progress | None:
     """Run the robot of ``world`` on the bus until it has to stop.
 
     It publishes its map (latched) and its pose with simulated time as the stamp, and
     drives along the newest path, or as it is told. In the main thread, SIGINT and SIGTERM
     end it too.
-    Its last map and pose are published before it returns its last progress.
+    Its last map and pose are published before it returns its last progress; None if it was stopped
+    before it had joined the bus.
 
     Args:
         world: the building and the robot.
@@ -123,16 +127,22 @@ def run_simulation(
             runs slower.
         driver: ideal: it follows paths itself; follow: velocities drive it.
         meets_others: whether other robots on the bus are obstacles.
+        waits: whether it waits while nobody listens where it is to connect.
         should_stop: asked some fifty times a second.
         report: called about twice a second, and at the end.
 
     Raises:
         BadConfiguration: ``speed`` is not above 0.
-        BusUnavailable: the bus cannot be joined.
+        BusUnavailable: the bus cannot be joined, and it does not wait.
     """
     if not speed > 0.0:
         raise BadConfiguration(f"speed must be above 0, got {speed}")
-    with open_bus(settings) as bus, stop_event() as stop:
+    with ExitStack() as stack:
+        stop = stack.enter_context(stop_event())
+        joined = join(settings, stop) if waits else open_bus(settings)
+        if joined is None:
+            return None
+        bus = stack.enter_context(joined)
         robot = RobotOnBus(world, keys, bus, driver)
         if meets_others:
             bus.subscribe(keys.of_all(topics.POSE), robot.meet)

@@ -105,7 +105,6 @@ def folder(tmp_path, monkeypatch):
             "good.npy is a coverage grid (.npy), which lies in no",
         ),
         ("plan office --xy-out no/l.csv", 78, "cannot write no/l.csv: there is no folder no"),
-        (f"simulate office --connect {NOBODY}", 1, "Unable to connect to any of"),
         (f"simulate nowhere --connect {NOBODY}", 1, "no map 'nowhere'"),
         (f"simulate office --speed 0 --connect {NOBODY}", 78, "speed must be above 0, got 0.0"),
         (f"simulate office --start-xy 999,9 --connect {NOBODY}", 1, "(999, 9) m is not on the map"),

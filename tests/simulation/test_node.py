@@ -28,6 +28,8 @@ from fasaco_edge.wire.messages.paths import encode_path
 from fasaco_edge.wire.messages.poses import decode_pose
 from fasaco_edge.wire.messages.twists import Velocity, encode_velocity
 from tests.simulation.rooms import building, centres, distances_to, serpentine
+from tests.support.forked import ENVIRONMENT
+from tests.support.processes import PROGRAM, free_endpoint
 
 ROBOT = """
 import json, sys
@@ -274,3 +276,26 @@ def test_what_cannot_run_says_so():
         run_simulation(world, Keys(), BusSettings(), speed=0.0)
     with pytest.raises(BusUnavailable):
         run_simulation(world, Keys(), BusSettings(connect=("tcp/127.0.0.1:1",)))
+
+
+def test_it_waits_for_a_bus_that_is_not_there_yet():
+    """As the daemon and `follow` do: a bare base's manual starts the robot first."""
+    endpoint = free_endpoint()
+    words = [*PROGRAM, "simulate", "office", "--connect", endpoint]
+    with subprocess.Popen(words, stderr=subprocess.PIPE, env=ENVIRONMENT) as robot:
+        assert b"waiting for the bus at " + endpoint.encode() in robot.stderr.readline()
+        heard = threading.Event()
+        with open_bus(BusSettings(mode="router", connect=(), listen=(endpoint,))) as bus:
+            bus.listen(Keys(), topics.MAP, lambda _: heard.set())
+            assert heard.wait(30.0)
+            robot.terminate()
+            assert robot.wait(30.0) == 0
+
+
+def test_stopped_before_it_has_joined_it_ends_in_order():
+    words = [*PROGRAM, "simulate", "office", "--connect", free_endpoint()]
+    with subprocess.Popen(words, stderr=subprocess.PIPE, env=ENVIRONMENT) as robot:
+        assert b"waiting for the bus" in robot.stderr.readline()
+        robot.terminate()
+        assert robot.wait(30.0) == 0
+        assert robot.stderr.read() == b""
