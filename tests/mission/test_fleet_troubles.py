@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import pytest
 
+from fasaco_edge.mission.fleet.traffic import OLD_S
 from tests.mission.fleets import FleetDrive
 from tests.mission.world import CONFIG, MapReceived, building, pose_at
 from tests.mission.world import Drive as Alone
@@ -80,3 +81,28 @@ def test_a_robot_whose_frame_changes_is_left_out_by_name_until_it_fits_again(aga
         assert fleet.left_out() == set()
     else:
         fleet.finish_one(ours)
+
+
+@pytest.mark.parametrize("dies_at", [20, 60, 100])
+def test_where_a_robot_stood_in_the_way_is_swept_once_it_is_silent(dies_at):
+    fleet = FleetDrive(["." * 9] * 6, {"r1": (0, 0), "r2": (2, 4)})
+    ours, other = fleet.robots.values()
+    # Its wheels are stuck, and it goes on telling that it will drive.
+    other.hangs = True
+    fleet.run(dies_at)
+    assert ours.mission.fleet.others.is_avoided("r2")
+    del fleet.robots["r2"]
+    fleet.run(int(OLD_S) + 2)
+    fleet.finish_one(ours)
+    assert fleet.left_out() == set()
+
+
+def test_a_robot_that_is_stuck_but_tells_of_its_path_holds_nobody_up():
+    fleet = FleetDrive(["." * 9] * 6, {"r1": (0, 0), "r2": (2, 4)})
+    ours, other = fleet.robots.values()
+    other.hangs = True
+    fleet.finish_one(ours, most=40)
+    # Its share, while it may still move; then all cells but those beside it.
+    fleet.run(60)
+    assert ours.mission.state == "done"
+    assert fleet.left_out() == {(2, 3), (2, 5), (1, 4), (3, 4)}

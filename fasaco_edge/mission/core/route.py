@@ -215,7 +215,8 @@ class Route(PlanRequests):
         visit. Empty if no path leads there: the robot was carried elsewhere.
         """
         first = self._first_open(cells, area.lattice.window)
-        lead = area.shortest_path(here, (int(cells[first, 0]), int(cells[first, 1])))
+        to = int(cells[first, 0]), int(cells[first, 1])
+        lead = self._orders.passable(area, here).shortest_path(here, to)
         return np.concatenate((lead[:-1], cells[first:])) if len(lead) else lead
 
     def _first_open(self, cells: NDArray[np.int32], window: Window) -> int:

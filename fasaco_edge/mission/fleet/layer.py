@@ -119,6 +119,8 @@ class FleetLayer:
             at_once: whether this robot is out of work.
         """
         area = self._map.area
+        if silent := self.others.forget_silent(now):
+            return f"{silent} is silent: only the map shows whether it stands in the way"
         if area is None or not self.members:
             return ""
         if not (at_once or now - self._looked_at >= LOOK_S):

@@ -44,8 +44,9 @@ class Member:
     left_at: float = float("-inf")
 
     def has_moved(self, heard: MemberHeard) -> bool:
-        """Tell whether it has moved or has started to work."""
+        """Tell whether it has moved, has started to work, or has just ended a wait."""
         has_begun = self.newest.state not in AT_WORK and heard.state in AT_WORK
+        has_begun |= bool(self.newest.waits_for) and not heard.waits_for
         return has_begun or math.dist(self.place, (heard.x, heard.y)) > STANDING_M
 
     def absence(self, now: float) -> str:
@@ -98,6 +99,20 @@ class Members:
     def is_avoided(self, robot: str) -> bool:
         """Tell whether paths are planned around a robot."""
         return robot in self._avoided
+
+    def forget_silent(self, now: float) -> str:
+        """Plan around silent robots no longer; return the name of one, or "".
+
+        They may be gone or not: only this robot's map may show it.
+        """
+        silent = [
+            name
+            for name in sorted(self._avoided)
+            if name not in self.known or now - self.known[name].heard_at >= OLD_S
+        ]
+        for name in silent:
+            del self._avoided[name]
+        return silent[0] if silent else ""
 
     def closed(self, area: ReachableArea, radius_m: float) -> NDArray[np.bool_] | None:
         """Return the cells where robots stand in the way, bool (rows, cols); None for none."""

@@ -96,7 +96,8 @@ def obstruction(
 ) -> Obstruction | None:
     """Return what keeps a robot from going on; None for nothing.
 
-    For each other robot the first case that holds:
+    A robot has stopped that waits, has no path, or has stood on it for STANDS_S. For each other
+    robot the first case that holds:
 
     | the other robot | this robot | decision |
     |---|---|---|
@@ -134,7 +135,7 @@ NEARER_M farther than the other, or about as far and second by name | waits |
         is_in_its_way = is_over and (holds_it or not heard.waits_for)
         if is_in_its_way and (is_held or len(line) == 1) and not is_its_turn:
             return Obstruction(other, is_on_path=True)
-        if heard.waits_for or len(theirs) == 1:
+        if heard.waits_for or len(theirs) == 1 or near.stands_s > STANDS_S:
             if not _comes_to(apart_m, clear_m):
                 continue
             if is_held and holds_it and not is_first:

@@ -144,12 +144,8 @@ class Sequencer:
         """
         area, state = self._map.area, self.order_state
         assert area is not None
-        lattice, home, reachable = area.lattice, self.goal(), area.reachable
-        closed = self._fleet.others.closed(area, self._config.footprint.robot_radius_m)
-        if closed is not None and area.contains(cell):
-            closed[lattice.local(cell)] = False
-            lattice = replace(lattice, steps=without(lattice.steps, closed))
-            reachable = ReachableArea.around(lattice, cell).reachable
+        free, home = self.passable(area, cell), self.goal()
+        lattice, reachable = free.lattice, free.reachable
         self._run.exploration.end_if_reached(state.current_zone, area)
         ends_home = home is not None and state.returns_home_next and area.contains(home)
         ends_home = ends_home and home is not None and bool(reachable[lattice.local(home)])
@@ -164,6 +160,15 @@ class Sequencer:
             # An attempt starts on the path, which the robot may have left for another area.
             reachable=reachable if area.contains(cell) else None,
         )
+
+    def passable(self, area: ReachableArea, cell: Cell) -> ReachableArea:
+        """Return an area as a robot in ``cell`` can drive it: around robots in the way."""
+        closed = self._fleet.others.closed(area, self._config.footprint.robot_radius_m)
+        if closed is None or not area.contains(cell):
+            return area
+        lattice = area.lattice
+        closed[lattice.local(cell)] = False
+        return ReachableArea.around(replace(lattice, steps=without(lattice.steps, closed)), cell)
 
     def explore(self, cell: Cell) -> str:
         """Look for a path to an unreachable zone; return why a plan is wanted, or ""."""

@@ -1,0 +1,80 @@
+"""Robots that stand: cells closed around them, and one that is stopped beside another."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from fasaco_edge.grid.lattice import CoverageLattice
+from fasaco_edge.mission.core.events import MapReceived, MemberHeard
+from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
+from fasaco_edge.mission.fleet.members import Members
+from fasaco_edge.mission.fleet.traffic import OLD_S, PATIENCE_S
+from fasaco_edge.mission.map.reachable_area import ReachableArea
+from tests.mission.world import CONFIG, Drive, building, pose_at
+
+CELL_M, RADIUS_M = 0.25, 0.1
+
+
+def member(x, y):
+    return MemberHeard("r2", state="covering", x=x, y=y, epoch=1, open_cells=9, radius_m=0.1)
+
+
+@pytest.fixture
+def area():
+    return ReachableArea.around(CoverageLattice.from_free(np.ones((9, 40), bool), CELL_M), (0, 0))
+
+
+@pytest.fixture
+def members():
+    return Members("r1", MissionLedger(CELL_M, CELL_M, 0.0), CELL_M)
+
+
+def test_cells_within_reach_of_a_robot_that_stands_in_the_way_are_closed(area, members):
+    members.hear(member(1.125, 1.125), 0.0)
+    assert members.closed(area, RADIUS_M) is None
+    members.avoid("r2")
+    closed = members.closed(area, RADIUS_M)
+    # Two discs of 0.1 m, and 0.1 m between them: the cell of its place, and the four beside it.
+    assert set(map(tuple, np.argwhere(closed).tolist())) == {(4, 4), (3, 4), (5, 4), (4, 3), (4, 5)}
+
+
+@pytest.mark.parametrize("x", [-0.1, 10.1, 90.0])
+def test_of_a_robot_at_the_edge_or_off_the_map_only_cells_of_the_map_are_closed(area, members, x):
+    members.hear(member(x, 1.125), 0.0)
+    members.avoid("r2")
+    assert np.count_nonzero(members.closed(area, RADIUS_M)) == (0 if x == 90.0 else 1)
+
+
+def test_no_cells_stay_closed_behind_a_robot_that_drives_on(area, members):
+    members.hear(member(1.125, 1.125), 0.0)
+    members.avoid("r2")
+    members.hear(member(2.125, 1.125), 1.0)
+    assert members.closed(area, RADIUS_M) is None
+    assert not members.is_avoided("r2")
+
+
+def test_where_a_silent_robot_is_only_the_map_shows(area, members):
+    members.hear(member(1.125, 1.125), 0.0)
+    members.avoid("r2")
+    assert members.forget_silent(OLD_S - 0.1) == ""
+    assert members.closed(area, RADIUS_M).any()
+    assert members.forget_silent(OLD_S) == "r2"
+    assert members.closed(area, RADIUS_M) is None
+
+
+def test_one_stopped_beside_another_is_blocked_by_it_though_the_paths_lead_past():
+    drive = Drive((2, 4), config=replace(CONFIG, robot="r1"))
+    drive.tell(MapReceived(building(*["." * 24] * 5)), pose_at(2, 4))
+    drive.plan()
+    row, col = drive.walk[1]
+    # Two cells behind it, where its path does not lead.
+    behind = member((4.5 - (col - 4)) * CELL_M, (2.5 - (row - 2)) * CELL_M)
+    for _ in range(int(PATIENCE_S) + 1):
+        assert drive.mission.giving_way.waits_for == ""
+        drive.tell(pose_at(2, 4), behind, after=1.0)
+    drive.tell(pose_at(2, 4), behind, after=1.0)
+    assert drive.mission.giving_way.waits_for == "r2"
+    assert "stands in the way" in drive.mission.reason
