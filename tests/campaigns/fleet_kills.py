@@ -44,6 +44,8 @@ for x_m in (4.0, 8.0):
 STARTS = {"r1": (0.75, 0.75), "r2": (11.25, 0.75), "r3": (6.15, 7.05)}
 # Time for a cell: a robot of 6 m/s, so that a mission takes half a minute.
 STEP_S = 0.05
+# A robot whose daemon waits for a map publishes it again, as a mapper does, each [s].
+MAP_S = 1.0
 # A share is to be taken over within this time [s]; events come this long after another at most.
 TAKEN_OVER_S, CALM_S = 10.0, 6.0
 AT_WORK = ("covering", "planning")
@@ -100,6 +102,7 @@ class House:
         # Robots whose daemon is gone.
         self.standing: set[str] = set()
         self.cells = coverable_cells(FLOOR)
+        self._mapped_at = time.monotonic()
         for name in STARTS:
             (folder / name).mkdir()
             self.start(name)
@@ -147,9 +150,14 @@ class House:
 
     def tick(self) -> None:
         """Let every robot drive a cell."""
+        is_due = time.monotonic() - self._mapped_at > MAP_S
         for name, robot in self.robots.items():
-            if name not in self.standing:
-                robot.go()
+            if name in self.standing:
+                continue
+            robot.go()
+            if is_due and self.statuses([name])[name]["state"] == "waiting for map":
+                robot.look()
+                self._mapped_at = time.monotonic()
         time.sleep(STEP_S)
 
     def until(self, holds: Callable[[], bool], most_s: float) -> float:
