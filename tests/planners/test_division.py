@@ -94,10 +94,11 @@ def test_it_is_the_same_on_any_number_of_threads(cost):
 
 
 def test_it_begins_anew_with_the_largest_seed():
-    """Corridors of one cell have to be driven twice, which the bound does not know."""
+    """Both have to drive through the corridor, which the bound knows of neither."""
     free = np.zeros((9, 9), np.bool_)
     free[4] = free[:, 4] = True
-    fleet = Fleet([(4, 4), (4, 5)], STEPS_ALONE, seed=2**63 - 1)
+    free[3:6, 6:] = True
+    fleet = Fleet([(4, 0), (4, 1)], STEPS_ALONE, seed=2**63 - 1)
     division = divide(CoverageLattice.from_free(free), fleet, rounds(60))
     check(free, fleet.starts, division, returns=True)
     assert division.rounds == 60

@@ -5,7 +5,8 @@
 2. In every other attempt instead: one tour over everything, split in two, for two groups of robots,
    and each part again, until every robot has one (``kernels.fleet.split``). That adds hardly a
    step, but balances only what is beside the paths from the starts.
-3. In rounds, pairs of robots with adjacent parts merge their tours, improve the result by local
+3. All walks are improved together by simulated annealing (``kernels.fleet.annealing``).
+4. In rounds, pairs of robots with adjacent parts merge their tours, improve the result by local
    search, and split it again; or one hands some cells to the other. Without a gain the groups grow,
    and finally everything restarts with other parts.
 
@@ -27,6 +28,8 @@ from numpy.typing import NDArray
 from fasaco_edge.grid.lattice import Cell, CoverageLattice
 from fasaco_edge.kernels import EAST, NORTH
 from fasaco_edge.planners.cost import MICROSECONDS, CoverageCost, SearchWork
+from fasaco_edge.planners.fleet.annealing import PIECES, FleetWalks, can_anneal
+from fasaco_edge.planners.fleet.bound import longest_bound
 from fasaco_edge.planners.fleet.parts import can_part, owners_of_parts
 from fasaco_edge.planners.fleet.tours import Tour, TourGround
 from fasaco_edge.planners.paper.colony import ColonyConfig
@@ -44,6 +47,10 @@ SHIFTED, FEW = 0.5, 6
 GAINLESS_PAIRS = 4
 # After this many rounds without a gain everything restarts.
 GAINLESS_ROUNDS = 40
+# Proposals per cell of the annealings of an attempt.
+ANNEALED = (1_000, 2_000, 4_000)
+# Fewest rounds of these.
+ANNEALINGS = PIECES * len(ANNEALED)
 # Upper limit of a seed.
 SEEDS = 2**63
 
@@ -89,23 +96,10 @@ class Sharing:
         self._best = _Best([], self._owner, 0)
         self.cells = int(np.count_nonzero(reached))
         self.rounds = 0
+        self.lower_bound_steps = longest_bound(
+            lattice, fleet.starts, reached, self._ground.distances, returns=fleet.returns
+        )
         self._least_us = self.lower_bound_steps * fleet.cost.step_us
-
-    @property
-    def lower_bound_steps(self) -> int:
-        """Lower bound on the steps of the longest walk.
-
-        A closed walk visits cells of both colours of a chessboard equally often; and one robot must
-        come to the cell farthest from all starts.
-        """
-        robots, returns = len(self._starts), self._fleet.returns
-        rows, cols = np.nonzero(self._reached)
-        odd = int(np.count_nonzero((rows + cols) & 1))
-        visits = 2 * max(odd, self.cells - odd) if returns else self.cells
-        share = -(-visits // robots)
-        share = share + share % 2 if returns else share - 1
-        farthest = int(self._ground.distances.min(axis=0)[self._reached.ravel()].max())
-        return max(share if self.cells > robots else 0, farthest * (2 if returns else 1))
 
     def progress(self) -> SearchProgress:
         """Return progress: figures of the longest walk of the best division so far."""
@@ -120,6 +114,7 @@ class Sharing:
                 self._begin(stop, attempt)
                 self._note_best()
                 yield
+                yield from self._anneal(attempt)
                 gainless, least_us = 0, max(self._costs_us)
                 while gainless < GAINLESS_ROUNDS:
                     if len(self._starts) == 1 or self._is_proven():
@@ -132,6 +127,27 @@ class Sharing:
                     least_us = min(least_us, worst_us)
                     self._note_best()
                     yield
+
+    def _anneal(self, attempt: int) -> Iterator[None]:
+        """Improve all walks together."""
+        if not can_anneal(len(self._starts), self.cells) or self._is_proven():
+            return
+        walks = FleetWalks(self._lattice, self._reached, self._starts, self._fleet.cost)
+        walks.load(self._tours)
+        stream = stream_of(self._fleet.seed, attempt)
+        for proposals in ANNEALED:
+            for _ in walks.improve(proposals, stream):
+                self.rounds += 1
+                self._set_tours(walks.tours())
+                self._note_best()
+                yield
+
+    def _set_tours(self, tours: list[Tour]) -> None:
+        """Take other tours of all robots; the first that passes a cell has it."""
+        self._tours = tours
+        self._costs_us = [self._ground.cost_us(tour) for tour in tours]
+        for robot in reversed(range(len(tours))):
+            self._owner[tours[robot]] = robot
 
     def _note_best(self) -> None:
         worst_us = max(self._costs_us)

@@ -1,0 +1,100 @@
+"""Simulated annealing of all robots' closed walks together: shorter in all, and equally long."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fasaco_edge.grid.lattice import CoverageLattice
+from fasaco_edge.kernels.fleet.annealing import anneal
+from fasaco_edge.kernels.fleet.parts import MOST_ROBOTS
+from fasaco_edge.kernels.fleet.walks import STEP, Walks, add_tour, driven, walks_of
+from fasaco_edge.planners.cost import CoverageCost
+from fasaco_edge.planners.fleet.tours import Tour
+
+# Temperatures from the first proposal to the last, in energy of a sixteenth.
+HOT, COLD = 12 * 16, 3 * 16
+# Weight of an uneven share at the beginning; it is FULL from a while before the end on.
+UNEVEN, FULL, FULL_FROM = 32, 256, 0.77
+# Pieces of one annealing, after each of which the walks are compared; most proposals of a piece.
+PIECES, MOST_PROPOSALS = 8, 200_000
+# Limits of the kernels on robots and cells.
+MOST_CELLS = 2**22
+
+
+def can_anneal(robots: int, cells: int) -> bool:
+    """Tell whether so many robots and cells can be taken."""
+    return 2 <= robots <= MOST_ROBOTS and cells < MOST_CELLS
+
+
+class FleetWalks:
+    """The closed walks of robots on one ground, which annealing improves.
+
+    Args:
+        lattice: the cells where robots fit.
+        reached: bool (rows, cols), the ground: connected cells.
+        starts: flat cells.
+        cost: prices of steps and turns.
+    """
+
+    def __init__(
+        self,
+        lattice: CoverageLattice,
+        reached: NDArray[np.bool_],
+        starts: Sequence[int],
+        cost: CoverageCost,
+    ) -> None:
+        cols = lattice.steps.shape[1]
+        self._steps, self._cells = lattice.steps.ravel(), np.flatnonzero(reached)
+        self._offsets = np.array([1, cols, -1, -cols], np.int64)
+        self._starts = np.array(starts, np.int64)
+        self._turn = cost.quarter_turn_us * STEP // cost.step_us
+        self._best = np.zeros((len(starts), lattice.steps.size), np.uint8)
+        self._score = 0, 0
+
+    def load(self, tours: Sequence[Tour]) -> None:
+        """Go on from these tours; together they pass all cells."""
+        self._best[:] = 0
+        for links, tour in zip(self._best, tours, strict=True):
+            if tour.size > 1:
+                add_tour(links, self._offsets, tour)
+        self._score = self._score_of(self._walks().costs)
+
+    def improve(self, proposals: int, random: NDArray[np.uint64]) -> Iterator[None]:
+        """Anneal from the best walks on with so many proposals per cell, in pieces.
+
+        Args:
+            proposals: per cell.
+            random: stream, uint64 (1,); advanced.
+        """
+        walks, count = self._walks(), proposals * self._cells.size
+        pieces = max(PIECES, -(-count // MOST_PROPOSALS))
+        for piece in range(pieces):
+            hot, cold = (HOT + (COLD - HOT) * (piece + more) // pieces for more in (0, 1))
+            progress = min(1.0, piece / (FULL_FROM * pieces))
+            weight = int(UNEVEN * (FULL / UNEVEN) ** progress)
+            anneal(walks, self._turn, hot, cold, weight, count // pieces, random)
+            score = self._score_of(walks.costs)
+            if score < self._score:
+                self._score, self._best = score, walks.links.copy()
+            yield
+
+    def tours(self) -> list[Tour]:
+        """Return the best walks as tours."""
+        most = int(self._walks().costs.sum()) // STEP + 2
+        tours = []
+        for links, start in zip(self._best, self._starts.tolist(), strict=True):
+            walk = driven(links.copy(), self._offsets, start, most)
+            tours.append(walk[:-1] if len(walk) > 1 else walk)
+        return tours
+
+    def _walks(self) -> Walks:
+        return walks_of(
+            self._steps, self._offsets, self._cells, self._starts, self._best.copy(), self._turn
+        )
+
+    @staticmethod
+    def _score_of(costs: NDArray[np.int64]) -> tuple[int, int]:
+        return int(costs.max()), int(costs.sum())
