@@ -84,8 +84,9 @@ class Nav2Robot:
         while not stop.wait(PERIOD_S):
             now = time.monotonic()
             dt, last = min(now - last, 0.2), now
+            # None is made up for: each goal would be aborted as it begins.
             abort = now >= next_abort and self._server.current is not None
-            if abort:
+            if now >= next_abort:
                 next_abort = self._after("abort_every_s")
             if now >= next_restart:
                 next_restart = self._after("restart_every_s")
@@ -104,7 +105,9 @@ class Nav2Robot:
 
     def _faults(self) -> Faults:
         wanted = self.wanted
-        return Faults(wanted.get("delay_s", 0.0), wanted.get("lost", 0.0), wanted.get("seed", 0))
+        # Started anew, it would lose the same replies again: the first one of each start, say.
+        seed = wanted.get("seed", 0) + 1000 * self.restarts
+        return Faults(wanted.get("delay_s", 0.0), wanted.get("lost", 0.0), seed)
 
     def _serve(self) -> ActionServer:
         wanted, faults = self.wanted, self._faults()
