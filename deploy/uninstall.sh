@@ -49,7 +49,7 @@ read_words() {
 
 remove_services() {
     local unit found=
-    for unit in $RECORDER $DAEMON; do
+    for unit in $FOLLOWER $RECORDER $DAEMON; do
         [[ -e $UNITS/$unit ]] || continue
         found=yes
         step "stop and remove $unit" remove_service "$unit"

@@ -8,6 +8,8 @@ UNITS=/etc/systemd/system
 KERNELS=/var/cache/fasaco-edge/numba
 DAEMON=fasaco-edge.service
 RECORDER=fasaco-edge-recorder.service
+# Whoever needs it installs it.
+FOLLOWER=fasaco-edge-follow.service
 
 # What a caller's environment, folder and mode mask say does not count here: root runs this, and
 # anybody may have written what they point to. (Run by its own first line, bash takes neither

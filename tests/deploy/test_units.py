@@ -7,9 +7,9 @@ import re
 import pytest
 
 from tests.deploy.lab import Lab
-from tests.deploy.service import UNITS, Service
+from tests.deploy.service import UNITS, Service, wait_for
 
-NAMES = ("fasaco-edge", "fasaco-edge-recorder")
+NAMES = ("fasaco-edge", "fasaco-edge-recorder", "fasaco-edge-follow")
 MOST_EXPOSED = 1.3
 # What `fasaco-edge run` does first, under the unit's own rules and one more.
 PYTHON = "/opt/fasaco-edge/current/bin/python3"
@@ -68,3 +68,19 @@ def test_zenoh_finds_interfaces_by_netlink(service: Service):
     result, said = once(service, FACES, "RestrictAddressFamilies=\nRestrictAddressFamilies=AF_UNIX")
     assert result == "exit-code", said
     assert "Address family not supported" in said
+
+
+def test_the_follower_runs_ahead_of_all_else_and_starts_anew_with_the_planner(service: Service):
+    follower = Service(service.lab, "fasaco-edge-follow")
+    try:
+        service.start()
+        follower.start()
+        wait_for(lambda: "standing, no p" in follower.text(), 10.0, "what it stands for")
+        before, stat = follower.pid, service.lab.run("cat", f"/proc/{follower.pid}/stat").stdout
+        assert stat.rpartition(")")[2].split()[16] == "-10"
+        service.lab.run("systemctl", "restart", "fasaco-edge")
+        wait_for(lambda: follower.pid not in (0, before), 10.0, "the follower to start anew")
+        assert follower.show("NRestarts") == "0"
+    finally:
+        follower.remove()
+        service.lab.run("rm", "/etc/systemd/system/fasaco-edge-follow.service")
