@@ -114,19 +114,33 @@ def test_a_refuge_lies_off_discs_and_paths_and_is_reached_past_none_of_them():
     lattice = CoverageLattice.from_free(free, 0.25)
     area = ReachableArea.around(lattice, (5, 8))
     other = heard("r2", (3.2, 1.375), (0.1, 1.375))
-    here = refuge(
+    way = refuge(
         area, (5, 8), RADIUS_M, {"r2": Neighbour(other, 0.0, 0.0, PACE_S_M)}, lattice.centres
     )
-    assert here in {(7, 4), (5, 2)}
+    assert tuple(way[-1].tolist()) in {(7, 4), (5, 2)}
     # Behind the other there is a place, too, but no way to it.
     free[6:9, 4] = False
     lattice = CoverageLattice.from_free(free, 0.25)
     area = ReachableArea.around(lattice, (5, 8))
     other = heard("r2", (1.2, 1.375), (3.2, 1.375))
-    found = refuge(
+    way = refuge(
         area, (5, 8), RADIUS_M, {"r2": Neighbour(other, 0.0, 0.0, PACE_S_M)}, lattice.centres
     )
-    assert found[1] > 13
+    assert way[-1, 1] > 13
+
+
+def test_the_way_to_a_refuge_leads_round_the_disc_of_the_other():
+    # A ring of corridors: the other one comes from the east, where the way would be shorter.
+    free = np.ones((3, 6), np.bool_)
+    free[1, 1:5] = False
+    lattice = CoverageLattice.from_free(free, 0.25)
+    area = ReachableArea.around(lattice, (0, 2))
+    ahead = [(0.125, 0.125), (0.125, 0.625), (0.625, 0.625)]
+    near = {"r2": Neighbour(heard("r2", (1.125, 0.125), *ahead), 0.0, 0.0, PACE_S_M)}
+    way = refuge(area, (0, 2), RADIUS_M, near, lattice.centres)
+    assert way.tolist()[-1] == [2, 4]
+    assert [0, 0] in way.tolist()
+    assert len(area.shortest_path((0, 2), (2, 4))) < len(way)
 
 
 def test_a_refuge_is_sought_no_farther_than_the_cells_around_the_robot():

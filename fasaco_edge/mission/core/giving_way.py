@@ -166,10 +166,10 @@ class GivingWay:
         is_due = found.is_on_path or max(waited_s, now - self._came_at) > PATIENCE_S
         if is_due and now - self._sought_at >= AGAIN_S:
             self._sought_at = now
-            goal = refuge(area, cell, self._radius_m, neighbours, area.lattice.centres)
-            if goal is not None and goal != cell:
-                self._refuge = goal
-                return route.publish(area.shortest_path(cell, goal), self.reason, now)
+            way = refuge(area, cell, self._radius_m, neighbours, area.lattice.centres)
+            if way is not None and len(way) > 1:
+                self._refuge = int(way[-1, 0]), int(way[-1, 1])
+                return route.publish(way, self.reason, now)
             if self._fleet.others.is_avoided(found.robot):
                 self.end()
                 return None

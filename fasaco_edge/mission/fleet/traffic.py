@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from fasaco_edge.grid.lattice import Cell
 from fasaco_edge.kernels import EAST, NORTH, SOUTH, WEST
 from fasaco_edge.kernels.fleet.split import FAR, ways_from
+from fasaco_edge.kernels.lattice.reach import shortest_walk
 from fasaco_edge.mission.core.events import MemberHeard
 from fasaco_edge.mission.map.reachable_area import ReachableArea
 
@@ -201,10 +202,10 @@ def refuge(
     radius_m: float,
     neighbours: Mapping[str, Neighbour],
     places: Callable[[NDArray[np.int32]], Points],
-) -> Cell | None:
-    """Return the nearest cell off the discs and paths of other robots; None for none.
+) -> NDArray[np.int32] | None:
+    """Return the way to the nearest cell off the discs and paths of other robots; None for none.
 
-    The way there leads through none of their discs.
+    It leads through none of their discs: cells, int32 (n, 2), the robot's first.
 
     Args:
         area: the reachable area.
@@ -223,7 +224,8 @@ def refuge(
     corner = np.array((window.row0 + rows.start, window.col0 + cols.start))
     points = places((at + corner).astype(np.int32))
     is_free, is_passable = np.ones(len(at), np.bool_), np.ones(len(at), np.bool_)
-    here = (at == (row - rows.start, col - cols.start)).all(axis=1)
+    local = row - rows.start, col - cols.start
+    here = (at == local).all(axis=1)
     for near in neighbours.values():
         heard = near.heard
         clear_m = radius_m + heard.radius_m + CLEARANCE_M
@@ -237,12 +239,14 @@ def refuge(
     closed = np.zeros(steps.shape, np.bool_)
     closed[tuple(at[~is_passable].T)] = True
     steps = _inside(without(steps, closed))
-    away = ways_from(steps, (row - rows.start) * steps.shape[1] + col - cols.start)
+    away = ways_from(steps, local[0] * steps.shape[1] + local[1])
     away = np.where(is_free, away.reshape(steps.shape)[tuple(at.T)], FAR)
     if not len(away) or away.min() >= FAR:
         return None
-    best = at[int(away.argmin())] + corner
-    return int(best[0]), int(best[1])
+    nearest = at[int(away.argmin())]
+    walk = shortest_walk(steps, local, (int(nearest[0]), int(nearest[1])))
+    way: NDArray[np.int32] = (walk + corner).astype(np.int32)
+    return way
 
 
 def _inside(steps: NDArray[np.uint8]) -> NDArray[np.uint8]:
