@@ -11,6 +11,7 @@ from fasaco_edge.grid.lattice import CoverageLattice
 from fasaco_edge.mission.core.events import MapReceived, MemberHeard
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
 from fasaco_edge.mission.fleet.members import Members
+from fasaco_edge.mission.fleet.shared import TILE_BYTES
 from fasaco_edge.mission.fleet.traffic import OLD_S, PATIENCE_S
 from fasaco_edge.mission.map.reachable_area import ReachableArea
 from tests.mission.world import CONFIG, Drive, building, pose_at
@@ -78,3 +79,23 @@ def test_one_stopped_beside_another_is_blocked_by_it_though_the_paths_lead_past(
     drive.tell(pose_at(2, 4), behind, after=1.0)
     assert drive.mission.giving_way.waits_for == "r2"
     assert "stands in the way" in drive.mission.reason
+
+
+def test_who_waits_while_others_sweep_all_that_is_left_is_done_and_leads_nowhere():
+    drive = Drive((2, 4), config=replace(CONFIG, robot="r1"))
+    drive.tell(MapReceived(building(*["." * 24] * 5)), pose_at(2, 4))
+    drive.plan()
+    x, y = ((at + 0.5) * CELL_M for at in drive.walk[1][::-1])
+    ahead = replace(member(x, y), waits_for="r3")
+    for _ in range(3):
+        drive.tell(pose_at(2, 4), ahead, after=1.0)
+    assert drive.mission.giving_way.waits_for == "r2"
+    assert len(drive.mission.next_metres())
+    swept = replace(ahead, tiles=(((0, 0), b"\xff" * TILE_BYTES),))
+    for _ in range(3):
+        drive.tell(pose_at(2, 4), swept, after=1.0)
+        if drive.request is not None:
+            drive.plan()
+    assert drive.mission.state == "done"
+    assert drive.mission.giving_way.waits_for == ""
+    assert not len(drive.mission.next_metres())

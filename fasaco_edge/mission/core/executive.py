@@ -139,7 +139,9 @@ class Executive:
         if not (is_going and self.fleet.members) or self.monitor.trouble(self._now):
             way.end()
             return None
-        update = way.look(self._now)
+        # Others may have swept meanwhile what this robot waits to drive to.
+        has_work = order.is_open and not (way.waits_for and not self.orders.left())
+        update = way.look(self._now, has_work=has_work)
         if not way.waits_for:
             return None
         cell = self.map.robot_cell()

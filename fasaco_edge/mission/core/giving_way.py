@@ -57,6 +57,7 @@ class GivingWay:
         self._map, self._route, self._fleet = map_state, route, fleet
         self._since = self._sought_at = 0.0
         self._refuge: Cell | None = None
+        self._has_work = True
         # Its place, and since when it has had a path there.
         self._place, self._came_at = (math.inf, math.inf), 0.0
 
@@ -74,6 +75,8 @@ class GivingWay:
         """Return the path ahead, also one that is set aside."""
         if self._refuge is not None and len(self._route.path.ahead) > 1:
             return self._route.path.ahead
+        if not self._has_work:
+            return NO_CELLS
         aside = self._route.aside
         return aside if self.waits_for and aside is not None else self._route.path.ahead
 
@@ -82,8 +85,10 @@ class GivingWay:
         self.waits_for = self.reason = ""
         self._refuge = None
 
-    def look(self, now: float) -> PathUpdate | None:
+    def look(self, now: float, *, has_work: bool = True) -> PathUpdate | None:
         """Decide again; return the path to publish, if any. ``waits_for`` tells the result.
+
+        A robot without work left has no path, but for one to a refuge: it makes way alone.
 
         The first case that holds:
 
@@ -95,6 +100,7 @@ class GivingWay:
         | it has stood on its path for PATIENCE_S beside another robot | is blocked by that |
         | none of these | goes on |
         """
+        self._has_work = has_work
         area, cell, pose = self._map.area, self._map.robot_cell(), self._map.pose
         neighbours = self._fleet.others.neighbours(now)
         here = (math.inf, math.inf) if pose is None else (pose.pose.x, pose.pose.y)
