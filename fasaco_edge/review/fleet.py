@@ -154,11 +154,7 @@ def review_fleet(paths: Sequence[Path]) -> FleetReview:
     robots = [robot for batch in batches for robot in batch.robots]
     seat = _seat(robots[0]) if robots else Seat(1.0)
     tracks, ground = _tracks(batches, seat)
-    window = window_of(ground)
-    if window is not None:
-        known = mask_of(ground, window)
-        for track in tracks:
-            _find_again(track, [other for other in tracks if other is not track], known, window)
+    find_again(tracks, ground)
     return FleetReview(_figures(batches[0].fleet, tracks, seat), seat, ground, tracks)
 
 
@@ -191,10 +187,25 @@ def _tracks(batches: Sequence[NoteBatch], seat: Seat) -> tuple[list[RobotTrack],
     return sorted(tracks.values(), key=lambda track: track.name), together(ground)
 
 
-def _find_again(
+def find_again(tracks: Sequence[RobotTrack], ground: Cells) -> None:
+    """Find the cells that robots swept after others, and how much of that was sweeping again.
+
+    Args:
+        tracks: their passes and swept cells; ``again`` is filled in.
+        ground: int64 (n, 2), the cells that they could reach.
+    """
+    window = window_of(ground)
+    if window is None:
+        return
+    known = mask_of(ground, window)
+    for track in tracks:
+        others = [other for other in tracks if other is not track]
+        _find_again_of(track, others, known, window)
+
+
+def _find_again_of(
     track: RobotTrack, others: Sequence[RobotTrack], known: NDArray[np.bool_], window: Window
 ) -> None:
-    """Find the cells that a robot swept after another, and how much of that was sweeping again."""
     steps = [(ms, (row, col)) for ms, row, col in track.passes.tolist()]
     foreign = [any(other.swept_ms.get(cell, FAR) < ms for other in others) for ms, cell in steps]
     seen: set[Place] = set()

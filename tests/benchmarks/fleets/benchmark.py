@@ -24,10 +24,10 @@ from tests.benchmarks.online.buildings import RADIUS_SHARE, of_grid
 
 Point = tuple[float, float]
 
-# What a fleet is to reach: its time against one robot's, and the cells swept by two or more.
-TIME_GOALS, TWICE_GOAL = {2: 0.56, 4: 0.31, 8: 0.19}, 0.03
+# What a fleet is to reach: its time against one robot's, and the cells swept again.
+TIME_GOALS, AGAIN_GOAL = {2: 0.56, 4: 0.31, 8: 0.19}, 0.03
 HEADER = (
-    "robots", "runs", "time", "worst", "driven", "twice", "ends", "stood s", "touches",
+    "robots", "runs", "time", "worst", "driven", "twice", "again", "ends", "stood s", "touches",
     "plan ms", "step ms",
 )  # fmt: skip
 
@@ -44,6 +44,7 @@ class FleetFigures:
         driven_ratio: that against one robot's.
         cells: swept.
         twice: share of them that two or more robots swept.
+        again: share of them that were swept after another robot, beyond the shortest way through.
         unheard: share that a robot swept before it had heard of another's sweep.
         first_end: when the first robot is done, as a share of ``time_s``.
         longest_stand_s: the longest stand of a robot under way.
@@ -63,6 +64,7 @@ class FleetFigures:
     driven_ratio: float
     cells: int
     twice: float
+    again: float
     unheard: float
     first_end: float
     longest_stand_s: float
@@ -145,6 +147,7 @@ def _figures(name: str, run: FleetRun, alone: FleetRun) -> FleetFigures:
         driven_ratio=driven_m / single.world.distance_m,
         cells=run.cells,
         twice=run.twice / run.cells,
+        again=run.again / run.cells,
         unheard=run.unheard / run.cells,
         first_end=min(ends) / max(ends),
         longest_stand_s=max(robot.world.longest_stand_s for robot in run.robots),
@@ -171,23 +174,24 @@ def _report(args: argparse.Namespace, runs: Sequence[FleetFigures]) -> Report:
         some = [run for run in runs if run.robots == robots]
         if not some:
             continue
-        time, driven, twice, ends, *slow = (
+        time, driven, twice, again, ends, *slow = (
             statistics.fmean(getattr(run, name) for run in some)
             for name in (
-                "time_ratio", "driven_ratio", "twice", "first_end", "plan_ms", "plan_alone_ms",
-                "step_ms", "step_alone_ms",
+                "time_ratio", "driven_ratio", "twice", "again", "first_end", "plan_ms",
+                "plan_alone_ms", "step_ms", "step_alone_ms",
             )
         )  # fmt: skip
         worst = max(run.time_ratio for run in some)
         stood_s, touches = max(run.longest_stand_s for run in some), sum(r.touches for r in some)
-        figures = f"{time:.3f}", f"{worst:.3f}", f"{driven:.3f}", f"{twice:.1%}", f"{ends:.2f}"
+        shares = f"{twice:.1%}", f"{again:.1%}"
+        figures = f"{time:.3f}", f"{worst:.3f}", f"{driven:.3f}", *shares, f"{ends:.2f}"
         slower = f"{slow[0]:.1f} ({slow[1]:.1f})", f"{slow[2]:.1f} ({slow[3]:.1f})"
         rows.append(
             (str(robots), str(len(some)), *figures, f"{stood_s:.0f}", str(touches), *slower)
         )
         if robots in TIME_GOALS:
             goals.append(Goal(f"{robots} robots: time", round(time, 4), TIME_GOALS[robots]))
-        goals.append(Goal(f"{robots} robots: swept twice", round(twice, 4), TWICE_GOAL))
+        goals.append(Goal(f"{robots} robots: swept again", round(again, 4), AGAIN_GOAL))
     return Report(
         title=f"fleets in unknown buildings against one robot, {args.line}",
         header=HEADER,
@@ -196,9 +200,10 @@ def _report(args: argparse.Namespace, runs: Sequence[FleetFigures]) -> Report:
         goals=tuple(goals),
         remarks=(
             "means but for worst, stood and touches. time, driven: against one robot's. twice: "
-            "share of the cells that two or more swept, also by only driving through. ends: when "
-            "the first robot is done, against the last. plan, step: processor time of a plan and "
-            "of a step of the mission, 99th percentile (of one robot).",
+            "share of the cells that two or more swept, also by only driving through; again: "
+            "without the shortest ways through floor that others had swept. ends: when the first "
+            "robot is done, against the last. plan, step: processor time of a plan and of a step "
+            "of the mission, 99th percentile (of one robot).",
         ),
     )
 

@@ -6,6 +6,7 @@ the same run. Robots hear of each other once a period, as far as ``hears`` lets 
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
@@ -35,6 +36,7 @@ from fasaco_edge.planners.cost import CoverageCost, SearchWork
 from fasaco_edge.planners.line import LINES
 from fasaco_edge.planners.planner import WorkLimit
 from fasaco_edge.planners.search.near_optimal import NearOptimal
+from fasaco_edge.review.fleet import RobotTrack, find_again
 from fasaco_edge.simulation.robot import SimulationConfig
 from fasaco_edge.simulation.world import World
 
@@ -99,6 +101,7 @@ class FleetRobot:
     """A robot, its mission, and what was noted of it.
 
     ``step_ms``, ``plan_ms``: processor time of each step of the mission, and of each plan [ms].
+    ``swept_ms``: the cells it swept, and when [ms]; ``passes``: the cells it came into, in order.
     """
 
     name: str
@@ -113,6 +116,8 @@ class FleetRobot:
     is_dead: bool = False
     step_ms: list[float] = field(default_factory=list)
     plan_ms: list[float] = field(default_factory=list)
+    swept_ms: dict[Cell, int] = field(default_factory=dict)
+    passes: list[tuple[int, int, int]] = field(default_factory=list)
     inbox: list[MemberHeard] = field(default_factory=list)
 
     def report(self) -> MemberHeard | None:
@@ -243,8 +248,13 @@ class FleetRun:
                     listener.inbox.append(report)
 
     def _note(self, robot: FleetRobot, pose: Pose2D) -> None:
-        """Note the cells that it sweeps."""
+        """Note the cells that it sweeps, and the one it comes into."""
+        at_ms, cell_m = round(1000 * self.now), self.fleet.cell_m
+        place = math.floor(pose.y / cell_m), math.floor(pose.x / cell_m)
+        if not robot.passes or robot.passes[-1][1:] != place:
+            robot.passes.append((at_ms, *place))
         for cell in robot.ledger.record(pose):
+            robot.swept_ms.setdefault(cell, at_ms)
             by = self._swept_by.setdefault(cell, set())
             if by and robot.name not in by:
                 swept = robot.mission.shared.swept(Window(*cell, cell[0] + 1, cell[1] + 1))
@@ -255,6 +265,16 @@ class FleetRun:
     def cells(self) -> int:
         """Cells swept."""
         return len(self._swept_by)
+
+    @property
+    def again(self) -> float:
+        """Cells that robots swept after others, beyond their shortest ways through these."""
+        tracks = [
+            RobotTrack(robot.name, 0, [], robot.swept_ms, np.array(robot.passes, np.int64))
+            for robot in self.robots
+        ]
+        find_again(tracks, np.array(sorted(self._swept_by), np.int64))
+        return sum(sum(track.again.values()) for track in tracks)
 
     @property
     def twice(self) -> int:
