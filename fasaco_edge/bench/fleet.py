@@ -31,7 +31,7 @@ from fasaco_edge.bench.fleet_online import (
 from fasaco_edge.grid.lattice import Cell
 from fasaco_edge.planners.cost import CoverageCost
 from fasaco_edge.planners.fleet.division import Division, divide
-from fasaco_edge.planners.fleet.sharing import Fleet
+from fasaco_edge.planners.fleet.first_tours import Fleet
 from fasaco_edge.planners.grids import NamedGrid, read_grid
 from fasaco_edge.planners.planner import TimeBudget
 from fasaco_edge.planners.problem import CoverageProblem

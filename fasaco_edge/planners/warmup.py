@@ -28,8 +28,9 @@ from fasaco_edge.kernels.lattice.polygons import add_near, count_in, turn_inside
 from fasaco_edge.kernels.lattice.reach import update_reach
 from fasaco_edge.planners.bound import lower_bound_of
 from fasaco_edge.planners.cost import CoverageCost
+from fasaco_edge.planners.fleet.annealing import PIECES
 from fasaco_edge.planners.fleet.division import divide
-from fasaco_edge.planners.fleet.sharing import ANNEALINGS, Fleet
+from fasaco_edge.planners.fleet.first_tours import Fleet
 from fasaco_edge.planners.line import LineConfig, line_over, memory_for_moves
 from fasaco_edge.planners.paper.colony import ColonyConfig
 from fasaco_edge.planners.path import CoveragePath, walk_figures
@@ -145,8 +146,8 @@ def _take_windows(room: _TinyRoom) -> None:
 
 def _take_shares(room: _TinyRoom) -> None:
     fleet = Fleet([(0, 0), (3, 3)], room.costly.cost)
-    # Until the first pairs have shared anew.
-    divide(room.lattice, fleet, lambda progress: progress.work.perturbations > ANNEALINGS)
+    # Until pairs have shared anew in either way.
+    divide(room.lattice, fleet, lambda progress: progress.work.perturbations > PIECES + 8)
 
 
 def _take_repair(room: _TinyRoom) -> None:

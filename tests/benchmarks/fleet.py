@@ -24,7 +24,7 @@ from fasaco_edge.bench.benchmark import (
 from fasaco_edge.bench.fleet import SharedWalks, drawn_starts, plan_shared
 from fasaco_edge.grid.lattice import Cell
 from fasaco_edge.planners.cost import CoverageCost
-from fasaco_edge.planners.fleet.sharing import Fleet
+from fasaco_edge.planners.fleet.first_tours import Fleet
 from fasaco_edge.planners.grids import NamedGrid, read_grid
 from fasaco_edge.planners.warmup import warm_up
 from tests.benchmarks.buildings import building

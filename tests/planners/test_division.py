@@ -15,7 +15,7 @@ from fasaco_edge.kernels.fleet.split import FAR, WORST, best_split, ways_from
 from fasaco_edge.kernels.lattice.reach import reachable_from
 from fasaco_edge.planners.cost import STEPS_ALONE, CoverageCost
 from fasaco_edge.planners.fleet.division import divide
-from fasaco_edge.planners.fleet.sharing import Fleet
+from fasaco_edge.planners.fleet.first_tours import Fleet
 from tests.support.examples import examples
 
 TURNS = CoverageCost(1.0, 1.5)
@@ -72,6 +72,30 @@ def test_walks_in_a_hall_are_about_equally_long():
     check(free, starts, division, returns=True)
     longest = max(len(walk) - 1 for walk in division.walks)
     assert longest <= 1.05 * division.cells / 4
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_sharing_a_hall_takes_hardly_a_step_more(seed):
+    """An even share is 281.75 cells; pairs alone were left with 286 to 288 steps."""
+    free, starts = hall(), [(0, 0), (0, 1), (29, 39), (15, 20)]
+    fleet = Fleet(starts, STEPS_ALONE, seed=seed)
+    division = divide(CoverageLattice.from_free(free), fleet, rounds(16))
+    check(free, starts, division, returns=True)
+    steps = [len(walk) - 1 for walk in division.walks]
+    assert max(steps) <= 1.01 * division.cells / 4
+    assert sum(steps) <= 1.01 * division.cells
+
+
+def test_the_bound_counts_who_has_to_pass_a_corridor():
+    """Two robots at one end of a corridor of 20 cells, a room at the other: both go there."""
+    free = np.zeros((12, 34), np.bool_)
+    free[5, :22] = True
+    free[:, 22:] = True
+    starts = [(5, 0), (5, 1)]
+    division = divide(CoverageLattice.from_free(free), Fleet(starts, STEPS_ALONE), rounds(8))
+    check(free, starts, division, returns=True)
+    assert division.lower_bound_steps >= (2 * 2 * 20 + 12 * 12) // 2
+    assert division.lower_bound_steps <= 1.05 * max(len(walk) - 1 for walk in division.walks)
 
 
 def test_robots_that_start_side_by_side_share_alike():

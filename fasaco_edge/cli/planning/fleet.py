@@ -40,7 +40,7 @@ def plan_fleet(args: argparse.Namespace, request: PlanRequest) -> int:
     # After that, as they import the compiler.
     from fasaco_edge.offline.maps import load_map
     from fasaco_edge.planners.fleet.division import divide
-    from fasaco_edge.planners.fleet.sharing import Fleet
+    from fasaco_edge.planners.fleet.first_tours import Fleet
 
     map = load_map(args.map, resolution_m=args.resolution, unknown_free=args.unknown_free)
     lattice = map.lattice(robot)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,12 +15,31 @@ from fasaco_edge.kernels.fleet.walks import STEP, Walks, add_tour, driven, walks
 from fasaco_edge.planners.cost import CoverageCost
 from fasaco_edge.planners.fleet.tours import Tour
 
-# Temperatures from the first proposal to the last, in energy of a sixteenth.
-HOT, COLD = 12 * 16, 3 * 16
-# Weight of an uneven share at the beginning; it is FULL from a while before the end on.
-UNEVEN, FULL, FULL_FROM = 32, 256, 0.77
+
+class Schedule(NamedTuple):
+    """How walks are annealed.
+
+    Attributes:
+        hot, cold: temperatures from the first proposal to the last, in energy of a sixteenth.
+        uneven: weight of an uneven share at first.
+        per_cell: proposals per cell.
+    """
+
+    hot: int
+    cold: int
+    uneven: int
+    per_cell: int
+
+
+# Where turns have a price, a longer or hotter annealing spoils them, which local search does not
+# make good again.
+STEPS, TURNS = Schedule(12 * 16, 3 * 16, 32, 1_000), Schedule(4 * 16, 2 * 16, 32, 500)
+# Weight of an uneven share from a while before the end on.
+FULL, FULL_FROM = 256, 0.77
+# Most proposals of the first annealing; they double after so many attempts.
+FIRST, DOUBLED = 1_500_000, 8
 # Pieces of one annealing, after each of which the walks are compared; most proposals of a piece.
-PIECES, MOST_PROPOSALS = 8, 200_000
+PIECES, MOST_PROPOSALS = 8, 100_000
 # Limits of the kernels on robots and cells.
 MOST_CELLS = 2**22
 
@@ -62,20 +82,22 @@ class FleetWalks:
                 add_tour(links, self._offsets, tour)
         self._score = self._score_of(self._walks().costs)
 
-    def improve(self, proposals: int, random: NDArray[np.uint64]) -> Iterator[None]:
-        """Anneal from the best walks on with so many proposals per cell, in pieces.
+    def improve(self, attempt: int, random: NDArray[np.uint64]) -> Iterator[None]:
+        """Anneal from the best walks on, in pieces.
 
         Args:
-            proposals: per cell.
+            attempt: number of annealings before; later ones take longer.
             random: stream, uint64 (1,); advanced.
         """
-        walks, count = self._walks(), proposals * self._cells.size
-        pieces = max(PIECES, -(-count // MOST_PROPOSALS))
+        schedule = TURNS if self._turn else STEPS
+        proposals = min(schedule.per_cell * self._cells.size, FIRST) << attempt // DOUBLED
+        walks, pieces = self._walks(), max(PIECES, -(-proposals // MOST_PROPOSALS))
         for piece in range(pieces):
-            hot, cold = (HOT + (COLD - HOT) * (piece + more) // pieces for more in (0, 1))
+            cooling = schedule.cold - schedule.hot
+            hot, cold = (schedule.hot + cooling * (piece + more) // pieces for more in (0, 1))
             progress = min(1.0, piece / (FULL_FROM * pieces))
-            weight = int(UNEVEN * (FULL / UNEVEN) ** progress)
-            anneal(walks, self._turn, hot, cold, weight, count // pieces, random)
+            weight = int(schedule.uneven * (FULL / schedule.uneven) ** progress)
+            anneal(walks, self._turn, hot, cold, weight, proposals // pieces, random)
             score = self._score_of(walks.costs)
             if score < self._score:
                 self._score, self._best = score, walks.links.copy()

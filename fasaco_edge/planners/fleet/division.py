@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from fasaco_edge.errors import FasacoError
 from fasaco_edge.grid.lattice import Cell, CoverageLattice
-from fasaco_edge.planners.fleet.sharing import Fleet, Sharing
+from fasaco_edge.planners.fleet.first_tours import Fleet
+from fasaco_edge.planners.fleet.sharing import Sharing
 from fasaco_edge.planners.planner import StoppingCriterion
 from fasaco_edge.planners.problem import CoverageProblem
 
