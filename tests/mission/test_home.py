@@ -75,6 +75,19 @@ def test_the_way_home_begins_at_the_robot_wherever_its_line_is_on_its_path():
     assert len(path.cells) == 1 + abs(drive.cell[0] - 5) + abs(drive.cell[1] - 0)
 
 
+def test_it_goes_on_at_the_nearer_end_of_what_is_left():
+    row, col = covering().mission.route.path.cells[-1].tolist()
+    drive = covering(home=Place(x_m=(col + 0.5) * CELL, y_m=(row + 0.5) * CELL))
+    drive.command("home")
+    arrive(drive)
+    left = drive.mission.route.aside.tolist()
+    assert left[-1] == [row, col]
+    drive.command("resume")
+    assert drive.request.problem.before.tolist() == left[::-1]
+    drive.finish()
+    assert len(drive.visited) == 48
+
+
 def test_the_way_home_ends_with_the_heading_of_that_place():
     drive = covering(home=HOME)
     assert drive.command("home").path.end_yaw == math.pi / 2

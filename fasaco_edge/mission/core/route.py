@@ -105,9 +105,21 @@ class Route(PlanRequests):
         if self._aside is None:
             return None
         update = self.publish(NO_CELLS, reason, now) if len(self.path.cells) else None
-        self._kept, self._aside = PathProgress(self._aside), None
+        self._kept, self._aside = PathProgress(self._from_nearer_end(self._aside)), None
         self.want(reason)
         return update
+
+    def _from_nearer_end(self, cells: NDArray[np.int32]) -> NDArray[np.int32]:
+        """Return a kept path, reversed if its end is nearer to the robot than its begin.
+
+        Not a path that has to end at home: what it saves at first it drives in the end.
+        """
+        area, cell = self._map.area, self._map.robot_cell()
+        if area is None or cell is None or not len(cells) or self._orders.ends_home:
+            return cells
+        ends = [area.shortest_path(cell, (int(row), int(col))) for row, col in cells[[0, -1]]]
+        is_nearer = 0 < len(ends[1]) < len(ends[0])
+        return np.ascontiguousarray(cells[::-1]) if is_nearer else cells
 
     def resume(self, now: float) -> PathUpdate | None:
         """Publish the kept path after a pause; want a plan if it does not hold."""

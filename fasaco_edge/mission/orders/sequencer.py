@@ -90,6 +90,11 @@ class Sequencer:
         pose = place.stand
         return anchor_cell(lattice, pose) or lattice.cell_at(pose.x, pose.y)
 
+    @property
+    def ends_home(self) -> bool:
+        """Whether the present path has to end at the robot's home."""
+        return self.order_state.returns_home_next
+
     def start(self, state: OrderState) -> None:
         """Begin another order, or none."""
         self.order_state, self._run = state, _Run()
