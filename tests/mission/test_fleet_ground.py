@@ -5,7 +5,7 @@ import pytest
 
 from fasaco_edge.grid.lattice import BLOCKED, CoverageLattice
 from fasaco_edge.mission.fleet import ground as shared_ground
-from fasaco_edge.mission.fleet.division import Robot, divide
+from fasaco_edge.mission.fleet.division import Division, Robot, divide
 from fasaco_edge.mission.fleet.ground import GroundTelling, SharedGround
 from fasaco_edge.mission.fleet.shared import TILE_BYTES
 from fasaco_edge.mission.map.reachable_area import ReachableArea
@@ -81,6 +81,20 @@ def test_parts_stay_in_place_while_nothing_ends_much_earlier(moved):
     first = divide(lattice, wanted, robots)
     later = divide(lattice, wanted, [Robot("r1", moved, 1.0), robots[1]], first)
     assert later.seeds == first.seeds
+
+
+@pytest.mark.parametrize(("idle_at", "helps"), [((5, 12), False), ((0, 20), True)])
+def test_a_robot_without_cells_gets_some_only_where_all_end_sooner(idle_at, helps):
+    """From too far its help comes late, and other robots' cells changed hands all the same."""
+    lattice = CoverageLattice.from_free(np.ones((6, 40), np.bool_))
+    wanted = np.zeros((6, 40), np.bool_)
+    wanted[:2, 2:6], wanted[:, 34:] = True, True
+    places, seeds = [(2, 5), idle_at, (3, 33)], ((1, 4), (3, 20), (3, 36))
+    robots = [Robot(f"r{number}", cell, 1.0) for number, cell in enumerate(places)]
+    before = Division(tuple(robots), seeds, (0.0, 0.0, 0.0))
+    after = divide(lattice, wanted, robots, before)
+    changed = wanted & (before.owners(lattice) != after.owners(lattice))
+    assert changed.any() == helps
 
 
 def test_all_robots_take_over_one_division():

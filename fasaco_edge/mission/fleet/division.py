@@ -24,8 +24,9 @@ MOST_CELLS, MOST_SEARCHED = 2_000, 3_000_000
 ROUNDS, CHANGES, DAMPING = 3, 30, 0.85
 # A seed on a cell that is not coverable counts as on the nearest one within this distance [cells].
 SNAP = 2
-# Seeds are kept unless others end before this share of their time.
-STABLE = 0.9
+# Seeds are kept unless others end before this share of their time. The time of all cells that go to
+# another robot, over the number of robots, counts as so much time of the last robot.
+STABLE, CHANGED = 0.9, 1.0
 
 Seconds = NDArray[np.float32]
 
@@ -89,7 +90,8 @@ def divide(
         lattice: the cells where robots fit.
         wanted: bool (rows, cols), the cells to divide; all robots must be connected.
         robots: at least one.
-        before: the last division, whose seeds are kept unless others end much earlier.
+        before: the last division; its seeds are kept unless others end much earlier, and where
+            nothing is gained, cells keep their robot.
     """
     robots = sorted(robots, key=lambda robot: robot.name)
     starts, steps_s = [robot.cell for robot in robots], [robot.step_s for robot in robots]
@@ -100,28 +102,76 @@ def divide(
     travel = _Travel(lattice, cells)
     from_starts_s = travel.times_s(starts, steps_s)
     scale = np.count_nonzero(wanted) / len(cells)
-    rounds = max(1, min(ROUNDS, MOST_SEARCHED // (len(robots) * lattice.steps.size)))
-    best: tuple[float, list[Cell], NDArray[np.float32]] | None = None
-    kept = {} if before is None else dict(zip(before.names, before.seeds, strict=True))
-    if kept.keys() & {robot.name for robot in robots}:
-        seeds = [kept.get(robot.name, robot.cell) for robot in robots]
+    choice = _Choice(
+        from_starts_s, scale * np.array(steps_s), _owners_before(before, robots, travel)
+    )
+    names = [robot.name for robot in robots]
+    if before is not None and set(before.names) & set(names):
+        kept = dict(
+            zip(before.names, zip(before.seeds, before.handicaps_s, strict=True), strict=True)
+        )
+        pairs = [kept.get(robot.name, (robot.cell, 0.0)) for robot in robots]
+        seeds, old_s = [seed for seed, _ in pairs], np.array([s for _, s in pairs], np.float32)
         times_s = travel.times_s(seeds, steps_s)
-        handicaps_s = _handicaps_s(times_s, np.array(steps_s))
-        owner = (times_s + handicaps_s[:, None]).argmin(axis=0)
-        end_s = _end_s(from_starts_s, owner, scale * np.array(steps_s))
-        best = STABLE * end_s, seeds, handicaps_s
+        balanced_s = (
+            _handicaps_s(times_s, np.array(steps_s), first_s) for first_s in (old_s, None)
+        )
+        for handicaps_s in (old_s, *balanced_s):
+            choice.offer(seeds, handicaps_s, times_s, STABLE)
+    rounds = max(1, min(ROUNDS, MOST_SEARCHED // (len(robots) * lattice.steps.size)))
     for begin in (starts, _spread(travel, from_starts_s)):
         seeds = begin
         for _ in range(rounds):
             times_s = travel.times_s(seeds, steps_s)
-            handicaps_s = _handicaps_s(times_s, np.array(steps_s))
-            owner = (times_s + handicaps_s[:, None]).argmin(axis=0)
-            end_s = _end_s(from_starts_s, owner, scale * np.array(steps_s))
-            if best is None or end_s < best[0]:
-                best = end_s, seeds, handicaps_s
+            owner = choice.offer(seeds, _handicaps_s(times_s, np.array(steps_s)), times_s)
             seeds = _middles(lattice, cells, owner, seeds)
-    assert best is not None
-    return Division(tuple(robots), tuple(best[1]), tuple(best[2].tolist()))
+    return Division(tuple(robots), tuple(choice.seeds), tuple(choice.handicaps_s.tolist()))
+
+
+class _Choice:
+    """The best of the divisions offered.
+
+    Attributes:
+        seeds, handicaps_s: of the best, see ``Division``; handicaps float32 (k,).
+    """
+
+    def __init__(
+        self, from_starts_s: Seconds, cell_s: NDArray[np.float64], before: NDArray[np.int64]
+    ) -> None:
+        self.seeds: list[Cell] = []
+        self.handicaps_s = np.zeros(0, np.float32)
+        self._from_starts_s, self._cell_s, self._before = from_starts_s, cell_s, before
+        self._cost_s = np.inf
+
+    def offer(
+        self, seeds: list[Cell], handicaps_s: Seconds, times_s: Seconds, factor: float = 1.0
+    ) -> NDArray[np.int64]:
+        """Take a division if it costs less; return the owner of each cell.
+
+        Args:
+            seeds, handicaps_s: the division.
+            times_s: travel times from its seeds, float32 (k, n) [s].
+            factor: on the time of its last robot.
+        """
+        owner: NDArray[np.int64] = (times_s + handicaps_s[:, None]).argmin(axis=0)
+        changed = owner[(self._before >= 0) & (owner != self._before)]
+        changed_s = float(self._cell_s[changed].sum()) / len(seeds)
+        cost_s = factor * _end_s(self._from_starts_s, owner, self._cell_s) + CHANGED * changed_s
+        if cost_s < self._cost_s:
+            self.seeds, self.handicaps_s, self._cost_s = seeds, handicaps_s, cost_s
+        return owner
+
+
+def _owners_before(
+    before: Division | None, robots: Sequence[Robot], travel: _Travel
+) -> NDArray[np.int64]:
+    """Return the index of the robot that had each cell, int64 (n,); -1 for one that is gone."""
+    if before is None:
+        return np.full(len(travel.cells), -1)
+    index = {robot.name: number for number, robot in enumerate(robots)}
+    numbers = np.array([index.get(name, -1) for name in before.names])
+    owners: NDArray[np.int64] = numbers[before.owners(travel.lattice).reshape(-1)[travel.cells]]
+    return owners
 
 
 def _times_s(lattice: CoverageLattice, start: Cell, step_s: float) -> Seconds:
@@ -172,9 +222,14 @@ class _Travel:
         return times
 
 
-def _handicaps_s(times_s: Seconds, steps_s: NDArray[np.float64]) -> Seconds:
-    """Return handicaps, float32 (k,), that balance the load, for travel times float32 (k, n)."""
-    handicaps = np.zeros(len(times_s), np.float32)
+def _handicaps_s(
+    times_s: Seconds, steps_s: NDArray[np.float64], first_s: Seconds | None = None
+) -> Seconds:
+    """Return handicaps, float32 (k,), that balance the load, for travel times float32 (k, n).
+
+    They are sought from the first ones on, which are kept unless others balance better.
+    """
+    handicaps = np.zeros(len(times_s), np.float32) if first_s is None else first_s
     best, least = handicaps, np.inf
     change = float(np.ptp(times_s)) / 2
     for _ in range(CHANGES):
