@@ -17,27 +17,37 @@ from fasaco_edge.planners.fleet.tours import Tour
 
 
 class Schedule(NamedTuple):
-    """How walks are annealed.
+    """How walks are annealed, from several first tours; the best of these again, for longer.
 
     Attributes:
         hot, cold: temperatures from the first proposal to the last, in energy of a sixteenth.
-        uneven: weight of an uneven share at first.
-        per_cell: proposals per cell.
+        per_cell, most: proposals per cell, and a limit on them; they double after so many
+            generations of attempts as DOUBLED says.
+        attempts: number of first tours of a generation.
+        again_hot, again: temperature from which the best of them is annealed again, and how many
+            times as many proposals; 0 for not.
     """
 
     hot: int
     cold: int
-    uneven: int
     per_cell: int
+    most: int
+    attempts: int
+    again_hot: int
+    again: int
 
 
+STEPS = Schedule(
+    hot=12 * 16, cold=3 * 16, per_cell=50, most=150_000, attempts=4, again_hot=120, again=8
+)
 # Where turns have a price, a longer or hotter annealing spoils them, which local search does not
 # make good again.
-STEPS, TURNS = Schedule(12 * 16, 3 * 16, 32, 1_000), Schedule(4 * 16, 2 * 16, 32, 500)
-# Weight of an uneven share from a while before the end on.
-FULL, FULL_FROM = 256, 0.77
-# Most proposals of the first annealing; they double after so many attempts.
-FIRST, DOUBLED = 1_500_000, 8
+TURNS = Schedule(
+    hot=4 * 16, cold=2 * 16, per_cell=500, most=1_500_000, attempts=1, again_hot=0, again=0
+)
+DOUBLED = 3
+# Weight of an uneven share at first, and from a while before the end on.
+UNEVEN, FULL, FULL_FROM = 32, 256, 0.77
 # Pieces of one annealing, after each of which the walks are compared; most proposals of a piece.
 PIECES, MOST_PROPOSALS = 8, 100_000
 # Limits of the kernels on robots and cells.
@@ -57,6 +67,10 @@ class FleetWalks:
         reached: bool (rows, cols), the ground: connected cells.
         starts: flat cells.
         cost: prices of steps and turns.
+
+    Attributes:
+        schedule: how they are annealed.
+        score: greatest cost of a walk and cost of all, in units of the kernels.
     """
 
     def __init__(
@@ -72,7 +86,8 @@ class FleetWalks:
         self._starts = np.array(starts, np.int64)
         self._turn = cost.quarter_turn_us * STEP // cost.step_us
         self._best = np.zeros((len(starts), lattice.steps.size), np.uint8)
-        self._score = 0, 0
+        self.score = 0, 0
+        self.schedule = TURNS if self._turn else STEPS
 
     def load(self, tours: Sequence[Tour]) -> None:
         """Go on from these tours; together they pass all cells."""
@@ -80,27 +95,26 @@ class FleetWalks:
         for links, tour in zip(self._best, tours, strict=True):
             if tour.size > 1:
                 add_tour(links, self._offsets, tour)
-        self._score = self._score_of(self._walks().costs)
+        self.score = self._score_of(self._walks().costs)
 
-    def improve(self, attempt: int, random: NDArray[np.uint64]) -> Iterator[None]:
+    def improve(self, proposals: int, hot: int, random: NDArray[np.uint64]) -> Iterator[None]:
         """Anneal from the best walks on, in pieces.
 
         Args:
-            attempt: number of annealings before; later ones take longer.
+            proposals: how many.
+            hot: temperature at first, in energy of a sixteenth.
             random: stream, uint64 (1,); advanced.
         """
-        schedule = TURNS if self._turn else STEPS
-        proposals = min(schedule.per_cell * self._cells.size, FIRST) << attempt // DOUBLED
         walks, pieces = self._walks(), max(PIECES, -(-proposals // MOST_PROPOSALS))
         for piece in range(pieces):
-            cooling = schedule.cold - schedule.hot
-            hot, cold = (schedule.hot + cooling * (piece + more) // pieces for more in (0, 1))
+            cooling = self.schedule.cold - hot
+            first, last = (hot + cooling * (piece + more) // pieces for more in (0, 1))
             progress = min(1.0, piece / (FULL_FROM * pieces))
-            weight = int(schedule.uneven * (FULL / schedule.uneven) ** progress)
-            anneal(walks, self._turn, hot, cold, weight, proposals // pieces, random)
+            weight = int(UNEVEN * (FULL / UNEVEN) ** progress)
+            anneal(walks, self._turn, first, last, weight, proposals // pieces, random)
             score = self._score_of(walks.costs)
-            if score < self._score:
-                self._score, self._best = score, walks.links.copy()
+            if score < self.score:
+                self.score, self._best = score, walks.links.copy()
             yield
 
     def tours(self) -> list[Tour]:

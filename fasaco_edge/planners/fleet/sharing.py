@@ -1,9 +1,9 @@
 """Fleet search: walks of similar cost for several robots that share a connected ground.
 
-Each robot gets a tour (``first_tours``); then all are improved together by simulated annealing
-(``annealing``), where turns have a price pairs of robots share theirs anew (``pairs``), and
-everything begins anew with other tours. The objective is the makespan: the
-cost of the longest walk.
+Each robot gets a tour (``first_tours``), and all are improved together by simulated annealing
+(``annealing``). After some short attempts the best one is annealed for longer; where turns have a
+price, pairs of robots share theirs anew instead (``pairs``). Then everything begins
+anew. The objective is the makespan: the cost of the longest walk.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from fasaco_edge.grid.lattice import CoverageLattice
 from fasaco_edge.planners.cost import MICROSECONDS, SearchWork
-from fasaco_edge.planners.fleet.annealing import FleetWalks, can_anneal
+from fasaco_edge.planners.fleet.annealing import DOUBLED, FleetWalks, can_anneal
 from fasaco_edge.planners.fleet.bound import longest_bound
 from fasaco_edge.planners.fleet.first_tours import FirstTours, Fleet
 from fasaco_edge.planners.fleet.pairs import Pairs
@@ -67,33 +67,45 @@ class Sharing:
         first = FirstTours(self._lattice, self._fleet, self._reached, self._ground, stop)
         least_us = self.lower_bound_steps * self._fleet.cost.step_us
         with ThreadPoolExecutor(self._fleet.threads) as pool:
-            for attempt in itertools.count():
-                tours = first.find(attempt, pool)
-                self._take(tours)
-                yield
-                if len(tours) == 1:
-                    return
-                for better in self._improved(tours, attempt, pool):
-                    self.rounds += 1
-                    self._take(better)
-                    if self._best.worst_us <= least_us:
-                        return
+            for generation in itertools.count():
+                for tours in self._found(first, generation, pool):
+                    self._take(tours)
                     yield
+                    if len(tours) == 1 or self._best.worst_us <= least_us:
+                        return
 
-    def _improved(
-        self, tours: list[Tour], attempt: int, pool: ThreadPoolExecutor
+    def _found(
+        self, first: FirstTours, generation: int, pool: ThreadPoolExecutor
     ) -> Iterator[list[Tour]]:
-        """Improve all tours together; yield them after each piece of work."""
-        cost = self._fleet.cost
-        if can_anneal(len(tours), self.cells):
+        """Find tours of all robots and improve them together; yield them after each piece."""
+        cost, seed, robots = self._fleet.cost, self._fleet.seed, len(self._fleet.starts)
+        if not can_anneal(robots, self.cells):
+            tours = first.find(generation, pool)
+            yield tours
+        else:
             walks = FleetWalks(self._lattice, self._reached, self._ground.starts, cost)
-            walks.load(tours)
-            for _ in walks.improve(attempt, stream_of(self._fleet.seed, attempt)):
-                yield walks.tours()
-            tours = walks.tours()
+            plan = walks.schedule
+            proposals = min(plan.per_cell * self.cells, plan.most) << generation // DOUBLED
+            attempts = []
+            for attempt in range(generation * plan.attempts, (generation + 1) * plan.attempts):
+                tours = first.find(attempt, pool)
+                yield tours
+                walks.load(tours)
+                for _ in walks.improve(proposals, plan.hot, stream_of(seed, attempt)):
+                    self.rounds += 1
+                    yield walks.tours()
+                attempts.append((walks.score, attempt, walks.tours()))
+            (_, attempt, tours) = min(attempts, key=lambda found: found[:2])
+            if plan.again:
+                walks.load(tours)
+                stream = stream_of(seed, attempt, 1)
+                for _ in walks.improve(plan.again * proposals, plan.again_hot, stream):
+                    self.rounds += 1
+                    yield walks.tours()
         pairs = Pairs(self._fleet, self._ground, tours, self.rounds)
-        while pairs.gainless < GAINLESS_ROUNDS and cost.quarter_turn_us:
+        while pairs.gainless < GAINLESS_ROUNDS and cost.quarter_turn_us and robots > 1:
             pairs.balance(pool)
+            self.rounds += 1
             yield pairs.tours
 
     def _take(self, tours: list[Tour]) -> None:
