@@ -33,7 +33,7 @@ from fasaco_edge.planners.cost import CoverageCost
 from fasaco_edge.planners.fleet.division import Division, divide
 from fasaco_edge.planners.fleet.first_tours import Fleet
 from fasaco_edge.planners.grids import NamedGrid, read_grid
-from fasaco_edge.planners.planner import TimeBudget
+from fasaco_edge.planners.planner import StoppingCriterion, TimeBudget
 from fasaco_edge.planners.problem import CoverageProblem
 from fasaco_edge.planners.warmup import warm_up
 
@@ -77,10 +77,12 @@ class SharedWalks:
         return self.bound_steps * self.robots / self.cells
 
 
-def plan_shared(grid: NamedGrid, fleet: Fleet, budget_s: float) -> tuple[SharedWalks, Division]:
+def plan_shared(
+    grid: NamedGrid, fleet: Fleet, stop: StoppingCriterion
+) -> tuple[SharedWalks, Division]:
     """Plan one walk for each robot; return the figures, and the walks."""
     began = time.process_time()
-    division = divide(grid.lattice, fleet, TimeBudget(budget_s))
+    division = divide(grid.lattice, fleet, stop)
     cpu_s = time.process_time() - began
     window = grid.lattice.window
     times = np.zeros(grid.lattice.states.shape, np.int64)
@@ -135,7 +137,7 @@ def _measure(args: argparse.Namespace, say: Say) -> Generator[SharedWalks | Onli
             say(f"{name}, {robots} robots")
             starts = [grid.start, *drawn_starts(cells, robots - 1, args.seed)]
             fleet = Fleet(starts, CoverageCost(STEP_S, 0.0), seed=args.seed)
-            yield plan_shared(grid, fleet, args.budget)[0]
+            yield plan_shared(grid, fleet, TimeBudget(args.budget))[0]
 
 
 def _report(args: argparse.Namespace, samples: Sequence[SharedWalks | OnlineRun]) -> Report:
