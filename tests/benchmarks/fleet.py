@@ -252,7 +252,7 @@ FLEET = Benchmark(
     epilog="""\
 examples:
   python -m tests.benchmarks fleet
-  python -m tests.benchmarks fleet --maps --generated 1 --cells 12000 --first 13
+  python -m tests.benchmarks fleet --generated 1 --cells 12000 --first 13
   python -m tests.benchmarks fleet --grids *.npy --robots 4 8 --starts spread together --json
 """,
 )
