@@ -130,8 +130,8 @@ def _propose_square(
         after = (2 if index == doubled else 0) if times == 1 else 1
         change += after - times
         back = (direction + 2) & 3
-        links[here] = links[here] & ~(3 << 2 * direction) | after << 2 * direction
-        links[there] = links[there] & ~(3 << 2 * back) | after << 2 * back
+        links[here] = links[here] & (0xFF ^ 3 << 2 * direction) | after << 2 * direction
+        links[there] = links[there] & (0xFF ^ 3 << 2 * back) | after << 2 * back
     more = _cost_around(walks, memory, robot, 4, turn) - before
     _settle(walks, memory, robot, 4, more, turn, mean, weight, heat, random)
 

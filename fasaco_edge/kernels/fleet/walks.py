@@ -100,7 +100,7 @@ def note_links(walks: Walks, robot: int, cell: int, before: int) -> None:
 def _turn_link(walks: Walks, robot: int, cell: int, gone: int, come: int, turn: int) -> int:
     """Replace a step from a cell by one in another direction; return what its turns cost more."""
     links = walks.links[robot, cell]
-    after = links & ~(3 << 2 * gone) | 1 << 2 * come
+    after = links & (0xFF ^ 3 << 2 * gone) | 1 << 2 * come
     walks.links[robot, cell] = after
     return int(turn * (TURNS[after] - TURNS[links]))
 
@@ -169,8 +169,8 @@ def add_tour(links: NDArray[np.uint8], offsets: NDArray[np.int64], tour: NDArray
                 back = (direction + 2) & 3
                 times = (links[here] >> 2 * direction & 3) + 1
                 times = 1 if times > 2 else times
-                links[here] = links[here] & ~(3 << 2 * direction) | times << 2 * direction
-                links[there] = links[there] & ~(3 << 2 * back) | times << 2 * back
+                links[here] = links[here] & (0xFF ^ 3 << 2 * direction) | times << 2 * direction
+                links[there] = links[there] & (0xFF ^ 3 << 2 * back) | times << 2 * back
 
 
 @kernel
