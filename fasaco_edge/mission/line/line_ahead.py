@@ -115,6 +115,10 @@ class LineAhead:
         self._see(pose)
         # A plan's cells are read-only; for those kernels would be compiled again, in the loop.
         walk = walk.copy()
+        # A line ends before a cell that is off the lattice, whatever published it.
+        is_off = np.isnan(self._floor.stands.stands_of(walk)[:, 0])
+        if is_off.any():
+            walk = walk[: int(np.argmax(is_off))]
         ahead, line = self._walk[self.cell :], self.line.renumbered(-self.cell)
         is_beginning = is_cut and common_beginning(walk, ahead) == len(walk)
         if len(walk) < len(ahead) > 1 and len(line) and is_beginning:
