@@ -87,7 +87,7 @@ class Sharing:
             plan = walks.schedule
             proposals = min(plan.per_cell * self.cells, plan.most) << generation // DOUBLED
             attempts = []
-            for attempt in range(generation * plan.attempts, (generation + 1) * plan.attempts):
+            for attempt in walks.attempts(generation):
                 tours = first.find(attempt, pool)
                 yield tours
                 walks.load(tours)

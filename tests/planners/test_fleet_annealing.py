@@ -1,0 +1,28 @@
+"""Walks of a fleet that are annealed together: how many first tours a ground gets."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from fasaco_edge.grid.lattice import CoverageLattice
+from fasaco_edge.planners.cost import STEPS_ALONE, CoverageCost
+from fasaco_edge.planners.fleet.annealing import AT_FIRST, FleetWalks
+
+
+def walks(rows, cost=STEPS_ALONE):
+    free = np.ones((rows, 100), np.bool_)
+    return FleetWalks(CoverageLattice.from_free(free), free, [0, 1], cost)
+
+
+@pytest.mark.parametrize(("rows", "first"), [(10, 4), (40, 3), (AT_FIRST // 100 + 1, 1)])
+def test_a_large_ground_has_fewer_attempts_at_first(rows, first):
+    """A second of four short attempts on 12,000 cells left no time to anneal one for long."""
+    fleet = walks(rows)
+    assert fleet.attempts(0) == range(first)
+    assert [fleet.attempts(generation) for generation in (1, 2)] == [range(4, 8), range(8, 12)]
+
+
+def test_one_attempt_where_turns_have_a_price():
+    fleet = walks(10, CoverageCost(1.0, 1.5))
+    assert [fleet.attempts(generation) for generation in (0, 1)] == [range(1), range(1, 2)]
