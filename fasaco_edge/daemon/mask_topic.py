@@ -3,6 +3,9 @@
 It takes the place of the file ``mission.keep_out_mask`` in the configuration in force, as a reload
 does: recordings and replays know it from there. Reading one takes as much memory as a map; maps
 wait meanwhile.
+
+A mask belongs to the frame it came in. The newest one of another frame than the map's is kept: it
+holds if the map's frame becomes that one. Until one of the map's frame has come, the mission waits.
 """
 
 from __future__ import annotations
@@ -24,7 +27,7 @@ from fasaco_edge.wire.messages.maps import decode_occupancy_grid
 
 
 class MaskTopic:
-    """Subscribes to the mask, and puts the newest one into a configuration.
+    """Subscribes to the mask, and puts the one that belongs to the map into a configuration.
 
     Args:
         bus: the session.
@@ -33,8 +36,7 @@ class MaskTopic:
         came: called for each mask, on a Zenoh thread.
 
     Attributes:
-        map_frame: the frame of the map, which must be the mask's; until it is known, "", a mask
-            waits.
+        map_frame: the frame of the map; until it is known, "", a mask waits.
     """
 
     def __init__(
@@ -46,51 +48,61 @@ class MaskTopic:
         self.map_frame = ""
         self._lock = threading.Lock()
         self._newest: Sample | None = None
-        self._inline = ""
+        # The newest mask of each frame, inline, the newest last; and the one in force.
+        self._masks: dict[str, str] = {}
+        self._in_force = ""
         bus.listen(config.keys(), topics.KEEP_OUT_MASK, self._take)
         if ros is not None:
             ros.subscribe_mask(self._take)
 
     @property
     def has_come(self) -> bool:
-        """Whether there is a mask that can be put into a configuration."""
-        return self._newest is not None and bool(self.map_frame)
+        """Whether there is a mask to read, or the map's frame has become that of another one."""
+        kept = self._masks.get(self.map_frame, self._in_force)
+        return bool(self.map_frame) and (self._newest is not None or kept != self._in_force)
 
-    def added_to(self, config: DaemonConfig) -> DaemonConfig:
-        """Return a configuration with the newest mask.
+    def added_to(self, config: DaemonConfig) -> tuple[DaemonConfig, list[BadConfiguration]]:
+        """Return a configuration with the newest mask of the map's frame, or else the last one.
 
-        Raises:
-            BadConfiguration: that is malformed, or too fine; the one before stays.
+        Also why the newest one is not that: it is malformed, too fine, or of another frame.
         """
+        frame = self.map_frame
         with self._lock:
-            newest = self._newest if self.map_frame else None
+            newest = self._newest if frame else None
             if newest is not None:
                 self._newest = None
+        faults: list[BadConfiguration] = []
         if newest is not None:
-            self._inline = self._read(newest)
-        if not self._inline or not config.mission.keep_out_topic:
-            return config
-        mission = structs.replace(config.mission, keep_out_mask=self._inline)
-        return structs.replace(config, mission=mission)
+            try:
+                self._read(newest)
+            except FasacoError as error:
+                is_named = isinstance(error, BadConfiguration)
+                text = str(error) if is_named else f"keep_out_mask: {error}"
+                faults.append(BadConfiguration(text, hint=error.hint))
+            else:
+                came_in = next(reversed(self._masks))
+                if came_in != frame:
+                    text = f"keep_out_mask: in frame {came_in!r}, the map in {frame!r}"
+                    hint = "publish map and mask in the same frame"
+                    faults.append(BadConfiguration(text, hint=hint))
+        self._in_force = self._masks.get(frame, self._in_force)
+        # Whether the mask comes as a message changes with a restart alone, whatever is written.
+        mission = structs.replace(config.mission, keep_out_mask=self._in_force)
+        return structs.replace(config, mission=mission), faults
 
-    def _read(self, sample: Sample) -> str:
+    def _read(self, sample: Sample) -> None:
         most = most_bytes(topics.MAP.name, self._max_pixels)
         if sample.size > most:
             raise BadConfiguration(
                 f"keep_out_mask: a message of {sample.size} bytes; it may have at most {most}"
             )
-        try:
-            grid = decode_occupancy_grid(sample.payload, self._max_pixels)
-            if grid.frame != self.map_frame:
-                raise BadConfiguration(
-                    f"keep_out_mask: in frame {grid.frame!r}, the map in {self.map_frame!r}",
-                    hint="publish map and mask in the same frame",
-                )
-            return inline_grid(grid, self._occupied_at_least)
-        except FasacoError as error:
-            if isinstance(error, BadConfiguration):
-                raise
-            raise BadConfiguration(f"keep_out_mask: {error}", hint=error.hint) from None
+        grid = decode_occupancy_grid(sample.payload, self._max_pixels)
+        mask = inline_grid(grid, self._occupied_at_least)
+        self._masks.pop(grid.frame, None)
+        for other in list(self._masks)[:-1]:
+            if other != self.map_frame:
+                del self._masks[other]
+        self._masks[grid.frame] = mask
 
     def _take(self, sample: Sample) -> None:
         with self._lock:

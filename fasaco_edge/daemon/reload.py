@@ -1,4 +1,8 @@
-"""Reload of the configuration on SIGHUP; an invalid one is refused as a whole."""
+"""Reload of the configuration on SIGHUP; an invalid one is refused as a whole.
+
+A file with a mask that cannot be read is invalid. A mask that comes as a message is no part of the
+file: where it cannot be read, the last one stays in force, and the file is taken.
+"""
 
 from __future__ import annotations
 
@@ -71,7 +75,7 @@ class Reload:
         self.mask: MaskTopic | None = None
         self._read = read
         self._manager = manager
-        self._reading: Future[DaemonConfig] | None = None
+        self._reading: Future[tuple[DaemonConfig, list[BadConfiguration]]] | None = None
 
     @property
     def is_reading(self) -> bool:
@@ -101,28 +105,30 @@ class Reload:
         def run() -> None:
             try:
                 config = read()
-                reading.set_result(self.mask.added_to(config) if self.mask else config)
+                reading.set_result(self.mask.added_to(config) if self.mask else (config, []))
             except BaseException as error:
                 reading.set_exception(error)
             ended()
 
         threading.Thread(target=run, name="reload", daemon=True).start()
 
-    def take(self, running: DaemonConfig) -> DaemonConfig:
+    def take(self, running: DaemonConfig) -> tuple[DaemonConfig, list[BadConfiguration]]:
         """Return the running configuration with the changeable values of the file.
 
-        Raises:
-            BadConfiguration: the file is invalid.
+        Also why the file, of which nothing is taken then, or the newest mask is refused.
         """
         assert self._reading is not None
         reading, self._reading = self._reading, None
         try:
-            written = reading.result()
+            written, faults = reading.result()
         except BadConfiguration as error:
             text = "configuration refused, the previous one stays in force: %s (%s)"
             extra = {"event": "reload_refused", "code": error.code}
             LOG.error(text, error, error.hint, extra=extra)
-            raise
+            return running, [error]
+        for fault in faults:
+            extra = {"event": "mask_refused", "code": fault.code}
+            LOG.error("keep-out mask refused: %s (%s)", fault, fault.hint, extra=extra)
         changed = changed_keys(running, written)
         for_restart = [key for key in changed if not is_changeable(key)]
         if for_restart:
@@ -130,7 +136,7 @@ class Reload:
             LOG.warning("%s: needs a restart", keys, extra={"event": "reload_needs_restart"})
         taken = ", ".join(key for key in changed if is_changeable(key))
         LOG.info("configuration read again: %s", taken or "no change", extra={"event": "reload"})
-        return with_changeable(running, written)
+        return with_changeable(running, written), faults
 
     def done(self) -> None:
         """Report that the new configuration is in force."""

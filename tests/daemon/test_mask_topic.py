@@ -2,15 +2,27 @@
 
 from __future__ import annotations
 
+import time
+from types import SimpleNamespace
+
+import msgspec
+import numpy as np
 import pytest
 
+from fasaco_edge.bus.arrival import Sample
+from fasaco_edge.config.config import DaemonConfig
+from fasaco_edge.daemon.mask_topic import MaskTopic
+from fasaco_edge.daemon.notify import ServiceManager
 from fasaco_edge.daemon.reload import Reload
+from fasaco_edge.errors import BadConfiguration
 from tests.daemon.test_mission import planned
+from tests.daemon.test_reload import taken_by
 from tests.daemon.test_ros2 import BRIDGE, RMW, ros2
-from tests.support.outsider import Outsider
+from tests.support.outsider import TIMEOUT_S, Outsider
 from tests.support.processes import daemon_process
 from tests.support.rooms import FREE, WALL, cells_of, fill, lanes, map_bytes, pose_bytes, room
 from tests.support.ros_robot import GRID, ros_robot
+from tests.wire import oracle
 
 ROOM = room(4.0, 3.0)
 BLANK = fill(ROOM, 0.0, 0.0, 4.0, 3.0, FREE)
@@ -28,6 +40,13 @@ def give(outsider):
     """Give map and pose, without waiting for a path."""
     outsider.put("map", map_bytes(ROOM))
     outsider.put("pose", pose_bytes(*lanes(1)[0]))
+
+
+def cells_in(frame, heard):
+    """Return the cells of a path in a frame; none of one in another."""
+    message = oracle.from_bytes("nav_msgs/msg/Path", heard.payload)
+    places = [(stamped.pose.position.x, stamped.pose.position.y) for stamped in message.poses]
+    return set(cells_of(np.array(places))) if message.header.frame_id == frame and places else set()
 
 
 def driven(heard):
@@ -91,23 +110,76 @@ def test_navs_mask_is_taken_however_early_it_was_published(naming, tmp_path):
         assert not cells & AROUND
 
 
+def test_a_mask_of_another_frame_is_told_and_holds_once_the_map_is_in_that(tmp_path):
+    """Published once, it would not come again; one of another map keeps out of other places."""
+    with (
+        daemon_process(tmp_path, mission=dict(MISSION)) as running,
+        Outsider(running.endpoint) as outsider,
+    ):
+        put_mask(outsider, BLANK)
+        give(outsider)
+        outsider.wait_status(lambda status: status["state"] == "covering")
+        put_mask(outsider, MASK, frame="odom")
+        wrong = "keep_out_mask: in frame 'odom', the map in 'map'"
+        outsider.wait_status(lambda status: wrong in (status["errors"]["last"] or ""))
+        assert outsider.ask_status()["state"] == "covering"
+        paths = outsider.listen("path", late=False)
+        outsider.put("map", map_bytes(ROOM, frame="odom"))
+        deadline = time.monotonic() + TIMEOUT_S
+        while not any(cells_in("odom", heard) for heard in paths.heard):
+            assert time.monotonic() < deadline, outsider.ask_status()["reason"]
+            outsider.put("pose", pose_bytes(*lanes(1)[0], frame="odom"))
+            time.sleep(0.1)
+        assert not any(cells_in("odom", heard) & AROUND for heard in paths.heard)
+
+
+class Mask:
+    """A mask that has come, and what is wrong with it."""
+
+    def __init__(self, *faults):
+        self.has_come = True
+        self.faults = list(faults)
+
+    def added_to(self, config):
+        self.has_come = False
+        return config, self.faults
+
+
 def test_a_mask_alone_does_not_read_the_file_again():
-    class Mask:
-        has_come = True
-
-        def added_to(self, config):
-            self.has_come = False
-            return config
-
-    from fasaco_edge.config.config import DaemonConfig
-    from fasaco_edge.daemon.notify import ServiceManager
-    from tests.daemon.test_reload import taken_by
-
     def read():
         raise AssertionError("the file may hold what nobody has put in force yet")
 
     reload = Reload(read, ServiceManager({}))
     reload.mask = Mask()
     assert reload.is_wanted
-    assert taken_by(reload) == DaemonConfig()
+    assert taken_by(reload) == (DaemonConfig(), [])
     assert not reload.is_wanted
+
+
+def test_a_mask_that_cannot_be_read_costs_a_written_configuration_nothing(caplog):
+    written = msgspec.convert({"robot": {"speed_m_s": 2.0}}, DaemonConfig)
+    fault = BadConfiguration("keep_out_mask: rubbish")
+    reload = Reload(lambda: written, ServiceManager({}))
+    reload.mask = Mask(fault)
+    reload.asked.set()
+    assert taken_by(reload) == (written, [fault])
+    assert "keep-out mask refused: keep_out_mask: rubbish" in caplog.text
+
+
+def test_what_is_written_does_not_take_the_mask_out_of_force():
+    """Whether one comes as a message changes with a restart alone."""
+    bus = SimpleNamespace(listen=lambda keys, topic, take: heard.append(take))
+    heard = []
+    config = msgspec.convert({"mission": MISSION}, DaemonConfig)
+    mask = MaskTopic(bus, config, None, lambda: None)
+    (take,) = heard
+    payload = map_bytes(MASK)
+    take(Sample("keep_out_mask", payload, GRID))
+    mask.map_frame = "map"
+    assert mask.has_come
+    in_force, faults = mask.added_to(config)
+    assert faults == []
+    assert in_force.mission.keep_out_mask
+    assert not mask.has_come
+    written = DaemonConfig()
+    assert mask.added_to(written)[0].mission.keep_out_mask == in_force.mission.keep_out_mask

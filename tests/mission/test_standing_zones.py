@@ -2,14 +2,16 @@
 
 import time
 import tracemalloc
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from PIL import Image
 
 from fasaco_edge.errors import BadConfiguration
-from fasaco_edge.mission.core.events import MapReceived
-from fasaco_edge.mission.orders.mask import inline_mask, mask_polygons
+from fasaco_edge.mission.core.events import MapReceived, State
+from fasaco_edge.mission.map.inputs import PATIENCE_S
+from fasaco_edge.mission.orders.mask import inline_grid, inline_mask, mask_polygons
 from fasaco_edge.mission.orders.order import StandingZone, order_document, read_order
 from fasaco_edge.mission.orders.order_state import OrderState
 from fasaco_edge.mission.orders.zones import cells_inside, with_kept_out
@@ -125,6 +127,31 @@ def test_a_mission_with_a_mask_drives_as_with_the_polygon(tmp_path):
         drive.finish()
         walks.append(drive.driven)
     assert walks[0] == walks[1]
+
+
+@pytest.mark.parametrize("lattice_deg", [0.0, 30.0])
+def test_a_mask_of_another_frame_than_the_maps_stops_the_robot(lattice_deg):
+    """In coordinates of another map it would keep out of other places, and not of its own."""
+    mask = inline_grid(building("##", at=(2, 2)), 65)
+    config = replace(with_policy(CONFIG, keep_out_mask=mask), lattice_deg=lattice_deg)
+    drive = Drive((0, 0), MapReceived(building(*ROOM)), pose_at(0, 0), config=config)
+    drive.plan()
+    assert drive.mission.state is State.COVERING
+    drive.tell(MapReceived(building(*ROOM, frame="odom")))
+    for _ in range(int(PATIENCE_S) + 2):
+        decision = drive.tell(pose_at(0, 0, frame="odom"), after=1.0)
+        assert drive.mission.grid.frame == "map" or drive.walk == []
+    assert (drive.mission.grid.frame, decision.plan) == ("odom", None)
+    why = "the keep-out mask is in frame 'map', the map in 'odom': waits for one in the map's"
+    assert (drive.mission.state, drive.mission.reason) == (State.BLOCKED, why)
+    drive.command("home")
+    assert (drive.mission.state, drive.walk) == (State.BLOCKED, [])
+    # The frame of the mask again.
+    drive.command("start")
+    for _ in range(int(PATIENCE_S) + 2):
+        drive.tell(MapReceived(building(*ROOM)), pose_at(0, 0), after=1.0)
+    drive.plan()
+    assert drive.mission.state is State.COVERING
 
 
 def test_masks_that_are_none_are_refused(tmp_path):

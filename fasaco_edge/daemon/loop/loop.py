@@ -30,7 +30,7 @@ from fasaco_edge.daemon.loop.turn_log import TurnLog, TurnNote
 from fasaco_edge.daemon.notify import Watchdog
 from fasaco_edge.daemon.reload import Reload
 from fasaco_edge.daemon.supervisor import RecorderSupervisor
-from fasaco_edge.errors import BadConfiguration, FasacoError, MissionBroke, PatchWithoutBase
+from fasaco_edge.errors import FasacoError, MissionBroke, PatchWithoutBase
 from fasaco_edge.mission.core.events import (
     Answer,
     CommandReceived,
@@ -180,16 +180,12 @@ class Loop:
         """Apply the configuration that was read; restart the mission if it has changed."""
         reload, watchdog = self._host.reload, self._host.watchdog
         self._bus.mailbox.let_go()
-        try:
-            config = reload.take(self.config)
-        except BadConfiguration as error:
-            self._status.faults.count([error], is_logged=True)
-            watchdog.remark = f"configuration refused: {error}"
-        else:
-            watchdog.remark = ""
-            if config != self.config:
-                self._restart("the configuration has changed", config)
-                batch.plans.clear()  # they are the previous mission's
+        config, faults = reload.take(self.config)
+        self._status.faults.count(faults, is_logged=True)
+        watchdog.remark = f"configuration refused: {faults[0]}" if faults else ""
+        if config != self.config:
+            self._restart("the configuration has changed", config)
+            batch.plans.clear()  # they are the previous mission's
         reload.done()
 
     def _restart(

@@ -47,7 +47,11 @@ DRIVING = (State.PLANNING, State.COVERING, State.RETURNING)
 
 @dataclass(slots=True, eq=False)
 class Executive:
-    """Decides from map, ledger, monitor, orders and route; owns the mission's state."""
+    """Decides from map, ledger, monitor, orders and route; owns the mission's state.
+
+    Attributes:
+        mask_frame: the frame of the map that the keep-out mask belongs to; "" for any.
+    """
 
     map: MapState
     ledger: MissionLedger
@@ -60,6 +64,7 @@ class Executive:
     giving_way: GivingWay
     dock: InDock
     policy: MissionPolicy
+    mask_frame: str
     _state: State = field(default=State.WAITING_FOR_MAP, init=False)
     _reason: str = field(default="no map yet", init=False)
     _now: float = field(default=0.0, init=False)
@@ -136,7 +141,8 @@ class Executive:
         """
         order, way = self.orders.order_state, self.giving_way
         is_going = order.order is not None and not order.paused and not order.errand
-        if not (is_going and self.fleet.members) or self.monitor.trouble(self._now):
+        may_drive = not self.monitor.trouble(self._now) and not self._why_no_mask()
+        if not (is_going and self.fleet.members and may_drive):
             way.end()
             return None
         # Others may have swept meanwhile what this robot waits to drive to.
@@ -166,7 +172,21 @@ class Executive:
             return State.WAITING_FOR_MAP, self.map.why_no_map()
         if self.map.pose is None:
             return State.WAITING_FOR_POSE, self.map.why_no_pose()
-        return None
+        no_mask = self._why_no_mask()
+        return (State.BLOCKED, no_mask) if no_mask else None
+
+    def _why_no_mask(self) -> str:
+        """Return why there is no keep-out mask for this map; "" where there is one, or none is due.
+
+        In another frame it would keep out of other places.
+        """
+        grid = self.map.grid
+        if grid is None or self.mask_frame in ("", grid.frame):
+            return ""
+        return (
+            f"the keep-out mask is in frame {self.mask_frame!r}, the map in {grid.frame!r}: "
+            "waits for one in the map's"
+        )
 
     def _rest(self, state: State, reason: str) -> Decision:
         """Rest in a state; a driving robot is stopped."""

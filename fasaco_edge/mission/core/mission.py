@@ -38,6 +38,7 @@ from fasaco_edge.mission.line.layer import FloorToSweep, LineLayer
 from fasaco_edge.mission.map.inputs import InputMonitor
 from fasaco_edge.mission.map.map_state import MapState
 from fasaco_edge.mission.map.reachable_area import ReachableArea
+from fasaco_edge.mission.orders.mask import mask_frame
 from fasaco_edge.mission.orders.order_state import OrderState
 from fasaco_edge.mission.orders.sequencer import Sequencer
 from fasaco_edge.planners.living_trail import LivingTrail
@@ -97,7 +98,8 @@ class Mission:
         self.giving_way = GivingWay(config, self._map, self.route, self.fleet)
         decided_by = self._trail, self.fleet, self.charging, self.giving_way
         in_dock = InDock(self._map, self._gauge, config.policy)
-        self._executive = Executive(*owners, *decided_by, in_dock, config.policy)
+        mask = mask_frame(self._config.policy.keep_out_mask)
+        self._executive = Executive(*owners, *decided_by, in_dock, config.policy, mask)
 
     def restore_ledger(self, before: LedgerSnapshot) -> None:
         """Continue a ledger from before a restart, unless the map contradicts it.

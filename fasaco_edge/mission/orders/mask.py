@@ -30,9 +30,11 @@ MOST_COLS = 100_000
 INLINE = "mask:"
 
 
-class _Inline(msgspec.Struct, frozen=True):
+class _Inline(msgspec.Struct, frozen=True, omit_defaults=True):
     geometry: tuple[int, int, float, float, float, float]
     deflated: str
+    # Of the map that it belongs to; "" for any, as a file names none.
+    frame: str = ""
 
 
 def inline_mask(file: Path, occupied_at_least: int, most_bytes: int | None = None) -> str:
@@ -68,10 +70,16 @@ def inline_grid(grid: OccupancyGrid, occupied_at_least: int) -> str:
         _check_width(place.cols)
     except ValueError as error:
         raise BadConfiguration(f"keep_out_mask: {error}") from error
-    return _inline(place, np.packbits(grid.cells >= occupied_at_least), "keep_out_mask")
+    bits = np.packbits(grid.cells >= occupied_at_least)
+    return _inline(place, bits, "keep_out_mask", grid.frame)
 
 
-def _inline(place: GridGeometry, bits: NDArray[np.uint8], what: str) -> str:
+def mask_frame(inline: str) -> str:
+    """Return the frame of the map that a mask belongs to; "" for any, or without a mask."""
+    return msgspec.json.decode(inline.removeprefix(INLINE), type=_Inline).frame if inline else ""
+
+
+def _inline(place: GridGeometry, bits: NDArray[np.uint8], what: str, frame: str = "") -> str:
     shape = (place.rows, place.cols)
     if len(_rectangles(bits, *shape)) > MOST_RECTANGLES:
         raise BadConfiguration(
@@ -82,6 +90,7 @@ def _inline(place: GridGeometry, bits: NDArray[np.uint8], what: str) -> str:
     document = _Inline(
         (*shape, place.resolution, place.origin.x, place.origin.y, place.origin.yaw),
         deflated,
+        frame,
     )
     return INLINE + msgspec.json.encode(document).decode()
 
