@@ -28,6 +28,8 @@ limited = pytest.mark.skipif(bool(why_not()), reason=why_not())
         (Flood("maps", 2000, 0.0003, 5.0), "refused", "must be 0.0012 m or larger"),
         (Flood("maps", 2000, 0.05, 5.0), "refused", "exceeds 60000 cells"),
         (Flood("grey", 900, 0.02, 10.0), "taken", ""),
+        (Flood("message", 1900, 0.02, 10.0), "taken", ""),
+        (Flood("message", 2700, 0.02, 10.0), "refused", "a message of 7290104 bytes"),
         (Flood("grey", 2700, 0.02, 10.0), "refused", "take 15.2 MB to read, more than the 14.0"),
         (Flood("colour", 4000, 0.02, 10.0), "refused", "take 71.7 MB to read, more than the 14.0"),
     ],
@@ -49,8 +51,9 @@ def test_a_daemon_takes_no_more_than_it_says(tmp_path, flood, outcome, error):
         Flood("updates", 5000, 0.03, 20.0),
         Flood("grey", 5900, 0.03, 20.0),
         Flood("colour", 8000, 0.03, 20.0),
+        Flood("message", 2300, 0.03, 20.0),
     ],
-    ids=["twenty", "fine", "updates", "grey", "colour"],
+    ids=["twenty", "fine", "updates", "grey", "colour", "message"],
 )
 def test_a_daemon_lives_under_its_units_limit(tmp_path, flood):
     (row,) = run_floods([flood], tmp_path, 2.0, unit_limit())
