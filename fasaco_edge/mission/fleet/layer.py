@@ -96,9 +96,19 @@ class FleetLayer:
         part = cells & self._is_own(self._division, area)
         return part if (part & area.reachable).any() else cells
 
-    def within_part(self, cells: NDArray[np.bool_], area: ReachableArea) -> NDArray[np.bool_]:
-        """Return which cells are in this robot's part; all of them without a division."""
-        return cells if self._division is None else cells & self._is_own(self._division, area)
+    def mine_to_sweep(
+        self, cells: NDArray[np.bool_], unvisited: NDArray[np.bool_], area: ReachableArea
+    ) -> NDArray[np.bool_]:
+        """Return on which cells the floor is this robot's to sweep, visited or not.
+
+        Those of its part; all of them if none of its part is unvisited, as for ``mine``: wherever
+        its path leads to a cell, the floor there is its own, too.
+        """
+        if self._division is None:
+            return cells
+        own = self._is_own(self._division, area)
+        has_work = (self._untried(unvisited, area) & own & area.reachable).any()
+        return cells & own if has_work else cells
 
     def give_up(self, cells: NDArray[np.bool_], area: ReachableArea) -> None:
         """Leave cells that this robot tried in vain to the others."""

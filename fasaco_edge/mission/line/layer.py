@@ -174,17 +174,23 @@ class LineLayer:
     def _credit(self, passed: NDArray[np.int32]) -> None:
         """Count passed cells as covered if hardly any of their floor is left.
 
-        A polished line need not pass the stand of a cell.
+        A polished line need not pass the stand of a cell. Where no floor is asked for, none seems
+        left: such cells, of another robot's part for instance, need a visit.
         """
         ahead, floor, covered = self._ahead, self._map.floor, self._ledger.current
         assert ahead is not None
         assert floor is not None
         cells = dict.fromkeys((row, col) for row, col in passed.tolist())
         unseen = [cell for cell in cells if not covered.has_visited(cell)]
-        if unseen:
-            self._take_floor()
-        for cell in unseen:
-            if ahead.tally.missed_m2(floor.box_of(cell)) < LEAST_LEFT_M2:
+        if not unseen:
+            return
+        self._take_floor()
+        if self._asked is None:
+            return
+        window, asked, _ = self._asked
+        is_asked = window.values_at(asked, np.array(unseen, np.int32), 0).tolist()
+        for cell, counts in zip(unseen, is_asked, strict=True):
+            if counts and ahead.tally.missed_m2(floor.box_of(cell)) < LEAST_LEFT_M2:
                 self._ledger.credit(cell)
 
     def _explain(self) -> None:

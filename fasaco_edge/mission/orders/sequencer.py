@@ -226,8 +226,10 @@ class Sequencer:
         return inside & ~shared.swept(window) if shared.version else inside
 
     def asked_of_me(self, area: ReachableArea) -> NDArray[np.bool_]:
-        """Return which cells of an area this robot has to cover, covered or not: its part only."""
-        return self._fleet.within_part(self.asked_for(area.lattice.window), area)
+        """Return on which cells of an area this robot has to sweep the floor, covered or not."""
+        window = area.lattice.window
+        asked = self.asked_for(window)
+        return self._fleet.mine_to_sweep(asked, self._unswept(window), area)
 
     def note_path_end(self) -> bool:
         """Note the end of a path; return whether the cells it left over must wait for a retry."""

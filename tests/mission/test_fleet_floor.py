@@ -1,0 +1,48 @@
+"""The floor that a robot of a fleet sweeps: wherever its path leads to a cell."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from fasaco_edge.bench.floor import judge_floor
+from fasaco_edge.mission.core.events import MapReceived, MemberHeard, Part, State
+from fasaco_edge.mission.core.mission import Mission
+from tests.grid.test_floor import room
+from tests.mission.test_line import CONFIG, RADIUS_M, ROBOT, Robot
+
+
+def divided_by(member, number):
+    """A robot that stands in the corner, and gives all that is left to itself."""
+    parts = (Part("r1", (5, 9), 1e6, 1.0), Part(member, (5, 10), 0.0, 1.0))
+    return MemberHeard(
+        robot=member,
+        frame="map",
+        state="covering",
+        x=0.3,
+        y=0.3,
+        epoch=1,
+        division=number,
+        tiles=(),
+        ground=(),
+        by=member,
+        parts=parts,
+        radius_m=RADIUS_M,
+        ahead=(),
+        waits_for="",
+    )
+
+
+def test_a_robot_without_a_part_sweeps_the_floor_that_it_drives_to_for_another():
+    grid = room(4.5, 3.5)
+    robot = Robot(Mission(replace(CONFIG, robot="r1")))
+    robot.mission.shared.begin(1)
+    robot.tell(MapReceived(grid))
+    for number in range(1, 2000):
+        if robot.mission.state is State.DONE:
+            break
+        robot.tell(divided_by("r2", number))
+        robot.drive(is_checked=False)
+    figures = judge_floor(grid, np.array([*robot.trail, robot.at]), ROBOT).figures
+    assert figures.swept_share > 0.9
