@@ -206,9 +206,12 @@ def run_campaign(
     while (total := left.total()) and campaign.counted["missions"] < 4 * sum(counts.values()):
         place = folder / f"mission{campaign.counted['missions']}"
         place.mkdir()
+        known = len(campaign.violations)
         with house(place) as there:
             _one_mission(campaign, there, rng, left)
         campaign.counted["missions"] += 1
+        for violation in campaign.violations[known:]:
+            say(violation)
         say(f"{total} events left; {len(campaign.violations)} violations")
     return campaign
 
