@@ -18,7 +18,7 @@ from fasaco_edge.mission.core.events import (
     PoseReceived,
     State,
 )
-from fasaco_edge.mission.core.executive import PATIENCE_S
+from fasaco_edge.mission.core.standing import PATIENCE_S
 from fasaco_edge.planners.path import CoveragePath
 from tests.mission.world import (
     Drive,

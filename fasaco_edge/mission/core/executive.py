@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -16,6 +15,7 @@ from fasaco_edge.mission.core.events import Decision, PathUpdate, State
 from fasaco_edge.mission.core.giving_way import GivingWay
 from fasaco_edge.mission.core.in_dock import InDock
 from fasaco_edge.mission.core.route import Route
+from fasaco_edge.mission.core.standing import PATIENCE_S, Standing
 from fasaco_edge.mission.core.trail_layer import TrailLayer
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
 from fasaco_edge.mission.fleet.layer import FleetLayer
@@ -25,17 +25,6 @@ from fasaco_edge.mission.orders.order import Errand
 from fasaco_edge.mission.orders.order_state import Stage
 from fasaco_edge.mission.orders.sequencer import Sequencer
 
-# Minimum time between new plans for a robot that left its path or stands still at its end [s]: a
-# flickering pose must not keep the planner busy.
-PATIENCE_S = 1.0
-# A robot that stands for so long on its path gets the path again [s]: the follower may have lost
-# it, or stopped for an obstacle that is gone. Not sooner: it may be waiting for somebody to pass,
-# or be driving out of a corner, which another path would end. By the robot's clock, as a
-# simulation may run at twenty times the real speed.
-STANDING_S, STANDING_M = 30.0, 0.1
-# A robot that stands beside its path gets a new one after this time [s]: an obstacle may separate
-# it from the path.
-BESIDE_S = 2.0
 # An errand ends once the robot was in the last cell for this long [s]: its path leads to the centre
 # and ends with a turn.
 ARRIVAL_S = 2.0
@@ -68,13 +57,10 @@ class Executive:
     _state: State = field(default=State.WAITING_FOR_MAP, init=False)
     _reason: str = field(default="no map yet", init=False)
     _now: float = field(default=0.0, init=False)
-    # The robot's cell, and when it entered it.
-    _cell: Cell | None = field(default=None, init=False)
-    _entered_at: float = field(default=0.0, init=False)
-    # The robot's position, to STANDING_M, and since when it has had its path there: by our clock
-    # [s], and by the robot's [ns].
-    _place: tuple[float, float] = field(default=(math.inf, math.inf), init=False)
-    _stands_since: tuple[float, int] = field(default=(0.0, 0), init=False)
+    _standing: Standing = field(init=False)
+
+    def __post_init__(self) -> None:
+        self._standing = Standing(self.map, self.route)
 
     def status(self) -> tuple[State, str]:
         """Return the reported state and its reason."""
@@ -99,8 +85,7 @@ class Executive:
         if cell is None or self.map.area is None:
             self.map.forget_area()
             return self._rest(State.BLOCKED, self.map.why_misplaced())
-        if cell != self._cell:
-            self._cell, self._entered_at = cell, now
+        self._standing.look(cell, now)
         if not len(route.path.cells):
             self.monitor.clear_doubt()  # without a path the robot cannot be off it
         update = route.truncate(now)
@@ -120,7 +105,7 @@ class Executive:
             if why := route.why_not_yet(now):
                 return self._rest(State.BLOCKED, why)
             # Wait a moment after the robot was stopped.
-            is_too_soon = self._state is State.BLOCKED and not self._has_waited()
+            is_too_soon = self._state is State.BLOCKED and not self._standing.has_waited
             return Decision(path=update) if is_too_soon else self._request(cell, update)
         if orders.order_state.stage is Stage.RETURNING and cell == orders.goal():
             orders.advance(now)
@@ -129,7 +114,7 @@ class Executive:
         ):
             return self._settle(update)
         self._report_driving()
-        if self._stands_on_path() and update is None:
+        if self._standing.is_on_path and update is None:
             update = route.publish(route.path.ahead, "robot stands", now)
         is_free = self._state is State.COVERING and route.pending is None and not route.wanted
         return Decision(path=update, plan=route.request_improvement(now) if is_free else None)
@@ -210,13 +195,10 @@ class Executive:
         elif self.orders.order_state.stage is not Stage.RETURNING:
             self._state, self._reason = State.COVERING, f"path {route.revision}"
 
-    def _has_waited(self) -> bool:
-        return self._now - self.route.published_at >= PATIENCE_S
-
     def _check_deviation(self, cell: Cell) -> None:
         """Want a new plan for a robot that is off its path or at its end."""
         route, monitor, path = self.route, self.monitor, self.route.path
-        waited = self._has_waited()
+        waited = self._standing.has_waited
         if route.pending is not None or route.wanted or self._state not in DRIVING:
             return
         if monitor.doubt:
@@ -229,47 +211,13 @@ class Executive:
         last = tuple(path.cells[-1].tolist()) if len(path.cells) else None
         if (
             path.finished and (waited or (last and self.ledger.current.has_visited(last)))
-        ) or self._stands_at(last):
+        ) or self._standing.is_at(last):
             if self.orders.note_path_end():
                 self.orders.advance(self._now)
             else:
                 route.want("cells left over")
-        elif waited and (path.is_far(cell) or self._stands_beside(cell)):
+        elif waited and (path.is_far(cell) or self._standing.is_beside_path):
             route.want("robot left the path")
-
-    def _stands_beside(self, cell: Cell) -> bool:
-        """Tell whether the robot stands in another cell than its index on the path."""
-        ahead = self.route.path.ahead
-        return len(ahead) > 1 and cell != tuple(ahead[0].tolist()) and self._stood_s() >= BESIDE_S
-
-    def _stands_at(self, last: Cell | None) -> bool:
-        """Tell whether the robot stands in the last cell of a path that it did not complete.
-
-        It missed a cell, so its index on the path is before the last.
-        """
-        if self._cell != last or last == tuple(self.route.path.ahead[0].tolist()):
-            return False
-        return self._has_waited() and self._now - self._entered_at >= PATIENCE_S
-
-    def _stands_on_path(self) -> bool:
-        """Tell whether the robot has stood in one place for long, with a path to drive."""
-        stood_s = self._stood_s()
-        return len(self.route.path.ahead) > 1 and stood_s >= STANDING_S
-
-    def _stood_s(self) -> float:
-        """Return how long the robot has stood in one place with its present path [s].
-
-        By our clock or the robot's, whichever says longer: stamps may stand still.
-        """
-        assert self.map.pose is not None
-        stamped, published_at = self.map.pose, self.route.published_at
-        here = stamped.pose.x, stamped.pose.y
-        if math.dist(here, self._place) > STANDING_M:
-            self._place, self._stands_since = here, (self._now, stamped.stamp_ns)
-        elif published_at > self._stands_since[0]:
-            self._stands_since = published_at, stamped.stamp_ns
-        since, since_ns = self._stands_since
-        return max(self._now - since, (stamped.stamp_ns - since_ns) * 1e-9)
 
     def _request(self, cell: Cell, update: PathUpdate | None) -> Decision:
         """Request the wanted plan; if nothing is left to cover, continue with the order."""
@@ -332,12 +280,14 @@ class Executive:
         is_new = route.set_aside()
         route.drop()
         goal = orders.goal(errand)
-        if cell == goal and not is_new and self._now - self._entered_at >= ARRIVAL_S:
+        if cell == goal and not is_new and self._standing.in_cell_s >= ARRIVAL_S:
             if errand == "charge":
                 return self._rest(State.CHARGING, self.charging.why(self._now))
             return self._arrive()
         is_off = path.finished or path.is_far(cell) or bool(self.monitor.doubt)
-        is_lost = cell != goal and ((is_off and self._has_waited()) or self._stands_on_path())
+        is_lost = cell != goal and (
+            (is_off and self._standing.has_waited) or self._standing.is_on_path
+        )
         to = PLACES[errand]
         if is_new or is_lost or not len(path.cells) or tuple(path.cells[-1].tolist()) != goal:
             self.monitor.clear_doubt()

@@ -1,0 +1,88 @@
+"""Standing: since when the robot is in its cell, in one place, and has its path. Times are [s]."""
+
+from __future__ import annotations
+
+import math
+
+from fasaco_edge.grid.lattice import Cell
+from fasaco_edge.mission.core.route import Route
+from fasaco_edge.mission.map.map_state import MapState
+
+# Minimum time between new plans for a robot that left its path or stands still at its end: a
+# flickering pose must not keep the planner busy.
+PATIENCE_S = 1.0
+# A robot that stands for so long on its path gets the path again: the follower may have lost it, or
+# stopped for an obstacle that is gone. Not sooner: it may be waiting for somebody to pass, or be
+# driving out of a corner, which another path would end. By the robot's clock, as a simulation may
+# run at twenty times the real speed.
+STANDING_S, STANDING_M = 30.0, 0.1
+# A robot that stands beside its path gets a new one after this time: an obstacle may separate it
+# from the path.
+BESIDE_S = 2.0
+
+
+class Standing:
+    """Measures how long the robot stands; to be told its cell in each step."""
+
+    def __init__(self, map_state: MapState, route: Route) -> None:
+        self._map, self._route = map_state, route
+        self._now = 0.0
+        self._cell: Cell | None = None
+        self._entered_at = 0.0
+        # The robot's position, to STANDING_M, and since when it has had its path there: by our
+        # clock, and by the robot's [ns].
+        self._place = math.inf, math.inf
+        self._since = 0.0, 0
+
+    def look(self, cell: Cell, now: float) -> None:
+        """Note the robot's cell."""
+        self._now = now
+        if cell != self._cell:
+            self._cell, self._entered_at = cell, now
+
+    @property
+    def in_cell_s(self) -> float:
+        """How long the robot has been in its cell."""
+        return self._now - self._entered_at
+
+    @property
+    def has_waited(self) -> bool:
+        """Whether the robot has had its path for a moment."""
+        return self._now - self._route.published_at >= PATIENCE_S
+
+    def is_at(self, last: Cell | None) -> bool:
+        """Tell whether the robot stands in the last cell of a path that it did not complete.
+
+        It missed a cell, so its index on the path is before the last.
+        """
+        if self._cell != last or last == tuple(self._route.path.ahead[0].tolist()):
+            return False
+        return self.has_waited and self.in_cell_s >= PATIENCE_S
+
+    @property
+    def is_beside_path(self) -> bool:
+        """Whether the robot stands in another cell than its index on the path."""
+        ahead = self._route.path.ahead
+        is_beside = len(ahead) > 1 and self._cell != tuple(ahead[0].tolist())
+        return is_beside and self._in_place_s() >= BESIDE_S
+
+    @property
+    def is_on_path(self) -> bool:
+        """Whether the robot has stood in one place for long, with a path to drive."""
+        stood_s = self._in_place_s()
+        return len(self._route.path.ahead) > 1 and stood_s >= STANDING_S
+
+    def _in_place_s(self) -> float:
+        """Return how long the robot has stood in one place with its present path.
+
+        By our clock or the robot's, whichever says longer: stamps may stand still.
+        """
+        assert self._map.pose is not None
+        stamped, published_at = self._map.pose, self._route.published_at
+        here = stamped.pose.x, stamped.pose.y
+        if math.dist(here, self._place) > STANDING_M:
+            self._place, self._since = here, (self._now, stamped.stamp_ns)
+        elif published_at > self._since[0]:
+            self._since = published_at, stamped.stamp_ns
+        since, since_ns = self._since
+        return max(self._now - since, (stamped.stamp_ns - since_ns) * 1e-9)
