@@ -116,7 +116,7 @@ def kernels(context: CheckContext) -> Finding:
 
 def _own_kernels(context: CheckContext, folder: Path, user: int | None) -> Finding:
     command = _warmup(context)
-    later = "the first plan waits for them, up to a minute"
+    later = "the first plan waits for them, some minutes"
     try:
         owner = folder.stat().st_uid
     except FileNotFoundError:
