@@ -1,9 +1,10 @@
 """Coverage lines driven by a look-alike of Nav2: aborts, delays, restarts, lost replies.
 
 ``python -m tests.campaigns.nav2_goals [--missions 50] [--length 40] [--speed 1] [--seed 0]
-[--faults all]`` prints a row for each mission and what became of all. A mission is part of a line
-over a bundled map, so many metres long; daemon, path and status are stood in for, the follower and
-the look-alike are processes.
+[--faults all] [--at-once 4]`` prints a row for each mission and what became of all. A mission is
+part of a line over a bundled map, so many metres long; daemon, path and status are stood in for,
+the follower and the look-alike are processes that hardly work: several missions at once disturb
+each other little.
 
 Standing is forced where nobody who sees the robot could have avoided it: a goal that took longer to
 come than the robot took from where the goal could first hold, without leaving out anything of the
@@ -17,6 +18,7 @@ import itertools
 import math
 import tempfile
 import time
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -147,6 +149,19 @@ def run_mission(faults: str, length_m: float, speed_m_s: float, seed: int) -> Mi
     )
 
 
+def show(number: int, mission: Mission) -> None:
+    """Print the row of a mission."""
+    figures = {name: value for name, value in mission.figures.items() if name != "log"}
+    print(
+        f"{number:3} {mission.faults:20} {'complete' if mission.complete else 'NOT COMPLETE':12}"
+        f" again {mission.again_m:6.2f} m  standing {mission.standing:6.2%}, forced"
+        f" {mission.forced:6.2%}  {figures}",
+        flush=True,
+    )
+    if not mission.complete:
+        print(mission.figures["log"], flush=True)
+
+
 def main() -> None:
     """Run missions, the faults in turn."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -155,21 +170,18 @@ def main() -> None:
     parser.add_argument("--speed", type=float, default=1.0)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--faults", choices=list(FAULTS), help="of all missions, not in turn")
+    parser.add_argument("--at-once", type=int, default=1, help="missions beside each other")
     args = parser.parse_args()
     missions = []
-    for number in range(args.missions):
+
+    def run(number: int) -> Mission:
         faults = args.faults or list(FAULTS)[number % len(FAULTS)]
-        mission = run_mission(faults, args.length, args.speed, args.seed + number)
-        missions.append(mission)
-        figures = {name: value for name, value in mission.figures.items() if name != "log"}
-        print(
-            f"{number:3} {faults:20} {'complete' if mission.complete else 'NOT COMPLETE':12}"
-            f" again {mission.again_m:6.2f} m  standing {mission.standing:6.2%}, forced"
-            f" {mission.forced:6.2%}  {figures}",
-            flush=True,
-        )
-        if not mission.complete:
-            print(mission.figures["log"], flush=True)
+        return run_mission(faults, args.length, args.speed, args.seed + number)
+
+    with ThreadPoolExecutor(args.at_once) as pool:
+        for number, mission in enumerate(pool.map(run, range(args.missions))):
+            missions.append(mission)
+            show(number, mission)
     complete = sum(mission.complete for mission in missions)
     print(f"{complete} of {len(missions)} complete")
     for faults in FAULTS:
