@@ -61,6 +61,7 @@ def test_below_its_level_it_drives_to_the_dock_charges_and_goes_on_where_it_was(
         State.RETURNING,
         "on the way to the dock",
     )
+    assert drive.updates[-1].reason == "drives to the dock: battery at 20%"
     drive.run(State.CHARGING)
     assert (drive.cell, drive.walk) == (AT_DOCK, [])
     assert drive.mission.reason == "battery at 20%, but discharging, goes on at 90%"
@@ -129,6 +130,7 @@ def test_it_goes_while_the_dock_is_near_where_its_path_leads_away(level, goes):
         drive.go()
         drive.level -= 0.002
     assert (drive.mission.state is not State.COVERING) is goes, drive.mission.reason
+    assert any(one.reason.endswith("%, the dock is near") for one in drive.updates) is goes
 
 
 @pytest.mark.parametrize("lie", [0.0, 1.0])

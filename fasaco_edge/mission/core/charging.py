@@ -190,6 +190,13 @@ class Charging:
         is_low = level <= self.turns_back_at or self._is_best_here
         return self.orders.goal("charge") is not None and is_low
 
+    def why_due(self) -> str:
+        """Return why the robot goes and charges, as the end of a path's reason."""
+        if self.gauge.level is None:
+            return ""
+        near = ", the dock is near" if self._is_best_here else ""
+        return f": battery at {self.gauge.level:.0%}{near}"
+
     @property
     def turns_back_at(self) -> float:
         """The level at which the robot goes to charge; includes the charge for the path back."""

@@ -294,7 +294,8 @@ class Executive:
             if goal is None or area is None or not area.contains(goal):
                 return self._rest(State.BLOCKED, f"no way {to}: waits for a map that shows one")
             here = self.map.cell_at_pose() or cell
-            update = self._lead(area.shortest_path(here, goal), f"drives {to}", errand)
+            why = self.charging.why_due() if errand == "charge" else ""
+            update = self._lead(area.shortest_path(here, goal), f"drives {to}{why}", errand)
         self._state, self._reason = State.RETURNING, f"on the way {to}"
         return Decision(path=update)
 
