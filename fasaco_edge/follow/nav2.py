@@ -46,6 +46,9 @@ RETRY_S, MOST_RETRY_S = 1.0, 30.0
 # goal is given up [s].
 MOVED_M, STANDS_S, ARRIVED_S, GIVE_UP_S = 0.05, 3.0, 1.0, 20.0
 
+# Of a goal that another client's takes the place of Nav2 says no more; Humble has no codes at all.
+NO_CODE = "without a code; does another program send goals, too?"
+
 
 @dataclass(slots=True)
 class Tally:
@@ -159,7 +162,7 @@ class Nav2Follower(Supervision):
         elif ending.status == SUCCEEDED:
             self._take_done(goal, now)
         elif ending.status == ABORTED:
-            what = ERRORS.get(ending.code, "no code") if ending.code else "without a code"
+            what = ERRORS.get(ending.code, "no code") if ending.code else NO_CODE
             code = f"{ending.code} " if ending.code else ""
             said = f": {ending.message}" if ending.message else ""
             self._fail(State.GIVEN_UP, f"{code}{what}{said}", now)

@@ -220,6 +220,13 @@ def test_errors_have_their_names_and_goals_are_sent_anew_later_and_later(code, n
     assert isinstance(goal, SendGoal)
 
 
+def test_a_goal_that_ends_without_a_code_may_have_been_replaced_by_somebody_elses():
+    drive = Drive(*LONG)
+    drive.end(drive.begun(), ABORTED, 0)
+    assert drive.step(0.0) == []
+    assert drive.follower.detail == "without a code; does another program send goals, too?"
+
+
 def test_what_somebody_else_cancels_stays_canceled_until_the_next_path():
     drive = Drive(*LONG)
     drive.end(drive.begun(), CANCELED)
