@@ -16,6 +16,7 @@ from fasaco_edge.kernels.fleet.walks import DEGREE, STEP, TURNS, add_tour, drive
 from fasaco_edge.kernels.lattice.reach import reachable_from
 from fasaco_edge.planners.search.walk_region import stream_of
 from tests import naive
+from tests.support.drawn import free_cells, ground
 from tests.support.examples import examples
 
 FULL = 256
@@ -80,15 +81,8 @@ def check(walks, turn=0):
 @given(data=st.data())
 @examples(40, suppress_health_check=[HealthCheck.too_slow])
 def test_walks_stay_connected_and_complete(data):
-    rows, cols = data.draw(st.tuples(st.integers(2, 9), st.integers(2, 9)))
-    blocked = data.draw(st.sets(st.tuples(st.integers(0, rows - 1), st.integers(0, cols - 1))))
-    free = np.ones((rows, cols), np.bool_)
-    for cell in blocked:
-        free[cell] = False
-    if not free.any():
-        return
-    steps = CoverageLattice.from_free(free).steps
-    cells = sorted(naive.distances(steps, tuple(np.argwhere(free)[0].tolist())))
+    free = free_cells(data)
+    cells = ground(CoverageLattice.from_free(free).steps, free)
     if len(cells) < 2:
         return
     starts = data.draw(st.lists(st.sampled_from(cells), min_size=2, max_size=4, unique=True))

@@ -12,6 +12,7 @@ from fasaco_edge.kernels.fleet.parts import balance_parts
 from fasaco_edge.kernels.lattice.reach import reachable_from
 from fasaco_edge.planners.search.walk_region import stream_of
 from tests import naive
+from tests.support.drawn import free_cells, ground
 from tests.support.examples import examples
 
 
@@ -50,16 +51,10 @@ def load_of(part):
 @given(data=st.data())
 @examples(25, suppress_health_check=[HealthCheck.too_slow])
 def test_parts_are_connected_and_leave_nothing_out(data):
-    rows, cols = data.draw(st.tuples(st.integers(2, 9), st.integers(2, 9)))
-    blocked = data.draw(st.sets(st.tuples(st.integers(0, rows - 1), st.integers(0, cols - 1))))
-    free = np.ones((rows, cols), np.bool_)
-    for cell in blocked:
-        free[cell] = False
-    if not free.any():
+    free = free_cells(data)
+    cells = ground(CoverageLattice.from_free(free).steps, free)
+    if not cells:
         return
-    steps = CoverageLattice.from_free(free).steps
-    first = tuple(np.argwhere(free)[0].tolist())
-    cells = sorted(naive.distances(steps, first))
     starts = data.draw(st.lists(st.sampled_from(cells), min_size=2, max_size=5))
     parts, loads = parted(free, starts, 2_000, data.draw(st.integers(0, 9)))
     assert set(map(tuple, np.argwhere(parts.any(axis=0)).tolist())) == set(cells)

@@ -16,6 +16,7 @@ from fasaco_edge.kernels.lattice.reach import reachable_from
 from fasaco_edge.planners.cost import STEPS_ALONE, CoverageCost
 from fasaco_edge.planners.fleet.division import divide
 from fasaco_edge.planners.fleet.first_tours import Fleet
+from tests.support.drawn import free_cells
 from tests.support.examples import examples
 
 TURNS = CoverageCost(1.0, 1.5)
@@ -43,11 +44,7 @@ def check(free, starts, division, *, returns):
 @given(data=st.data())
 @examples(25, suppress_health_check=[HealthCheck.too_slow])
 def test_every_cell_is_covered_by_legal_walks(data):
-    rows, cols = data.draw(st.tuples(st.integers(1, 9), st.integers(1, 9)))
-    blocked = data.draw(st.sets(st.tuples(st.integers(0, rows - 1), st.integers(0, cols - 1))))
-    free = np.ones((rows, cols), np.bool_)
-    for cell in blocked:
-        free[cell] = False
+    free = free_cells(data, 1)
     cells = [tuple(cell) for cell in np.argwhere(free).tolist()]
     if not cells:
         return
