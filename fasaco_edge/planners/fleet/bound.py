@@ -4,11 +4,13 @@
 steps, are one tour over everything: they have at least as many steps as its bound, less these. An
 even share of them is a bound, and so is an even share of the visits of one colour of a chessboard.
 
-*Layers.* Let layer d be the cells d steps away from the nearest start. A robot that goes beyond it
-passes each layer up to d on its way out, and again on its way back. If no walk is longer than M,
-it has at most M - 2 d - 1 steps left beyond, so there are at least n / (M - 2 d - 1) such robots
-where n cells lie beyond, and they pass the layer twice each, however few cells it has. If all
-layers take more steps together than k walks of M have, M is too low.
+*Layers.* The cells at least d steps away from the nearest start fall into connected parts; those d
+steps away are a layer of each (``kernels.fleet.layers``). A robot that goes beyond a layer passes
+each one on its way out, and again on its way back. If no walk is longer than M, it has at most
+M - 2 d - 1 visits left beyond. So if there are v visits beyond a layer, at least v / (M - 2 d - 1)
+robots go there, and pass the layer twice each, however few cells it has: from the farthest layers
+inward this counts the visits that all of a part takes. If all parts take more together than k
+walks of M steps have, M is too low.
 """
 
 from __future__ import annotations
@@ -20,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.grid.lattice import Cell, CoverageLattice
+from fasaco_edge.kernels.fleet.layers import layers_of, longest_by_layers
 from fasaco_edge.planners.bound import lower_bound_steps
 from fasaco_edge.planners.problem import CoverageProblem
 
@@ -47,11 +50,11 @@ def longest_bound(
     least = times * int(away.max())
     if cells > robots:
         least = max(least, _share(_all_steps(lattice, starts, reached, returns), robots, returns))
-    of_layer = np.bincount(away)
-    beyond = cells - np.cumsum(of_layer)
-    while not _is_enough(least, robots, of_layer, beyond, times):
-        least += times
-    return least
+    inward = np.flatnonzero(reached)[np.argsort(-away, kind="stable")]
+    cols = lattice.steps.shape[1]
+    offsets = np.array([1, cols, -1, -cols], np.int64)
+    layers = layers_of(lattice.steps.ravel(), offsets, inward, distances.min(axis=0))
+    return longest_by_layers(layers, robots, least, times)
 
 
 def _share(steps: int, robots: int, returns: bool) -> int:
@@ -73,21 +76,3 @@ def _all_steps(
     problem = CoverageProblem.of(lattice, starts[0], end=starts[0], reachable=reached)
     tour = lower_bound_steps(replace(problem, to_cover=reached))
     return max(2 * max(odd, cells - odd), tour - 2 * (robots - 1))
-
-
-def _is_enough(
-    most: int,
-    robots: int,
-    of_layer: NDArray[np.int64],
-    beyond: NDArray[np.int64],
-    times: int,
-) -> bool:
-    """Tell whether walks of at most ``most`` steps may be enough for all layers."""
-    left = most - times * np.arange(of_layer.size) - (times - 1)
-    if (left[beyond > 0] <= 0).any():
-        return False
-    crossing = -(-beyond // np.maximum(left, 1))
-    if crossing.max() > robots:
-        return False
-    passed = np.maximum(of_layer[1:], times * crossing[1:]).sum()
-    return bool(passed <= robots * most)
