@@ -122,14 +122,15 @@ def test_the_same_numbers_give_the_same_walks():
     assert (found[0].links == found[1].links).all()
 
 
-def test_a_tour_becomes_steps_and_a_tour_again():
-    tour = np.array([0, 1, 2, 1, 4, 3], np.int32)
-    offsets = np.array([1, 3, -1, -3], np.int64)
-    links = np.zeros(6, np.uint8)
-    add_tour(links, offsets, tour)
+@pytest.mark.parametrize(("shape", "tour"), [((2, 3), [0, 1, 2, 1, 4, 3]), ((3, 1), [0, 1, 2, 1])])
+def test_a_tour_becomes_steps_and_a_tour_again(shape, tour):
+    steps = CoverageLattice.from_free(np.ones(shape, np.bool_)).steps
+    offsets = np.array([1, shape[1], -1, -shape[1]], np.int64)
+    links = np.zeros(steps.size, np.uint8)
+    add_tour(steps.ravel(), offsets, links, np.array(tour, np.int32))
+    assert DEGREE[links].sum() == 2 * len(tour)
     walk = driven(links.copy(), offsets, 0, 12)
     pairs = [
-        Counter(frozenset(pair) for pair in pairwise(one.tolist()))
-        for one in (walk, np.append(tour, tour[0]))
+        Counter(frozenset(pair) for pair in pairwise(one)) for one in (walk.tolist(), [*tour, 0])
     ]
     assert pairs[0] == pairs[1]

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from fasaco_edge.grid.lattice import CoverageLattice
+from fasaco_edge.kernels.fleet.walks import STEP
 from fasaco_edge.planners.cost import STEPS_ALONE, CoverageCost
-from fasaco_edge.planners.fleet.annealing import AT_FIRST, FleetWalks
+from fasaco_edge.planners.fleet.annealing import AT_FIRST, MOST_COST, FleetWalks
 
 
 def walks(rows, cost=STEPS_ALONE):
@@ -26,3 +27,11 @@ def test_a_large_ground_has_fewer_attempts_at_first(rows, first):
 def test_one_attempt_where_turns_have_a_price():
     fleet = walks(10, CoverageCost(1.0, 1.5))
     assert [fleet.attempts(generation) for generation in (0, 1)] == [range(1), range(1, 2)]
+
+
+def test_squares_of_costs_stay_in_64_bits_however_dear_a_turn_is():
+    """An hour for a quarter-turn, a millisecond for a step."""
+    fleet = walks(10, CoverageCost(0.001, 3600.0))
+    fleet.load([np.array([0, 1, 101, 100], np.int32), np.array([1], np.int32)])
+    least = STEP * 4
+    assert least < fleet.score[0] <= least + 4 * MOST_COST // 1000

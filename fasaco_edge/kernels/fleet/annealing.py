@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.kernels.fleet.joining import BROKEN, Memory, energy_of, join, parts_of, take_in
-from fasaco_edge.kernels.fleet.walks import DEGREE, NONE, STEP, TURNS, Walks
+from fasaco_edge.kernels.fleet.walks import DEGREE, NONE, STEP, Walks, cost_at
 from fasaco_edge.kernels.jit import kernel, lean_kernel
 from fasaco_edge.kernels.random import draw, index_of
 
@@ -42,16 +42,6 @@ def _member(robots: int, count: int, bits: int) -> int:
     while not robots >> robot & 1:
         robot = robot + 1 if robot + 1 < count else 0
     return robot
-
-
-@lean_kernel
-def _cost_around(walks: Walks, memory: Memory, robot: int, count: int, turn: int) -> int:
-    """Return the cost of the links at the corners; each step counts half at either end."""
-    cost = 0
-    for index in range(count):
-        links = walks.links[robot, memory.corners[index]]
-        cost += STEP // 2 * DEGREE[links] + turn * TURNS[links]
-    return cost
 
 
 @lean_kernel
@@ -121,18 +111,16 @@ def _propose_square(
     doubled = bits >> 18 & 7
     for index in range(4):
         memory.before[index] = links[corners[index]]
-    before = _cost_around(walks, memory, robot, 4, turn)
-    change = 0
+    before = cost_at(walks, robot, corners, 4, turn)
     for index in range(4):
         direction = (first + index) & 3
         here, there = corners[index], corners[(index + 1) & 3]
         times = links[here] >> 2 * direction & 3
         after = (2 if index == doubled else 0) if times == 1 else 1
-        change += after - times
         back = (direction + 2) & 3
         links[here] = links[here] & (0xFF ^ 3 << 2 * direction) | after << 2 * direction
         links[there] = links[there] & (0xFF ^ 3 << 2 * back) | after << 2 * back
-    more = _cost_around(walks, memory, robot, 4, turn) - before
+    more = cost_at(walks, robot, corners, 4, turn) - before
     _settle(walks, memory, robot, 4, more, turn, mean, weight, heat, random)
 
 
@@ -159,10 +147,10 @@ def _propose_spike(
         return
     memory.corners[0], memory.corners[1] = cell, there
     memory.before[0], memory.before[1] = links[cell], links[there]
-    before = _cost_around(walks, memory, robot, 2, turn)
+    before = cost_at(walks, robot, memory.corners, 2, turn)
     links[cell] ^= 2 << 2 * direction
     links[there] ^= 2 << 2 * back
-    more = _cost_around(walks, memory, robot, 2, turn) - before
+    more = cost_at(walks, robot, memory.corners, 2, turn) - before
     _settle(walks, memory, robot, 2, more, turn, mean, weight, heat, random)
 
 
@@ -200,7 +188,7 @@ def anneal(
             mean = walks.costs.sum() // walks.starts.size
             heat = (hot * scale + (cold - hot) * scale * number // proposals) // 16
         bits = draw(random)
-        count = walks.spare_at[size]
+        count = int(walks.spare_at[size])
         if bits & 255 < AT_SPARE and count:
             cell = int(walks.spare[index_of(bits, count)])
             # Half of them a step or two away.

@@ -15,9 +15,9 @@ from fasaco_edge.kernels.fleet.walks import (
     DEGREE,
     NONE,
     STEP,
-    TURNS,
     Walks,
     add_spike,
+    cost_at,
     exchange,
     give,
     note_links,
@@ -175,16 +175,6 @@ def _is_place(walks: Walks, robot: int, taker: int, here: int, kind: int) -> boo
 
 
 @lean_kernel
-def _cost_of_part(walks: Walks, memory: Memory, robot: int, side: int, turn: int) -> int:
-    """Return the cost of a robot's visits in a part."""
-    cost = 0
-    for index in range(memory.clock[1]):
-        links = walks.links[robot, memory.queues[side, index]]
-        cost += STEP // 2 * DEGREE[links] + turn * TURNS[links]
-    return cost
-
-
-@lean_kernel
 def _added(
     walks: Walks,
     robot: int,
@@ -246,7 +236,7 @@ def join(
     if is_given:
         if memory.seen[walks.starts[robot]] == tag:
             return False
-        cost = _cost_of_part(walks, memory, robot, side, turn)
+        cost = cost_at(walks, robot, memory.queues[side], count, turn)
     begin = index_of(bits, min(count, 1 << 21))
     for number in range(begin, begin + count):
         here = int(memory.queues[side, number if number < count else number - count])

@@ -67,6 +67,16 @@ class Walks(NamedTuple):
 
 
 @lean_kernel
+def cost_at(walks: Walks, robot: int, cells: NDArray[np.int64], count: int, turn: int) -> int:
+    """Return the cost of a robot's visits of the first cells; a step counts half at either end."""
+    cost = 0
+    for index in range(count):
+        links = walks.links[robot, cells[index]]
+        cost += STEP // 2 * DEGREE[links] + turn * TURNS[links]
+    return int(cost)
+
+
+@lean_kernel
 def _note_visits(walks: Walks, cell: int, more: int) -> None:
     """Change the number of visits of a cell, and list it as spare or not."""
     spare, at, size = walks.spare, walks.spare_at, walks.steps.size
@@ -157,7 +167,12 @@ def give(walks: Walks, robot: int, taker: int, cell: int, turn: int) -> None:
 
 
 @lean_kernel
-def add_tour(links: NDArray[np.uint8], offsets: NDArray[np.int64], tour: NDArray[np.int32]) -> None:
+def add_tour(
+    steps: NDArray[np.uint8],
+    offsets: NDArray[np.int64],
+    links: NDArray[np.uint8],
+    tour: NDArray[np.int32],
+) -> None:
     """Add the steps of a closed walk, int32 (n,), to links, uint8 (size,).
 
     A step that it takes more than twice is left out twice.
@@ -165,7 +180,8 @@ def add_tour(links: NDArray[np.uint8], offsets: NDArray[np.int64], tour: NDArray
     for index in range(tour.size):
         here, there = int(tour[index]), int(tour[(index + 1) % tour.size])
         for direction in range(4):
-            if there - here == offsets[direction]:
+            # In a column of cells east and north lead to the same one.
+            if there - here == offsets[direction] and steps[here] >> direction & 1:
                 back = (direction + 2) & 3
                 times = (links[here] >> 2 * direction & 3) + 1
                 times = 1 if times > 2 else times

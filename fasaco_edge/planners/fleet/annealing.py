@@ -52,8 +52,8 @@ AT_FIRST = 12_000
 UNEVEN, FULL, FULL_FROM = 32, 256, 0.77
 # Pieces of one annealing, after each of which the walks are compared; most proposals of a piece.
 PIECES, MOST_PROPOSALS = 8, 100_000
-# Limits of the kernels on robots and cells.
-MOST_CELLS = 2**22
+# Limits of the kernels on cells, and on what a quarter-turn in each of them may cost in all.
+MOST_CELLS, MOST_COST = 2**22, 2**29
 
 
 def can_anneal(robots: int, cells: int) -> bool:
@@ -86,7 +86,9 @@ class FleetWalks:
         self._steps, self._cells = lattice.steps.ravel(), np.flatnonzero(reached)
         self._offsets = np.array([1, cols, -1, -cols], np.int64)
         self._starts = np.array(starts, np.int64)
-        self._turn = cost.quarter_turn_us * STEP // cost.step_us
+        # The kernels square costs of whole walks.
+        dear = MOST_COST // self._cells.size
+        self._turn = min(cost.quarter_turn_us * STEP // cost.step_us, dear)
         self._best = np.zeros((len(starts), lattice.steps.size), np.uint8)
         self.score = 0, 0
         self.schedule = TURNS if self._turn else STEPS
@@ -103,7 +105,7 @@ class FleetWalks:
         self._best[:] = 0
         for links, tour in zip(self._best, tours, strict=True):
             if tour.size > 1:
-                add_tour(links, self._offsets, tour)
+                add_tour(self._steps, self._offsets, links, tour)
         self.score = self._score_of(self._walks().costs)
 
     def improve(self, proposals: int, hot: int, random: NDArray[np.uint64]) -> Iterator[None]:
