@@ -46,8 +46,8 @@ TURNS = Schedule(
     hot=4 * 16, cold=2 * 16, per_cell=500, most=1_500_000, attempts=1, again_hot=0, again=0
 )
 DOUBLED = 3
-# Cells in the attempts of the first generation, which are fewer on a larger ground.
-AT_FIRST = 12_000
+# Cells in the attempts of the first generation, which are fewer on a larger ground; least attempts.
+AT_FIRST, FEWEST = 12_000, 2
 # Weight of an uneven share at first, and from a while before the end on.
 UNEVEN, FULL, FULL_FROM = 32, 256, 0.77
 # Pieces of one annealing, after each of which the walks are compared; most proposals of a piece.
@@ -96,7 +96,7 @@ class FleetWalks:
     def attempts(self, generation: int) -> range:
         """Return the numbers of the attempts of a generation: few at first on a large ground."""
         most = self.schedule.attempts
-        few = min(most, max(1, AT_FIRST // self._cells.size))
+        few = min(most, max(FEWEST, AT_FIRST // self._cells.size))
         first = generation * most
         return range(first, first + (most if generation else few))
 

@@ -1,10 +1,10 @@
 """First tours of robots that share a ground, others at each attempt.
 
-In even attempts the ground is parted: each robot gets connected cells around its start, about as
-many as the others (``kernels.fleet.parts``), and a tour over them by the project's search. In odd
-ones one tour over everything is split in two, for two groups of robots, and each part again, until
-every robot has one (``kernels.fleet.split``). That adds hardly a step, but balances only what is
-beside the paths from the starts.
+In some attempts the ground is parted: each robot gets connected cells, about as many as the others
+(``parts``), and a tour over them by the project's search. In others one tour over everything is
+split in two, for two groups of robots, and each part again, until every robot has one
+(``kernels.fleet.split``). That adds hardly a step, but balances only what is beside the paths from
+the starts.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from fasaco_edge.grid.lattice import Cell, CoverageLattice
 from fasaco_edge.planners.cost import CoverageCost
-from fasaco_edge.planners.fleet.parts import can_part, owners_of_parts
+from fasaco_edge.planners.fleet.parts import Parting, can_part
 from fasaco_edge.planners.fleet.tours import Tour, TourGround
 from fasaco_edge.planners.paper.colony import ColonyConfig
 from fasaco_edge.planners.planner import SearchProgress, StoppingCriterion
@@ -28,6 +28,9 @@ from fasaco_edge.planners.search.near_optimal import NearOptimal
 
 # Proposals per cell of a robot's first tour, and of the only tour where there is one robot.
 PROPOSALS, ALONE = 100, 1_000
+# What the first attempts begin with, and again those after them: parts, or one tour that is split.
+PIECES, NEAREST, SPLIT = "pieces", "nearest", "split"
+KINDS = (PIECES, SPLIT, NEAREST, PIECES)
 # Upper limit of a seed.
 SEEDS = 2**63
 
@@ -73,16 +76,13 @@ class FirstTours:
         """Return a tour for each robot."""
         robots = range(len(self.fleet.starts))
         cells = int(np.count_nonzero(self.reached))
-        if attempt % 2 or not can_part(len(robots), cells):
+        kind = KINDS[attempt % len(KINDS)]
+        if kind == SPLIT or not can_part(len(robots), cells):
             tours = self.ground.parted(self._tour(attempt, 0, None), robots)
             return [tours[robot] for robot in robots]
-        owners = owners_of_parts(
-            self.lattice,
-            self.reached,
-            self.ground.starts,
-            self.ground.distances,
-            (self.fleet.seed, attempt),
-        )
+        ground, seed = self.ground, (self.fleet.seed, attempt)
+        parting = Parting(self.lattice, self.reached, ground.starts, ground.distances)
+        owners = parting.from_pieces(seed) if kind == PIECES else parting.from_nearest(seed)
         return list(pool.map(partial(self._tour_over_part, owners, attempt), robots))
 
     def _tour_over_part(self, owners: NDArray[np.int32], attempt: int, robot: int) -> Tour:
