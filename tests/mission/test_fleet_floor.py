@@ -1,7 +1,8 @@
-"""The floor that a robot of a fleet sweeps: wherever its path leads to a cell."""
+"""The floor of a fleet: swept wherever the path leads, along the line that was polished."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -10,7 +11,7 @@ from fasaco_edge.bench.floor import judge_floor
 from fasaco_edge.mission.core.events import MapReceived, MemberHeard, Part, State
 from fasaco_edge.mission.core.mission import Mission
 from tests.grid.test_floor import room
-from tests.mission.test_line import CONFIG, RADIUS_M, ROBOT, Robot
+from tests.mission.test_line import CELL_M, CONFIG, RADIUS_M, ROBOT, Robot
 
 
 def divided_by(member, number):
@@ -46,3 +47,23 @@ def test_a_robot_without_a_part_sweeps_the_floor_that_it_drives_to_for_another()
         robot.drive(is_checked=False)
     figures = judge_floor(grid, np.array([*robot.trail, robot.at]), ROBOT).figures
     assert figures.swept_share > 0.9
+
+
+def test_a_line_that_is_polished_outlives_the_wait_for_another_robot():
+    robot = Robot(Mission(replace(CONFIG, robot="r1")))
+    robot.mission.shared.begin(1)
+    robot.tell(MapReceived(room(4.5, 3.5)))
+    robot.drive(60)
+    while math.dist(robot.at, robot.mission.next_metres()[1]) > 2 * CELL_M:
+        robot.drive()
+    before = {tuple(point) for point in robot.line}
+    x, y = robot.mission.next_metres()[1].tolist()
+    in_the_way = replace(divided_by("r2", 0), state="done", parts=(), by="", x=x, y=y)
+    robot.tell(in_the_way)
+    assert robot.mission.giving_way.waits_for == "r2"
+    assert not robot.line
+    for _ in range(10):
+        robot.tell(replace(in_the_way, x=x + 100.0))
+    assert robot.mission.giving_way.waits_for == ""
+    assert len(before & {tuple(point) for point in robot.line}) > 0.6 * len(before)
+    robot.drive(20)

@@ -74,6 +74,8 @@ class LineLayer:
         # pixels.
         self._swept: tuple[SweptFloor | None, int] = None, 0
         self._forgotten = 0
+        # Whether the line is set aside.
+        self._is_aside = False
         # The floor at the last update, and its revision.
         self._seen: tuple[FloorMap | None, int] = None, 0
 
@@ -126,6 +128,7 @@ class LineLayer:
         # Its cell may be ahead of its place on the line, which may skip cells.
         is_further = path.index > ahead.cell
         if update is not None:
+            self._set_aside(ahead, len(update.cells) > 0)
             is_cut = self._route.is_cut
             ahead.lay(update.cells, stamped.pose, is_cut=is_cut, keeps=not is_errand)
         elif why := self._why_anew(ahead, is_further and touched is not None):
@@ -151,6 +154,16 @@ class LineLayer:
             return None
         ahead.note_published()
         return replace(update, xy=ahead.xy())
+
+    def _set_aside(self, ahead: LineAhead, is_driven: bool) -> None:
+        """Set the line aside with the path, and take it up with the next one that is driven."""
+        if self._route.aside is not None:
+            if not self._is_aside:
+                ahead.set_aside()
+            self._is_aside = True
+        elif self._is_aside and is_driven:
+            ahead.take_up()
+            self._is_aside = False
 
     def _why_anew(self, ahead: LineAhead, is_further: bool) -> str:
         """Return why to lay the line along the same path again; "" to leave it."""

@@ -17,6 +17,7 @@ from fasaco_edge.grid.floor_map import FloorMap
 from fasaco_edge.grid.geometry import Pose2D, Window
 from fasaco_edge.kernels.floor.line import LEAST_EDGE
 from fasaco_edge.mission.line.alignment import aligned, by_distance
+from fasaco_edge.mission.line.line_aside import LineAside
 from fasaco_edge.mission.line.pieces import Joiner, Piece, kept_pieces
 from fasaco_edge.mission.line.place_on_line import PlaceOnLine
 from fasaco_edge.mission.line.polyline import (
@@ -63,6 +64,7 @@ class LineAhead:
         self._cut: int | None = None
         # Window of later maps that was not checked beyond the cut.
         self._unchecked: Window | None = None
+        self._aside: LineAside | None = None
         self._place = PlaceOnLine()
 
     def follow_floor(self, floor: FloorMap) -> bool:
@@ -76,7 +78,7 @@ class LineAhead:
             return False
         self.tally = SweepTally(floor)
         dropped, self.line = bool(len(self.line)), Line()
-        self._cut = self._unchecked = None
+        self._cut = self._unchecked = self._aside = None
         return dropped
 
     def _move(self, shape: tuple[int, int], by: tuple[int, int]) -> None:
@@ -93,6 +95,23 @@ class LineAhead:
         self.tally.exchange(NO_EDGES, edges_between(moved, is_edge))
         self._place.here = self._place.here + np.array(by)
         self._unchecked = self._unchecked and self._unchecked.moved(*by)
+        self._aside = self._aside and self._aside.moved(by)
+
+    def set_aside(self) -> None:
+        """Keep the line for after an errand, which replaces it."""
+        if len(self.line) > 1:
+            place = self._place.on(self.line.points)
+            self._aside = LineAside.of(self._walk, self.line, self.cell, place)
+
+    def take_up(self) -> None:
+        """Put back the line that was set aside, if any; the next walk keeps parts of it."""
+        aside, self._aside = self._aside, None
+        if aside is None:
+            return
+        self._take([Piece(aside.line, -1)])
+        self._walk, self.cell, self._cut, self._place.along = aside.walk, 0, None, 0.0
+        if aside.touched is not None:
+            self._unchecked = Window.around(self._unchecked, aside.touched)
 
     def lay(
         self,
@@ -130,6 +149,9 @@ class LineAhead:
             self._walk, self.line, self.cell, self._cut = ahead, line, 0, None
         else:
             pieces = kept_pieces(line, ahead, walk) if keeps and len(line) and len(walk) else []
+            if pieces and pieces[0].begin == 0 and not self.is_followed:
+                # The robot is not behind its first point any more.
+                pieces[0] = pieces[0].without_first()
             self._walk, self.cell, self._cut = walk, 0, None
             self._join(pieces)
             if not keeps and len(self.line):
@@ -207,7 +229,7 @@ class LineAhead:
         Args:
             touched: window of the raster that may have changed.
         """
-        line = self.line
+        line, self._aside = self.line, self._aside and self._aside.on_map(touched)
         if self._cut is not None:
             self._unchecked = Window.around(self._unchecked, touched)
             line = line.part(0, line.before(self._cut - 1))

@@ -118,6 +118,11 @@ class SweepTally:
         counts = self.sweeps.counts[part.row0 : part.row1, part.col0 : part.col1]
         return int(np.count_nonzero(counts == 0)) * self.unit_m**2
 
+    def open_in_m2(self, part: Window) -> float:
+        """Return the area in a window that should be swept, on the line or not [m2]."""
+        state = self._state[part.row0 : part.row1, part.col0 : part.col1]
+        return int(np.count_nonzero(state & OPEN)) * self.unit_m**2
+
     @property
     def wanted_m2(self) -> float:
         """Area asked for [m2]."""
