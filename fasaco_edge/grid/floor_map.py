@@ -193,10 +193,11 @@ class FloorMap:
         y, x = self.stands.stands[lattice.local(cell)].tolist()
         return None if math.isnan(y) else self.geometry.to_map(x + 0.5, y + 0.5)
 
-    def box_of(self, cell: Cell) -> Window:
-        """Return the bounding box of a cell on the raster."""
+    def box_of(self, cell: Cell, rim_m: float = 0.0) -> Window:
+        """Return the bounding box of a cell on the raster, with a rim around it."""
         window = Window(cell[0], cell[1], cell[0] + 1, cell[1] + 1)
-        return self._box_around(window, self.geometry, 0) or Window(0, 0, 0, 0)
+        rim = round(rim_m / self.geometry.resolution)
+        return self._box_around(window, self.geometry, rim) or Window(0, 0, 0, 0)
 
     def reached(self, cells: NDArray[np.bool_], part: Window) -> NDArray[np.bool_]:
         """Return the pixels in a window of the raster that the tool reaches from places in cells.

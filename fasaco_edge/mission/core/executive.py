@@ -131,8 +131,11 @@ class Executive:
             way.end()
             return None
         # Others may have swept meanwhile what this robot waits to drive to.
-        has_work = order.is_open and not (way.waits_for and not self.orders.left())
-        update = way.look(self._now, has_work=has_work)
+        is_vain = bool(way.waits_for) and not self.orders.left()
+        if is_vain:
+            # Floor that is left in passed cells is not waited for.
+            self.ledger.left_floor.give_up(self.ledger.left_floor.left)
+        update = way.look(self._now, has_work=order.is_open and not is_vain)
         if not way.waits_for:
             return None
         cell = self.map.robot_cell()

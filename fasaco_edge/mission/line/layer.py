@@ -5,6 +5,7 @@ It follows map, poses and paths, and publishes a changed line even if the path i
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -29,6 +30,9 @@ from fasaco_edge.mission.orders.sequencer import Sequencer
 
 # A cell with less unswept floor than this is not driven to [m2].
 LEAST_LEFT_M2 = 0.04
+# A robot of a fleet goes back to a passed cell if the price of the floor left in it, and in a rim
+# around it, is so high [s], [m]; cells looked at each time that it passes one.
+WORTH_S, RIM_M, LOOKED_AT = 4.0, 0.1, 24
 
 
 class FloorToSweep(NamedTuple):
@@ -60,6 +64,8 @@ class LineLayer:
     ) -> None:
         self._map, self._ledger, self._orders, self._route = map_state, ledger, orders, route
         self._polisher = Polisher(sweeping.line) if sweeping else None
+        price_s_m2 = sweeping.line.price_s_m2 if sweeping else 0.0
+        self._worth_m2 = WORTH_S / price_s_m2 if price_s_m2 else math.inf
         self._ahead: LineAhead | None = None
         # Window of map and floor that may have changed since the last update; window, asked-for
         # cells and reachable cells of that update.
@@ -111,7 +117,10 @@ class LineLayer:
         ahead.drive(pose)
         self._route.follow_line(ahead.cell)
         path = self._route.held
-        self._credit(path.cells[before : path.index])
+        passed = path.cells[before : path.index]
+        self._credit(passed)
+        if self._orders.keeps_left_floor:
+            self._note_left(passed)
         is_on_it = ahead.is_followed and len(path.cells) > 0
         row, col = path.cells[path.index].tolist() if is_on_it else (0, 0)
         self._map.follow_path((row, col) if is_on_it else None)
@@ -205,6 +214,20 @@ class LineLayer:
         for cell, counts in zip(unseen, is_asked, strict=True):
             if counts and ahead.tally.missed_m2(floor.box_of(cell)) < LEAST_LEFT_M2:
                 self._ledger.credit(cell)
+
+    def _note_left(self, passed: NDArray[np.int32]) -> None:
+        """Note which of the passed cells have floor left."""
+        ahead, floor, left_floor = self._ahead, self._map.floor, self._ledger.left_floor
+        assert ahead is not None
+        assert floor is not None
+        for row, col in passed.tolist():
+            left_floor.note_passed((row, col))
+        for cell in left_floor.next(LOOKED_AT) if len(passed) else ():
+            around = floor.box_of(cell, RIM_M)
+            if ahead.tally.open_in_m2(around) < self._worth_m2:
+                left_floor.drop(cell)
+            else:
+                left_floor.note_left(cell, is_left=ahead.tally.missed_m2(around) >= self._worth_m2)
 
     def _explain(self) -> None:
         """Update the causes of unreachable floor where they may have changed."""

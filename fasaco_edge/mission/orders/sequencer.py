@@ -197,6 +197,8 @@ class Sequencer:
         """Return the cells that still need a visit by this robot: its part, in a fleet."""
         window = area.lattice.window
         cells = self._fleet.mine(self._unswept(window), area).copy()
+        if self.keeps_left_floor:
+            cells |= self._ledger.left_floor.left_in(window) & self.asked_for(window)
         self._run.exploration.mark(cells, window)
         return cells
 
@@ -225,14 +227,23 @@ class Sequencer:
         shared = self._ledger.shared
         return inside & ~shared.swept(window) if shared.version else inside
 
+    @property
+    def keeps_left_floor(self) -> bool:
+        """Whether this robot goes back to floor that it has left: nobody else in a fleet would."""
+        return bool(self._fleet.members)
+
     def asked_of_me(self, area: ReachableArea) -> NDArray[np.bool_]:
         """Return on which cells of an area this robot has to sweep the floor, covered or not."""
         window = area.lattice.window
         asked = self.asked_for(window)
-        return self._fleet.mine_to_sweep(asked, self._unswept(window), area)
+        mine = self._fleet.mine_to_sweep(asked, self._unswept(window), area)
+        if self.keeps_left_floor:
+            mine = mine | (self._ledger.left_floor.passed_in(window) & asked)
+        return mine
 
     def note_path_end(self) -> bool:
         """Note the end of a path; return whether the cells it left over must wait for a retry."""
+        self._ledger.left_floor.note_path_end()
         run, cells = self._run, self._left_to_me()
         if cells > 0:
             self._unreached.note_failure()
