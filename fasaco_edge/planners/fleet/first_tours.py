@@ -28,9 +28,10 @@ from fasaco_edge.planners.search.near_optimal import NearOptimal
 
 # Proposals per cell of a robot's first tour, and of the only tour where there is one robot.
 PROPOSALS, ALONE = 100, 1_000
-# What the first attempts begin with, and again those after them: parts, or one tour that is split.
+# What attempts begin with, in turn: parts, or one tour that is split. Pieces are of use where all
+# robots start near one place.
 PIECES, NEAREST, SPLIT = "pieces", "nearest", "split"
-KINDS = (PIECES, SPLIT, NEAREST, PIECES)
+TOGETHER, APART = (PIECES, SPLIT, NEAREST, PIECES), (NEAREST, SPLIT, NEAREST, SPLIT)
 # Upper limit of a seed.
 SEEDS = 2**63
 
@@ -76,12 +77,13 @@ class FirstTours:
         """Return a tour for each robot."""
         robots = range(len(self.fleet.starts))
         cells = int(np.count_nonzero(self.reached))
-        kind = KINDS[attempt % len(KINDS)]
-        if kind == SPLIT or not can_part(len(robots), cells):
-            tours = self.ground.parted(self._tour(attempt, 0, None), robots)
-            return [tours[robot] for robot in robots]
         ground, seed = self.ground, (self.fleet.seed, attempt)
         parting = Parting(self.lattice, self.reached, ground.starts, ground.distances)
+        kinds = TOGETHER if parting.are_together else APART
+        kind = kinds[attempt % len(kinds)]
+        if kind == SPLIT or not can_part(len(robots), cells):
+            tours = ground.parted(self._tour(attempt, 0, None), robots)
+            return [tours[robot] for robot in robots]
         owners = parting.from_pieces(seed) if kind == PIECES else parting.from_nearest(seed)
         return list(pool.map(partial(self._tour_over_part, owners, attempt), robots))
 

@@ -1,0 +1,62 @@
+"""Parts of a ground for robots: complete, few robots through each passage, the same again."""
+
+from __future__ import annotations
+
+from itertools import permutations
+
+import numpy as np
+import pytest
+
+from fasaco_edge.grid.lattice import CoverageLattice
+from fasaco_edge.kernels.fleet.split import ways_from
+from fasaco_edge.planners.fleet.parts import Parting, assigned
+
+
+def parting(free, starts):
+    lattice = CoverageLattice.from_free(free)
+    flat = [row * free.shape[1] + col for row, col in starts]
+    ways = np.array([ways_from(lattice.steps, start) for start in flat])
+    return Parting(lattice, free, flat, ways)
+
+
+def rooms():
+    """Three rooms of 45 cells at the ends of corridors of nine, which meet in (14, 14)."""
+    free = np.zeros((15, 29), np.bool_)
+    free[14, 5:24] = free[5:, 14] = True
+    free[6:, :5] = free[6:, 24:] = free[:5, 10:19] = True
+    return free
+
+
+@pytest.mark.parametrize("begin", [Parting.from_pieces, Parting.from_nearest])
+@pytest.mark.parametrize("starts", [[(14, 14), (14, 13), (14, 15)], [(6, 0), (14, 28), (0, 10)]])
+def test_every_cell_is_a_robots_and_the_same_ones_again(begin, starts):
+    free = rooms()
+    owners = begin(parting(free, starts), (1, 2))
+    assert ((owners.reshape(free.shape) >= 0) == free).all()
+    assert set(owners[free.ravel()].tolist()) == {0, 1, 2}
+    assert (owners == begin(parting(free, starts), (1, 2))).all()
+
+
+def test_from_one_place_each_room_is_one_robots():
+    free = rooms()
+    owners = parting(free, [(14, 14), (14, 13), (14, 15)]).from_pieces((1, 0)).reshape(free.shape)
+    for room in (np.s_[6:, :5], np.s_[6:, 24:], np.s_[:5, 10:19]):
+        assert len(np.unique(owners[room])) == 1
+
+
+def test_robots_are_together_for_the_size_of_their_parts():
+    hall = np.ones((40, 40), np.bool_)
+    assert parting(hall, [(0, 0), (0, 1), (1, 0)]).are_together
+    assert not parting(hall, [(0, 0), (39, 39), (0, 39), (39, 0)]).are_together
+    assert not parting(hall[:4, :4], [(0, 0), (0, 1), (1, 0)]).are_together
+
+
+def test_no_swap_of_two_pieces_costs_less():
+    random = np.random.default_rng(1)
+    for _ in range(50):
+        costs = random.integers(0, 100, (5, 5)) ** 2
+        column = assigned(costs)
+        assert sorted(column.tolist()) == list(range(5))
+        sums = [costs[range(5), list(other)].sum() for other in permutations(range(5))]
+        mine = costs[range(5), column].sum()
+        assert min(sums) <= mine <= np.median(sums)
