@@ -16,7 +16,7 @@ from fasaco_edge.wire.ros_keys import RosNode, attachment, gid_of
 
 # Timeout of a reply [s]; of a result, as long as driving to the end of a goal. After it the query
 # is repeated.
-ANSWER_S, RESULT_S = 5.0, 300.0
+ANSWER_S, RESULT_S = 2.5, 300.0
 # Period of searching the graph for the action's server [s].
 LOOK_EVERY_S = 2.0
 

@@ -8,6 +8,7 @@ message: a cell keeps its index during the whole mission. Indices may be negativ
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -180,6 +181,15 @@ def lattice_window(geometry: GridGeometry, cell_m: float, max_cells: int) -> Win
             f"{cell_m} m, reaches beyond {farthest:.0f} m from 0"
         )
     return window
+
+
+def mask_of(cells: Iterable[Cell], window: Window) -> NDArray[np.bool_]:
+    """Return which cells of a window are among some, bool (rows, cols)."""
+    found = np.zeros((window.rows, window.cols), np.bool_)
+    for row, col in cells:
+        if window.row0 <= row < window.row1 and window.col0 <= col < window.col1:
+            found[row - window.row0, col - window.col0] = True
+    return found
 
 
 def pixels_of(grid: OccupancyGrid) -> Pixels:

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.kernels.jit import kernel, lean_kernel
+from fasaco_edge.kernels.lattice.areas import root
 
 NONE = -1
 
@@ -30,15 +31,6 @@ class Layers(NamedTuple):
 
 
 @lean_kernel
-def _root(joined: NDArray[np.int32], cell: int) -> int:
-    """Return the cell that stands for the part of a cell."""
-    while joined[cell] != cell:
-        joined[cell] = joined[joined[cell]]
-        cell = joined[cell]
-    return cell
-
-
-@lean_kernel
 def _join(
     steps: NDArray[np.uint8], offsets: NDArray[np.int64], joined: NDArray[np.int32], here: int
 ) -> None:
@@ -47,7 +39,7 @@ def _join(
         if steps[here] >> direction & 1:
             there = here + offsets[direction]
             if joined[there] != NONE:
-                joined[_root(joined, there)] = _root(joined, here)
+                joined[root(joined, there)] = root(joined, here)
 
 
 @kernel
@@ -78,11 +70,11 @@ def layers_of(
             _join(steps, offsets, joined, here)
         for here in cells[begin:end]:
             # A part with cells of this layer is stood for by one of them.
-            root = _root(joined, here)
-            if of[root] == NONE:
-                of[root], depths[count] = count, depth
+            part = root(joined, here)
+            if of[part] == NONE:
+                of[part], depths[count] = count, depth
                 count += 1
-            of[here] = of[root]
+            of[here] = of[part]
             sizes[of[here]] += 1
         for here in cells[begin:end]:
             for direction in range(4):

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.grid.geometry import Window
-from fasaco_edge.grid.lattice import Cell
+from fasaco_edge.grid.lattice import Cell, mask_of
 
 # Limit on the cells kept: the oldest are dropped.
 MOST_PASSED = 2_000
@@ -80,16 +80,8 @@ class LeftFloor:
 
     def passed_in(self, window: Window) -> NDArray[np.bool_]:
         """Return which cells of a window are such passed cells, bool (rows, cols)."""
-        return _mask(self._passed, window)
+        return mask_of(self._passed, window)
 
     def left_in(self, window: Window) -> NDArray[np.bool_]:
         """Return which cells of a window have floor left, bool (rows, cols)."""
-        return _mask(self.left, window)
-
-
-def _mask(cells: Iterable[Cell], window: Window) -> NDArray[np.bool_]:
-    found = np.zeros((window.rows, window.cols), np.bool_)
-    for row, col in cells:
-        if window.row0 <= row < window.row1 and window.col0 <= col < window.col1:
-            found[row - window.row0, col - window.col0] = True
-    return found
+        return mask_of(self.left, window)

@@ -80,8 +80,6 @@ class LineLayer:
         # pixels.
         self._swept: tuple[SweptFloor | None, int] = None, 0
         self._forgotten = 0
-        # Whether the line is set aside.
-        self._is_aside = False
         # The floor at the last update, and its revision.
         self._seen: tuple[FloorMap | None, int] = None, 0
 
@@ -167,12 +165,9 @@ class LineLayer:
     def _set_aside(self, ahead: LineAhead, is_driven: bool) -> None:
         """Set the line aside with the path, and take it up with the next one that is driven."""
         if self._route.aside is not None:
-            if not self._is_aside:
-                ahead.set_aside()
-            self._is_aside = True
-        elif self._is_aside and is_driven:
+            ahead.set_aside()
+        elif is_driven:
             ahead.take_up()
-            self._is_aside = False
 
     def _why_anew(self, ahead: LineAhead, is_further: bool) -> str:
         """Return why to lay the line along the same path again; "" to leave it."""

@@ -64,6 +64,7 @@ class LineAhead:
         self._cut: int | None = None
         # Window of later maps that was not checked beyond the cut.
         self._unchecked: Window | None = None
+        # The line from before an errand, while that is driven.
         self._aside: LineAside | None = None
         self._place = PlaceOnLine()
 
@@ -78,7 +79,8 @@ class LineAhead:
             return False
         self.tally = SweepTally(floor)
         dropped, self.line = bool(len(self.line)), Line()
-        self._cut = self._unchecked = self._aside = None
+        self._cut = self._unchecked = None
+        self._aside = self._aside and LineAside()
         return dropped
 
     def _move(self, shape: tuple[int, int], by: tuple[int, int]) -> None:
@@ -99,6 +101,9 @@ class LineAhead:
 
     def set_aside(self) -> None:
         """Keep the line for after an errand, which replaces it."""
+        if self._aside is not None:
+            return
+        self._aside = LineAside()
         if len(self.line) > 1:
             place = self._place.on(self.line.points)
             self._aside = LineAside.of(self._walk, self.line, self.cell, place)
@@ -106,7 +111,7 @@ class LineAhead:
     def take_up(self) -> None:
         """Put back the line that was set aside, if any; the next walk keeps parts of it."""
         aside, self._aside = self._aside, None
-        if aside is None:
+        if aside is None or not len(aside.line):
             return
         self._take([Piece(aside.line, -1)])
         self._walk, self.cell, self._cut, self._place.along = aside.walk, 0, None, 0.0

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -12,7 +12,7 @@ from fasaco_edge.mission.line.polyline import Line, Points, Walk
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LineAside:
-    """A line on the raster that it will be taken up on.
+    """A line on the raster that it will be taken up on; empty where there was none, or no more.
 
     Attributes:
         walk: int32 (n, 2), its cells.
@@ -20,8 +20,8 @@ class LineAside:
         touched: window of the raster that maps may have changed since; None for none.
     """
 
-    walk: Walk
-    line: Line
+    walk: Walk = field(default_factory=lambda: np.empty((0, 2), np.int32))
+    line: Line = field(default_factory=Line)
     touched: Window | None = None
 
     @classmethod

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.grid.geometry import Polygon, Window
-from fasaco_edge.grid.lattice import UNKNOWN, Cell
+from fasaco_edge.grid.lattice import UNKNOWN, Cell, mask_of
 from fasaco_edge.mission.map.reachable_area import ReachableArea
 from fasaco_edge.mission.orders.order import Zone
 from fasaco_edge.mission.orders.zones import in_zones
@@ -97,9 +97,8 @@ class Exploration:
 
     def mark(self, cells: NDArray[np.bool_], window: Window) -> None:
         """Set the viewpoints in ``cells``, bool (rows, cols) of ``window``."""
-        for row, col in self.viewpoints:
-            if window.row0 <= row < window.row1 and window.col0 <= col < window.col1:
-                cells[row - window.row0, col - window.col0] = True
+        if self.viewpoints:
+            cells |= mask_of(self.viewpoints, window)
 
 
 def is_in_reach(zone: Zone, area: ReachableArea) -> bool:
