@@ -33,6 +33,8 @@ RESOLUTION_M = 0.05
 HALL_PX, WALL_PX, DOOR_PX, CRATE_PX = 200, 4, 30, 16
 # A crate further along each time, by less than its own width and back again.
 CRATE_PLACES, CRATE_STEP_PX = 12, 12
+# Where the crate stands when the robot begins to drive.
+FIRST_CRATE = 1
 POSES_HZ = 10
 SPEED_M_S = 0.5
 # Period of maps [s], each with the crate at another place: the rest of the path is replanned.
@@ -166,7 +168,7 @@ class CoveringRobot:
         self._building = building()
         self._at = np.array([2.5, 2.5])
         self._ahead: NDArray[np.float64] = np.empty((0, 2))
-        self._maps, self._map_due = 0, 0.0
+        self._maps, self._map_due = FIRST_CRATE * maps_a_crate, 0.0
         self._lock = threading.Lock()
 
     def take_path(self, sample: Sample) -> None:
@@ -220,7 +222,8 @@ def robot_beside(
     bus.subscribe(daemon.keys.of(topics.PATH), robot.take_path)
     stamp_ns = time.time_ns()
     source.put_pose(robot_pose(stamp_ns))
-    source.put_map(with_crate(building(), 0, stamp_ns))
+    # Not a map that the daemon may know already: nothing would be planned on that.
+    source.put_map(with_crate(building(), FIRST_CRATE, stamp_ns))
     source.wait_path(stamp_ns)
     over = threading.Event()
 
