@@ -67,3 +67,25 @@ def test_a_line_that_is_polished_outlives_the_wait_for_another_robot():
     assert robot.mission.giving_way.waits_for == ""
     assert len(before & {tuple(point) for point in robot.line}) > 0.6 * len(before)
     robot.drive(20)
+
+
+def test_a_robot_that_makes_way_goes_straight_and_not_over_the_middle_of_its_cell_first():
+    robot = Robot(Mission(replace(CONFIG, robot="r1")))
+    robot.mission.shared.begin(1)
+    robot.tell(MapReceived(room(4.5, 3.5)))
+    robot.drive(40)
+    while math.dist(robot.at, robot.mission.next_metres()[1]) > 2 * CELL_M:
+        robot.drive()
+    x, y = robot.mission.next_metres()[1].tolist()
+    in_the_way = replace(divided_by("r2", 0), state="done", parts=(), by="", x=x, y=y)
+    robot.tell(in_the_way)
+    assert robot.mission.giving_way.waits_for == "r2"
+    # Beside the middle of its cell, on the side of the other robot.
+    (here_x, here_y), apart = robot.at, math.dist(robot.at, (x, y))
+    robot.at = tuple(a + 0.3 * CELL_M * (b - a) / apart for a, b in ((here_x, x), (here_y, y)))
+    over = ((here_x, here_y), (2 * here_x - x, 2 * here_y - y))
+    robot.tell(replace(in_the_way, state="covering", ahead=over))
+    assert "makes way for r2" in robot.reasons[-1]
+    begin, *_, end = robot.line
+    assert len(robot.line) == 2
+    assert math.dist(end, (x, y)) > math.dist(begin, (x, y))

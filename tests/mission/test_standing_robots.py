@@ -99,3 +99,22 @@ def test_who_waits_while_others_sweep_all_that_is_left_is_done_and_leads_nowhere
     assert drive.mission.state == "done"
     assert drive.mission.giving_way.waits_for == ""
     assert not len(drive.mission.next_metres())
+
+
+def test_one_that_makes_way_drives_to_the_middle_of_its_refuge():
+    drive = Drive((2, 4), config=replace(CONFIG, robot="r1"))
+    drive.tell(MapReceived(building(*["." * 24] * 5)), pose_at(2, 4))
+    drive.plan()
+    x, y = ((at + 0.5) * CELL_M for at in drive.walk[1][::-1])
+    drive.tell(pose_at(2, 4), replace(member(x, y), waits_for="r3"), after=1.0)
+    assert drive.mission.giving_way.waits_for == "r2"
+    over = replace(member(x, y), ahead=((4.5 * CELL_M, 2.5 * CELL_M),))
+    drive.tell(pose_at(2, 4), over, after=2.0)
+    assert "makes way for r2" in drive.mission.reason
+    way = drive.mission.route.path.cells
+    (before, last) = way[-2:]
+    edge = last + 0.4 * (before - last)
+    drive.tell(pose_at(*edge.tolist()), over, after=2.0)
+    assert len(drive.mission.route.path.cells)
+    drive.tell(pose_at(*last.tolist()), over, after=1.0)
+    assert not len(drive.mission.route.path.cells)

@@ -108,6 +108,11 @@ def test_one_that_stands_in_the_way_is_named():
     assert seen("r1", EAST, heard("r2", (1.9, 0.0))) is None
 
 
+def at(cell):
+    """The middle of a cell."""
+    return (cell[1] + 0.5) * 0.25, (cell[0] + 0.5) * 0.25
+
+
 def test_a_refuge_lies_off_discs_and_paths_and_is_reached_past_none_of_them():
     free = np.zeros((12, 24), np.bool_)
     free[5], free[6:9, 4] = True, True  # a corridor with a niche
@@ -115,7 +120,12 @@ def test_a_refuge_lies_off_discs_and_paths_and_is_reached_past_none_of_them():
     area = ReachableArea.around(lattice, (5, 8))
     other = heard("r2", (3.2, 1.375), (0.1, 1.375))
     way = refuge(
-        area, (5, 8), RADIUS_M, {"r2": Neighbour(other, 0.0, 0.0, PACE_S_M)}, lattice.centres
+        area,
+        (5, 8),
+        at((5, 8)),
+        RADIUS_M,
+        {"r2": Neighbour(other, 0.0, 0.0, PACE_S_M)},
+        lattice.centres,
     )
     assert tuple(way[-1].tolist()) in {(7, 4), (5, 2)}
     # Behind the other there is a place, too, but no way to it.
@@ -124,7 +134,12 @@ def test_a_refuge_lies_off_discs_and_paths_and_is_reached_past_none_of_them():
     area = ReachableArea.around(lattice, (5, 8))
     other = heard("r2", (1.2, 1.375), (3.2, 1.375))
     way = refuge(
-        area, (5, 8), RADIUS_M, {"r2": Neighbour(other, 0.0, 0.0, PACE_S_M)}, lattice.centres
+        area,
+        (5, 8),
+        at((5, 8)),
+        RADIUS_M,
+        {"r2": Neighbour(other, 0.0, 0.0, PACE_S_M)},
+        lattice.centres,
     )
     assert way[-1, 1] > 13
 
@@ -137,10 +152,23 @@ def test_the_way_to_a_refuge_leads_round_the_disc_of_the_other():
     area = ReachableArea.around(lattice, (0, 2))
     ahead = [(0.125, 0.125), (0.125, 0.625), (0.625, 0.625)]
     near = {"r2": Neighbour(heard("r2", (1.125, 0.125), *ahead), 0.0, 0.0, PACE_S_M)}
-    way = refuge(area, (0, 2), RADIUS_M, near, lattice.centres)
+    way = refuge(area, (0, 2), at((0, 2)), RADIUS_M, near, lattice.centres)
     assert way.tolist()[-1] == [2, 4]
     assert [0, 0] in way.tolist()
     assert len(area.shortest_path((0, 2), (2, 4))) < len(way)
+
+
+def test_one_that_is_nearer_to_the_other_than_its_cell_is_gets_away_past_cells_near_it():
+    free = np.zeros((2, 12), np.bool_)
+    free[0, 4], free[1, 4:] = True, True
+    lattice = CoverageLattice.from_free(free, 0.25)
+    area = ReachableArea.around(lattice, (0, 4))
+    near = {"r2": Neighbour(heard("r2", (0.7, 0.45), at((0, 4))), 0.0, 0.0, PACE_S_M)}
+    # 0.41 m from the other; its cell is at 0.54 m, the next one of the way at 0.43 m.
+    way = refuge(area, (0, 4), (1.02, 0.2), RADIUS_M, near, lattice.centres)
+    assert way is not None
+    assert way.tolist() == [[0, 4], [1, 4], [1, 5], [1, 6]]
+    assert refuge(area, (0, 4), at((0, 4)), RADIUS_M, near, lattice.centres) is None
 
 
 def test_a_refuge_is_sought_no_farther_than_the_cells_around_the_robot():
@@ -158,7 +186,7 @@ def test_a_refuge_is_sought_no_farther_than_the_cells_around_the_robot():
         for x in range(5, 24)
     }
     assert area.reachable[7, 16]
-    assert refuge(area, (5, 40), RADIUS_M, near, lattice.centres) is None
+    assert refuge(area, (5, 40), at((5, 40)), RADIUS_M, near, lattice.centres) is None
 
 
 def test_closed_cells_have_no_steps_left():

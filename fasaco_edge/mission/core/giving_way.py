@@ -34,6 +34,8 @@ from fasaco_edge.mission.map.reachable_area import ReachableArea
 
 # A robot that stands on its path this near to another one is blocked by it [m]; motion that counts.
 BESIDE_M, MOVED_M = 0.4, 0.1
+# It has come to its refuge at this distance from its place there [m].
+ARRIVED_M = 0.05
 # A robot that made way, or waits, looks for another place no sooner than this [s].
 AGAIN_S = 2.0
 
@@ -109,11 +111,11 @@ class GivingWay:
         if area is None or cell is None or not self.is_near:
             self.end()
             return None
-        if self._is_underway(cell, now):
+        if self._is_underway(here, now):
             return None
         self._refuge = None
         if found := self._obstruction(here, neighbours, now):
-            return self._hold(found, neighbours, area, cell, now)
+            return self._hold(found, neighbours, area, cell, here, now)
         self.end()
         return None
 
@@ -122,11 +124,16 @@ class GivingWay:
         if math.dist(here, self._place) > MOVED_M or len(self._cells()) < 2:
             self._place, self._came_at = here, now
 
-    def _is_underway(self, cell: Cell, now: float) -> bool:
+    def _is_underway(self, here: tuple[float, float], now: float) -> bool:
         """Tell whether the robot drives to its refuge."""
-        is_there = self._refuge is None or cell == self._refuge
+        is_there = self._refuge is None or self._is_in(self._refuge, here)
         is_stuck = now - self._sought_at > PATIENCE_S
-        return not is_there and not is_stuck and len(self._route.path.ahead) > 1
+        return not is_there and not is_stuck and len(self._route.path.ahead) > 0
+
+    def _is_in(self, refuge: Cell, here: tuple[float, float]) -> bool:
+        """Tell whether the robot has come to its refuge: at the edge it may be in the way."""
+        place = self._map.place_of(refuge)
+        return place is None or math.dist(here, place) <= ARRIVED_M
 
     def _obstruction(
         self, here: tuple[float, float], neighbours: Mapping[str, Neighbour], now: float
@@ -157,6 +164,7 @@ class GivingWay:
         neighbours: Mapping[str, Neighbour],
         area: ReachableArea,
         cell: Cell,
+        here: tuple[float, float],
         now: float,
     ) -> PathUpdate | None:
         route = self._route
@@ -172,9 +180,10 @@ class GivingWay:
         is_due = found.is_on_path or max(waited_s, now - self._came_at) > PATIENCE_S
         if is_due and now - self._sought_at >= AGAIN_S:
             self._sought_at = now
-            way = refuge(area, cell, self._radius_m, neighbours, area.lattice.centres)
-            if way is not None and len(way) > 1:
-                self._refuge = int(way[-1, 0]), int(way[-1, 1])
+            way = refuge(area, cell, here, self._radius_m, neighbours, area.lattice.centres)
+            to = None if way is None else (int(way[-1, 0]), int(way[-1, 1]))
+            if way is not None and to is not None and not self._is_in(to, here):
+                self._refuge = to
                 return route.publish(way, self.reason, now)
             if self._fleet.others.is_avoided(found.robot):
                 self.end()

@@ -199,6 +199,7 @@ def _meeting(
 def refuge(
     area: ReachableArea,
     cell: Cell,
+    place: tuple[float, float],
     radius_m: float,
     neighbours: Mapping[str, Neighbour],
     places: Callable[[NDArray[np.int32]], Points],
@@ -210,6 +211,7 @@ def refuge(
     Args:
         area: the reachable area.
         cell: the robot's cell.
+        place: the robot's place in it (x, y) [m].
         radius_m: radius of its disc [m].
         neighbours: the other robots.
         places: returns the points of cells.
@@ -233,9 +235,8 @@ def refuge(
         apart = np.hypot(*(points[:, None] - theirs[None]).transpose(2, 0, 1))
         is_free &= (apart >= clear_m).all(axis=1)
         is_passable &= (apart[:, 0] >= clear_m) | here
-        if here.any():
-            # From too near it may go where it is farther.
-            is_passable |= apart[:, 0] > apart[here, 0].max() + 1e-6
+        # From too near it may go where it is farther.
+        is_passable |= apart[:, 0] > math.dist(place, (heard.x, heard.y)) + 1e-6
     closed = np.zeros(steps.shape, np.bool_)
     closed[tuple(at[~is_passable].T)] = True
     steps = _inside(without(steps, closed))

@@ -137,7 +137,9 @@ class LineLayer:
         if update is not None:
             self._set_aside(ahead, len(update.cells) > 0)
             is_cut = self._route.is_cut
-            ahead.lay(update.cells, stamped.pose, is_cut=is_cut, keeps=not is_errand)
+            # To make way is an errand, too: straight there, over no place nearer to the other.
+            keeps = not is_errand and self._route.aside is None
+            ahead.lay(update.cells, stamped.pose, is_cut=is_cut, keeps=keeps)
         elif why := self._why_anew(ahead, is_further and touched is not None):
             ahead.lay(path.ahead, stamped.pose)
             update = self._route.publish(path.ahead, why, now) if len(path.ahead) else None
