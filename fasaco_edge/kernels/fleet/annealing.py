@@ -23,25 +23,14 @@ energies and temperatures are integers, so that results are equal on all machine
 import numpy as np
 from numpy.typing import NDArray
 
+from fasaco_edge.kernels.fleet.chance import member, most_energy
 from fasaco_edge.kernels.fleet.joining import BROKEN, Memory, energy_of, join, parts_of, take_in
 from fasaco_edge.kernels.fleet.walks import DEGREE, NONE, STEP, Walks, cost_at
 from fasaco_edge.kernels.jit import kernel, lean_kernel
 from fasaco_edge.kernels.random import draw, index_of
 
-# Quantiles of the exponential distribution, times ONE.
-ONE = 64
-QUANTILES = np.round(-ONE * np.log((np.arange(1024) + 0.5) / 1024)).astype(np.int64)
 # Of 256 proposals those that begin at a spare visit or beside it, and those of spikes.
 AT_SPARE, SPIKES = 160, 24
-
-
-@lean_kernel
-def _member(robots: int, count: int, bits: int) -> int:
-    """Return one of a set of robots, which is not empty."""
-    robot = (bits & 0xFFFF) % count
-    while not robots >> robot & 1:
-        robot = robot + 1 if robot + 1 < count else 0
-    return robot
 
 
 @lean_kernel
@@ -65,7 +54,7 @@ def _settle(
         if not DEGREE[links[cell]] and walks.sets[cell] == bit and cell != walks.starts[robot]:
             is_kept = False  # nobody else passes it
     bits = draw(random)
-    limit = heat * QUANTILES[index_of(bits, QUANTILES.size)] // ONE
+    limit = most_energy(heat, bits)
     energy = energy_of(walks, robot, more, mean, weight)
     for index in range(count, 4):
         corners[index] = NONE
@@ -106,7 +95,7 @@ def _propose_square(
         corners[index] = here
         robots |= walks.sets[here]
         here += offsets[direction]
-    robot = _member(robots, walks.starts.size, bits >> 2)
+    robot = member(robots, walks.starts.size, bits >> 2)
     links = walks.links[robot]
     doubled = bits >> 18 & 7
     for index in range(4):
@@ -140,7 +129,7 @@ def _propose_spike(
     direction = bits & 3
     if not walks.steps[cell] >> direction & 1:
         return
-    robot = _member(walks.sets[cell], walks.starts.size, bits >> 2)
+    robot = member(walks.sets[cell], walks.starts.size, bits >> 2)
     links, there, back = walks.links[robot], cell + walks.offsets[direction], (direction + 2) & 3
     times = links[cell] >> 2 * direction & 3
     if times == 1:

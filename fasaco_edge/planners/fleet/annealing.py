@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from fasaco_edge.grid.lattice import CoverageLattice
 from fasaco_edge.kernels.fleet.annealing import anneal
-from fasaco_edge.kernels.fleet.parts import MOST_ROBOTS
+from fasaco_edge.kernels.fleet.chance import MOST_ROBOTS
 from fasaco_edge.kernels.fleet.walks import STEP, Walks, add_tour, driven, walks_of
 from fasaco_edge.planners.cost import CoverageCost
 from fasaco_edge.planners.fleet.tours import Tour

@@ -1,10 +1,9 @@
 """First tours of robots that share a ground, others at each attempt.
 
-In some attempts the ground is parted: each robot gets connected cells, about as many as the others
-(``parts``), and a tour over them by the project's search. In others one tour over everything is
-split in two, for two groups of robots, and each part again, until every robot has one
-(``kernels.fleet.split``). That adds hardly a step, but balances only what is beside the paths from
-the starts.
+The ground is parted, each robot gets cells of about as much work as the others (``parts``), and a
+tour over them by the project's search. Where there are too many robots or cells for that, one tour
+over everything is split in two, for two groups of robots, and each part again, until every robot
+has one (``kernels.fleet.split``).
 """
 
 from __future__ import annotations
@@ -28,10 +27,6 @@ from fasaco_edge.planners.search.near_optimal import NearOptimal
 
 # Proposals per cell of a robot's first tour, and of the only tour where there is one robot.
 PROPOSALS, ALONE = 100, 1_000
-# What attempts begin with, in turn: parts, or one tour that is split. Pieces are of use where all
-# robots start near one place.
-PIECES, NEAREST, SPLIT = "pieces", "nearest", "split"
-TOGETHER, APART = (PIECES, SPLIT, NEAREST, PIECES), (NEAREST, SPLIT, NEAREST, SPLIT)
 # Upper limit of a seed.
 SEEDS = 2**63
 
@@ -77,14 +72,11 @@ class FirstTours:
         """Return a tour for each robot."""
         robots = range(len(self.fleet.starts))
         cells = int(np.count_nonzero(self.reached))
-        ground, seed = self.ground, (self.fleet.seed, attempt)
-        parting = Parting(self.lattice, self.reached, ground.starts, ground.distances)
-        kinds = TOGETHER if parting.are_together else APART
-        kind = kinds[attempt % len(kinds)]
-        if kind == SPLIT or not can_part(len(robots), cells):
-            tours = ground.parted(self._tour(attempt, 0, None), robots)
+        if not can_part(len(robots), cells):
+            tours = self.ground.parted(self._tour(attempt, 0, None), robots)
             return [tours[robot] for robot in robots]
-        owners = parting.from_pieces(seed) if kind == PIECES else parting.from_nearest(seed)
+        parting = Parting(self.lattice, self.reached, self.ground.starts, self.ground.distances)
+        owners = parting.owners((self.fleet.seed, attempt))
         return list(pool.map(partial(self._tour_over_part, owners, attempt), robots))
 
     def _tour_over_part(self, owners: NDArray[np.int32], attempt: int, robot: int) -> Tour:
