@@ -1,1 +1,1 @@
-"""Kernels that divide one coverage walk among several robots."""
+"""Kernels that share a ground among several robots: its blocks, and closed walks over it."""

@@ -1,4 +1,4 @@
-"""Chance in simulated annealing of a fleet: how much worse a change may be, and whose it is."""
+"""Random choices in simulated annealing of a fleet: how much worse a change may be, and whose."""
 
 import numpy as np
 from numpy.typing import NDArray

@@ -2,14 +2,16 @@
 
 Each block has an owner, who sweeps it, and robots that pass through it on their way to blocks of
 their own: the blocks that a robot has are connected, with its start in one of them. Its load is the
-steps that these take (``blocks``). A proposal hands over
+steps that these take (``blocks``); a robot that owns none has its start alone, and no load. A
+proposal hands over
 
 - a branch of what a robot has: to the one to which it is worth most among those nearest, which from
   then on passes through the blocks between;
 - a block: to a robot that passes through it.
 
-The energy is the squares of the loads' deviations from the mean, and a price of each unit of load.
-It begins so hot that rooms change hands. Integers, so that results are equal on all machines.
+The energy is the sum of the squares of the loads' deviations from the mean, and a price for each
+unit of load. The search begins so hot that rooms change hands. All numbers are integers, so that
+results are equal on all machines.
 """
 
 from typing import NamedTuple
@@ -22,11 +24,11 @@ from fasaco_edge.kernels.fleet.chance import member, most_energy
 from fasaco_edge.kernels.jit import kernel, lean_kernel
 from fasaco_edge.kernels.random import draw, index_of
 
-# Of 256 proposals those of a branch.
+# Of 256 proposals, so many hand over a branch.
 BRANCHES = 160
-# Most robots among which a branch goes to the best, unless it is among all.
+# A branch goes to the best of the nearest 1 to so many robots, or of all.
 NEAREST = 3
-# The temperature falls by this part of it at a time.
+# The temperature falls by one part in so many at a time.
 COOLING = 32
 
 
@@ -35,7 +37,7 @@ class _Shares(NamedTuple):
 
     Attributes:
         owner: int64 (m,).
-        sets: int64 (m,), the robots that have each block, a bit each, its owner with them.
+        sets: int64 (m,), the robots that own or pass each block or start in it, a bit each.
         starts: int64 (k,), block of each robot's start.
         loads: int64 (k,).
         mean: the least mean load.
@@ -157,7 +159,7 @@ def _load_of_branch(
     load = 0
     for index in range(count):
         here = memory.around[index]
-        has = shares.sets[here] >> taker & 1
+        has = shares.loads[taker] > 0 and shares.sets[here] >> taker & 1 > 0
         if shares.owner[here] == giver:
             load += blocks.own[here] - (blocks.passing[here] if has else 0)
         elif not has:
@@ -175,7 +177,7 @@ def _best_taker(
         blocks, shares, memory: the branch first in ``memory.around``.
         giver: who has it.
         count: number of its blocks.
-        among: how many robots, the nearest.
+        among: how many robots, the fewest blocks away; all of the last block are asked.
 
     Returns:
         the robot, NONE for none, the nearest block that it has, and the energy that it adds.
@@ -186,14 +188,15 @@ def _best_taker(
     at, end = 0, count
     while at < end and among > 0:
         here = around[at]
-        # It has the last block of the way already.
-        between = way[here] - (blocks.passing[here] if at >= count else 0)
+        # A robot at work has the last block of the way already.
+        last = blocks.passing[here] if at >= count else 0
         at += 1
         for robot in range(robots if sets[here] & ~met else 0):
             if sets[here] & ~met & 1 << robot:
                 met |= 1 << robot
                 among -= 1
-                load = between + _load_of_branch(blocks, shares, memory, giver, robot, count)
+                load = way[here] - (last if shares.loads[robot] else 0)
+                load += _load_of_branch(blocks, shares, memory, giver, robot, count)
                 energy = _energy(shares, robot, load)
                 if taker == NONE or energy < least:
                     taker, meets, least = robot, here, energy
@@ -246,9 +249,13 @@ def _hand_over(
     if not others:
         return
     taker = member(others, shares.starts.size, bits)
-    more = blocks.own[block] - blocks.passing[block]
-    if _energy(shares, giver, -more) + _energy(shares, taker, more) <= limit:
-        shares.owner[block] = taker
+    more = blocks.own[block] - (blocks.passing[block] if shares.loads[taker] else 0)
+    size = _grow(blocks, shares, memory, giver)
+    shares.owner[block] = taker
+    less = _need(blocks, shares, memory, giver, size) - shares.loads[giver]
+    if _energy(shares, giver, less) + _energy(shares, taker, more) > limit:
+        shares.owner[block] = giver
+    else:
         _trim(blocks, shares, memory, giver)
         _trim(blocks, shares, memory, taker)
 
@@ -296,7 +303,7 @@ def share_blocks(
         starts: int64 (k,), 2 <= k <= MOST_ROBOTS, block of each robot's start.
         proposals: how many.
         hot, cold: temperatures from the first proposal to the last, in energy.
-        price: energy of a unit of load; a unit above the mean load is one, too, squared.
+        price: energy of a unit of load; to deviate from the mean by one has an energy of 1.
         far: of 256 branches those that go to the best of all robots, not of the nearest.
         random: stream, uint64 (1,); advanced.
         owner: int64 (m,), out: who has each block.

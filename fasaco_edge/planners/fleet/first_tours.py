@@ -1,9 +1,9 @@
 """First tours of robots that share a ground, others at each attempt.
 
 The ground is parted, each robot gets cells of about as much work as the others (``parts``), and a
-tour over them by the project's search. Where there are too many robots or cells for that, one tour
-over everything is split in two, for two groups of robots, and each part again, until every robot
-has one (``kernels.fleet.split``).
+tour over them by the project's search. One robot gets one tour over everything. Where there are too
+many robots or cells to be parted, that is split in two, for two groups of robots, and each part
+again, until every robot has one (``kernels.fleet.split``).
 """
 
 from __future__ import annotations

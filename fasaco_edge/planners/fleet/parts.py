@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import sqrt
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,8 +15,8 @@ from fasaco_edge.kernels.fleet.shares import share_blocks
 from fasaco_edge.planners.search.walk_region import stream_of
 
 # Blocks for each robot, about: few enough to search among rooms, small enough to be made even. The
-# side of one is an even number of cells: a closed walk along a border of such blocks needs no spare
-# step.
+# side of one is an even number of cells, or 1 on a small ground: a closed walk along a border of
+# even blocks needs no spare step.
 BLOCKS = 25
 # Proposals, whatever the size of the ground.
 PROPOSALS = 20_000
@@ -28,7 +29,8 @@ PRICE_TOGETHER, PRICE_APART = 8, 2
 # Of 256 branches those that may go to any robot. From one place some robots have to go beyond all
 # others; elsewhere what lies far away is seldom worth its way.
 FAR_TOGETHER, FAR_APART = 48, 4
-# Robots start together if they are nearer than so much of a share of the cells to one of them.
+# Robots start together if they are nearer to one of them, on average, than so much of a share of
+# the cells.
 TOGETHER = 0.05
 # Limit of the kernel on the cells.
 MOST_CELLS = 2**22
@@ -58,11 +60,11 @@ class Parting:
     ) -> None:
         self._cells, robots = np.flatnonzero(reached), len(starts)
         share = self._cells.size // robots
-        side = max(1, 2 * round((share / BLOCKS) ** 0.5 / 2))
+        side = max(1, 2 * round(sqrt(share / BLOCKS) / 2))
         offsets = np.array([1, reached.shape[1], -1, -reached.shape[1]], np.int64)
         self._blocks = blocks_of(lattice.steps.ravel(), offsets, self._cells, side)
         self._starts = self._blocks.of[list(starts)].astype(np.int64)
-        # Blocks that are not handed over one by one any more differ by less than half of one.
+        # At the end a block is handed over only where loads differ by less than half of one.
         self._cold = max(4, side**4 // 8)
         self._hot = max((share // WIDE) ** 2, 2 * self._cold)
         # From the start that is nearest to the one farthest from it.
