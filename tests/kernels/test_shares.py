@@ -1,4 +1,4 @@
-"""Blocks of a ground and shares in them: complete, even, and the same again."""
+"""Blocks of a ground and shares in them: complete, connected, even, and the same again."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ def blocked(free, start, side):
 
 
 def shared(blocks, starts, proposals=5_000, hot=400, far=64, seed=0):
-    """The owner of each block, and the loads."""
+    """The owner of each block, the robots that have it, and the loads."""
     owner = np.empty(blocks.own.size, np.int64)
     starts = np.array(starts, np.int64)
-    loads = share_blocks(blocks, starts, proposals, hot, 4, 20, far, stream_of(seed), owner)
-    return owner, loads
+    sets, loads = share_blocks(blocks, starts, proposals, hot, 4, 20, far, stream_of(seed), owner)
+    return owner, sets >> np.arange(len(starts))[:, None] & 1 > 0, loads
 
 
 @given(data=st.data())
@@ -62,7 +62,7 @@ def test_blocks_are_connected_squares_and_leave_nothing_out(data):
 
 @given(data=st.data())
 @examples(40)
-def test_every_block_has_an_owner_whose_load_it_is(data):
+def test_what_a_robot_has_is_connected_with_its_start_and_is_its_load(data):
     free = free_cells(data)
     cells = ground(CoverageLattice.from_free(free).steps, free)
     if not cells:
@@ -70,15 +70,19 @@ def test_every_block_has_an_owner_whose_load_it_is(data):
     blocks, of = blocked(free, cells[0], data.draw(st.integers(1, 3)))
     starts = data.draw(st.lists(st.sampled_from(cells), min_size=2, max_size=5))
     seed = data.draw(st.integers(0, 9))
-    owner, loads = shared(blocks, [of[start] for start in starts], 2_000, seed=seed)
-    robots = range(len(starts))
-    assert np.isin(owner, robots).all()
-    # A load is a robot's own blocks, and ways to them.
-    for robot in robots:
-        mine = int(blocks.own[owner == robot].sum())
-        assert mine <= loads[robot] <= mine + blocks.passing.sum()
-        if not mine:
+    begins = [of[start] for start in starts]
+    owner, has, loads = shared(blocks, begins, 2_000, seed=seed)
+    assert has[owner, np.arange(owner.size)].all()
+    for robot, start in enumerate(begins):
+        mine = owner == robot
+        if not mine.any():
+            assert np.flatnonzero(has[robot]).tolist() == [start]
             assert loads[robot] == 0
+            continue
+        assert loads[robot] == np.where(mine, blocks.own, blocks.passing)[has[robot]].sum()
+        part = CoverageLattice.from_free(np.isin(of, np.flatnonzero(has[robot]))).steps
+        reached = naive.distances(part, tuple(np.argwhere(of == start)[0].tolist()))
+        assert set(np.unique([of[cell] for cell in reached])) == set(np.flatnonzero(has[robot]))
 
 
 def test_one_robot_goes_to_each_of_three_rooms_at_the_ends_of_corridors():
@@ -88,7 +92,7 @@ def test_one_robot_goes_to_each_of_three_rooms_at_the_ends_of_corridors():
     for room in rooms:
         free[room] = True
     blocks, of = blocked(free, (14, 14), 3)
-    owner, loads = shared(blocks, [of[14, 14]] * 3)
+    owner, _, loads = shared(blocks, [of[14, 14]] * 3)
     owners = [set(owner[of[room]].ravel().tolist()) for room in rooms]
     assert sorted(map(len, owners)) == [1, 1, 1]
     assert set.union(*owners) == {0, 1, 2}
@@ -98,7 +102,7 @@ def test_one_robot_goes_to_each_of_three_rooms_at_the_ends_of_corridors():
 
 def test_loads_of_robots_in_one_corner_are_even():
     blocks, of = blocked(np.ones((40, 40), np.bool_), (0, 0), 4)
-    _, loads = shared(blocks, [of[0, 0]] * 4, proposals=20_000)
+    *_, loads = shared(blocks, [of[0, 0]] * 4, proposals=20_000)
     assert loads.max() <= 1.15 * 1600 / 4
     assert loads.sum() <= 1.12 * 1600
 
@@ -109,7 +113,7 @@ def test_robots_of_one_room_go_beyond_each_other_where_far_ones_are_asked():
     free[:4, :4] = free[3, 4:40] = free[:, 40:] = True
     blocks, of = blocked(free, (0, 0), 3)
     starts = [of[0, 0], of[0, 3], of[3, 0], of[3, 3]]
-    _, loads = shared(blocks, starts, proposals=20_000)
+    *_, loads = shared(blocks, starts, proposals=20_000)
     assert loads.min() > 0.5 * loads.max()
 
 

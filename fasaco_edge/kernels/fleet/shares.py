@@ -295,8 +295,8 @@ def share_blocks(
     far: int,
     random: NDArray[np.uint64],
     owner: NDArray[np.int64],
-) -> NDArray[np.int64]:
-    """Share blocks among robots; return their loads, int64 (k,).
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Share blocks among robots.
 
     Args:
         blocks: of a connected ground.
@@ -307,6 +307,10 @@ def share_blocks(
         far: of 256 branches those that go to the best of all robots, not of the nearest.
         random: stream, uint64 (1,); advanced.
         owner: int64 (m,), out: who has each block.
+
+    Returns:
+        the robots that own or pass each block or start in it, a bit each, int64 (m,), and the loads
+        of the robots, int64 (k,).
     """
     count, robots = blocks.own.size, starts.size
     sets, loads = np.zeros(count, np.int64), np.zeros(robots, np.int64)
@@ -340,4 +344,4 @@ def share_blocks(
                 among = robots if bits & 255 < far else 1 + (bits >> 8) % NEAREST
                 _hand_over_branch(blocks, shares, memory, block, among, limit)
         heat -= max(heat // COOLING, 1)
-    return loads
+    return sets, loads

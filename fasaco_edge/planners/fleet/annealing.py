@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from fasaco_edge.grid.lattice import CoverageLattice
 from fasaco_edge.kernels.fleet.annealing import anneal
-from fasaco_edge.kernels.fleet.chance import MOST_ROBOTS
 from fasaco_edge.kernels.fleet.walks import STEP, Walks, add_tour, driven, walks_of
 from fasaco_edge.planners.cost import CoverageCost
 from fasaco_edge.planners.fleet.tours import Tour
@@ -52,13 +51,8 @@ AT_FIRST, FEWEST = 12_000, 2
 UNEVEN, FULL, FULL_FROM = 32, 256, 0.77
 # Pieces of one annealing, after each of which the walks are compared; most proposals of a piece.
 PIECES, MOST_PROPOSALS = 8, 100_000
-# Limits of the kernels on cells, and on what a quarter-turn in each of them may cost in all.
-MOST_CELLS, MOST_COST = 2**22, 2**29
-
-
-def can_anneal(robots: int, cells: int) -> bool:
-    """Tell whether so many robots and cells can be taken."""
-    return 2 <= robots <= MOST_ROBOTS and cells < MOST_CELLS
+# Limit of the kernels on what a quarter-turn in each cell may cost in all.
+MOST_COST = 2**29
 
 
 class FleetWalks:

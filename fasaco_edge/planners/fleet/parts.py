@@ -32,12 +32,12 @@ FAR_TOGETHER, FAR_APART = 48, 4
 # Robots start together if they are nearer to one of them, on average, than so much of a share of
 # the cells.
 TOGETHER = 0.05
-# Limit of the kernel on the cells.
+# Limit of the kernels on the cells.
 MOST_CELLS = 2**22
 
 
 def can_part(robots: int, cells: int) -> bool:
-    """Tell whether so many robots and cells can be taken."""
+    """Tell whether the kernels take so many robots and cells: to be parted, and annealed."""
     return 2 <= robots <= MOST_ROBOTS and cells < MOST_CELLS
 
 

@@ -19,10 +19,11 @@ from numpy.typing import NDArray
 
 from fasaco_edge.grid.lattice import CoverageLattice
 from fasaco_edge.planners.cost import MICROSECONDS, SearchWork
-from fasaco_edge.planners.fleet.annealing import DOUBLED, FleetWalks, can_anneal
+from fasaco_edge.planners.fleet.annealing import DOUBLED, FleetWalks
 from fasaco_edge.planners.fleet.bound import longest_bound
 from fasaco_edge.planners.fleet.first_tours import FirstTours, Fleet
 from fasaco_edge.planners.fleet.pairs import Pairs
+from fasaco_edge.planners.fleet.parts import can_part
 from fasaco_edge.planners.fleet.tours import Tour, TourGround
 from fasaco_edge.planners.paper.colony import ColonyConfig
 from fasaco_edge.planners.planner import AnyOf, SearchProgress, StoppingCriterion, WorkLimit
@@ -79,7 +80,7 @@ class Sharing:
     ) -> Iterator[list[Tour]]:
         """Find tours of all robots and improve them together; yield them after each piece."""
         cost, seed, robots = self._fleet.cost, self._fleet.seed, len(self._fleet.starts)
-        if not can_anneal(robots, self.cells):
+        if not can_part(robots, self.cells):
             tours = first.find(generation, pool)
             yield tours
         else:
