@@ -45,7 +45,7 @@ class FleetRobot(Drive):
             parts=mission.fleet.parts,
             radius_m=CONFIG.footprint.robot_radius_m,
             ahead=tuple((x, y) for x, y in mission.next_metres().tolist()),
-            waits_for=mission.giving_way.waits_for,
+            waits_for=mission.waits_for,
         )
 
     def tick(self, after=1.0):

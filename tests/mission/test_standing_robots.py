@@ -12,7 +12,7 @@ from fasaco_edge.mission.core.events import MapReceived, MemberHeard
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
 from fasaco_edge.mission.fleet.members import Members
 from fasaco_edge.mission.fleet.shared import TILE_BYTES
-from fasaco_edge.mission.fleet.traffic import OLD_S, PATIENCE_S
+from fasaco_edge.mission.fleet.traffic import OLD_S, PATIENCE_S, STANDS_S
 from fasaco_edge.mission.map.reachable_area import ReachableArea
 from tests.mission.world import CONFIG, Drive, building, pose_at
 
@@ -66,7 +66,7 @@ def test_where_a_silent_robot_is_only_the_map_shows(area, members):
     assert members.closed(area, RADIUS_M) is None
 
 
-def test_one_stopped_beside_another_is_blocked_by_it_though_the_paths_lead_past():
+def test_one_stopped_beside_another_plans_around_it_though_the_paths_lead_past():
     drive = Drive((2, 4), config=replace(CONFIG, robot="r1"))
     drive.tell(MapReceived(building(*["." * 24] * 5)), pose_at(2, 4))
     drive.plan()
@@ -74,11 +74,49 @@ def test_one_stopped_beside_another_is_blocked_by_it_though_the_paths_lead_past(
     # Two cells behind it, where its path does not lead.
     behind = member((4.5 - (col - 4)) * CELL_M, (2.5 - (row - 2)) * CELL_M)
     for _ in range(int(PATIENCE_S) + 1):
-        assert drive.mission.giving_way.waits_for == ""
+        assert not drive.mission.fleet.others.is_avoided("r2")
         drive.tell(pose_at(2, 4), behind, after=1.0)
-    drive.tell(pose_at(2, 4), behind, after=1.0)
-    assert drive.mission.giving_way.waits_for == "r2"
-    assert "stands in the way" in drive.mission.reason
+        if drive.request is not None:
+            drive.plan()
+    assert drive.mission.fleet.others.is_avoided("r2")
+    assert len(drive.mission.route.path.ahead) > 1
+
+
+def test_one_that_has_waited_beside_another_gets_the_time_to_drive_on():
+    # Two such stood for minutes: the time of the wait counted as if they could not drive.
+    drive = Drive((2, 4), config=replace(CONFIG, robot="r1"))
+    drive.tell(MapReceived(building(*["." * 24] * 5)), pose_at(2, 4))
+    drive.plan()
+    row, col = drive.walk[1]
+    x, y = (col + 0.5) * CELL_M, (row + 0.5) * CELL_M
+    for _ in range(int(PATIENCE_S)):
+        drive.tell(pose_at(2, 4), member(x, y), after=1.0)
+        assert drive.mission.giving_way.waits_for == "r2"
+    # Now it stands where the path does not lead.
+    behind = member((8.5 - col) * CELL_M, (4.5 - row) * CELL_M)
+    for _ in range(int(PATIENCE_S)):
+        drive.tell(pose_at(2, 4), behind, after=1.0)
+        if drive.request is not None:
+            drive.plan()
+        assert drive.mission.giving_way.waits_for == ""
+    assert len(drive.mission.route.path.ahead) > 1
+
+
+def test_one_that_is_waited_for_but_is_jammed_is_planned_around():
+    # Nobody moved again: the first by name goes first, and could not.
+    drive = Drive((2, 4), config=replace(CONFIG, robot="r1"))
+    drive.tell(MapReceived(building(*["." * 24] * 5)), pose_at(2, 4))
+    drive.plan()
+    row, col = drive.walk[1]
+    x, y = (col + 0.5) * CELL_M, (row + 0.5) * CELL_M
+    away = (x + (col - 4) * CELL_M, y + (row - 2) * CELL_M)
+    jammed = replace(member(x, y), robot="r0", ahead=(away,), waits_for="r1")
+    for _ in range(int(PATIENCE_S + STANDS_S) + 2):
+        drive.tell(pose_at(2, 4), jammed, after=1.0)
+        if drive.request is not None:
+            drive.plan()
+    assert drive.mission.giving_way.waits_for == ""
+    assert len(drive.mission.route.path.ahead) > 1
 
 
 def test_who_waits_while_others_sweep_all_that_is_left_is_done_and_leads_nowhere():

@@ -81,6 +81,13 @@ def test_one_that_stops_for_this_robot_is_waited_for_by_the_second_alone():
     assert seen("r1", EAST, heard("r2", *there, waits_for="r1"), "r2").is_blocked
 
 
+def test_one_that_has_no_path_and_cannot_make_way_is_not_waited_for():
+    # Each waited for the other for ever: it had no place to go to.
+    stands = heard("r1", (0.6, 0.0), waits_for="r2")
+    assert seen("r2", EAST, stands, "r1").is_blocked
+    assert seen("r1", [(0.6, 0.0)], heard("r2", *EAST, waits_for="r1"), "r2").is_on_path
+
+
 def test_one_on_the_path_of_a_robot_that_waits_for_a_third_stays():
     other = heard("r1", (1.2, 0.0), (0.0, 0.0), waits_for="r3")
     held = seen("r2", [(0.0, 0.0)], other)
@@ -111,6 +118,16 @@ def test_one_that_stands_in_the_way_is_named():
 def at(cell):
     """The middle of a cell."""
     return (cell[1] + 0.5) * 0.25, (cell[0] + 0.5) * 0.25
+
+
+def test_a_path_planned_around_one_that_stands_is_driven_though_it_passes_near():
+    other = heard("r2", (0.4, 0.45))
+    for is_avoided in (False, True):
+        near = {"r2": Neighbour(other, 0.0, 9.0, PACE_S_M, is_avoided)}
+        held = obstruction("r1", RADIUS_M, PACE_S_M, spaced(EAST), near, "")
+        assert (held is None) == is_avoided
+    near = {"r2": Neighbour(heard("r2", (0.4, 0.3)), 0.0, 9.0, PACE_S_M, True)}
+    assert obstruction("r1", RADIUS_M, PACE_S_M, spaced(EAST), near, "").is_blocked
 
 
 def test_a_refuge_lies_off_discs_and_paths_and_is_reached_past_none_of_them():
@@ -169,6 +186,22 @@ def test_one_that_is_nearer_to_the_other_than_its_cell_is_gets_away_past_cells_n
     assert way is not None
     assert way.tolist() == [[0, 4], [1, 4], [1, 5], [1, 6]]
     assert refuge(area, (0, 4), at((0, 4)), RADIUS_M, near, lattice.centres) is None
+
+
+def test_cells_far_from_one_robot_are_no_way_through_another():
+    # A corridor: r1 stands in it, and r2 comes from the other side.
+    free = np.zeros((3, 24), np.bool_)
+    free[1] = True
+    lattice = CoverageLattice.from_free(free, 0.25)
+    area = ReachableArea.around(lattice, (1, 8))
+    near = {
+        name: Neighbour(other, 0.0, 0.0, PACE_S_M)
+        for name, other in (
+            ("r1", heard("r1", at((1, 5)))),
+            ("r2", heard("r2", at((1, 12)), at((1, 7)))),
+        )
+    }
+    assert refuge(area, (1, 8), at((1, 8)), RADIUS_M, near, lattice.centres) is None
 
 
 def test_a_refuge_is_sought_no_farther_than_the_cells_around_the_robot():

@@ -161,10 +161,10 @@ class FleetVoice:
         stamped = mission.pose
         if stamped is None or not mission.ledger.frame:
             return
-        way = mission.giving_way
-        key = mission.state, mission.fleet.number, mission.shared.epoch, way.waits_for
+        is_near, waits_for = mission.giving_way.is_near, mission.waits_for
+        key = mission.state, mission.fleet.number, mission.shared.epoch, waits_for
         is_news, is_due = key != self._said, now - self._told_at >= PERIOD_S
-        if now - self._said_at < LEAST_PERIOD_S or not (is_news or is_due or way.is_near):
+        if now - self._said_at < LEAST_PERIOD_S or not (is_news or is_due or is_near):
             return
         self._said, self._said_at = key, now
         most = FEW_TILES if is_news else 0
@@ -197,7 +197,7 @@ class FleetVoice:
             ),
             radius_m=self._radius_m,
             ahead=tuple((round(x, 3), round(y, 3)) for x, y in mission.next_metres().tolist()),
-            waits_for=way.waits_for,
+            waits_for=waits_for,
             origin=self._origin,
         )
         self._publisher.put(encode_json(member))

@@ -228,6 +228,8 @@ class Executive:
         orders.reopen()
         self._share(cell, at_once=True)
         while orders.order_state.stage is not Stage.RETURNING:
+            if orders.waits_for_others:
+                return self._wait_for_others(update)
             try:
                 problem = orders.problem(cell, route.path_to_keep)
             except NothingToCover:
@@ -247,6 +249,11 @@ class Executive:
             self._reason = request.reason
             return Decision(plan=request, path=update)
         return self._return_home(cell, update)
+
+    def _wait_for_others(self, update: PathUpdate | None) -> Decision:
+        """Stand until others have swept what is left, or this robot has a part again."""
+        rest = self._rest(State.COVERING, "others sweep what is left")
+        return replace(rest, path=rest.path or update)
 
     def _share(self, cell: Cell, *, at_once: bool = False) -> str:
         """Divide the rest among the fleet if due; return why a plan is wanted, or ""."""

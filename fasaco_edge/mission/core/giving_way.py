@@ -60,8 +60,8 @@ class GivingWay:
         self._since = self._sought_at = 0.0
         self._refuge: Cell | None = None
         self._has_work = True
-        # Its place, and since when it has had a path there.
-        self._place, self._came_at = (math.inf, math.inf), 0.0
+        # Its place, and since when it has had a path there and was free to drive.
+        self._place, self._free_since = (math.inf, math.inf), 0.0
 
     def line(self) -> Points:
         """Return the next metres, from the robot's place on, points (x, y) [m], float64 (n, 2)."""
@@ -99,7 +99,7 @@ class GivingWay:
         | it has no place, or no other robot is within NEAR_M | goes on |
         | it is on its way to a refuge, for PATIENCE_S at most | goes there |
         | another robot keeps it from going on (``traffic.obstruction``) | waits or makes way |
-        | it has stood on its path for PATIENCE_S beside another robot | is blocked by that |
+        | it was free to drive, and stood for PATIENCE_S beside another robot | is blocked by that |
         | none of these | goes on |
         """
         self._has_work = has_work
@@ -120,9 +120,9 @@ class GivingWay:
         return None
 
     def _note_place(self, here: tuple[float, float], now: float) -> None:
-        """Note where the robot is, and since when it has had a path there."""
+        """Note where the robot is, and since when it has been free to drive on from there."""
         if math.dist(here, self._place) > MOVED_M or len(self._cells()) < 2:
-            self._place, self._came_at = here, now
+            self._place, self._free_since = here, now
 
     def _is_underway(self, here: tuple[float, float], now: float) -> bool:
         """Tell whether the robot drives to its refuge."""
@@ -143,10 +143,14 @@ class GivingWay:
         found = obstruction(
             self._robot, self._radius_m, pace_s_m, spaced(line), neighbours, self.waits_for
         )
-        if found is None and now - self._came_at > PATIENCE_S and len(line) > 1:
+        if found is None and self._hangs(now) and len(line) > 1:
             # It should drive: its line passes nearer than its cells, or it is stopped by a sensor.
             return self._beside(here, neighbours)
         return found
+
+    def _hangs(self, now: float) -> bool:
+        """Tell whether the robot stands though it has long been free to drive."""
+        return now - self._free_since > PATIENCE_S
 
     def _beside(
         self, here: tuple[float, float], neighbours: Mapping[str, Neighbour]
@@ -173,12 +177,13 @@ class GivingWay:
         self.waits_for, self.reason = found.robot, found.reason
         has_path = len(route.path.cells) > 0
         route.set_aside()
-        waited_s = now - self._since
-        stands_s = neighbours[found.robot].stands_s
-        if found.is_blocked and waited_s > PATIENCE_S and stands_s > STANDS_S:
+        is_long = now - self._since > PATIENCE_S or self._hangs(now)
+        # While it is held it stands for that reason: let go, it has all the time to drive again.
+        self._free_since = now
+        # Also one that is to go first: it may be jammed, and the wait for it without end.
+        if is_long and neighbours[found.robot].stands_s > STANDS_S:
             self._fleet.others.avoid(found.robot)
-        is_due = found.is_on_path or max(waited_s, now - self._came_at) > PATIENCE_S
-        if is_due and now - self._sought_at >= AGAIN_S:
+        if (found.is_on_path or is_long) and now - self._sought_at >= AGAIN_S:
             self._sought_at = now
             way = refuge(area, cell, here, self._radius_m, neighbours, area.lattice.centres)
             to = None if way is None else (int(way[-1, 0]), int(way[-1, 1]))

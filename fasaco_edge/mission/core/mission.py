@@ -273,6 +273,14 @@ class Mission:
         line = self.giving_way.line()[1:]
         return rotated_points(line, self._rotation.deg) if len(line) else line
 
+    @property
+    def waits_for(self) -> str:
+        """Name of the robot that this one waits or makes way for, or that sweeps what is left."""
+        is_underway = len(self.route.path.ahead) > 1
+        if self.giving_way.waits_for or is_underway or not self._orders.waits_for_others:
+            return self.giving_way.waits_for
+        return self.fleet.busiest(self._orders.open_cells)
+
     def open_cells(self) -> int:
         """Return the number of cells still to be swept, by this robot or another."""
         return self._orders.left()

@@ -9,7 +9,7 @@ as distances).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from fasaco_edge.grid.lattice import Cell, CoverageLattice
 from fasaco_edge.kernels.fleet.split import ways_from
+from fasaco_edge.mission.core.events import Part
 
 # With more cells every second, third ... is used; on larger lattices there are fewer rounds.
 MOST_CELLS, MOST_SEARCHED = 2_000, 3_000_000
@@ -64,6 +65,31 @@ class Division:
     def names(self) -> tuple[str, ...]:
         """The names of the robots."""
         return tuple(robot.name for robot in self.robots)
+
+    @classmethod
+    def of(cls, parts: Iterable[Part]) -> Division:
+        """Return a division as others tell of it."""
+        parts = sorted(parts, key=lambda part: part.robot)
+        robots = tuple(Robot(part.robot, part.seed, part.step_s) for part in parts)
+        seeds, handicaps_s = (part.seed for part in parts), (part.handicap_s for part in parts)
+        return cls(robots, tuple(seeds), tuple(handicaps_s))
+
+    @property
+    def parts(self) -> tuple[Part, ...]:
+        """The division as others are told."""
+        told = zip(self.robots, self.seeds, self.handicaps_s, strict=True)
+        return tuple(Part(robot.name, seed, s, robot.step_s) for robot, seed, s in told)
+
+    def busiest(self, owners: NDArray[np.int8], robot: str) -> str:
+        """Return which robot but ``robot`` owns most of some cells; "" for none.
+
+        Args:
+            owners: int8 (n,), the index of each cell's robot.
+            robot: a name.
+        """
+        cells = np.bincount(owners, minlength=len(self.robots)).tolist()
+        others = {name: n for name, n in zip(self.names, cells, strict=True) if name != robot}
+        return max(others, key=lambda name: others[name], default="")
 
     def owners(self, lattice: CoverageLattice) -> NDArray[np.int8]:
         """Return the index of each cell's robot, int8 (rows, cols)."""

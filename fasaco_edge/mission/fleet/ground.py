@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from fasaco_edge.grid.changes import carried
 from fasaco_edge.grid.geometry import Window
 from fasaco_edge.grid.lattice import COVERABLE, UNKNOWN, Cell, CoverageLattice
+from fasaco_edge.kernels.fleet.split import FAR, ways_from
 from fasaco_edge.mission.coverage.ledger import TILE
 from fasaco_edge.mission.fleet.shared import MOST_ROBOTS, MOST_TILES_OF_ONE, TILE_BYTES
 from fasaco_edge.mission.map.reachable_area import ReachableArea
@@ -65,6 +66,37 @@ class SharedGround:
                 bits = np.frombuffer(packed, np.uint8)
                 merged[place] = merged[place] | bits if place in merged else bits
         return merged
+
+
+def viewpoint(
+    area: ReachableArea, joint: ReachableArea, wanted: NDArray[np.bool_], cell: Cell
+) -> Cell | None:
+    """Return where to look for the nearest wanted cell beyond a robot's own area; None for none.
+
+    That is the last cell (row, col) of its own area on the shortest way there.
+
+    Args:
+        area: what it can reach itself.
+        joint: that with the ground of others.
+        wanted: cells of the joint area, bool (rows, cols).
+        cell: the robot's cell.
+    """
+    beyond = wanted & joint.reachable
+    beyond[area.lattice.window.slices_in(joint.lattice.window)] &= ~area.reachable
+    if not beyond.any() or not area.contains(cell):
+        return None
+    lattice = joint.lattice
+    row, col = lattice.local(cell)
+    ways = ways_from(lattice.steps, row * lattice.window.cols + col)
+    nearest = int(np.where(beyond.ravel(), ways, FAR).argmin())
+    at = divmod(nearest, lattice.window.cols)
+    way = joint.shortest_path(cell, (at[0] + lattice.window.row0, at[1] + lattice.window.col0))
+    seen = cell
+    for step in map(tuple, way.tolist()):
+        if not area.contains(step):
+            break
+        seen = step
+    return seen
 
 
 class GroundTelling:

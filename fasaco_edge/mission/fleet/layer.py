@@ -18,7 +18,9 @@ from fasaco_edge.grid.lattice import Cell
 from fasaco_edge.mission.core.events import MemberHeard, Part
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
 from fasaco_edge.mission.fleet.division import Division, Robot, divide
+from fasaco_edge.mission.fleet.ground import viewpoint
 from fasaco_edge.mission.fleet.members import GONE_S, Member, Members
+from fasaco_edge.mission.fleet.remainder import Remainder
 from fasaco_edge.mission.map.map_state import MapState
 from fasaco_edge.mission.map.reachable_area import ReachableArea, anchor_cell
 
@@ -72,8 +74,7 @@ class FleetLayer:
         # Number of own cells that others had swept at the last plan; version of the shared progress
         # at the last check.
         self._taken, self._counted = 0, 0
-        # Whether the last division gave this robot a part; number of cells left at that time.
-        self._had_part, self._left = False, 0
+        self._remainder = Remainder()
 
     @property
     def members(self) -> dict[str, Member]:
@@ -85,29 +86,63 @@ class FleetLayer:
         """Whether other robots are at work on the remaining area."""
         return self._division is not None
 
-    def mine(self, cells: NDArray[np.bool_], area: ReachableArea) -> NDArray[np.bool_]:
-        """Return which cells are this robot's to sweep; all of them if its part has none.
+    def busiest(self, open_cells: OpenCells) -> str:
+        """Return the name of the other robot with most cells left in its part; "" for none."""
+        area, division = self._map.area, self._division
+        if area is None or division is None:
+            return ""
+        joint, left = self._left(open_cells, area)
+        return division.busiest(self._owners_on(division, joint)[left], self._robot)
 
-        Cells that it has given up are left to the others, while there are any.
+    def viewpoint(self, open_cells: OpenCells, cell: Cell) -> Cell | None:
+        """Return where to look for this robot's part, where others alone see it; None for none."""
+        area, division = self._map.area, self._division
+        if area is None or division is None:
+            return None
+        joint, left = self._left(open_cells, area)
+        return viewpoint(area, joint, left & self._of_me(division, joint), cell)
+
+    def _left(
+        self, open_cells: OpenCells, area: ReachableArea
+    ) -> tuple[ReachableArea, NDArray[np.bool_]]:
+        """Return the joint area, and which of its cells are left and untried, bool (rows, cols)."""
+        joint = self.others.ground.joint(area)
+        left = open_cells(joint.lattice.window) & joint.reachable
+        inside = area.lattice.window.slices_in(joint.lattice.window)
+        left[inside] = self.untried(left[inside], area)
+        return joint, left
+
+    @property
+    def others_go_on(self) -> bool:
+        """Whether all that is left is others' to sweep, and becomes less."""
+        return self._division is not None and self._remainder.others_go_on
+
+    def mine(self, cells: NDArray[np.bool_], area: ReachableArea) -> NDArray[np.bool_]:
+        """Return which cells are this robot's to sweep.
+
+        All of them if its part has none and the others do not go on. Cells that it has given up
+        are left to the others.
         """
         if self._division is None:
             return cells
-        cells = self._untried(cells, area)
+        cells = self.untried(cells, area)
         part = cells & self._is_own(self._division, area)
-        return part if (part & area.reachable).any() else cells
+        return part if self.others_go_on or (part & area.reachable).any() else cells
 
     def mine_to_sweep(
         self, cells: NDArray[np.bool_], unvisited: NDArray[np.bool_], area: ReachableArea
     ) -> NDArray[np.bool_]:
         """Return on which cells the floor is this robot's to sweep, visited or not.
 
-        Those of its part; all of them if none of its part is unvisited, as for ``mine``: wherever
-        its path leads to a cell, the floor there is its own, too.
+        Those of its part; all of them if none of its part is unvisited and the others do not go on,
+        as for ``mine``: wherever its path leads to a cell, the floor there is its own, too.
         """
         if self._division is None:
             return cells
         own = self._is_own(self._division, area)
-        has_work = (self._untried(unvisited, area) & own & area.reachable).any()
+        if self.others_go_on:
+            return cells & own
+        has_work = (self.untried(unvisited, area) & own & area.reachable).any()
         return cells & own if has_work else cells
 
     def give_up(self, cells: NDArray[np.bool_], area: ReachableArea) -> None:
@@ -136,13 +171,13 @@ class FleetLayer:
         if not (at_once or now - self._looked_at >= LOOK_S):
             return self._why_by_taken()
         self._looked_at = now
-        joint, before = self.others.ground.joint(area), self._division
-        left = open_cells(joint.lattice.window) & joint.reachable
+        (joint, left), before = self._left(open_cells, area), self._division
         inside = area.lattice.window.slices_in(joint.lattice.window)
-        left[inside] = self._untried(left[inside], area)
+        own = left if before is None else left & self._of_me(before, joint)
+        self._remainder.note(int(left.sum()), int(own.sum()), now)
         if newer := self._newer():
             self.why, self.number, self.by = LATER, newer.division, newer.by
-            self._division = _division_of(newer.parts)
+            self._division = Division.of(newer.parts)
         else:
             robots = self._robots(joint, cell, now)
             if not (why := self._why_anew(joint, left, robots, now, at_once=at_once)):
@@ -151,25 +186,16 @@ class FleetLayer:
             self.number = min(max(self.number, self._newest_heard()) + 1, MOST_NUMBER)
             several = len(robots) > 1
             self._division = divide(joint.lattice, left, robots, before) if several else None
-        own = left if before is None else left & self._of_me(before, joint)
         self._divided_at, self._owners = now, (None, self._owners[1])
         self._taken = self._count_taken()
         after = left if self._division is None else left & self._of_me(self._division, joint)
-        self._had_part, self._left = bool(after.any()), int(np.count_nonzero(left))
+        self._remainder.note_division(int(left.sum()), int(after.sum()), now)
         return self.why if (own != after)[inside].any() else ""
 
     @property
     def parts(self) -> tuple[Part, ...]:
         """The newest division, as others are told."""
-        division = self._division
-        if division is None:
-            return ()
-        return tuple(
-            Part(robot.name, seed, handicap_s, robot.step_s)
-            for robot, seed, handicap_s in zip(
-                division.robots, division.seeds, division.handicaps_s, strict=True
-            )
-        )
+        return () if self._division is None else self._division.parts
 
     def owns(self, cell: Cell) -> bool:
         """Tell whether a cell is in this robot's part."""
@@ -265,7 +291,7 @@ class FleetLayer:
         cells = np.bincount(owners[left], minlength=len(division.robots))
         if not cells[division.names.index(self._robot)]:
             # If there was no part for it, there will be none soon after.
-            is_other = self._had_part or cells.sum() > self._left
+            is_other = self._remainder.had_part or cells.sum() > self._remainder.divided
             is_other |= now - self._divided_at >= EVEN_S
             return "own part is done" if left.any() and is_other else ""
         steps_s = np.array([robot.step_s for robot in division.robots])
@@ -273,7 +299,8 @@ class FleetLayer:
         is_uneven = (cells * steps_s).max() > even_s and now - self._divided_at >= EVEN_S
         return "parts have become uneven" if is_uneven else ""
 
-    def _untried(self, cells: NDArray[np.bool_], area: ReachableArea) -> NDArray[np.bool_]:
+    def untried(self, cells: NDArray[np.bool_], area: ReachableArea) -> NDArray[np.bool_]:
+        """Return the cells that this robot has not given up."""
         return cells & ~self._tried[1] if self._tried[0] is area else cells
 
     def _is_own(self, division: Division, area: ReachableArea) -> NDArray[np.bool_]:
@@ -321,12 +348,3 @@ class FleetLayer:
         if self._division is not None:
             swept = swept & self._is_own(self._division, area)
         return int(np.count_nonzero(swept))
-
-
-def _division_of(parts: tuple[Part, ...]) -> Division:
-    """Return a division as others tell of it."""
-    parts = tuple(sorted(parts, key=lambda part: part.robot))
-    robots = tuple(Robot(part.robot, part.seed, part.step_s) for part in parts)
-    return Division(
-        robots, tuple(part.seed for part in parts), tuple(part.handicap_s for part in parts)
-    )

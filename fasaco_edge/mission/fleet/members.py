@@ -87,6 +87,7 @@ class Members:
                 now - member.heard_at,
                 now - member.moved_at,
                 member.newest.step_s / self._cell_m,
+                self._avoided.get(name) == member.place,
             )
             for name, member in self.known.items()
             if not member.left_out and now - member.heard_at < OLD_S

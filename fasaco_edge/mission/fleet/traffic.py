@@ -48,12 +48,14 @@ class Neighbour(NamedTuple):
         age_s: age of the message [s].
         stands_s: how long it has stood [s].
         pace_s_m: its time for a metre [s/m].
+        is_avoided: whether paths are planned around it where it stands.
     """
 
     heard: MemberHeard
     age_s: float
     stands_s: float
     pace_s_m: float
+    is_avoided: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,9 +105,9 @@ def obstruction(
     | the other robot | this robot | decision |
     |---|---|---|
     | its path leads over this one; waits for this one or nobody | waits for it, or has no path; \
-not if each waits for the other and this one is first by name | makes way |
-    | has stopped, WAIT_M / 2 ahead or less; waits for this one | waits for it; is second by name \
-| goes on waiting |
+not if each waits for the other and this one has a path and is first by name | makes way |
+    | has stopped, WAIT_M / 2 ahead or less; waits for this one; has a path | waits for it; is \
+second by name | goes on waiting |
     | has stopped, WAIT_M / 2 ahead or less | comes nearer to it | is blocked, unless it waits for \
 another robot |
     | drives; both come too near within SLACK_S of each other | is WAIT_M from there or less, and \
@@ -131,15 +133,19 @@ NEARER_M farther than the other, or about as far and second by name | waits |
         is_held, is_first = waits_for == other, name < other
         holds_it = heard.waits_for == name
         is_over = _is_over(apart_m, clear_m)
-        is_its_turn = is_held and holds_it and is_first
+        is_its_turn = is_held and holds_it and is_first and len(line) > 1
         # The other cannot go on because of this robot, which waits or has no path.
         is_in_its_way = is_over and (holds_it or not heard.waits_for)
         if is_in_its_way and (is_held or len(line) == 1) and not is_its_turn:
             return Obstruction(other, is_on_path=True)
         if heard.waits_for or len(theirs) == 1 or near.stands_s > STANDS_S:
-            if not _comes_to(apart_m, clear_m):
+            # A path around it keeps clear of it at the middles of cells alone, and of its place
+            # when it was last seen to move.
+            passes_m = clear_m - CLEARANCE_M if near.is_avoided else clear_m
+            if not _comes_to(apart_m, passes_m):
                 continue
-            if is_held and holds_it and not is_first:
+            # One without a path would go if it could: for that nobody waits.
+            if is_held and holds_it and not is_first and len(theirs) > 1:
                 return Obstruction(other, is_on_path=is_over)
             blocked = blocked or Obstruction(other, is_blocked=True)
             continue
@@ -234,9 +240,9 @@ def refuge(
         theirs = spaced([(heard.x, heard.y), *heard.ahead])
         apart = np.hypot(*(points[:, None] - theirs[None]).transpose(2, 0, 1))
         is_free &= (apart >= clear_m).all(axis=1)
-        is_passable &= (apart[:, 0] >= clear_m) | here
-        # From too near it may go where it is farther.
-        is_passable |= apart[:, 0] > math.dist(place, (heard.x, heard.y)) + 1e-6
+        # From too near it may go where it is farther from that robot.
+        is_farther = apart[:, 0] > math.dist(place, (heard.x, heard.y)) + 1e-6
+        is_passable &= (apart[:, 0] >= clear_m) | here | is_farther
     closed = np.zeros(steps.shape, np.bool_)
     closed[tuple(at[~is_passable].T)] = True
     steps = _inside(without(steps, closed))

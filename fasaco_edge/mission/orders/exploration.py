@@ -57,11 +57,13 @@ class Exploration:
 
     Attributes:
         viewpoints: cells (row, col) to look from, not yet reached.
-        looked: cells already visited in search of the zone.
+        looked: cells already visited in search of the zone, or of ground that others see.
+        seeks_zone: whether the viewpoints are for a zone.
     """
 
     viewpoints: set[Cell] = field(default_factory=set)
     looked: set[Cell] = field(default_factory=set)
+    seeks_zone: bool = False
 
     def seek(self, zone: Zone | None, area: ReachableArea | None, cell: Cell) -> str:
         """Look for a path to an unreachable zone; return why a plan is wanted, or "".
@@ -76,8 +78,19 @@ class Exploration:
         if goal is None:
             return ""
         self.looked.add(goal)
-        self.viewpoints = {goal}
+        self.viewpoints, self.seeks_zone = {goal}, True
         return f"looking for a way to zone {zone.name!r}"
+
+    def look_beyond(self, viewpoint: Cell | None, cell: Cell) -> str:
+        """Look from where ground begins that others see; return why a plan is wanted, or "".
+
+        Each place is looked from once: what others tell may be wrong, or closed to this robot.
+        """
+        if viewpoint is None or any(_is_beside(viewpoint, at) for at in (cell, *self.looked)):
+            return ""
+        self.looked.add(viewpoint)
+        self.viewpoints, self.seeks_zone = {viewpoint}, False
+        return "looks for its part, which others see"
 
     def aim_at(self, viewpoints: set[Cell]) -> None:
         """Set the viewpoints."""
@@ -85,7 +98,7 @@ class Exploration:
 
     def end_if_reached(self, zone: Zone | None, area: ReachableArea) -> None:
         """Stop searching for a zone once it is reachable."""
-        if zone is not None and self.viewpoints and is_in_reach(zone, area):
+        if zone is not None and self.seeks_zone and is_in_reach(zone, area):
             self.viewpoints.clear()
 
     def skip_viewpoint(self) -> bool:
@@ -99,6 +112,11 @@ class Exploration:
         """Set the viewpoints in ``cells``, bool (rows, cols) of ``window``."""
         if self.viewpoints:
             cells |= mask_of(self.viewpoints, window)
+
+
+def _is_beside(cell: Cell, other: Cell) -> bool:
+    """Tell whether from a cell no more is seen than from another."""
+    return max(abs(cell[0] - other[0]), abs(cell[1] - other[1])) <= SEEN_AROUND
 
 
 def is_in_reach(zone: Zone, area: ReachableArea) -> bool:

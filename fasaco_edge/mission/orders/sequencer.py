@@ -78,6 +78,11 @@ class Sequencer:
         return self.order_state.stage is not Stage.RETURNING and self.left() > 0
 
     @property
+    def waits_for_others(self) -> bool:
+        """Whether all that is left is others' to sweep, who go on with it."""
+        return self._fleet.others_go_on and not self._left_to_me()
+
+    @property
     def ending(self) -> str:
         """How the order ended."""
         return self._run.ending
@@ -176,8 +181,11 @@ class Sequencer:
         return ReachableArea.around(replace(lattice, steps=without(lattice.steps, closed)), cell)
 
     def explore(self, cell: Cell) -> str:
-        """Look for a path to an unreachable zone; return why a plan is wanted, or ""."""
-        return self._run.exploration.seek(self.order_state.current_zone, self._map.area, cell)
+        """Look for a path to an unreachable zone or part; return why a plan is wanted, or ""."""
+        exploration = self._run.exploration
+        if reason := exploration.seek(self.order_state.current_zone, self._map.area, cell):
+            return reason
+        return exploration.look_beyond(self._fleet.viewpoint(self.open_cells, cell), cell)
 
     def open_cells(self, window: Window) -> NDArray[np.bool_]:
         """Return which cells of ``window`` still need a visit, coverable or not."""
@@ -261,7 +269,7 @@ class Sequencer:
         assert area is not None
         unswept = self._unswept(area.lattice.window) & area.reachable
         self._fleet.give_up(self._fleet.mine(unswept, area), area)
-        return not self._fleet.mine(unswept, area).any()
+        return not self._fleet.untried(unswept, area).any()
 
     def advance(self, now: float) -> None:
         """Continue with the next part: nothing more can be done in this one now."""

@@ -87,7 +87,8 @@ class FleetMember(Document, frozen=True):
         ahead: points x, y of the path's next metres [m], in the frame of the map.
         origin: where the origin of its map frame lies in the fleet's frame: x, y [m], the angle
             [deg]; without a frame of the fleet's own 0.
-        waits_for: name of the robot that it waits or makes way for; "" for none.
+        waits_for: name of the robot that it waits or makes way for, or that has most of what is
+            left, of which this one has no part; "" for none.
     """
 
     version: Annotated[int, Meta(ge=1)]

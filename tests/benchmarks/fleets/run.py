@@ -143,7 +143,7 @@ class FleetRobot:
             parts=mission.fleet.parts,
             radius_m=self.world.config.robot_radius_m,
             ahead=tuple((x, y) for x, y in mission.next_metres().tolist()),
-            waits_for=mission.giving_way.waits_for,
+            waits_for=mission.waits_for,
         )
 
 

@@ -1,0 +1,132 @@
+"""The end of a fleet's mission: who has no part left stands until others have swept it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from fasaco_edge.mission.core.events import MapReceived, Part
+from fasaco_edge.mission.fleet.ground import GroundTelling
+from fasaco_edge.mission.fleet.members import HANGING_S
+from fasaco_edge.mission.fleet.remainder import STUCK_S
+from tests.mission.fleets import FleetDrive, FleetRobot
+from tests.mission.test_fleet import tiles_of
+from tests.mission.world import building
+
+HALL = ["." * 24] * 12
+CELLS = [(row, col) for row in range(12) for col in range(24)]
+ALL_TO_R2 = (Part("r1", (0, 0), 1e6, 1.0), Part("r2", (6, 12), 0.0, 1.0))
+
+
+class Shared:
+    """A robot, r1, in a hall whose cells another one, r2, gives itself and sweeps one by one."""
+
+    def __init__(self):
+        fleet = FleetDrive(HALL, {"r1": (0, 0), "r2": (6, 12)})
+        self.ours, other = fleet.robots.values()
+        self._report, self.swept, self._number = other.report(), 0, 0
+
+    def run(self, seconds, sweeps=1):
+        for _ in range(seconds):
+            self._number += 1
+            self.swept += sweeps
+            report = replace(
+                self._report,
+                division=self._number,
+                by="r2",
+                parts=ALL_TO_R2,
+                tiles=tiles_of(CELLS[len(CELLS) - self.swept :]) if self.swept else (),
+                x=3.0 + 0.2 * (self._number % 2),
+            )
+            self.ours.tell(report, after=0.0)
+            self.ours.tick()
+
+
+def test_a_robot_without_a_part_stands_while_another_sweeps_what_is_left():
+    shared = Shared()
+    shared.run(40)
+    ours = shared.ours
+    plans = ours.mission.route.plans
+    shared.run(60)
+    assert (ours.mission.state, ours.mission.reason) == ("covering", "others sweep what is left")
+    assert not ours.walk
+    assert ours.mission.route.plans == plans
+    # By that others know that it does not hang.
+    assert ours.mission.waits_for == "r2"
+    shared.run(len(CELLS) - shared.swept)
+    assert ours.mission.state == "done"
+
+
+def test_what_another_leaves_is_swept_by_a_robot_without_a_part():
+    shared = Shared()
+    shared.run(40)
+    assert not shared.ours.walk
+    shared.run(int(STUCK_S) + 2, sweeps=0)
+    assert shared.ours.walk
+
+
+def test_a_robot_whose_part_others_alone_can_see_sweeps_what_it_sees():
+    # The east half is still unknown to it, and its part lies there.
+    ours = FleetRobot("r1", (0, 0), [row[:12] for row in HALL])
+    other = FleetRobot("r2", (6, 12), HALL)
+    report = replace(other.report(), ground=GroundTelling().next(other.mission.area, 100))
+    parts = (Part("r1", (6, 22), 0.0, 1.0), Part("r2", (6, 4), 0.0, 1.0))
+    for second in range(20):
+        place = 3.0 + 0.2 * (second % 2)
+        ours.tell(replace(report, division=second + 1, by="r2", parts=parts, x=place), after=0.0)
+        ours.tick()
+    assert ours.mission.reason != "others sweep what is left"
+    assert len(set(ours.driven)) > 10
+
+
+def test_a_robot_that_stands_for_want_of_a_part_stays_in_the_fleet():
+    fleet = FleetDrive(HALL, {"r1": (0, 0), "r2": (11, 23)})
+    fleet.run(5)
+    ours, other = fleet.robots.values()
+    report = replace(other.report(), ahead=(), waits_for="r1")
+    for _ in range(int(HANGING_S) + 4):
+        ours.tell(report, after=0.0)
+        ours.tick()
+    assert ours.mission.fleet.has_company
+
+
+def heard_from_the_east(other, number, to_r1):
+    """What r2 tells, who has swept the west half and sees the whole hall."""
+    seed = (6, 22) if to_r1 else (0, 0)
+    return replace(
+        other.report(),
+        ground=GroundTelling().next(other.mission.area, 100),
+        tiles=tiles_of([cell for cell in CELLS if cell[1] < 12]),
+        parts=(Part("r1", seed, 0.0 if to_r1 else 1e6, 1.0), Part("r2", (6, 14), 0.0, 1.0)),
+        division=number,
+        by="r2",
+        x=4.0 + 0.2 * (number % 2),
+    )
+
+
+@pytest.mark.parametrize("to_r1", [True, False], ids=["a part", "no part"])
+def test_a_robot_that_sees_nothing_left_goes_where_its_part_is_and_without_one_stands(to_r1):
+    ours = FleetRobot("r1", (6, 0), [row[:12] for row in HALL])
+    other = FleetRobot("r2", (6, 16), HALL)
+    for second in range(25):
+        ours.tell(heard_from_the_east(other, second + 1, to_r1), after=0.0)
+        ours.tick()
+    if to_r1:
+        # At the edge of what its map shows, on the way there; it has looked, and saw nothing new.
+        assert ours.cell[1] == 11
+        assert ours.mission.state == "done"
+    else:
+        assert ours.mission.reason == "others sweep what is left"
+        assert not ours.walk
+
+
+def test_a_robot_sweeps_its_part_once_it_has_come_to_see_it():
+    ours = FleetRobot("r1", (6, 0), [row[:12] for row in HALL])
+    other = FleetRobot("r2", (6, 16), HALL)
+    for second in range(60):
+        if ours.cell[1] == 10:
+            ours.tell(MapReceived(building(*HALL)), after=0.0)
+        ours.tell(heard_from_the_east(other, second + 1, True), after=0.0)
+        ours.tick()
+    assert max(col for _, col in ours.driven) > 18
