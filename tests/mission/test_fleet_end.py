@@ -6,10 +6,10 @@ from dataclasses import replace
 
 import pytest
 
-from fasaco_edge.mission.core.events import MapReceived, Part
+from fasaco_edge.mission.core.events import CommandReceived, MapReceived, Part
 from fasaco_edge.mission.fleet.ground import GroundTelling
 from fasaco_edge.mission.fleet.members import HANGING_S
-from fasaco_edge.mission.fleet.remainder import STUCK_S
+from fasaco_edge.mission.fleet.remainder import STUCK_S, Remainder
 from tests.mission.fleets import FleetDrive, FleetRobot
 from tests.mission.test_fleet import tiles_of
 from tests.mission.world import building
@@ -64,6 +64,30 @@ def test_what_another_leaves_is_swept_by_a_robot_without_a_part():
     assert not shared.ours.walk
     shared.run(int(STUCK_S) + 2, sweeps=0)
     assert shared.ours.walk
+
+
+@pytest.mark.parametrize(
+    "cells", [[9] * 50, [9, 8] * 25, range(50, 0, -1)], ids=["none", "up and down", "own"]
+)
+def test_a_robot_does_not_stand_again_for_others_that_did_not_go_on(cells):
+    remainder = Remainder()
+    for second in range(int(STUCK_S) + 2):
+        remainder.note(9 + 50 + second % 2, 0, float(second))
+    assert not remainder.others_go_on
+    for second, left in enumerate(cells):
+        remainder.note(left, 0, STUCK_S + 2 + second)
+        assert not remainder.others_go_on
+    remainder.note(40, 3, 100.0)
+    remainder.note(40, 0, 101.0)
+    assert remainder.others_go_on
+
+
+def test_a_robot_that_is_paused_tells_of_nobody_that_it_waits_for():
+    shared = Shared()
+    shared.run(40)
+    assert shared.ours.mission.waits_for == "r2"
+    shared.ours.tell(CommandReceived(1, "pause"), after=1.0)
+    assert (shared.ours.mission.state, shared.ours.mission.waits_for) == ("paused", "")
 
 
 def test_a_robot_whose_part_others_alone_can_see_sweeps_what_it_sees():

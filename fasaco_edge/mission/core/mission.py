@@ -16,7 +16,14 @@ from fasaco_edge.grid.rotation import rotated_points
 from fasaco_edge.mission.config import MissionConfig
 from fasaco_edge.mission.core.charging import BatteryGauge, Charging
 from fasaco_edge.mission.core.event_handler import EventHandler
-from fasaco_edge.mission.core.events import Decision, Event, MapReceived, PathUpdate, PoseReceived
+from fasaco_edge.mission.core.events import (
+    Decision,
+    Event,
+    MapReceived,
+    PathUpdate,
+    PoseReceived,
+    State,
+)
 from fasaco_edge.mission.core.executive import Executive
 from fasaco_edge.mission.core.giving_way import GivingWay
 from fasaco_edge.mission.core.in_dock import InDock
@@ -276,8 +283,8 @@ class Mission:
     @property
     def waits_for(self) -> str:
         """Name of the robot that this one waits or makes way for, or that sweeps what is left."""
-        is_underway = len(self.route.path.ahead) > 1
-        if self.giving_way.waits_for or is_underway or not self._orders.waits_for_others:
+        stands = self.state is State.COVERING and len(self.route.path.ahead) < 2
+        if self.giving_way.waits_for or not (stands and self._orders.waits_for_others):
             return self.giving_way.waits_for
         return self.fleet.busiest(self._orders.open_cells)
 

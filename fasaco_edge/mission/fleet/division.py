@@ -81,14 +81,14 @@ class Division:
         return tuple(Part(robot.name, seed, s, robot.step_s) for robot, seed, s in told)
 
     def busiest(self, owners: NDArray[np.int8], robot: str) -> str:
-        """Return which robot but ``robot`` owns most of some cells; "" for none.
+        """Return which robot but ``robot`` owns most of some cells; "" where none owns any.
 
         Args:
             owners: int8 (n,), the index of each cell's robot.
             robot: a name.
         """
         cells = np.bincount(owners, minlength=len(self.robots)).tolist()
-        others = {name: n for name, n in zip(self.names, cells, strict=True) if name != robot}
+        others = {name: n for name, n in zip(self.names, cells, strict=True) if n and name != robot}
         return max(others, key=lambda name: others[name], default="")
 
     def owners(self, lattice: CoverageLattice) -> NDArray[np.int8]:

@@ -5,7 +5,7 @@ A robot without a part stands while the others go on: it would be in their way.
 
 from __future__ import annotations
 
-# Others go on while the number of cells left has changed within this time [s].
+# Others go on as long as the cells left have become fewer within this time [s].
 STUCK_S = 30.0
 
 
@@ -13,7 +13,8 @@ class Remainder:
     """Follows what is left for a fleet.
 
     Attributes:
-        others_go_on: whether all that is left is others' to sweep, and becomes less.
+        others_go_on: whether all that is left is others' to sweep, and has become less. Once it has
+            not for STUCK_S, it counts as stuck until this robot has a part again.
         had_part: whether the last division gave this robot a part.
         divided: number of cells left at that time.
     """
@@ -21,16 +22,22 @@ class Remainder:
     def __init__(self) -> None:
         self.others_go_on = self.had_part = False
         self.divided = 0
-        self._cells, self._changed_at = 0, float("-inf")
+        # Fewest cells left since this robot has no part, and when they became so few; None while it
+        # has one. A number that goes up and down again is no progress.
+        self._least: tuple[int, float] | None = None
 
     def note(self, cells: int, own: int, now: float) -> None:
         """Take in the numbers of cells left, in all and in this robot's part.
 
         A part that other robots' maps show alone is a part: this robot has to come to see it.
         """
-        if cells != self._cells:
-            self._cells, self._changed_at = cells, now
-        self.others_go_on = cells > 0 and own == 0 and now - self._changed_at <= STUCK_S
+        if own > 0:
+            self._least, self.others_go_on = None, False
+            return
+        least, since = self._least or (cells, now)
+        is_stuck = now - since > STUCK_S
+        self._least = (cells, now) if cells < least and not is_stuck else (least, since)
+        self.others_go_on = cells > 0 and not is_stuck
 
     def note_division(self, cells: int, own: int, now: float) -> None:
         """Take in a new division, as ``note`` does."""
