@@ -10,6 +10,7 @@ from fasaco_edge.mission.core.events import CommandReceived, MapReceived, Part
 from fasaco_edge.mission.fleet.ground import GroundTelling
 from fasaco_edge.mission.fleet.members import HANGING_S
 from fasaco_edge.mission.fleet.remainder import STUCK_S, Remainder
+from fasaco_edge.mission.orders.order import MissionOrder, Zone
 from tests.mission.fleets import FleetDrive, FleetRobot
 from tests.mission.test_fleet import tiles_of
 from tests.mission.world import building
@@ -154,3 +155,19 @@ def test_a_robot_sweeps_its_part_once_it_has_come_to_see_it():
         ours.tell(heard_from_the_east(other, second + 1, True), after=0.0)
         ours.tick()
     assert max(col for _, col in ours.driven) > 18
+
+
+@pytest.mark.parametrize("late_s", [1, 4])
+def test_a_robot_waits_a_moment_for_the_map_that_shows_its_part(late_s):
+    ours = FleetRobot("r1", (6, 0), [row[:12] for row in HALL])
+    whole = Zone("hall", ((0.0, 0.0), (24.0, 0.0), (24.0, 12.0), (0.0, 12.0)))
+    ours.tell(CommandReceived(1, "start", MissionOrder((whole,))), after=0.0)
+    other = FleetRobot("r2", (6, 16), HALL)
+    there = 0
+    for second in range(40):
+        there += ours.cell[1] == 11
+        if there == late_s:
+            ours.tell(MapReceived(building(*HALL)), after=0.0)
+        ours.tell(heard_from_the_east(other, second + 1, True), after=0.0)
+        ours.tick()
+    assert max(col for _, col in ours.driven) > 11

@@ -229,13 +229,15 @@ class Executive:
         self._share(cell, at_once=True)
         while orders.order_state.stage is not Stage.RETURNING:
             if orders.waits_for_others:
-                return self._wait_for_others(update)
+                return self._wait("others sweep what is left", update)
             try:
                 problem = orders.problem(cell, route.path_to_keep)
             except NothingToCover:
                 if reason := orders.explore(cell):
                     route.want(reason)
                     continue
+                if orders.is_looking(cell, self._now):
+                    return self._wait("looks for its part, which others see", update)
                 orders.advance(self._now)
                 if orders.is_waiting or orders.order_state.stage is Stage.OVER:
                     route.drop()
@@ -250,9 +252,9 @@ class Executive:
             return Decision(plan=request, path=update)
         return self._return_home(cell, update)
 
-    def _wait_for_others(self, update: PathUpdate | None) -> Decision:
-        """Stand until others have swept what is left, or this robot has a part again."""
-        rest = self._rest(State.COVERING, "others sweep what is left")
+    def _wait(self, reason: str, update: PathUpdate | None) -> Decision:
+        """Stand for a while: a plan is wanted as before."""
+        rest = self._rest(State.COVERING, reason)
         return replace(rest, path=rest.path or update)
 
     def _share(self, cell: Cell, *, at_once: bool = False) -> str:

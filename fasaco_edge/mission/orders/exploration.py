@@ -16,6 +16,8 @@ from fasaco_edge.mission.orders.zones import in_zones
 
 # Cells this close to one from which nothing new was seen are not visited either [cells].
 SEEN_AROUND = 1
+# A robot looks so long at ground that others see: its map may come late [s].
+LOOKS_S = 6.0
 
 
 def frontier(area: ReachableArea) -> NDArray[np.bool_]:
@@ -64,6 +66,9 @@ class Exploration:
     viewpoints: set[Cell] = field(default_factory=set)
     looked: set[Cell] = field(default_factory=set)
     seeks_zone: bool = False
+    # The last viewpoint of ground that others see, and since when the robot is there.
+    _beyond: Cell | None = None
+    _there_since: float | None = None
 
     def seek(self, zone: Zone | None, area: ReachableArea | None, cell: Cell) -> str:
         """Look for a path to an unreachable zone; return why a plan is wanted, or "".
@@ -90,7 +95,16 @@ class Exploration:
             return ""
         self.looked.add(viewpoint)
         self.viewpoints, self.seeks_zone = {viewpoint}, False
+        self._beyond, self._there_since = viewpoint, None
         return "looks for its part, which others see"
+
+    def is_looking(self, cell: Cell, now: float) -> bool:
+        """Tell whether the robot stands and looks at ground that others see."""
+        if self._beyond is None or not _is_beside(self._beyond, cell):
+            return False
+        if self._there_since is None:
+            self._there_since = now
+        return now - self._there_since <= LOOKS_S
 
     def aim_at(self, viewpoints: set[Cell]) -> None:
         """Set the viewpoints."""

@@ -187,6 +187,10 @@ class Sequencer:
             return reason
         return exploration.look_beyond(self._fleet.viewpoint(self.open_cells, cell), cell)
 
+    def is_looking(self, cell: Cell, now: float) -> bool:
+        """Tell whether the robot waits for a map that shows ground that others see."""
+        return self._run.exploration.is_looking(cell, now)
+
     def open_cells(self, window: Window) -> NDArray[np.bool_]:
         """Return which cells of ``window`` still need a visit, coverable or not."""
         open_cells = self._unswept(window)
