@@ -106,14 +106,14 @@ def test_a_robot_whose_part_others_alone_can_see_sweeps_what_it_sees():
 
 
 def test_a_robot_that_stands_for_want_of_a_part_stays_in_the_fleet():
-    fleet = FleetDrive(HALL, {"r1": (0, 0), "r2": (11, 23)})
-    fleet.run(5)
-    ours, other = fleet.robots.values()
-    report = replace(other.report(), ahead=(), waits_for="r1")
+    shared, other = Shared(), FleetRobot("r2", (6, 12), HALL)
+    shared.run(40)
     for _ in range(int(HANGING_S) + 4):
-        ours.tell(report, after=0.0)
-        ours.tick()
-    assert ours.mission.fleet.has_company
+        shared.run(1)
+        assert not shared.ours.walk
+        other.tell(shared.ours.report(), after=1.0)
+    (ours,) = other.mission.fleet.members.values()
+    assert ours.absence(other.now) == ""
 
 
 def heard_from_the_east(other, number, to_r1):

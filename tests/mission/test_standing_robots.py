@@ -23,6 +23,14 @@ def member(x, y):
     return MemberHeard("r2", state="covering", x=x, y=y, epoch=1, open_cells=9, radius_m=0.1)
 
 
+def planned():
+    """A robot, r1, in a hall that has its first path."""
+    drive = Drive((2, 4), config=replace(CONFIG, robot="r1"))
+    drive.tell(MapReceived(building(*["." * 24] * 5)), pose_at(2, 4))
+    drive.plan()
+    return drive
+
+
 @pytest.fixture
 def area():
     return ReachableArea.around(CoverageLattice.from_free(np.ones((9, 40), bool), CELL_M), (0, 0))
@@ -67,9 +75,7 @@ def test_where_a_silent_robot_is_only_the_map_shows(area, members):
 
 
 def test_one_stopped_beside_another_plans_around_it_though_the_paths_lead_past():
-    drive = Drive((2, 4), config=replace(CONFIG, robot="r1"))
-    drive.tell(MapReceived(building(*["." * 24] * 5)), pose_at(2, 4))
-    drive.plan()
+    drive = planned()
     row, col = drive.walk[1]
     # Two cells behind it, where its path does not lead.
     behind = member((4.5 - (col - 4)) * CELL_M, (2.5 - (row - 2)) * CELL_M)
@@ -84,9 +90,7 @@ def test_one_stopped_beside_another_plans_around_it_though_the_paths_lead_past()
 
 def test_one_that_has_waited_beside_another_gets_the_time_to_drive_on():
     # Two such stood for minutes: the time of the wait counted as if they could not drive.
-    drive = Drive((2, 4), config=replace(CONFIG, robot="r1"))
-    drive.tell(MapReceived(building(*["." * 24] * 5)), pose_at(2, 4))
-    drive.plan()
+    drive = planned()
     row, col = drive.walk[1]
     x, y = (col + 0.5) * CELL_M, (row + 0.5) * CELL_M
     for _ in range(int(PATIENCE_S)):
@@ -104,9 +108,7 @@ def test_one_that_has_waited_beside_another_gets_the_time_to_drive_on():
 
 def test_one_that_is_waited_for_but_is_jammed_is_planned_around():
     # Nobody moved again: the first by name goes first, and could not.
-    drive = Drive((2, 4), config=replace(CONFIG, robot="r1"))
-    drive.tell(MapReceived(building(*["." * 24] * 5)), pose_at(2, 4))
-    drive.plan()
+    drive = planned()
     row, col = drive.walk[1]
     x, y = (col + 0.5) * CELL_M, (row + 0.5) * CELL_M
     away = (x + (col - 4) * CELL_M, y + (row - 2) * CELL_M)
@@ -120,9 +122,7 @@ def test_one_that_is_waited_for_but_is_jammed_is_planned_around():
 
 
 def test_who_waits_while_others_sweep_all_that_is_left_is_done_and_leads_nowhere():
-    drive = Drive((2, 4), config=replace(CONFIG, robot="r1"))
-    drive.tell(MapReceived(building(*["." * 24] * 5)), pose_at(2, 4))
-    drive.plan()
+    drive = planned()
     x, y = ((at + 0.5) * CELL_M for at in drive.walk[1][::-1])
     ahead = replace(member(x, y), waits_for="r3")
     for _ in range(3):
@@ -140,9 +140,7 @@ def test_who_waits_while_others_sweep_all_that_is_left_is_done_and_leads_nowhere
 
 
 def test_one_that_makes_way_drives_to_the_middle_of_its_refuge():
-    drive = Drive((2, 4), config=replace(CONFIG, robot="r1"))
-    drive.tell(MapReceived(building(*["." * 24] * 5)), pose_at(2, 4))
-    drive.plan()
+    drive = planned()
     x, y = ((at + 0.5) * CELL_M for at in drive.walk[1][::-1])
     drive.tell(pose_at(2, 4), replace(member(x, y), waits_for="r3"), after=1.0)
     assert drive.mission.giving_way.waits_for == "r2"

@@ -159,12 +159,13 @@ class FleetVoice:
     def publish(self, mission: Mission, now: float) -> None:
         """Publish a message if due; the caller catches failures."""
         stamped = mission.pose
-        if stamped is None or not mission.ledger.frame:
+        is_too_soon = now - self._said_at < LEAST_PERIOD_S
+        if is_too_soon or stamped is None or not mission.ledger.frame:
             return
         is_near, waits_for = mission.giving_way.is_near, mission.waits_for
         key = mission.state, mission.fleet.number, mission.shared.epoch, waits_for
         is_news, is_due = key != self._said, now - self._told_at >= PERIOD_S
-        if now - self._said_at < LEAST_PERIOD_S or not (is_news or is_due or is_near):
+        if not (is_news or is_due or is_near):
             return
         self._said, self._said_at = key, now
         most = FEW_TILES if is_news else 0

@@ -176,19 +176,17 @@ class Executive:
             "waits for one in the map's"
         )
 
-    def _rest(self, state: State, reason: str) -> Decision:
-        """Rest in a state; a driving robot is stopped."""
+    def _rest(self, state: State, reason: str, update: PathUpdate | None = None) -> Decision:
+        """Rest in a state; a driving robot is stopped, else ``update`` is published."""
         self._state, self._reason = state, reason
-        return Decision(path=self.route.stop(reason, self._now))
+        return Decision(path=self.route.stop(reason, self._now) or update)
 
     def _settle(self, update: PathUpdate | None) -> Decision:
         """Stop: all is covered, or the rest waits for a retry."""
         orders = self.orders
         if orders.is_waiting:
-            rest = self._rest(State.BLOCKED, orders.waiting_reason())
-        else:
-            rest = self._rest(State.DONE, orders.ending)
-        return replace(rest, path=rest.path or update)
+            return self._rest(State.BLOCKED, orders.waiting_reason(), update)
+        return self._rest(State.DONE, orders.ending, update)
 
     def _report_driving(self) -> None:
         """Set the state of a robot that has work to do."""
@@ -226,10 +224,12 @@ class Executive:
         """Request the wanted plan; if nothing is left to cover, continue with the order."""
         route, orders = self.route, self.orders
         orders.reopen()
-        self._share(cell, at_once=True)
+        # One that stands, as others go on or for a map, has no more reason in each step.
+        stands = self._state is State.COVERING and not len(route.path.cells)
+        self._share(cell, at_once=not stands)
         while orders.order_state.stage is not Stage.RETURNING:
             if orders.waits_for_others:
-                return self._wait("others sweep what is left", update)
+                return self._rest(State.COVERING, "others sweep what is left", update)
             try:
                 problem = orders.problem(cell, route.path_to_keep)
             except NothingToCover:
@@ -237,7 +237,8 @@ class Executive:
                     route.want(reason)
                     continue
                 if orders.is_looking(cell, self._now):
-                    return self._wait("looks for its part, which others see", update)
+                    why = "looks for its part, which others see"
+                    return self._rest(State.COVERING, why, update)
                 orders.advance(self._now)
                 if orders.is_waiting or orders.order_state.stage is Stage.OVER:
                     route.drop()
@@ -251,11 +252,6 @@ class Executive:
             self._reason = request.reason
             return Decision(plan=request, path=update)
         return self._return_home(cell, update)
-
-    def _wait(self, reason: str, update: PathUpdate | None) -> Decision:
-        """Stand for a while: a plan is wanted as before."""
-        rest = self._rest(State.COVERING, reason)
-        return replace(rest, path=rest.path or update)
 
     def _share(self, cell: Cell, *, at_once: bool = False) -> str:
         """Divide the rest among the fleet if due; return why a plan is wanted, or ""."""

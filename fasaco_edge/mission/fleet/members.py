@@ -10,11 +10,12 @@ from numpy.typing import NDArray
 
 from fasaco_edge.errors import FleetError
 from fasaco_edge.grid.geometry import Window
+from fasaco_edge.grid.lattice import Cell
 from fasaco_edge.mission.core.events import MemberHeard, State
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
 from fasaco_edge.mission.fleet.ground import SharedGround
 from fasaco_edge.mission.fleet.shared import MOST_ROBOTS
-from fasaco_edge.mission.fleet.traffic import CLEARANCE_M, OLD_S, Neighbour
+from fasaco_edge.mission.fleet.traffic import CLEARANCE_M, OLD_S, Neighbour, without
 from fasaco_edge.mission.map.reachable_area import ReachableArea
 
 # Timeouts of a silent robot, and of one that should move; motion that counts [s], [s], [m].
@@ -138,6 +139,15 @@ class Members:
             apart = np.hypot((cols + 0.5) * cell_m - x, (rows + 0.5) * cell_m - y)
             closed[near.slices_in(window)] |= apart < clear_m
         return closed
+
+    def passable(self, area: ReachableArea, cell: Cell, radius_m: float) -> ReachableArea:
+        """Return an area as a robot in ``cell`` can drive it: around robots in the way."""
+        closed = self.closed(area, radius_m)
+        if closed is None or not area.contains(cell):
+            return area
+        lattice = area.lattice
+        closed[lattice.local(cell)] = False
+        return ReachableArea.around(replace(lattice, steps=without(lattice.steps, closed)), cell)
 
     def hear(self, event: MemberHeard, now: float) -> str:
         """Take in another robot's message; return why it requires a plan, or "".

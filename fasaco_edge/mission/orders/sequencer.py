@@ -14,7 +14,6 @@ from fasaco_edge.mission.config import MissionConfig
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
 from fasaco_edge.mission.coverage.unreached import Unreached, UnreachedFinder
 from fasaco_edge.mission.fleet.layer import FleetLayer
-from fasaco_edge.mission.fleet.traffic import without
 from fasaco_edge.mission.map.map_state import MapState
 from fasaco_edge.mission.map.reachable_area import ReachableArea, anchor_cell
 from fasaco_edge.mission.orders.exploration import Exploration, frontier
@@ -173,12 +172,8 @@ class Sequencer:
 
     def passable(self, area: ReachableArea, cell: Cell) -> ReachableArea:
         """Return an area as a robot in ``cell`` can drive it: around robots in the way."""
-        closed = self._fleet.others.closed(area, self._config.footprint.robot_radius_m)
-        if closed is None or not area.contains(cell):
-            return area
-        lattice = area.lattice
-        closed[lattice.local(cell)] = False
-        return ReachableArea.around(replace(lattice, steps=without(lattice.steps, closed)), cell)
+        radius_m = self._config.footprint.robot_radius_m
+        return self._fleet.others.passable(area, cell, radius_m)
 
     def explore(self, cell: Cell) -> str:
         """Look for a path to an unreachable zone or part; return why a plan is wanted, or ""."""
@@ -262,10 +257,12 @@ class Sequencer:
         run.same_again = run.same_again + 1 if cells == run.left_over else 1
         run.left_over = cells
         is_given_up = cells > 0 and run.same_again > MAX_SAME_LEFTOVERS
+        if is_given_up and run.exploration.skip_viewpoint():
+            return False
         if is_given_up and self._fleet.has_company:
             # Other robots may leave before they have swept their parts: those come first.
             is_given_up, run.same_again = self._leave_to_others(), 0
-        return is_given_up and not run.exploration.skip_viewpoint()
+        return is_given_up
 
     def _leave_to_others(self) -> bool:
         """Give up what this robot has tried in vain; tell whether nothing untried is left."""
