@@ -1,18 +1,27 @@
 """Ground of a fleet: what others can reach counts where a robot's own map shows nothing."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from fasaco_edge.errors import FleetError
 from fasaco_edge.grid.lattice import BLOCKED, CoverageLattice
+from fasaco_edge.mission.core.events import MapReceived, MemberHeard
+from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
 from fasaco_edge.mission.fleet import ground as shared_ground
 from fasaco_edge.mission.fleet.division import Division, Robot, divide
 from fasaco_edge.mission.fleet.ground import GroundTelling, SharedGround
-from fasaco_edge.mission.fleet.shared import TILE_BYTES
+from fasaco_edge.mission.fleet.members import Members
+from fasaco_edge.mission.fleet.shared import MOST_ROBOTS, MOST_TILES_OF_ONE, TILE_BYTES
+from fasaco_edge.mission.map.inputs import PATIENCE_S
 from fasaco_edge.mission.map.reachable_area import ReachableArea
 from tests.mission.fleets import FleetDrive
-from tests.mission.world import building, reachable_cells
+from tests.mission.world import CELL, building, pose_at, reachable_cells
 
 CORRIDOR = ["." * 40] * 3
+# A whole tile that r2 can reach.
+LARGER = MemberHeard("r2", frame="map", epoch=1, ground=(((0, 0), b"\xff" * TILE_BYTES),))
 
 
 def area_of(*rows, cell=(0, 0)):
@@ -29,7 +38,7 @@ def cells_of(area):
 def test_what_another_can_reach_joins_on_where_the_own_map_shows_nothing():
     own, other = area_of("....", "...."), area_of("...." + "." * 60, "...#" + "." * 60)
     ground = SharedGround()
-    ground.hear("r2", GroundTelling().next(other, 10), {"r2"})
+    ground.hear("r2", GroundTelling().next(other, 10))
     joint = ground.joint(own)
     # The other's obstacle lies where the own map shows free floor.
     assert cells_of(joint) == cells_of(own) | cells_of(other)
@@ -40,20 +49,62 @@ def test_what_another_can_reach_joins_on_where_the_own_map_shows_nothing():
 def test_the_own_map_decides_where_it_shows_a_wall():
     own, other = area_of("..#", "..#"), area_of("......", "......")
     ground = SharedGround()
-    ground.hear("r2", GroundTelling().next(other, 10), {"r2"})
+    ground.hear("r2", GroundTelling().next(other, 10))
     joint = ground.joint(own)
     assert cells_of(joint) == cells_of(own)
     assert (joint.lattice.states[:2, 2] == BLOCKED).all()
 
 
-def test_ground_that_is_lost_again_is_told_and_that_of_one_that_is_forgotten_is_dropped():
+def test_ground_that_is_lost_again_is_told():
     own, telling, ground = area_of("...."), GroundTelling(), SharedGround()
     larger, smaller = area_of("." * 9), area_of("." * 6)
     for told in (larger, smaller):
-        ground.hear("r2", telling.next(told, 10), {"r2"})
+        ground.hear("r2", telling.next(told, 10))
     assert cells_of(ground.joint(own)) == cells_of(smaller)
-    ground.hear("r3", (), {"r3"})
-    ground.hear("r3", telling.next(own, 10), {"r3"})
+
+
+@pytest.fixture
+def members():
+    """What r1 knows of r2, which can reach more than itself."""
+    ledger = MissionLedger(CELL, CELL)
+    ledger.move_to("map")
+    ledger.shared.begin(1)
+    members = Members("r1", ledger, CELL)
+    members.hear(LARGER, 1.0)
+    return members
+
+
+def test_ground_of_a_robot_that_no_longer_fits_is_dropped_as_of_one_that_is_forgotten(members):
+    own = area_of("....")
+    assert cells_of(members.ground.joint(own)) > cells_of(own)
+    members.hear(replace(LARGER, frame="elsewhere"), 2.0)
+    assert cells_of(members.ground.joint(own)) == cells_of(own)
+    members.hear(LARGER, 3.0)
+    assert cells_of(members.ground.joint(own)) > cells_of(own)
+    for number in range(MOST_ROBOTS):
+        members.hear(MemberHeard(f"x{number}", frame="map", epoch=1), 10.0)
+    assert "r2" not in members.known
+    assert cells_of(members.ground.joint(own)) == cells_of(own)
+
+
+def test_ground_of_a_robot_whose_progress_finds_no_room_is_dropped(members):
+    own = area_of("....")
+    tiles = tuple(((row, 9), b"\xff" * TILE_BYTES) for row in range(MOST_TILES_OF_ONE + 1))
+    with pytest.raises(FleetError):
+        members.hear(replace(LARGER, tiles=tiles), 2.0)
+    assert cells_of(members.ground.joint(own)) == cells_of(own)
+
+
+def test_ground_told_in_another_frame_counts_no_longer_once_the_frame_is_left():
+    fleet = FleetDrive(["...."], {"r1": (0, 0)})
+    ours = fleet.robots["r1"]
+    fleet.tick()
+    ours.tell(LARGER)
+    ground, own = ours.mission.fleet.others.ground, area_of("....")
+    assert cells_of(ground.joint(own)) > cells_of(own)
+    for _ in range(int(PATIENCE_S) + 2):
+        ours.tell(MapReceived(building("....", frame="map2")), pose_at(0, 0, "map2"), after=1.0)
+    assert ours.mission.ledger.frame == "map2"
     assert cells_of(ground.joint(own)) == cells_of(own)
 
 
@@ -68,7 +119,7 @@ def test_tiles_are_told_a_few_at_a_time_and_changed_ones_first():
 def test_ground_far_away_of_a_robot_that_lies_takes_no_memory():
     own, ground = area_of("...."), SharedGround()
     all_set = b"\xff" * TILE_BYTES
-    ground.hear("r2", [((2**20, 2**20), all_set), ((1, 0), all_set)], {"r2"})
+    ground.hear("r2", [((2**20, 2**20), all_set), ((1, 0), all_set)])
     joint = ground.joint(own)
     assert joint.lattice.states.size <= own.lattice.states.size + shared_ground.MOST_ADDED
 

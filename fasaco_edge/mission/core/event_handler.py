@@ -168,6 +168,9 @@ class EventHandler:
         is_other_map = self.map.switch_frame()
         before = self.ledger.current.frame
         misfit = self.ledger.move_to(frame)
+        if before not in ("", frame):
+            # As the ledger forgets what they swept there.
+            self.fleet.others.ground.clear()
         if misfit is None and before not in ("", frame):
             why = f"map and poses are in frame {frame!r} now, no longer in {before!r}"
             self.begin_order(self.orders.order_state.in_other_frame(why))

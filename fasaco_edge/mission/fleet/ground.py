@@ -6,7 +6,7 @@ same area. This robot's own map decides where it shows anything; paths are plann
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable
+from collections.abc import Iterable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +16,7 @@ from fasaco_edge.grid.geometry import Window
 from fasaco_edge.grid.lattice import COVERABLE, UNKNOWN, Cell, CoverageLattice
 from fasaco_edge.kernels.fleet.split import FAR, ways_from
 from fasaco_edge.mission.coverage.ledger import TILE
-from fasaco_edge.mission.fleet.shared import MOST_ROBOTS, MOST_TILES_OF_ONE, TILE_BYTES
+from fasaco_edge.mission.fleet.shared import MOST_TILES_OF_ONE, TILE_BYTES
 from fasaco_edge.mission.map.reachable_area import ReachableArea
 
 # Limit on the cells that the ground of others may add to the lattice; beyond it is left out.
@@ -26,7 +26,7 @@ Placed = tuple[Cell, bytes]
 
 
 class SharedGround:
-    """The cells that other robots can reach.
+    """The cells that other robots can reach; its user drops robots that it keeps no longer.
 
     Attributes:
         version: counter of changes.
@@ -38,18 +38,24 @@ class SharedGround:
         # The last joint area, and what it was made of.
         self._joint: tuple[ReachableArea, int, ReachableArea] | None = None
 
-    def hear(self, robot: str, tiles: Iterable[Placed], members: Collection[str]) -> None:
+    def hear(self, robot: str, tiles: Iterable[Placed]) -> None:
         """Take in a robot's tiles, each with TILE_BYTES of bits; the newest of a place counts."""
-        for gone in self._robots.keys() - set(members):
-            del self._robots[gone]
-        if len(self._robots) >= MOST_ROBOTS and robot not in self._robots:
-            return
         known = self._robots.setdefault(robot, {})
         for place, bits in tiles:
             has_room = place in known or len(known) < MOST_TILES_OF_ONE
             if has_room and known.get(place) != bits:
                 known[place] = bits
                 self.version += 1
+
+    def drop(self, robot: str) -> None:
+        """Forget a robot's ground: it is in another frame, or the robot is kept no longer."""
+        if self._robots.pop(robot, None):
+            self.version += 1
+
+    def clear(self) -> None:
+        """Forget all ground: it lies in another frame."""
+        self._robots.clear()
+        self.version += 1
 
     def joint(self, area: ReachableArea) -> ReachableArea:
         """Return an area with the ground of others, where its map shows nothing."""

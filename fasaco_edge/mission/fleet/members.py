@@ -67,7 +67,7 @@ class Members:
 
     Attributes:
         known: the others, by name.
-        ground: the cells that they can reach.
+        ground: the cells that those of them can reach that fit.
     """
 
     def __init__(self, robot: str, ledger: MissionLedger, cell_m: float) -> None:
@@ -170,14 +170,16 @@ class Members:
         member = Member(event, now, left_out, place, moved_at, left_at)
         self.known[event.robot] = member
         if left_out:
+            self.ground.drop(event.robot)
             return ""
-        self.ground.hear(event.robot, event.ground, self.known)
         swept = event.robot, event.epoch, event.tiles
         try:
             is_open_again = self._ledger.shared.hear(*swept, self.known)
         except FleetError as error:
             self.known[event.robot] = replace(member, left_out=str(error))
+            self.ground.drop(event.robot)
             raise
+        self.ground.hear(event.robot, event.ground)
         return f"{event.robot}: cells must be swept again" if is_open_again else ""
 
     def division_numbers(self) -> list[int]:
@@ -201,3 +203,4 @@ class Members:
         if now - self.known[name].heard_at <= GONE_S:
             raise FleetError(f"{robot}: {MOST_ROBOTS} others of a fleet are heard at most")
         del self.known[name]
+        self.ground.drop(name)
