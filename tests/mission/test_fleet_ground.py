@@ -148,6 +148,36 @@ def test_a_robot_without_cells_gets_some_only_where_all_end_sooner(idle_at, help
     assert changed.any() == helps
 
 
+# 30 x 60 cells, of which r1 knows the first 40 columns, or sees a wall after them.
+WIDE = CoverageLattice.from_free(np.ones((30, 60), np.bool_))
+NARROW = CoverageLattice.from_free(np.ones((30, 40), np.bool_))
+WALLED = CoverageLattice.from_free(np.arange(60) != np.full((30, 1), 40))
+
+
+@pytest.mark.parametrize("own", [NARROW, WALLED], ids=["off the map", "behind a wall"])
+@pytest.mark.parametrize("step_s", [0.6, 1.2])
+@pytest.mark.parametrize("wide", [20, 40])
+def test_a_seed_out_of_reach_is_not_kept(own, step_s, wide):
+    """Its huge handicap gave all to one robot, on its map and on the other's to different ones."""
+    robots = [Robot("r1", (0, 0), step_s), Robot("r2", (29, 39), step_s)]
+    before = Division(tuple(robots), ((0, 0), (15, 50)), (0.0, 0.0))
+    wanted = np.zeros(own.steps.shape, np.bool_)
+    wanted[:, :wide] = True
+    after = divide(own, wanted, robots, before)
+    on_r1s, on_r2s = (after.owners(lattice)[:, :wide] for lattice in (own, WIDE))
+    assert (on_r1s == on_r2s).all()
+    assert np.bincount(on_r1s.ravel(), minlength=2).min() > 0.4 * wanted.sum()
+
+
+@pytest.mark.parametrize("own", [NARROW, WALLED], ids=["off the map", "behind a wall"])
+def test_cells_that_no_seed_reaches_go_by_handicap_whatever_the_pace(own):
+    robots = Robot("r1", (0, 0), 3.0), Robot("r2", (29, 39), 0.6)
+    seeds = (15, 50), (20, 50)
+    for handicaps_s, owner in (((0.0, 1000.0), 0), ((1000.0, 0.0), 1)):
+        owners = Division(robots, seeds, handicaps_s).owners(own)
+        assert (owners[:, :40] == owner).all()
+
+
 def test_all_robots_take_over_one_division():
     fleet = FleetDrive(CORRIDOR, {"r3": (0, 0), "r1": (0, 1), "r2": (0, 39)})
     fleet.run(8)

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.grid.lattice import Cell, CoverageLattice
-from fasaco_edge.kernels.fleet.split import ways_from
+from fasaco_edge.kernels.fleet.split import FAR, ways_from
 from fasaco_edge.mission.core.events import Part
 
 # With more cells every second, third ... is used; on larger lattices there are fewer rounds.
@@ -29,7 +29,11 @@ SNAP = 2
 # another robot, over the number of robots, counts as so much time of the last robot.
 STABLE, CHANGED = 0.9, 1.0
 
+# Travel time to a cell that cannot be reached [s].
+UNREACHED_S = np.float32(1e9)
+
 Seconds = NDArray[np.float32]
+Steps = NDArray[np.float32]
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,7 +101,8 @@ class Division:
         owners = np.zeros(lattice.steps.size, np.int8)
         # One robot at a time: large lattices would take much memory for many robots.
         for index, (robot, seed) in enumerate(zip(self.robots, self.seeds, strict=True)):
-            times_s = _times_s(lattice, seed, robot.step_s) + np.float32(self.handicaps_s[index])
+            times_s = _times_s(_ways(lattice, seed), np.float32(robot.step_s))
+            times_s += np.float32(self.handicaps_s[index])
             is_earlier = times_s < first
             owners[is_earlier] = index
             np.minimum(first, times_s, out=first)
@@ -136,6 +141,8 @@ def divide(
         kept = dict(
             zip(before.names, zip(before.seeds, before.handicaps_s, strict=True), strict=True)
         )
+        # A seed that others see and this robot cannot reach would take a huge handicap.
+        kept = {name: pair for name, pair in kept.items() if travel.has_ways_from(pair[0])}
         pairs = [kept.get(robot.name, (robot.cell, 0.0)) for robot in robots]
         seeds, old_s = [seed for seed, _ in pairs], np.array([s for _, s in pairs], np.float32)
         times_s = travel.times_s(seeds, steps_s)
@@ -200,14 +207,17 @@ def _owners_before(
     return owners
 
 
-def _times_s(lattice: CoverageLattice, start: Cell, step_s: float) -> Seconds:
-    """Return travel times from a cell [s], float32 (rows * cols,); huge where unreachable."""
+def _ways(lattice: CoverageLattice, start: Cell) -> Steps:
+    """Return the steps from a cell, float32 (rows * cols,); FAR where unreachable."""
     if not lattice.contains(start):
-        return np.full(lattice.steps.size, np.float32(1e9))
+        return np.full(lattice.steps.size, np.float32(FAR))
     row, col = _on_ground(lattice, *lattice.local(start))
-    ways = ways_from(lattice.steps, row * lattice.steps.shape[1] + col)
-    times: Seconds = ways.astype(np.float32) * np.float32(step_s)
-    return times
+    return ways_from(lattice.steps, row * lattice.steps.shape[1] + col).astype(np.float32)
+
+
+def _times_s(ways: Steps, steps_s: NDArray[np.float32] | np.float32) -> Seconds:
+    """Return the times of ways [s], float32 (k, n); UNREACHED_S where unreachable, at any pace."""
+    return np.where(ways < FAR, ways * steps_s, UNREACHED_S)
 
 
 def _on_ground(lattice: CoverageLattice, row: int, col: int) -> Cell:
@@ -236,16 +246,21 @@ class _Travel:
 
     def __init__(self, lattice: CoverageLattice, cells: NDArray[np.int64]) -> None:
         self.lattice, self.cells = lattice, cells
-        self._known: dict[Cell, Seconds] = {}
+        self._known: dict[Cell, Steps] = {}
 
     def times_s(self, starts: Sequence[Cell], steps_s: Sequence[float]) -> Seconds:
         """Return travel times from starts [s], float32 (k, n); huge where unreachable."""
-        for start in starts:
-            if start not in self._known:
-                self._known[start] = _times_s(self.lattice, start, 1.0)[self.cells]
-        found = np.array([self._known[start] for start in starts])
-        times: Seconds = found * np.array(steps_s, np.float32)[:, None]
-        return times
+        ways = np.array([self._ways_from(start) for start in starts])
+        return _times_s(ways, np.array(steps_s, np.float32)[:, None])
+
+    def has_ways_from(self, start: Cell) -> bool:
+        """Tell whether any of the cells can be reached from a start."""
+        return bool((self._ways_from(start) < FAR).any())
+
+    def _ways_from(self, start: Cell) -> Steps:
+        if start not in self._known:
+            self._known[start] = _ways(self.lattice, start)[self.cells]
+        return self._known[start]
 
 
 def _handicaps_s(
