@@ -23,6 +23,8 @@ RASTER_STEPS = 2048
 # The largest distance of a map, a pose or a path from the frame's origin [m]: UTM northings go up
 # to 10,000 km. ``protocol/limits.yaml`` has the same number.
 FARTHEST_M = 2e7
+# Limit of the indices of a lattice's cells: they, and sums of two of them, are int32.
+MOST_INDEX = 2**30
 
 # Default limit of a lattice.
 MAX_LATTICE_CELLS = 4_000_000

@@ -18,6 +18,7 @@ from fasaco_edge.errors import MapTooFar, MapTooLarge
 from fasaco_edge.grid.geometry import (
     FARTHEST_M,
     MAX_LATTICE_CELLS,
+    MOST_INDEX,
     GridGeometry,
     Raster,
     Window,
@@ -33,8 +34,6 @@ Cell = tuple[int, int]
 
 # A map that extends into a cell by less than this is taken to end before it [cells]: rounding.
 ROUNDING = 1e-6
-# Limit of cell indices: they, and sums of two of them, are int32.
-MOST_INDEX = 2**30
 
 # Limit on the pixels that robot and tool may span: above it, the tables for classifying a map take
 # more memory than the map itself, see ``kernels.lattice.classification``.

@@ -205,6 +205,7 @@ FLEET = Topic(
         "max_json_bytes",
         "max_fleet_tiles",
         "max_fleet_parts",
+        "max_fleet_index",
         "max_fleet_points",
         "queue_fleet",
     ),

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from fasaco_edge.errors import MapTooFar
-from fasaco_edge.grid.geometry import FARTHEST_M, GridGeometry, Pose2D, StampedPose
-from fasaco_edge.grid.lattice import MOST_INDEX, CoverageLattice, Footprint
+from fasaco_edge.grid.geometry import FARTHEST_M, MOST_INDEX, GridGeometry, Pose2D, StampedPose
+from fasaco_edge.grid.lattice import CoverageLattice, Footprint
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.mission.core.events import MapReceived, PoseReceived, State
 from tests.mission.world import CELL, CONFIG, Drive, building

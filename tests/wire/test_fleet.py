@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import pytest
 from hypothesis import given
@@ -14,7 +15,7 @@ from fasaco_edge.config.config import DaemonConfig, FleetConfig
 from fasaco_edge.config.robot import RobotConfig
 from fasaco_edge.daemon.loop.fleet import LEAST_SPACING_S, TILES, FleetEar, FleetVoice
 from fasaco_edge.errors import FleetError, MalformedMessage
-from fasaco_edge.mission.core.events import Part
+from fasaco_edge.mission.core.events import MapReceived, Part
 from fasaco_edge.wire.documents.fleet import CellTile, FleetMember, FleetPart, decode_member
 from fasaco_edge.wire.documents.json_text import encode_json
 from fasaco_edge.wire.limits import (
@@ -24,6 +25,8 @@ from fasaco_edge.wire.limits import (
     MAX_JSON_BYTES,
 )
 from tests.mission.fleets import FleetRobot
+from tests.mission.world import CELL, Drive, building, pose_at
+from tests.mission.world import CONFIG as WORLD
 from tests.wire.schemas import check
 
 TILE = CellTile(-1, 2, bytes(range(256)) * 2)
@@ -76,10 +79,10 @@ def test_it_comes_back_as_it_was_and_is_that_of_the_schema():
         {"parts": [["r1", 0, 0, 0.0, 0.0]]},
         {"origin": [0.0, 1e9, 0.0]},
         {"origin": [0.0, 0.0, 361.0]},
-        {"parts": [["r1", 0, 2**30, 0.0, 1.0]]},
+        {"parts": [["r1", 0, 2**30 + 1, 0.0, 1.0]]},
         {"parts": [["r1", 0, 0, 1e300, 1.0]]},
         {"parts": [["r1", 0, 0, 0.0, 1.0]] * (MAX_FLEET_PARTS + 1)},
-        {"swept": [[2**30, 0, "A" * 682 + "=="]]},
+        {"swept": [[2**24 + 1, 0, "A" * 682 + "=="]]},
         {"swept": [[0, 0, "A" * 682 + "=="]] * (MAX_FLEET_TILES + 1)},
     ],
     ids=str,
@@ -137,9 +140,10 @@ class Listener:
     """Keeps what is published."""
 
     def __init__(self):
-        self.heard = []
+        self.payloads, self.heard = [], []
 
     def put(self, payload):
+        self.payloads.append(payload)
         self.heard.append(decode_member(payload, "hall"))
 
 
@@ -154,6 +158,34 @@ def test_a_robot_tells_its_pace_as_it_is_now_and_after_forgetting_all_tiles_at_o
         voice.publish(robot.mission, now)
     assert [said.step_s for said in listener.heard] == [7.5] * 3
     assert [len(said.swept) for said in listener.heard] == [TILES] * 3
+
+
+@pytest.mark.parametrize("northing_m", [5_500_000, 9_999_000])
+def test_robots_on_a_map_in_utm_divide_its_cells(northing_m):
+    corner = round(northing_m / CELL), round(500_000 / CELL)
+    ends = {"r1": corner, "r2": (corner[0] + 3, corner[1] + 11)}
+    drives, ears = {}, {}
+    for name, cell in ends.items():
+        drives[name] = Drive(cell, config=replace(WORLD, robot=name))
+        drives[name].mission.shared.begin(1)
+        drives[name].tell(MapReceived(building(*["." * 12] * 4, at=corner)), pose_at(*cell))
+        drives[name].plan()
+        ears[name] = FleetEar(structs.replace(CONFIG, robot=RobotConfig(name=name)))
+    for now in range(4):
+        for name, drive in drives.items():
+            listener = Listener()
+            FleetVoice(listener, CONFIG).publish(drive.mission, float(now))
+            (payload,) = listener.payloads
+            sample = Sample(f"fasaco/@v1/{name}/fleet", payload)
+            for other in drives.keys() - {name}:
+                event = ears[other].event(sample)
+                assert event.misfit == ""
+                drives[other].tell(event, pose_at(*ends[other]), after=1.0)
+                if drives[other].request is not None:
+                    drives[other].plan()
+    parts = [drive.mission.fleet.parts for drive in drives.values()]
+    assert parts[0] == parts[1]
+    assert [part.robot for part in parts[0]] == ["r1", "r2"]
 
 
 def test_a_robot_that_floods_is_heard_at_its_rate():

@@ -15,6 +15,7 @@ from fasaco_edge.errors import FleetError, MalformedMessage
 from fasaco_edge.wire.documents.json_text import Document
 from fasaco_edge.wire.limits import (
     MAX_COORDINATE_M,
+    MAX_FLEET_INDEX,
     MAX_FLEET_PARTS,
     MAX_FLEET_POINTS,
     MAX_FLEET_TILES,
@@ -22,8 +23,10 @@ from fasaco_edge.wire.limits import (
 )
 
 FLEET_VERSION: Final = 1
-# Bytes of a tile of 64 x 64 cells, a bit each.
-TILE_BYTES: Final = 512
+# Edge of a tile [cells], and its bytes: a bit a cell.
+TILE: Final = 64
+TILE_BYTES: Final = TILE * TILE // 8
+MOST_TILE_INDEX: Final = MAX_FLEET_INDEX // TILE
 
 Coordinate = Annotated[float, Meta(ge=-MAX_COORDINATE_M, le=MAX_COORDINATE_M)]
 Point = tuple[Coordinate, Coordinate]
@@ -31,7 +34,8 @@ Angle = Annotated[float, Meta(ge=-360, le=360)]
 Text = Annotated[str, Meta(max_length=256)]
 Whole = Annotated[int, Meta(ge=0, le=2**31 - 1)]
 Pace = Annotated[float, Meta(ge=1e-3, le=3600)]
-Place = Annotated[int, Meta(ge=-(2**24), le=2**24)]
+CellIndex = Annotated[int, Meta(ge=-MAX_FLEET_INDEX, le=MAX_FLEET_INDEX)]
+TileIndex = Annotated[int, Meta(ge=-MOST_TILE_INDEX, le=MOST_TILE_INDEX)]
 
 
 class CellTile(msgspec.Struct, frozen=True, array_like=True):
@@ -42,8 +46,8 @@ class CellTile(msgspec.Struct, frozen=True, array_like=True):
         cells: 512 bytes in base64: a bit a cell, row by row, the first of eight the highest.
     """
 
-    row: Place
-    col: Place
+    row: TileIndex
+    col: TileIndex
     cells: Annotated[bytes, Meta(min_length=TILE_BYTES, max_length=TILE_BYTES)]
 
 
@@ -58,8 +62,8 @@ class FleetPart(msgspec.Struct, frozen=True, array_like=True):
     """
 
     robot: Text
-    row: Place
-    col: Place
+    row: CellIndex
+    col: CellIndex
     handicap_s: Annotated[float, Meta(ge=-1e9, le=1e9)]
     step_s: Pace
 
