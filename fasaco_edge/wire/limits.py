@@ -17,7 +17,7 @@ MAX_COORDINATE_M: Final = geometry.FARTHEST_M
 
 MIN_RESOLUTION_M: Final = geometry.MIN_RESOLUTION_M
 MAX_RESOLUTION_M: Final = geometry.MAX_RESOLUTION_M
-"""Edge of a grid's pixel [m]."""
+"""Edge of a grid's pixel, and of the cells of a fleet's robot [m]."""
 
 QUATERNION_TOLERANCE: Final = 0.01
 """How far the norm of a quaternion may be from 1."""

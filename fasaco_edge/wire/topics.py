@@ -203,6 +203,8 @@ FLEET = Topic(
     queues=Queues(daemon=64),
     limits=(
         "max_json_bytes",
+        "min_resolution_m",
+        "max_resolution_m",
         "max_fleet_tiles",
         "max_fleet_parts",
         "max_fleet_index",

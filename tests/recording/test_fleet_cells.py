@@ -95,3 +95,7 @@ def test_notes_come_back_and_what_is_none_is_refused():
     for wrong in (b"", blob[:-3], b"x" + blob, later):
         with pytest.raises(ValueError, match="notes of a fleet"):
             decode_notes(wrong)
+    for cell_m in (5e-324, 1e200):
+        robots = [msgspec.structs.replace(ROBOT, cell_m=cell_m)]
+        with pytest.raises(msgspec.ValidationError, match=r"at `\$\[3\]\[0\]\[2\]`"):
+            decode_notes(encode_notes(msgspec.structs.replace(batch, robots=robots)))

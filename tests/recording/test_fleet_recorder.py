@@ -21,6 +21,8 @@ from fasaco_edge.recording.fleet.recorder import FleetRecorder
 from fasaco_edge.recording.write.process import Output
 from fasaco_edge.recording.write.quota import DiskBudget
 from fasaco_edge.review.fleet import review_fleet
+from fasaco_edge.wire.documents.fleet import FleetPart
+from fasaco_edge.wire.limits import MAX_RESOLUTION_M, MIN_RESOLUTION_M
 from tests.support import viewer
 from tests.support.fleet_told import CELL_M, Teller, member
 from tests.support.processes import fasaco_edge
@@ -135,6 +137,24 @@ def test_one_that_floods_lies_or_sends_rubbish_harms_no_other(studio):
     assert by_name["good"].swept_m2 == pytest.approx(2 * CELL_M**2, abs=0.01)
     assert by_name["bad"].swept_m2 <= 0.1
     assert by_name["bad"].kb_s > 5 * by_name["good"].kb_s
+
+
+@pytest.mark.parametrize("cell_m", [5e-324, MIN_RESOLUTION_M, MAX_RESOLUTION_M, 1e200])
+def test_no_size_of_cells_ends_the_recording_of_the_others(studio, cell_m):
+    odd, good = Teller(studio.bus, "odd"), Teller(studio.bus, "good")
+    good.tell()
+    # As far away as rows and columns go.
+    odd.tell(cell_m=cell_m, cells=[(0, 0)], parts=(FleetPart("odd", 2**30, -(2**30), 0.0, 1.0),))
+    studio.until(lambda: studio.joined("good"))
+    studio.pass_time(0.3)
+    odd.stand(1e7, -1e7)
+    good.tell(cells=[(0, 0), (0, 1)])
+    studio.pass_time(1.3)
+    (part,) = studio.parts()
+    is_size = MIN_RESOLUTION_M <= cell_m <= MAX_RESOLUTION_M
+    assert studio.joined("odd") == is_size
+    assert any("odd: fleet: 1 refused" in line for line in log_of(part)) != is_size
+    assert "good" in {robot.name for robot in review_fleet([part]).figures.robots}
 
 
 def test_maps_of_many_robots_leave_room_in_a_part(studio, monkeypatch):

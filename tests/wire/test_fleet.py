@@ -66,6 +66,8 @@ def test_it_comes_back_as_it_was_and_is_that_of_the_schema():
         {"y": float("inf")},
         {"x": 1e9},
         {"cell_m": 0.0},
+        {"cell_m": 5e-324},
+        {"cell_m": 1e200},
         {"step_s": 0.0},
         {"epoch": 0},
         {"division": 2**31},

@@ -21,7 +21,7 @@ from fasaco_edge.recording import entities
 from fasaco_edge.recording.arrow import pa
 from fasaco_edge.recording.read.frames import chunks, column
 from fasaco_edge.recording.read.repair import HINT, open_part
-from fasaco_edge.wire.documents.fleet import CellTile
+from fasaco_edge.wire.documents.fleet import CellEdge, CellTile
 
 NOTES_VERSION: Final = 1
 # Largest content of a batch, checked while it is inflated [bytes].
@@ -82,7 +82,7 @@ class NotedRobot(msgspec.Struct, frozen=True, array_like=True):
 
     name: Text
     radius_m: float
-    cell_m: Annotated[float, Meta(gt=0)]
+    cell_m: CellEdge
     lattice_deg: float
     x: float
     y: float

@@ -20,6 +20,8 @@ from fasaco_edge.wire.limits import (
     MAX_FLEET_POINTS,
     MAX_FLEET_TILES,
     MAX_JSON_BYTES,
+    MAX_RESOLUTION_M,
+    MIN_RESOLUTION_M,
 )
 
 FLEET_VERSION: Final = 1
@@ -34,6 +36,7 @@ Angle = Annotated[float, Meta(ge=-360, le=360)]
 Text = Annotated[str, Meta(max_length=256)]
 Whole = Annotated[int, Meta(ge=0, le=2**31 - 1)]
 Pace = Annotated[float, Meta(ge=1e-3, le=3600)]
+CellEdge = Annotated[float, Meta(ge=MIN_RESOLUTION_M, le=MAX_RESOLUTION_M)]
 CellIndex = Annotated[int, Meta(ge=-MAX_FLEET_INDEX, le=MAX_FLEET_INDEX)]
 TileIndex = Annotated[int, Meta(ge=-MOST_TILE_INDEX, le=MOST_TILE_INDEX)]
 
@@ -97,7 +100,7 @@ class FleetMember(Document, frozen=True):
 
     version: Annotated[int, Meta(ge=1)]
     fleet: Text
-    cell_m: Annotated[float, Meta(gt=0)]
+    cell_m: CellEdge
     frame: Text
     state: Text
     x: Coordinate
