@@ -139,6 +139,33 @@ def test_robots_in_two_parts_of_a_building_share_theirs():
     assert division.lower_bound_steps == 64
 
 
+def pieces(count):
+    """A budget of pieces of work, as a clock is one: it does not ask which area they were of."""
+    left = [count]
+
+    def is_over(progress):
+        # A single tour has a limit of its own.
+        left[0] -= not progress.work.proposals
+        return left[0] < 0
+
+    return is_over
+
+
+def test_two_areas_share_the_budget_whichever_robots_come_first():
+    """All of it went to the area of the first robot: the longest walk was 18 % above the bound."""
+    free = np.random.default_rng(2).random((41, 40)) > 0.1
+    free[20], free[[0, 0, 40, 40], [0, 39, 0, 39]] = False, True
+    starts = [(0, 0), (0, 39), (40, 0), (40, 39)]
+    longest = []
+    for ordered in (starts, starts[2:] + starts[:2]):
+        fleet = Fleet(ordered, STEPS_ALONE)
+        division = divide(CoverageLattice.from_free(free), fleet, pieces(20))
+        check(free, ordered, division, returns=True)
+        longest.append(max(len(walk) - 1 for walk in division.walks))
+        assert longest[-1] <= 1.05 * division.lower_bound_steps
+    assert longest[0] == longest[1]
+
+
 def test_more_robots_than_cells_leave_some_where_they_are():
     free, starts = np.ones((1, 3), np.bool_), [(0, 0), (0, 1), (0, 2)]
     division = divide(CoverageLattice.from_free(free), Fleet(starts, STEPS_ALONE), rounds(3))
