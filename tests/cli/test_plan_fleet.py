@@ -9,6 +9,7 @@ import pytest
 from PIL import Image
 
 from fasaco_edge.cli import main
+from fasaco_edge.cli.console.arguments import Exit
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from maps.map_writer import write_map
@@ -70,20 +71,38 @@ def test_the_figures_are_those_of_the_walks(plan, grid, tmp_path, end):
         assert drawn.width > 300
 
 
-def test_points_of_a_map_are_cells_of_it(plan, tmp_path):
-    room = OccupancyGrid(GridGeometry(70, 90, 0.05, Pose2D(0.0, 0.0)), np.zeros((70, 90), np.int8))
+@pytest.mark.parametrize(
+    "places",
+    [
+        [(1, 1), (3, 2.5)],
+        [(-3, -2), (1, 1)],
+        [(1, 1), (-3, -2), (-2, 1), (0.5, -1), (-1, -1)],
+    ],
+    ids=str,
+)
+def test_points_of_a_map_are_cells_of_it(plan, tmp_path, places):
+    # Around the frame's origin, as maps of slam_toolbox are.
+    origin = Pose2D(-4.0, -3.0)
+    room = OccupancyGrid(GridGeometry(140, 180, 0.05, origin), np.zeros((140, 180), np.int8))
     file, xy = tmp_path / "room.yaml", tmp_path / "xy.csv"
     write_map(room, file)
-    starts = ["--robots-xy", "1,1", "3,2.5"]
+    starts = ["--robots-xy", *(f"{x:g},{y:g}" for x, y in places)]
     code, out, _ = plan(file, *starts, "--xy-out", xy, "--budget", 0.2, "--json")
     assert code == 0
     told = json.loads(out)
     rows = np.loadtxt(xy, delimiter=",", skiprows=1)
     assert xy.read_text().startswith("robot,x_m,y_m\n")
-    for number, (x, y) in enumerate([(1, 1), (3, 2.5)], 1):
+    for number, (x, y) in enumerate(places, 1):
         first = rows[rows[:, 0] == number][0, 1:]
         assert np.abs(first - (x, y)).max() <= told["cell_m"] / 2 + 1e-6
-    assert len(told["robots"]) == 2
+    assert len(told["robots"]) == len(places)
+
+
+def test_cells_left_of_and_below_the_first_can_be_named(plan, grid):
+    starts = ["--robots", "-1,0", "0,0", "-2,-3"]
+    code, _, err = plan(grid, *starts, "--budget", 0.1)
+    assert code == Exit.ERROR
+    assert "robot 1: start cell (-1, 0) lies outside" in " ".join(err.split())
 
 
 def test_without_json_it_prints_a_line_for_each_robot(plan, grid):

@@ -26,6 +26,9 @@ if TYPE_CHECKING:
 
 DEFAULT_CELL_M = 0.3
 DEFAULT_RADIUS_M = 0.18
+# Options with a value as ``-1,2``, and with several of these.
+WITH_PAIR = ("--start", "--start-xy", "--end", "--keep-out", "--point")
+WITH_PAIRS = ("--robots", "--robots-xy")
 # Of the environment, for who gives the same options all day.
 ROBOT, CONNECT = "FASACO_ROBOT", "FASACO_CONNECT"
 
@@ -117,18 +120,26 @@ def seconds(text: str) -> float:
 def with_negative_pairs(words: Sequence[str]) -> list[str]:
     """Return the words of a command line with ``--start -1,2`` as ``--start=-1,2``.
 
-    argparse takes negative numbers for values, but ``-1,2`` for an option.
+    argparse takes negative numbers for values, but ``-1,2`` for an option. Of an option with
+    several values each such one stands alone: ``--robots 0,0 --robots=-1,2 --robots 3,3``.
     """
     joined: list[str] = []
+    # That the next word may be a value of.
+    option = ""
     for word in words:
-        if (
-            joined
-            and joined[-1] in ("--start", "--start-xy", "--end", "--keep-out", "--point")
-            and re.match(r"-[\d.]", word)
-        ):
-            joined[-1] += f"={word}"
-        else:
+        if option and re.match(r"-[\d.]", word):
+            if joined[-1] == option:
+                joined.pop()
+            joined.append(f"{option}={word}")
+        elif word.startswith("-"):
+            option = word if word in (*WITH_PAIR, *WITH_PAIRS) else ""
             joined.append(word)
+            continue
+        else:
+            if option and joined[-1].startswith(f"{option}="):
+                joined.append(option)
+            joined.append(word)
+        option = option if option in WITH_PAIRS else ""
     return joined
 
 

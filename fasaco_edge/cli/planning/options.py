@@ -127,7 +127,7 @@ def _add_problem(group: argparse._ArgumentGroup) -> None:
         nargs="+",
         action="extend",
         metavar="X,Y",
-        help="the same as points [m]; --robots-xy=-1,2 if the first begins with a minus sign",
+        help="the same as points [m]",
     )
     group.add_argument(
         "--cell",
