@@ -103,9 +103,13 @@ class RecordedMember:
             self._plans_ms.append(took_ms)
         self._plans = plans
 
+    def is_gone(self, now_ns: int) -> bool:
+        """Tell whether it is silent."""
+        return now_ns - self.heard_ns > GONE_NS
+
     def state(self, now_ns: int) -> str:
         """Return the state of its mission, or that it waits for another, or is gone."""
-        if now_ns - self.heard_ns > GONE_NS:
+        if self.is_gone(now_ns):
             return GONE
         return WAITING if self.newest.waits_for else self.newest.state
 
@@ -117,7 +121,7 @@ class RecordedMember:
         """Return what was heard since the last note."""
         said = self.newest
         pose = self.pose or Pose2D(said.x, said.y)
-        is_gone = now_ns - self.heard_ns > GONE_NS
+        is_gone = self.is_gone(now_ns)
         note = Note(
             robot=self.number,
             at_ms=at_ms,
@@ -197,7 +201,12 @@ class Members:
     def __len__(self) -> int:
         return len(self._by_name)
 
-    def dividing(self) -> RecordedMember | None:
-        """Return a robot that tells the division in force; None if none tells one."""
-        telling = [member for member in self if member.newest.parts]
+    def dividing(self, now_ns: int) -> RecordedMember | None:
+        """Return a robot that tells the division in force; None if none tells one.
+
+        One left alone tells a new number without parts: all that is left is its own. What a robot
+        that is gone told last counts only where all are gone.
+        """
+        dividing = [member for member in self if member.newest.division]
+        telling = [member for member in dividing if not member.is_gone(now_ns)] or dividing
         return min(telling, key=lambda m: (-m.newest.division, m.newest.by), default=None)

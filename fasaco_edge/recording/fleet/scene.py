@@ -286,7 +286,7 @@ class FleetScene:
         self._log_grid(_world(member, "swept"), geometry, pixels, SWEPT_ORDER)
 
     def _draw_shares(self) -> None:
-        shares = shares_of(self._members)
+        shares = shares_of(self._members, self._writer.wall_ns)
         if shares is None:
             return
         self._shares = shares.cells

@@ -47,9 +47,9 @@ def union_on(seat: Seat, members: Members, what: str) -> Cells:
     return together(member.seat.carried(getattr(member, what).cells(), seat) for member in members)
 
 
-def shares_of(members: Members) -> Shares | None:
-    """Return the shares by the division in force; None before there is one."""
-    telling = members.dividing()
+def shares_of(members: Members, now_ns: int) -> Shares | None:
+    """Return the shares by the division in force at a time; None before there is one."""
+    telling = members.dividing(now_ns)
     if telling is None:
         return None
     ground = union_on(telling.seat, members, "ground")
@@ -70,6 +70,9 @@ def _owners(
 ) -> NDArray[np.int16]:
     first = np.full(known.shape, np.float32(np.inf))
     owners = np.full(known.shape, NOBODY, np.int16)
+    if not telling.newest.parts:
+        owners[known] = telling.number
+        return owners
     for part in sorted(telling.newest.parts, key=lambda part: part.robot):
         member = members.get(part.robot)
         if member is None:

@@ -1,0 +1,56 @@
+"""Who is shown to sweep what: the division in force among the robots of a fleet that are there."""
+
+from __future__ import annotations
+
+import pytest
+
+pytest.importorskip("rerun")
+
+from fasaco_edge.recording.fleet.members import GONE_NS, Members
+from fasaco_edge.recording.fleet.shares import shares_of
+from fasaco_edge.wire.documents.fleet import FleetPart
+from tests.support.fleet_told import member
+
+SECOND = 1_000_000_000
+HALL = 20 * 30
+PARTS = tuple(FleetPart(name, *cell, 0.0, 1.2) for name, cell in (("a", (0, 0)), ("b", (19, 29))))
+
+
+@pytest.fixture
+def halved():
+    """Two robots that have divided a hall."""
+    members = Members()
+    assert shares_of(members, 0) is None
+    for name in ("a", "b"):
+        members.hear(name, member(division=7, by="a", parts=PARTS), SECOND)
+    return members
+
+
+def test_each_has_the_part_that_it_is_nearer_to(halved):
+    cells = shares_of(halved, SECOND).cells
+    assert cells.keys() == {"a", "b"}
+    assert cells.total() == HALL
+    assert abs(cells["a"] - cells["b"]) <= 20
+
+
+def test_one_left_alone_has_all_that_is_left(halved):
+    swept = [(0, col) for col in range(30)]
+    now = SECOND + GONE_NS + 1
+    halved.hear("b", member(cells=swept, division=8, by="b"), now)
+    assert shares_of(halved, now).cells == {"b": HALL - 30}
+
+
+def test_a_robot_that_comes_and_has_not_divided_yet_changes_nothing(halved):
+    halved.hear("c", member(division=0), SECOND)
+    assert shares_of(halved, SECOND).cells.keys() == {"a", "b"}
+
+
+def test_what_a_robot_that_is_gone_told_is_not_in_force(halved):
+    halved.hear("c", member(division=9, by="c", parts=(FleetPart("c", 0, 0, 0.0, 1.2),)), SECOND)
+    now = SECOND + GONE_NS
+    for name in ("a", "b"):
+        halved.hear(name, member(division=8, by="b", parts=PARTS), now)
+    assert shares_of(halved, now).cells == {"c": HALL}
+    assert shares_of(halved, now + 1).cells.keys() == {"a", "b"}
+    # Once all are gone the last division stays drawn.
+    assert shares_of(halved, now + GONE_NS + 1).cells == {"c": HALL}
