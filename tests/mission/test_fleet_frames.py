@@ -16,7 +16,13 @@ from fasaco_edge.mission.core.events import MapReceived, MemberHeard, Part, Pose
 from fasaco_edge.mission.coverage.ledger import TILE
 from fasaco_edge.mission.fleet.division import Division
 from fasaco_edge.mission.fleet.division import Robot as SharingRobot
-from fasaco_edge.mission.fleet.frames import FleetFrames, Relaid, placed_point, seen_from
+from fasaco_edge.mission.fleet.frames import (
+    MOST_HEARD,
+    FleetFrames,
+    Relaid,
+    placed_point,
+    seen_from,
+)
 from tests.mission.world import CELL, CONFIG, Drive, building
 
 AT = Pose2D(3.1, -2.0, math.radians(30.0))
@@ -84,6 +90,27 @@ def test_a_new_epoch_ends_what_was_swept_before():
     assert before
     assert after
     assert not before & after
+
+
+def test_as_many_robots_as_are_heard_keep_their_ground():
+    """With one more than there was room for, each lost what it had told before, in turn."""
+    frames, every = FleetFrames(Pose2D(10 * CELL, 0.0), 0.0, CELL), bits_of({(0, 0), (0, 63)})
+    names = [f"r{number}" for number in range(MOST_HEARD)]
+
+    def told(name, col):
+        heard = MemberHeard(name, epoch=1, ground=(((0, col), every),))
+        return frames.event(heard, Pose2D(0.0, 0.0), 0.0).ground
+
+    # Shifted by ten cells, the first tile here has cells of two of theirs.
+    for name in names:
+        told(name, 0)
+    for name in names:
+        assert cells_of(told(name, 1)) == {(0, 53), (0, 54), (0, 117)}
+    # One more displaces the one heard longest ago.
+    told("r0", 0)
+    told("new", 0)
+    assert cells_of(told("r0", 0)) == {(0, -10), (0, 53), (0, 54)}
+    assert cells_of(told("r1", 1)) == {(0, 54), (0, 117)}
 
 
 def test_places_and_seeds_come_in_this_robots_frames():

@@ -17,7 +17,7 @@ from fasaco_edge.config.config import DaemonConfig, FleetConfig
 from fasaco_edge.errors import FasacoError, FleetError
 from fasaco_edge.grid.geometry import Pose2D
 from fasaco_edge.mission.core.events import MemberHeard, Part
-from fasaco_edge.mission.fleet.frames import FleetFrames
+from fasaco_edge.mission.fleet.frames import MOST_HEARD, FleetFrames
 from fasaco_edge.mission.fleet.ground import GroundTelling
 from fasaco_edge.mission.fleet.shared import Telling
 from fasaco_edge.wire.documents.fleet import (
@@ -34,8 +34,8 @@ if TYPE_CHECKING:
     from fasaco_edge.mission.core.mission import Mission
 
 PERIOD_S, LEAST_PERIOD_S = 1.0, 0.25
-# Rate limit of the messages of a robot [s], and the most robots that are heard.
-LEAST_SPACING_S, MOST_ROBOTS = 0.2, 64
+# Rate limit of the messages of a robot [s].
+LEAST_SPACING_S = 0.2
 # A robot silent for this long makes room for another [s].
 FORGOTTEN_S = 60.0
 # Tiles of progress, and as many of ground, in a message sent once a second, and in one on change:
@@ -127,7 +127,7 @@ class FleetEar:
         if now - self._heard_at.get(key, float("-inf")) < LEAST_SPACING_S:
             return False
         # The robot heard longest ago is first.
-        if len(self._heard_at) >= MOST_ROBOTS and key not in self._heard_at:
+        if len(self._heard_at) >= MOST_HEARD and key not in self._heard_at:
             longest = next(iter(self._heard_at))
             if now - self._heard_at[longest] < FORGOTTEN_S:
                 return False

@@ -12,12 +12,15 @@ from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fasaco_edge.grid.geometry import Point, Pose2D
 from fasaco_edge.mission.core.events import MemberHeard
 from fasaco_edge.mission.coverage.ledger import TILE
-from fasaco_edge.mission.fleet.shared import MOST_ROBOTS, MOST_TILES_OF_ONE, TILE_BYTES
+from fasaco_edge.mission.fleet.shared import MOST_TILES_OF_ONE, TILE_BYTES
+
+# Number of robots heard at once. More than can be members: a robot that is refused may become one,
+# and its tiles come in turn.
+MOST_HEARD = 64
 
 Placed = tuple[tuple[int, int], bytes]
 # Tiles of another robot that only touch one of this robot's do not count, nor do angles that only
@@ -54,7 +57,6 @@ class Relaid:
         self._shift = lattice.x / cell_m, lattice.y / cell_m
         self._cos, self._sin = math.cos(lattice.yaw), math.sin(lattice.yaw)
         self._given: dict[tuple[int, int], bytes] = {}
-        self._cells: dict[tuple[int, int], NDArray[np.bool_]] = {}
         # The tiles of this lattice, until one that they are made of changes.
         self._made: dict[tuple[int, int], bytes] = {}
         # Those that had a cell.
@@ -69,8 +71,6 @@ class Relaid:
             below = self._below(place)
             if self._given.get(place) != bits:
                 self._given[place] = bits
-                unpacked = np.unpackbits(np.frombuffer(bits, np.uint8))
-                self._cells[place] = unpacked.reshape(TILE, TILE).view(np.bool_)
                 for made in below:
                     self._made.pop(made, None)
             wanted.update(below)
@@ -112,7 +112,9 @@ class Relaid:
         tile_rows, tile_cols = rows // TILE, cols // TILE
         for row in range(int(tile_rows.min()), int(tile_rows.max()) + 1):
             for col in range(int(tile_cols.min()), int(tile_cols.max()) + 1):
-                if (cells := self._cells.get((row, col))) is not None:
+                if (bits := self._given.get((row, col))) is not None:
+                    unpacked = np.unpackbits(np.frombuffer(bits, np.uint8))
+                    cells = unpacked.reshape(TILE, TILE).view(np.bool_)
                     inside = (tile_rows == row) & (tile_cols == col)
                     found[inside] = cells[rows[inside] % TILE, cols[inside] % TILE]
         return np.packbits(found.reshape(-1)).tobytes()
@@ -130,7 +132,8 @@ class FleetFrames:
     def __init__(self, map_frame: Pose2D, lattice_deg: float, cell_m: float) -> None:
         self._map_frame, self._cell_m = map_frame, cell_m
         self._lattice = turned(map_frame, lattice_deg)
-        # For each robot its epoch, its swept cells and those that it can reach.
+        # For each robot its epoch, its swept cells and those that it can reach; the one heard
+        # longest ago is first.
         self._robots: dict[str, tuple[int, Relaid, Relaid]] = {}
 
     def event(self, heard: MemberHeard, map_frame: Pose2D, lattice_deg: float) -> MemberHeard:
@@ -143,6 +146,7 @@ class FleetFrames:
         frame = seen_from(map_frame, self._map_frame)
         lattice = seen_from(turned(map_frame, lattice_deg), self._lattice)
         epoch, swept, ground = self._of(heard.robot, heard.epoch, lattice)
+        self._robots.pop(heard.robot, None)
         self._robots[heard.robot] = epoch, swept, ground
         x, y = placed_point(frame, heard.x, heard.y)
         return replace(
@@ -159,7 +163,7 @@ class FleetFrames:
     def _of(self, robot: str, epoch: int, lattice: Pose2D) -> tuple[int, Relaid, Relaid]:
         """Return what is known of a robot; nothing once its frame has moved."""
         known = self._robots.get(robot)
-        if known is None and len(self._robots) >= MOST_ROBOTS:
+        if known is None and len(self._robots) >= MOST_HEARD:
             del self._robots[next(iter(self._robots))]
         if known is None or known[1].lattice != lattice:
             return epoch, Relaid(lattice, self._cell_m), Relaid(lattice, self._cell_m)
