@@ -14,7 +14,7 @@ from fasaco_edge.errors import FleetError
 from fasaco_edge.grid.geometry import Pose2D, Window
 from fasaco_edge.mission.coverage.ledger import CoverageLedger
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
-from fasaco_edge.mission.fleet.layer import MANY_TAKEN
+from fasaco_edge.mission.fleet.layer import BELIEVED_S, MANY_TAKEN, MOST_AHEAD, MOST_FIRST
 from fasaco_edge.mission.fleet.members import GONE_S
 from fasaco_edge.mission.fleet.shared import (
     MOST_ROBOTS,
@@ -395,6 +395,33 @@ def test_a_number_that_no_count_leads_to_is_nobodys_division(begun):
     before = ours.mission.fleet.number
     fleet.run(int(GONE_S) + 3)
     assert ours.mission.fleet.number > before
+
+
+@pytest.mark.parametrize("lead", [MOST_AHEAD - 100, MOST_AHEAD + 100, MOST_FIRST - 100])
+def test_a_robot_far_behind_in_counting_agrees_once_the_other_has_told_it_for_long(lead):
+    fleet = FleetDrive(HALL, TWO)
+    fleet.run(4)
+    ours, other = (robot.mission.fleet for robot in fleet.robots.values())
+    # It has counted on with a third robot, where this one heard none of it.
+    fleet.hears = lambda speaker, listener: False
+    fleet.run(8)
+    other.number += lead
+    fleet.hears = lambda speaker, listener: True
+    fleet.run(int(BELIEVED_S) + 5)
+    assert ours.number > lead
+    assert (ours.number, ours.by, ours.parts) == (other.number, other.by, other.parts)
+
+
+@pytest.mark.parametrize("said", [range(3), range(0, 30, 12)], ids=["once", "now and then"])
+def test_a_number_far_ahead_that_one_tells_for_a_moment_is_not_believed(said):
+    fleet = FleetDrive(HALL, TWO)
+    fleet.run(4)
+    ours, other = fleet.robots.values()
+    liar = replace(other.report(), robot="r0", division=10**6, state="idle")
+    for second in range(30):
+        ours.tell(liar if second in said else replace(liar, division=3))
+        fleet.tick()
+    assert 0 < ours.mission.fleet.number < 10
 
 
 @examples(60)

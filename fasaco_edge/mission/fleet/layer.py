@@ -32,8 +32,10 @@ UNEVEN, UNEVEN_S = 1.25, 40.0
 # merely passing through. In unknown buildings 4 cost 7 % of two robots' time.
 MANY_TAKEN = 30
 # Limits on a division's number: absolute, ahead of this robot's own, and the first of a newcomer.
-# Numbers beyond are errors.
+# Numbers beyond are errors, unless a robot tells numbers ahead, but below the last limit, for some
+# time [s]: it has counted on out of hearing.
 MOST_NUMBER, MOST_AHEAD, MOST_FIRST = 2**31 - 1, 2**10, 2**24
+BELIEVED_S = 10.0
 LATER = "another robot has a newer division"
 
 OpenCells = Callable[[Window], NDArray[np.bool_]]
@@ -75,6 +77,8 @@ class FleetLayer:
         # at the last check.
         self._taken, self._counted = 0, 0
         self._remainder = Remainder()
+        # When robots were heard first whose divisions' numbers are too far ahead [s].
+        self._too_far: dict[str, float] = {}
 
     @property
     def members(self) -> dict[str, Member]:
@@ -232,13 +236,19 @@ class FleetLayer:
         """Return the highest valid division number heard."""
         most = self._most_valid()
         return max(
-            (number for number in self.others.division_numbers() if number <= most), default=0
+            (one for one in self.others.division_numbers().values() if one <= most), default=0
         )
 
     def _most_valid(self) -> int:
         """Return the highest division number that is no error."""
-        first = min((number for number in self.others.division_numbers() if number), default=0)
-        return (self.number or min(first, MOST_FIRST)) + MOST_AHEAD
+        told = self.others.division_numbers()
+        first = min((number for number in told.values() if number), default=0)
+        most = (self.number or min(first, MOST_FIRST)) + MOST_AHEAD
+        too_far = {name for name, number in told.items() if most < number <= MOST_FIRST}
+        heard_at = {name: self.members[name].heard_at for name in too_far}
+        self._too_far = {name: self._too_far.get(name, at) for name, at in heard_at.items()}
+        is_long = {name for name in too_far if heard_at[name] - self._too_far[name] >= BELIEVED_S}
+        return max([most, *(told[name] for name in is_long)])
 
     def _robots(self, area: ReachableArea, cell: Cell, now: float) -> list[Robot]:
         """Return the robots at work in the area that this robot can reach."""

@@ -182,9 +182,9 @@ class Members:
         self.ground.hear(event.robot, event.ground)
         return f"{event.robot}: cells must be swept again" if is_open_again else ""
 
-    def division_numbers(self) -> list[int]:
-        """Return the numbers of the divisions that they have told."""
-        return [m.newest.division for m in self.known.values() if not m.left_out]
+    def division_numbers(self) -> dict[str, int]:
+        """Return the numbers of the divisions that they have told, by name."""
+        return {name: m.newest.division for name, m in self.known.items() if not m.left_out}
 
     def note_left(self, names: set[str], now: float) -> None:
         """Note that robots have left a new division."""
