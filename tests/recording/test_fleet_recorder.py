@@ -15,13 +15,16 @@ from fasaco_edge.cli.console.arguments import Exit
 from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.errors import FleetError, UnreadableRecording
 from fasaco_edge.recording import entities
-from fasaco_edge.recording.fleet import members, scene
+from fasaco_edge.recording.fleet import members, recorder, scene
+from fasaco_edge.recording.fleet.inbox import MOST_HEARD
 from fasaco_edge.recording.fleet.notes import is_fleet_recording, read_notes
 from fasaco_edge.recording.fleet.recorder import FleetRecorder
 from fasaco_edge.recording.write.process import Output
 from fasaco_edge.recording.write.quota import DiskBudget
 from fasaco_edge.review.fleet import review_fleet
+from fasaco_edge.wire import topics
 from fasaco_edge.wire.documents.fleet import FleetPart
+from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.limits import MAX_RESOLUTION_M, MIN_RESOLUTION_M
 from tests.support import viewer
 from tests.support.fleet_told import CELL_M, Teller, member
@@ -155,6 +158,47 @@ def test_no_size_of_cells_ends_the_recording_of_the_others(studio, cell_m):
     assert studio.joined("odd") == is_size
     assert any("odd: fleet: 1 refused" in line for line in log_of(part)) != is_size
     assert "good" in {robot.name for robot in review_fleet([part]).figures.robots}
+
+
+def test_names_that_send_rubbish_leave_room_for_a_robot_that_comes_later(studio):
+    names = [f"x{number}" for number in range(MOST_HEARD)]
+    strangers = [studio.bus.advertise(Keys(name), topics.FLEET) for name in names]
+    for payload in (b"rubbish", b'{"version": 9, "fleet": "house"}'):
+        for stranger in strangers:
+            stranger.put(payload)
+        studio.pass_time(0.3)
+    late = Teller(studio.bus, "late")
+
+    def has_joined():
+        late.tell()
+        return studio.joined("late")
+
+    studio.until(has_joined, 5.0)
+    (part,) = studio.parts()
+    assert any("x0: fleet: 1 refused" in line for line in log_of(part))
+
+
+def test_nothing_is_kept_of_names_without_end(studio, monkeypatch):
+    monkeypatch.setattr(recorder, "MOST_FAULTS", 8)
+    monkeypatch.setattr(members, "MOST_MEMBERS", 1)
+    monkeypatch.setattr(members, "REPLACED_NS", 0)
+    for number in range(20):
+        Teller(studio.bus, f"bad{number}").send("fleet", b"rubbish")
+        good = Teller(studio.bus, f"good{number}")
+        good.tell()
+        studio.until(lambda name=good.name: studio.joined(name))
+        good.send("status", b"{")
+        studio.pass_time(0.1)
+    studio.pass_time(1.2)
+    kept = studio.recorder
+    assert len(kept._poses) == len(kept._rates) == len(kept._subscriptions) == 1
+    assert len(kept._faults) <= 8 + 2
+    (part,) = studio.parts()
+    log = log_of(part)
+    assert any("good19: status: 1 refused" in line for line in log)
+    # Those beyond are counted together.
+    assert any(line.startswith("other robots: fleet: 8 refused") for line in log)
+    assert not any(line.startswith("bad19") for line in log)
 
 
 def test_maps_of_many_robots_leave_room_in_a_part(studio, monkeypatch):

@@ -44,6 +44,8 @@ NOTE_NS, WRITE_NS = 1_000_000_000, 5_000_000_000
 MAP_TURN_NS = 2_000_000_000
 # A robot's rate of messages is plotted over this time.
 RATE_NOTES = 5
+# Robots and topics whose faults are counted apart, beside those of the robots recorded.
+MOST_FAULTS = 256
 
 
 def run_fleet_recorder(
@@ -138,6 +140,11 @@ class FleetRecorder:
             self._take(heard.robot, heard.arrival)
         except FasacoError as error:
             what = f"{heard.robot}: {heard.arrival.topic}"
+            if self._members.get(heard.robot) is None:
+                # Any number of names would each keep a queue from others.
+                self._inbox.forget(heard.robot)
+                if what not in self._faults and len(self._faults) >= MOST_FAULTS:
+                    what = f"other robots: {heard.arrival.topic}"
             self._faults[what] += 1
             count = self._faults[what]
             # A robot may send nothing else.
@@ -203,6 +210,10 @@ class FleetRecorder:
         self._end_map_turn(robot)
         self._inbox.forget(robot)
         self._scene.leave(robot)
+        for kept in (self._poses, self._rates):
+            kept.pop(robot, None)
+        for topic in (FLEET, STATUS, PATH, POSE, MAP):
+            self._faults.pop(f"{robot}: {topic.name}", None)
 
     def _ask_for_maps(self, now_ns: int) -> None:
         """Ask the robots for their maps, one after another."""
