@@ -40,7 +40,7 @@ MAX_JSON_BYTES: Final = 1_048_576
 MAX_FLEET_TILES: Final = 24
 """Of progress in one message of a fleet's robot, of 64 x 64 cells each: 17 kB; and of ground."""
 MAX_FLEET_PARTS: Final = 33
-"""Of a division, a robot each."""
+"""Of a division, a robot each: the most robots of a fleet."""
 MAX_FLEET_INDEX: Final = geometry.MOST_INDEX
 """Magnitude of a cell's row and column: as far as any lattice reaches."""
 MAX_FLEET_POINTS: Final = 64

@@ -126,7 +126,7 @@ def test_without_json_it_prints_a_line_for_each_robot(plan, grid):
         (["--robots", "0,0", "--overlap", "0.1"], "--overlap"),
         (
             ["--robots", *(f"0,{col}" for col in range(17)), *(f"1,{c}" for c in range(17))],
-            "at most 32",
+            "at most 33",
         ),
     ],
 )

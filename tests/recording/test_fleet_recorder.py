@@ -14,9 +14,9 @@ from fasaco_edge.bus.settings import BusSettings
 from fasaco_edge.cli.console.arguments import Exit
 from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.errors import FleetError, UnreadableRecording
+from fasaco_edge.mission.fleet.frames import MOST_HEARD
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.fleet import members, recorder, scene
-from fasaco_edge.recording.fleet.inbox import MOST_HEARD
 from fasaco_edge.recording.fleet.notes import is_fleet_recording, read_notes
 from fasaco_edge.recording.fleet.recorder import FleetRecorder
 from fasaco_edge.recording.write.process import Output
@@ -25,7 +25,7 @@ from fasaco_edge.review.fleet import review_fleet
 from fasaco_edge.wire import topics
 from fasaco_edge.wire.documents.fleet import FleetPart
 from fasaco_edge.wire.keys import Keys
-from fasaco_edge.wire.limits import MAX_RESOLUTION_M, MIN_RESOLUTION_M
+from fasaco_edge.wire.limits import MAX_FLEET_PARTS, MAX_RESOLUTION_M, MIN_RESOLUTION_M
 from tests.support import viewer
 from tests.support.fleet_told import CELL_M, Teller, member
 from tests.support.processes import fasaco_edge
@@ -254,6 +254,13 @@ def test_one_robot_too_many_is_named_and_gets_the_place_of_one_long_gone(monkeyp
     joined, news = fleet.hear("c", member(), 70 * second)
     assert (joined.number, news) == (0, members.JOINED)
     assert [one.name for one in fleet] == ["c", "b"]
+
+
+def test_all_robots_that_a_division_may_have_are_recorded():
+    fleet = members.Members()
+    for number in range(MAX_FLEET_PARTS):
+        fleet.hear(f"r{number}", member(), 1)
+    assert [one.number for one in fleet] == list(range(MAX_FLEET_PARTS))
 
 
 def test_the_review_of_a_fleet_is_printed_and_drawn(studio, tmp_path):

@@ -16,6 +16,7 @@ from fasaco_edge.config.robot import RobotConfig
 from fasaco_edge.daemon.loop.fleet import LEAST_SPACING_S, TILES, FleetEar, FleetVoice
 from fasaco_edge.errors import FleetError, MalformedMessage
 from fasaco_edge.mission.core.events import MapReceived, Part
+from fasaco_edge.mission.fleet.shared import MOST_ROBOTS
 from fasaco_edge.wire.documents.fleet import CellTile, FleetMember, FleetPart, decode_member
 from fasaco_edge.wire.documents.json_text import encode_json
 from fasaco_edge.wire.limits import (
@@ -98,6 +99,10 @@ def test_what_is_beyond_a_limit_is_refused_and_the_robot_named(members):
 def test_other_bytes_are_refused(payload):
     with pytest.raises(MalformedMessage):
         decode_member(payload, "hall")
+
+
+def test_a_division_has_a_part_for_this_robot_and_for_each_other_that_it_keeps():
+    assert MAX_FLEET_PARTS == 1 + MOST_ROBOTS
 
 
 def test_what_is_too_long_is_not_looked_at():

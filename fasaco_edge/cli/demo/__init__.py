@@ -20,7 +20,7 @@ from fasaco_edge.grid.map_files import find_map
 from fasaco_edge.host.files import make_own_folder
 
 RUNS = Path("runs")
-MOST_ROBOTS = 8
+MOST_IN_DEMO = 8
 SPEED, FLEET_SPEED = 20.0, 5.0
 
 
@@ -31,11 +31,11 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--robots",
         type=int,
-        choices=range(1, MOST_ROBOTS + 1),
+        choices=range(1, MOST_IN_DEMO + 1),
         default=1,
         metavar="N",
-        help=f"how many share the building as a fleet, 1 to {MOST_ROBOTS}; they begin far from one "
-        "another, and stop before one another (default: %(default)s)",
+        help=f"how many share the building as a fleet, 1 to {MOST_IN_DEMO}; they begin far from "
+        "one another, and stop before one another (default: %(default)s)",
     )
     parser.add_argument(
         "--speed",

@@ -22,14 +22,13 @@ from fasaco_edge.host.processes import ctrl_c_asks
 from fasaco_edge.offline.settings import ANYWHERE, CELLS, HOME
 from fasaco_edge.planners.cost import count_turns
 from fasaco_edge.planners.planner import Interrupt, SearchProgress, TimeBudget
+from fasaco_edge.wire.limits import MAX_FLEET_PARTS
 
 if TYPE_CHECKING:
     from fasaco_edge.cli.planning.request import PlanRequest
     from fasaco_edge.grid.lattice import Cell, CoverageLattice
     from fasaco_edge.grid.occupancy import OccupancyGrid
     from fasaco_edge.planners.fleet.division import Division
-
-MOST_ROBOTS = 32
 
 
 def plan_fleet(args: argparse.Namespace, request: PlanRequest) -> int:
@@ -104,8 +103,8 @@ def _check(args: argparse.Namespace, request: PlanRequest) -> None:
                 hint=f"leave {option} out",
             )
     count = len(args.robots or args.robots_xy)
-    if count > MOST_ROBOTS:
-        raise BadConfiguration(f"at most {MOST_ROBOTS} robots share a floor, got {count}")
+    if count > MAX_FLEET_PARTS:
+        raise BadConfiguration(f"at most {MAX_FLEET_PARTS} robots share a floor, got {count}")
 
 
 def _check_apart(starts: Sequence[Cell]) -> None:

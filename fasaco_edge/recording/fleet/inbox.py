@@ -12,13 +12,14 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from fasaco_edge.bus.arrival import Arrival, Sample
+from fasaco_edge.mission.fleet.frames import MOST_HEARD
 from fasaco_edge.wire.topics import FLEET, POSE
 
 # Samples of a topic that wait, at most; of all others the newest one. A fleet's message is told
 # again within a second; of poses some are needed to see which cells a robot drove through.
 DEPTHS = {FLEET.name: 4, POSE.name: 256}
-# Robots heard at most, those of other fleets included; and the least number that share the space.
-MOST_HEARD, LEAST_SHARING = 64, 4
+# The least number of robots that share the space.
+LEAST_SHARING = 4
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,10 +13,11 @@ from fasaco_edge.recording.fleet.cells import Place, Seat, TileSet
 from fasaco_edge.recording.fleet.notes import Note, NotedRobot, Pass
 from fasaco_edge.wire.documents.fleet import CellTile, FleetMember
 from fasaco_edge.wire.documents.status import Status
+from fasaco_edge.wire.limits import MAX_FLEET_PARTS
 
-# Robots of a fleet that are recorded; a robot silent for this long is gone, and gives its place to
-# another after that [ns].
-MOST_MEMBERS = 32
+# Robots of a fleet that are recorded: as many as one may have. A robot silent for this long is
+# gone, and gives its place to another after that [ns].
+MOST_MEMBERS = MAX_FLEET_PARTS
 GONE_NS, REPLACED_NS = 5_000_000_000, 60_000_000_000
 # Messages beyond this rate are counted, not read [ns].
 LEAST_SPACING_NS = 100_000_000
