@@ -213,8 +213,9 @@ def _home(path: Path) -> Path:
 class FleetConfig(Section, frozen=True):
     """Robots under one ``bus.base`` with this name and one map frame share the work in an area.
 
-    With maps of their own they give one ``frame``, and where the origin of their map lies in it:
-    ``x_m``, ``y_m`` [m], ``yaw_deg`` [deg].
+    That frame has one origin: only its name is compared. With maps of their own they give one
+    ``frame``, and where the origin of their map lies in it: ``x_m``, ``y_m`` [m], ``yaw_deg``
+    [deg].
     """
 
     name: Annotated[str, Meta(min_length=1, max_length=64)]
