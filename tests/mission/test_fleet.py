@@ -19,10 +19,10 @@ from fasaco_edge.mission.fleet.members import GONE_S
 from fasaco_edge.mission.fleet.shared import (
     MOST_ROBOTS,
     MOST_TILES,
-    TILE_BYTES,
     SharedProgress,
     Telling,
 )
+from fasaco_edge.mission.fleet.tiles import TILE_BYTES
 from fasaco_edge.mission.orders.order import Zone
 from fasaco_edge.mission.orders.zones import in_zones
 from tests.mission.fleets import FleetDrive, FleetRobot, flaky

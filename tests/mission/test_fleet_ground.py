@@ -13,7 +13,8 @@ from fasaco_edge.mission.fleet import ground as shared_ground
 from fasaco_edge.mission.fleet.division import Division, Robot, divide
 from fasaco_edge.mission.fleet.ground import GroundTelling, SharedGround
 from fasaco_edge.mission.fleet.members import Members
-from fasaco_edge.mission.fleet.shared import MOST_ROBOTS, MOST_TILES_OF_ONE, TILE_BYTES
+from fasaco_edge.mission.fleet.shared import MOST_ROBOTS, MOST_TILES_OF_ONE
+from fasaco_edge.mission.fleet.tiles import TILE_BYTES
 from fasaco_edge.mission.map.inputs import PATIENCE_S
 from fasaco_edge.mission.map.reachable_area import ReachableArea
 from tests.mission.fleets import FleetDrive

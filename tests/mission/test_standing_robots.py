@@ -11,7 +11,7 @@ from fasaco_edge.grid.lattice import CoverageLattice
 from fasaco_edge.mission.core.events import MapReceived, MemberHeard
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
 from fasaco_edge.mission.fleet.members import Members
-from fasaco_edge.mission.fleet.shared import TILE_BYTES
+from fasaco_edge.mission.fleet.tiles import TILE_BYTES
 from fasaco_edge.mission.fleet.traffic import OLD_S, PATIENCE_S, STANDS_S
 from fasaco_edge.mission.map.reachable_area import ReachableArea
 from tests.mission.world import CONFIG, Drive, building, pose_at
@@ -20,7 +20,7 @@ CELL_M, RADIUS_M = 0.25, 0.1
 
 
 def member(x, y):
-    return MemberHeard("r2", state="covering", x=x, y=y, epoch=1, open_cells=9, radius_m=0.1)
+    return MemberHeard("r2", state="covering", x=x, y=y, epoch=1, radius_m=0.1)
 
 
 def planned():

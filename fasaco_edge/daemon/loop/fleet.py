@@ -106,7 +106,6 @@ class FleetEar:
             step_s=member.step_s,
             epoch=member.epoch,
             division=member.division,
-            open_cells=member.open_cells,
             tiles=_placed(member.swept),
             ground=_placed(member.ground),
             by=member.by,

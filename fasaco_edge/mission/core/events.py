@@ -129,7 +129,6 @@ class MemberHeard:
         step_s: its time to sweep one cell [s].
         epoch: epoch number of its tiles, see ``fleet.shared``.
         division: number of its newest division.
-        open_cells: number of cells still to be swept, as it knows.
         tiles: places and bits of the cells it has swept; a subset of its tiles.
         ground: places and bits of the cells it can reach; a subset of its tiles.
         by: name of the robot that made that division.
@@ -148,7 +147,6 @@ class MemberHeard:
     step_s: float = 1.0
     epoch: int = 0
     division: int = 0
-    open_cells: int = 0
     tiles: tuple[tuple[tuple[int, int], bytes], ...] = ()
     ground: tuple[tuple[tuple[int, int], bytes], ...] = ()
     by: str = ""

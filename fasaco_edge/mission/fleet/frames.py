@@ -16,17 +16,16 @@ import numpy as np
 from fasaco_edge.grid.geometry import Point, Pose2D
 from fasaco_edge.mission.core.events import MemberHeard
 from fasaco_edge.mission.coverage.ledger import TILE
-from fasaco_edge.mission.fleet.shared import MOST_TILES_OF_ONE, TILE_BYTES
+from fasaco_edge.mission.fleet.shared import MOST_TILES_OF_ONE
+from fasaco_edge.mission.fleet.tiles import EMPTY, Placed, bits_of, packed, unpacked
 
 # Number of robots heard at once. More than can be members: a robot that is refused may become one,
 # and its tiles come in turn.
 MOST_HEARD = 64
 
-Placed = tuple[tuple[int, int], bytes]
 # Tiles of another robot that only touch one of this robot's do not count, nor do angles that only
 # rounding makes [cells], [rad].
 TOUCH, STRAIGHT = 1e-6, 1e-9
-EMPTY = bytes(TILE_BYTES)
 
 
 def seen_from(frame: Pose2D, other: Pose2D) -> Pose2D:
@@ -113,11 +112,10 @@ class Relaid:
         for row in range(int(tile_rows.min()), int(tile_rows.max()) + 1):
             for col in range(int(tile_cols.min()), int(tile_cols.max()) + 1):
                 if (bits := self._given.get((row, col))) is not None:
-                    unpacked = np.unpackbits(np.frombuffer(bits, np.uint8))
-                    cells = unpacked.reshape(TILE, TILE).view(np.bool_)
+                    cells = unpacked(bits_of(bits))
                     inside = (tile_rows == row) & (tile_cols == col)
                     found[inside] = cells[rows[inside] % TILE, cols[inside] % TILE]
-        return np.packbits(found.reshape(-1)).tobytes()
+        return packed(found)
 
 
 class FleetFrames:

@@ -16,13 +16,12 @@ from fasaco_edge.grid.geometry import Window
 from fasaco_edge.grid.lattice import COVERABLE, UNKNOWN, Cell, CoverageLattice
 from fasaco_edge.kernels.fleet.split import FAR, ways_from
 from fasaco_edge.mission.coverage.ledger import TILE
-from fasaco_edge.mission.fleet.shared import MOST_TILES_OF_ONE, TILE_BYTES
+from fasaco_edge.mission.fleet.shared import MOST_TILES_OF_ONE
+from fasaco_edge.mission.fleet.tiles import EMPTY, Placed, bits_of, packed, unpacked, window_of
 from fasaco_edge.mission.map.reachable_area import ReachableArea
 
 # Limit on the cells that the ground of others may add to the lattice; beyond it is left out.
 MOST_ADDED = 1_000_000
-
-Placed = tuple[Cell, bytes]
 
 
 class SharedGround:
@@ -68,8 +67,8 @@ class SharedGround:
     def _merged(self) -> dict[Cell, NDArray[np.uint8]]:
         merged: dict[Cell, NDArray[np.uint8]] = {}
         for tiles in self._robots.values():
-            for place, packed in tiles.items():
-                bits = np.frombuffer(packed, np.uint8)
+            for place, told in tiles.items():
+                bits = bits_of(told)
                 merged[place] = merged[place] | bits if place in merged else bits
         return merged
 
@@ -119,8 +118,7 @@ class GroundTelling:
         if area is not self._area and area is not None:
             self._area, self._tiles = area, _tiles_of(area)
             # What is no longer reachable is reported as empty.
-            nothing = bytes(TILE_BYTES)
-            self._tiles |= {place: nothing for place in self._told if place not in self._tiles}
+            self._tiles |= {place: EMPTY for place in self._told if place not in self._tiles}
         tiles = self._tiles
         new = [place for place, bits in tiles.items() if self._told.get(place) != bits]
         chosen = [*sorted(new), *(place for place in self._told if place not in new)][:most]
@@ -138,16 +136,16 @@ def _joined(area: ReachableArea, tiles: dict[Cell, NDArray[np.uint8]]) -> Reacha
     places = sorted(tiles, key=lambda at: (abs(at[0] * TILE - row) + abs(at[1] * TILE - col), at))
     around = window
     for place in places:
-        larger = Window.around(around, _window(place))
+        larger = Window.around(around, window_of(place))
         assert larger is not None
         if larger.rows * larger.cols - window.rows * window.cols > MOST_ADDED:
             break
         around = larger
     ground = np.zeros((around.rows, around.cols), np.bool_)
     for place in places:
-        whole = _window(place)
+        whole = window_of(place)
         if common := whole.intersection(around):
-            cells = np.unpackbits(tiles[place]).reshape(TILE, TILE).view(np.bool_)
+            cells = unpacked(tiles[place])
             ground[common.slices_in(around)] |= cells[common.slices_in(whole)]
     inside = window.slices_in(around)
     ground[inside] &= lattice.states == UNKNOWN
@@ -178,16 +176,11 @@ def _tiles_of(area: ReachableArea) -> dict[Cell, bytes]:
     window, found = area.lattice.window, {}
     for row in range(window.row0 // TILE, -(-window.row1 // TILE)):
         for col in range(window.col0 // TILE, -(-window.col1 // TILE)):
-            whole = _window((row, col))
+            whole = window_of((row, col))
             if common := whole.intersection(window):
                 part = area.reachable[common.slices_in(window)]
                 if part.any():
                     cells = np.zeros((TILE, TILE), np.bool_)
                     cells[common.slices_in(whole)] = part
-                    found[row, col] = np.packbits(cells.reshape(-1)).tobytes()
+                    found[row, col] = packed(cells)
     return found
-
-
-def _window(place: Cell) -> Window:
-    row, col = place[0] * TILE, place[1] * TILE
-    return Window(row, col, row + TILE, col + TILE)

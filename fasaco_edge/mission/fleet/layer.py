@@ -48,7 +48,6 @@ class FleetLayer:
         others: the other robots.
         number: number of the newest division.
         by: name of the robot that made it.
-        why: reason for it.
         step_s: this robot's time to sweep one cell [s].
     """
 
@@ -62,7 +61,7 @@ class FleetLayer:
     ) -> None:
         self.others = Members(robot, ledger, cell_m)
         self.number = 0
-        self.why = self.by = ""
+        self.by = ""
         self._robot, self.step_s = robot, step_s
         self._map, self._ledger = map_state, ledger
         self._division: Division | None = None
@@ -180,13 +179,13 @@ class FleetLayer:
         own = left if before is None else left & self._of_me(before, joint)
         self._remainder.note(int(left.sum()), int(own.sum()), now)
         if newer := self._newer():
-            self.why, self.number, self.by = LATER, newer.division, newer.by
+            why, self.number, self.by = LATER, newer.division, newer.by
             self._division = Division.of(newer.parts)
         else:
             robots = self._robots(joint, cell, now)
             if not (why := self._why_anew(joint, left, robots, now, at_once=at_once)):
                 return self._why_by_taken()
-            self.why, self.by = why, self._robot
+            self.by = self._robot
             self.number = min(max(self.number, self._newest_heard()) + 1, MOST_NUMBER)
             several = len(robots) > 1
             self._division = divide(joint.lattice, left, robots, before) if several else None
@@ -194,19 +193,12 @@ class FleetLayer:
         self._taken = self._count_taken()
         after = left if self._division is None else left & self._of_me(self._division, joint)
         self._remainder.note_division(int(left.sum()), int(after.sum()), now)
-        return self.why if (own != after)[inside].any() else ""
+        return why if (own != after)[inside].any() else ""
 
     @property
     def parts(self) -> tuple[Part, ...]:
         """The newest division, as others are told."""
         return () if self._division is None else self._division.parts
-
-    def owns(self, cell: Cell) -> bool:
-        """Tell whether a cell is in this robot's part."""
-        area, division = self._map.area, self._division
-        if division is None or area is None or not area.contains(cell):
-            return division is None
-        return bool(self._is_own(division, area)[area.lattice.local(cell)])
 
     def part_cells(self) -> int | None:
         """Return the number of cells in this robot's part; None if all are."""

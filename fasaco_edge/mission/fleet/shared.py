@@ -22,22 +22,28 @@ from msgspec import Meta
 from numpy.typing import NDArray
 
 from fasaco_edge.errors import FleetError
-from fasaco_edge.grid.geometry import Window
 from fasaco_edge.mission.coverage.ledger import TILE, Cells, LedgerSnapshot
+from fasaco_edge.mission.fleet.tiles import (
+    TILE_BYTES,
+    Bits,
+    Placed,
+    bits_of,
+    packed,
+    unpacked,
+    window_of,
+)
 
 if TYPE_CHECKING:
     # For types only: a daemon announces itself to its fleet before the kernels are loaded.
+    from fasaco_edge.grid.geometry import Window
     from fasaco_edge.grid.lattice import Cell
 
-# Size of a tile as bits, row by row, the first of eight highest [bytes].
-TILE_BYTES = TILE * TILE // 8
 # Number of bits set in each byte value.
 _ONES = np.unpackbits(np.arange(256, dtype=np.uint8)[:, None], axis=1).sum(axis=1)
 # Limits on the robots and, over all of them, on the tiles: 16 million cells.
 MOST_ROBOTS, MOST_TILES = 32, 4096
 MOST_TILES_OF_ONE = MOST_TILES // 8
 
-Bits = NDArray[np.uint8]
 Tiles = dict["Cell", Bits]
 Inside = Callable[[Cells, Cells], NDArray[np.bool_]]
 
@@ -103,7 +109,7 @@ class SharedProgress:
         self,
         robot: str,
         epoch: int,
-        tiles: Iterable[tuple[Cell, bytes]],
+        tiles: Iterable[Placed],
         members: Collection[str] = (),
     ) -> bool:
         """Take in a robot's report; tell whether cells need sweeping again because of it.
@@ -127,8 +133,8 @@ class SharedProgress:
                 heard.drop_gone()
             heard.begin(epoch)
             self._note_lost()
-        for place, packed in tiles:
-            bits, before = np.frombuffer(packed, np.uint8), heard.tiles.get(place)
+        for place, told in tiles:
+            bits, before = bits_of(told), heard.tiles.get(place)
             if before is None:
                 self._check_room(robot)
                 without = heard.disregarded.pop(place, np.uint8(0)) & bits
@@ -150,7 +156,7 @@ class SharedProgress:
         elif self._grown:
             found = found.copy()
         for place in self._grown:
-            whole = _window(place)
+            whole = window_of(place)
             if common := whole.intersection(window):
                 found[common.slices_in(window)] |= self._swept_of(place)[common.slices_in(whole)]
         self._grown = set()
@@ -164,7 +170,7 @@ class SharedProgress:
         for heard in self._robots.values():
             if place in heard.tiles:
                 bits |= heard.counted(place)
-        return _cells(bits)
+        return unpacked(bits)
 
     def _note_lost(self) -> None:
         """Note that some cells may need sweeping again."""
@@ -180,7 +186,7 @@ class SharedProgress:
         for place in self._places():
             # Once for all robots: evaluating ``inside`` is the expensive part.
             swept = (heard.tiles[place] for heard in self._robots.values() if place in heard.tiles)
-            at = np.argwhere(_cells(np.bitwise_or.reduce(list(swept))))
+            at = np.argwhere(unpacked(np.bitwise_or.reduce(list(swept))))
             rows, cols = (at + np.multiply(place, TILE)).T
             chosen = inside(rows, cols) if len(at) else np.zeros(0, np.bool_)
             if chosen.any():
@@ -286,9 +292,7 @@ class Telling:
         # Cells reported per tile, in the order of reporting.
         self._told: dict[Cell, NDArray[np.uint16]] = {}
 
-    def next(
-        self, tiles: Mapping[Cell, NDArray[np.uint16]], most: int
-    ) -> tuple[tuple[Cell, bytes], ...]:
+    def next(self, tiles: Mapping[Cell, NDArray[np.uint16]], most: int) -> tuple[Placed, ...]:
         """Return places and bits of a limited number of tiles of a ledger's snapshot."""
         self._told = {place: tile for place, tile in self._told.items() if place in tiles}
         new = [place for place, tile in tiles.items() if self._told.get(place) is not tile]
@@ -301,16 +305,7 @@ class Telling:
 
 def tile_bits(tile: NDArray[np.uint16]) -> bytes:
     """Return the visited cells of a ledger's tile as TILE_BYTES of bits."""
-    return np.packbits((tile > 0).reshape(-1)).tobytes()
-
-
-def _cells(bits: Bits) -> NDArray[np.bool_]:
-    return np.unpackbits(bits).reshape(TILE, TILE).view(np.bool_)
-
-
-def _window(place: Cell) -> Window:
-    row, col = place[0] * TILE, place[1] * TILE
-    return Window(row, col, row + TILE, col + TILE)
+    return packed(tile > 0)
 
 
 def _listed(tiles: Tiles) -> list[_Tile]:
@@ -318,4 +313,4 @@ def _listed(tiles: Tiles) -> list[_Tile]:
 
 
 def _placed(tiles: list[_Tile]) -> Tiles:
-    return {(row, col): np.frombuffer(bits, np.uint8) for row, col, bits in tiles}
+    return {(row, col): bits_of(bits) for row, col, bits in tiles}

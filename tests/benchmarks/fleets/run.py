@@ -136,7 +136,6 @@ class FleetRobot:
             step_s=mission.fleet.step_s,
             epoch=mission.shared.epoch,
             division=mission.fleet.number,
-            open_cells=mission.open_cells(),
             tiles=self.telling.next(mission.ledger.snapshot().tiles, MOST_TILES),
             ground=self.telling_ground.next(mission.area, MOST_TILES),
             by=mission.fleet.by,

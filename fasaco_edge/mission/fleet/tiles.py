@@ -1,0 +1,47 @@
+"""Tiles of bits: cells of squares of the lattice, as the robots of a fleet tell of them.
+
+A tile has TILE x TILE cells; that of place (row, col) begins at cell (TILE * row, TILE * col).
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fasaco_edge.grid.geometry import Window
+from fasaco_edge.mission.coverage.ledger import TILE
+
+if TYPE_CHECKING:
+    # For types only: a daemon announces itself to its fleet before the kernels are loaded.
+    from fasaco_edge.grid.lattice import Cell
+
+# Size of a tile as bits, row by row, the first of eight highest [bytes].
+TILE_BYTES = TILE * TILE // 8
+EMPTY = bytes(TILE_BYTES)
+
+Bits = NDArray[np.uint8]
+# A place, and TILE_BYTES of bits.
+Placed = tuple["Cell", bytes]
+
+
+def window_of(place: Cell) -> Window:
+    """Return the window of a tile's cells."""
+    row, col = place[0] * TILE, place[1] * TILE
+    return Window(row, col, row + TILE, col + TILE)
+
+
+def bits_of(packed: bytes) -> Bits:
+    """Return a tile's bytes as uint8 (TILE_BYTES,), read-only."""
+    return np.frombuffer(packed, np.uint8)
+
+
+def unpacked(bits: Bits) -> NDArray[np.bool_]:
+    """Return the cells of a tile's bits, bool (TILE, TILE)."""
+    return np.unpackbits(bits).reshape(TILE, TILE).view(np.bool_)
+
+
+def packed(cells: NDArray[np.bool_]) -> bytes:
+    """Return cells, bool (TILE, TILE), as TILE_BYTES of bits."""
+    return np.packbits(cells.reshape(-1)).tobytes()
