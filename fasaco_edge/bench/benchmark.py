@@ -127,6 +127,14 @@ def positive(text: str) -> int:
     return number
 
 
+def seed(text: str) -> int:
+    """Read the seed of a search."""
+    number = int(text)
+    if not 0 <= number < 2**63:
+        raise argparse.ArgumentTypeError(f"must be in 0..2^63 - 1, got {number}")
+    return number
+
+
 def seconds(text: str) -> float:
     """Read a time [s] from 0 to an hour."""
     number = float(text)

@@ -21,6 +21,7 @@ from fasaco_edge.bench.benchmark import (
     grid_names,
     positive,
     seconds_above_zero,
+    seed,
 )
 from fasaco_edge.bench.fleet_online import (
     OnlineRun,
@@ -119,7 +120,7 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         "--budget", type=seconds_above_zero, default=1.0, metavar="S",
         help="search time of a plan [s] (default: 1)",
     )  # fmt: skip
-    parser.add_argument("--seed", type=int, default=0, help="of starts and search (default: 0)")
+    parser.add_argument("--seed", type=seed, default=0, help="of starts and search (default: 0)")
     add_online_options(parser)
 
 

@@ -18,6 +18,7 @@ from fasaco_edge.bench.benchmark import (
     grid_names,
     peak_mb,
     positive,
+    seed,
 )
 from fasaco_edge.drawing.spread import Spread, document
 
@@ -64,7 +65,7 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
     add_grid_options(parser, DEFAULT_MAPS)
     parser.add_argument("--ants", type=positive, default=1000, help="(default: %(default)s)")
     parser.add_argument("--velocities", default="8:1", help="as in `plan` (default: %(default)s)")
-    parser.add_argument("--seed", type=int, default=0, help="(default: %(default)s)")
+    parser.add_argument("--seed", type=seed, default=0, help="(default: %(default)s)")
     parser.add_argument("--repeats", type=positive, default=5, help="(default: %(default)s)")
     parser.add_argument("--return-home", action="store_true", help="end each walk at its start")
     parser.add_argument(

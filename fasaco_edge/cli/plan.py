@@ -16,7 +16,7 @@ from fasaco_edge.cli.console.arguments import Command, Exit, check_outputs, writ
 from fasaco_edge.cli.console.streams import print_json
 from fasaco_edge.cli.planning.options import EPILOG, add_options
 from fasaco_edge.cli.planning.progress import watching
-from fasaco_edge.cli.planning.request import read_request
+from fasaco_edge.cli.planning.request import read_request, require_frame
 from fasaco_edge.cli.warmup import compile_kernels
 from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.grid.map_files import find_map, map_sources
@@ -53,11 +53,7 @@ def run(args: argparse.Namespace) -> int:
     from fasaco_edge.offline.plan import plan
 
     map = load_map(args.map, resolution_m=args.resolution, unknown_free=args.unknown_free)
-    if args.xy_out is not None and map.grid is None:
-        raise BadConfiguration(
-            f"--xy-out: {map.file} is a coverage grid (.npy), which lies in no map frame",
-            hint="plan on a map_server YAML file, or ask for --path-out",
-        )
+    require_frame(map, args.xy_out)
     asked = Interrupt()
     total = search.most_s if search.has_local_search else search.ants
     counted = not search.has_local_search

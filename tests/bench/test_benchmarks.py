@@ -286,8 +286,18 @@ def test_help_teaches_by_example(benchmark, capsys):
     assert f"fasaco-edge bench {benchmark.name}" in capsys.readouterr().out
 
 
-@pytest.mark.parametrize("words", [["--ants", "0"], ["--repeats", "-1"], ["--threads", "nan"]])
-def test_impossible_options_are_refused(words, capsys):
+@pytest.mark.parametrize(
+    ("benchmark", "words"),
+    [
+        ("speed", ["--ants", "0"]),
+        ("speed", ["--repeats", "-1"]),
+        ("speed", ["--threads", "nan"]),
+        ("speed", ["--seed", "-1"]),
+        ("fleet", ["--seed", "-1"]),
+        ("fleet", ["--seed", str(2**63)]),
+    ],
+)
+def test_impossible_options_are_refused(benchmark, words, capsys):
     with pytest.raises(SystemExit, match="2"):
-        main(["bench", "speed", *words])
+        main(["bench", benchmark, *words])
     assert words[0] in capsys.readouterr().err

@@ -105,6 +105,27 @@ def test_cells_left_of_and_below_the_first_can_be_named(plan, grid):
     assert "robot 1: start cell (-1, 0) lies outside" in " ".join(err.split())
 
 
+def test_points_of_a_grid_without_a_frame_are_refused(plan, grid, tmp_path):
+    xy = tmp_path / "xy.csv"
+    code, _, err = plan(grid, "--robots", "0,0", "0,5", "--budget", 0.1, "--xy-out", xy)
+    assert code == Exit.CONFIG
+    assert "which lies in no map frame" in " ".join(err.split())
+    assert not xy.exists()
+
+
+def test_turns_are_no_part_of_the_gap_and_each_figure_is_explained(plan, grid, capsys):
+    words = ["--turn-s", 3, "--budget", 0.2, "--json"]
+    _, out, _ = plan(grid, "--robots", "0,0", "11,17", *words)
+    told = json.loads(out)
+    least = told["lower_bound_makespan_steps"]
+    assert told["gap"] == pytest.approx(told["makespan_steps"] / least - 1, abs=1e-6)
+    with pytest.raises(SystemExit):
+        main(["plan", "--help"])
+    explained = capsys.readouterr().out.partition("figures of several robots:")[2]
+    for figure in ("gap", "balance", "swept_twice", "unreachable_cells", "rounds"):
+        assert f"\n  {figure}" in explained
+
+
 def test_without_json_it_prints_a_line_for_each_robot(plan, grid):
     code, out, _ = plan(grid, "--robots", "0,0", "11,17", "--budget", 0.1)
     assert code == 0

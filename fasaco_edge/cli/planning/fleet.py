@@ -16,6 +16,7 @@ from fasaco_edge.cli.console import terminal
 from fasaco_edge.cli.console.arguments import Exit, writing
 from fasaco_edge.cli.console.streams import print_json
 from fasaco_edge.cli.planning.progress import watching
+from fasaco_edge.cli.planning.request import require_frame
 from fasaco_edge.cli.warmup import compile_kernels
 from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.host.processes import ctrl_c_asks
@@ -42,6 +43,7 @@ def plan_fleet(args: argparse.Namespace, request: PlanRequest) -> int:
     from fasaco_edge.planners.fleet.first_tours import Fleet
 
     map = load_map(args.map, resolution_m=args.resolution, unknown_free=args.unknown_free)
+    require_frame(map, args.xy_out)
     lattice = map.lattice(robot)
     starts = args.robots or [lattice.cell_at(*xy) for xy in args.robots_xy]
     _check_apart(starts)

@@ -60,8 +60,14 @@ figures of several robots:
   makespan_steps   steps of the longest walk; makespan_s seconds of the costliest
   lower_bound_makespan_steps
                    steps that the longest walk cannot be below
+  gap              makespan_steps / lower_bound_makespan_steps - 1: steps alone, whatever
+                   turns take; null where that bound is 0
   balance          mean steps of the walks / makespan_steps
   swept_twice      cells that two or more robots visit
+  unreachable_cells
+                   cells that none of the robots can come to
+  rounds           pieces of the search, of all areas: of its annealing and, where turns
+                   take time, of sharing two robots' walks anew
 
 fasaco searches until its budget ends, the walk is proven optimal, or all ants have
 walked: a complete walk within milliseconds, then better ones by local search, restarted

@@ -6,7 +6,7 @@ import argparse
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import msgspec
 
@@ -14,8 +14,12 @@ from fasaco_edge.cli.planning.turning import turning_of
 from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.config.loading import load_config
 from fasaco_edge.config.robot import RobotConfig
+from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.offline.settings import CELLS, Search, default_line, require
 from fasaco_edge.planners.own.loading import UserCode, load
+
+if TYPE_CHECKING:
+    from fasaco_edge.offline.maps import Map
 
 # Members of ``RobotConfig`` and ``Search`` by the options for them.
 ROBOT_OPTIONS = {
@@ -84,6 +88,19 @@ def read_request(args: argparse.Namespace) -> PlanRequest:
     named = args.config, Path(own.file) if own and own.file else None
     sources = tuple(file for file in named if file is not None)
     return PlanRequest(msgspec.structs.replace(robot, **changes), search, line, own, sources)
+
+
+def require_frame(map: Map, xy_out: Path | None) -> None:
+    """Check that a map has a frame if points in it are to be written.
+
+    Raises:
+        BadConfiguration: it is a coverage grid.
+    """
+    if xy_out is not None and map.grid is None:
+        raise BadConfiguration(
+            f"--xy-out: {map.file} is a coverage grid (.npy), which lies in no map frame",
+            hint="plan on a map_server YAML file, or ask for --path-out",
+        )
 
 
 def _search(config: DaemonConfig | None) -> Search:
