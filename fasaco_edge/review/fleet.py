@@ -7,6 +7,7 @@ The shortest way between the two is driving through; what it takes beyond that i
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
@@ -35,6 +36,7 @@ AT_WORK = ("planning", "covering", "degraded")
 PEAK_S = 5.0
 # Notes come once a second: more than that apart nothing was heard in between [s].
 LONGEST_NOTE_S = 3.0
+NEVER_MS = math.inf
 
 
 class FleetRobotFigures(msgspec.Struct, frozen=True):
@@ -207,7 +209,9 @@ def _find_again_of(
     track: RobotTrack, others: Sequence[RobotTrack], known: NDArray[np.bool_], window: Window
 ) -> None:
     steps = [(ms, (row, col)) for ms, row, col in track.passes.tolist()]
-    foreign = [any(other.swept_ms.get(cell, FAR) < ms for other in others) for ms, cell in steps]
+    foreign = [
+        any(other.swept_ms.get(cell, NEVER_MS) < ms for other in others) for ms, cell in steps
+    ]
     seen: set[Place] = set()
     at = 0
     while at < len(steps):

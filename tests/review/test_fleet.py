@@ -37,12 +37,12 @@ def lane(row, first, last):
     return [(row, col) for col in range(first, last + step, step)]
 
 
-def reviewed(monkeypatch, *ways, waits=()):
+def reviewed(monkeypatch, *ways, waits=(), begin_s=0):
     """Return the review of robots that drive one after another."""
     robots = [
         NotedRobot(f"r{number + 1}", 0.2, CELL_M, 0.0, 0.0, 0.0, 0.0) for number in range(len(ways))
     ]
-    notes, begin_s = [], 0
+    notes = []
     for number, way in enumerate(ways):
         notes += noted(number, way, begin_s, waits=waits if number else ())
         begin_s += len(way)
@@ -71,6 +71,12 @@ def test_lanes_over_swept_floor_are_sweeping_again(monkeypatch):
     assert second.again_m2 + second.through_m2 == pytest.approx(36 * CELL_M**2, abs=0.02)
     assert figures.swept_m2 == 37 * CELL_M**2
     assert figures.robots[0].again_m2 == 0.0
+
+
+def test_after_a_month_floor_that_nobody_swept_before_is_new(monkeypatch):
+    lanes = [*lane(4, 0, 11), *lane(5, 11, 0), *lane(6, 0, 11)]
+    figures = reviewed(monkeypatch, SWEPT, lanes, begin_s=30 * 24 * 3600)
+    assert figures.again_m2 == figures.through_m2 == 0.0
 
 
 def test_makespan_balance_waiting_and_messages(monkeypatch):
