@@ -217,6 +217,22 @@ def test_maps_of_many_robots_leave_room_in_a_part(studio, monkeypatch):
         assert len(data) <= 4 * 1_000
 
 
+def test_what_is_left_out_of_a_robots_recording_is_told_once(studio, monkeypatch):
+    wide, large = Teller(studio.bus, "wide"), Teller(studio.bus, "large")
+    wide.tell(cells=[(0, 0)])
+    large.tell(cells=[(1, 0)])
+    studio.until(lambda: studio.joined("wide", "large"))
+    studio.pass_time(0.3)
+    monkeypatch.setattr(studio.recorder._inbox, "_capacity", 16_000)
+    for col in (900, 901):
+        wide.tell(cells=[(0, 64 * col)])
+        large.send("status", bytes(20_000))
+        studio.pass_time(1.3)
+    (part,) = studio.parts()
+    for line in (f"wide: {recorder.TOO_WIDE}", f"large: {recorder.TOO_LARGE}"):
+        assert log_of(part).count(line) == 1
+
+
 def test_a_frame_that_changes_is_told_and_begins_anew(studio):
     robot = Teller(studio.bus, "r1")
     robot.tell(cells=[(0, 0)])

@@ -32,11 +32,11 @@ class Heard:
 
 @dataclass(slots=True)
 class Traffic:
-    """Messages of a fleet's robot to the others, and their bytes; ``lost``: of all topics."""
+    """Messages of a robot to its fleet, their bytes, and samples of all topics left out."""
 
     messages: int = 0
     bytes: int = 0
-    lost: int = 0
+    too_large: int = 0
 
 
 @dataclass(slots=True)
@@ -113,9 +113,8 @@ class FleetInbox:
             len(waiting) >= DEPTHS.get(arrival.topic, 1) or queues.bytes + size > share
         ):
             queues.bytes -= waiting.popleft().sample.size
-            queues.traffic.lost += 1
         if queues.bytes + size > share:
-            queues.traffic.lost += 1
+            queues.traffic.too_large += 1
             return
         waiting.append(arrival)
         queues.bytes += size

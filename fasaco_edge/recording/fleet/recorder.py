@@ -46,6 +46,8 @@ MAP_TURN_NS = 2_000_000_000
 RATE_NOTES = 5
 # Robots and topics whose faults are counted apart, beside those of the robots recorded.
 MOST_FAULTS = 256
+TOO_LARGE = "what is larger than its share of the memory is left out, its map, say"
+TOO_WIDE = "cells farther apart than are recorded, or more, are left out"
 
 
 def run_fleet_recorder(
@@ -86,7 +88,7 @@ class FleetRecorder:
         self._next_note_ns = self._next_write_ns = self._began_ns
         self._noted_ns = self._began_ns
         self._part = 0
-        self._faults: Counter[str] = Counter()
+        self._faults: Counter[tuple[str, str]] = Counter()
 
     def listen(self) -> None:
         """Subscribe to what all robots tell their fleets."""
@@ -139,17 +141,25 @@ class FleetRecorder:
         try:
             self._take(heard.robot, heard.arrival)
         except FasacoError as error:
-            what = f"{heard.robot}: {heard.arrival.topic}"
+            what = heard.robot, heard.arrival.topic
             if self._members.get(heard.robot) is None:
                 # Any number of names would each keep a queue from others.
                 self._inbox.forget(heard.robot)
                 if what not in self._faults and len(self._faults) >= MOST_FAULTS:
-                    what = f"other robots: {heard.arrival.topic}"
+                    what = "other robots", heard.arrival.topic
             self._faults[what] += 1
             count = self._faults[what]
             # A robot may send nothing else.
             if is_reported(count):
-                self._scene.add_line(one_line(f"{what}: {count} refused: {error}"), "WARN")
+                self._scene.add_line(
+                    one_line(f"{': '.join(what)}: {count} refused: {error}"), "WARN"
+                )
+
+    def _warn_once(self, robot: str, fault: str) -> None:
+        """Log what a robot's recording lacks, once."""
+        if (robot, fault) not in self._faults:
+            self._scene.add_line(one_line(f"{robot}: {fault}"), "WARN")
+        self._faults[robot, fault] += 1
 
     def _take(self, robot: str, arrival: Arrival) -> None:
         if arrival.topic == FLEET.name:
@@ -212,8 +222,8 @@ class FleetRecorder:
         self._scene.leave(robot)
         for kept in (self._poses, self._rates):
             kept.pop(robot, None)
-        for topic in (FLEET, STATUS, PATH, POSE, MAP):
-            self._faults.pop(f"{robot}: {topic.name}", None)
+        for fault in [fault for fault in self._faults if fault[0] == robot]:
+            del self._faults[fault]
 
     def _ask_for_maps(self, now_ns: int) -> None:
         """Ask the robots for their maps, one after another."""
@@ -246,6 +256,10 @@ class FleetRecorder:
         self._noted_ns = now_ns
         for member in self._members:
             traffic = self._inbox.traffic(member.name)
+            if traffic.too_large:
+                self._warn_once(member.name, TOO_LARGE)
+            if member.swept.refused or member.ground.refused:
+                self._warn_once(member.name, TOO_WIDE)
             note = member.note(self._ms(now_ns), now_ns, (traffic.messages, traffic.bytes))
             self._notes.append(note)
             rates = self._rates.setdefault(member.name, [])
