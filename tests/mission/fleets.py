@@ -21,7 +21,7 @@ class FleetRobot(Drive):
 
     def __init__(self, name, cell, rows, config=CONFIG, before=None):
         self.name, self.hangs, self.told, self.cannot = name, False, Telling(), ()
-        self.told_ground = GroundTelling()
+        self.told_ground, self.told_epoch = GroundTelling(), 1
         super().__init__(cell, config=replace(config, robot=name))
         if before is not None:
             self.mission.restore_ledger(before)
@@ -30,7 +30,10 @@ class FleetRobot(Drive):
 
     def report(self):
         mission, pose = self.mission, self.mission.pose.pose
-        tiles = self.told.next(mission.ledger.snapshot().tiles, MOST_TILES)
+        swept = mission.ledger.snapshot().tiles
+        if mission.shared.epoch != self.told_epoch:
+            self.told, self.told_epoch = Telling(swept), mission.shared.epoch
+        tiles = self.told.next(swept, MOST_TILES)
         return MemberHeard(
             robot=self.name,
             frame="map",
@@ -46,6 +49,7 @@ class FleetRobot(Drive):
             radius_m=CONFIG.footprint.robot_radius_m,
             ahead=tuple((x, y) for x, y in mission.next_metres().tolist()),
             waits_for=mission.waits_for,
+            kept=self.told.kept(tiles),
         )
 
     def tick(self, after=1.0):

@@ -280,8 +280,45 @@ def test_a_zone_swept_again_holds_nobody_up_however_many_have_swept_it():
     assert swept[~inside(whole, 0.3)][:1000].all()
 
 
+def everywhere(rows, _cols):
+    return np.ones(len(rows), np.bool_)
+
+
+@pytest.mark.parametrize(
+    ("kept", "counted"), [((), 20), (range(3), 17), (None, 0)], ids=["none", "some", "unknown"]
+)
+def test_what_is_swept_anew_counts_although_it_was_disregarded_before(kept, counted):
+    shared, cells = SharedProgress(), {(0, col) for col in range(20)}
+    shared.begin(1)
+    shared.hear("r2", 1, tiles_of(cells))
+    shared.disregard(everywhere)
+    # It has forgotten all but what it kept, and swept all again, out of hearing.
+    told = None if kept is None else tiles_of({(0, col) for col in kept})
+    for _ in range(3):
+        shared.hear("r2", 2, tiles_of(cells), (), told)
+        assert shared.cells_of("r2") == counted
+    # In an epoch, what is disregarded stays so.
+    shared.disregard(everywhere)
+    shared.hear("r2", 2, tiles_of(cells), (), told)
+    assert shared.cells_of("r2") == 0
+
+
+def test_a_second_order_counts_what_was_swept_for_it_out_of_hearing():
+    fleet = FleetDrive(HALL, TWO)
+    fleet.finish()
+    ours, other = fleet.robots.values()
+    for robot in (ours, other):
+        sweeps_everything_again(robot)
+    fleet.hears = lambda speaker, listener: False
+    fleet.run(40)
+    fleet.hears = lambda speaker, listener: True
+    fleet.run(2)
+    # All but what it passed before it first told of the order.
+    assert ours.mission.shared.cells_of("r2") >= other.mission.snapshot().cells - 2 > 35
+
+
 def test_what_is_disregarded_is_dropped_with_the_cells_and_where_it_is_too_much():
-    shared, everywhere = SharedProgress(), lambda rows, _: np.ones(len(rows), bool)
+    shared = SharedProgress()
     for epoch in range(1, 120):
         places = range(100 * epoch, 100 * epoch + 100)
         shared.hear("r2", epoch, [((row, 0), b"\xff" * TILE_BYTES) for row in places])

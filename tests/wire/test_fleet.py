@@ -40,6 +40,7 @@ MEMBER = structs.replace(
     radius_m=0.2,
     ahead=((1.5, -2.0), (1.5, -1.75)),
     waits_for="r3",
+    kept=(TILE,),
 )
 CONFIG = DaemonConfig(robot=RobotConfig(name="r1"), fleet=FleetConfig("hall"))
 
@@ -167,6 +168,24 @@ def test_a_robot_tells_its_pace_as_it_is_now_and_after_forgetting_all_tiles_at_o
     assert [len(said.swept) for said in listener.heard] == [TILES] * 3
 
 
+def test_a_robot_tells_which_of_its_cells_are_from_before_their_epoch_where_it_knows():
+    robot, listener = FleetRobot("r1", (0, 0), ["." * 12] * 4), Listener()
+    ledger, voice = robot.mission.ledger, FleetVoice(listener, CONFIG)
+    ledger.credit((64, 0))
+    voice.publish(robot.mission, 0.0)
+    before = {tile.row: tile for tile in listener.heard[-1].swept}
+    assert listener.heard[-1].kept is None
+    robot.mission.shared.note_forgotten()
+    voice.publish(robot.mission, 1.0)
+    ledger.credit((64, 9))
+    ledger.credit((128, 0))
+    voice.publish(robot.mission, 2.0)
+    told = listener.heard[-1]
+    assert {64 * tile.row for tile in told.swept} >= {64, 128}
+    assert {tile.row: tile for tile in told.kept}[1] == before[1]
+    assert 2 not in {tile.row for tile in told.kept}
+
+
 @pytest.mark.parametrize("northing_m", [5_500_000, 9_999_000])
 def test_robots_on_a_map_in_utm_divide_its_cells(northing_m):
     corner = round(northing_m / CELL), round(500_000 / CELL)
@@ -224,8 +243,9 @@ def test_a_division_comes_with_its_parts_and_one_that_lacks_them_is_read():
     heard_now = heard(said())
     assert heard_now.by == "r2"
     assert heard_now.parts[0] == Part("r1", (3, -4), -1.5, 1.2)
-    assert heard_now.ground == (((-1, 2), TILE.cells),)
+    assert heard_now.ground == heard_now.kept == (((-1, 2), TILE.cells),)
     older = json.loads(said())
-    for member in ("ground", "by", "parts", "radius_m", "ahead", "waits_for"):
+    for member in ("ground", "by", "parts", "radius_m", "ahead", "waits_for", "kept"):
         del older[member]
     assert heard(json.dumps(older).encode()).parts == ()
+    assert heard(json.dumps(older).encode()).kept is None

@@ -136,6 +136,8 @@ class MemberHeard:
         radius_m: radius of its disc [m].
         ahead: points (x, y) of its next metres [m].
         waits_for: name of the robot that it waits for; "" for none.
+        kept: as ``tiles``, those of their cells that it swept before this epoch; None where that is
+            not known.
     """
 
     robot: str
@@ -154,6 +156,7 @@ class MemberHeard:
     radius_m: float = 0.0
     ahead: tuple[tuple[float, float], ...] = ()
     waits_for: str = ""
+    kept: tuple[tuple[tuple[int, int], bytes], ...] | None = None
 
 
 Event = (

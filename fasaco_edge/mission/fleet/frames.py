@@ -154,6 +154,8 @@ class FleetFrames:
             y=y,
             ahead=tuple(placed_point(frame, *point) for point in heard.ahead),
             tiles=swept.tiles(heard.tiles),
+            # A tile here is made of several of theirs, which come one after the other.
+            kept=None,
             ground=ground.tiles(heard.ground),
             parts=tuple(replace(part, seed=swept.cell(*part.seed)) for part in heard.parts),
         )

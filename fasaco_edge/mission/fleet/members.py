@@ -174,7 +174,7 @@ class Members:
             return ""
         swept = event.robot, event.epoch, event.tiles
         try:
-            is_open_again = self._ledger.shared.hear(*swept, self.known)
+            is_open_again = self._ledger.shared.hear(*swept, self.known, event.kept)
         except FleetError as error:
             self.known[event.robot] = replace(member, left_out=str(error))
             self.ground.drop(event.robot)

@@ -6,7 +6,9 @@ halves of a split fleet agree once they hear each other again. When the epoch ch
 earlier reports are dropped. The progress of a robot that is gone stays.
 
 Cells that this robot has to sweep again, whoever swept them (a second pass, a reset, a map that
-moved), are disregarded until the robot that swept them has forgotten them itself.
+moved), are disregarded until the robot that swept them has forgotten them itself. It tells which of
+its cells are from before its epoch. Where it does not know, or swept some anew in an epoch that was
+never heard of, they stay disregarded, and are swept once more than needed.
 """
 
 from __future__ import annotations
@@ -24,6 +26,7 @@ from numpy.typing import NDArray
 from fasaco_edge.errors import FleetError
 from fasaco_edge.mission.coverage.ledger import TILE, Cells, LedgerSnapshot
 from fasaco_edge.mission.fleet.tiles import (
+    EMPTY,
     TILE_BYTES,
     Bits,
     Placed,
@@ -111,6 +114,7 @@ class SharedProgress:
         epoch: int,
         tiles: Iterable[Placed],
         members: Collection[str] = (),
+        kept: Iterable[Placed] | None = None,
     ) -> bool:
         """Take in a robot's report; tell whether cells need sweeping again because of it.
 
@@ -119,6 +123,7 @@ class SharedProgress:
             epoch: epoch of its cells.
             tiles: places, with TILE_BYTES of bits each.
             members: names of robots that must not be displaced.
+            kept: as the tiles, their cells swept before the epoch; None where that is not known.
 
         Raises:
             FleetError: there is no room for its data.
@@ -133,11 +138,13 @@ class SharedProgress:
                 heard.drop_gone()
             heard.begin(epoch)
             self._note_lost()
+        known = None if kept is None else dict(kept)
         for place, told in tiles:
             bits, before = bits_of(told), heard.tiles.get(place)
             if before is None:
                 self._check_room(robot)
-                without = heard.disregarded.pop(place, np.uint8(0)) & bits
+                from_before = bits if known is None else bits & bits_of(known.get(place, EMPTY))
+                without = heard.disregarded.pop(place, np.uint8(0)) & from_before
                 if without.any():
                     heard.disregarded[place] = without
             after = bits if before is None else before | bits
@@ -286,9 +293,16 @@ class _Note(msgspec.Struct, frozen=True):
 
 
 class Telling:
-    """Selects the tiles of the next report: new ones first, then all others in turn."""
+    """Selects the tiles of the next report: new ones first, then all others in turn.
 
-    def __init__(self) -> None:
+    Args:
+        kept: the ledger's tiles when the epoch began; None where that is not known.
+    """
+
+    def __init__(self, kept: Mapping[Cell, NDArray[np.uint16]] | None = None) -> None:
+        self._kept = None
+        if kept is not None:
+            self._kept = {place: tile_bits(tile) for place, tile in kept.items()}
         # Cells reported per tile, in the order of reporting.
         self._told: dict[Cell, NDArray[np.uint16]] = {}
 
@@ -301,6 +315,11 @@ class Telling:
             self._told.pop(place, None)
             self._told[place] = tiles[place]
         return tuple((place, tile_bits(tiles[place])) for place in chosen)
+
+    def kept(self, told: Iterable[Placed]) -> tuple[Placed, ...] | None:
+        """Return which cells of tiles were swept before this epoch; None where not known."""
+        kept = self._kept
+        return None if kept is None else tuple((at, kept[at]) for at, _ in told if at in kept)
 
 
 def tile_bits(tile: NDArray[np.uint16]) -> bytes:

@@ -85,7 +85,9 @@ class FleetMember(Document, frozen=True):
         epoch: changes whenever the robot drops some of its swept cells.
         division: number of the newest division of the remaining cells known to it.
         open_cells: number of cells known to it that are still to sweep.
-        swept: tiles swept in this epoch: changed ones first, then all in turn.
+        swept: its swept tiles: changed ones first, then all in turn.
+        kept: which cells of these tiles it swept before this epoch, no tile for none; null where it
+            does not know.
         lattice_deg: the angle of its cells' rows to the x axis of the map frame [deg].
         ground: tiles of cells that it can reach: changed ones first, then all in turn.
         by: name of the robot that made that division.
@@ -118,6 +120,7 @@ class FleetMember(Document, frozen=True):
     ahead: Annotated[tuple[Point, ...], Meta(max_length=MAX_FLEET_POINTS)] = ()
     waits_for: Text = ""
     origin: tuple[Coordinate, Coordinate, Angle] = (0.0, 0.0, 0.0)
+    kept: Annotated[tuple[CellTile, ...], Meta(max_length=MAX_FLEET_TILES)] | None = None
 
 
 class _Head(msgspec.Struct, frozen=True):

@@ -125,8 +125,11 @@ class FleetRobot:
         mission = self.mission
         if mission.pose is None or not mission.ledger.frame:
             return None
+        swept = mission.ledger.snapshot().tiles
         if mission.shared.epoch != self.epoch:
-            self.epoch, self.telling = mission.shared.epoch, Telling()
+            before = swept if self.epoch else None
+            self.epoch, self.telling = mission.shared.epoch, Telling(before)
+        tiles = self.telling.next(swept, MOST_TILES)
         return MemberHeard(
             robot=self.name,
             frame=mission.ledger.frame,
@@ -136,13 +139,14 @@ class FleetRobot:
             step_s=mission.fleet.step_s,
             epoch=mission.shared.epoch,
             division=mission.fleet.number,
-            tiles=self.telling.next(mission.ledger.snapshot().tiles, MOST_TILES),
+            tiles=tiles,
             ground=self.telling_ground.next(mission.area, MOST_TILES),
             by=mission.fleet.by,
             parts=mission.fleet.parts,
             radius_m=self.world.config.robot_radius_m,
             ahead=tuple((x, y) for x, y in mission.next_metres().tolist()),
             waits_for=mission.waits_for,
+            kept=self.telling.kept(tiles),
         )
 
 
