@@ -17,6 +17,7 @@ from fasaco_edge.grid.geometry import GridGeometry, Pose2D, Window
 from fasaco_edge.mission.coverage.ledger import TILE
 from fasaco_edge.mission.fleet.frames import placed_point, turned
 from fasaco_edge.mission.fleet.shared import MOST_TILES_OF_ONE
+from fasaco_edge.mission.fleet.tiles import bits_of, unpacked
 from fasaco_edge.wire.documents.fleet import CellTile, FleetMember
 
 Place = tuple[int, int]
@@ -112,8 +113,7 @@ class TileSet:
                 continue
             bits = tile.cells
             if grows and before is not None:
-                both = np.frombuffer(before, np.uint8) | np.frombuffer(bits, np.uint8)
-                bits = both.tobytes()
+                bits = (bits_of(before) | bits_of(bits)).tobytes()
             if bits != before:
                 self.count += _count(bits) - _count(before or b"")
                 self._tiles[place] = bits
@@ -148,7 +148,7 @@ def cells_of(tiles: Iterable[CellTile]) -> Cells:
     """Return the cells (row, col) of tiles, int64 (n, 2)."""
     found = [np.zeros((0, 2), np.int64)]
     for tile in tiles:
-        marked = np.unpackbits(np.frombuffer(tile.cells, np.uint8)).reshape(TILE, TILE)
+        marked = unpacked(bits_of(tile.cells))
         found.append(np.argwhere(marked) + np.multiply((tile.row, tile.col), TILE))
     return np.concatenate(found)
 
