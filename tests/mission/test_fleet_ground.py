@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from fasaco_edge.errors import FleetError
-from fasaco_edge.grid.lattice import BLOCKED, CoverageLattice
+from fasaco_edge.grid.lattice import BLOCKED, UNKNOWN, CoverageLattice
 from fasaco_edge.mission.core.events import MapReceived, MemberHeard
+from fasaco_edge.mission.coverage.ledger import TILE
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
 from fasaco_edge.mission.fleet import ground as shared_ground
 from fasaco_edge.mission.fleet.division import Division, Robot, divide
@@ -54,6 +55,19 @@ def test_the_own_map_decides_where_it_shows_a_wall():
     joint = ground.joint(own)
     assert cells_of(joint) == cells_of(own)
     assert (joint.lattice.states[:2, 2] == BLOCKED).all()
+
+
+@pytest.mark.parametrize("told", [5, 8])
+def test_own_cells_beyond_the_ground_of_others_count_only_if_somebody_can_reach_them(told):
+    """Between there may be a wall: nobody came to sweep them, and a robot stood for them."""
+    lattice = CoverageLattice.from_free(np.arange(10)[None] != 4)
+    states = lattice.states.copy()
+    states[0, 4] = UNKNOWN
+    own = ReachableArea.around(replace(lattice, states=states), (0, 0))
+    ground = SharedGround()
+    bits = np.packbits(np.arange(TILE * TILE) < told).tobytes()
+    ground.hear("r2", [((0, 0), bits)])
+    assert cells_of(ground.joint(own)) == {(0, col) for col in range(told)}
 
 
 def test_ground_that_is_lost_again_is_told():

@@ -147,7 +147,7 @@ def _joined(area: ReachableArea, tiles: dict[Cell, NDArray[np.uint8]]) -> Reacha
         if common := whole.intersection(around):
             cells = unpacked(tiles[place])
             ground[common.slices_in(around)] |= cells[common.slices_in(whole)]
-    inside = window.slices_in(around)
+    inside, told = window.slices_in(around), ground.copy()
     ground[inside] &= lattice.states == UNKNOWN
     if not ground.any():
         return area
@@ -168,7 +168,9 @@ def _joined(area: ReachableArea, tiles: dict[Cell, NDArray[np.uint8]]) -> Reacha
     if not len(seeds):
         return ReachableArea(whole_lattice, reached)
     first = int(seeds[0, 0]) + around.row0, int(seeds[0, 1]) + around.col0
-    return ReachableArea.around(whole_lattice, first)
+    joined = ReachableArea.around(whole_lattice, first).reachable
+    # Own cells beyond the ground of others, which nobody can reach, may lie behind a wall there.
+    return ReachableArea(whole_lattice, joined & (reached | told))
 
 
 def _tiles_of(area: ReachableArea) -> dict[Cell, bytes]:
