@@ -30,7 +30,7 @@ class Division:
         costs_s: cost of each walk [s].
         cells: number of cells to cover.
         lower_bound_steps: lower bound on the steps of the longest walk.
-        rounds: number of rounds of pairs.
+        rounds: number of pieces of annealing and rounds of pairs, in all areas.
     """
 
     walks: tuple[NDArray[np.int32], ...]
