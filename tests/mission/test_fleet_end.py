@@ -9,7 +9,7 @@ import pytest
 from fasaco_edge.mission.core.events import CommandReceived, MapReceived, Part
 from fasaco_edge.mission.fleet.ground import GroundTelling
 from fasaco_edge.mission.fleet.members import HANGING_S
-from fasaco_edge.mission.fleet.remainder import STUCK_S, Remainder
+from fasaco_edge.mission.fleet.remainder import STUCK_S, WAITING_S, Remainder
 from fasaco_edge.mission.orders.order import MissionOrder, Zone
 from tests.mission.fleets import FleetDrive, FleetRobot
 from tests.mission.test_fleet import tiles_of
@@ -65,6 +65,17 @@ def test_what_another_leaves_is_swept_by_a_robot_without_a_part():
     assert not shared.ours.walk
     shared.run(int(STUCK_S) + 2, sweeps=0)
     assert shared.ours.walk
+
+
+def test_robots_do_not_stand_for_one_another():
+    remainder = Remainder()
+    for now in range(int(WAITING_S) + 4):
+        remainder.note_others(now, wait=now > 0)
+        remainder.note(100 - now, 0, now)
+        assert remainder.others_go_on == (now <= WAITING_S + 1)
+    remainder.note_others(now, wait=False)
+    remainder.note(50, 0, now)
+    assert remainder.others_go_on
 
 
 @pytest.mark.parametrize(
@@ -148,7 +159,8 @@ def test_a_robot_that_sees_nothing_left_goes_where_its_part_is_and_without_one_s
 
 def test_a_robot_sweeps_its_part_once_it_has_come_to_see_it():
     ours = FleetRobot("r1", (6, 0), [row[:12] for row in HALL])
-    other = FleetRobot("r2", (6, 16), HALL)
+    # Off the way of the first.
+    other = FleetRobot("r2", (11, 16), HALL)
     for second in range(60):
         if ours.cell[1] == 10:
             ours.tell(MapReceived(building(*HALL)), after=0.0)

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 
 from fasaco_edge.bench.floor import judge_floor
 from fasaco_edge.mission.core.events import MapReceived, MemberHeard, Part, State
 from fasaco_edge.mission.core.mission import Mission
+from fasaco_edge.mission.fleet.layer import MANY_TAKEN
 from tests.grid.test_floor import room
+from tests.mission.test_fleet import tiles_of
 from tests.mission.test_line import CELL_M, CONFIG, RADIUS_M, ROBOT, Robot
 
 
@@ -89,3 +92,18 @@ def test_a_robot_that_makes_way_goes_straight_and_not_over_the_middle_of_its_cel
     begin, *_, end = robot.line
     assert len(robot.line) == 2
     assert math.dist(end, (x, y)) > math.dist(begin, (x, y))
+
+
+def test_the_rest_of_a_line_that_leads_to_nothing_more_is_not_driven():
+    robot = Robot(Mission(replace(CONFIG, robot="r1")))
+    robot.mission.shared.begin(1)
+    robot.tell(MapReceived(room(4.5, 3.5)))
+    alone = replace(divided_by("r2", 0), parts=(), by="")
+    robot.tell(alone)
+    # Fewer are no reason for another path at once.
+    while robot.mission.open_cells() > MANY_TAKEN - 1:
+        robot.drive(is_checked=False)
+    assert len(robot.line) > 5
+    robot.tell(replace(alone, tiles=tiles_of(product(range(-2, 30), range(-2, 30)))))
+    robot.drive(4, is_checked=False)
+    assert robot.mission.state is State.DONE

@@ -19,6 +19,7 @@ from fasaco_edge.mission.core.standing import PATIENCE_S, Standing
 from fasaco_edge.mission.core.trail_layer import TrailLayer
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
 from fasaco_edge.mission.fleet.layer import FleetLayer
+from fasaco_edge.mission.line.layer import LineLayer
 from fasaco_edge.mission.map.inputs import InputMonitor
 from fasaco_edge.mission.map.map_state import MapState
 from fasaco_edge.mission.orders.order import Errand
@@ -28,6 +29,8 @@ from fasaco_edge.mission.orders.sequencer import Sequencer
 # An errand ends once the robot was in the last cell for this long [s]: its path leads to the centre
 # and ends with a turn.
 ARRIVAL_S = 2.0
+# Period of checks whether the rest of a line is worth driving [s].
+WEIGH_S = 1.0
 PLACES: dict[Errand, str] = {"home": "home", "charge": "to the dock"}
 
 # The states of a robot that drives, or soon will.
@@ -47,6 +50,7 @@ class Executive:
     monitor: InputMonitor
     orders: Sequencer
     route: Route
+    line: LineLayer
     trail: TrailLayer
     fleet: FleetLayer
     charging: Charging
@@ -57,6 +61,7 @@ class Executive:
     _state: State = field(default=State.WAITING_FOR_MAP, init=False)
     _reason: str = field(default="no map yet", init=False)
     _now: float = field(default=0.0, init=False)
+    _weighed_at: float = field(default=float("-inf"), init=False)
     _standing: Standing = field(init=False)
 
     def __post_init__(self) -> None:
@@ -97,6 +102,7 @@ class Executive:
         """Continue with the order."""
         route, orders, now = self.route, self.orders, self._now
         self._check_deviation(cell)
+        self._check_worth()
         if reason := orders.begin(cell, now):
             route.want(reason)
         if reason := self._share(cell):
@@ -134,7 +140,7 @@ class Executive:
         is_vain = bool(way.waits_for) and not self.orders.left()
         if is_vain:
             # Floor that is left in passed cells is not waited for.
-            self.ledger.left_floor.give_up(self.ledger.left_floor.left)
+            self.ledger.left_floor.give_up(self.ledger.left_floor.worth_s)
         update = way.look(self._now, has_work=order.is_open and not is_vain)
         if not way.waits_for:
             return None
@@ -220,6 +226,22 @@ class Executive:
         elif waited and (path.is_far(cell) or self._standing.is_beside_path):
             route.want("robot left the path")
 
+    def _check_worth(self) -> None:
+        """End the path of a fleet's robot that leads to no cell of its part any more.
+
+        Others have swept what lay ahead; floor that is left must be worth the time.
+        """
+        route = self.route
+        is_driving = self._state is State.COVERING and route.pending is None and not route.wanted
+        is_due = self._now - self._weighed_at >= WEIGH_S
+        if not (is_due and is_driving and self.fleet.members and len(route.path.ahead) > 1):
+            return
+        self._weighed_at = self._now
+        if self.orders.has_work or self.line.is_worth_driving:
+            return
+        self.ledger.left_floor.give_up(self.ledger.left_floor.chosen)
+        route.want("what is left is not worth the way")
+
     def _request(self, cell: Cell, update: PathUpdate | None) -> Decision:
         """Request the wanted plan; if nothing is left to cover, continue with the order."""
         route, orders = self.route, self.orders
@@ -227,6 +249,7 @@ class Executive:
         # One that stands, as others go on or for a map, has no more reason in each step.
         stands = self._state is State.COVERING and not len(route.path.cells)
         self._share(cell, at_once=not stands)
+        orders.choose_left_floor(cell)
         while orders.order_state.stage is not Stage.RETURNING:
             if orders.waits_for_others:
                 return self._rest(State.COVERING, "others sweep what is left", update)

@@ -103,7 +103,7 @@ class Mission:
             *owners, self._line, self._trail, *measured, config.policy, self._rotation.deg
         )
         self.giving_way = GivingWay(config, self._map, self.route, self.fleet)
-        decided_by = self._trail, self.fleet, self.charging, self.giving_way
+        decided_by = self._line, self._trail, self.fleet, self.charging, self.giving_way
         in_dock = InDock(self._map, self._gauge, config.policy)
         mask = mask_frame(self._config.policy.keep_out_mask)
         self._executive = Executive(*owners, *decided_by, in_dock, config.policy, mask)

@@ -177,6 +177,8 @@ class FleetLayer:
         (joint, left), before = self._left(open_cells, area), self._division
         inside = area.lattice.window.slices_in(joint.lattice.window)
         own = left if before is None else left & self._of_me(before, joint)
+        at_work = [one.newest for one in self.members.values() if not one.absence(now)]
+        self._remainder.note_others(now, wait=all(heard.waits_for for heard in at_work))
         self._remainder.note(int(left.sum()), int(own.sum()), now)
         if newer := self._newer():
             why, self.number, self.by = LATER, newer.division, newer.by

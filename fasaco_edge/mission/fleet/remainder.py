@@ -7,14 +7,16 @@ from __future__ import annotations
 
 # Others go on as long as the cells left have become fewer within this time [s].
 STUCK_S = 30.0
+# Nobody goes on if for so long all others have waited, perhaps for this robot [s].
+WAITING_S = 6.0
 
 
 class Remainder:
     """Follows what is left for a fleet.
 
     Attributes:
-        others_go_on: whether all that is left is others' to sweep, and has become less. Once it has
-            not for STUCK_S, it counts as stuck until this robot has a part again.
+        others_go_on: whether all that is left is others' to sweep, who are at it, and has become
+            less. Once it has not for STUCK_S, it counts as stuck until this robot has a part again.
         had_part: whether the last division gave this robot a part.
         divided: number of cells left at that time.
     """
@@ -25,6 +27,15 @@ class Remainder:
         # Fewest cells left since this robot has no part, and when they became so few; None while it
         # has one. A number that goes up and down again is no progress.
         self._least: tuple[int, float] | None = None
+        # Since when all others wait; None while one is at work.
+        self._waiting_since: float | None = None
+
+    def note_others(self, now: float, *, wait: bool) -> None:
+        """Note whether all other robots at work wait for one, perhaps for this robot."""
+        if not wait:
+            self._waiting_since = None
+        elif self._waiting_since is None:
+            self._waiting_since = now
 
     def note(self, cells: int, own: int, now: float) -> None:
         """Take in the numbers of cells left, in all and in this robot's part.
@@ -37,7 +48,8 @@ class Remainder:
         least, since = self._least or (cells, now)
         is_stuck = now - since > STUCK_S
         self._least = (cells, now) if cells < least and not is_stuck else (least, since)
-        self.others_go_on = cells > 0 and not is_stuck
+        waiting_s = 0.0 if self._waiting_since is None else now - self._waiting_since
+        self.others_go_on = cells > 0 and not is_stuck and waiting_s <= WAITING_S
 
     def note_division(self, cells: int, own: int, now: float) -> None:
         """Take in a new division, as ``note`` does."""

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from fasaco_edge.grid.geometry import Window
 from fasaco_edge.grid.lattice import Cell
 from fasaco_edge.mission.config import MissionConfig
+from fasaco_edge.mission.coverage.left_floor import WayBack
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
 from fasaco_edge.mission.coverage.unreached import Unreached, UnreachedFinder
 from fasaco_edge.mission.fleet.layer import FleetLayer
@@ -203,9 +204,13 @@ class Sequencer:
     def _open_to_me(self, area: ReachableArea) -> NDArray[np.bool_]:
         """Return the cells that still need a visit by this robot: its part, in a fleet."""
         window = area.lattice.window
-        cells = self._fleet.mine(self._unswept(window), area).copy()
+        cells = self._unvisited_by_me(area, window)
         if self.keeps_left_floor:
-            cells |= self._ledger.left_floor.left_in(window) & self.asked_for(window)
+            cells |= self._ledger.left_floor.chosen_in(window) & self.asked_for(window)
+        return cells
+
+    def _unvisited_by_me(self, area: ReachableArea, window: Window) -> NDArray[np.bool_]:
+        cells = self._fleet.mine(self._unswept(window), area).copy()
         self._run.exploration.mark(cells, window)
         return cells
 
@@ -238,6 +243,26 @@ class Sequencer:
     def keeps_left_floor(self) -> bool:
         """Whether this robot goes back to floor that it has left: nobody else in a fleet would."""
         return bool(self._fleet.members)
+
+    def choose_left_floor(self, cell: Cell) -> None:
+        """Choose to which left floor the robot in ``cell`` goes back.
+
+        To all of it on its way; where no other work is left, to what is worth the way.
+        """
+        area = self._map.area
+        if area is None or not self.keeps_left_floor:
+            return
+        way = None if self.has_work else WayBack(area, cell, self._config.cost.step_s)
+        self._ledger.left_floor.choose(way)
+
+    @property
+    def has_work(self) -> bool:
+        """Whether there are cells for this robot to visit, other than to go back to."""
+        area = self._map.area
+        if area is None:
+            return False
+        window = area.lattice.window
+        return bool((self._unvisited_by_me(area, window) & area.reachable).any())
 
     def asked_of_me(self, area: ReachableArea) -> NDArray[np.bool_]:
         """Return on which cells of an area this robot has to sweep the floor, covered or not."""
