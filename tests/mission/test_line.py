@@ -626,7 +626,7 @@ def test_a_line_on_a_map_that_grows_becomes_better_and_never_worse():
     grid = with_obstacle(with_obstacle(room(6.0, 3.0), 22, 30), 0, 82, 62, UNKNOWN)
     robot = Robot(Mission(CONFIG))
     robot.tell(MapReceived(grid))
-    assert robot.mission._orders.is_exploring
+    assert robot.mission._orders.cells.is_exploring
     ahead, line = robot.mission._line._ahead, CONFIG.sweeping.line
     while (first := ahead.line.first_below(POLISHED)) < len(ahead.line) and (
         ahead.lengths()[first] <= AHEAD_M

@@ -288,10 +288,12 @@ class Charging:
         """Return the time for the rest of the order, from the dock and back; None if unknown."""
         state, cells, area = self.orders.order_state, self.route.aside, self.map.area
         goal = self.orders.goal("charge")
-        is_last = state.is_open and state.next_pass() is state and not self.orders.is_exploring
+        is_last = (
+            state.is_open and state.next_pass() is state and not self.orders.cells.is_exploring
+        )
         if not is_last or area is None or goal is None or cells is None or not len(cells):
             return None
         ends = [(int(row), int(col)) for row, col in (cells[0], cells[-1])]
         walks = area.shortest_path(goal, ends[0]), cells, area.shortest_path(ends[1], goal)
-        beyond_s = self.config.cost.step_s * BEYOND_CELLS * self.orders.frontier_cells
+        beyond_s = self.config.cost.step_s * BEYOND_CELLS * self.orders.cells.frontier_cells
         return sum(self.config.cost.of_walk(walk) for walk in walks) + beyond_s

@@ -137,7 +137,7 @@ class Executive:
             way.end()
             return None
         # Others may have swept meanwhile what this robot waits to drive to.
-        is_vain = bool(way.waits_for) and not self.orders.left()
+        is_vain = bool(way.waits_for) and not self.orders.cells.left()
         if is_vain:
             # Floor that is left in passed cells is not waited for.
             self.ledger.left_floor.give_up(self.ledger.left_floor.worth_s)
@@ -237,7 +237,7 @@ class Executive:
         if not (is_due and is_driving and self.fleet.members and len(route.path.ahead) > 1):
             return
         self._weighed_at = self._now
-        if self.orders.has_work or self.line.is_worth_driving:
+        if self.orders.cells.has_work or self.line.is_worth_driving:
             return
         self.ledger.left_floor.give_up(self.ledger.left_floor.chosen)
         route.want("what is left is not worth the way")
@@ -249,7 +249,7 @@ class Executive:
         # One that stands, as others go on or for a map, has no more reason in each step.
         stands = self._state is State.COVERING and not len(route.path.cells)
         self._share(cell, at_once=not stands)
-        orders.choose_left_floor(cell)
+        orders.cells.choose_left_floor(cell)
         while orders.order_state.stage is not Stage.RETURNING:
             if orders.waits_for_others:
                 return self._rest(State.COVERING, "others sweep what is left", update)
@@ -280,7 +280,7 @@ class Executive:
         """Divide the rest among the fleet if due; return why a plan is wanted, or ""."""
         if self.orders.order_state.stage is Stage.RETURNING:
             return ""
-        return self.fleet.share(self.orders.open_cells, cell, self._now, at_once=at_once)
+        return self.fleet.share(self.orders.cells.open_cells, cell, self._now, at_once=at_once)
 
     def _return_home(self, cell: Cell, update: PathUpdate | None) -> Decision:
         route, area, home = self.route, self.map.area, self.orders.goal()

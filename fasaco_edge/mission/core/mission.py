@@ -286,11 +286,11 @@ class Mission:
         stands = self.state is State.COVERING and len(self.route.path.ahead) < 2
         if self.giving_way.waits_for or not (stands and self._orders.waits_for_others):
             return self.giving_way.waits_for
-        return self.fleet.busiest(self._orders.open_cells)
+        return self.fleet.busiest(self._orders.cells.open_cells)
 
     def open_cells(self) -> int:
         """Return the number of cells still to be swept, by this robot or another."""
-        return self._orders.left()
+        return self._orders.cells.left()
 
     @property
     def trail(self) -> LivingTrail:

@@ -233,7 +233,7 @@ class Route(PlanRequests):
 
     def _first_open(self, cells: NDArray[np.int32], window: Window) -> int:
         """Return the index of the first cell that needs a visit; that of the last if none does."""
-        is_open = self._orders.open_cells(window)
+        is_open = self._orders.cells.open_cells(window)
         begin, piece = 0, FIRST_PIECE
         while begin < len(cells):
             found = window.values_at(is_open, cells[begin : begin + piece], True)

@@ -122,7 +122,7 @@ class LineLayer:
         path = self._route.held
         passed = path.cells[before : path.index]
         self._credit(passed)
-        if self._orders.keeps_left_floor:
+        if self._orders.cells.keeps_left_floor:
             self._note_left(passed, pose)
         is_on_it = ahead.is_followed and len(path.cells) > 0
         row, col = path.cells[path.index].tolist() if is_on_it else (0, 0)
@@ -152,7 +152,7 @@ class LineLayer:
         if touched is not None and ahead.check(touched):
             reason = "line blocked"
         if touched is not None or self._is_settled is None:
-            self._is_settled = not self._orders.is_exploring
+            self._is_settled = not self._orders.cells.is_exploring
         # Urgent updates are published first; the rest comes with the next pose.
         is_waited_for = update is not None or reason or is_further
         if not is_waited_for:
@@ -299,7 +299,7 @@ class LineLayer:
         if area is None or area.lattice.window != floor.stands.lattice.window:
             return None
         window = area.lattice.window
-        asked = area.reachable & self._orders.asked_of_me(area)
+        asked = area.reachable & self._orders.cells.asked_of_me(area)
         before, self._asked = self._asked, (window, asked, area.reachable)
         if before is None:
             return Window(0, 0, floor.geometry.rows, floor.geometry.cols)

@@ -8,17 +8,16 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.grid.geometry import Window
 from fasaco_edge.grid.lattice import Cell
 from fasaco_edge.mission.config import MissionConfig
-from fasaco_edge.mission.coverage.left_floor import WayBack
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
 from fasaco_edge.mission.coverage.unreached import Unreached, UnreachedFinder
 from fasaco_edge.mission.fleet.layer import FleetLayer
 from fasaco_edge.mission.map.map_state import MapState
 from fasaco_edge.mission.map.reachable_area import ReachableArea, anchor_cell
-from fasaco_edge.mission.orders.exploration import Exploration, frontier
-from fasaco_edge.mission.orders.order import Errand
+from fasaco_edge.mission.orders.cells_left import CellsLeft
+from fasaco_edge.mission.orders.exploration import Exploration
+from fasaco_edge.mission.orders.order import Errand, Zone
 from fasaco_edge.mission.orders.order_state import NO_ORDER, OrderState, Stage
 from fasaco_edge.mission.orders.zones import in_zones
 from fasaco_edge.planners.problem import CoverageProblem
@@ -52,6 +51,7 @@ class Sequencer:
 
     Attributes:
         order_state: the order and its progress.
+        cells: the cells left of it.
     """
 
     def __init__(
@@ -63,6 +63,9 @@ class Sequencer:
         self._ledger = ledger
         self._fleet = fleet
         self._run = _Run()
+        self.cells = CellsLeft(
+            config, map_state, ledger, fleet, self._zones, lambda: self._run.exploration
+        )
         self._unreached = UnreachedFinder(map_state, ledger)
         # Cached result: whether a retry is worthwhile, for a given map and ledger.
         self._retry_check: tuple[object, bool] = (None, False)
@@ -75,12 +78,12 @@ class Sequencer:
     @property
     def can_plan(self) -> bool:
         """Whether a plan would have anything to cover."""
-        return self.order_state.stage is not Stage.RETURNING and self.left() > 0
+        return self.order_state.stage is not Stage.RETURNING and self.cells.left() > 0
 
     @property
     def waits_for_others(self) -> bool:
         """Whether all that is left is others' to sweep, who go on with it."""
-        return self._fleet.others_go_on and not self._left_to_me()
+        return self._fleet.others_go_on and not self.cells.left_to_me()
 
     @property
     def ending(self) -> str:
@@ -162,7 +165,7 @@ class Sequencer:
         return CoverageProblem.of(
             lattice,
             cell,
-            covered=~self._open_to_me(area),
+            covered=~self.cells.open_to_me(area),
             end=home if ends_home else None,
             cost=self._config.cost,
             before=before,
@@ -181,102 +184,16 @@ class Sequencer:
         exploration = self._run.exploration
         if reason := exploration.seek(self.order_state.current_zone, self._map.area, cell):
             return reason
-        return exploration.look_beyond(self._fleet.viewpoint(self.open_cells, cell), cell)
+        return exploration.look_beyond(self._fleet.viewpoint(self.cells.open_cells, cell), cell)
 
     def is_looking(self, cell: Cell, now: float) -> bool:
         """Tell whether the robot waits for a map that shows ground that others see."""
         return self._run.exploration.is_looking(cell, now)
 
-    def open_cells(self, window: Window) -> NDArray[np.bool_]:
-        """Return which cells of ``window`` still need a visit, coverable or not."""
-        open_cells = self._unswept(window)
-        self._run.exploration.mark(open_cells, window)
-        return open_cells
-
-    def _unswept(self, window: Window) -> NDArray[np.bool_]:
-        if self.order_state.order is None:
-            return np.zeros((window.rows, window.cols), bool)
-        unswept: NDArray[np.bool_] = self.asked_for(window) & (
-            self._ledger.current.visits(window) == 0
-        )
-        return unswept
-
-    def _open_to_me(self, area: ReachableArea) -> NDArray[np.bool_]:
-        """Return the cells that still need a visit by this robot: its part, in a fleet."""
-        window = area.lattice.window
-        cells = self._unvisited_by_me(area, window)
-        if self.keeps_left_floor:
-            cells |= self._ledger.left_floor.chosen_in(window) & self.asked_for(window)
-        return cells
-
-    def _unvisited_by_me(self, area: ReachableArea, window: Window) -> NDArray[np.bool_]:
-        cells = self._fleet.mine(self._unswept(window), area).copy()
-        self._run.exploration.mark(cells, window)
-        return cells
-
-    @property
-    def is_exploring(self) -> bool:
-        """Whether for some reachable cells the map does not yet show whether the robot fits."""
-        area = self._map.area
-        decided = None if area is None else self._map.is_decided(area.lattice.window)
-        if area is None or decided is None:
-            return False
-        return bool((area.reachable & ~decided).any())
-
-    @property
-    def frontier_cells(self) -> int:
-        """Number of reachable cells asked for that border on what the map does not show yet."""
-        area = self._map.area
-        if area is None:
-            return 0
-        return int(np.count_nonzero(frontier(area) & self.asked_for(area.lattice.window)))
-
-    def asked_for(self, window: Window) -> NDArray[np.bool_]:
-        """Return which cells of ``window`` this robot has to cover, covered or not."""
-        order, zone = self.order_state.order, self.order_state.current_zone
-        zones = () if order is None else order.zones if zone is None else (zone,)
-        inside = in_zones(zones, window, self._config.footprint.cell_m)
-        shared = self._ledger.shared
-        return inside & ~shared.swept(window) if shared.version else inside
-
-    @property
-    def keeps_left_floor(self) -> bool:
-        """Whether this robot goes back to floor that it has left: nobody else in a fleet would."""
-        return bool(self._fleet.members)
-
-    def choose_left_floor(self, cell: Cell) -> None:
-        """Choose to which left floor the robot in ``cell`` goes back.
-
-        To all of it on its way; where no other work is left, to what is worth the way.
-        """
-        area = self._map.area
-        if area is None or not self.keeps_left_floor:
-            return
-        way = None if self.has_work else WayBack(area, cell, self._config.cost.step_s)
-        self._ledger.left_floor.choose(way)
-
-    @property
-    def has_work(self) -> bool:
-        """Whether there are cells for this robot to visit, other than to go back to."""
-        area = self._map.area
-        if area is None:
-            return False
-        window = area.lattice.window
-        return bool((self._unvisited_by_me(area, window) & area.reachable).any())
-
-    def asked_of_me(self, area: ReachableArea) -> NDArray[np.bool_]:
-        """Return on which cells of an area this robot has to sweep the floor, covered or not."""
-        window = area.lattice.window
-        asked = self.asked_for(window)
-        mine = self._fleet.mine_to_sweep(asked, self._unswept(window), area)
-        if self.keeps_left_floor:
-            mine = mine | (self._ledger.left_floor.passed_in(window) & asked)
-        return mine
-
     def note_path_end(self) -> bool:
         """Note the end of a path; return whether the cells it left over must wait for a retry."""
         self._ledger.left_floor.note_path_end()
-        run, cells = self._run, self._left_to_me()
+        run, cells = self._run, self.cells.left_to_me()
         if cells > 0:
             self._unreached.note_failure()
         run.same_again = run.same_again + 1 if cells == run.left_over else 1
@@ -293,7 +210,7 @@ class Sequencer:
         """Give up what this robot has tried in vain; tell whether nothing untried is left."""
         area = self._map.area
         assert area is not None
-        unswept = self._unswept(area.lattice.window) & area.reachable
+        unswept = self.cells.unswept(area.lattice.window) & area.reachable
         self._fleet.give_up(self._fleet.mine(unswept, area), area)
         return not self._fleet.untried(unswept, area).any()
 
@@ -344,11 +261,11 @@ class Sequencer:
         run.exploration.aim_at(self._viewpoints() - {cell})
         self._fleet.try_again()
         # In a retry, one path without progress is enough to give up.
-        run.left_over, run.same_again = self._left_to_me(), MAX_SAME_LEFTOVERS
+        run.left_over, run.same_again = self.cells.left_to_me(), MAX_SAME_LEFTOVERS
         return f"tried again, {self.order_state.tries + 1} of {self._config.policy.retries}"
 
     def _end(self) -> None:
-        run, left, order = self._run, self.left(), self.order_state.order
+        run, left, order = self._run, self.cells.left(), self.order_state.order
         run.retry_at = None
         self.order_state = replace(self.order_state, stage=Stage.OVER)
         every = order is None or order.zones[0].polygon is None
@@ -362,19 +279,15 @@ class Sequencer:
         """Tell whether a retry is worthwhile; recomputed if anything changed."""
         key = (self._map.area, self._ledger.version)
         if key != self._retry_check[0]:
-            self._retry_check = key, bool(self.left() or self._viewpoints())
+            self._retry_check = key, bool(self.cells.left() or self._viewpoints())
         return self._retry_check[1]
 
-    def left(self) -> int:
-        """Return the number of reachable cells that still need a visit."""
-        area = self._map.area
-        if area is None:
-            return 0
-        return int(np.count_nonzero(self.open_cells(area.lattice.window) & area.reachable))
-
-    def _left_to_me(self) -> int:
-        area = self._map.area
-        return 0 if area is None else int(np.count_nonzero(self._open_to_me(area) & area.reachable))
+    def _zones(self) -> tuple[Zone, ...] | None:
+        """Return the zones that are due; None without an order."""
+        order, zone = self.order_state.order, self.order_state.current_zone
+        if order is None:
+            return None
+        return order.zones if zone is None else (zone,)
 
     def _viewpoints(self) -> set[Cell]:
         """Return the cells from which to look at closed areas."""

@@ -1,0 +1,139 @@
+"""Cells left of an order: which still need a visit, by this robot or by others of its fleet."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fasaco_edge.grid.geometry import Window
+from fasaco_edge.grid.lattice import Cell
+from fasaco_edge.mission.config import MissionConfig
+from fasaco_edge.mission.coverage.left_floor import WayBack
+from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
+from fasaco_edge.mission.fleet.layer import FleetLayer
+from fasaco_edge.mission.map.map_state import MapState
+from fasaco_edge.mission.map.reachable_area import ReachableArea
+from fasaco_edge.mission.orders.exploration import Exploration, frontier
+from fasaco_edge.mission.orders.order import Zone
+from fasaco_edge.mission.orders.zones import in_zones
+
+
+class CellsLeft:
+    """Derives the cells left from map, ledger and fleet; owns nothing.
+
+    Args:
+        config, map_state, ledger, fleet: what they are derived from.
+        zones: the zones of the order that are due; None without an order.
+        exploration: the viewpoints.
+    """
+
+    def __init__(
+        self,
+        config: MissionConfig,
+        map_state: MapState,
+        ledger: MissionLedger,
+        fleet: FleetLayer,
+        zones: Callable[[], tuple[Zone, ...] | None],
+        exploration: Callable[[], Exploration],
+    ) -> None:
+        self._config, self._map, self._ledger, self._fleet = config, map_state, ledger, fleet
+        self._zones, self._exploration = zones, exploration
+
+    def open_cells(self, window: Window) -> NDArray[np.bool_]:
+        """Return which cells of ``window`` still need a visit, coverable or not."""
+        open_cells = self.unswept(window)
+        self._exploration().mark(open_cells, window)
+        return open_cells
+
+    def unswept(self, window: Window) -> NDArray[np.bool_]:
+        """Return which cells of ``window`` are asked for and not visited."""
+        if self._zones() is None:
+            return np.zeros((window.rows, window.cols), bool)
+        unswept: NDArray[np.bool_] = self.asked_for(window) & (
+            self._ledger.current.visits(window) == 0
+        )
+        return unswept
+
+    def open_to_me(self, area: ReachableArea) -> NDArray[np.bool_]:
+        """Return the cells that still need a visit by this robot: its part, in a fleet."""
+        window = area.lattice.window
+        cells = self._unvisited_by_me(area, window)
+        if self.keeps_left_floor:
+            cells |= self._ledger.left_floor.chosen_in(window) & self.asked_for(window)
+        return cells
+
+    def _unvisited_by_me(self, area: ReachableArea, window: Window) -> NDArray[np.bool_]:
+        cells = self._fleet.mine(self.unswept(window), area).copy()
+        self._exploration().mark(cells, window)
+        return cells
+
+    @property
+    def is_exploring(self) -> bool:
+        """Whether for some reachable cells the map does not yet show whether the robot fits."""
+        area = self._map.area
+        decided = None if area is None else self._map.is_decided(area.lattice.window)
+        if area is None or decided is None:
+            return False
+        return bool((area.reachable & ~decided).any())
+
+    @property
+    def frontier_cells(self) -> int:
+        """Number of reachable cells asked for that border on what the map does not show yet."""
+        area = self._map.area
+        if area is None:
+            return 0
+        return int(np.count_nonzero(frontier(area) & self.asked_for(area.lattice.window)))
+
+    def asked_for(self, window: Window) -> NDArray[np.bool_]:
+        """Return which cells of ``window`` this robot has to cover, covered or not."""
+        inside = in_zones(self._zones() or (), window, self._config.footprint.cell_m)
+        shared = self._ledger.shared
+        return inside & ~shared.swept(window) if shared.version else inside
+
+    @property
+    def keeps_left_floor(self) -> bool:
+        """Whether this robot goes back to floor that it has left: nobody else in a fleet would."""
+        return bool(self._fleet.members)
+
+    def choose_left_floor(self, cell: Cell) -> None:
+        """Choose to which left floor the robot in ``cell`` goes back.
+
+        To all of it on its way; where no other work is left, to what is worth the way.
+        """
+        area = self._map.area
+        if area is None or not self.keeps_left_floor:
+            return
+        way = None if self.has_work else WayBack(area, cell, self._config.cost.step_s)
+        self._ledger.left_floor.choose(way)
+
+    @property
+    def has_work(self) -> bool:
+        """Whether there are cells for this robot to visit, other than to go back to."""
+        area = self._map.area
+        if area is None:
+            return False
+        window = area.lattice.window
+        return bool((self._unvisited_by_me(area, window) & area.reachable).any())
+
+    def asked_of_me(self, area: ReachableArea) -> NDArray[np.bool_]:
+        """Return on which cells of an area this robot has to sweep the floor, covered or not."""
+        window = area.lattice.window
+        asked = self.asked_for(window)
+        mine = self._fleet.mine_to_sweep(asked, self.unswept(window), area)
+        if self.keeps_left_floor:
+            mine = mine | (self._ledger.left_floor.passed_in(window) & asked)
+        return mine
+
+    def left(self) -> int:
+        """Return the number of reachable cells that still need a visit."""
+        area = self._map.area
+        if area is None:
+            return 0
+        return int(np.count_nonzero(self.open_cells(area.lattice.window) & area.reachable))
+
+    def left_to_me(self) -> int:
+        """Return the number of those that this robot has to visit, or to go back to."""
+        area = self._map.area
+        return 0 if area is None else int(np.count_nonzero(self.open_to_me(area) & area.reachable))
