@@ -8,12 +8,10 @@ import numpy as np
 import pytest
 
 from fasaco_edge.grid.geometry import Window
-from fasaco_edge.grid.lattice import CoverageLattice
 from fasaco_edge.mission.core.events import MapReceived, State
 from fasaco_edge.mission.core.mission import Mission
 from fasaco_edge.mission.coverage.floor_tiles import PIXEL_M
-from fasaco_edge.mission.coverage.left_floor import MOST_PASSED, LeftFloor, WayBack
-from fasaco_edge.mission.map.reachable_area import ReachableArea
+from fasaco_edge.mission.coverage.left_floor import MOST_PASSED, LeftFloor
 from tests.grid.test_floor import room
 from tests.mission.test_fleet_floor import divided_by
 from tests.mission.test_line import CELL_M, CONFIG, Robot
@@ -21,66 +19,26 @@ from tests.mission.test_line import CELL_M, CONFIG, Robot
 CELL = (3, 5)
 
 
-def test_adjacent_cells_are_gone_back_to_together():
-    floor = LeftFloor()
-    for cell, worth_s in (((0, 0), 8.0), ((9, 5), 9.0), ((1, 1), 5.0), ((1, 2), 4.0)):
-        floor.note_left(cell, worth_s)
-    free = CoverageLattice.from_free(np.ones((10, 6), np.bool_))
-    floor.choose(WayBack(ReachableArea.around(free, (0, 0)), (5, 5), 1.0))
-    assert floor.chosen == {(0, 0), (1, 1), (1, 2), (9, 5)}
-    floor.note_left((1, 1), 0.0)
-    floor.choose(WayBack(ReachableArea.around(free, (0, 0)), (5, 5), 1.0))
-    assert floor.chosen == {(9, 5)}
-    floor.choose(None)
-    assert floor.chosen == {(0, 0), (1, 2), (9, 5)}
-
-
-def walled(cols):
-    """Two rows of cells with a wall between them but at the last column."""
-    free = np.ones((3, cols), np.bool_)
-    free[1, :-1] = False
-    return ReachableArea.around(CoverageLattice.from_free(free), (0, 0))
-
-
-@pytest.mark.parametrize(
-    ("worth_s", "cell", "is_worth"),
-    [
-        (6.0, (0, 2), True),
-        (5.9, (0, 2), False),
-        (29.0, (2, 0), False),
-        (30.0, (2, 0), True),
-        (1e9, (9, 9), False),
-    ],
-    ids=["near", "too little", "behind a wall", "around it", "out of reach"],
-)
-def test_it_goes_back_where_the_floor_is_worth_the_way(worth_s, cell, is_worth):
-    assert WayBack(walled(13), (0, 0), 1.0).is_worth([cell], worth_s) == is_worth
-
-
 def test_a_cell_that_it_came_back_to_is_never_looked_at_again():
     floor = LeftFloor()
     floor.note_passed(CELL)
     assert floor.next(9) == [CELL]
-    floor.note_left(CELL, 9.0)
-    floor.choose(None)
-    assert floor.chosen_in(Window(3, 5, 4, 6)).all()
+    floor.note_left(CELL, is_left=True)
+    assert floor.left_in(Window(3, 5, 4, 6)).all()
     for _ in range(3):
         floor.note_passed(CELL)
         assert floor.next(9) == []
-        floor.choose(None)
-        assert not floor.chosen_in(Window(0, 0, 9, 9)).any()
+        assert not floor.left_in(Window(0, 0, 9, 9)).any()
 
 
 def test_a_cell_that_a_whole_path_did_not_lead_back_to_is_given_up():
     floor = LeftFloor()
     floor.note_passed(CELL)
-    floor.note_left(CELL, 9.0)
-    floor.choose(None)
+    floor.note_left(CELL, is_left=True)
     floor.note_path_end()
-    assert floor.chosen == {CELL}
+    assert floor.left == {CELL}
     floor.note_path_end()
-    assert not floor.chosen
-    assert not floor.worth_s
+    assert floor.left == set()
     floor.note_passed(CELL)
     assert floor.next(9) == []
 
@@ -88,9 +46,9 @@ def test_a_cell_that_a_whole_path_did_not_lead_back_to_is_given_up():
 def test_what_another_line_sweeps_is_no_longer_left_and_may_be_left_again():
     floor = LeftFloor()
     floor.note_passed(CELL)
-    for worth_s in (9.0, 0.0, 9.0):
-        floor.note_left(CELL, worth_s)
-        assert set(floor.worth_s) == ({CELL} if worth_s else set())
+    for is_left in (True, False, True):
+        floor.note_left(CELL, is_left=is_left)
+        assert floor.left == ({CELL} if is_left else set())
         assert floor.passed_in(Window(3, 5, 4, 6)).all()
 
 
@@ -111,24 +69,6 @@ def around(cell):
         return rows[:, None] & cols
 
     return inside
-
-
-def test_a_cell_that_the_line_leads_through_beside_the_path_is_looked_at_too():
-    robot = Robot(Mission(replace(CONFIG, robot="r1")))
-    robot.mission.shared.begin(1)
-    robot.tell(MapReceived(room(4.5, 3.5)))
-    robot.tell(replace(divided_by("r2", 0), parts=(), by=""))
-    been: dict[tuple[int, int], None] = {}
-    for _ in range(150):
-        cell = robot.mission.area.lattice.cell_at(*robot.at)
-        robot.mission.floor.forget(around(cell))
-        robot.drive(is_checked=False)
-        if cell != robot.mission.area.lattice.cell_at(*robot.at):
-            been[cell] = None
-    left_floor = robot.mission.covered.left_floor
-    looked_at = {*left_floor.next(1000), *left_floor._tried}
-    assert len(been) > 20
-    assert been.keys() <= looked_at
 
 
 @pytest.mark.parametrize("is_again", [False, True], ids=["once", "each-time"])

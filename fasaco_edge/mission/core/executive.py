@@ -29,7 +29,7 @@ from fasaco_edge.mission.orders.sequencer import Sequencer
 # An errand ends once the robot was in the last cell for this long [s]: its path leads to the centre
 # and ends with a turn.
 ARRIVAL_S = 2.0
-# Period of checks whether the rest of a line is worth driving [s].
+# Period of checks whether a path leads to anything [s].
 WEIGH_S = 1.0
 PLACES: dict[Errand, str] = {"home": "home", "charge": "to the dock"}
 
@@ -140,7 +140,7 @@ class Executive:
         is_vain = bool(way.waits_for) and not self.orders.cells.left()
         if is_vain:
             # Floor that is left in passed cells is not waited for.
-            self.ledger.left_floor.give_up(self.ledger.left_floor.worth_s)
+            self.ledger.left_floor.give_up(self.ledger.left_floor.left)
         update = way.look(self._now, has_work=order.is_open and not is_vain)
         if not way.waits_for:
             return None
@@ -227,20 +227,16 @@ class Executive:
             route.want("robot left the path")
 
     def _check_worth(self) -> None:
-        """End the path of a fleet's robot that leads to no cell of its part any more.
-
-        Others have swept what lay ahead; floor that is left must be worth the time.
-        """
+        """End the path of a fleet's robot that leads to nothing more: others have swept it."""
         route = self.route
         is_driving = self._state is State.COVERING and route.pending is None and not route.wanted
         is_due = self._now - self._weighed_at >= WEIGH_S
         if not (is_due and is_driving and self.fleet.members and len(route.path.ahead) > 1):
             return
         self._weighed_at = self._now
-        if self.orders.cells.has_work or self.line.is_worth_driving:
-            return
-        self.ledger.left_floor.give_up(self.ledger.left_floor.chosen)
-        route.want("what is left is not worth the way")
+        is_worth = self.ledger.left_floor.left or self.line.is_worth_driving
+        if not is_worth and not self.orders.cells.has_work:
+            route.want("others have swept what lay ahead")
 
     def _request(self, cell: Cell, update: PathUpdate | None) -> Decision:
         """Request the wanted plan; if nothing is left to cover, continue with the order."""
@@ -249,7 +245,6 @@ class Executive:
         # One that stands, as others go on or for a map, has no more reason in each step.
         stands = self._state is State.COVERING and not len(route.path.cells)
         self._share(cell, at_once=not stands)
-        orders.cells.choose_left_floor(cell)
         while orders.order_state.stage is not Stage.RETURNING:
             if orders.waits_for_others:
                 return self._rest(State.COVERING, "others sweep what is left", update)

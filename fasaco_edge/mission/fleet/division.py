@@ -28,9 +28,6 @@ SNAP = 2
 # Seeds are kept unless others end before this share of their time. The time of all cells that go to
 # another robot, over the number of robots, counts as so much time of the last robot.
 STABLE, CHANGED = 0.9, 1.0
-# Where parts are done, what is left lies scattered: with the turns and the ways between them cells
-# take several times as long as in the open (6 to 9 times where it was measured).
-SCATTERED = 4.0
 
 # Travel time to a cell that cannot be reached [s].
 UNREACHED_S = np.float32(1e9)
@@ -136,10 +133,9 @@ def divide(
     travel = _Travel(lattice, cells)
     from_starts_s = travel.times_s(starts, steps_s)
     scale = np.count_nonzero(wanted) / len(cells)
-    owners = _owners_before(before, robots, travel)
-    if before is not None and _is_over_for_one(before, robots, owners):
-        scale *= SCATTERED
-    choice = _Choice(from_starts_s, scale * np.array(steps_s), owners)
+    choice = _Choice(
+        from_starts_s, scale * np.array(steps_s), _owners_before(before, robots, travel)
+    )
     names = [robot.name for robot in robots]
     if before is not None and set(before.names) & set(names):
         kept = dict(
@@ -209,13 +205,6 @@ def _owners_before(
     numbers = np.array([index.get(name, -1) for name in before.names])
     owners: NDArray[np.int64] = numbers[before.owners(travel.lattice).reshape(-1)[travel.cells]]
     return owners
-
-
-def _is_over_for_one(before: Division, robots: Sequence[Robot], owners: NDArray[np.int64]) -> bool:
-    """Tell whether a robot has no cell left of its part."""
-    has_part = np.isin(np.arange(len(robots)), owners)
-    had_part = [robot.name in before.names for robot in robots]
-    return bool((~has_part & had_part).any())
 
 
 def _ways(lattice: CoverageLattice, start: Cell) -> Steps:

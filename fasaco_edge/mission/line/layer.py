@@ -16,7 +16,6 @@ from fasaco_edge.grid.changes import carried
 from fasaco_edge.grid.fine_raster import strips
 from fasaco_edge.grid.floor_map import FloorMap
 from fasaco_edge.grid.geometry import Pose2D, Window
-from fasaco_edge.grid.lattice import Cell
 from fasaco_edge.mission.config import Sweeping
 from fasaco_edge.mission.core.events import PathUpdate
 from fasaco_edge.mission.core.route import Route
@@ -26,7 +25,6 @@ from fasaco_edge.mission.coverage.swept_floor import ANYWHERE, NOWHERE, SweptFlo
 from fasaco_edge.mission.line.line_ahead import LineAhead
 from fasaco_edge.mission.line.out_of_reach import REASONS, causes_of
 from fasaco_edge.mission.line.polisher import Polisher
-from fasaco_edge.mission.line.way import drive_s
 from fasaco_edge.mission.map.map_state import MapState
 from fasaco_edge.mission.orders.sequencer import Sequencer
 
@@ -65,10 +63,9 @@ class LineLayer:
         route: Route,
     ) -> None:
         self._map, self._ledger, self._orders, self._route = map_state, ledger, orders, route
-        self._sweeping = sweeping
         self._polisher = Polisher(sweeping.line) if sweeping else None
-        self._price_s_m2 = sweeping.line.price_s_m2 if sweeping else 0.0
-        self._worth_m2 = WORTH_S / self._price_s_m2 if self._price_s_m2 else math.inf
+        price_s_m2 = sweeping.line.price_s_m2 if sweeping else 0.0
+        self._worth_m2 = WORTH_S / price_s_m2 if price_s_m2 else math.inf
         self._ahead: LineAhead | None = None
         # Window of map and floor that may have changed since the last update; window, asked-for
         # cells and reachable cells of that update.
@@ -83,8 +80,6 @@ class LineLayer:
         # pixels.
         self._swept: tuple[SweptFloor | None, int] = None, 0
         self._forgotten = 0
-        # The cell where the robot was last.
-        self._cell: Cell | None = None
         # The floor at the last update, and its revision.
         self._seen: tuple[FloorMap | None, int] = None, 0
 
@@ -123,7 +118,7 @@ class LineLayer:
         passed = path.cells[before : path.index]
         self._credit(passed)
         if self._orders.cells.keeps_left_floor:
-            self._note_left(passed, pose)
+            self._note_left(passed)
         is_on_it = ahead.is_followed and len(path.cells) > 0
         row, col = path.cells[path.index].tolist() if is_on_it else (0, 0)
         self._map.follow_path((row, col) if is_on_it else None)
@@ -197,16 +192,10 @@ class LineLayer:
 
     @property
     def is_worth_driving(self) -> bool:
-        """Whether the floor that the line ahead sweeps is worth its time, at the line's price.
-
-        Where cells are counted no floor is.
-        """
-        ahead = self._ahead
-        if ahead is None or self._sweeping is None:
+        """Whether the line ahead sweeps floor to speak of; where cells are counted none is."""
+        if self._ahead is None:
             return False
-        tally = ahead.tally
-        worth_s = self._price_s_m2 * (tally.open_m2 - tally.left_m2)
-        return worth_s >= drive_s(ahead.line.points, tally.unit_m, self._sweeping.line)
+        return self._ahead.tally.open_m2 - self._ahead.tally.left_m2 >= self._worth_m2
 
     def _credit(self, passed: NDArray[np.int32]) -> None:
         """Count passed cells as covered if hardly any of their floor is left.
@@ -230,25 +219,19 @@ class LineLayer:
             if counts and ahead.tally.missed_m2(floor.box_of(cell)) < LEAST_LEFT_M2:
                 self._ledger.credit(cell)
 
-    def _note_left(self, passed: NDArray[np.int32], pose: Pose2D) -> None:
-        """Note which cells of the path that it has passed, or that it has left, have floor left."""
+    def _note_left(self, passed: NDArray[np.int32]) -> None:
+        """Note which of the passed cells have floor left."""
         ahead, floor, left_floor = self._ahead, self._map.floor, self._ledger.left_floor
         assert ahead is not None
         assert floor is not None
         for row, col in passed.tolist():
             left_floor.note_passed((row, col))
-        # A polished line leads through cells beside those of its path, and these count as covered.
-        before, self._cell = self._cell, floor.stands.lattice.cell_at(pose.x, pose.y)
-        has_left = before is not None and before != self._cell
-        if before is not None and has_left and before not in left_floor.chosen:
-            left_floor.note_passed(before)
-        for cell in left_floor.next(LOOKED_AT) if len(passed) or has_left else ():
+        for cell in left_floor.next(LOOKED_AT) if len(passed) else ():
             around = floor.box_of(cell, RIM_M)
             if ahead.tally.open_in_m2(around) < self._worth_m2:
                 left_floor.drop(cell)
             else:
-                worth_s = self._price_s_m2 * ahead.tally.missed_m2(around)
-                left_floor.note_left(cell, worth_s if worth_s >= WORTH_S else 0.0)
+                left_floor.note_left(cell, is_left=ahead.tally.missed_m2(around) >= self._worth_m2)
 
     def _explain(self) -> None:
         """Update the causes of unreachable floor where they may have changed."""

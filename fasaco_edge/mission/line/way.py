@@ -22,7 +22,6 @@ from fasaco_edge.kernels.floor.turning import turn_seconds
 from fasaco_edge.kernels.lattice.reach import shortest_walk
 from fasaco_edge.mission.config import Sweeping
 from fasaco_edge.mission.line.polyline import Points
-from fasaco_edge.planners.line import LineConfig
 
 # A point is connected straight to one of so many next ones, the farthest possible: each is a corner
 # of the walk, so this spans a hall.
@@ -121,21 +120,10 @@ def way_s(walk: NDArray[np.int32], pose: Pose2D, floor: FloorMap, sweeping: Swee
     points, _ = floor.stands.line(walk)
     here = np.array(map_to_raster(floor.geometry, pose.x, pose.y))
     points = np.concatenate([here[None], points])
-    points = points[shortened(points, floor)]
-    half_turn_s = turn_seconds(sweeping.line.turning, math.pi)
-    return drive_s(points, floor.geometry.resolution, sweeping.line) + 2 * half_turn_s
-
-
-def drive_s(points: Points, unit_m: float, config: LineConfig) -> float:
-    """Return how long a line takes, with the turns at its corners [s].
-
-    Args:
-        points: float64 (n, 2): y, x [pixels].
-        unit_m: edge of a pixel [m].
-        config: speed and turns.
-    """
-    edges = np.diff(points, axis=0)
+    edges = np.diff(points[shortened(points, floor)], axis=0)
+    way_m = float(np.hypot(*edges.T).sum()) * floor.geometry.resolution
     headings = np.arctan2(*edges.T)
     turns = np.abs((np.diff(headings) + math.pi) % math.tau - math.pi)
-    turning_s = sum(turn_seconds(config.turning, turn) for turn in turns.tolist())
-    return float(np.hypot(*edges.T).sum()) * unit_m / config.speed_m_s + turning_s
+    turning = sweeping.line.turning
+    turning_s = sum(turn_seconds(turning, turn) for turn in (*turns.tolist(), math.pi, math.pi))
+    return way_m / sweeping.line.speed_m_s + turning_s

@@ -8,9 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.grid.geometry import Window
-from fasaco_edge.grid.lattice import Cell
 from fasaco_edge.mission.config import MissionConfig
-from fasaco_edge.mission.coverage.left_floor import WayBack
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
 from fasaco_edge.mission.fleet.layer import FleetLayer
 from fasaco_edge.mission.map.map_state import MapState
@@ -61,7 +59,7 @@ class CellsLeft:
         window = area.lattice.window
         cells = self._unvisited_by_me(area, window)
         if self.keeps_left_floor:
-            cells |= self._ledger.left_floor.chosen_in(window) & self.asked_for(window)
+            cells |= self._ledger.left_floor.left_in(window) & self.asked_for(window)
         return cells
 
     def _unvisited_by_me(self, area: ReachableArea, window: Window) -> NDArray[np.bool_]:
@@ -96,17 +94,6 @@ class CellsLeft:
     def keeps_left_floor(self) -> bool:
         """Whether this robot goes back to floor that it has left: nobody else in a fleet would."""
         return bool(self._fleet.members)
-
-    def choose_left_floor(self, cell: Cell) -> None:
-        """Choose to which left floor the robot in ``cell`` goes back.
-
-        To all of it on its way; where no other work is left, to what is worth the way.
-        """
-        area = self._map.area
-        if area is None or not self.keeps_left_floor:
-            return
-        way = None if self.has_work else WayBack(area, cell, self._config.cost.step_s)
-        self._ledger.left_floor.choose(way)
 
     @property
     def has_work(self) -> bool:
