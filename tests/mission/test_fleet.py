@@ -14,7 +14,8 @@ from fasaco_edge.errors import FleetError
 from fasaco_edge.grid.geometry import Pose2D, Window
 from fasaco_edge.mission.coverage.ledger import CoverageLedger
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
-from fasaco_edge.mission.fleet.layer import BELIEVED_S, MANY_TAKEN, MOST_AHEAD, MOST_FIRST
+from fasaco_edge.mission.fleet.division_numbers import BELIEVED_S, MOST_AHEAD, MOST_FIRST
+from fasaco_edge.mission.fleet.layer import MANY_TAKEN
 from fasaco_edge.mission.fleet.members import GONE_S
 from fasaco_edge.mission.fleet.shared import (
     MOST_ROBOTS,
@@ -109,13 +110,16 @@ def test_a_newer_division_without_this_robot_hides_no_other():
     fleet = FleetDrive(HALL, THREE)
     fleet.run(20)
     robots = fleet.robots
-    number = robots["r3"].mission.fleet.number
+    number = robots["r3"].mission.fleet.numbers.number
     shifted = tuple(replace(part, handicap_s=1.5) for part in robots["r2"].report().parts)
     alone = replace(robots["r1"].report(), division=number + 2, by="r1", parts=())
     of_r2 = replace(robots["r2"].report(), division=number + 1, by="r2", parts=shifted)
     robots["r3"].tell(alone, of_r2)
     robots["r3"].tick()
-    assert (robots["r3"].mission.fleet.number, robots["r3"].mission.fleet.by) == (number + 1, "r2")
+    assert (robots["r3"].mission.fleet.numbers.number, robots["r3"].mission.fleet.numbers.by) == (
+        number + 1,
+        "r2",
+    )
     assert robots["r3"].mission.fleet.parts == shifted
 
 
@@ -386,7 +390,7 @@ def test_more_robots_than_there_is_room_for_do_not_push_each_other_out():
         assert [fault.code for fault in decision.faults] == ["fleet_member"] * 8
         ours.tick()
     assert list(ours.mission.fleet.members) == names[:MOST_ROBOTS]
-    assert ours.mission.fleet.number <= 3
+    assert ours.mission.fleet.numbers.number <= 3
     # Those that are gone make room.
     later = [replace(report, robot=name) for name in names[8:]]
     assert not ours.tell(*later, after=GONE_S + 1.0).faults
@@ -400,7 +404,7 @@ def test_one_that_comes_and_goes_does_not_change_the_path_of_others_each_time():
         state = "covering" if second % 2 else "blocked"
         ours.tell(replace(report, state=state, x=1.0 + 0.1 * (second % 3)), after=0.0)
         ours.tick()
-    assert 2 <= ours.mission.fleet.number <= 9
+    assert 2 <= ours.mission.fleet.numbers.number <= 9
     assert ours.mission.route.plans - plans <= 9
 
 
@@ -414,7 +418,7 @@ def test_a_robot_without_a_part_does_not_divide_again_and_again():
         ours.tell(replace(report, x=5.6 + 0.2 * (second % 2)), after=0.0)
         ours.tick()
     assert ours.mission.fleet.part_cells() < 200
-    assert 0 < ours.mission.fleet.number <= 4
+    assert 0 < ours.mission.fleet.numbers.number <= 4
 
 
 @pytest.mark.parametrize("begun", [0, 4])
@@ -426,12 +430,12 @@ def test_a_number_that_no_count_leads_to_is_nobodys_division(begun):
     for _ in range(6):
         ours.tell(liar)
         fleet.tick()
-    assert 0 < ours.mission.fleet.number < 10
-    assert abs(ours.mission.fleet.number - other.mission.fleet.number) <= 1
+    assert 0 < ours.mission.fleet.numbers.number < 10
+    assert abs(ours.mission.fleet.numbers.number - other.mission.fleet.numbers.number) <= 1
     del fleet.robots["r2"]
-    before = ours.mission.fleet.number
+    before = ours.mission.fleet.numbers.number
     fleet.run(int(GONE_S) + 3)
-    assert ours.mission.fleet.number > before
+    assert ours.mission.fleet.numbers.number > before
 
 
 @pytest.mark.parametrize("lead", [MOST_AHEAD - 100, MOST_AHEAD + 100, MOST_FIRST - 100])
@@ -458,7 +462,7 @@ def test_a_number_far_ahead_that_one_tells_for_a_moment_is_not_believed(said):
     for second in range(30):
         ours.tell(liar if second in said else replace(liar, division=3))
         fleet.tick()
-    assert 0 < ours.mission.fleet.number < 10
+    assert 0 < ours.mission.fleet.numbers.number < 10
 
 
 @examples(60)

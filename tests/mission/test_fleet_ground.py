@@ -197,7 +197,7 @@ def test_all_robots_take_over_one_division():
     fleet = FleetDrive(CORRIDOR, {"r3": (0, 0), "r1": (0, 1), "r2": (0, 39)})
     fleet.run(8)
     layers = [robot.mission.fleet for robot in fleet.robots.values()]
-    assert len({layer.number for layer in layers}) == 1
-    assert len({layer.by for layer in layers}) == 1
+    assert len({layer.numbers.number for layer in layers}) == 1
+    assert len({layer.numbers.by for layer in layers}) == 1
     assert len({layer.parts for layer in layers}) == 1
     assert len(layers[0].parts) == 3

@@ -163,7 +163,7 @@ class FleetVoice:
         if is_too_soon or stamped is None or not mission.ledger.frame:
             return
         is_near, waits_for = mission.giving_way.is_near, mission.waits_for
-        key = mission.state, mission.fleet.number, mission.shared.epoch, waits_for
+        key = mission.state, mission.fleet.numbers.number, mission.shared.epoch, waits_for
         is_news, is_due = key != self._said, now - self._told_at >= PERIOD_S
         if not (is_news or is_due or is_near):
             return
@@ -190,11 +190,11 @@ class FleetVoice:
             y=round(stamped.pose.y, 3),
             step_s=mission.fleet.step_s,
             epoch=mission.shared.epoch,
-            division=mission.fleet.number,
+            division=mission.fleet.numbers.number,
             open_cells=mission.open_cells(),
             swept=tuple(CellTile(*place, bits) for place, bits in swept),
             ground=tuple(CellTile(*place, bits) for place, bits in ground),
-            by=mission.fleet.by,
+            by=mission.fleet.numbers.by,
             parts=tuple(
                 FleetPart(part.robot, *part.seed, part.handicap_s, part.step_s)
                 for part in mission.fleet.parts

@@ -167,7 +167,9 @@ class StatusBoard:
             )
             for name, member in sorted(mission.fleet.members.items())
         )
-        return FleetReport(fleet.name, mission.fleet.number, mission.fleet.part_cells(), members)
+        return FleetReport(
+            fleet.name, mission.fleet.numbers.number, mission.fleet.part_cells(), members
+        )
 
     def _drive(self, mission: Mission | None) -> DriveReport:
         planned_s = round(self._cost.quarter_turn_s, 3)

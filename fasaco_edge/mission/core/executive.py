@@ -14,8 +14,9 @@ from fasaco_edge.mission.core.charging import Charging
 from fasaco_edge.mission.core.events import Decision, PathUpdate, State
 from fasaco_edge.mission.core.giving_way import GivingWay
 from fasaco_edge.mission.core.in_dock import InDock
+from fasaco_edge.mission.core.path_checks import PathChecks
 from fasaco_edge.mission.core.route import Route
-from fasaco_edge.mission.core.standing import PATIENCE_S, Standing
+from fasaco_edge.mission.core.standing import Standing
 from fasaco_edge.mission.core.trail_layer import TrailLayer
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
 from fasaco_edge.mission.fleet.layer import FleetLayer
@@ -29,8 +30,6 @@ from fasaco_edge.mission.orders.sequencer import Sequencer
 # An errand ends once the robot was in the last cell for this long [s]: its path leads to the centre
 # and ends with a turn.
 ARRIVAL_S = 2.0
-# Period of checks whether a path leads to anything [s].
-WEIGH_S = 1.0
 PLACES: dict[Errand, str] = {"home": "home", "charge": "to the dock"}
 
 # The states of a robot that drives, or soon will.
@@ -61,11 +60,14 @@ class Executive:
     _state: State = field(default=State.WAITING_FOR_MAP, init=False)
     _reason: str = field(default="no map yet", init=False)
     _now: float = field(default=0.0, init=False)
-    _weighed_at: float = field(default=float("-inf"), init=False)
     _standing: Standing = field(init=False)
+    _checks: PathChecks = field(init=False)
 
     def __post_init__(self) -> None:
         self._standing = Standing(self.map, self.route)
+        self._checks = PathChecks(
+            self.ledger, self.monitor, self.orders, self.route, self.line, self._standing
+        )
 
     def status(self) -> tuple[State, str]:
         """Return the reported state and its reason."""
@@ -101,8 +103,10 @@ class Executive:
     def _carry_on(self, cell: Cell, update: PathUpdate | None) -> Decision:
         """Continue with the order."""
         route, orders, now = self.route, self.orders, self._now
-        self._check_deviation(cell)
-        self._check_worth()
+        if self._state in DRIVING:
+            self._checks.check_deviation(cell, now)
+        if self._state is State.COVERING and self.fleet.members:
+            self._checks.check_worth(now)
         if reason := orders.begin(cell, now):
             route.want(reason)
         if reason := self._share(cell):
@@ -201,42 +205,6 @@ class Executive:
             self._state, self._reason = State.PLANNING, route.pending.reason
         elif self.orders.order_state.stage is not Stage.RETURNING:
             self._state, self._reason = State.COVERING, f"path {route.revision}"
-
-    def _check_deviation(self, cell: Cell) -> None:
-        """Want a new plan for a robot that is off its path or at its end."""
-        route, monitor, path = self.route, self.monitor, self.route.path
-        waited = self._standing.has_waited
-        if route.pending is not None or route.wanted or self._state not in DRIVING:
-            return
-        if monitor.doubt:
-            doubted = route.published_at < monitor.doubt_since
-            if doubted and list(cell) in path.ahead[:2].tolist():
-                monitor.clear_doubt()  # it only flickered
-            elif waited and self._now - monitor.doubt_since >= PATIENCE_S:
-                route.want(monitor.doubt)
-            return
-        last = tuple(path.cells[-1].tolist()) if len(path.cells) else None
-        if (
-            path.finished and (waited or (last and self.ledger.current.has_visited(last)))
-        ) or self._standing.is_at(last):
-            if self.orders.note_path_end():
-                self.orders.advance(self._now)
-            else:
-                route.want("cells left over")
-        elif waited and (path.is_far(cell) or self._standing.is_beside_path):
-            route.want("robot left the path")
-
-    def _check_worth(self) -> None:
-        """End the path of a fleet's robot that leads to nothing more: others have swept it."""
-        route = self.route
-        is_driving = self._state is State.COVERING and route.pending is None and not route.wanted
-        is_due = self._now - self._weighed_at >= WEIGH_S
-        if not (is_due and is_driving and self.fleet.members and len(route.path.ahead) > 1):
-            return
-        self._weighed_at = self._now
-        is_worth = self.ledger.left_floor.left or self.line.is_worth_driving
-        if not is_worth and not self.orders.cells.has_work:
-            route.want("others have swept what lay ahead")
 
     def _request(self, cell: Cell, update: PathUpdate | None) -> Decision:
         """Request the wanted plan; if nothing is left to cover, continue with the order."""

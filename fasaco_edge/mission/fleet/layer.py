@@ -15,9 +15,10 @@ from numpy.typing import NDArray
 
 from fasaco_edge.grid.geometry import Pose2D, Window
 from fasaco_edge.grid.lattice import Cell
-from fasaco_edge.mission.core.events import MemberHeard, Part
+from fasaco_edge.mission.core.events import Part
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
 from fasaco_edge.mission.fleet.division import Division, Robot, divide
+from fasaco_edge.mission.fleet.division_numbers import DivisionNumbers
 from fasaco_edge.mission.fleet.ground import viewpoint
 from fasaco_edge.mission.fleet.members import GONE_S, Member, Members
 from fasaco_edge.mission.fleet.remainder import Remainder
@@ -31,11 +32,6 @@ UNEVEN, UNEVEN_S = 1.25, 40.0
 # Number of cells of this robot's part swept by another one that triggers a new plan: more than by
 # merely passing through. In unknown buildings 4 cost 7 % of two robots' time.
 MANY_TAKEN = 30
-# Limits on a division's number: absolute, ahead of this robot's own, and the first of a newcomer.
-# Numbers beyond are errors, unless a robot tells numbers ahead, but below the last limit, for some
-# time [s]: it has counted on out of hearing.
-MOST_NUMBER, MOST_AHEAD, MOST_FIRST = 2**31 - 1, 2**10, 2**24
-BELIEVED_S = 10.0
 LATER = "another robot has a newer division"
 
 OpenCells = Callable[[Window], NDArray[np.bool_]]
@@ -46,8 +42,7 @@ class FleetLayer:
 
     Attributes:
         others: the other robots.
-        number: number of the newest division.
-        by: name of the robot that made it.
+        numbers: the newest division's number, and who made it.
         step_s: this robot's time to sweep one cell [s].
     """
 
@@ -60,8 +55,7 @@ class FleetLayer:
         ledger: MissionLedger,
     ) -> None:
         self.others = Members(robot, ledger, cell_m)
-        self.number = 0
-        self.by = ""
+        self.numbers = DivisionNumbers(robot, self.others)
         self._robot, self.step_s = robot, step_s
         self._map, self._ledger = map_state, ledger
         self._division: Division | None = None
@@ -76,8 +70,6 @@ class FleetLayer:
         # at the last check.
         self._taken, self._counted = 0, 0
         self._remainder = Remainder()
-        # When robots were heard first whose divisions' numbers are too far ahead [s].
-        self._too_far: dict[str, float] = {}
 
     @property
     def members(self) -> dict[str, Member]:
@@ -180,15 +172,15 @@ class FleetLayer:
         at_work = [one.newest for one in self.members.values() if not one.absence(now)]
         self._remainder.note_others(now, wait=all(heard.waits_for for heard in at_work))
         self._remainder.note(int(left.sum()), int(own.sum()), now)
-        if newer := self._newer():
-            why, self.number, self.by = LATER, newer.division, newer.by
+        if newer := self.numbers.newer():
+            why = LATER
+            self.numbers.follow(newer)
             self._division = Division.of(newer.parts)
         else:
             robots = self._robots(joint, cell, now)
             if not (why := self._why_anew(joint, left, robots, now, at_once=at_once)):
                 return self._why_by_taken()
-            self.by = self._robot
-            self.number = min(max(self.number, self._newest_heard()) + 1, MOST_NUMBER)
+            self.numbers.count_on()
             several = len(robots) > 1
             self._division = divide(joint.lattice, left, robots, before) if several else None
         self._divided_at, self._owners = now, (None, self._owners[1])
@@ -208,41 +200,6 @@ class FleetLayer:
             return None
         area = self._map.area
         return int(np.count_nonzero(self._is_own(self._division, area) & area.reachable))
-
-    def _newer(self) -> MemberHeard | None:
-        """Return the newest division of others that is newer than this robot's, if it is in it.
-
-        Newer ones without this robot do not hide it: a robot that takes others for gone makes them.
-        """
-        most = self._most_valid()
-        found = [
-            member.newest
-            for member in self.members.values()
-            if not member.left_out
-            and member.newest.division <= most
-            and any(part.robot == self._robot for part in member.newest.parts)
-        ]
-        first = min(found, key=lambda heard: (-heard.division, heard.by), default=None)
-        mine = -self.number, self.by
-        return first if first and (-first.division, first.by) < mine else None
-
-    def _newest_heard(self) -> int:
-        """Return the highest valid division number heard."""
-        most = self._most_valid()
-        return max(
-            (one for one in self.others.division_numbers().values() if one <= most), default=0
-        )
-
-    def _most_valid(self) -> int:
-        """Return the highest division number that is no error."""
-        told = self.others.division_numbers()
-        first = min((number for number in told.values() if number), default=0)
-        most = (self.number or min(first, MOST_FIRST)) + MOST_AHEAD
-        too_far = {name for name, number in told.items() if most < number <= MOST_FIRST}
-        heard_at = {name: self.members[name].heard_at for name in too_far}
-        self._too_far = {name: self._too_far.get(name, at) for name, at in heard_at.items()}
-        is_long = {name for name in too_far if heard_at[name] - self._too_far[name] >= BELIEVED_S}
-        return max([most, *(told[name] for name in is_long)])
 
     def _robots(self, area: ReachableArea, cell: Cell, now: float) -> list[Robot]:
         """Return the robots at work in the area that this robot can reach."""

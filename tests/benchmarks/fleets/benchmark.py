@@ -154,7 +154,7 @@ def _figures(name: str, run: FleetRun, alone: FleetRun) -> FleetFigures:
         touches=sum(robot.world.touches for robot in run.robots),
         meetings=sum(robot.world.meetings for robot in run.robots),
         plans=sum(robot.plans for robot in run.robots),
-        divisions=max(robot.mission.fleet.number for robot in run.robots),
+        divisions=max(robot.mission.fleet.numbers.number for robot in run.robots),
         plan_ms=_p99(run, "plan_ms"),
         step_ms=_p99(run, "step_ms"),
         plan_alone_ms=_p99(alone, "plan_ms"),
