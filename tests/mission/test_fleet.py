@@ -446,11 +446,12 @@ def test_a_robot_far_behind_in_counting_agrees_once_the_other_has_told_it_for_lo
     # It has counted on with a third robot, where this one heard none of it.
     fleet.hears = lambda speaker, listener: False
     fleet.run(8)
-    other.number += lead
+    other.numbers.number += lead
     fleet.hears = lambda speaker, listener: True
     fleet.run(int(BELIEVED_S) + 5)
-    assert ours.number > lead
-    assert (ours.number, ours.by, ours.parts) == (other.number, other.by, other.parts)
+    assert ours.numbers.number > lead
+    said, heard = ((one.numbers.number, one.numbers.by, one.parts) for one in (other, ours))
+    assert heard == said
 
 
 @pytest.mark.parametrize("said", [range(3), range(0, 30, 12)], ids=["once", "now and then"])

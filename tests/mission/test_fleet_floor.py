@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from itertools import product
+from itertools import pairwise, product
 
 import numpy as np
+import pytest
 
 from fasaco_edge.bench.floor import judge_floor
 from fasaco_edge.mission.core.events import MapReceived, MemberHeard, Part, State
@@ -107,3 +108,29 @@ def test_the_rest_of_a_line_that_leads_to_nothing_more_is_not_driven():
     robot.tell(replace(alone, tiles=tiles_of(product(range(-2, 30), range(-2, 30)))))
     robot.drive(4, is_checked=False)
     assert robot.mission.state is State.DONE
+
+
+@pytest.mark.parametrize("toward", range(12))
+def test_a_robot_that_makes_way_comes_no_nearer_to_one_that_it_all_but_touches(toward):
+    # Both stood in a doorway for good: straight to its refuge meant into the other's side.
+    robot = Robot(Mission(replace(CONFIG, robot="r1")))
+    robot.mission.shared.begin(1)
+    robot.tell(MapReceived(room(4.5, 3.5)))
+    robot.drive(150)
+    angle, apart = toward * math.tau / 12, 2 * RADIUS_M + 0.01
+    x, y = robot.at[0] + apart * math.cos(angle), robot.at[1] + apart * math.sin(angle)
+    over = ((robot.at[0] - 0.3 * (x - robot.at[0]), robot.at[1] - 0.3 * (y - robot.at[1])),)
+    other = replace(divided_by("r2", 0), parts=(), by="", x=x, y=y, ahead=over)
+    for _ in range(12):
+        if robot.mission.giving_way.waits_for != "r2" or not robot.line:
+            robot.now += 1.0
+            robot.tell(other)
+    assert robot.mission.giving_way.waits_for == "r2"
+    line = np.array(robot.line)
+    nearest = [
+        math.dist(a + share * (b - a), (x, y))
+        for a, b in pairwise(line)
+        for share in np.linspace(0.0, 1.0, 21)
+    ]
+    assert len(line) > 1
+    assert min(nearest) >= apart - 1e-6

@@ -5,7 +5,8 @@ import pytest
 
 from fasaco_edge.grid.lattice import CoverageLattice
 from fasaco_edge.mission.core.events import MemberHeard
-from fasaco_edge.mission.fleet.traffic import Neighbour, obstruction, refuge, spaced, without
+from fasaco_edge.mission.fleet.refuge import refuge, without
+from fasaco_edge.mission.fleet.traffic import Neighbour, obstruction, spaced
 from fasaco_edge.mission.map.reachable_area import ReachableArea
 
 RADIUS_M, PACE_S_M = 0.2, 4.0

@@ -17,6 +17,7 @@ from fasaco_edge.mission.config import MissionConfig
 from fasaco_edge.mission.core.events import PathUpdate
 from fasaco_edge.mission.core.route import NO_CELLS, Route
 from fasaco_edge.mission.fleet.layer import FleetLayer
+from fasaco_edge.mission.fleet.refuge import discs, refuge
 from fasaco_edge.mission.fleet.traffic import (
     AHEAD_M,
     NEAR_M,
@@ -26,7 +27,6 @@ from fasaco_edge.mission.fleet.traffic import (
     Obstruction,
     Points,
     obstruction,
-    refuge,
     spaced,
 )
 from fasaco_edge.mission.map.map_state import MapState
@@ -103,7 +103,8 @@ class GivingWay:
         | none of these | goes on |
         """
         self._has_work = has_work
-        area, cell, pose = self._map.area, self._map.robot_cell(), self._map.pose
+        # A refuge is sought from where the robot is, which on a short cut is far from its path.
+        area, cell, pose = self._map.area, self._map.cell_at_pose(), self._map.pose
         neighbours = self._fleet.others.neighbours(now)
         here = (math.inf, math.inf) if pose is None else (pose.pose.x, pose.pose.y)
         self.is_near = area is not None and cell is not None and _is_near(here, neighbours)
@@ -185,11 +186,12 @@ class GivingWay:
             self._fleet.others.avoid(found.robot)
         if (found.is_on_path or is_long) and now - self._sought_at >= AGAIN_S:
             self._sought_at = now
-            way = refuge(area, cell, here, self._radius_m, neighbours, area.lattice.centres)
+            way = refuge(area, cell, here, self._radius_m, neighbours, self._map.places_of)
             to = None if way is None else (int(way[-1, 0]), int(way[-1, 1]))
             if way is not None and to is not None and not self._is_in(to, here):
                 self._refuge = to
-                return route.publish(way, self.reason, now)
+                beside = discs(self._radius_m, neighbours)
+                return route.publish(way, self.reason, now, beside=beside)
             if self._fleet.others.is_avoided(found.robot):
                 self.end()
                 return None

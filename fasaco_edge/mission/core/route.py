@@ -250,8 +250,9 @@ class Route(PlanRequests):
         ready: PlanReady | None = None,
         changed: Window | None = None,
         end_yaw: float | None = None,
+        beside: NDArray[np.float64] | None = None,
     ) -> PathUpdate:
-        """Publish a path that replaces the current one."""
+        """Publish a path that replaces the current one; for ``beside`` see ``PathUpdate``."""
         self.revision += 1
         self._numberings += 1
         self._walks += not np.array_equal(cells, self.path.ahead)
@@ -260,7 +261,7 @@ class Route(PlanRequests):
         self._end_yaw = end_yaw
         plan, seconds = (ready.path, ready.seconds) if ready else (None, 0.0)
         return PathUpdate(
-            self.revision, cells, reason, plan, seconds, changed, end_yaw=self._end_yaw
+            self.revision, cells, reason, plan, seconds, changed, end_yaw=end_yaw, beside=beside
         )
 
     def publish_line(self, reason: str, now: float) -> PathUpdate:

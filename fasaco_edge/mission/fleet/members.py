@@ -14,8 +14,9 @@ from fasaco_edge.grid.lattice import Cell
 from fasaco_edge.mission.core.events import MemberHeard, State
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
 from fasaco_edge.mission.fleet.ground import SharedGround
+from fasaco_edge.mission.fleet.refuge import without
 from fasaco_edge.mission.fleet.shared import MOST_ROBOTS
-from fasaco_edge.mission.fleet.traffic import CLEARANCE_M, OLD_S, Neighbour, without
+from fasaco_edge.mission.fleet.traffic import CLEARANCE_M, OLD_S, Neighbour
 from fasaco_edge.mission.map.reachable_area import ReachableArea
 
 # Timeouts of a silent robot, and of one that should move; motion that counts [s], [s], [m].

@@ -9,19 +9,14 @@ passage is given to one robot at a time.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.grid.lattice import Cell
-from fasaco_edge.kernels import EAST, NORTH, SOUTH, WEST
-from fasaco_edge.kernels.fleet.split import FAR, ways_from
-from fasaco_edge.kernels.lattice.reach import shortest_walk
 from fasaco_edge.mission.core.events import MemberHeard
-from fasaco_edge.mission.map.reachable_area import ReachableArea
 
 # Length of the path told and checked, spacing of the points checked, and clearance [m].
 AHEAD_M, SPACING_M, CLEARANCE_M = 2.0, 0.1, 0.1
@@ -200,78 +195,3 @@ def _meeting(
         return None
     mine_m = float(np.flatnonzero(is_meeting.any(axis=1))[0] * SPACING_M)
     return _Meeting(mine_m, float(np.flatnonzero(is_meeting.any(axis=0))[0] * SPACING_M))
-
-
-def refuge(
-    area: ReachableArea,
-    cell: Cell,
-    place: tuple[float, float],
-    radius_m: float,
-    neighbours: Mapping[str, Neighbour],
-    places: Callable[[NDArray[np.int32]], Points],
-) -> NDArray[np.int32] | None:
-    """Return the way to the nearest cell off the discs and paths of other robots; None for none.
-
-    It leads through none of their discs: cells, int32 (n, 2), the robot's first.
-
-    Args:
-        area: the reachable area.
-        cell: the robot's cell.
-        place: the robot's place in it (x, y) [m].
-        radius_m: radius of its disc [m].
-        neighbours: the other robots.
-        places: returns the points of cells.
-    """
-    lattice, window = area.lattice, area.lattice.window
-    reach = math.ceil((2 * AHEAD_M + 2.0) / lattice.cell_m)
-    row, col = lattice.local(cell)
-    rows = slice(max(row - reach, 0), row + reach + 1)
-    cols = slice(max(col - reach, 0), col + reach + 1)
-    steps = lattice.steps[rows, cols].copy()
-    at = np.argwhere(area.reachable[rows, cols])
-    corner = np.array((window.row0 + rows.start, window.col0 + cols.start))
-    points = places((at + corner).astype(np.int32))
-    is_free, is_passable = np.ones(len(at), np.bool_), np.ones(len(at), np.bool_)
-    local = row - rows.start, col - cols.start
-    here = (at == local).all(axis=1)
-    for near in neighbours.values():
-        heard = near.heard
-        clear_m = radius_m + heard.radius_m + CLEARANCE_M
-        theirs = spaced([(heard.x, heard.y), *heard.ahead])
-        apart = np.hypot(*(points[:, None] - theirs[None]).transpose(2, 0, 1))
-        is_free &= (apart >= clear_m).all(axis=1)
-        # From too near it may go where it is farther from that robot.
-        is_farther = apart[:, 0] > math.dist(place, (heard.x, heard.y)) + 1e-6
-        is_passable &= (apart[:, 0] >= clear_m) | here | is_farther
-    closed = np.zeros(steps.shape, np.bool_)
-    closed[tuple(at[~is_passable].T)] = True
-    steps = _inside(without(steps, closed))
-    away = ways_from(steps, local[0] * steps.shape[1] + local[1])
-    away = np.where(is_free, away.reshape(steps.shape)[tuple(at.T)], FAR)
-    if not len(away) or away.min() >= FAR:
-        return None
-    nearest = at[int(away.argmin())]
-    walk = shortest_walk(steps, local, (int(nearest[0]), int(nearest[1])))
-    way: NDArray[np.int32] = (walk + corner).astype(np.int32)
-    return way
-
-
-def _inside(steps: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """Return the step masks of a part of a lattice without those that lead out of it."""
-    edges = ((EAST, np.s_[:, -1]), (WEST, np.s_[:, 0]), (NORTH, np.s_[-1]), (SOUTH, np.s_[0]))
-    for direction, edge in edges:
-        steps[edge] &= np.uint8(0xFF ^ (1 << direction))
-    return steps
-
-
-def without(steps: NDArray[np.uint8], closed: NDArray[np.bool_]) -> NDArray[np.uint8]:
-    """Return step masks without steps from and to closed cells, uint8 (rows, cols)."""
-    steps = np.where(closed, 0, steps).astype(np.uint8)
-    for direction, here, there in (
-        (EAST, np.s_[:, :-1], np.s_[:, 1:]),
-        (WEST, np.s_[:, 1:], np.s_[:, :-1]),
-        (NORTH, np.s_[:-1], np.s_[1:]),
-        (SOUTH, np.s_[1:], np.s_[:-1]),
-    ):
-        steps[here] &= ~(closed[there].astype(np.uint8) << direction)
-    return steps

@@ -139,7 +139,7 @@ class LineLayer:
             is_cut = self._route.is_cut
             # To make way is an errand, too: straight there, over no place nearer to the other.
             keeps = not is_errand and self._route.aside is None
-            ahead.lay(update.cells, stamped.pose, is_cut=is_cut, keeps=keeps)
+            ahead.lay(update.cells, stamped.pose, is_cut=is_cut, keeps=keeps, beside=update.beside)
         elif why := self._why_anew(ahead, is_further and touched is not None):
             ahead.lay(path.ahead, stamped.pose)
             update = self._route.publish(path.ahead, why, now) if len(path.ahead) else None

@@ -125,6 +125,7 @@ class LineAhead:
         *,
         is_cut: bool = False,
         keeps: bool = True,
+        beside: NDArray[np.float64] | None = None,
     ) -> None:
         """Lay the line along a walk; it stays where it leads along the same cells.
 
@@ -135,6 +136,7 @@ class LineAhead:
                 kept for the next walk.
             keeps: False for a walk that is only a way, see ``way``: a polished line reaches its
                 cells in another order, and by far longer ways.
+            beside: what such a way keeps clear of, as ``PathUpdate.beside``.
         """
         self._see(pose)
         # A plan's cells are read-only; for those kernels would be compiled again, in the loop.
@@ -160,10 +162,8 @@ class LineAhead:
             self._walk, self.cell, self._cut = walk, 0, None
             self._join(pieces)
             if not keeps and len(self.line):
-                kept = shortened(self.line.points, self._floor)
-                line = self.line
-                way = Line(line.points[kept], line.cells[kept], line.state[kept])
-                self._take([Piece(way, -1)])
+                kept = shortened(self.line.points, self._floor, beside)
+                self._take([Piece(self.line.only(kept), -1)])
         unchecked, self._unchecked = self._unchecked, None
         if unchecked is not None:
             self.check(unchecked)

@@ -46,6 +46,10 @@ class Line:
         """Return the points from ``begin`` to ``end``."""
         return Line(self.points[begin:end], self.cells[begin:end], self.state[begin:end])
 
+    def only(self, kept: NDArray[np.intp]) -> Line:
+        """Return the points of some indices."""
+        return Line(self.points[kept], self.cells[kept], self.state[kept])
+
     def joined(self, *others: Line) -> Line:
         """Return this line with others appended."""
         lines = self, *others

@@ -21,6 +21,7 @@ from fasaco_edge.kernels.floor.capsule import is_clear
 from fasaco_edge.kernels.floor.turning import turn_seconds
 from fasaco_edge.kernels.lattice.reach import shortest_walk
 from fasaco_edge.mission.config import Sweeping
+from fasaco_edge.mission.fleet.refuge import comes_nearer
 from fasaco_edge.mission.line.polyline import Points
 
 # A point is connected straight to one of so many next ones, the farthest possible: each is a corner
@@ -38,18 +39,29 @@ def is_clear_between(floor: FloorMap, a: Points, b: Points) -> bool:
     return bool(is_clear(floor.blocked, a[0], a[1], b[0], b[1], radius))
 
 
-def shortened(points: Points, floor: FloorMap) -> NDArray[np.intp]:
+def shortened(
+    points: Points, floor: FloorMap, beside: NDArray[np.float64] | None = None
+) -> NDArray[np.intp]:
     """Return the indices of the points of a way that skips corners wherever the floor is clear.
 
     Args:
         points: float64 (n, 2), n >= 1: y, x [pixels]; from each to the next one it is clear.
         floor: the floor.
+        beside: what no straight part comes too near to, as ``PathUpdate.beside``.
     """
+    geometry = floor.geometry
+    near = () if beside is None else beside.tolist()
+    on_raster = [(*map_to_raster(geometry, x, y), m / geometry.resolution) for x, y, m in near]
+    discs = np.array(on_raster, np.float64).reshape(-1, 3)
+
+    def may_skip(a: Points, b: Points) -> bool:
+        return is_clear_between(floor, a, b) and not comes_nearer(a, b, discs)
+
     kept, last = [0], len(points) - 1
     while kept[-1] < last:
         at = kept[-1]
         farthest = min(at + MOST_SKIPPED, last)
-        while farthest > at + 1 and not is_clear_between(floor, points[at], points[farthest]):
+        while farthest > at + 1 and not may_skip(points[at], points[farthest]):
             farthest -= 1
         kept.append(farthest)
     return np.array(kept, np.intp)

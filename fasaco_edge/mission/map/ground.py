@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.grid.changes import LatticeChange
-from fasaco_edge.grid.fine_raster import RobotDiscs
+from fasaco_edge.grid.fine_raster import RobotDiscs, raster_to_map
 from fasaco_edge.grid.floor_map import FloorMap
 from fasaco_edge.grid.geometry import Point, Polygon, Window
 from fasaco_edge.grid.lattice import UNKNOWN, Cell, CoverageLattice
@@ -108,6 +108,15 @@ class Ground:
             cell_m = self._config.footprint.cell_m
             return (cell[1] + 0.5) * cell_m, (cell[0] + 0.5) * cell_m
         return floor.stand_xy(cell)
+
+    def places_of(self, cells: NDArray[np.int32]) -> NDArray[np.float64]:
+        """Return the robot's positions for cells (row, col), int32 (n, 2).
+
+        x, y [m], float64 (n, 2); NaN where it cannot stand.
+        """
+        if self.floor is None:
+            return (cells[:, ::-1].astype(np.float64) + 0.5) * self._config.footprint.cell_m
+        return raster_to_map(self.floor.geometry, self.floor.stands.stands_of(cells))
 
     def _set_free(self, change: LatticeChange | None, grid: OccupancyGrid) -> None:
         """Take over the changed lattice of cell centres, or the lattice of a new floor.

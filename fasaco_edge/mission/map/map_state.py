@@ -170,6 +170,10 @@ class MapState:
         """Return the robot's position for a cell, x, y [m]; None if it cannot stand there."""
         return self._ground.place_of(cell)
 
+    def places_of(self, cells: NDArray[np.int32]) -> NDArray[np.float64]:
+        """Return the robot's positions for cells, see ``Ground``."""
+        return self._ground.places_of(cells)
+
     def take_pose(self, pose: StampedPose) -> None:
         """Take in a pose.
 

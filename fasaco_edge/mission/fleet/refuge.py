@@ -1,0 +1,147 @@
+"""Refuge: where a robot of a fleet goes that makes way for another, and how.
+
+Two robots may stand all but in touch, in a doorway for instance: whoever makes way must not come
+nearer to the other at first, as the base's sensors, or the other's side, would stop it for good.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fasaco_edge.grid.lattice import Cell
+from fasaco_edge.kernels import EAST, NORTH, SOUTH, WEST
+from fasaco_edge.kernels.fleet.split import FAR, ways_from
+from fasaco_edge.kernels.lattice.reach import shortest_walk
+from fasaco_edge.mission.fleet.traffic import AHEAD_M, CLEARANCE_M, Neighbour, Points, spaced
+from fasaco_edge.mission.map.reachable_area import ReachableArea
+
+# The cell beside one in each direction (row, col).
+BESIDE = {EAST: (0, 1), NORTH: (1, 0), WEST: (0, -1), SOUTH: (-1, 0)}
+
+Places = Callable[[NDArray[np.int32]], Points]
+
+
+def discs(radius_m: float, neighbours: Mapping[str, Neighbour]) -> Points:
+    """Return where the middle of a robot's disc is too near to others, as ``PathUpdate.beside``."""
+    heard = [near.heard for _, near in sorted(neighbours.items())]
+    rows = [(one.x, one.y, radius_m + one.radius_m + CLEARANCE_M) for one in heard]
+    return np.array(rows, np.float64).reshape(-1, 3)
+
+
+def comes_nearer(a: Points, b: Points, beside: Points) -> bool:
+    """Tell whether a straight way enters one of some discs, or goes farther into one.
+
+    Args:
+        a, b: its ends, (2,).
+        beside: the discs, float64 (k, 3): their middles, in the same units, and radii.
+    """
+    edge, to = b - a, beside[:, :2] - a
+    share = np.clip(to @ edge / max(float(edge @ edge), 1e-12), 0.0, 1.0)
+    nearest = np.hypot(*(to - share[:, None] * edge).T)
+    return bool((nearest < np.minimum(beside[:, 2], np.hypot(*to.T)) - 1e-6).any())
+
+
+def refuge(
+    area: ReachableArea,
+    cell: Cell,
+    place: tuple[float, float],
+    radius_m: float,
+    neighbours: Mapping[str, Neighbour],
+    places: Places,
+) -> NDArray[np.int32] | None:
+    """Return the way to the nearest cell off the discs and paths of other robots; None for none.
+
+    It leads through none of their discs: cells, int32 (n, 2), the robot's first. The second one is
+    such that straight there the robot comes no nearer to any, if there is such a way.
+
+    Args:
+        area: the reachable area.
+        cell: the robot's cell.
+        place: the robot's place in it (x, y) [m].
+        radius_m: radius of its disc [m].
+        neighbours: the other robots.
+        places: returns the points of cells.
+    """
+    lattice, window = area.lattice, area.lattice.window
+    reach = math.ceil((2 * AHEAD_M + 2.0) / lattice.cell_m)
+    row, col = lattice.local(cell)
+    rows = slice(max(row - reach, 0), row + reach + 1)
+    cols = slice(max(col - reach, 0), col + reach + 1)
+    at = np.argwhere(area.reachable[rows, cols])
+    corner = np.array((window.row0 + rows.start, window.col0 + cols.start))
+    points = places((at + corner).astype(np.int32))
+    is_free, is_passable = np.ones(len(at), np.bool_), np.ones(len(at), np.bool_)
+    local = row - rows.start, col - cols.start
+    here = (at == local).all(axis=1)
+    for near in neighbours.values():
+        heard = near.heard
+        clear_m = radius_m + heard.radius_m + CLEARANCE_M
+        theirs = spaced([(heard.x, heard.y), *heard.ahead])
+        apart = np.hypot(*(points[:, None] - theirs[None]).transpose(2, 0, 1))
+        is_free &= (apart >= clear_m).all(axis=1)
+        # From too near it may go where it is farther from that robot.
+        is_farther = apart[:, 0] > math.dist(place, (heard.x, heard.y)) + 1e-6
+        is_passable &= (apart[:, 0] >= clear_m) | here | is_farther
+    closed = np.zeros(area.reachable[rows, cols].shape, np.bool_)
+    closed[tuple(at[~is_passable].T)] = True
+    steps = _inside(without(lattice.steps[rows, cols], closed))
+    beside = discs(radius_m, neighbours)
+    straight = _begun_apart(steps, local, (cell, place), places, beside)
+    for open_steps in (straight, steps):
+        away = ways_from(open_steps, local[0] * steps.shape[1] + local[1])
+        away = np.where(is_free, away.reshape(steps.shape)[tuple(at.T)], FAR)
+        if len(away) and away.min() < FAR:
+            nearest = at[int(away.argmin())]
+            walk = shortest_walk(open_steps, local, (int(nearest[0]), int(nearest[1])))
+            way: NDArray[np.int32] = (walk + corner).astype(np.int32)
+            return way
+    return None
+
+
+def _begun_apart(
+    steps: NDArray[np.uint8],
+    local: Cell,
+    start: tuple[Cell, tuple[float, float]],
+    places: Places,
+    beside: Points,
+) -> NDArray[np.uint8]:
+    """Return step masks without the first steps on which a robot comes nearer to another.
+
+    Args:
+        steps: uint8 (rows, cols).
+        local: the robot's cell in these.
+        start: its cell, and its place in it (x, y) [m].
+        places: returns the points of cells.
+        beside: the others, see ``discs``.
+    """
+    ((row, col), place), steps = start, steps.copy()
+    around = np.array([(row + down, col + right) for down, right in BESIDE.values()], np.int32)
+    for direction, point in zip(BESIDE, places(around), strict=True):
+        if comes_nearer(np.array(place), point, beside):
+            steps[local] &= np.uint8(0xFF ^ (1 << direction))
+    return steps
+
+
+def _inside(steps: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """Return the step masks of a part of a lattice without those that lead out of it."""
+    edges = ((EAST, np.s_[:, -1]), (WEST, np.s_[:, 0]), (NORTH, np.s_[-1]), (SOUTH, np.s_[0]))
+    for direction, edge in edges:
+        steps[edge] &= np.uint8(0xFF ^ (1 << direction))
+    return steps
+
+
+def without(steps: NDArray[np.uint8], closed: NDArray[np.bool_]) -> NDArray[np.uint8]:
+    """Return step masks without steps from and to closed cells, uint8 (rows, cols)."""
+    steps = np.where(closed, 0, steps).astype(np.uint8)
+    for direction, here, there in (
+        (EAST, np.s_[:, :-1], np.s_[:, 1:]),
+        (WEST, np.s_[:, 1:], np.s_[:, :-1]),
+        (NORTH, np.s_[:-1], np.s_[1:]),
+        (SOUTH, np.s_[1:], np.s_[:-1]),
+    ):
+        steps[here] &= ~(closed[there].astype(np.uint8) << direction)
+    return steps
