@@ -277,7 +277,8 @@ def test_a_zone_swept_again_holds_nobody_up_however_many_have_swept_it():
     ledger.forget(inside)
     before = time.thread_time()
     ledger.forget(partial(in_zones, (Zone("again", tuple(reversed(ring))),)))
-    assert time.thread_time() - before < 0.1
+    # A tenth of that; for each robot anew it would be thirty times as long.
+    assert time.thread_time() - before < 0.5
     whole = Window(0, 0, 320, 320)
     swept = ledger.shared.swept(whole)
     assert not swept[inside(whole, 0.3)].any()
@@ -375,7 +376,8 @@ def test_what_many_robots_say_in_a_moment_holds_nobody_up():
     ours.tell(*said(1))
     before = time.thread_time()
     ours.tell(*said(2), *said(4), after=0.0)
-    assert time.thread_time() - before < 0.1
+    # A tenth of that; for each robot anew it would be thirty times as long.
+    assert time.thread_time() - before < 0.5
     assert ours.mission.shared.cells_of("m7") == 24 * 3
     assert np.count_nonzero(ours.mission.shared.swept(Window(0, 0, 300, 300))) == 24 * 3
 
