@@ -134,3 +134,8 @@ def test_a_robot_that_makes_way_comes_no_nearer_to_one_that_it_all_but_touches(t
     ]
     assert len(line) > 1
     assert min(nearest) >= apart - 1e-6
+    robot.reasons.clear()
+    for _ in range(6):
+        robot.now += 0.3
+        robot.tell(other)
+    assert "line polished" not in robot.reasons

@@ -152,8 +152,9 @@ class LineLayer:
         is_waited_for = update is not None or reason or is_further
         if not is_waited_for:
             self._explain()
-            # On the way home or to its dock the robot sweeps nothing beside its path.
-            if not is_errand and self._polisher.polish(
+            # On the way home, to its dock or to a refuge it sweeps nothing beside its path.
+            is_way = is_errand or self._route.aside is not None
+            if not is_way and self._polisher.polish(
                 ahead, self._map.floor, is_settled=self._is_settled
             ):
                 reason = "line polished"
