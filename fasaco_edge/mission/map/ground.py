@@ -115,7 +115,8 @@ class Ground:
         x, y [m], float64 (n, 2); NaN where it cannot stand.
         """
         if self.floor is None:
-            return (cells[:, ::-1].astype(np.float64) + 0.5) * self._config.footprint.cell_m
+            assert self.lattice is not None
+            return self.lattice.centres(cells)
         return raster_to_map(self.floor.geometry, self.floor.stands.stands_of(cells))
 
     def _set_free(self, change: LatticeChange | None, grid: OccupancyGrid) -> None:
