@@ -18,12 +18,11 @@ from fasaco_edge.grid.geometry import Pose2D, Window
 from fasaco_edge.kernels.floor.line import LEAST_EDGE
 from fasaco_edge.mission.line.alignment import aligned, by_distance
 from fasaco_edge.mission.line.line_aside import LineAside
-from fasaco_edge.mission.line.pieces import Joiner, Piece, kept_pieces
+from fasaco_edge.mission.line.pieces import Joiner, Piece, exchanged, kept_pieces
 from fasaco_edge.mission.line.place_on_line import PlaceOnLine
 from fasaco_edge.mission.line.polyline import (
     NO_EDGES,
     POLISHED,
-    RAW,
     Line,
     Points,
     Walk,
@@ -136,7 +135,7 @@ class LineAhead:
                 kept for the next walk.
             keeps: False for a walk that is only a way, see ``way``: a polished line reaches its
                 cells in another order, and by far longer ways.
-            beside: what such a way keeps clear of, as ``PathUpdate.beside``.
+            beside: what such a way keeps clear of, as ``Route.beside``.
         """
         self._see(pose)
         # A plan's cells are read-only; for those kernels would be compiled again, in the loop.
@@ -355,22 +354,11 @@ class LineAhead:
             pieces: their ``begin`` is 0 or more if they are part of the previous line.
         """
         old = self.line
-        new = pieces[0].line.joined(*(piece.line for piece in pieces[1:])) if pieces else Line()
+        new, goes, comes = exchanged(old, pieces)
         if len(old) > 1 and not np.array_equal(old.points[:2], new.points[:2]):
             self.tally.drive(np.stack([old.points[0], self._place.on(old.points)]))
             self._place.along = 0.0
-        goes, comes = np.ones(max(len(old) - 1, 0), bool), np.ones(max(len(new) - 1, 0), bool)
-        at = 0
-        for piece in pieces:
-            inner = len(piece.line) - 1
-            if piece.begin >= 0:
-                goes[piece.begin : piece.begin + inner] = False
-                comes[at : at + inner] = False
-                # Points at a joint may improve.
-                new.state[at : at + 1 if at else 0] = RAW
-                new.state[at + inner : at + inner + 1 if at + inner + 1 < len(new) else 0] = RAW
-            at += inner + 1
-        self.tally.exchange(edges_between(old.points, goes), edges_between(new.points, comes))
+        self.tally.exchange(goes, comes)
         self.line = new
 
     def _is_clear(self, a: Points, b: Points) -> bool:

@@ -13,7 +13,7 @@ import numpy as np
 
 from fasaco_edge.kernels.floor.line import LEAST_EDGE
 from fasaco_edge.kernels.floor.runs import AFTER, BACKWARD, BEFORE, STEPS, common_runs
-from fasaco_edge.mission.line.polyline import Line, Numbers, Points, Walk
+from fasaco_edge.mission.line.polyline import RAW, Edges, Line, Numbers, Points, Walk, edges_between
 
 # Least steps of a reused piece: shorter ones would consist mostly of joints.
 LEAST_STEPS = 8
@@ -60,6 +60,33 @@ def kept_pieces(line: Line, before: Walk, after: Walk) -> list[Piece]:
             last = line.before(origin + steps)
             pieces.append(Piece(line.part(first, last).renumbered(begin - origin), first))
     return [piece for piece in pieces if len(piece.line)]
+
+
+def exchanged(line: Line, pieces: list[Piece]) -> tuple[Line, Edges, Edges]:
+    """Return the line that consists of pieces, and the edges that it exchanges for others.
+
+    Points where the line differs, and where an old piece meets a new one, are to be polished again.
+
+    Args:
+        line: the previous line.
+        pieces: in order; ``begin`` is -1 for those that are no part of the previous line.
+
+    Returns:
+        the new line, the edges of the previous one that go, and those that come: float64 (n, 4).
+    """
+    new = pieces[0].line.joined(*(piece.line for piece in pieces[1:])) if pieces else Line()
+    goes, comes = np.ones(max(len(line) - 1, 0), bool), np.ones(max(len(new) - 1, 0), bool)
+    at = 0
+    for piece in pieces:
+        inner = len(piece.line) - 1
+        if piece.begin >= 0:
+            goes[piece.begin : piece.begin + inner] = False
+            comes[at : at + inner] = False
+            # Points at a joint may improve.
+            new.state[at : at + 1 if at else 0] = RAW
+            new.state[at + inner : at + inner + 1 if at + inner + 1 < len(new) else 0] = RAW
+        at += inner + 1
+    return new, edges_between(line.points, goes), edges_between(new.points, comes)
 
 
 @dataclass(slots=True, eq=False)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from fasaco_edge.grid.geometry import Window
 
 Points = NDArray[np.float64]
+Edges = NDArray[np.float64]
 Numbers = NDArray[np.int64]
 Walk = NDArray[np.int32]
 
@@ -98,7 +99,7 @@ def is_outside(points: Points, shape: tuple[int, int], margin: float) -> NDArray
     return outside
 
 
-def edges_between(points: Points, which: NDArray[np.bool_] | None = None) -> NDArray[np.float64]:
+def edges_between(points: Points, which: NDArray[np.bool_] | None = None) -> Edges:
     """Return the edges between points, or some of them, float64 (n, 4)."""
     begins, ends = points[:-1], points[1:]
     if which is not None:
