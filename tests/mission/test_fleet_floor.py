@@ -15,7 +15,10 @@ from fasaco_edge.mission.core.mission import Mission
 from fasaco_edge.mission.fleet.layer import MANY_TAKEN
 from tests.grid.test_floor import room
 from tests.mission.test_fleet import tiles_of
-from tests.mission.test_line import CELL_M, CONFIG, RADIUS_M, ROBOT, Robot
+from tests.mission.test_line import CELL_M, CONFIG, RADIUS_M, ROBOT, Robot, shifted
+
+# Where along an edge its distance to a place is measured.
+SHARES = np.linspace(0.0, 1.0, 21)
 
 
 def divided_by(member, number):
@@ -110,6 +113,12 @@ def test_the_rest_of_a_line_that_leads_to_nothing_more_is_not_driven():
     assert robot.mission.state is State.DONE
 
 
+def nearest_to(line, place):
+    """Return the least distance of a line to a place."""
+    points = [a + (b - a) * share for a, b in pairwise(np.array(line)) for share in SHARES]
+    return min(math.dist(point, place) for point in points)
+
+
 @pytest.mark.parametrize("toward", range(12))
 def test_a_robot_that_makes_way_comes_no_nearer_to_one_that_it_all_but_touches(toward):
     # Both stood in a doorway for good: straight to its refuge meant into the other's side.
@@ -126,16 +135,13 @@ def test_a_robot_that_makes_way_comes_no_nearer_to_one_that_it_all_but_touches(t
             robot.now += 1.0
             robot.tell(other)
     assert robot.mission.giving_way.waits_for == "r2"
-    line = np.array(robot.line)
-    nearest = [
-        math.dist(a + share * (b - a), (x, y))
-        for a, b in pairwise(line)
-        for share in np.linspace(0.0, 1.0, 21)
-    ]
-    assert len(line) > 1
-    assert min(nearest) >= apart - 1e-6
+    assert len(robot.line) > 1
+    assert nearest_to(robot.line, (x, y)) >= apart - 1e-6
     robot.reasons.clear()
     for _ in range(6):
         robot.now += 0.3
         robot.tell(other)
     assert "line polished" not in robot.reasons
+    robot.tell(MapReceived(shifted(room(4.5, 3.5), 0.012)))
+    assert robot.reasons[-1] == "map on another raster"
+    assert nearest_to(robot.line, (x, y)) >= apart - 1e-6

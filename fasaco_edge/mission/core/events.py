@@ -220,8 +220,6 @@ class PathUpdate:
         changed: window of the cells whose change is the reason; None where that is not the reason.
         xy: float64 (m, 2), x, y [m]: the line to drive; None for the centres of the cells.
         end_yaw: heading at the end [rad]; None for the heading of the last segment.
-        beside: other robots that the line keeps clear of, float64 (k, 3): x, y, least distance [m];
-            where it begins nearer to one, it comes no nearer. None for any line.
     """
 
     revision: int
@@ -232,7 +230,6 @@ class PathUpdate:
     changed: Window | None = None
     xy: NDArray[np.float64] | None = None
     end_yaw: float | None = None
-    beside: NDArray[np.float64] | None = None
 
 
 @dataclass(frozen=True, slots=True)

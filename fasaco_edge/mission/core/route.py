@@ -32,6 +32,8 @@ class Route(PlanRequests):
         unchanged, outdated: count the plans that were not published because they equal the current
             path, or because they no longer hold.
         published_at: when a path was last published or confirmed by a plan.
+        beside: other robots that the path's line keeps clear of, float64 (k, 3): x, y, least
+            distance [m]; where it begins nearer to one, it comes no nearer. None for any line.
     """
 
     def __init__(self, spare_share: float, map_state: MapState, orders: Sequencer) -> None:
@@ -51,6 +53,7 @@ class Route(PlanRequests):
         self._numberings = self._walks = 0
         self.unchanged = self.outdated = 0
         self.published_at = 0.0
+        self.beside: NDArray[np.float64] | None = None
         self._map = map_state
         self._orders = orders
         self._spare = SpareTime(spare_share)
@@ -252,17 +255,15 @@ class Route(PlanRequests):
         end_yaw: float | None = None,
         beside: NDArray[np.float64] | None = None,
     ) -> PathUpdate:
-        """Publish a path that replaces the current one; for ``beside`` see ``PathUpdate``."""
+        """Publish a path that replaces the current one."""
         self.revision += 1
         self._numberings += 1
         self._walks += not np.array_equal(cells, self.path.ahead)
         self.published_at = now
         self.path, self._kept = PathProgress(cells), PathProgress(NO_CELLS)
-        self._end_yaw = end_yaw
+        self._end_yaw, self.beside = end_yaw, beside
         plan, seconds = (ready.path, ready.seconds) if ready else (None, 0.0)
-        return PathUpdate(
-            self.revision, cells, reason, plan, seconds, changed, end_yaw=end_yaw, beside=beside
-        )
+        return PathUpdate(self.revision, cells, reason, plan, seconds, changed, end_yaw=end_yaw)
 
     def publish_line(self, reason: str, now: float) -> PathUpdate:
         """Publish a new line along the same cells; a pending attempt still holds."""

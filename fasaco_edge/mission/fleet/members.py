@@ -16,7 +16,7 @@ from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
 from fasaco_edge.mission.fleet.ground import SharedGround
 from fasaco_edge.mission.fleet.refuge import without
 from fasaco_edge.mission.fleet.shared import MOST_ROBOTS
-from fasaco_edge.mission.fleet.traffic import CLEARANCE_M, OLD_S, Neighbour
+from fasaco_edge.mission.fleet.traffic import OLD_S, Neighbour, least_apart_m
 from fasaco_edge.mission.map.reachable_area import ReachableArea
 
 # Timeouts of a silent robot, and of one that should move; motion that counts [s], [s], [m].
@@ -127,7 +127,7 @@ class Members:
         window, cell_m = area.lattice.window, area.lattice.cell_m
         closed = np.zeros(area.reachable.shape, np.bool_)
         for name, (x, y) in self._avoided.items():
-            clear_m = radius_m + self.known[name].newest.radius_m + CLEARANCE_M
+            clear_m = least_apart_m(radius_m, self.known[name].newest)
             # Only the cells around it: lattices are large.
             (row0, row1), (col0, col1) = (
                 (math.floor((at - clear_m) / cell_m), math.ceil((at + clear_m) / cell_m))

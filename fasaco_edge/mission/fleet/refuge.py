@@ -16,7 +16,7 @@ from fasaco_edge.grid.lattice import Cell
 from fasaco_edge.kernels import EAST, NORTH, SOUTH, WEST
 from fasaco_edge.kernels.fleet.split import FAR, ways_from
 from fasaco_edge.kernels.lattice.reach import shortest_walk
-from fasaco_edge.mission.fleet.traffic import AHEAD_M, CLEARANCE_M, Neighbour, Points, spaced
+from fasaco_edge.mission.fleet.traffic import AHEAD_M, Neighbour, Points, least_apart_m, spaced
 from fasaco_edge.mission.map.reachable_area import ReachableArea
 
 # The cell beside one in each direction (row, col).
@@ -26,9 +26,9 @@ Places = Callable[[NDArray[np.int32]], Points]
 
 
 def discs(radius_m: float, neighbours: Mapping[str, Neighbour]) -> Points:
-    """Return where the middle of a robot's disc is too near to others, as ``PathUpdate.beside``."""
+    """Return where the middle of a robot's disc is too near to others, as ``Route.beside``."""
     heard = [near.heard for _, near in sorted(neighbours.items())]
-    rows = [(one.x, one.y, radius_m + one.radius_m + CLEARANCE_M) for one in heard]
+    rows = [(one.x, one.y, least_apart_m(radius_m, one)) for one in heard]
     return np.array(rows, np.float64).reshape(-1, 3)
 
 
@@ -79,7 +79,7 @@ def refuge(
     here = (at == local).all(axis=1)
     for near in neighbours.values():
         heard = near.heard
-        clear_m = radius_m + heard.radius_m + CLEARANCE_M
+        clear_m = least_apart_m(radius_m, heard)
         theirs = spaced([(heard.x, heard.y), *heard.ahead])
         apart = np.hypot(*(points[:, None] - theirs[None]).transpose(2, 0, 1))
         is_free &= (apart >= clear_m).all(axis=1)

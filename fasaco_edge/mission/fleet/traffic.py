@@ -75,6 +75,11 @@ class Obstruction:
         return f"makes way for {self.robot}" if self.is_on_path else f"waits for {self.robot}"
 
 
+def least_apart_m(radius_m: float, other: MemberHeard) -> float:
+    """Return the least distance of two robots' middles [m], for the radius of one [m]."""
+    return radius_m + other.radius_m + CLEARANCE_M
+
+
 def spaced(points: Sequence[tuple[float, float]] | Points) -> Points:
     """Return points every SPACING_M along the first AHEAD_M of a polyline [m], float64 (n, 2)."""
     line = np.asarray(points, np.float64).reshape(-1, 2)
@@ -120,7 +125,7 @@ NEARER_M farther than the other, or about as far and second by name | waits |
     """
     blocked: Obstruction | None = None
     for other, near in sorted(neighbours.items()):
-        heard, clear_m = near.heard, radius_m + near.heard.radius_m + CLEARANCE_M
+        heard, clear_m = near.heard, least_apart_m(radius_m, near.heard)
         if math.dist(line[0], (heard.x, heard.y)) > NEAR_M + 2 * clear_m:
             continue
         theirs = spaced([(heard.x, heard.y), *heard.ahead])

@@ -131,17 +131,13 @@ class LineLayer:
         touched, self._touched = self._touched, None
         self._take_floor(touched)
         reason, path = "", self._route.path
-        is_errand = bool(self._orders.order_state.errand)
         # Its cell may be ahead of its place on the line, which may skip cells.
         is_further = path.index > ahead.cell
         if update is not None:
             self._set_aside(ahead, len(update.cells) > 0)
-            is_cut = self._route.is_cut
-            # To make way is an errand, too: straight there, over no place nearer to the other.
-            keeps = not is_errand and self._route.aside is None
-            ahead.lay(update.cells, stamped.pose, is_cut=is_cut, keeps=keeps, beside=update.beside)
+            self._lay(ahead, update.cells, stamped.pose, is_cut=self._route.is_cut)
         elif why := self._why_anew(ahead, is_further and touched is not None):
-            ahead.lay(path.ahead, stamped.pose)
+            self._lay(ahead, path.ahead, stamped.pose)
             update = self._route.publish(path.ahead, why, now) if len(path.ahead) else None
         self._is_dropped = False
         if touched is not None and ahead.check(touched):
@@ -152,9 +148,8 @@ class LineLayer:
         is_waited_for = update is not None or reason or is_further
         if not is_waited_for:
             self._explain()
-            # On the way home, to its dock or to a refuge it sweeps nothing beside its path.
-            is_way = is_errand or self._route.aside is not None
-            if not is_way and self._polisher.polish(
+            # On such a way it sweeps nothing beside its path.
+            if not self._is_way and self._polisher.polish(
                 ahead, self._map.floor, is_settled=self._is_settled
             ):
                 reason = "line polished"
@@ -164,6 +159,18 @@ class LineLayer:
             return None
         ahead.note_published()
         return replace(update, xy=ahead.xy())
+
+    @property
+    def _is_way(self) -> bool:
+        """Whether the path is only a way: home, to the dock or to a refuge."""
+        return bool(self._orders.order_state.errand) or self._route.aside is not None
+
+    def _lay(
+        self, ahead: LineAhead, cells: NDArray[np.int32], pose: Pose2D, *, is_cut: bool = False
+    ) -> None:
+        """Lay the line along cells; a way leads straight there, past no other robot's place."""
+        beside = self._route.beside
+        ahead.lay(cells, pose, is_cut=is_cut, keeps=not self._is_way, beside=beside)
 
     def _set_aside(self, ahead: LineAhead, is_driven: bool) -> None:
         """Set the line aside with the path, and take it up with the next one that is driven."""

@@ -47,7 +47,7 @@ def shortened(
     Args:
         points: float64 (n, 2), n >= 1: y, x [pixels]; from each to the next one it is clear.
         floor: the floor.
-        beside: what no straight part comes too near to, as ``PathUpdate.beside``.
+        beside: what no straight part comes too near to, as ``Route.beside``.
     """
     geometry = floor.geometry
     near = () if beside is None else beside.tolist()
