@@ -1,5 +1,7 @@
 """Traffic of a fleet: who waits, who makes way, and that a narrow passage is no dead end."""
 
+import math
+
 import numpy as np
 import pytest
 
@@ -131,6 +133,16 @@ def test_a_path_planned_around_one_that_stands_is_driven_though_it_passes_near()
     assert obstruction("r1", RADIUS_M, PACE_S_M, spaced(EAST), near, "").is_blocked
 
 
+def sees_in(area):
+    """Whether two points lie in one cell, or in two that a step connects."""
+
+    def sees(a, b):
+        first, second = (area.lattice.cell_at(*point) for point in (a, b))
+        return 1 <= len(area.shortest_path(first, second)) <= 2
+
+    return sees
+
+
 def test_a_refuge_lies_off_discs_and_paths_and_is_reached_past_none_of_them():
     free = np.zeros((12, 24), np.bool_)
     free[5], free[6:9, 4] = True, True  # a corridor with a niche
@@ -144,6 +156,7 @@ def test_a_refuge_lies_off_discs_and_paths_and_is_reached_past_none_of_them():
         RADIUS_M,
         {"r2": Neighbour(other, 0.0, 0.0, PACE_S_M)},
         lattice.centres,
+        sees_in(area),
     )
     assert tuple(way[-1].tolist()) in {(7, 4), (5, 2)}
     # Behind the other there is a place, too, but no way to it.
@@ -158,6 +171,7 @@ def test_a_refuge_lies_off_discs_and_paths_and_is_reached_past_none_of_them():
         RADIUS_M,
         {"r2": Neighbour(other, 0.0, 0.0, PACE_S_M)},
         lattice.centres,
+        sees_in(area),
     )
     assert way[-1, 1] > 13
 
@@ -170,7 +184,7 @@ def test_the_way_to_a_refuge_leads_round_the_disc_of_the_other():
     area = ReachableArea.around(lattice, (0, 2))
     ahead = [(0.125, 0.125), (0.125, 0.625), (0.625, 0.625)]
     near = {"r2": Neighbour(heard("r2", (1.125, 0.125), *ahead), 0.0, 0.0, PACE_S_M)}
-    way = refuge(area, (0, 2), at((0, 2)), RADIUS_M, near, lattice.centres)
+    way = refuge(area, (0, 2), at((0, 2)), RADIUS_M, near, lattice.centres, sees_in(area))
     assert way.tolist()[-1] == [2, 4]
     assert [0, 0] in way.tolist()
     assert len(area.shortest_path((0, 2), (2, 4))) < len(way)
@@ -183,10 +197,25 @@ def test_one_that_is_nearer_to_the_other_than_its_cell_is_gets_away_past_cells_n
     area = ReachableArea.around(lattice, (0, 4))
     near = {"r2": Neighbour(heard("r2", (0.7, 0.45), at((0, 4))), 0.0, 0.0, PACE_S_M)}
     # 0.41 m from the other; its cell is at 0.54 m, the next one of the way at 0.43 m.
-    way = refuge(area, (0, 4), (1.02, 0.2), RADIUS_M, near, lattice.centres)
+    way = refuge(area, (0, 4), (1.02, 0.2), RADIUS_M, near, lattice.centres, sees_in(area))
     assert way is not None
     assert way.tolist() == [[0, 4], [1, 4], [1, 5], [1, 6]]
-    assert refuge(area, (0, 4), at((0, 4)), RADIUS_M, near, lattice.centres) is None
+    assert refuge(area, (0, 4), at((0, 4)), RADIUS_M, near, lattice.centres, sees_in(area)) is None
+
+
+def test_one_that_sees_no_cell_a_step_away_begins_with_one_beside_its_own():
+    # Two stood in a doorway for good: the way through the next cell led round a corner, nearer to
+    # the other; the way on which it had come led straight away, from a cell beside its own.
+    lattice = CoverageLattice.from_free(np.ones((6, 12), np.bool_), 0.25)
+    area = ReachableArea.around(lattice, (2, 5))
+    (x, y), behind = at((2, 5)), at((1, 4))
+    near = {"r2": Neighbour(heard("r2", (x, y + 0.3), (x, y)), 0.0, 0.0, PACE_S_M)}
+
+    def sees(_, to):
+        return math.dist(to, behind) < 0.01
+
+    way = refuge(area, (2, 5), (x, y), RADIUS_M, near, lattice.centres, sees)
+    assert tuple(way[0].tolist()) == (1, 4)
 
 
 def test_cells_far_from_one_robot_are_no_way_through_another():
@@ -202,7 +231,7 @@ def test_cells_far_from_one_robot_are_no_way_through_another():
             ("r2", heard("r2", at((1, 12)), at((1, 7)))),
         )
     }
-    assert refuge(area, (1, 8), at((1, 8)), RADIUS_M, near, lattice.centres) is None
+    assert refuge(area, (1, 8), at((1, 8)), RADIUS_M, near, lattice.centres, sees_in(area)) is None
 
 
 def test_a_refuge_is_sought_no_farther_than_the_cells_around_the_robot():
@@ -220,7 +249,9 @@ def test_a_refuge_is_sought_no_farther_than_the_cells_around_the_robot():
         for x in range(5, 24)
     }
     assert area.reachable[7, 16]
-    assert refuge(area, (5, 40), at((5, 40)), RADIUS_M, near, lattice.centres) is None
+    assert (
+        refuge(area, (5, 40), at((5, 40)), RADIUS_M, near, lattice.centres, sees_in(area)) is None
+    )
 
 
 def test_closed_cells_have_no_steps_left():

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +30,7 @@ from fasaco_edge.mission.fleet.traffic import (
     obstruction,
     spaced,
 )
+from fasaco_edge.mission.line.way import sees_on
 from fasaco_edge.mission.map.map_state import MapState
 from fasaco_edge.mission.map.reachable_area import ReachableArea
 
@@ -136,6 +138,16 @@ class GivingWay:
         place = self._map.place_of(refuge)
         return place is None or math.dist(here, place) <= ARRIVED_M
 
+    def _sees(self, area: ReachableArea, a: Points, b: Points) -> bool:
+        """Tell whether the robot can drive straight between two points, (2,): x, y [m].
+
+        Where cells are counted: between those of one cell, and of two that a step connects.
+        """
+        if self._map.floor is not None:
+            return sees_on(self._map.floor, a, b)
+        ends = [area.lattice.cell_at(*point.tolist()) for point in (a, b)]
+        return 1 <= len(area.shortest_path(ends[0], ends[1])) <= 2
+
     def _obstruction(
         self, here: tuple[float, float], neighbours: Mapping[str, Neighbour], now: float
     ) -> Obstruction | None:
@@ -186,7 +198,8 @@ class GivingWay:
             self._fleet.others.avoid(found.robot)
         if (found.is_on_path or is_long) and now - self._sought_at >= AGAIN_S:
             self._sought_at = now
-            way = refuge(area, cell, here, self._radius_m, neighbours, self._map.places_of)
+            places, sees = self._map.places_of, partial(self._sees, area)
+            way = refuge(area, cell, here, self._radius_m, neighbours, places, sees)
             to = None if way is None else (int(way[-1, 0]), int(way[-1, 1]))
             if way is not None and to is not None and not self._is_in(to, here):
                 self._refuge = to

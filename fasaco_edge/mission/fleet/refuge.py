@@ -7,7 +7,7 @@ nearer to the other at first, as the base's sensors, or the other's side, would 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,10 +19,8 @@ from fasaco_edge.kernels.lattice.reach import shortest_walk
 from fasaco_edge.mission.fleet.traffic import AHEAD_M, Neighbour, Points, least_apart_m, spaced
 from fasaco_edge.mission.map.reachable_area import ReachableArea
 
-# The cell beside one in each direction (row, col).
-BESIDE = {EAST: (0, 1), NORTH: (1, 0), WEST: (0, -1), SOUTH: (-1, 0)}
-
 Places = Callable[[NDArray[np.int32]], Points]
+Sees = Callable[[Points, Points], bool]
 
 
 def discs(radius_m: float, neighbours: Mapping[str, Neighbour]) -> Points:
@@ -52,11 +50,13 @@ def refuge(
     radius_m: float,
     neighbours: Mapping[str, Neighbour],
     places: Places,
+    sees: Sees,
 ) -> NDArray[np.int32] | None:
     """Return the way to the nearest cell off the discs and paths of other robots; None for none.
 
-    It leads through none of their discs: cells, int32 (n, 2), the robot's first. The second one is
-    such that straight there the robot comes no nearer to any, if there is such a way.
+    It leads through none of their discs: cells, int32 (n, 2). The first one is the robot's or one
+    beside it, such that straight there the robot comes no nearer to any, if there is such a way;
+    else its own.
 
     Args:
         area: the reachable area.
@@ -65,6 +65,7 @@ def refuge(
         radius_m: radius of its disc [m].
         neighbours: the other robots.
         places: returns the points of cells.
+        sees: tells whether the robot can drive straight between two points.
     """
     lattice, window = area.lattice, area.lattice.window
     reach = math.ceil((2 * AHEAD_M + 2.0) / lattice.cell_m)
@@ -89,41 +90,43 @@ def refuge(
     closed = np.zeros(area.reachable[rows, cols].shape, np.bool_)
     closed[tuple(at[~is_passable].T)] = True
     steps = _inside(without(lattice.steps[rows, cols], closed))
-    beside = discs(radius_m, neighbours)
-    straight = _begun_apart(steps, local, (cell, place), places, beside)
-    for open_steps in (straight, steps):
-        away = ways_from(open_steps, local[0] * steps.shape[1] + local[1])
-        away = np.where(is_free, away.reshape(steps.shape)[tuple(at.T)], FAR)
-        if len(away) and away.min() < FAR:
-            nearest = at[int(away.argmin())]
-            walk = shortest_walk(open_steps, local, (int(nearest[0]), int(nearest[1])))
-            way: NDArray[np.int32] = (walk + corner).astype(np.int32)
-            return way
-    return None
+    beside, first = discs(radius_m, neighbours), np.array(place)
+    is_beside = (np.abs(at - local) <= 1).all(axis=1) & is_passable
+    begins = [
+        (math.dist(place, point) / lattice.cell_m, (begin[0], begin[1]))
+        for begin, point in zip(at[is_beside].tolist(), points[is_beside], strict=True)
+        if sees(first, point) and not comes_nearer(first, point, beside)
+    ]
+    way = _nearest(steps, begins, at[is_free], corner)
+    # Where each leads nearer to another robot, it may still be let past.
+    return _nearest(steps, [(0.0, local)], at[is_free], corner) if way is None else way
 
 
-def _begun_apart(
+def _nearest(
     steps: NDArray[np.uint8],
-    local: Cell,
-    start: tuple[Cell, tuple[float, float]],
-    places: Places,
-    beside: Points,
-) -> NDArray[np.uint8]:
-    """Return step masks without the first steps on which a robot comes nearer to another.
+    begins: Sequence[tuple[float, Cell]],
+    ends: NDArray[np.int64],
+    corner: NDArray[np.int64],
+) -> NDArray[np.int32] | None:
+    """Return the shortest way from one of some cells to one of others, int32 (n, 2), or None.
 
     Args:
-        steps: uint8 (rows, cols).
-        local: the robot's cell in these.
-        start: its cell, and its place in it (x, y) [m].
-        places: returns the points of cells.
-        beside: the others, see ``discs``.
+        steps: step masks, uint8 (rows, cols).
+        begins: cells in these, and how far the robot is from each [steps].
+        ends: cells in these, int64 (k, 2).
+        corner: the cell of the first one, int64 (2,).
     """
-    ((row, col), place), steps = start, steps.copy()
-    around = np.array([(row + down, col + right) for down, right in BESIDE.values()], np.int32)
-    for direction, point in zip(BESIDE, places(around), strict=True):
-        if comes_nearer(np.array(place), point, beside):
-            steps[local] &= np.uint8(0xFF ^ (1 << direction))
-    return steps
+    best, way = float(FAR), None
+    for far, begin in begins:
+        away = ways_from(steps, begin[0] * steps.shape[1] + begin[1]).reshape(steps.shape)
+        lengths = away[tuple(ends.T)]
+        if len(ends) and lengths.min() < FAR and far + lengths.min() < best:
+            best, way = far + float(lengths.min()), (begin, ends[int(lengths.argmin())].tolist())
+    if way is None:
+        return None
+    begin, (row, col) = way
+    cells: NDArray[np.int32] = (shortest_walk(steps, begin, (row, col)) + corner).astype(np.int32)
+    return cells
 
 
 def _inside(steps: NDArray[np.uint8]) -> NDArray[np.uint8]:

@@ -159,7 +159,7 @@ class LineAhead:
                 # The robot is not behind its first point any more.
                 pieces[0] = pieces[0].without_first()
             self._walk, self.cell, self._cut = walk, 0, None
-            self._join(pieces)
+            self._join(pieces, skips=beside is None)
             if not keeps and len(self.line):
                 kept = shortened(self.line.points, self._floor, beside)
                 self._take([Piece(self.line.only(kept), -1)])
@@ -167,12 +167,15 @@ class LineAhead:
         if unchecked is not None:
             self.check(unchecked)
 
-    def _join(self, pieces: list[Piece], beyond: Piece | None = None) -> None:
+    def _join(
+        self, pieces: list[Piece], beyond: Piece | None = None, *, skips: bool = True
+    ) -> None:
         """Replace the line by one joined from pieces.
 
         Args:
             pieces: in order.
             beyond: the kept part beyond the cut, if the walk was cut off.
+            skips: whether it may skip the stand of the robot's cell, where that is swept.
         """
         begin = self._begin()[None]
         here = Line(begin, np.array([self.cell]), np.array([POLISHED], np.uint8))
@@ -187,7 +190,7 @@ class LineAhead:
             stand=stands.stand,
             raw=stands.line,
             is_clear=self._is_clear,
-            is_swept=lambda cell: not tally.is_open(stands.stand(cell)),
+            is_swept=lambda cell: skips and not tally.is_open(stands.stand(cell)),
             way=lambda a, b: corners_between(self._floor, a, b),
         )
         joined = joiner.joined(pieces)

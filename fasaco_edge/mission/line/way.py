@@ -39,6 +39,12 @@ def is_clear_between(floor: FloorMap, a: Points, b: Points) -> bool:
     return bool(is_clear(floor.blocked, a[0], a[1], b[0], b[1], radius))
 
 
+def sees_on(floor: FloorMap, a: Points, b: Points) -> bool:
+    """Tell whether the robot can drive straight between two points, (2,): x, y [m]."""
+    ends = [np.array(map_to_raster(floor.geometry, *point.tolist())) for point in (a, b)]
+    return is_clear_between(floor, ends[0], ends[1])
+
+
 def shortened(
     points: Points, floor: FloorMap, beside: NDArray[np.float64] | None = None
 ) -> NDArray[np.intp]:
