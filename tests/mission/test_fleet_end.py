@@ -71,26 +71,34 @@ def test_robots_do_not_stand_for_one_another():
     remainder = Remainder()
     for now in range(int(WAITING_S) + 4):
         remainder.note_others(now, wait=now > 0)
-        remainder.note(100 - now, 0, now)
+        remainder.note(100 - now, 0, now, now)
         assert remainder.others_go_on == (now <= WAITING_S + 1)
     remainder.note_others(now, wait=False)
-    remainder.note(50, 0, now)
+    remainder.note(50, 0, 50, now)
     assert remainder.others_go_on
 
 
+def test_others_that_find_as_many_cells_as_they_sweep_go_on():
+    # One was done with 160 cells left, and out of the fleet, for the last 390 s of 950.
+    remainder = Remainder()
+    for second in range(3 * int(STUCK_S)):
+        remainder.note(160 + second, 0, second, float(second))
+        assert remainder.others_go_on
+
+
 @pytest.mark.parametrize(
-    "cells", [[9] * 50, [9, 8] * 25, range(50, 0, -1)], ids=["none", "up and down", "own"]
+    "swept", [[50] * 50, [51, 50] * 25, range(51, 100)], ids=["none", "up and down", "later"]
 )
-def test_a_robot_does_not_stand_again_for_others_that_did_not_go_on(cells):
+def test_a_robot_does_not_stand_again_for_others_that_did_not_go_on(swept):
     remainder = Remainder()
     for second in range(int(STUCK_S) + 2):
-        remainder.note(9 + 50 + second % 2, 0, float(second))
+        remainder.note(59 + second % 2, 0, 50 - second % 2, float(second))
     assert not remainder.others_go_on
-    for second, left in enumerate(cells):
-        remainder.note(left, 0, STUCK_S + 2 + second)
+    for second, cells in enumerate(swept):
+        remainder.note(40, 0, cells, STUCK_S + 2 + second)
         assert not remainder.others_go_on
-    remainder.note(40, 3, 100.0)
-    remainder.note(40, 0, 101.0)
+    remainder.note(40, 3, 100, 100.0)
+    remainder.note(40, 0, 100, 101.0)
     assert remainder.others_go_on
 
 

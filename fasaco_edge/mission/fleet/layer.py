@@ -109,7 +109,7 @@ class FleetLayer:
 
     @property
     def others_go_on(self) -> bool:
-        """Whether all that is left is others' to sweep, and becomes less."""
+        """Whether all that is left is others' to sweep, who are at it."""
         return self._division is not None and self._remainder.others_go_on
 
     def mine(self, cells: NDArray[np.bool_], area: ReachableArea) -> NDArray[np.bool_]:
@@ -171,7 +171,8 @@ class FleetLayer:
         own = left if before is None else left & self._of_me(before, joint)
         at_work = [one.newest for one in self.members.values() if not one.absence(now)]
         self._remainder.note_others(now, wait=all(heard.waits_for for heard in at_work))
-        self._remainder.note(int(left.sum()), int(own.sum()), now)
+        swept = int(np.count_nonzero(self._ledger.shared.swept(joint.lattice.window)))
+        self._remainder.note(int(left.sum()), int(own.sum()), swept, now)
         if newer := self.numbers.newer():
             why = LATER
             self.numbers.follow(newer)
@@ -186,7 +187,7 @@ class FleetLayer:
         self._divided_at, self._owners = now, (None, self._owners[1])
         self._taken = self._count_taken()
         after = left if self._division is None else left & self._of_me(self._division, joint)
-        self._remainder.note_division(int(left.sum()), int(after.sum()), now)
+        self._remainder.note_division(int(left.sum()), int(after.sum()), swept, now)
         return why if (own != after)[inside].any() else ""
 
     @property

@@ -5,7 +5,7 @@ A robot without a part stands while the others go on: it would be in their way.
 
 from __future__ import annotations
 
-# Others go on as long as the cells left have become fewer within this time [s].
+# Others go on as long as more cells have been swept within this time [s].
 STUCK_S = 30.0
 # Nobody goes on if for so long all others have waited, perhaps for this robot [s].
 WAITING_S = 6.0
@@ -15,8 +15,8 @@ class Remainder:
     """Follows what is left for a fleet.
 
     Attributes:
-        others_go_on: whether all that is left is others' to sweep, who are at it, and has become
-            less. Once it has not for STUCK_S, it counts as stuck until this robot has a part again.
+        others_go_on: whether all that is left is others' to sweep, who are at it. Once they have
+            swept nothing for STUCK_S, they count as stuck until this robot has a part again.
         had_part: whether the last division gave this robot a part.
         divided: number of cells left at that time.
     """
@@ -24,9 +24,9 @@ class Remainder:
     def __init__(self) -> None:
         self.others_go_on = self.had_part = False
         self.divided = 0
-        # Fewest cells left since this robot has no part, and when they became so few; None while it
-        # has one. A number that goes up and down again is no progress.
-        self._least: tuple[int, float] | None = None
+        # Most cells swept since this robot has no part, and when they became so many; None while it
+        # has one. How many are left tells less: what others find adds to them as they sweep.
+        self._most: tuple[int, float] | None = None
         # Since when all others wait; None while one is at work.
         self._waiting_since: float | None = None
 
@@ -37,21 +37,21 @@ class Remainder:
         elif self._waiting_since is None:
             self._waiting_since = now
 
-    def note(self, cells: int, own: int, now: float) -> None:
-        """Take in the numbers of cells left, in all and in this robot's part.
+    def note(self, cells: int, own: int, swept: int, now: float) -> None:
+        """Take in the numbers of cells left, in all and in this robot's part, and of cells swept.
 
         A part that other robots' maps show alone is a part: this robot has to come to see it.
         """
         if own > 0:
-            self._least, self.others_go_on = None, False
+            self._most, self.others_go_on = None, False
             return
-        least, since = self._least or (cells, now)
+        most, since = self._most or (swept, now)
         is_stuck = now - since > STUCK_S
-        self._least = (cells, now) if cells < least and not is_stuck else (least, since)
+        self._most = (swept, now) if swept > most and not is_stuck else (most, since)
         waiting_s = 0.0 if self._waiting_since is None else now - self._waiting_since
         self.others_go_on = cells > 0 and not is_stuck and waiting_s <= WAITING_S
 
-    def note_division(self, cells: int, own: int, now: float) -> None:
+    def note_division(self, cells: int, own: int, swept: int, now: float) -> None:
         """Take in a new division, as ``note`` does."""
         self.had_part, self.divided = own > 0, cells
-        self.note(cells, own, now)
+        self.note(cells, own, swept, now)
