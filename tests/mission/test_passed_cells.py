@@ -1,62 +1,36 @@
-"""Left floor: a robot of a fleet comes back once to the cells that it passed with floor unswept."""
+"""Passed cells: their floor stays a robot's, whoever's part they lie in, but is not driven to."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 
 import numpy as np
-import pytest
 
 from fasaco_edge.grid.geometry import Window
 from fasaco_edge.mission.core.events import MapReceived, State
 from fasaco_edge.mission.core.mission import Mission
 from fasaco_edge.mission.coverage.floor_tiles import PIXEL_M
-from fasaco_edge.mission.coverage.left_floor import MOST_PASSED, LeftFloor
+from fasaco_edge.mission.coverage.passed_cells import MOST_PASSED, PassedCells
 from tests.grid.test_floor import room
 from tests.mission.test_fleet_floor import divided_by
 from tests.mission.test_line import CELL_M, CONFIG, Robot
 
-CELL = (3, 5)
 
-
-def test_a_cell_that_it_came_back_to_is_never_looked_at_again():
-    floor = LeftFloor()
-    floor.note_passed(CELL)
-    assert floor.next(9) == [CELL]
-    floor.note_left(CELL, is_left=True)
-    assert floor.left_in(Window(3, 5, 4, 6)).all()
-    for _ in range(3):
-        floor.note_passed(CELL)
-        assert floor.next(9) == []
-        assert not floor.left_in(Window(0, 0, 9, 9)).any()
-
-
-def test_a_cell_that_a_whole_path_did_not_lead_back_to_is_given_up():
-    floor = LeftFloor()
-    floor.note_passed(CELL)
-    floor.note_left(CELL, is_left=True)
-    floor.note_path_end()
-    assert floor.left == {CELL}
-    floor.note_path_end()
-    assert floor.left == set()
-    floor.note_passed(CELL)
-    assert floor.next(9) == []
-
-
-def test_what_another_line_sweeps_is_no_longer_left_and_may_be_left_again():
-    floor = LeftFloor()
-    floor.note_passed(CELL)
-    for is_left in (True, False, True):
-        floor.note_left(CELL, is_left=is_left)
-        assert floor.left == ({CELL} if is_left else set())
-        assert floor.passed_in(Window(3, 5, 4, 6)).all()
+def test_a_cell_is_kept_until_its_floor_is_swept():
+    cells = PassedCells()
+    cells.note((3, 5))
+    assert cells.next(9) == [(3, 5)]
+    assert cells.inside(Window(3, 5, 4, 6)).all()
+    cells.drop((3, 5))
+    assert cells.next(9) == []
+    assert not cells.inside(Window(0, 0, 9, 9)).any()
 
 
 def test_cells_are_looked_at_in_turn_and_no_more_are_kept_than_there_is_room_for():
-    floor = LeftFloor()
+    cells = PassedCells()
     for col in range(MOST_PASSED + 5):
-        floor.note_passed((0, col))
-    seen = [floor.next(500)[0][1] for _ in range(5)]
+        cells.note((0, col))
+    seen = [cells.next(500)[0][1] for _ in range(5)]
     assert seen == [5, 505, 1005, 1505, 5]
 
 
@@ -71,26 +45,37 @@ def around(cell):
     return inside
 
 
-@pytest.mark.parametrize("is_again", [False, True], ids=["once", "each-time"])
-def test_floor_left_in_a_passed_cell_is_swept_and_one_that_stays_unswept_holds_nobody_up(is_again):
+def begun():
+    """A robot, r1, that has passed cells of a room beside another one; and one of those."""
     robot = Robot(Mission(replace(CONFIG, robot="r1")))
     robot.mission.shared.begin(1)
     robot.tell(MapReceived(room(4.5, 3.5)))
     robot.tell(replace(divided_by("r2", 0), parts=(), by=""))
     robot.drive(40, is_checked=False)
-    (cell, *_) = (
-        cell
-        for cell in robot.mission.covered.left_floor.next(100)
-        if robot.mission.ledger.has_visited(cell)
-    )
-    robot.mission.floor.forget(around(cell))
+    passed = robot.mission.covered.passed.next(100)
+    return robot, next(cell for cell in passed if robot.mission.ledger.has_visited(cell))
+
+
+def test_floor_of_a_passed_cell_stays_this_robots_where_the_cell_becomes_anothers():
+    unswept_m2 = []
+    for is_left in (False, True):
+        robot, cell = begun()
+        if is_left:
+            robot.mission.floor.forget(around(cell))
+        for number in range(1, 9):
+            robot.tell(replace(divided_by("r2", number), x=0.3 + 0.2 * (number % 2)))
+            robot.drive(is_checked=False)
+        assert robot.mission.fleet.part_cells() == 0
+        to_sweep = robot.mission.floor_to_sweep()
+        unswept_m2.append(to_sweep.ahead_m2 + to_sweep.left_m2)
+    assert unswept_m2[1] - unswept_m2[0] > 0.5 * CELL_M**2
+
+
+def test_floor_that_stays_unswept_in_a_passed_cell_holds_nobody_up():
+    robot, cell = begun()
     for _ in range(2000):
         if robot.mission.state is State.DONE:
             break
         robot.drive(is_checked=False)
-        if is_again:
-            robot.mission.floor.forget(around(cell))
+        robot.mission.floor.forget(around(cell))
     assert robot.mission.state is State.DONE
-    row, col = (round((number + 0.5) * CELL_M / PIXEL_M) for number in cell)
-    swept = robot.mission.floor.swept_in(Window(row - 3, col - 3, row + 3, col + 3))
-    assert is_again or swept.all()

@@ -142,9 +142,6 @@ class Executive:
             return None
         # Others may have swept meanwhile what this robot waits to drive to.
         is_vain = bool(way.waits_for) and not self.orders.cells.left()
-        if is_vain:
-            # Floor that is left in passed cells is not waited for.
-            self.ledger.left_floor.give_up(self.ledger.left_floor.left)
         update = way.look(self._now, has_work=order.is_open and not is_vain)
         if not way.waits_for:
             return None

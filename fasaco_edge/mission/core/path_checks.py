@@ -64,8 +64,7 @@ class PathChecks:
         if not is_due or self._has_plan_due or len(route.path.ahead) <= 1:
             return
         self._worth_at = now
-        is_worth = self._ledger.left_floor.left or self._line.is_worth_driving
-        if not is_worth and not self._orders.cells.has_work:
+        if not self._line.is_worth_driving and not self._orders.cells.left_to_me():
             route.want("others have swept what lay ahead")
 
     @property

@@ -41,7 +41,7 @@ from fasaco_edge.mission.coverage.ledger import (
     CoverageLedger,
     LedgerSnapshot,
 )
-from fasaco_edge.mission.coverage.left_floor import LeftFloor
+from fasaco_edge.mission.coverage.passed_cells import PassedCells
 from fasaco_edge.mission.coverage.swept_floor import (
     DROPPED_FLOOR_TILES,
     MOST_FLOOR_TILES,
@@ -164,7 +164,7 @@ class MissionLedger:
     Attributes:
         first_plan_reason: reason of the first plan.
         shared: cells swept by other robots.
-        left_floor: cells that this robot has passed with floor unswept.
+        passed: cells that this robot has passed while floor in them is unswept.
     """
 
     def __init__(self, cell_m: float, tool_m: float, ahead_m: float = 0.0) -> None:
@@ -179,7 +179,7 @@ class MissionLedger:
         self._covered = self._nothing("")
         self.first_plan_reason = "first plan"
         self.shared = SharedProgress()
-        self.left_floor = LeftFloor()
+        self.passed = PassedCells()
         # The ledger from before a restart while no map has confirmed it, and what was covered
         # since, which is true in any building.
         self._resumed: tuple[LedgerSnapshot, _Covered] | None = None
@@ -271,7 +271,7 @@ class MissionLedger:
         motion, self._pose_before_motion = self.map_motion(pose), None
         if motion is None or motion.is_still:
             return 0
-        self.left_floor.clear()
+        self.passed.clear()
         before = self.snapshot()
         cells, floor = uncertain_cells(before, motion), certain_floor(before.floor, motion)
         for covered in self._all:
@@ -295,7 +295,7 @@ class MissionLedger:
             around = Window(row0, col0, int(rows.max()) + 1, int(cols.max()) + 1)
             return inside(around, self._cell_m)[rows - row0, cols - col0]
 
-        self.left_floor.clear()
+        self.passed.clear()
         for covered in self._all:
             covered.cells.forget(cells_inside)
             covered.floor.forget(lambda window: inside(window, PIXEL_M))
@@ -344,7 +344,7 @@ class MissionLedger:
 
     def _replace(self, covered: _Covered) -> None:
         self._covered, self._resumed, self._pose_before_motion = covered, None, None
-        self.left_floor.clear()
+        self.passed.clear()
         self.shared.note_forgotten()
 
     def _begun_anew(self, why: str) -> LedgerMismatchError:

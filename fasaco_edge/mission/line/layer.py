@@ -30,8 +30,9 @@ from fasaco_edge.mission.orders.sequencer import Sequencer
 
 # A cell with less unswept floor than this is not driven to [m2].
 LEAST_LEFT_M2 = 0.04
-# A robot of a fleet goes back to a passed cell if the price of the floor left in it, and in a rim
-# around it, is so high [s], [m]; cells looked at each time that it passes one.
+# A passed cell is kept while the price of the floor left in it, and in a rim around it, is so high
+# [s], [m]; cells looked at each time that the robot passes one. It is not gone back to: at the end
+# of a mission that took four robots a tenth more time, for 0.4 % of the floor.
 WORTH_S, RIM_M, LOOKED_AT = 4.0, 0.1, 24
 
 
@@ -117,8 +118,8 @@ class LineLayer:
         path = self._route.held
         passed = path.cells[before : path.index]
         self._credit(passed)
-        if self._orders.cells.keeps_left_floor:
-            self._note_left(passed)
+        if self._orders.cells.keeps_passed:
+            self._note_passed(passed)
         is_on_it = ahead.is_followed and len(path.cells) > 0
         row, col = path.cells[path.index].tolist() if is_on_it else (0, 0)
         self._map.follow_path((row, col) if is_on_it else None)
@@ -227,19 +228,16 @@ class LineLayer:
             if counts and ahead.tally.missed_m2(floor.box_of(cell)) < LEAST_LEFT_M2:
                 self._ledger.credit(cell)
 
-    def _note_left(self, passed: NDArray[np.int32]) -> None:
-        """Note which of the passed cells have floor left."""
-        ahead, floor, left_floor = self._ahead, self._map.floor, self._ledger.left_floor
+    def _note_passed(self, passed: NDArray[np.int32]) -> None:
+        """Note the passed cells, and drop those whose floor is swept."""
+        ahead, floor, kept = self._ahead, self._map.floor, self._ledger.passed
         assert ahead is not None
         assert floor is not None
         for row, col in passed.tolist():
-            left_floor.note_passed((row, col))
-        for cell in left_floor.next(LOOKED_AT) if len(passed) else ():
-            around = floor.box_of(cell, RIM_M)
-            if ahead.tally.open_in_m2(around) < self._worth_m2:
-                left_floor.drop(cell)
-            else:
-                left_floor.note_left(cell, is_left=ahead.tally.missed_m2(around) >= self._worth_m2)
+            kept.note((row, col))
+        for cell in kept.next(LOOKED_AT) if len(passed) else ():
+            if ahead.tally.open_in_m2(floor.box_of(cell, RIM_M)) < self._worth_m2:
+                kept.drop(cell)
 
     def _explain(self) -> None:
         """Update the causes of unreachable floor where they may have changed."""

@@ -57,12 +57,6 @@ class CellsLeft:
     def open_to_me(self, area: ReachableArea) -> NDArray[np.bool_]:
         """Return the cells that still need a visit by this robot: its part, in a fleet."""
         window = area.lattice.window
-        cells = self._unvisited_by_me(area, window)
-        if self.keeps_left_floor:
-            cells |= self._ledger.left_floor.left_in(window) & self.asked_for(window)
-        return cells
-
-    def _unvisited_by_me(self, area: ReachableArea, window: Window) -> NDArray[np.bool_]:
         cells = self._fleet.mine(self.unswept(window), area).copy()
         self._exploration().mark(cells, window)
         return cells
@@ -91,26 +85,17 @@ class CellsLeft:
         return inside & ~shared.swept(window) if shared.version else inside
 
     @property
-    def keeps_left_floor(self) -> bool:
-        """Whether this robot goes back to floor that it has left: nobody else in a fleet would."""
+    def keeps_passed(self) -> bool:
+        """Whether floor of cells that this robot has passed stays its own, whose part they are."""
         return bool(self._fleet.members)
-
-    @property
-    def has_work(self) -> bool:
-        """Whether there are cells for this robot to visit, other than to go back to."""
-        area = self._map.area
-        if area is None:
-            return False
-        window = area.lattice.window
-        return bool((self._unvisited_by_me(area, window) & area.reachable).any())
 
     def asked_of_me(self, area: ReachableArea) -> NDArray[np.bool_]:
         """Return on which cells of an area this robot has to sweep the floor, covered or not."""
         window = area.lattice.window
         asked = self.asked_for(window)
         mine = self._fleet.mine_to_sweep(asked, self.unswept(window), area)
-        if self.keeps_left_floor:
-            mine = mine | (self._ledger.left_floor.passed_in(window) & asked)
+        if self.keeps_passed:
+            mine = mine | (self._ledger.passed.inside(window) & asked)
         return mine
 
     def left(self) -> int:
@@ -121,6 +106,6 @@ class CellsLeft:
         return int(np.count_nonzero(self.open_cells(area.lattice.window) & area.reachable))
 
     def left_to_me(self) -> int:
-        """Return the number of those that this robot has to visit, or to go back to."""
+        """Return the number of those that this robot has to visit."""
         area = self._map.area
         return 0 if area is None else int(np.count_nonzero(self.open_to_me(area) & area.reachable))

@@ -192,7 +192,6 @@ class Sequencer:
 
     def note_path_end(self) -> bool:
         """Note the end of a path; return whether the cells it left over must wait for a retry."""
-        self._ledger.left_floor.note_path_end()
         run, cells = self._run, self.cells.left_to_me()
         if cells > 0:
             self._unreached.note_failure()
