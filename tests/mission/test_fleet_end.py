@@ -191,3 +191,25 @@ def test_a_robot_waits_a_moment_for_the_map_that_shows_its_part(late_s):
         ours.tell(heard_from_the_east(other, second + 1, True), after=0.0)
         ours.tick()
     assert max(col for _, col in ours.driven) > 11
+
+
+def between(first, second):
+    """Let two robots tell each other for a minute; return how many divisions they counted."""
+    for _ in range(60):
+        for robot in (first, second):
+            robot.tick()
+        reports = first.report(), second.report()
+        first.tell(reports[1], after=0.0)
+        second.tell(reports[0], after=0.0)
+    return max(robot.mission.fleet.numbers.number for robot in (first, second))
+
+
+def test_robots_of_which_one_sees_no_way_to_the_other_share_by_one_division():
+    # Each left the other out that it saw no way to, and was left out in turn: every other second
+    # all cells changed hands.
+    hall = HALL * 2
+    wall = [row[:10] + "#" + row[11:] for row in hall]
+    first, second = FleetRobot("r1", (0, 0), wall), FleetRobot("r2", (6, 20), hall)
+    assert between(first, second) < 5
+    assert {part.robot for part in first.mission.fleet.parts} == {"r1", "r2"}
+    assert len(first.mission.fleet.parts) == 2

@@ -84,6 +84,16 @@ class Division:
         told = zip(self.robots, self.seeds, self.handicaps_s, strict=True)
         return tuple(Part(robot.name, seed, s, robot.step_s) for robot, seed, s in told)
 
+    def joined_by(self, away: Sequence[Robot]) -> Division:
+        """Return the division with robots out of reach here: a seed where each is, no handicap.
+
+        So each has what it alone can reach, on its own map.
+        """
+        whole = [*zip(self.robots, self.seeds, self.handicaps_s, strict=True)]
+        whole += [(robot, robot.cell, 0.0) for robot in away]
+        robots, seeds, handicaps_s = zip(*sorted(whole, key=lambda one: one[0].name), strict=True)
+        return Division(robots, seeds, handicaps_s)
+
     def busiest(self, owners: NDArray[np.int8], robot: str) -> str:
         """Return which robot but ``robot`` owns most of some cells; "" where none owns any.
 

@@ -182,8 +182,10 @@ class FleetLayer:
             if not (why := self._why_anew(joint, left, robots, now, at_once=at_once)):
                 return self._why_by_taken()
             self.numbers.count_on()
-            several = len(robots) > 1
-            self._division = divide(joint.lattice, left, robots, before) if several else None
+            away = self._out_of_reach(joint, robots, now)
+            is_alone = len(robots) + len(away) == 1
+            division = None if is_alone else divide(joint.lattice, left, robots, before)
+            self._division = division and division.joined_by(away)
         self._divided_at, self._owners = now, (None, self._owners[1])
         self._taken = self._count_taken()
         after = left if self._division is None else left & self._of_me(self._division, joint)
@@ -211,6 +213,20 @@ class FleetLayer:
                 robots.append(Robot(name, place, member.newest.step_s))
         return robots
 
+    def _out_of_reach(self, area: ReachableArea, robots: list[Robot], now: float) -> list[Robot]:
+        """Return the robots at work, of the last division, to which its map shows no way.
+
+        Left out, they would divide again themselves, and leave out those that they do not see.
+        """
+        reached = {robot.name for robot in robots}
+        found = []
+        for name in () if self._division is None else self._division.names:
+            member = self.members.get(name)
+            if name not in reached and member is not None and not member.absence(now):
+                cell = area.lattice.cell_at(member.newest.x, member.newest.y)
+                found.append(Robot(name, cell, member.newest.step_s))
+        return found
+
     def _why_anew(
         self,
         area: ReachableArea,
@@ -236,7 +252,7 @@ class FleetLayer:
         new = names - known - {self._robot}
         if more := sorted(name for name in new if now - self.members[name].left_at >= EVEN_S):
             return f"shared with {', '.join(more)}"
-        return "" if division is None else self._why_by_parts(division, area, left, now)
+        return "" if division is None else self._why_by_parts(division, area, left, names, now)
 
     def _is_gone(self, name: str, now: float) -> bool:
         """Tell whether a robot of the division takes no part any more."""
@@ -246,9 +262,14 @@ class FleetLayer:
         return bool(member.absence(now))
 
     def _why_by_parts(
-        self, division: Division, area: ReachableArea, left: NDArray[np.bool_], now: float
+        self,
+        division: Division,
+        area: ReachableArea,
+        left: NDArray[np.bool_],
+        names: set[str],
+        now: float,
     ) -> str:
-        """Return why the parts should change, or ""."""
+        """Return why the parts should change, or "", for robots of some names at work."""
         owners = self._owners_on(division, area)
         cells = np.bincount(owners[left], minlength=len(division.robots))
         if not cells[division.names.index(self._robot)]:
@@ -256,6 +277,10 @@ class FleetLayer:
             is_other = self._remainder.had_part or cells.sum() > self._remainder.divided
             is_other |= now - self._divided_at >= EVEN_S
             return "own part is done" if left.any() and is_other else ""
+        # Without a robot that its map shows no way to it would take the part of a robot at work,
+        # which would divide again in turn.
+        if not names.issuperset(division.names):
+            return ""
         steps_s = np.array([robot.step_s for robot in division.robots])
         even_s = UNEVEN * cells.sum() / (1.0 / steps_s).sum() + UNEVEN_S
         is_uneven = (cells * steps_s).max() > even_s and now - self._divided_at >= EVEN_S
