@@ -17,6 +17,7 @@ from fasaco_edge.grid.geometry import GridGeometry, Pose2D, Window
 from fasaco_edge.grid.lattice import CoverageLattice, Footprint, pixels_of, placement_on
 from fasaco_edge.grid.occupancy import OCCUPIED, OccupancyGrid
 from fasaco_edge.kernels.code_files import note_all_compiled
+from fasaco_edge.kernels.fleet.nearest import walk_parts
 from fasaco_edge.kernels.floor.capsule import is_clear
 from fasaco_edge.kernels.floor.certain import TILE, FloorTiles, Whereabouts, certain_floor
 from fasaco_edge.kernels.floor.driven import note_driven, set_causes, set_open
@@ -148,6 +149,9 @@ def _take_shares(room: _TinyRoom) -> None:
     fleet = Fleet([(0, 0), (3, 3)], room.costly.cost)
     # Until pairs have shared anew in either way.
     divide(room.lattice, fleet, lambda progress: progress.work.perturbations > PIECES + 8)
+    steps, cols = room.lattice.steps.ravel().copy(), room.lattice.steps.shape[1]
+    offsets, cells = np.array([1, cols, -1, -cols], np.int64), np.arange(2, dtype=np.int64)
+    walk_parts(steps, offsets, cells, cells, cells)
 
 
 def _take_repair(room: _TinyRoom) -> None:

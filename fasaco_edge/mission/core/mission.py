@@ -87,7 +87,7 @@ class Mission:
         monitor = InputMonitor(config)
         self.fleet = FleetLayer(
             config.robot,
-            config.cost.step_s,
+            config.cost,
             config.footprint.cell_m,
             self._map,
             self._ledger,

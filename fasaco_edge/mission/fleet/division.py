@@ -2,9 +2,9 @@
 
 A cell belongs to the robot whose seed has the shortest travel time to it, plus the robot's
 handicap. So each part is connected, and cells that a map shows later have an owner, too. Handicaps
-balance the workload of the parts. Seeds start at the robots, or far from one another, whichever
-finishes earlier; then they move to the centres of the parts (Lloyd's algorithm, with travel times
-as distances).
+balance the workload of the parts. Seeds start at the robots, or far from one another; then they
+move to the centres of the parts (Lloyd's algorithm, with travel times as distances). Of all these
+divisions the one is taken whose last robot ends first, if each walks from cell to nearest cell.
 """
 
 from __future__ import annotations
@@ -16,24 +16,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.grid.lattice import Cell, CoverageLattice
-from fasaco_edge.kernels.fleet.split import FAR, ways_from
+from fasaco_edge.kernels.fleet.nearest import walk_parts
 from fasaco_edge.mission.core.events import Part
+from fasaco_edge.mission.fleet.travel import Seconds, Travel, cell_of, on_ground, times_of, ways
 
 # With more cells every second, third ... is used; on larger lattices there are fewer rounds.
 MOST_CELLS, MOST_SEARCHED = 2_000, 3_000_000
 # Rounds of moving the seeds; updates of the handicaps, and the factor between successive ones.
 ROUNDS, CHANGES, DAMPING = 3, 30, 0.85
-# A seed on a cell that is not coverable counts as on the nearest one within this distance [cells].
-SNAP = 2
-# Seeds are kept unless others end before this share of their time. The time of all cells that go to
-# another robot, over the number of robots, counts as so much time of the last robot.
+# How often handicaps are sought for the same seeds: for equal numbers of cells first, then for the
+# times that a cell took each robot.
+EVENED = 3
+# Seeds are kept unless others end before this share of their time. The share of cells that go to
+# another robot, of the mean time, counts as so much time of the last robot.
 STABLE, CHANGED = 0.9, 1.0
-
-# Travel time to a cell that cannot be reached [s].
-UNREACHED_S = np.float32(1e9)
-
-Seconds = NDArray[np.float32]
-Steps = NDArray[np.float32]
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,7 +107,7 @@ class Division:
         owners = np.zeros(lattice.steps.size, np.int8)
         # One robot at a time: large lattices would take much memory for many robots.
         for index, (robot, seed) in enumerate(zip(self.robots, self.seeds, strict=True)):
-            times_s = _times_s(_ways(lattice, seed), np.float32(robot.step_s))
+            times_s = times_of(ways(lattice, seed), np.float32(robot.step_s))
             times_s += np.float32(self.handicaps_s[index])
             is_earlier = times_s < first
             owners[is_earlier] = index
@@ -124,6 +120,7 @@ def divide(
     wanted: NDArray[np.bool_],
     robots: Sequence[Robot],
     before: Division | None = None,
+    turn_steps: float = 0.0,
 ) -> Division:
     """Divide cells among robots; independent of the order in which these are given.
 
@@ -133,19 +130,18 @@ def divide(
         robots: at least one.
         before: the last division; its seeds are kept unless others end much earlier, and where
             nothing is gained, cells keep their robot.
+        turn_steps: time of a quarter turn, in steps.
     """
     robots = sorted(robots, key=lambda robot: robot.name)
     starts, steps_s = [robot.cell for robot in robots], [robot.step_s for robot in robots]
     cells = np.flatnonzero(wanted)
-    cells = cells[:: -(-len(cells) // MOST_CELLS) or 1]
+    every = -(-len(cells) // MOST_CELLS) or 1
+    cells = cells[::every]
     if len(robots) == 1 or not len(cells):
         return Division(tuple(robots), tuple(starts), (0.0,) * len(robots))
-    travel = _Travel(lattice, cells)
+    travel = Travel(lattice, cells, every)
     from_starts_s = travel.times_s(starts, steps_s)
-    scale = np.count_nonzero(wanted) / len(cells)
-    choice = _Choice(
-        from_starts_s, scale * np.array(steps_s), _owners_before(before, robots, travel)
-    )
+    choice = _Choice(travel, robots, _owners_before(before, robots, travel), turn_steps)
     names = [robot.name for robot in robots]
     if before is not None and set(before.names) & set(names):
         kept = dict(
@@ -165,8 +161,11 @@ def divide(
     for begin in (starts, _spread(travel, from_starts_s)):
         seeds = begin
         for _ in range(rounds):
-            times_s = travel.times_s(seeds, steps_s)
-            owner = choice.offer(seeds, _handicaps_s(times_s, np.array(steps_s)), times_s)
+            times_s, cells_s = travel.times_s(seeds, steps_s), np.array(steps_s)
+            for _ in range(EVENED):
+                handicaps_s = _handicaps_s(times_s, cells_s)
+                owner, ends_s = choice.offer(seeds, handicaps_s, times_s)
+                cells_s = _cells_s(owner, ends_s)
             seeds = _middles(lattice, cells, owner, seeds)
     return Division(tuple(robots), tuple(choice.seeds), tuple(choice.handicaps_s.tolist()))
 
@@ -179,34 +178,61 @@ class _Choice:
     """
 
     def __init__(
-        self, from_starts_s: Seconds, cell_s: NDArray[np.float64], before: NDArray[np.int64]
+        self, travel: Travel, robots: Sequence[Robot], before: NDArray[np.int64], turn_steps: float
     ) -> None:
         self.seeds: list[Cell] = []
         self.handicaps_s = np.zeros(0, np.float32)
-        self._from_starts_s, self._cell_s, self._before = from_starts_s, cell_s, before
+        self._travel, self._before, self._turn_steps = travel, before, turn_steps
+        self._steps_s = np.array([robot.step_s for robot in robots])
+        lattice, cols = travel.lattice, travel.lattice.steps.shape[1]
+        starts = [on_ground(lattice, *lattice.local(robot.cell)) for robot in robots]
+        self._starts = np.array([row * cols + col for row, col in starts], np.int64)
+        # Writable, as for other arrays kernels would be compiled again.
+        self._steps = lattice.steps.ravel().copy()
+        self._offsets = np.array([1, cols, -1, -cols], np.int64)
         self._cost_s = np.inf
 
     def offer(
         self, seeds: list[Cell], handicaps_s: Seconds, times_s: Seconds, factor: float = 1.0
-    ) -> NDArray[np.int64]:
-        """Take a division if it costs less; return the owner of each cell.
+    ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+        """Take a division if it costs less.
 
         Args:
             seeds, handicaps_s: the division.
             times_s: travel times from its seeds, float32 (k, n) [s].
             factor: on the time of its last robot.
+
+        Returns:
+            the owner of each cell, int64 (n,), and when each robot ends, float64 (k,) [s].
         """
         owner: NDArray[np.int64] = (times_s + handicaps_s[:, None]).argmin(axis=0)
-        changed = owner[(self._before >= 0) & (owner != self._before)]
-        changed_s = float(self._cell_s[changed].sum()) / len(seeds)
-        cost_s = factor * _end_s(self._from_starts_s, owner, self._cell_s) + CHANGED * changed_s
+        ends_s = self._ends_s(owner)
+        changed = np.count_nonzero((self._before >= 0) & (owner != self._before))
+        changed_s = changed / len(owner) * float(ends_s.mean())
+        cost_s = factor * float(ends_s.max()) + CHANGED * changed_s
         if cost_s < self._cost_s:
             self.seeds, self.handicaps_s, self._cost_s = seeds, handicaps_s, cost_s
-        return owner
+        return owner, ends_s
+
+    def _ends_s(self, owner: NDArray[np.int64]) -> NDArray[np.float64]:
+        """Return when each robot ends, float64 (k,) [s], if it walks from cell to nearest cell."""
+        walks = walk_parts(self._steps, self._offsets, self._travel.cells, owner, self._starts)
+        # Where every second, third ... cell is looked at, the others take a step each.
+        between = (self._travel.every - 1) * np.bincount(owner, minlength=len(walks))
+        steps = walks[:, 0] + between + self._turn_steps * walks[:, 1]
+        ends_s: NDArray[np.float64] = steps * self._steps_s
+        return ends_s
+
+
+def _cells_s(owner: NDArray[np.int64], ends_s: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return how long a cell takes each robot, float64 (k,) [s]; one without any as on average."""
+    count = np.bincount(owner, minlength=len(ends_s))
+    mean_s = ends_s.sum() / len(owner)
+    return np.where(count > 0, ends_s / np.maximum(count, 1), mean_s)
 
 
 def _owners_before(
-    before: Division | None, robots: Sequence[Robot], travel: _Travel
+    before: Division | None, robots: Sequence[Robot], travel: Travel
 ) -> NDArray[np.int64]:
     """Return the index of the robot that had each cell, int64 (n,); -1 for one that is gone."""
     if before is None:
@@ -215,62 +241,6 @@ def _owners_before(
     numbers = np.array([index.get(name, -1) for name in before.names])
     owners: NDArray[np.int64] = numbers[before.owners(travel.lattice).reshape(-1)[travel.cells]]
     return owners
-
-
-def _ways(lattice: CoverageLattice, start: Cell) -> Steps:
-    """Return the steps from a cell, float32 (rows * cols,); FAR where unreachable."""
-    if not lattice.contains(start):
-        return np.full(lattice.steps.size, np.float32(FAR))
-    row, col = _on_ground(lattice, *lattice.local(start))
-    return ways_from(lattice.steps, row * lattice.steps.shape[1] + col).astype(np.float32)
-
-
-def _times_s(ways: Steps, steps_s: NDArray[np.float32] | np.float32) -> Seconds:
-    """Return the times of ways [s], float32 (k, n); UNREACHED_S where unreachable, at any pace."""
-    return np.where(ways < FAR, ways * steps_s, UNREACHED_S)
-
-
-def _on_ground(lattice: CoverageLattice, row: int, col: int) -> Cell:
-    """Return the coverable cell nearest to one, within SNAP cells; the cell itself for none.
-
-    Seeds that others tell may lie on cells that this robot's map shows otherwise.
-    """
-    if lattice.coverable[row, col]:
-        return row, col
-    top, left = max(row - SNAP, 0), max(col - SNAP, 0)
-    near = lattice.coverable[top : row + SNAP + 1, left : col + SNAP + 1]
-    cells = np.argwhere(near) + np.array((top, left))
-    if not len(cells):
-        return row, col
-    best = cells[((cells - (row, col)) ** 2).sum(axis=1).argmin()]
-    return int(best[0]), int(best[1])
-
-
-class _Travel:
-    """Travel times to some cells of a lattice; a cell that was asked for is not searched again.
-
-    Attributes:
-        lattice: the lattice.
-        cells: int64 (n,), flat.
-    """
-
-    def __init__(self, lattice: CoverageLattice, cells: NDArray[np.int64]) -> None:
-        self.lattice, self.cells = lattice, cells
-        self._known: dict[Cell, Steps] = {}
-
-    def times_s(self, starts: Sequence[Cell], steps_s: Sequence[float]) -> Seconds:
-        """Return travel times from starts [s], float32 (k, n); huge where unreachable."""
-        ways = np.array([self._ways_from(start) for start in starts])
-        return _times_s(ways, np.array(steps_s, np.float32)[:, None])
-
-    def has_ways_from(self, start: Cell) -> bool:
-        """Tell whether any of the cells can be reached from a start."""
-        return bool((self._ways_from(start) < FAR).any())
-
-    def _ways_from(self, start: Cell) -> Steps:
-        if start not in self._known:
-            self._known[start] = _ways(self.lattice, start)[self.cells]
-        return self._known[start]
 
 
 def _handicaps_s(
@@ -293,24 +263,14 @@ def _handicaps_s(
     return best
 
 
-def _end_s(from_starts_s: Seconds, owner: NDArray[np.int64], cell_s: NDArray[np.float64]) -> float:
-    """Return when the last robot finishes, given its time per cell, float64 (k,) [s]."""
-    ends_s = [0.0]
-    for robot, time_s in enumerate(from_starts_s):
-        own = owner == robot
-        if own.any():
-            ends_s.append(float(time_s[own].min() + np.count_nonzero(own) * cell_s[robot]))
-    return max(ends_s)
-
-
-def _spread(travel: _Travel, from_starts_s: Seconds) -> list[Cell]:
+def _spread(travel: Travel, from_starts_s: Seconds) -> list[Cell]:
     """Return seeds far from one another, each assigned to a robot near it."""
     count, nearest_s = len(from_starts_s), from_starts_s.min(axis=0)
     places: list[Cell] = []
     seeds: list[int] = []
     for _ in range(count):
         seeds.append(int(nearest_s.argmax()))
-        places.append(_cell(travel.lattice, int(travel.cells[seeds[-1]])))
+        places.append(cell_of(travel.lattice, int(travel.cells[seeds[-1]])))
         (times_s,) = travel.times_s(places[-1:], [1.0])
         nearest_s = np.minimum(nearest_s, times_s) if len(seeds) > 1 else times_s
     apart_s, order = from_starts_s[:, seeds].copy(), [0] * count
@@ -333,10 +293,5 @@ def _middles(
             found.append(seed)
             continue
         off = (rows[own] - rows[own].mean()) ** 2 + (cols[own] - cols[own].mean()) ** 2
-        found.append(_cell(lattice, int(cells[own[off.argmin()]])))
+        found.append(cell_of(lattice, int(cells[own[off.argmin()]])))
     return found
-
-
-def _cell(lattice: CoverageLattice, flat: int) -> Cell:
-    row, col = divmod(flat, lattice.steps.shape[1])
-    return row + lattice.window.row0, col + lattice.window.col0

@@ -24,6 +24,7 @@ from fasaco_edge.mission.fleet.members import GONE_S, Member, Members
 from fasaco_edge.mission.fleet.remainder import Remainder
 from fasaco_edge.mission.map.map_state import MapState
 from fasaco_edge.mission.map.reachable_area import ReachableArea, anchor_cell
+from fasaco_edge.planners.cost import CoverageCost
 
 # Period of checks; least life of a division while no robot leaves: in general, and for balance [s].
 LOOK_S, HOLDS_S, EVEN_S = 1.0, 2.0, 10.0
@@ -49,14 +50,15 @@ class FleetLayer:
     def __init__(
         self,
         robot: str,
-        step_s: float,
+        cost: CoverageCost,
         cell_m: float,
         map_state: MapState,
         ledger: MissionLedger,
     ) -> None:
         self.others = Members(robot, ledger, cell_m)
         self.numbers = DivisionNumbers(robot, self.others)
-        self._robot, self.step_s = robot, step_s
+        self._robot, self.step_s = robot, cost.step_s
+        self._turn_steps = cost.quarter_turn_s / cost.step_s
         self._map, self._ledger = map_state, ledger
         self._division: Division | None = None
         self._divided_at = self._looked_at = float("-inf")
@@ -184,8 +186,10 @@ class FleetLayer:
             self.numbers.count_on()
             away = self._out_of_reach(joint, robots, now)
             is_alone = len(robots) + len(away) == 1
-            division = None if is_alone else divide(joint.lattice, left, robots, before)
-            self._division = division and division.joined_by(away)
+            self._division = None
+            if not is_alone:
+                divided = divide(joint.lattice, left, robots, before, self._turn_steps)
+                self._division = divided.joined_by(away)
         self._divided_at, self._owners = now, (None, self._owners[1])
         self._taken = self._count_taken()
         after = left if self._division is None else left & self._of_me(self._division, joint)

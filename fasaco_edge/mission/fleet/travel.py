@@ -1,0 +1,82 @@
+"""Travel: ways and travel times over a lattice, from robots and seeds to cells."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fasaco_edge.grid.lattice import Cell, CoverageLattice
+from fasaco_edge.kernels.fleet.split import FAR, ways_from
+
+# A cell that is not coverable counts as on the nearest one within this distance [cells].
+SNAP = 2
+# Travel time to a cell that cannot be reached [s].
+UNREACHED_S = np.float32(1e9)
+
+Seconds = NDArray[np.float32]
+Steps = NDArray[np.float32]
+
+
+def ways(lattice: CoverageLattice, start: Cell) -> Steps:
+    """Return the steps from a cell, float32 (rows * cols,); FAR where unreachable."""
+    if not lattice.contains(start):
+        return np.full(lattice.steps.size, np.float32(FAR))
+    row, col = on_ground(lattice, *lattice.local(start))
+    return ways_from(lattice.steps, row * lattice.steps.shape[1] + col).astype(np.float32)
+
+
+def times_of(steps: Steps, steps_s: NDArray[np.float32] | np.float32) -> Seconds:
+    """Return the times of ways [s], float32 (k, n); UNREACHED_S where unreachable, at any pace."""
+    return np.where(steps < FAR, steps * steps_s, UNREACHED_S)
+
+
+def on_ground(lattice: CoverageLattice, row: int, col: int) -> Cell:
+    """Return the coverable cell nearest to one, within SNAP cells; the cell itself for none.
+
+    Seeds that others tell may lie on cells that this robot's map shows otherwise.
+    """
+    if lattice.coverable[row, col]:
+        return row, col
+    top, left = max(row - SNAP, 0), max(col - SNAP, 0)
+    near = lattice.coverable[top : row + SNAP + 1, left : col + SNAP + 1]
+    cells = np.argwhere(near) + np.array((top, left))
+    if not len(cells):
+        return row, col
+    best = cells[((cells - (row, col)) ** 2).sum(axis=1).argmin()]
+    return int(best[0]), int(best[1])
+
+
+class Travel:
+    """Travel times to some cells of a lattice; a cell that was asked for is not searched again.
+
+    Attributes:
+        lattice: the lattice.
+        cells: int64 (n,), flat.
+        every: they are every second, third ... of the cells, 1 for all.
+    """
+
+    def __init__(self, lattice: CoverageLattice, cells: NDArray[np.int64], every: int) -> None:
+        self.lattice, self.cells, self.every = lattice, cells, every
+        self._known: dict[Cell, Steps] = {}
+
+    def times_s(self, starts: Sequence[Cell], steps_s: Sequence[float]) -> Seconds:
+        """Return travel times from starts [s], float32 (k, n); huge where unreachable."""
+        found = np.array([self._ways_from(start) for start in starts])
+        return times_of(found, np.array(steps_s, np.float32)[:, None])
+
+    def has_ways_from(self, start: Cell) -> bool:
+        """Tell whether any of the cells can be reached from a start."""
+        return bool((self._ways_from(start) < FAR).any())
+
+    def _ways_from(self, start: Cell) -> Steps:
+        if start not in self._known:
+            self._known[start] = ways(self.lattice, start)[self.cells]
+        return self._known[start]
+
+
+def cell_of(lattice: CoverageLattice, flat: int) -> Cell:
+    """Return the cell of a flat index."""
+    row, col = divmod(flat, lattice.steps.shape[1])
+    return row + lattice.window.row0, col + lattice.window.col0
