@@ -212,3 +212,36 @@ def test_where_a_cell_takes_longer_a_part_has_fewer_cells():
     owners = divide(lattice, free, robots).owners(lattice)[free]
     first, second = np.bincount(owners).tolist()
     assert 1.15 * first < second
+
+
+def test_robots_that_stand_on_the_last_cells_each_have_their_own():
+    # A cell took them no time: one got all, and the handicaps were no numbers.
+    lattice = CoverageLattice.from_free(np.ones((5, 12), np.bool_))
+    wanted = np.zeros((5, 12), np.bool_)
+    wanted[2, 2], wanted[2, 9] = True, True
+    robots = [Robot("r1", (2, 2), 1.0), Robot("r2", (2, 9), 1.0)]
+    owners = divide(lattice, wanted, robots).owners(lattice)
+    assert (owners[2, 2], owners[2, 9]) == (0, 1)
+
+
+@pytest.mark.parametrize("step_s", [1.0, 1e-3, 1e3])
+@pytest.mark.parametrize("cell", [(8, 30), (-500, 10**6), (2**29, -(2**29))])
+def test_a_robot_out_of_reach_takes_nothing_from_those_that_divide(cell, step_s):
+    free = np.ones((9, 60), np.bool_)
+    free[6:] = False
+    lattice = CoverageLattice.from_free(free)
+    robots = [Robot("r1", (0, 0), 1.0), Robot("r2", cell, step_s), Robot("r3", (0, 59), 1.0)]
+    division = divide(lattice, free, robots)
+    assert division.names == ("r1", "r2", "r3")
+    first, away, third = np.bincount(division.owners(lattice)[free], minlength=3).tolist()
+    assert away == 0
+    assert min(first, third) > 150
+
+
+def test_a_robot_just_off_the_ground_gets_no_more_than_its_share():
+    free = np.ones((9, 60), np.bool_)
+    free[6:] = False
+    robots = [Robot(f"r{col}", (7 * (col == 30), col), 1.0) for col in (0, 30, 59)]
+    lattice = CoverageLattice.from_free(free)
+    counts = np.bincount(divide(lattice, free, robots).owners(lattice)[free], minlength=3)
+    assert counts.max() - counts.min() < 30

@@ -71,13 +71,15 @@ class GivingWay:
         if pose is None or self._map.lattice is None:
             return np.zeros((0, 2))
         count = int(AHEAD_M / self._cell_m) + 2
-        cells = self._cells()[1 : count + 1]
+        # A way to a refuge may begin with a cell beside the robot's own.
+        first = 1 if self._refuge is None else 0
+        cells = self._cells()[first : count + 1]
         here = np.array([[pose.pose.x, pose.pose.y]])
         return np.concatenate((here, self._map.lattice.centres(cells))) if len(cells) else here
 
     def _cells(self) -> NDArray[np.int32]:
         """Return the path ahead, also one that is set aside."""
-        if self._refuge is not None and len(self._route.path.ahead) > 1:
+        if self._refuge is not None and len(self._route.path.ahead):
             return self._route.path.ahead
         if not self._has_work:
             return NO_CELLS

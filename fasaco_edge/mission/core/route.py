@@ -265,6 +265,11 @@ class Route(PlanRequests):
         plan, seconds = (ready.path, ready.seconds) if ready else (None, 0.0)
         return PathUpdate(self.revision, cells, reason, plan, seconds, changed, end_yaw=end_yaw)
 
+    def publish_anew(self, reason: str, now: float) -> PathUpdate:
+        """Publish the rest of the path once more, with a line that is laid anew."""
+        ahead, end_yaw, beside = self.path.ahead, self._end_yaw, self.beside
+        return self.publish(ahead, reason, now, end_yaw=end_yaw, beside=beside)
+
     def publish_line(self, reason: str, now: float) -> PathUpdate:
         """Publish a new line along the same cells; a pending attempt still holds."""
         self.revision += 1

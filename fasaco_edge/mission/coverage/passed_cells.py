@@ -1,7 +1,8 @@
 """Passed cells: those that the robot has passed while floor in them is unswept.
 
-In a fleet such cells count as swept, and nobody drives to them. Their floor stays this robot's,
-whoever's part they lie in: its line sweeps it where it passes near again.
+In a fleet a cell counts as swept once a robot has swept its middle, and nobody drives there for the
+rest. That floor stays this robot's, whoever's part it lies in: its line sweeps it where it passes
+near again.
 """
 
 from __future__ import annotations

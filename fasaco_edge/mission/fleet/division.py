@@ -80,15 +80,10 @@ class Division:
         told = zip(self.robots, self.seeds, self.handicaps_s, strict=True)
         return tuple(Part(robot.name, seed, s, robot.step_s) for robot, seed, s in told)
 
-    def joined_by(self, away: Sequence[Robot]) -> Division:
-        """Return the division with robots out of reach here: a seed where each is, no handicap.
-
-        So each has what it alone can reach, on its own map.
-        """
-        whole = [*zip(self.robots, self.seeds, self.handicaps_s, strict=True)]
-        whole += [(robot, robot.cell, 0.0) for robot in away]
-        robots, seeds, handicaps_s = zip(*sorted(whole, key=lambda one: one[0].name), strict=True)
-        return Division(robots, seeds, handicaps_s)
+    def is_like(self, other: Division) -> bool:
+        """Tell whether it assigns all cells as another one, wherever the robots are now."""
+        mine, theirs = ((one.names, one.seeds, one.handicaps_s) for one in (self, other))
+        return mine == theirs
 
     def busiest(self, owners: NDArray[np.int8], robot: str) -> str:
         """Return which robot but ``robot`` owns most of some cells; "" where none owns any.
@@ -126,20 +121,32 @@ def divide(
 
     Args:
         lattice: the cells where robots fit.
-        wanted: bool (rows, cols), the cells to divide; all robots must be connected.
-        robots: at least one.
+        wanted: bool (rows, cols), the cells to divide.
+        robots: at least one. One without a way to any of the cells gets a seed where it is: it has
+            what it alone can reach, on its own map.
         before: the last division; its seeds are kept unless others end much earlier, and where
             nothing is gained, cells keep their robot.
         turn_steps: time of a quarter turn, in steps.
     """
-    robots = sorted(robots, key=lambda robot: robot.name)
-    starts, steps_s = [robot.cell for robot in robots], [robot.step_s for robot in robots]
     cells = np.flatnonzero(wanted)
     every = -(-len(cells) // MOST_CELLS) or 1
-    cells = cells[::every]
-    if len(robots) == 1 or not len(cells):
-        return Division(tuple(robots), tuple(starts), (0.0,) * len(robots))
-    travel = Travel(lattice, cells, every)
+    travel = Travel(lattice, cells[::every], every)
+    reached = [robot for robot in robots if travel.has_ways_from(robot.cell)]
+    divided = {robot.name: (robot, robot.cell, 0.0) for robot in robots}
+    if len(reached) > 1:
+        reached.sort(key=lambda robot: robot.name)
+        seeds, handicaps_s = _divided(travel, reached, before, turn_steps)
+        found = zip(reached, seeds, handicaps_s, strict=True)
+        divided |= {robot.name: (robot, seed, s) for robot, seed, s in found}
+    return Division(*zip(*(divided[name] for name in sorted(divided)), strict=True))
+
+
+def _divided(
+    travel: Travel, robots: Sequence[Robot], before: Division | None, turn_steps: float
+) -> tuple[list[Cell], list[float]]:
+    """Return seeds and handicaps [s] of robots that have ways to the cells, as ``divide`` does."""
+    lattice, cells = travel.lattice, travel.cells
+    starts, steps_s = [robot.cell for robot in robots], [robot.step_s for robot in robots]
     from_starts_s = travel.times_s(starts, steps_s)
     choice = _Choice(travel, robots, _owners_before(before, robots, travel), turn_steps)
     names = [robot.name for robot in robots]
@@ -162,12 +169,12 @@ def divide(
         seeds = begin
         for _ in range(rounds):
             times_s, cells_s = travel.times_s(seeds, steps_s), np.array(steps_s)
-            for _ in range(EVENED):
+            for _ in range(EVENED if rounds > 1 else 1):
                 handicaps_s = _handicaps_s(times_s, cells_s)
                 owner, ends_s = choice.offer(seeds, handicaps_s, times_s)
-                cells_s = _cells_s(owner, ends_s)
+                cells_s = _cells_s(owner, ends_s, np.array(steps_s))
             seeds = _middles(lattice, cells, owner, seeds)
-    return Division(tuple(robots), tuple(choice.seeds), tuple(choice.handicaps_s.tolist()))
+    return choice.seeds, choice.handicaps_s.tolist()
 
 
 class _Choice:
@@ -217,18 +224,26 @@ class _Choice:
     def _ends_s(self, owner: NDArray[np.int64]) -> NDArray[np.float64]:
         """Return when each robot ends, float64 (k,) [s], if it walks from cell to nearest cell."""
         walks = walk_parts(self._steps, self._offsets, self._travel.cells, owner, self._starts)
-        # Where every second, third ... cell is looked at, the others take a step each.
-        between = (self._travel.every - 1) * np.bincount(owner, minlength=len(walks))
-        steps = walks[:, 0] + between + self._turn_steps * walks[:, 1]
+        every = self._travel.every
+        if every == 1:
+            steps = walks[:, 0] + self._turn_steps * walks[:, 1]
+        else:
+            # Between cells that are looked at it turns elsewhere, and passes others that are not.
+            steps = np.maximum(walks[:, 0], every * np.bincount(owner, minlength=len(walks)))
         ends_s: NDArray[np.float64] = steps * self._steps_s
         return ends_s
 
 
-def _cells_s(owner: NDArray[np.int64], ends_s: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return how long a cell takes each robot, float64 (k,) [s]; one without any as on average."""
+def _cells_s(
+    owner: NDArray[np.int64], ends_s: NDArray[np.float64], steps_s: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return how long a cell takes each robot, float64 (k,) [s]; one without any as on average.
+
+    Not less than a step: one that stands on its only cell would have it for nothing.
+    """
     count = np.bincount(owner, minlength=len(ends_s))
     mean_s = ends_s.sum() / len(owner)
-    return np.where(count > 0, ends_s / np.maximum(count, 1), mean_s)
+    return np.maximum(np.where(count > 0, ends_s / np.maximum(count, 1), mean_s), steps_s)
 
 
 def _owners_before(

@@ -33,6 +33,8 @@ UNEVEN, UNEVEN_S = 1.25, 40.0
 # Number of cells of this robot's part swept by another one that triggers a new plan: more than by
 # merely passing through. In unknown buildings 4 cost 7 % of two robots' time.
 MANY_TAKEN = 30
+# Limit on the numbers of a seed's cell, as others are told.
+FARTHEST = 2**30
 LATER = "another robot has a newer division"
 
 OpenCells = Callable[[Window], NDArray[np.bool_]]
@@ -173,8 +175,9 @@ class FleetLayer:
         own = left if before is None else left & self._of_me(before, joint)
         at_work = [one.newest for one in self.members.values() if not one.absence(now)]
         self._remainder.note_others(now, wait=all(heard.waits_for for heard in at_work))
-        swept = int(np.count_nonzero(self._ledger.shared.swept(joint.lattice.window)))
-        self._remainder.note(int(left.sum()), int(own.sum()), swept, now)
+        swept = self._ledger.shared.swept(joint.lattice.window) & joint.reachable
+        swept_cells = int(np.count_nonzero(swept))
+        self._remainder.note(int(left.sum()), int(own.sum()), swept_cells, now)
         if newer := self.numbers.newer():
             why = LATER
             self.numbers.follow(newer)
@@ -183,17 +186,15 @@ class FleetLayer:
             robots = self._robots(joint, cell, now)
             if not (why := self._why_anew(joint, left, robots, now, at_once=at_once)):
                 return self._why_by_taken()
-            self.numbers.count_on()
-            away = self._out_of_reach(joint, robots, now)
-            is_alone = len(robots) + len(away) == 1
-            self._division = None
-            if not is_alone:
-                divided = divide(joint.lattice, left, robots, before, self._turn_steps)
-                self._division = divided.joined_by(away)
+            robots += self._out_of_reach(joint, robots, now)
+            divided = divide(joint.lattice, left, robots, before, self._turn_steps)
+            if before is None or not divided.is_like(before):
+                self.numbers.count_on()
+                self._division = divided if len(robots) > 1 else None
         self._divided_at, self._owners = now, (None, self._owners[1])
         self._taken = self._count_taken()
         after = left if self._division is None else left & self._of_me(self._division, joint)
-        self._remainder.note_division(int(left.sum()), int(after.sum()), swept, now)
+        self._remainder.note_division(int(left.sum()), int(after.sum()), swept_cells, now)
         return why if (own != after)[inside].any() else ""
 
     @property
@@ -226,9 +227,12 @@ class FleetLayer:
         found = []
         for name in () if self._division is None else self._division.names:
             member = self.members.get(name)
-            if name not in reached and member is not None and not member.absence(now):
-                cell = area.lattice.cell_at(member.newest.x, member.newest.y)
-                found.append(Robot(name, cell, member.newest.step_s))
+            if name in reached or member is None or member.absence(now):
+                continue
+            row, col = area.lattice.cell_at(member.newest.x, member.newest.y)
+            # Others could not be told of a seed farther off.
+            if max(abs(row), abs(col)) < FARTHEST:
+                found.append(Robot(name, (row, col), member.newest.step_s))
         return found
 
     def _why_anew(
@@ -273,7 +277,7 @@ class FleetLayer:
         names: set[str],
         now: float,
     ) -> str:
-        """Return why the parts should change, or "", for robots of some names at work."""
+        """Return why the parts should change, or ""; ``names``: the robots that it can reach."""
         owners = self._owners_on(division, area)
         cells = np.bincount(owners[left], minlength=len(division.robots))
         if not cells[division.names.index(self._robot)]:
@@ -281,8 +285,7 @@ class FleetLayer:
             is_other = self._remainder.had_part or cells.sum() > self._remainder.divided
             is_other |= now - self._divided_at >= EVEN_S
             return "own part is done" if left.any() and is_other else ""
-        # Without a robot that its map shows no way to it would take the part of a robot at work,
-        # which would divide again in turn.
+        # Only who can reach all of them sees all that is left to each.
         if not names.issuperset(division.names):
             return ""
         steps_s = np.array([robot.step_s for robot in division.robots])

@@ -32,7 +32,7 @@ from fasaco_edge.mission.orders.sequencer import Sequencer
 LEAST_LEFT_M2 = 0.04
 # A passed cell is kept while the price of the floor left in it, and in a rim around it, is so high
 # [s], [m]; cells looked at each time that the robot passes one. It is not gone back to: at the end
-# of a mission that took four robots a tenth more time, for 0.4 % of the floor.
+# of a mission that took four robots a tenth more time, for 0.1 % of the floor.
 WORTH_S, RIM_M, LOOKED_AT = 4.0, 0.1, 24
 
 
@@ -139,7 +139,7 @@ class LineLayer:
             self._lay(ahead, update.cells, stamped.pose, is_cut=self._route.is_cut)
         elif why := self._why_anew(ahead, is_further and touched is not None):
             self._lay(ahead, path.ahead, stamped.pose)
-            update = self._route.publish(path.ahead, why, now) if len(path.ahead) else None
+            update = self._route.publish_anew(why, now) if len(path.ahead) else None
         self._is_dropped = False
         if touched is not None and ahead.check(touched):
             reason = "line blocked"

@@ -86,7 +86,7 @@ class CellsLeft:
 
     @property
     def keeps_passed(self) -> bool:
-        """Whether floor of cells that this robot has passed stays its own, whose part they are."""
+        """Whether floor of cells that it has passed stays this robot's, whoever's part they are."""
         return bool(self._fleet.members)
 
     def asked_of_me(self, area: ReachableArea) -> NDArray[np.bool_]:
