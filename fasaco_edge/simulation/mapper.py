@@ -12,6 +12,10 @@ from fasaco_edge.grid.occupancy import UNKNOWN, OccupancyGrid
 from fasaco_edge.kernels.lattice.raycast import Scanner, cast_rays, disc_is_free, reveal_disc
 from fasaco_edge.simulation.robot import Point, SimulationConfig
 
+# Whether the hull has room on a straight way is looked at as often [m]: between two places a corner
+# may come less than a millimetre into it.
+SPACING_M = 0.025
+
 
 def rays_for(reach_px: float) -> int:
     """Return how many rays a scan needs so that it misses no pixel in sight.
@@ -66,13 +70,14 @@ class Mapper:
     def is_clear(self, start: Point, end: Point, margin_m: float = 0.0) -> bool:
         """Tell whether the hull can move straight between two points [m], by the own map.
 
-        Unknown is not clear. Checked every half pixel: what could slip through between
-        two discs is thinner than the padding, but enough to stop the robot. A margin [m] that
-        the hull is to keep from everything makes sure of that.
+        Unknown is not clear. Checked every half pixel, and every SPACING_M: what could slip through
+        between two discs is thinner than the padding, but enough to stop the robot. A margin [m]
+        that the hull is to keep from everything makes sure of that.
         """
         x0, y0 = self._truth.geometry.to_pixels(*start)
         x1, y1 = self._truth.geometry.to_pixels(*end)
-        steps = max(1, math.ceil(2.0 * math.hypot(x1 - x0, y1 - y0)))
+        spacing = min(0.5, SPACING_M / self._truth.geometry.resolution)
+        steps = max(1, math.ceil(math.hypot(x1 - x0, y1 - y0) / spacing))
         return all(
             disc_is_free(
                 self._known,

@@ -123,6 +123,20 @@ def test_a_way_is_clear_only_over_known_free_ground():
     assert not mapper.is_clear((2.0, 3.0), (6.0, 3.0))  # out of what is known
 
 
+def test_no_corner_slips_through_between_two_places_on_a_coarse_map():
+    # A robot joined its path so, beside a wall in pixels of 0.15 m, and stood for good.
+    cells = np.zeros((12, 12), np.int8)
+    cells[5, 5] = 100
+    truth = OccupancyGrid(GridGeometry(12, 12, 0.15, Pose2D(0.0, 0.0)), cells)
+    mapper = Mapper(truth, SimulationConfig(robot_radius_m=0.135, padding_m=0.01))
+    along, corner = np.array((1.0, -1.0)) / math.sqrt(2.0), np.array((0.75, 0.75))
+    for apart_m, is_clear in ((0.124, False), (0.126, True)):
+        nearest = corner - apart_m / math.sqrt(2.0)
+        begin, end = nearest - 0.0375 * along, nearest + 0.1125 * along
+        mapper.scan(Pose2D(*begin))
+        assert mapper.is_clear(tuple(begin), tuple(end)) == is_clear
+
+
 def test_the_rays_are_at_most_a_pixel_apart_at_their_ends():
     for reach in (0.3, 4.0, 70.0, 512.5):
         assert 2 * math.pi * reach / rays_for(reach) <= 1.0 + 1e-12
