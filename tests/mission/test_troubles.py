@@ -152,8 +152,9 @@ def test_a_pose_that_jumps_while_a_plan_is_made_gets_another():
 
 def test_a_map_that_stops_coming_is_told_and_the_mission_goes_on():
     drive = driving(*ROOM)
-    for _ in range(70):
-        drive.tell(pose_at(*drive.cell), after=1.0)
+    row, col = drive.cell
+    for tick in range(70):
+        drive.tell(pose_at(row, col + 0.45 * (tick % 2)), after=1.0)
     assert drive.mission.state is State.DEGRADED
     assert drive.mission.reason == "no map or update for 60 s: going on with the last one"
     drive.tell(patch(".", at=(0, 0)))
@@ -161,6 +162,33 @@ def test_a_map_that_stops_coming_is_told_and_the_mission_goes_on():
     drive.finish()
     drive.tell(pose_at(*drive.cell), after=100.0)
     assert drive.mission.state is State.DONE, "a mission that is done needs no map"
+
+
+def test_a_robot_that_does_not_drive_its_path_is_told_and_gets_it_again():
+    # A base may refuse a path for good: such a robot was covering, it said, for ever.
+    drive = driving(*ROOM, config=CONFIG)
+    got = [drive.tell(pose_at(*drive.cell), after=1.0).path for _ in range(65)]
+    again = [path for path in got if path is not None]
+    assert [path.reason for path in again] == ["robot stands"] * 2
+    assert drive.mission.state is State.DEGRADED
+    assert drive.mission.reason == "the robot stands: it got the same path 3 times"
+    drive.go()
+    assert drive.mission.state is State.COVERING
+    drive.finish()
+
+
+def test_a_robot_that_does_not_drive_home_is_told():
+    drive = driving(*ROOM, config=CONFIG)
+    drive.command("home")
+    for _ in range(65):
+        drive.tell(pose_at(*drive.cell), after=1.0)
+    assert (drive.mission.state, drive.mission.reason) == (
+        "degraded",
+        "the robot stands: it got the same path 3 times",
+    )
+    while drive.walk:
+        assert drive.go() is not None
+    assert drive.mission.state is not State.DEGRADED
 
 
 def test_none_of_this_is_looked_at_unless_asked_for():

@@ -77,6 +77,8 @@ class Executive:
             return State.DEGRADED, trouble + (self.map.why_other_frame() if lost else "")
         if self._state in DRIVING and (silence := self.charging.silence(self._now)):
             return State.DEGRADED, f"{silence}: when to charge is not known"
+        if self._state in DRIVING and (stuck := self._standing.why_stuck):
+            return State.DEGRADED, stuck
         return self._state, self._reason
 
     def decide(self, now: float) -> Decision:
@@ -126,6 +128,7 @@ class Executive:
         self._report_driving()
         if self._standing.is_on_path and update is None:
             update = route.publish(route.path.ahead, "robot stands", now)
+            self._standing.note_again()
         is_free = self._state is State.COVERING and route.pending is None and not route.wanted
         return Decision(path=update, plan=route.request_improvement(now) if is_free else None)
 
@@ -276,9 +279,10 @@ class Executive:
                 return self._rest(State.CHARGING, self.charging.why(self._now))
             return self._arrive()
         is_off = path.finished or path.is_far(cell) or bool(self.monitor.doubt)
-        is_lost = cell != goal and (
-            (is_off and self._standing.has_waited) or self._standing.is_on_path
-        )
+        stands = cell != goal and self._standing.is_on_path
+        if stands and not is_new:
+            self._standing.note_again()
+        is_lost = cell != goal and ((is_off and self._standing.has_waited) or stands)
         to = PLACES[errand]
         if is_new or is_lost or not len(path.cells) or tuple(path.cells[-1].tolist()) != goal:
             self.monitor.clear_doubt()

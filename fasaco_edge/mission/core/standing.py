@@ -16,6 +16,8 @@ PATIENCE_S = 1.0
 # driving out of a corner, which another path would end. By the robot's clock, as a simulation may
 # run at twenty times the real speed.
 STANDING_S, STANDING_M = 30.0, 0.1
+# So often a standing robot gets the path again before its mission is reported as degraded.
+TRIES = 2
 # A robot that stands beside its path gets a new one after this time: an obstacle may separate it
 # from the path.
 BESIDE_S = 2.0
@@ -33,10 +35,13 @@ class Standing:
         # clock, and by the robot's [ns].
         self._place = math.inf, math.inf
         self._since = 0.0, 0
+        # How often it has had the same path again in that place.
+        self._tries = 0
 
     def look(self, cell: Cell, now: float) -> None:
-        """Note the robot's cell."""
+        """Note the robot's cell, and its place."""
         self._now = now
+        self._note_place()
         if cell != self._cell:
             self._cell, self._entered_at = cell, now
 
@@ -72,17 +77,32 @@ class Standing:
         stood_s = self._in_place_s()
         return len(self._route.path.ahead) > 1 and stood_s >= STANDING_S
 
+    def note_again(self) -> None:
+        """Note that the robot gets the path that it stands on again."""
+        self._tries += 1
+
+    @property
+    def why_stuck(self) -> str:
+        """Why the robot is thought to be unable to drive its path; "" if it is not."""
+        tries = self._tries
+        return f"the robot stands: it got the same path {tries + 1} times" if tries >= TRIES else ""
+
+    def _note_place(self) -> None:
+        """Note the robot's place, and whether it has had another path since."""
+        assert self._map.pose is not None
+        stamped, published_at = self._map.pose, self._route.published_at
+        here = stamped.pose.x, stamped.pose.y
+        if math.dist(here, self._place) > STANDING_M:
+            self._place, self._since = here, (self._now, stamped.stamp_ns)
+            self._tries = 0
+        elif published_at > self._since[0]:
+            self._since = published_at, stamped.stamp_ns
+
     def _in_place_s(self) -> float:
         """Return how long the robot has stood in one place with its present path.
 
         By our clock or the robot's, whichever says longer: stamps may stand still.
         """
         assert self._map.pose is not None
-        stamped, published_at = self._map.pose, self._route.published_at
-        here = stamped.pose.x, stamped.pose.y
-        if math.dist(here, self._place) > STANDING_M:
-            self._place, self._since = here, (self._now, stamped.stamp_ns)
-        elif published_at > self._since[0]:
-            self._since = published_at, stamped.stamp_ns
         since, since_ns = self._since
-        return max(self._now - since, (stamped.stamp_ns - since_ns) * 1e-9)
+        return max(self._now - since, (self._map.pose.stamp_ns - since_ns) * 1e-9)
