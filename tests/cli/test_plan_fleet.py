@@ -98,8 +98,16 @@ def test_points_of_a_map_are_cells_of_it(plan, tmp_path, places):
     assert len(told["robots"]) == len(places)
 
 
-def test_cells_left_of_and_below_the_first_can_be_named(plan, grid):
-    starts = ["--robots", "-1,0", "0,0", "-2,-3"]
+@pytest.mark.parametrize(
+    "starts",
+    [
+        ["--robots", "-1,0", "0,0", "-2,-3"],
+        ["--robots=-1,0", "0,0", "-2,-3"],
+        ["--robots=-1,0", "--robots", "0,0", "-2,-3"],
+    ],
+    ids=" ".join,
+)
+def test_cells_left_of_and_below_the_first_can_be_named(plan, grid, starts):
     code, _, err = plan(grid, *starts, "--budget", 0.1)
     assert code == Exit.ERROR
     assert "robot 1: start cell (-1, 0) lies outside" in " ".join(err.split())

@@ -132,7 +132,8 @@ def with_negative_pairs(words: Sequence[str]) -> list[str]:
                 joined.pop()
             joined.append(f"{option}={word}")
         elif word.startswith("-"):
-            option = word if word in (*WITH_PAIR, *WITH_PAIRS) else ""
+            name, has_value, _ = word.partition("=")
+            option = name if name in (WITH_PAIRS if has_value else (*WITH_PAIR, *WITH_PAIRS)) else ""
             joined.append(word)
             continue
         else:
