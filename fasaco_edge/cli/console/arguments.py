@@ -133,7 +133,8 @@ def with_negative_pairs(words: Sequence[str]) -> list[str]:
             joined.append(f"{option}={word}")
         elif word.startswith("-"):
             name, has_value, _ = word.partition("=")
-            option = name if name in (WITH_PAIRS if has_value else (*WITH_PAIR, *WITH_PAIRS)) else ""
+            takes_more = name in WITH_PAIRS or (name in WITH_PAIR and not has_value)
+            option = name if takes_more else ""
             joined.append(word)
             continue
         else:

@@ -146,9 +146,9 @@ def _divided(
 ) -> tuple[list[Cell], list[float]]:
     """Return seeds and handicaps [s] of robots that have ways to the cells, as ``divide`` does."""
     lattice, cells = travel.lattice, travel.cells
-    starts, steps_s = [robot.cell for robot in robots], [robot.step_s for robot in robots]
+    starts, steps_s = [robot.cell for robot in robots], np.array([one.step_s for one in robots])
     from_starts_s = travel.times_s(starts, steps_s)
-    choice = _Choice(travel, robots, _owners_before(before, robots, travel), turn_steps)
+    choice = _Choice(travel, starts, steps_s, _owners_before(before, robots, travel), turn_steps)
     names = [robot.name for robot in robots]
     if before is not None and set(before.names) & set(names):
         kept = dict(
@@ -159,20 +159,18 @@ def _divided(
         pairs = [kept.get(robot.name, (robot.cell, 0.0)) for robot in robots]
         seeds, old_s = [seed for seed, _ in pairs], np.array([s for _, s in pairs], np.float32)
         times_s = travel.times_s(seeds, steps_s)
-        balanced_s = (
-            _handicaps_s(times_s, np.array(steps_s), first_s) for first_s in (old_s, None)
-        )
+        balanced_s = (_handicaps_s(times_s, steps_s, first_s) for first_s in (old_s, None))
         for handicaps_s in (old_s, *balanced_s):
             choice.offer(seeds, handicaps_s, times_s, STABLE)
     rounds = max(1, min(ROUNDS, MOST_SEARCHED // (len(robots) * lattice.steps.size)))
     for begin in (starts, _spread(travel, from_starts_s)):
         seeds = begin
         for _ in range(rounds):
-            times_s, cells_s = travel.times_s(seeds, steps_s), np.array(steps_s)
+            times_s, cells_s = travel.times_s(seeds, steps_s), steps_s
             for _ in range(EVENED if rounds > 1 else 1):
                 handicaps_s = _handicaps_s(times_s, cells_s)
                 owner, ends_s = choice.offer(seeds, handicaps_s, times_s)
-                cells_s = _cells_s(owner, ends_s, np.array(steps_s))
+                cells_s = _cells_s(owner, ends_s, steps_s)
             seeds = _middles(lattice, cells, owner, seeds)
     return choice.seeds, choice.handicaps_s.tolist()
 
@@ -185,15 +183,20 @@ class _Choice:
     """
 
     def __init__(
-        self, travel: Travel, robots: Sequence[Robot], before: NDArray[np.int64], turn_steps: float
+        self,
+        travel: Travel,
+        starts: Sequence[Cell],
+        steps_s: NDArray[np.float64],
+        before: NDArray[np.int64],
+        turn_steps: float,
     ) -> None:
         self.seeds: list[Cell] = []
         self.handicaps_s = np.zeros(0, np.float32)
         self._travel, self._before, self._turn_steps = travel, before, turn_steps
-        self._steps_s = np.array([robot.step_s for robot in robots])
+        self._steps_s = steps_s
         lattice, cols = travel.lattice, travel.lattice.steps.shape[1]
-        starts = [on_ground(lattice, *lattice.local(robot.cell)) for robot in robots]
-        self._starts = np.array([row * cols + col for row, col in starts], np.int64)
+        ground = [on_ground(lattice, *lattice.local(start)) for start in starts]
+        self._starts = np.array([row * cols + col for row, col in ground], np.int64)
         # Writable, as for other arrays kernels would be compiled again.
         self._steps = lattice.steps.ravel().copy()
         self._offsets = np.array([1, cols, -1, -cols], np.int64)
@@ -286,7 +289,7 @@ def _spread(travel: Travel, from_starts_s: Seconds) -> list[Cell]:
     for _ in range(count):
         seeds.append(int(nearest_s.argmax()))
         places.append(cell_of(travel.lattice, int(travel.cells[seeds[-1]])))
-        (times_s,) = travel.times_s(places[-1:], [1.0])
+        (times_s,) = travel.times_s(places[-1:], np.ones(1))
         nearest_s = np.minimum(nearest_s, times_s) if len(seeds) > 1 else times_s
     apart_s, order = from_starts_s[:, seeds].copy(), [0] * count
     for _ in range(count):

@@ -61,10 +61,10 @@ class Travel:
         self.lattice, self.cells, self.every = lattice, cells, every
         self._known: dict[Cell, Steps] = {}
 
-    def times_s(self, starts: Sequence[Cell], steps_s: Sequence[float]) -> Seconds:
+    def times_s(self, starts: Sequence[Cell], steps_s: NDArray[np.float64]) -> Seconds:
         """Return travel times from starts [s], float32 (k, n); huge where unreachable."""
         found = np.array([self._ways_from(start) for start in starts])
-        return times_of(found, np.array(steps_s, np.float32)[:, None])
+        return times_of(found, steps_s.astype(np.float32)[:, None])
 
     def has_ways_from(self, start: Cell) -> bool:
         """Tell whether any of the cells can be reached from a start."""
