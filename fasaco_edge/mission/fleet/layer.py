@@ -14,12 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.grid.geometry import Pose2D, Window
-from fasaco_edge.grid.lattice import Cell
+from fasaco_edge.grid.lattice import Cell, CoverageLattice
 from fasaco_edge.mission.core.events import Part
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
 from fasaco_edge.mission.fleet.division import Division, Robot, divide
 from fasaco_edge.mission.fleet.division_numbers import DivisionNumbers
-from fasaco_edge.mission.fleet.ground import viewpoint
+from fasaco_edge.mission.fleet.ground import JointGround, viewpoint
 from fasaco_edge.mission.fleet.members import GONE_S, Member, Members
 from fasaco_edge.mission.fleet.remainder import Remainder
 from fasaco_edge.mission.map.map_state import MapState
@@ -64,8 +64,8 @@ class FleetLayer:
         self._map, self._ledger = map_state, ledger
         self._division: Division | None = None
         self._divided_at = self._looked_at = float("-inf")
-        # The owners of the cells of a joint area, and of those of this robot's own area.
-        self._owners: tuple[ReachableArea | None, NDArray[np.int8]]
+        # The owners of the cells of a joint ground.
+        self._owners: tuple[JointGround | None, NDArray[np.int8]]
         self._owners = None, np.zeros((0, 0), np.int8)
         # Cells of an area that this robot tried in vain, while others are at work.
         self._tried: tuple[ReachableArea | None, NDArray[np.bool_]]
@@ -99,15 +99,18 @@ class FleetLayer:
         if area is None or division is None:
             return None
         joint, left = self._left(open_cells, area)
-        return viewpoint(area, joint, left & self._of_me(division, joint), cell)
+        return viewpoint(area, joint.area, left & self._of_me(division, joint), cell)
 
     def _left(
         self, open_cells: OpenCells, area: ReachableArea
-    ) -> tuple[ReachableArea, NDArray[np.bool_]]:
-        """Return the joint area, and which of its cells are left and untried, bool (rows, cols)."""
+    ) -> tuple[JointGround, NDArray[np.bool_]]:
+        """Return the joint ground, and which of its cells are left and untried, bool (rows, cols).
+
+        Of the cells of this robot's map these are such as it can reach.
+        """
         joint = self.others.ground.joint(area)
-        left = open_cells(joint.lattice.window) & joint.reachable
-        inside = area.lattice.window.slices_in(joint.lattice.window)
+        left = open_cells(joint.common.window) & joint.area.reachable
+        inside = area.lattice.window.slices_in(joint.common.window)
         left[inside] = self.untried(left[inside], area)
         return joint, left
 
@@ -171,11 +174,11 @@ class FleetLayer:
             return self._why_by_taken()
         self._looked_at = now
         (joint, left), before = self._left(open_cells, area), self._division
-        inside = area.lattice.window.slices_in(joint.lattice.window)
+        inside = area.lattice.window.slices_in(joint.common.window)
         own = left if before is None else left & self._of_me(before, joint)
         at_work = [one.newest for one in self.members.values() if not one.absence(now)]
         self._remainder.note_others(now, wait=all(heard.waits_for for heard in at_work))
-        swept = self._ledger.shared.swept(joint.lattice.window) & joint.reachable
+        swept = self._ledger.shared.swept(joint.common.window) & joint.area.reachable
         swept_cells = int(np.count_nonzero(swept))
         self._remainder.note(int(left.sum()), int(own.sum()), swept_cells, now)
         if newer := self.numbers.newer():
@@ -183,11 +186,11 @@ class FleetLayer:
             self.numbers.follow(newer)
             self._division = Division.of(newer.parts)
         else:
-            robots = self._robots(joint, cell, now)
+            robots = self._robots(joint.area, cell, now)
             if not (why := self._why_anew(joint, left, robots, now, at_once=at_once)):
                 return self._why_by_taken()
-            robots += self._out_of_reach(joint, robots, now)
-            divided = divide(joint.lattice, left, robots, before, self._turn_steps)
+            robots += self._out_of_reach(joint.common, robots, now)
+            divided = divide(joint.common, left, robots, before, self._turn_steps)
             if before is None or not divided.is_like(before):
                 self.numbers.count_on()
                 self._division = divided if len(robots) > 1 else None
@@ -218,7 +221,9 @@ class FleetLayer:
                 robots.append(Robot(name, place, member.newest.step_s))
         return robots
 
-    def _out_of_reach(self, area: ReachableArea, robots: list[Robot], now: float) -> list[Robot]:
+    def _out_of_reach(
+        self, lattice: CoverageLattice, robots: list[Robot], now: float
+    ) -> list[Robot]:
         """Return the robots at work, of the last division, to which its map shows no way.
 
         Left out, they would divide again themselves, and leave out those that they do not see.
@@ -229,7 +234,7 @@ class FleetLayer:
             member = self.members.get(name)
             if name in reached or member is None or member.absence(now):
                 continue
-            row, col = area.lattice.cell_at(member.newest.x, member.newest.y)
+            row, col = lattice.cell_at(member.newest.x, member.newest.y)
             # Others could not be told of a seed farther off.
             if max(abs(row), abs(col)) < FARTHEST:
                 found.append(Robot(name, (row, col), member.newest.step_s))
@@ -237,7 +242,7 @@ class FleetLayer:
 
     def _why_anew(
         self,
-        area: ReachableArea,
+        joint: JointGround,
         left: NDArray[np.bool_],
         robots: list[Robot],
         now: float,
@@ -260,7 +265,7 @@ class FleetLayer:
         new = names - known - {self._robot}
         if more := sorted(name for name in new if now - self.members[name].left_at >= EVEN_S):
             return f"shared with {', '.join(more)}"
-        return "" if division is None else self._why_by_parts(division, area, left, names, now)
+        return "" if division is None else self._why_by_parts(division, joint, left, names, now)
 
     def _is_gone(self, name: str, now: float) -> bool:
         """Tell whether a robot of the division takes no part any more."""
@@ -272,13 +277,13 @@ class FleetLayer:
     def _why_by_parts(
         self,
         division: Division,
-        area: ReachableArea,
+        joint: JointGround,
         left: NDArray[np.bool_],
         names: set[str],
         now: float,
     ) -> str:
         """Return why the parts should change, or ""; ``names``: the robots that it can reach."""
-        owners = self._owners_on(division, area)
+        owners = self._owners_on(division, joint)
         cells = np.bincount(owners[left], minlength=len(division.robots))
         if not cells[division.names.index(self._robot)]:
             # If there was no part for it, there will be none soon after.
@@ -300,20 +305,20 @@ class FleetLayer:
     def _is_own(self, division: Division, area: ReachableArea) -> NDArray[np.bool_]:
         """Return which cells of this robot's area are in its part."""
         joint = self.others.ground.joint(area)
-        return self._of_me(division, joint)[area.lattice.window.slices_in(joint.lattice.window)]
+        return self._of_me(division, joint)[area.lattice.window.slices_in(joint.common.window)]
 
-    def _of_me(self, division: Division, joint: ReachableArea) -> NDArray[np.bool_]:
-        """Return which cells of a joint area are in this robot's part."""
+    def _of_me(self, division: Division, joint: JointGround) -> NDArray[np.bool_]:
+        """Return which cells of the joint ground are in this robot's part."""
         own: NDArray[np.bool_] = self._owners_on(division, joint) == division.names.index(
             self._robot
         )
         return own
 
-    def _owners_on(self, division: Division, joint: ReachableArea) -> NDArray[np.int8]:
+    def _owners_on(self, division: Division, joint: JointGround) -> NDArray[np.int8]:
         if division is not self._division:
-            return division.owners(joint.lattice)
+            return division.owners(joint.common)
         if self._owners[0] is not joint:
-            self._owners = joint, division.owners(joint.lattice)
+            self._owners = joint, division.owners(joint.common)
         return self._owners[1]
 
     def _why_by_taken(self) -> str:
