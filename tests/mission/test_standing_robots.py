@@ -14,7 +14,7 @@ from fasaco_edge.mission.fleet.members import Members
 from fasaco_edge.mission.fleet.tiles import TILE_BYTES
 from fasaco_edge.mission.fleet.traffic import OLD_S, PATIENCE_S, STANDS_S
 from fasaco_edge.mission.map.reachable_area import ReachableArea
-from tests.mission.world import CONFIG, Drive, building, pose_at
+from tests.mission.world import CONFIG, Drive, building, pose_at, with_policy
 
 CELL_M, RADIUS_M = 0.25, 0.1
 
@@ -23,9 +23,9 @@ def member(x, y):
     return MemberHeard("r2", state="covering", x=x, y=y, epoch=1, radius_m=0.1)
 
 
-def planned():
+def planned(**policy):
     """A robot, r1, in a hall that has its first path."""
-    drive = Drive((2, 4), config=replace(CONFIG, robot="r1"))
+    drive = Drive((2, 4), config=with_policy(replace(CONFIG, robot="r1"), **policy))
     drive.tell(MapReceived(building(*["." * 24] * 5)), pose_at(2, 4))
     drive.plan()
     return drive
@@ -63,6 +63,15 @@ def test_no_cells_stay_closed_behind_a_robot_that_drives_on(area, members):
     members.hear(member(2.125, 1.125), 1.0)
     assert members.closed(area, RADIUS_M) is None
     assert not members.is_avoided("r2")
+
+
+def test_cells_stay_closed_where_the_poses_of_a_robot_that_stands_scatter(area, members):
+    members.hear(member(1.125, 1.125), 0.0)
+    members.avoid("r2")
+    closed = members.closed(area, RADIUS_M)
+    members.hear(member(1.18, 1.07), 1.0)
+    assert members.is_avoided("r2")
+    assert members.closed(area, RADIUS_M).sum() == closed.sum()
 
 
 def test_where_a_silent_robot_is_only_the_map_shows(area, members):
@@ -104,6 +113,50 @@ def test_one_that_has_waited_beside_another_gets_the_time_to_drive_on():
             drive.plan()
         assert drive.mission.giving_way.waits_for == ""
     assert len(drive.mission.route.path.ahead) > 1
+
+
+@pytest.mark.parametrize("scatter_m", [0.02, 0.05])
+@pytest.mark.parametrize("state", ["charging", "covering"])
+def test_one_that_stands_in_the_way_is_planned_around_though_its_poses_scatter(state, scatter_m):
+    # Each jump of more than 5 cm counted as motion: it was waited for to the end.
+    random, drive = np.random.default_rng(1), planned(retries=2, retry_s=30.0)
+    for _ in range(400):
+        if drive.request is not None:
+            drive.plan()
+        if drive.walk:
+            drive.cell = drive.walk.pop(0)
+        x, y = random.normal((12.5 * CELL_M, 2.5 * CELL_M), scatter_m)
+        drive.tell(pose_at(*drive.cell), replace(member(x, y), state=state), after=1.0)
+        if drive.mission.state == "done":
+            break
+    else:
+        raise AssertionError(drive.mission.reason)
+    # Those around its disc, and what that closes in a corner of the grid of cells.
+    assert len(drive.visited) >= 24 * 5 - 10
+
+
+def test_one_held_up_for_a_minute_says_so():
+    drive = planned()
+    row, col = drive.walk[1]
+    x, y = (col + 0.5) * CELL_M, (row + 0.5) * CELL_M
+    away = (x + (col - 4) * CELL_M, y + (row - 2) * CELL_M)
+    for second in range(70):
+        # It drives, it says, and never gets anywhere; between walls there would be no way around.
+        there = replace(member(x, y), ahead=(away,), waits_for="r1" if second % 9 else "")
+        drive.mission.fleet.others.avoid = lambda robot: None
+        drive.tell(pose_at(2, 4), there, after=1.0)
+        if drive.request is not None:
+            drive.plan()
+    assert drive.mission.state == "degraded"
+    assert "for more than a minute" in drive.mission.reason
+
+
+def test_whether_another_is_near_is_told_at_rest_too():
+    drive = planned()
+    drive.command("pause")
+    for x, near in ((3.0, True), (20.0, False)):
+        drive.tell(pose_at(2, 4), member(x, 0.6), after=1.0)
+        assert drive.mission.giving_way.is_near == near
 
 
 def test_one_that_is_waited_for_but_is_jammed_is_planned_around():

@@ -15,7 +15,7 @@ from fasaco_edge.mission.core.events import Decision, PathUpdate, State
 from fasaco_edge.mission.core.giving_way import GivingWay
 from fasaco_edge.mission.core.in_dock import InDock
 from fasaco_edge.mission.core.path_checks import PathChecks
-from fasaco_edge.mission.core.route import Route
+from fasaco_edge.mission.core.route import NO_CELLS, Route
 from fasaco_edge.mission.core.standing import Standing
 from fasaco_edge.mission.core.trail_layer import TrailLayer
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
@@ -23,6 +23,7 @@ from fasaco_edge.mission.fleet.layer import FleetLayer
 from fasaco_edge.mission.line.layer import LineLayer
 from fasaco_edge.mission.map.inputs import InputMonitor
 from fasaco_edge.mission.map.map_state import MapState
+from fasaco_edge.mission.map.reachable_area import ReachableArea
 from fasaco_edge.mission.orders.order import Errand
 from fasaco_edge.mission.orders.order_state import Stage
 from fasaco_edge.mission.orders.sequencer import Sequencer
@@ -77,7 +78,8 @@ class Executive:
             return State.DEGRADED, trouble + (self.map.why_other_frame() if lost else "")
         if self._state in DRIVING and (silence := self.charging.silence(self._now)):
             return State.DEGRADED, f"{silence}: when to charge is not known"
-        if self._state in DRIVING and (stuck := self._standing.why_stuck):
+        stuck = self.giving_way.why_stuck(self._now) or self._standing.why_stuck
+        if self._state in DRIVING and stuck:
             return State.DEGRADED, stuck
         return self._state, self._reason
 
@@ -135,21 +137,26 @@ class Executive:
     def _give_way(self) -> Decision | None:
         """Wait, or make way, for another robot of the fleet; None where there is no need.
 
-        A robot whose order is over makes way, too.
+        A robot whose order is over makes way, too; not one in its dock.
         """
         order, way = self.orders.order_state, self.giving_way
-        is_going = order.order is not None and not order.paused and not order.errand
+        way.look_around(self._now)
+        is_going = (order.order is not None or order.errand) and not order.paused
+        is_docked = order.errand == "charge" and self._why_in_dock() is not None
         may_drive = not self.monitor.trouble(self._now) and not self._why_no_mask()
-        if not (is_going and self.fleet.members and may_drive):
+        if not (is_going and self.fleet.members and may_drive) or is_docked:
             way.end()
             return None
         # Others may have swept meanwhile what this robot waits to drive to.
         is_vain = bool(way.waits_for) and not self.orders.cells.left()
-        update = way.look(self._now, has_work=order.is_open and not is_vain)
+        has_work = bool(order.errand) or (order.is_open and not is_vain)
+        update = way.look(self._now, has_work=has_work, errand=order.errand)
         if not way.waits_for:
             return None
         cell = self.map.robot_cell()
-        if self._state is not State.DONE and cell is not None:
+        if order.errand or order.stage is Stage.RETURNING:
+            self._state = State.RETURNING
+        elif self._state is not State.DONE and cell is not None:
             self._state = State.COVERING if order.is_open else State.DONE
             if reason := self._share(cell):
                 self.route.want(reason)
@@ -214,16 +221,15 @@ class Executive:
         stands = self._state is State.COVERING and not len(route.path.cells)
         self._share(cell, at_once=not stands)
         while orders.order_state.stage is not Stage.RETURNING:
-            if orders.waits_for_others:
-                return self._rest(State.COVERING, "others sweep what is left", update)
+            if why := orders.why_standing(self._now):
+                return self._rest(State.COVERING, why, update)
             try:
                 problem = orders.problem(cell, route.path_to_keep)
             except NothingToCover:
                 if reason := orders.explore(cell):
                     route.want(reason)
                     continue
-                if orders.is_looking(cell, self._now):
-                    why = "looks for its part, which others see"
+                if why := orders.why_looking(cell, self._now):
                     return self._rest(State.COVERING, why, update)
                 orders.advance(self._now)
                 if orders.is_waiting or orders.order_state.stage is Stage.OVER:
@@ -253,13 +259,19 @@ class Executive:
         if home is None or cell == home:
             self.orders.advance(self._now)
             return self._settle(update)
-        path = area.shortest_path(cell, home)
+        path = self._way(area, cell, home)
         if not len(path):
             return self._rest(State.BLOCKED, "no way home: waits for a map that shows one")
         self._state, self._reason = State.RETURNING, "on the way home"
         if np.array_equal(path, route.path.ahead):
             return Decision(path=update)
         return Decision(path=self._lead(path, "returning home", "home"))
+
+    def _way(self, area: ReachableArea, cell: Cell, goal: Cell) -> NDArray[np.int32]:
+        """Return the shortest path, around robots that stand in the way where that is possible."""
+        around = self.orders.passable(area, cell)
+        path = around.shortest_path(cell, goal) if around.contains(goal) else NO_CELLS
+        return path if len(path) else area.shortest_path(cell, goal)
 
     def _lead(self, path: NDArray[np.int32], reason: str, errand: Errand) -> PathUpdate:
         """Publish a path to the destination of an errand, with the heading there."""
@@ -290,7 +302,7 @@ class Executive:
                 return self._rest(State.BLOCKED, f"no way {to}: waits for a map that shows one")
             here = self.map.cell_at_pose() or cell
             why = self.charging.why_due() if errand == "charge" else ""
-            update = self._lead(area.shortest_path(here, goal), f"drives {to}{why}", errand)
+            update = self._lead(self._way(area, here, goal), f"drives {to}{why}", errand)
         self._state, self._reason = State.RETURNING, f"on the way {to}"
         return Decision(path=update)
 

@@ -1,7 +1,7 @@
 """Giving way: the robot waits for others of its fleet, and makes way for them.
 
-Its path is set aside meanwhile, and taken up afterwards. What keeps it from going on is decided in
-``fleet.traffic``.
+Its path is set aside meanwhile, and taken up afterwards; a way home is looked for anew. What keeps
+it from going on is decided in ``fleet.traffic``.
 """
 
 from __future__ import annotations
@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from functools import partial
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,12 +19,14 @@ from fasaco_edge.mission.config import MissionConfig
 from fasaco_edge.mission.core.events import PathUpdate
 from fasaco_edge.mission.core.route import NO_CELLS, Route
 from fasaco_edge.mission.fleet.layer import FleetLayer
-from fasaco_edge.mission.fleet.refuge import discs, refuge
+from fasaco_edge.mission.fleet.refuge import comes_nearer, discs, refuge
 from fasaco_edge.mission.fleet.traffic import (
     AHEAD_M,
     NEAR_M,
     PATIENCE_S,
+    SPACING_M,
     STANDS_S,
+    WAIT_M,
     Neighbour,
     Obstruction,
     Points,
@@ -33,11 +36,17 @@ from fasaco_edge.mission.fleet.traffic import (
 from fasaco_edge.mission.line.way import sees_on
 from fasaco_edge.mission.map.map_state import MapState
 from fasaco_edge.mission.map.reachable_area import ReachableArea
+from fasaco_edge.mission.orders.order import Errand
 
 # A robot that stands on its path this near to another one is blocked by it [m]; motion that counts.
 BESIDE_M, MOVED_M = 0.4, 0.1
 # It has come to its refuge at this distance from its place there [m].
 ARRIVED_M = 0.05
+# On its way there it looks so far ahead for others that have come in its way [points].
+LOOK_POINTS = int(WAIT_M / 2 / SPACING_M)
+# A robot that has not got farther than this for so long plans around whoever keeps it, and is
+# reported after so long [m], [s], [s]: the poses of the other scatter perhaps, as if it moved.
+STAYS_M, LONG_S, TOO_LONG_S = 0.2, 30.0, 60.0
 # A robot that made way, or waits, looks for another place no sooner than this [s].
 AGAIN_S = 2.0
 
@@ -56,14 +65,19 @@ class GivingWay:
     ) -> None:
         self.waits_for = self.reason = ""
         self.is_near = False
+        self._neighbours: Mapping[str, Neighbour] = {}
         self._robot, self._radius_m = config.robot, config.footprint.robot_radius_m
         self._cell_m = config.footprint.cell_m
         self._map, self._route, self._fleet = map_state, route, fleet
         self._since = self._sought_at = 0.0
         self._refuge: Cell | None = None
         self._has_work = True
+        # The path that it waits to go on with, and the errand that leads along it.
+        self._held, self._errand = NO_CELLS, ""
         # Its place, and since when it has had a path there and was free to drive.
         self._place, self._free_since = (math.inf, math.inf), 0.0
+        # Where it stays, and since when.
+        self._stays_at, self._stays_since = (math.inf, math.inf), 0.0
 
     def line(self) -> Points:
         """Return the next metres, from the robot's place on, points (x, y) [m], float64 (n, 2)."""
@@ -83,18 +97,33 @@ class GivingWay:
             return self._route.path.ahead
         if not self._has_work:
             return NO_CELLS
-        aside = self._route.aside
-        return aside if self.waits_for and aside is not None else self._route.path.ahead
+        is_held = self.waits_for and self._route.aside is not None
+        return self._held if is_held else self._route.path.ahead
+
+    def look_around(self, now: float) -> None:
+        """Note whether another robot is near: then all tell more often, also one at rest."""
+        pose = self._map.pose
+        here = None if pose is None else (pose.pose.x, pose.pose.y)
+        self._neighbours = self._fleet.others.neighbours(now)
+        self.is_near = here is not None and _is_near(here, self._neighbours)
+
+    def why_stuck(self, now: float) -> str:
+        """Return why the robot is thought to be held up for good, or ""."""
+        is_stuck = bool(self.waits_for) and now - self._stays_since > TOO_LONG_S
+        return f"{self.reason} for more than a minute" if is_stuck else ""
 
     def end(self) -> None:
         """Wait no longer."""
         self.waits_for = self.reason = ""
         self._refuge = None
 
-    def look(self, now: float, *, has_work: bool = True) -> PathUpdate | None:
-        """Decide again; return the path to publish, if any. ``waits_for`` tells the result.
+    def look(self, now: float, *, has_work: bool = True, errand: Errand = "") -> PathUpdate | None:
+        """Decide again after ``look_around``; return the path to publish, if any.
 
-        A robot without work left has no path, but for one to a refuge: it makes way alone.
+        ``waits_for`` tells the result.
+
+        A robot without work left has no path, but for one to a refuge: it makes way alone. Another
+        errand leads elsewhere, perhaps past nobody: the wait ends.
 
         The first case that holds:
 
@@ -107,16 +136,18 @@ class GivingWay:
         | none of these | goes on |
         """
         self._has_work = has_work
+        if errand != self._errand:
+            self._errand = errand
+            self.end()
         # A refuge is sought from where the robot is, which on a short cut is far from its path.
         area, cell, pose = self._map.area, self._map.cell_at_pose(), self._map.pose
-        neighbours = self._fleet.others.neighbours(now)
+        neighbours = self._neighbours
         here = (math.inf, math.inf) if pose is None else (pose.pose.x, pose.pose.y)
-        self.is_near = area is not None and cell is not None and _is_near(here, neighbours)
         self._note_place(here, now)
         if area is None or cell is None or not self.is_near:
             self.end()
             return None
-        if self._is_underway(here, now):
+        if self._is_underway(here, neighbours, now):
             return None
         self._refuge = None
         if found := self._obstruction(here, neighbours, now):
@@ -128,12 +159,20 @@ class GivingWay:
         """Note where the robot is, and since when it has been free to drive on from there."""
         if math.dist(here, self._place) > MOVED_M or len(self._cells()) < 2:
             self._place, self._free_since = here, now
+        if math.dist(here, self._stays_at) > STAYS_M or not self.waits_for:
+            self._stays_at, self._stays_since = here, now
 
-    def _is_underway(self, here: tuple[float, float], now: float) -> bool:
-        """Tell whether the robot drives to its refuge."""
+    def _is_underway(
+        self, here: tuple[float, float], neighbours: Mapping[str, Neighbour], now: float
+    ) -> bool:
+        """Tell whether the robot drives to its refuge, and nobody has come in its way there."""
+        ahead = self._route.path.ahead
         is_there = self._refuge is None or self._is_in(self._refuge, here)
         is_stuck = now - self._sought_at > PATIENCE_S
-        return not is_there and not is_stuck and len(self._route.path.ahead) > 0
+        if is_there or is_stuck or not len(ahead):
+            return False
+        line, beside = spaced(self.line())[: LOOK_POINTS + 1], discs(self._radius_m, neighbours)
+        return not any(comes_nearer(a, b, beside) for a, b in pairwise(line))
 
     def _is_in(self, refuge: Cell, here: tuple[float, float]) -> bool:
         """Tell whether the robot has come to its refuge: at the edge it may be in the way."""
@@ -189,14 +228,18 @@ class GivingWay:
         route = self._route
         if found.robot != self.waits_for:
             self._since = now
+        was_waiting = bool(self.waits_for)
         self.waits_for, self.reason = found.robot, found.reason
         has_path = len(route.path.cells) > 0
+        if not was_waiting:
+            self._held = route.path.ahead
         route.set_aside()
         is_long = now - self._since > PATIENCE_S or self._hangs(now)
         # While it is held it stands for that reason: let go, it has all the time to drive again.
         self._free_since = now
         # Also one that is to go first: it may be jammed, and the wait for it without end.
-        if is_long and neighbours[found.robot].stands_s > STANDS_S:
+        stands = neighbours[found.robot].stands_s > STANDS_S or now - self._stays_since > LONG_S
+        if is_long and stands:
             self._fleet.others.avoid(found.robot)
         if (found.is_on_path or is_long) and now - self._sought_at >= AGAIN_S:
             self._sought_at = now

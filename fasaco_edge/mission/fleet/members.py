@@ -21,6 +21,9 @@ from fasaco_edge.mission.map.reachable_area import ReachableArea
 
 # Timeouts of a silent robot, and of one that should move; motion that counts [s], [s], [m].
 GONE_S, HANGING_S, STANDING_M = 5.0, 8.0, 0.05
+# A robot that is planned around has driven on once it is this far from there [m]: the poses of one
+# that stands scatter.
+LEFT_M = 0.2
 
 AT_WORK = (State.PLANNING, State.COVERING, State.DEGRADED)
 
@@ -89,7 +92,7 @@ class Members:
                 now - member.heard_at,
                 now - member.moved_at,
                 member.newest.step_s / self._cell_m,
-                self._avoided.get(name) == member.place,
+                self._is_at_avoided(name),
             )
             for name, member in self.known.items()
             if not member.left_out and now - member.heard_at < OLD_S
@@ -97,11 +100,19 @@ class Members:
 
     def avoid(self, robot: str) -> None:
         """Plan around a robot where it stands now, until it moves."""
-        self._avoided[robot] = self.known[robot].place
+        newest = self.known[robot].newest
+        self._avoided[robot] = newest.x, newest.y
 
     def is_avoided(self, robot: str) -> bool:
         """Tell whether paths are planned around a robot."""
         return robot in self._avoided
+
+    def _is_at_avoided(self, robot: str) -> bool:
+        """Tell whether paths are planned around a robot, and it is still there."""
+        place, member = self._avoided.get(robot), self.known.get(robot)
+        if place is None or member is None:
+            return False
+        return math.dist(place, (member.newest.x, member.newest.y)) < LEFT_M
 
     def forget_silent(self, now: float) -> str:
         """Plan around silent robots no longer; return the name of one, or "".
@@ -119,8 +130,8 @@ class Members:
 
     def closed(self, area: ReachableArea, radius_m: float) -> NDArray[np.bool_] | None:
         """Return the cells where robots stand in the way, bool (rows, cols); None for none."""
-        for name, place in list(self._avoided.items()):
-            if name not in self.known or self.known[name].place != place:
+        for name in list(self._avoided):
+            if not self._is_at_avoided(name):
                 del self._avoided[name]
         if not self._avoided:
             return None

@@ -16,6 +16,8 @@ from fasaco_edge.mission.orders.zones import in_zones
 
 # Cells this close to one from which nothing new was seen are not visited either [cells].
 SEEN_AROUND = 1
+# Period of looking again for a way past robots that stand in it [s].
+AGAIN_S = 1.0
 # A robot looks so long at ground that others see: its map may come late [s].
 LOOKS_S = 6.0
 
@@ -61,30 +63,65 @@ class Exploration:
         viewpoints: cells (row, col) to look from, not yet reached.
         looked: cells already visited in search of the zone, or of ground that others see.
         seeks_zone: whether the viewpoints are for a zone.
+        is_shut: whether other robots stand in the way to all cells from which it may be seen.
     """
 
     viewpoints: set[Cell] = field(default_factory=set)
     looked: set[Cell] = field(default_factory=set)
     seeks_zone: bool = False
+    is_shut: bool = False
     # The last viewpoint of ground that others see, and since when the robot is there.
     _beyond: Cell | None = None
     _there_since: float | None = None
+    # Since when it has waited for those robots, and when it looked last.
+    _shut_since: float | None = None
+    _shut_looked: float = float("-inf")
 
-    def seek(self, zone: Zone | None, area: ReachableArea | None, cell: Cell) -> str:
+    def begin(self) -> None:
+        """Begin with another zone."""
+        self.looked.clear()
+        self.is_shut, self._shut_since = False, None
+
+    def seek(
+        self, zone: Zone | None, area: ReachableArea | None, free: ReachableArea | None, cell: Cell
+    ) -> str:
         """Look for a path to an unreachable zone; return why a plan is wanted, or "".
 
         Visits frontier cells, nearest to the zone's corners first, until the zone is reachable or
-        all were visited.
+        all were visited. Those behind other robots can wait.
+
+        Args:
+            zone: the zone.
+            area: the reachable area.
+            free: what of it can be reached around the robots that stand in the way now.
+            cell: the robot's cell.
         """
+        self.is_shut = False
         if zone is None or zone.polygon is None or area is None or is_in_reach(zone, area):
             return ""
         self.looked |= {cell}
-        goal = next_frontier(area, zone.polygon, self.looked)
+        goal = next_frontier(free or area, zone.polygon, self.looked)
         if goal is None:
+            self.is_shut = next_frontier(area, zone.polygon, self.looked) is not None
             return ""
         self.looked.add(goal)
+        self._shut_since = None
         self.viewpoints, self.seeks_zone = {goal}, True
         return f"looking for a way to zone {zone.name!r}"
+
+    def waits_for_way(self, now: float, patience_s: float) -> bool:
+        """Tell whether the robot waits, ``patience_s`` at most, for others to clear the way."""
+        if not self.is_shut:
+            self._shut_since = None
+            return False
+        if self._shut_since is None:
+            self._shut_since = now
+        self._shut_looked = now
+        return now - self._shut_since <= patience_s
+
+    def is_shut_still(self, now: float) -> bool:
+        """Tell whether it is too soon to look again for a way past others."""
+        return self._shut_since is not None and now - self._shut_looked < AGAIN_S
 
     def look_beyond(self, viewpoint: Cell | None, cell: Cell) -> str:
         """Look from where ground begins that others see; return why a plan is wanted, or "".

@@ -16,7 +16,7 @@ from fasaco_edge.mission.fleet.layer import FleetLayer
 from fasaco_edge.mission.map.map_state import MapState
 from fasaco_edge.mission.map.reachable_area import ReachableArea, anchor_cell
 from fasaco_edge.mission.orders.cells_left import CellsLeft
-from fasaco_edge.mission.orders.exploration import Exploration
+from fasaco_edge.mission.orders.exploration import Exploration, is_in_reach
 from fasaco_edge.mission.orders.order import Errand, Zone
 from fasaco_edge.mission.orders.order_state import NO_ORDER, OrderState, Stage
 from fasaco_edge.mission.orders.zones import in_zones
@@ -139,7 +139,7 @@ class Sequencer:
         run.left_over, run.same_again = -1, 0
         self._fleet.try_again()
         if state.pass_number == 1:
-            run.exploration.looked.clear()
+            run.exploration.begin()
         return "" if state.automatic else state.title
 
     def problem(
@@ -181,14 +181,39 @@ class Sequencer:
 
     def explore(self, cell: Cell) -> str:
         """Look for a path to an unreachable zone or part; return why a plan is wanted, or ""."""
-        exploration = self._run.exploration
-        if reason := exploration.seek(self.order_state.current_zone, self._map.area, cell):
+        exploration, zone, area = (
+            self._run.exploration,
+            self.order_state.current_zone,
+            self._map.area,
+        )
+        free = None if area is None else self.passable(area, cell)
+        if reason := exploration.seek(zone, area, free, cell):
             return reason
         return exploration.look_beyond(self._fleet.viewpoint(self.cells.open_cells, cell), cell)
 
-    def is_looking(self, cell: Cell, now: float) -> bool:
-        """Tell whether the robot waits for a map that shows ground that others see."""
-        return self._run.exploration.is_looking(cell, now)
+    def why_standing(self, now: float) -> str:
+        """Return why the robot stands, though a plan is wanted, or ""."""
+        if self.waits_for_others:
+            return "others sweep what is left"
+        return self._why_shut() if self._run.exploration.is_shut_still(now) else ""
+
+    def why_looking(self, cell: Cell, now: float) -> str:
+        """Return why the robot stands where it has nothing to cover, or "".
+
+        It looks at ground that others see, or waits for others that stand in the way to its zone,
+        for as long as cells that it has not reached would be tried again.
+        """
+        exploration, policy = self._run.exploration, self._config.policy
+        if exploration.waits_for_way(now, policy.retries * policy.retry_s):
+            return self._why_shut()
+        is_looking = exploration.is_looking(cell, now)
+        return "looks for its part, which others see" if is_looking else ""
+
+    def _why_shut(self) -> str:
+        zone = self.order_state.current_zone
+        return (
+            f"others stand in the way to zone {zone.name!r}" if zone else "others stand in the way"
+        )
 
     def note_path_end(self) -> bool:
         """Note the end of a path; return whether the cells it left over must wait for a retry."""
@@ -273,6 +298,9 @@ class Sequencer:
         if left:
             cells, were = ("cell", "was") if left == 1 else ("cells", "were")
             run.ending = f"{left} reachable {cells}{zones} {were} left over"
+        area, named = self._map.area, () if every or order is None else order.zones
+        if area is not None and (beyond := [z.name for z in named if not is_in_reach(z, area)]):
+            run.ending += f"; not reached: {', '.join(map(repr, beyond))}"
 
     def _is_worth_trying(self) -> bool:
         """Tell whether a retry is worthwhile; recomputed if anything changed."""
