@@ -106,3 +106,26 @@ def test_a_robot_that_is_stuck_but_tells_of_its_path_holds_nobody_up():
     fleet.run(60)
     assert ours.mission.state == "done"
     assert fleet.left_out() == {(2, 3), (2, 5), (1, 4), (3, 4)}
+
+
+@pytest.mark.parametrize("pairs", [{("b", "c"), ("c", "b")}, {("c", "b")}], ids=["both", "one"])
+def test_two_that_do_not_hear_each_other_leave_the_division_to_one_that_hears_both(pairs):
+    # Each divided without the other, the third with it again: 103 times, and 80.
+    fleet = FleetDrive(["." * 40] * 16, {"a": (0, 0), "b": (0, 39), "c": (15, 20)})
+    fleet.hears = lambda speaker, listener: (speaker, listener) not in pairs
+    fleet.finish()
+    assert not fleet.left_out()
+    assert max(robot.mission.fleet.numbers.number for robot in fleet.robots.values()) < 30
+
+
+def test_one_that_is_gone_is_missed_though_another_has_made_the_division():
+    fleet = FleetDrive(["." * 40] * 16, {"a": (0, 0), "b": (0, 39), "c": (15, 20)})
+    fleet.run(6)
+    made_by = fleet.robots["a"].mission.fleet.numbers.by
+    (dead, *_) = sorted({"a", "b", "c"} - {made_by})
+    del fleet.robots[dead]
+    fleet.run(7)
+    for robot in fleet.robots.values():
+        assert dead not in {part.robot for part in robot.mission.fleet.parts}
+    fleet.finish()
+    assert not fleet.left_out()

@@ -225,14 +225,15 @@ class _Choice:
         return owner, ends_s
 
     def _ends_s(self, owner: NDArray[np.int64]) -> NDArray[np.float64]:
-        """Return when each robot ends, float64 (k,) [s], if it walks from cell to nearest cell."""
-        walks = walk_parts(self._steps, self._offsets, self._travel.cells, owner, self._starts)
-        every = self._travel.every
-        if every == 1:
-            steps = walks[:, 0] + self._turn_steps * walks[:, 1]
+        """Return when each robot ends, float64 (k,) [s], if it walks from cell to nearest cell.
+
+        Of so many cells that only some are looked at, each takes a step.
+        """
+        if self._travel.every > 1:
+            steps = self._travel.every * np.bincount(owner, minlength=len(self._starts))
         else:
-            # Between cells that are looked at it turns elsewhere, and passes others that are not.
-            steps = np.maximum(walks[:, 0], every * np.bincount(owner, minlength=len(walks)))
+            walks = walk_parts(self._steps, self._offsets, self._travel.cells, owner, self._starts)
+            steps = walks[:, 0] + self._turn_steps * walks[:, 1]
         ends_s: NDArray[np.float64] = steps * self._steps_s
         return ends_s
 
@@ -257,7 +258,9 @@ def _owners_before(
         return np.full(len(travel.cells), -1)
     index = {robot.name: number for number, robot in enumerate(robots)}
     numbers = np.array([index.get(name, -1) for name in before.names])
-    owners: NDArray[np.int64] = numbers[before.owners(travel.lattice).reshape(-1)[travel.cells]]
+    times_s = travel.times_s(before.seeds, np.array([robot.step_s for robot in before.robots]))
+    handicaps_s = np.array(before.handicaps_s, np.float32)
+    owners: NDArray[np.int64] = numbers[(times_s + handicaps_s[:, None]).argmin(axis=0)]
     return owners
 
 

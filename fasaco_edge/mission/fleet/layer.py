@@ -13,17 +13,18 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.grid.geometry import Pose2D, Window
-from fasaco_edge.grid.lattice import Cell, CoverageLattice
+from fasaco_edge.grid.geometry import Window
+from fasaco_edge.grid.lattice import Cell
 from fasaco_edge.mission.core.events import Part
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
+from fasaco_edge.mission.fleet.at_work import AtWork
 from fasaco_edge.mission.fleet.division import Division, Robot, divide
 from fasaco_edge.mission.fleet.division_numbers import DivisionNumbers
 from fasaco_edge.mission.fleet.ground import JointGround, viewpoint
-from fasaco_edge.mission.fleet.members import GONE_S, Member, Members
+from fasaco_edge.mission.fleet.members import Member, Members
 from fasaco_edge.mission.fleet.remainder import Remainder
 from fasaco_edge.mission.map.map_state import MapState
-from fasaco_edge.mission.map.reachable_area import ReachableArea, anchor_cell
+from fasaco_edge.mission.map.reachable_area import ReachableArea
 from fasaco_edge.planners.cost import CoverageCost
 
 # Period of checks; least life of a division while no robot leaves: in general, and for balance [s].
@@ -33,8 +34,6 @@ UNEVEN, UNEVEN_S = 1.25, 40.0
 # Number of cells of this robot's part swept by another one that triggers a new plan: more than by
 # merely passing through. In unknown buildings 4 cost 7 % of two robots' time.
 MANY_TAKEN = 30
-# Limit on the numbers of a seed's cell, as others are told.
-FARTHEST = 2**30
 LATER = "another robot has a newer division"
 
 OpenCells = Callable[[Window], NDArray[np.bool_]]
@@ -60,6 +59,7 @@ class FleetLayer:
         self.others = Members(robot, ledger, cell_m)
         self.numbers = DivisionNumbers(robot, self.others)
         self._robot, self.step_s = robot, cost.step_s
+        self._at_work = AtWork(self.others, self.numbers)
         self._turn_steps = cost.quarter_turn_s / cost.step_s
         self._map, self._ledger = map_state, ledger
         self._division: Division | None = None
@@ -67,6 +67,8 @@ class FleetLayer:
         # The owners of the cells of a joint ground.
         self._owners: tuple[JointGround | None, NDArray[np.int8]]
         self._owners = None, np.zeros((0, 0), np.int8)
+        # The joint ground of an area at the last look: others tell of theirs many times a second.
+        self._seen: tuple[ReachableArea, JointGround] | None = None
         # Cells of an area that this robot tried in vain, while others are at work.
         self._tried: tuple[ReachableArea | None, NDArray[np.bool_]]
         self._tried = None, np.zeros((0, 0), np.bool_)
@@ -108,11 +110,17 @@ class FleetLayer:
 
         Of the cells of this robot's map these are such as it can reach.
         """
-        joint = self.others.ground.joint(area)
+        joint = self._joint(area)
         left = open_cells(joint.common.window) & joint.area.reachable
         inside = area.lattice.window.slices_in(joint.common.window)
         left[inside] = self.untried(left[inside], area)
         return joint, left
+
+    def _joint(self, area: ReachableArea) -> JointGround:
+        """Return the joint ground, of this area as at the last look."""
+        if self._seen is None or self._seen[0] is not area:
+            self._seen = area, self.others.ground.joint(area)
+        return self._seen[1]
 
     @property
     def others_go_on(self) -> bool:
@@ -172,7 +180,7 @@ class FleetLayer:
             return ""
         if not (at_once or now - self._looked_at >= LOOK_S):
             return self._why_by_taken()
-        self._looked_at = now
+        self._looked_at, self._seen = now, None
         (joint, left), before = self._left(open_cells, area), self._division
         inside = area.lattice.window.slices_in(joint.common.window)
         own = left if before is None else left & self._of_me(before, joint)
@@ -186,10 +194,13 @@ class FleetLayer:
             self.numbers.follow(newer)
             self._division = Division.of(newer.parts)
         else:
-            robots = self._robots(joint.area, cell, now)
+            robots = [
+                Robot(self._robot, cell, self.step_s),
+                *self._at_work.in_reach(joint.area, now),
+            ]
             if not (why := self._why_anew(joint, left, robots, now, at_once=at_once)):
                 return self._why_by_taken()
-            robots += self._out_of_reach(joint.common, robots, now)
+            robots += self._at_work.unseen(before, joint.common, robots, self._divided_at, now)
             divided = divide(joint.common, left, robots, before, self._turn_steps)
             if before is None or not divided.is_like(before):
                 self.numbers.count_on()
@@ -211,34 +222,6 @@ class FleetLayer:
             return None
         area = self._map.area
         return int(np.count_nonzero(self._is_own(self._division, area) & area.reachable))
-
-    def _robots(self, area: ReachableArea, cell: Cell, now: float) -> list[Robot]:
-        """Return the robots at work in the area that this robot can reach."""
-        robots = [Robot(self._robot, cell, self.step_s)]
-        for name, member in self.members.items():
-            place = anchor_cell(area.lattice, Pose2D(member.newest.x, member.newest.y))
-            if not member.absence(now) and place is not None and area.contains(place):
-                robots.append(Robot(name, place, member.newest.step_s))
-        return robots
-
-    def _out_of_reach(
-        self, lattice: CoverageLattice, robots: list[Robot], now: float
-    ) -> list[Robot]:
-        """Return the robots at work, of the last division, to which its map shows no way.
-
-        Left out, they would divide again themselves, and leave out those that they do not see.
-        """
-        reached = {robot.name for robot in robots}
-        found = []
-        for name in () if self._division is None else self._division.names:
-            member = self.members.get(name)
-            if name in reached or member is None or member.absence(now):
-                continue
-            row, col = lattice.cell_at(member.newest.x, member.newest.y)
-            # Others could not be told of a seed farther off.
-            if max(abs(row), abs(col)) < FARTHEST:
-                found.append(Robot(name, (row, col), member.newest.step_s))
-        return found
 
     def _why_anew(
         self,
@@ -269,10 +252,7 @@ class FleetLayer:
 
     def _is_gone(self, name: str, now: float) -> bool:
         """Tell whether a robot of the division takes no part any more."""
-        member = self.members.get(name)
-        if member is None:
-            return name != self._robot and now - self._divided_at > GONE_S
-        return bool(member.absence(now))
+        return name != self._robot and self._at_work.is_gone(name, self._divided_at, now)
 
     def _why_by_parts(
         self,
@@ -304,7 +284,7 @@ class FleetLayer:
 
     def _is_own(self, division: Division, area: ReachableArea) -> NDArray[np.bool_]:
         """Return which cells of this robot's area are in its part."""
-        joint = self.others.ground.joint(area)
+        joint = self._joint(area)
         return self._of_me(division, joint)[area.lattice.window.slices_in(joint.common.window)]
 
     def _of_me(self, division: Division, joint: JointGround) -> NDArray[np.bool_]:

@@ -25,6 +25,8 @@ GONE_S, HANGING_S, STANDING_M = 5.0, 8.0, 0.05
 # that stands scatter.
 LEFT_M = 0.2
 
+# Absence of a robot that is silent.
+GONE = "gone"
 AT_WORK = (State.PLANNING, State.COVERING, State.DEGRADED)
 
 
@@ -59,7 +61,7 @@ class Member:
         if self.left_out:
             return self.left_out
         if now - self.heard_at > GONE_S:
-            return "gone"
+            return GONE
         if self.newest.state not in AT_WORK:
             return self.newest.state
         is_hanging = now - self.moved_at > HANGING_S and not self.newest.waits_for
