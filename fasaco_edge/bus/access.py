@@ -76,7 +76,9 @@ ROLES: Mapping[str, Role] = {
     "mapper": _role("mapper", "publishes maps, map updates, poses and the battery"),
     "viewer": _role("viewer", "sees path, status, coverage and pheromone"),
     "operator": _role("operator", "commands the mission, and views", includes="viewer"),
-    "recorder": _role("recorder", "receives everything, publishes its status", includes="viewer"),
+    "recorder": _role(
+        "recorder", "receives all but the keep-out mask, publishes its status", includes="viewer"
+    ),
     "driver": _role("driver", "drives the robot: publishes cmd_vel, and views", includes="viewer"),
     # Topics that the configuration names: see ``ros_rights``.
     "ros": Role(
