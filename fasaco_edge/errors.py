@@ -253,10 +253,15 @@ class LedgerMismatchError(FasacoError):
 
 
 class FleetError(FasacoError):
-    """What another robot of the fleet says cannot be used; it is left out."""
+    """There is no room for what another robot of the fleet says; it is left out.
+
+    Also raised on a message of another version, which a daemon takes for a robot that does not fit.
+    """
 
     code = "fleet_member"
-    hint = "robots of one fleet need the same cell size and frame, and releases that fit together"
+    hint = (
+        "a fleet has at most 33 robots; look for a robot that tells cells far outside the building"
+    )
 
 
 class OrderError(FasacoError):
