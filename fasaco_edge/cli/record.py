@@ -1,4 +1,4 @@
-"""``fasaco-edge record``: write what is published on the bus into a recording."""
+"""``fasaco-edge record``: the recorder of one robot, or of a whole fleet, as a command."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import msgspec
 
 from fasaco_edge.cli.console.arguments import Command, add_robot_on_bus, robot_on_bus
+from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.wire.schemas import POSE_SCHEMAS, POSE_STAMPED
 
 if TYPE_CHECKING:
@@ -33,7 +34,8 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         "--fleet",
         metavar="NAME",
         help="record all robots of this fleet (`fleet: {name: NAME}`) into one file, also those "
-        "that come later; its layout shows all of them",
+        "that come later; its layout shows all of them. Maps and poses are those of the native "
+        "keys, not of ROS 2",
     )
     parser.add_argument(
         "--pose-schema",
@@ -47,7 +49,8 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         "--ros2",
         type=ros_config,
         metavar="JSON",
-        help="the block ros2 of the daemon's configuration: also record these topics",
+        help="the block ros2 of the daemon's configuration: also record these topics; not with "
+        "--fleet",
     )
     _add_room(parser)
     parser.add_argument(
@@ -117,7 +120,16 @@ def _add_room(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Record."""
+    """Record.
+
+    Raises:
+        BadConfiguration: options contradict each other, or the configuration is wrong.
+    """
+    if args.fleet is not None and args.ros2 is not None:
+        raise BadConfiguration(
+            "--ros2: of a fleet's robots only the native keys are recorded",
+            hint="leave --ros2 out, or record each robot",
+        )
     from fasaco_edge.recording.write.process import Output
     from fasaco_edge.recording.write.quota import budget_of
     from fasaco_edge.recording.write.recorder import run_recorder

@@ -113,6 +113,11 @@ def folder(tmp_path, monkeypatch):
         ("simulate office --connect office", 78, "'office': no protocol before the address"),
         (f"record --out . --connect {NOBODY}", 1, "Unable to connect to any of"),
         (f"record --out . --base /x --connect {NOBODY}", 78, "base must be chunks"),
+        (
+            'record --out . --fleet hall --ros2 {"kind":"bridge"}',
+            78,
+            "--ros2: of a fleet's robots only the native keys are recorded",
+        ),
         ("demo --map nowhere --out o", 1, "no map 'nowhere'"),
         ("demo --speed 0 --out o", 78, "--speed must be above 0, got 0.0"),
         ("demo --speed nan --out o", 78, "--speed must be above 0, got nan"),
