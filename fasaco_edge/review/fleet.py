@@ -1,4 +1,4 @@
-"""The review of a fleet's recording: makespan, balance, floor swept twice, waiting, messages.
+"""The review of a fleet's recording: makespan, balance, floor swept again, waiting, messages.
 
 A cell that two robots passed over is swept again, or only driven through: while a robot is on floor
 that others have swept, it takes a number of steps from where it comes onto it to where it leaves.

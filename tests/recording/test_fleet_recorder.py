@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import time
 
 import pytest
@@ -11,6 +12,7 @@ pytest.importorskip("rerun")
 
 from fasaco_edge.bus.session import open_bus
 from fasaco_edge.bus.settings import BusSettings
+from fasaco_edge.cli import review
 from fasaco_edge.cli.console.arguments import Exit
 from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.errors import FleetError, UnreadableRecording
@@ -21,7 +23,7 @@ from fasaco_edge.recording.fleet.notes import is_fleet_recording, read_notes
 from fasaco_edge.recording.fleet.recorder import FleetRecorder
 from fasaco_edge.recording.write.process import Output
 from fasaco_edge.recording.write.quota import DiskBudget
-from fasaco_edge.review.fleet import review_fleet
+from fasaco_edge.review.fleet import FleetFigures, FleetRobotFigures, review_fleet
 from fasaco_edge.wire import topics
 from fasaco_edge.wire.documents.fleet import FleetPart
 from fasaco_edge.wire.keys import Keys
@@ -298,9 +300,17 @@ def test_the_review_of_a_fleet_is_printed_and_drawn(studio, tmp_path):
     document = json.loads(fasaco_edge("review", part, "--json").out)
     assert [robot["name"] for robot in document["robots"]] == ["r1", "r2"]
     assert document["swept_m2"] == pytest.approx(6 * CELL_M**2, abs=0.01)
-    refused = fasaco_edge("review", part, "--at", "0:01")
-    assert refused.code == Exit.CONFIG
-    assert "recording of a fleet" in refused.err
+    for words in (["--at", "0:01"], ["--at", "0"], ["--long"]):
+        refused = fasaco_edge("review", part, *words)
+        assert refused.code == Exit.CONFIG
+        assert f"{words[0]}: this is the recording of a fleet" in refused.err
+
+
+def test_each_figure_of_a_fleet_is_in_the_help():
+    told = review.COMMAND.epilog.partition("Of a fleet it holds:")[2]
+    figures = (*FleetFigures.__struct_fields__, *FleetRobotFigures.__struct_fields__)
+    others = {"by", "cells", "and", "each", "with"}
+    assert [word for word in re.findall(r"\w+", told) if word not in others] == list(figures)
 
 
 @pytest.mark.skipif(not viewer.drivers(), reason="no software renderer")

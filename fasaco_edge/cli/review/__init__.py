@@ -1,4 +1,4 @@
-"""``fasaco-edge review``: what happened in a recorded mission, or in two."""
+"""``fasaco-edge review``: the report of a recorded mission, of two compared, or of a fleet."""
 
 from __future__ import annotations
 
@@ -28,8 +28,9 @@ DESCRIPTION = """\
 Report what happened in a recorded mission, on one screen; with --long all figures, orders,
 commands, replans, floor left and why, worst moments and faults. With --at and --point it answers a
 question: what was at a time, why a spot was not swept. Of a fleet's recording it reports makespan,
-balance, floor swept twice, waiting and messages. Parts of one run are read together. Files are only
-read; of files that a crash cut short, the whole part is used.
+balance, floor swept again or only driven through, waiting and messages; such a recording takes
+--json, --png and --view only. Parts of one run are read together. Files are only read; of files
+that a crash cut short, the whole part is used.
 """
 
 
@@ -42,6 +43,13 @@ examples:
   fasaco-edge review night.rrd --export night --export-as parquet
   fasaco-edge review night.rrd --html night.html       everything, as a page to pass on
 """
+
+OF_A_FLEET = (
+    "Of a fleet it holds: fleet, duration_s, makespan_s, busy_balance, swept_balance, swept_m2 (by "
+    "cells), through_m2, again_m2, again_share, waited_s, divisions, and robots: each with name, "
+    "state, busy_s, waited_s, waits, longest_wait_s, driven_m, swept_m2, through_m2, again_m2, "
+    "messages_s, kb_s, peak_kb_s, plans, plan_ms_p50, plan_ms_p99."
+)
 
 
 def _time(text: str) -> float:
@@ -234,6 +242,7 @@ def _epilog() -> str:
         "both have the `difference`, the first less the second.",
         96,
     )
+    lines += textwrap.wrap(OF_A_FLEET, 96)
     return "\n".join(lines)
 
 

@@ -1,4 +1,4 @@
-"""What ``fasaco-edge review`` prints of a fleet's recording: one screen, JSON, a picture."""
+"""The report of ``fasaco-edge review`` on a fleet: one screen, JSON, a picture."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from fasaco_edge.review.fleet import FleetFigures, review_fleet
 from fasaco_edge.review.wording import clock
 from fasaco_edge.text import one_line
 
-ONE_ROBOT = ("at", "point", "against", "html", "export")
+ONE_ROBOT = ("long", "at", "point", "against", "html", "export")
 HEADER = (
     "robot", "state", "busy", "waited", "swept m2", "through", "again", "driven m", "kB/s",
     "plan ms",
@@ -29,7 +29,9 @@ def print_fleet(args: argparse.Namespace) -> int:
         BadConfiguration: an option is for the recording of one robot.
     """
     for name in ONE_ROBOT:
-        if getattr(args, name):
+        value = getattr(args, name)
+        # Not by its truth: 0 is a time.
+        if value is not None and value is not False:
             raise BadConfiguration(
                 f"--{name}: this is the recording of a fleet",
                 hint="review the recording of one of its robots",

@@ -1,4 +1,4 @@
-"""What ``fasaco-edge review`` prints: one screen, all there is, or two runs side by side."""
+"""The screens of ``fasaco-edge review``: a run in short, in full, or two side by side."""
 
 from __future__ import annotations
 
