@@ -1,4 +1,4 @@
-"""``fasaco-edge mission``: command a running daemon, and see how far it is."""
+"""``fasaco-edge mission``: commands to a daemon, or to each of a fleet, and its progress."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ examples:
   fasaco-edge mission start --zone kitchen          a zone of the daemon's configuration
   fasaco-edge mission start --keep-out "1,1;2,1;2,2;1,2"
   fasaco-edge mission start --order evening.yaml
-  fasaco-edge mission start --fleet building_7      one order, which its robots share
+  fasaco-edge mission start --fleet building_7      to each of its robots: they share the floor
   fasaco-edge mission pause && fasaco-edge mission resume
 
 evening.yaml, or the same as JSON; all lengths in metres in the frame of the map:
@@ -43,7 +43,13 @@ Each pass starts from zero: what was covered before is covered again. An order, 
 whether it is paused survive a restart of the daemon. A daemon without an order covers everything
 by itself (mission.autostart of its configuration).
 
-exit codes: 0 done; 1 refused, or no answer; 2 usage error; 78 invalid robot name
+With --fleet all its robots get the same command, those that others heard within ten minutes, too.
+Some may refuse or not answer while the others obey: the exit code is 1 then, and one without an
+answer may still be driving. Robots share a zone; corners are in the frame of each robot's own map:
+with fleet.frame use zones and keep-outs of their configurations.
+
+exit codes: 0 done; 1 refused, or no answer, by one robot at least; 2 usage error; 78 invalid robot
+name
 """
 
 COMMANDS = {

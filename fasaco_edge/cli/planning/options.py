@@ -63,7 +63,7 @@ figures of several robots:
   gap              makespan_steps / lower_bound_makespan_steps - 1: steps alone, whatever
                    turns take; null where that bound is 0
   balance          mean steps of the walks / makespan_steps
-  swept_twice      cells that two or more robots visit
+  swept_twice      cells that two or more robots pass, driving through included
   unreachable_cells
                    cells that none of the robots can come to
   rounds           pieces of the search, of all areas: of its annealing and, where turns
@@ -125,7 +125,9 @@ def _add_problem(group: argparse._ArgumentGroup) -> None:
         action="extend",
         metavar="R,C",
         help="start cells of several robots that share the floor: one walk each, the longest as "
-        "short as possible",
+        "short as possible; the walks are not timed against each other: robots that drive them "
+        "have to avoid one another. By fasaco with local search, through the centres of cells; "
+        "without --align, --overlap, --target-gap and --pheromone-png",
     )
     start.add_argument(
         "--robots-xy",
