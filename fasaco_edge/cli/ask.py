@@ -1,4 +1,4 @@
-"""``fasaco-edge ask``: put a question to a running daemon, and show its answer.
+"""``fasaco-edge ask``: a query to a running daemon, and its answer.
 
 Answers are tables for people, or JSON where they came as CDR.
 """

@@ -1,4 +1,4 @@
-"""``fasaco-edge doctor``: check host, bus and configuration, and say what to do."""
+"""``fasaco-edge doctor``: checks of host, bus and configuration, each with what to do."""
 
 from __future__ import annotations
 

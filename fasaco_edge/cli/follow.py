@@ -1,4 +1,4 @@
-"""``fasaco-edge follow``: drive the robot's base along the path.
+"""``fasaco-edge follow``: the driver of a robot's base along its path.
 
 The configuration takes more memory to read than the robot to drive: once it is read, the process
 becomes a small one, which gets its settings through a pipe.

@@ -1,4 +1,4 @@
-"""``fasaco-edge plan``: plan offline, for a map or a coverage grid in a file."""
+"""``fasaco-edge plan``: an offline plan for a map or a coverage grid in a file."""
 
 from __future__ import annotations
 

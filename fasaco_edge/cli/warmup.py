@@ -1,4 +1,4 @@
-"""``fasaco-edge warmup``: compile the kernels into the cache."""
+"""``fasaco-edge warmup``: compilation of the kernels into the cache."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""``fasaco-edge demo``: a robot, or several, cover a building nobody mapped before."""
+"""``fasaco-edge demo``: a mission of simulated robots, one or several, in an unknown building."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the options of ``fasaco-edge plan`` ask for: a robot, a search, a line."""
+"""Request of ``fasaco-edge plan``: robot, search and line that its options state."""
 
 from __future__ import annotations
 

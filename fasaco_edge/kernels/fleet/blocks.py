@@ -1,4 +1,4 @@
-"""Blocks of a ground: connected cells within a square of some cells a side, and which lie beside.
+"""Blocks of a ground: connected cells within a square of the lattice, and which blocks adjoin.
 
 Who sweeps which room is searched over blocks (``shares``), of which there are few.
 """

@@ -1,4 +1,4 @@
-"""Parts of a robot's walk: found after a change has split it, joined to another walk or again.
+"""Pieces of a robot's walk that a change has split: found, and joined again or to another walk.
 
 Where the steps along two opposite sides of a square are replaced by those across it, a walk falls
 into two closed walks, and two closed walks become one. So a walk that falls into two by a change

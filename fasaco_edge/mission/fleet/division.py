@@ -1,4 +1,4 @@
-"""Division of the cells left among robots under way: a seed and a handicap for each robot.
+"""Division of the remaining cells among the robots at work: a seed and a handicap for each.
 
 A cell belongs to the robot whose seed has the shortest travel time to it, plus the robot's
 handicap. So each part is connected, and cells that a map shows later have an owner, too. Handicaps

@@ -1,4 +1,4 @@
-"""Traffic: robots of a fleet keep out of each other's way.
+"""Traffic rules of a fleet: which robot waits or makes way where two come near each other.
 
 Each robot tells its disc and the next metres of its path. Where two would come too near each other
 at about the same time, the one farther from that place waits; at about equal distance the one with

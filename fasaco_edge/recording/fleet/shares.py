@@ -1,4 +1,4 @@
-"""Who does what: the shares of a division, and the cells that several robots swept.
+"""Shares of the robots in a division, and the cells that several of them swept.
 
 A cell belongs to the robot whose seed has the shortest travel time to it, plus its handicap, as the
 robots themselves reckon; here over the cells that they tell to be within reach.
