@@ -75,6 +75,7 @@ def test_it_comes_back_as_it_was_and_is_that_of_the_schema():
         {"division": 2**31},
         {"frame": "m" * 300},
         {"state": 5},
+        {"state": ""},
         {"swept": [[0, 0, "AAAA"]]},
         {"ground": [[0, 0, "AAAA"]]},
         {"radius_m": -0.1},

@@ -34,6 +34,7 @@ Coordinate = Annotated[float, Meta(ge=-MAX_COORDINATE_M, le=MAX_COORDINATE_M)]
 Point = tuple[Coordinate, Coordinate]
 Angle = Annotated[float, Meta(ge=-360, le=360)]
 Text = Annotated[str, Meta(max_length=256)]
+Named = Annotated[str, Meta(min_length=1, max_length=256)]
 Whole = Annotated[int, Meta(ge=0, le=2**31 - 1)]
 Pace = Annotated[float, Meta(ge=1e-3, le=3600)]
 CellEdge = Annotated[float, Meta(ge=MIN_RESOLUTION_M, le=MAX_RESOLUTION_M)]
@@ -104,7 +105,7 @@ class FleetMember(Document, frozen=True):
     fleet: Text
     cell_m: CellEdge
     frame: Text
-    state: Text
+    state: Named
     x: Coordinate
     y: Coordinate
     step_s: Pace
