@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -15,6 +16,7 @@ from fasaco_edge.config.config import DaemonConfig, FleetConfig
 from fasaco_edge.config.robot import RobotConfig
 from fasaco_edge.daemon.loop.fleet import LEAST_SPACING_S, TILES, FleetEar, FleetVoice
 from fasaco_edge.errors import FleetError, MalformedMessage
+from fasaco_edge.grid.lattice import Footprint
 from fasaco_edge.mission.core.events import MapReceived, Part
 from fasaco_edge.mission.fleet.shared import MOST_ROBOTS
 from fasaco_edge.wire.documents.fleet import CellTile, FleetMember, FleetPart, decode_member
@@ -25,6 +27,7 @@ from fasaco_edge.wire.limits import (
     MAX_FLEET_TILES,
     MAX_JSON_BYTES,
 )
+from tests.mission import world
 from tests.mission.fleets import FleetRobot
 from tests.mission.world import CELL, Drive, building, pose_at
 from tests.mission.world import CONFIG as WORLD
@@ -185,6 +188,24 @@ def test_a_robot_tells_which_of_its_cells_are_from_before_their_epoch_where_it_k
     assert {64 * tile.row for tile in told.swept} >= {64, 128}
     assert {tile.row: tile for tile in told.kept}[1] == before[1]
     assert 2 not in {tile.row for tile in told.kept}
+
+
+@pytest.mark.parametrize("cell_m", [0.005, 0.028, CELL])
+def test_a_robot_tells_its_next_metres_whatever_the_size_of_its_cells(cell_m, monkeypatch):
+    monkeypatch.setattr(world, "CELL", cell_m)
+    footprint = Footprint(cell_m=cell_m, robot_radius_m=cell_m / 2)
+    drive = Drive((0, 0), config=replace(WORLD, robot="r1", footprint=footprint))
+    drive.mission.shared.begin(1)
+    drive.tell(MapReceived(building("." * 600)), pose_at(0, 0))
+    drive.plan()
+    line, listener = drive.mission.next_metres(), Listener()
+    FleetVoice(listener, CONFIG).publish(drive.mission, 0.0)
+    told = np.array(listener.heard[-1].ahead)
+    assert told[-1] == pytest.approx(line[-1], abs=1e-3)
+    assert told[0] == pytest.approx(line[0], abs=1e-3)
+    steps = np.hypot(*np.diff(told, axis=0).T)
+    assert steps.max() < max(1.1 * cell_m, 0.06)
+    assert steps.min() > 0.0
 
 
 @pytest.mark.parametrize("northing_m", [5_500_000, 9_999_000])

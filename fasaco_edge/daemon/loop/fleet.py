@@ -10,6 +10,8 @@ import time
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from fasaco_edge.bus.arrival import Sample
 from fasaco_edge.bus.publisher import Publisher
 from fasaco_edge.bus.session import Bus
@@ -28,10 +30,12 @@ from fasaco_edge.wire.documents.fleet import (
     decode_member,
 )
 from fasaco_edge.wire.documents.json_text import encode_json
+from fasaco_edge.wire.limits import MAX_FLEET_POINTS
 from fasaco_edge.wire.topics import FLEET
 
 if TYPE_CHECKING:
     from fasaco_edge.mission.core.mission import Mission
+    from fasaco_edge.mission.fleet.traffic import Points
 
 PERIOD_S, LEAST_PERIOD_S = 1.0, 0.25
 # Rate limit of the messages of a robot [s].
@@ -200,12 +204,24 @@ class FleetVoice:
                 for part in mission.fleet.parts
             ),
             radius_m=self._radius_m,
-            ahead=tuple((round(x, 3), round(y, 3)) for x, y in mission.next_metres().tolist()),
+            ahead=tuple((round(x, 3), round(y, 3)) for x, y in _thinned(mission.next_metres())),
             waits_for=waits_for,
             origin=self._origin,
             kept=None if kept is None else tuple(CellTile(*place, bits) for place, bits in kept),
         )
         self._publisher.put(encode_json(member))
+
+
+def _thinned(points: Points) -> list[list[float]]:
+    """Return at most as many points of a line as a message holds, evenly, with both ends [m].
+
+    Cells of less than 3.2 cm have more centres in the next 2 m.
+    """
+    count = len(points)
+    if count > MAX_FLEET_POINTS:
+        points = points[np.linspace(0, count - 1, MAX_FLEET_POINTS).round().astype(np.intp)]
+    found: list[list[float]] = points.tolist()
+    return found
 
 
 def _origin(fleet: FleetConfig) -> tuple[float, float, float]:
