@@ -14,7 +14,7 @@ from msgspec import structs
 from fasaco_edge.bus.arrival import Sample
 from fasaco_edge.config.config import DaemonConfig, FleetConfig
 from fasaco_edge.config.robot import RobotConfig
-from fasaco_edge.daemon.loop.fleet import LEAST_SPACING_S, TILES, FleetEar, FleetVoice
+from fasaco_edge.daemon.loop.fleet import TILES, FleetEar, FleetVoice
 from fasaco_edge.errors import FleetError, MalformedMessage
 from fasaco_edge.grid.lattice import Footprint
 from fasaco_edge.mission.core.events import MapReceived, Part
@@ -234,21 +234,6 @@ def test_robots_on_a_map_in_utm_divide_its_cells(northing_m):
     parts = [drive.mission.fleet.parts for drive in drives.values()]
     assert parts[0] == parts[1]
     assert [part.robot for part in parts[0]] == ["r1", "r2"]
-
-
-def test_a_robot_that_floods_is_heard_at_its_rate():
-    ear, key = FleetEar(CONFIG), "fasaco/@v1/r2/fleet"
-    taken = [at for at in range(1000) if ear._is_due(key, 0.001 * at)]
-    assert len(taken) == 1 / LEAST_SPACING_S
-    for number in range(1000):
-        ear._is_due(f"{key}{number}", 5.0)
-    assert ear._is_due(key, 6.0)
-    assert not ear._is_due("fasaco/@v1/another/fleet", 6.0)
-    # Room for another is there once one of them is silent, but not at the cost of one that is not.
-    for at in (30.0, 65.0):
-        assert ear._is_due(key, at)
-    assert all(ear._is_due(f"fasaco/@v1/other{number}/fleet", 65.0) for number in range(63))
-    assert not ear._is_due("fasaco/@v1/another/fleet", 65.0)
 
 
 def test_a_robot_whose_cells_lie_at_another_angle_is_left_out():

@@ -16,10 +16,11 @@ from fasaco_edge.bus.arrival import Sample
 from fasaco_edge.bus.publisher import Publisher
 from fasaco_edge.bus.session import Bus
 from fasaco_edge.config.config import DaemonConfig, FleetConfig
+from fasaco_edge.daemon.loop.fleet_arrivals import FleetArrivals
 from fasaco_edge.errors import FasacoError, FleetError
 from fasaco_edge.grid.geometry import Pose2D
 from fasaco_edge.mission.core.events import MemberHeard, Part
-from fasaco_edge.mission.fleet.frames import MOST_HEARD, FleetFrames
+from fasaco_edge.mission.fleet.frames import FleetFrames
 from fasaco_edge.mission.fleet.ground import GroundTelling
 from fasaco_edge.mission.fleet.shared import Telling
 from fasaco_edge.wire.documents.fleet import (
@@ -38,10 +39,6 @@ if TYPE_CHECKING:
     from fasaco_edge.mission.fleet.traffic import Points
 
 PERIOD_S, LEAST_PERIOD_S = 1.0, 0.25
-# Rate limit of the messages of a robot [s].
-LEAST_SPACING_S = 0.2
-# A robot silent for this long makes room for another [s].
-FORGOTTEN_S = 60.0
 # Tiles of progress, and as many of ground, in a message sent once a second, and in one on change:
 # 20 kB a second in all, and up to 7 more where cells were kept from before an epoch.
 TILES, FEW_TILES = 10, 2
@@ -62,13 +59,13 @@ class FleetEar:
         if self._frame:
             origin = _origin(config.fleet)
             self._frames = FleetFrames(_pose(*origin), self._lattice_deg, self._cell_m)
-        self._heard_at: dict[str, float] = {}
+        self._arrivals = FleetArrivals(self._keys, self._fleet)
 
     def listen(self, bus: Bus, post: Callable[[Sample], None]) -> None:
-        """Pass on the messages of others within their rate limit."""
+        """Pass on the messages of this fleet within their rate limit."""
 
         def post_due(sample: Sample) -> None:
-            if self._is_due(sample.key, time.monotonic()):
+            if self._arrivals.is_due(sample, time.monotonic()):
                 post(sample)
 
         bus.subscribe(self._keys.of_all(FLEET), post_due)
@@ -126,19 +123,9 @@ class FleetEar:
             return heard
         return self._frames.event(heard, _pose(*member.origin), member.lattice_deg)
 
-    def _is_due(self, key: str, now: float) -> bool:
-        """Tell whether a message on a key may be taken now; on a Zenoh thread."""
-        if now - self._heard_at.get(key, float("-inf")) < LEAST_SPACING_S:
-            return False
-        # The robot heard longest ago is first.
-        if len(self._heard_at) >= MOST_HEARD and key not in self._heard_at:
-            longest = next(iter(self._heard_at))
-            if now - self._heard_at[longest] < FORGOTTEN_S:
-                return False
-            del self._heard_at[longest]
-        self._heard_at.pop(key, None)
-        self._heard_at[key] = now
-        return True
+    def take_faults(self) -> list[FasacoError]:
+        """Return the faults since the last call that no message is refused with."""
+        return self._arrivals.take_faults()
 
 
 class FleetVoice:

@@ -244,6 +244,8 @@ class Inbox:
                 events.append(event)
         if lost:
             events.append(PatchesLost(lost))
+        if self._fleet is not None:
+            faults += self._fleet.take_faults()
         return events, faults
 
     def _newest_maps(

@@ -131,6 +131,14 @@ class _Head(msgspec.Struct, frozen=True):
     fleet: Text
 
 
+def fleet_of(payload: bytes) -> str | None:
+    """Return the name of the fleet that a message is for; None where it cannot be read."""
+    try:
+        return msgspec.json.decode(payload, type=_Head).fleet
+    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError):
+        return None
+
+
 def decode_member(payload: bytes, fleet: str) -> FleetMember | None:
     """Return a robot's message; None from another fleet.
 
