@@ -117,7 +117,7 @@ class MissionDrive:
             may_begin: whether the mission may begin, once there is a map.
         """
         self.began = now if self.began is None else self.began
-        events, malformed = self._inbox.decode(batch)
+        events, malformed = self._inbox.decode(batch, has_mission=self.is_begun)
         claim = ClaimState.PLANS if may_begin else ClaimState.WAITS
         mission, events, useless = self._runner.mission_for(events, claim)
         refused = (*malformed, *useless)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import gc
 import json
 import weakref
@@ -20,6 +21,7 @@ from fasaco_edge.daemon.loop.fleet import FleetEar
 from fasaco_edge.daemon.loop.held_events import HeldEvents
 from fasaco_edge.daemon.loop.inbox import (
     MOST_POSES,
+    Batch,
     Inbox,
     Received,
     make_mailbox,
@@ -125,6 +127,26 @@ def test_what_a_fleet_says_too_long_is_dropped_on_arrival():
         assert [str(fault) for fault in faults] == [
             "a fleet message of 1048577 bytes was dropped: it may have at most 1048576"
         ]
+
+
+def test_what_a_fleet_says_before_the_mission_is_not_heard():
+    """A replay hears nothing of it: with it, cells at the edges of tiles would be others."""
+    fleet = {"name": "hall", "frame": "house"}
+    config = msgspec.convert({"robot": {"name": "r1"}, "fleet": fleet}, DaemonConfig)
+    every, told = base64.b64encode(b"\xff" * 512).decode(), []
+    for col in range(2):
+        said = {"version": 1, "fleet": "hall", "cell_m": config.cell_m, "frame": "house"}
+        said |= {"state": "covering", "x": 0.0, "y": 0.0, "step_s": 1.0, "epoch": 1, "division": 0}
+        said |= {"open_cells": 9, "swept": [], "ground": [[0, col, every]]}
+        payload = json.dumps(said | {"origin": [3.0, 0.0, 20.0]}).encode()
+        told.append(Received("fleet", Sample("fasaco/@v1/r2/fleet", payload), 0.0))
+    with open_bus(BusSettings("peer", (), (free_endpoint(),))) as bus:
+        poses, ear = PoseDecoder(POSE_STAMPED, None), FleetEar(config)
+        inbox = Inbox(bus, config.keys(), make_mailbox(MAX_PIXELS), poses, MAX_PIXELS, fleet=ear)
+        assert inbox.decode(Batch(samples=told[:1]), has_mission=False) == ([], [])
+        events, faults = inbox.decode(Batch(samples=told[1:]))
+    assert events == [FleetEar(config).event(told[1].sample)]
+    assert faults == []
 
 
 def test_a_command_waits_for_the_poses_before_it_and_takes_them_in_no_larger_cycles(arrivals):

@@ -214,11 +214,14 @@ class Inbox:
         for subscription in self._maps:
             subscription.ask()
 
-    def decode(self, batch: Batch) -> tuple[list[Event], list[FasacoError]]:
+    def decode(
+        self, batch: Batch, *, has_mission: bool = True
+    ) -> tuple[list[Event], list[FasacoError]]:
         """Return the events in a batch, and the faults; a malformed sample affects no other.
 
         For each frame the newest readable map counts. It replaces earlier updates of that frame,
-        lost ones included.
+        lost ones included. Of a fleet nothing is heard before there is a mission: the ear keeps
+        what robots tell, and the turn log, of which a replay hears, has them from then on.
         """
         maps, faults = self._newest_maps(batch.samples)
         events = list[Event](MapReceived(grid) for grid, _ in maps.values())
@@ -226,7 +229,8 @@ class Inbox:
         faults.extend(map(_size_fault, batch.oversized))
         lost = batch.updates_lost
         for received in batch.samples:
-            if received.kind == "map":
+            is_early = received.kind == topics.FLEET.name and not has_mission
+            if received.kind == "map" or is_early:
                 continue
             try:
                 event = self._event(received)

@@ -119,7 +119,8 @@ class Loop:
         if self._host.reload.is_read and not self._runner.loading:
             self._reload_config(batch)
         now = time.monotonic()
-        events, faults = self._bus.inbox.decode(batch)
+        has_mission = self._runner.mission is not None
+        events, faults = self._bus.inbox.decode(batch, has_mission=has_mission)
         self._count_faults([*faults, *batch.planner_faults])
         self._note(batch)
         commands = self._bus.commands.take(batch.questions, now)

@@ -113,7 +113,7 @@ class TurnLog:
         if any(isinstance(plan, PlanBroken) for plan in batch.plans):
             self.end("a plan broke, which no replay repeats")
             return
-        # Fleet messages before there is a mission have no effect.
+        # Fleet messages before there is a mission are not heard.
         samples = [
             self._taken(received)
             for received in batch.samples
