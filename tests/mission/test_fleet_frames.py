@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from msgspec import structs
 
 from fasaco_edge.bus.arrival import Sample
 from fasaco_edge.config.config import DaemonConfig, FleetConfig
@@ -23,6 +24,8 @@ from fasaco_edge.mission.fleet.frames import (
     placed_point,
     seen_from,
 )
+from fasaco_edge.wire.documents.fleet import CellTile, FleetMember, FleetPart
+from fasaco_edge.wire.documents.json_text import encode_json
 from tests.mission.world import CELL, CONFIG, Drive, building
 
 AT = Pose2D(3.1, -2.0, math.radians(30.0))
@@ -126,6 +129,30 @@ def test_places_and_seeds_come_in_this_robots_frames():
         heard, Pose2D(1.0, 0.0), math.degrees(0.5)
     )
     assert placed.parts == heard.parts
+
+
+@pytest.mark.parametrize("sign", [-1, 1])
+def test_a_division_that_could_not_be_told_to_others_is_left_out_and_named(sign):
+    """A follower would repeat its seeds as they lie here, and be refused by all."""
+    tile = CellTile(0, 0, bits_of({(3, 4)}))
+    config = DaemonConfig(robot=RobotConfig(name="r1"), fleet=FleetConfig("hall", "house"))
+    said = FleetMember(1, "hall", config.cell_m, "house", "covering", 1.0, 2.0, 1.0, 1, 7, 5, ())
+    parts = FleetPart("r1", 0, 0, 0.0, 1.0), FleetPart("r2", 0, sign * 2**30, 0.0, 1.0)
+    said = structs.replace(said, swept=(tile,), parts=parts, by="r2", origin=(sign * 9.0, 0.0, 0.0))
+    ear = FleetEar(config)
+
+    def heard(said):
+        return ear.event(Sample("fasaco/@v1/r2/fleet", encode_json(said)))
+
+    event = heard(said)
+    assert (event.parts, event.division, event.by, event.misfit) == ((), 0, "", "")
+    assert (event.x, event.y) == (1.0 + sign * 9.0, 2.0)
+    assert cells_of(event.tiles)
+    (fault,) = ear.take_faults()
+    assert str(fault) == "r2: its division has a seed farther off than cells may lie here"
+    fits = structs.replace(said, origin=(-sign * 9.0, 0.0, 0.0))
+    assert heard(fits).division == 7
+    assert ear.take_faults() == []
 
 
 def test_a_seed_that_the_map_does_not_show_counts_as_on_the_nearest_cell():

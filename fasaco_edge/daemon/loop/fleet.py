@@ -60,6 +60,8 @@ class FleetEar:
             origin = _origin(config.fleet)
             self._frames = FleetFrames(_pose(*origin), self._lattice_deg, self._cell_m)
         self._arrivals = FleetArrivals(self._keys, self._fleet)
+        # Of messages that are taken but for a part.
+        self._faults: list[FasacoError] = []
 
     def listen(self, bus: Bus, post: Callable[[Sample], None]) -> None:
         """Pass on the messages of this fleet within their rate limit."""
@@ -121,11 +123,17 @@ class FleetEar:
         )
         if self._frames is None or misfit:
             return heard
-        return self._frames.event(heard, _pose(*member.origin), member.lattice_deg)
+        placed = self._frames.event(heard, _pose(*member.origin), member.lattice_deg)
+        if heard.parts and not placed.parts:
+            self._faults.append(
+                FleetError(f"{robot}: its division has a seed farther off than cells may lie here")
+            )
+        return placed
 
     def take_faults(self) -> list[FasacoError]:
-        """Return the faults since the last call that no message is refused with."""
-        return self._arrivals.take_faults()
+        """Return the faults since the last call that ``event`` did not raise."""
+        faults, self._faults = self._faults, []
+        return faults + self._arrivals.take_faults()
 
 
 class FleetVoice:

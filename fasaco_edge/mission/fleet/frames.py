@@ -13,7 +13,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from fasaco_edge.grid.geometry import Point, Pose2D
+from fasaco_edge.grid.geometry import MOST_INDEX, Point, Pose2D
 from fasaco_edge.mission.core.events import MemberHeard
 from fasaco_edge.mission.coverage.ledger import TILE
 from fasaco_edge.mission.fleet.shared import MOST_TILES_OF_ONE
@@ -137,6 +137,8 @@ class FleetFrames:
     def event(self, heard: MemberHeard, map_frame: Pose2D, lattice_deg: float) -> MemberHeard:
         """Return another robot's message in this robot's frames.
 
+        It has no division where a seed lies farther off than this robot could tell others.
+
         Args:
             heard: the message in the robot's own frames.
             map_frame, lattice_deg: as of ``FleetFrames``, of the other robot.
@@ -147,6 +149,9 @@ class FleetFrames:
         self._robots.pop(heard.robot, None)
         self._robots[heard.robot] = epoch, swept, ground
         x, y = placed_point(frame, heard.x, heard.y)
+        parts = tuple(replace(part, seed=swept.cell(*part.seed)) for part in heard.parts)
+        if any(abs(index) > MOST_INDEX for part in parts for index in part.seed):
+            heard, parts = replace(heard, division=0, by=""), ()
         return replace(
             heard,
             frame="",
@@ -157,7 +162,7 @@ class FleetFrames:
             # A tile here is made of several of theirs, which come one after the other.
             kept=None,
             ground=ground.tiles(heard.ground),
-            parts=tuple(replace(part, seed=swept.cell(*part.seed)) for part in heard.parts),
+            parts=parts,
         )
 
     def _of(self, robot: str, epoch: int, lattice: Pose2D) -> tuple[int, Relaid, Relaid]:
