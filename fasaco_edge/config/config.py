@@ -20,7 +20,7 @@ from fasaco_edge.config.ros import RosConfig
 from fasaco_edge.config.security import SecurityConfig
 from fasaco_edge.errors import BadConfiguration, OrderError
 from fasaco_edge.grid.geometry import FARTHEST_M
-from fasaco_edge.mission.config import BatteryPolicy, MissionPolicy
+from fasaco_edge.mission.config import BatteryPolicy, MapPlace, MissionPolicy
 from fasaco_edge.mission.orders.mask import INLINE, mask_polygons
 from fasaco_edge.mission.orders.order import OrderDocument, ZoneDocument, order_of
 from fasaco_edge.planners.own.loading import is_place
@@ -223,6 +223,11 @@ class FleetConfig(Section, frozen=True):
     x_m: Annotated[float, Meta(ge=-FARTHEST_M, le=FARTHEST_M)] = 0.0
     y_m: Annotated[float, Meta(ge=-FARTHEST_M, le=FARTHEST_M)] = 0.0
     yaw_deg: Annotated[float, Meta(ge=-360, le=360)] = 0.0
+
+    @property
+    def map_place(self) -> MapPlace | None:
+        """Where the map lies in that frame; None without one."""
+        return MapPlace((self.x_m, self.y_m, self.yaw_deg)) if self.frame else None
 
 
 class BatteryConfig(Section, BatteryPolicy, frozen=True, kw_only=True):

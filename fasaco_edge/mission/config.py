@@ -126,6 +126,17 @@ class Sweeping:
 
 
 @dataclass(frozen=True, slots=True)
+class MapPlace:
+    """Where the robot's map lies in the frame of its fleet.
+
+    Attributes:
+        origin: its origin's x, y [m], and the angle of its x axis [deg].
+    """
+
+    origin: tuple[float, float, float]
+
+
+@dataclass(frozen=True, slots=True)
 class MissionConfig:
     """Robot, cost, limits and policy of a mission; by default without retries.
 
@@ -143,6 +154,7 @@ class MissionConfig:
         battery: when to charge; None for never.
         lattice_deg: angle of the cells' rows to the x axis of the map frame [deg]; None to align
             them with the walls, once their direction is certain.
+        map_place: where its map lies in the frame of its fleet; None without such a frame.
     """
 
     footprint: Footprint
@@ -156,3 +168,4 @@ class MissionConfig:
     robot: str = ""
     battery: BatteryPolicy | None = None
     lattice_deg: float | None = 0.0
+    map_place: MapPlace | None = None

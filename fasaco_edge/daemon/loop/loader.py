@@ -110,6 +110,7 @@ def mission_config(config: DaemonConfig, chosen: CoveragePlanner) -> MissionConf
         robot.name if config.fleet else "",
         config.battery or None,
         config.lattice_deg,
+        config.fleet.map_place if config.fleet else None,
     )
 
 

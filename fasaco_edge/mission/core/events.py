@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.errors import FasacoError, PlanFailed
-from fasaco_edge.grid.geometry import StampedPose, Window
+from fasaco_edge.grid.geometry import Pose2D, StampedPose, Window
 from fasaco_edge.grid.occupancy import MapPatch, OccupancyGrid
 from fasaco_edge.mission.orders.order import EVERYTHING_ONCE, CommandName, MissionOrder
 
@@ -116,6 +116,10 @@ class Part:
     step_s: float
 
 
+SAME_LATTICE = Pose2D(0.0, 0.0)
+"""Pose of another robot's lattice in this robot's, where both have one map."""
+
+
 @dataclass(frozen=True, slots=True)
 class MemberHeard:
     """State of another robot of the fleet.
@@ -138,6 +142,7 @@ class MemberHeard:
         waits_for: name of the robot that it waits for; "" for none.
         kept: as ``tiles``, those of their cells that it swept before this epoch; None where that is
             not known.
+        lattice: pose of its lattice in this robot's [m], by which its cells were placed.
     """
 
     robot: str
@@ -157,6 +162,7 @@ class MemberHeard:
     ahead: tuple[tuple[float, float], ...] = ()
     waits_for: str = ""
     kept: tuple[tuple[tuple[int, int], bytes], ...] | None = None
+    lattice: Pose2D = SAME_LATTICE
 
 
 Event = (

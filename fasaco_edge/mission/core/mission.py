@@ -83,7 +83,7 @@ class Mission:
         self._map = MapState(config)
         cell_m, sweeping = config.footprint.cell_m, config.sweeping
         tool_m, ahead_m = (sweeping.tool_m, sweeping.ahead_m) if sweeping else (cell_m, 0.0)
-        self._ledger = MissionLedger(cell_m, tool_m, ahead_m)
+        self._ledger = MissionLedger(cell_m, tool_m, ahead_m, config.map_place)
         monitor = InputMonitor(config)
         self.fleet = FleetLayer(
             config.robot,

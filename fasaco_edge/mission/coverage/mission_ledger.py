@@ -32,6 +32,7 @@ from numpy.typing import NDArray
 from fasaco_edge.errors import LedgerFullError, LedgerMismatchError
 from fasaco_edge.grid.geometry import Point, Pose2D, Window
 from fasaco_edge.grid.lattice import BLOCKED, UNKNOWN, Cell, CoverageLattice
+from fasaco_edge.mission.config import MapPlace
 from fasaco_edge.mission.coverage.floor_tiles import FLOOR_TILE, PIXEL_M
 from fasaco_edge.mission.coverage.ledger import (
     DROPPED_TILES,
@@ -167,18 +168,25 @@ class MissionLedger:
         passed: cells that this robot has passed while floor in them is unswept.
     """
 
-    def __init__(self, cell_m: float, tool_m: float, ahead_m: float = 0.0) -> None:
+    def __init__(
+        self,
+        cell_m: float,
+        tool_m: float,
+        ahead_m: float = 0.0,
+        map_place: MapPlace | None = None,
+    ) -> None:
         """Start empty.
 
         Args:
             cell_m: edge of a cell [m].
             tool_m: width of the tool [m].
             ahead_m: from where the robot turns about to the tool's centre, ahead [m].
+            map_place: where its map lies in the frame of its fleet; None without such a frame.
         """
         self._cell_m, self._tool_m, self._ahead_m = cell_m, tool_m, ahead_m
         self._covered = self._nothing("")
         self.first_plan_reason = "first plan"
-        self.shared = SharedProgress()
+        self.shared = SharedProgress(map_place)
         self.passed = PassedCells()
         # The ledger from before a restart while no map has confirmed it, and what was covered
         # since, which is true in any building.

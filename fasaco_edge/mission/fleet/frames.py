@@ -163,6 +163,7 @@ class FleetFrames:
             kept=None,
             ground=ground.tiles(heard.ground),
             parts=parts,
+            lattice=lattice,
         )
 
     def _of(self, robot: str, epoch: int, lattice: Pose2D) -> tuple[int, Relaid, Relaid]:

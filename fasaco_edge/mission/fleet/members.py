@@ -186,9 +186,11 @@ class Members:
         if left_out:
             self.ground.drop(event.robot)
             return ""
+        if before is not None and before.newest.lattice != event.lattice:
+            self.ground.drop(event.robot)
         swept = event.robot, event.epoch, event.tiles
         try:
-            is_open_again = self._ledger.shared.hear(*swept, self.known, event.kept)
+            is_open_again = self._ledger.shared.hear(*swept, self.known, event.kept, event.lattice)
         except FleetError as error:
             self.known[event.robot] = replace(member, left_out=str(error))
             self.ground.drop(event.robot)

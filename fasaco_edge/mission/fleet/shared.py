@@ -14,17 +14,17 @@ never heard of, they stay disregarded, and are swept once more than needed.
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Mapping
-from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 import msgspec
 import numpy as np
-from msgspec import Meta
 from numpy.typing import NDArray
 
 from fasaco_edge.errors import FleetError
+from fasaco_edge.mission.core.events import SAME_LATTICE
 from fasaco_edge.mission.coverage.ledger import TILE, Cells, LedgerSnapshot
+from fasaco_edge.mission.fleet.heard import Heard, Kept
 from fasaco_edge.mission.fleet.tiles import (
     EMPTY,
     TILE_BYTES,
@@ -38,58 +38,33 @@ from fasaco_edge.mission.fleet.tiles import (
 
 if TYPE_CHECKING:
     # For types only: a daemon announces itself to its fleet before the kernels are loaded.
-    from fasaco_edge.grid.geometry import Window
+    from fasaco_edge.grid.geometry import Pose2D, Window
     from fasaco_edge.grid.lattice import Cell
+    from fasaco_edge.mission.config import MapPlace
 
-# Number of bits set in each byte value.
-_ONES = np.unpackbits(np.arange(256, dtype=np.uint8)[:, None], axis=1).sum(axis=1)
 # Limits on the robots and, over all of them, on the tiles: 16 million cells.
 MOST_ROBOTS, MOST_TILES = 32, 4096
 MOST_TILES_OF_ONE = MOST_TILES // 8
 
-Tiles = dict["Cell", Bits]
 Inside = Callable[[Cells, Cells], NDArray[np.bool_]]
-
-
-@dataclass(slots=True)
-class _Heard:
-    """Cells swept by one robot: tiles of bits, and the bits that are disregarded."""
-
-    epoch: int
-    tiles: Tiles = field(default_factory=dict)
-    disregarded: Tiles = field(default_factory=dict)
-
-    def begin(self, epoch: int) -> None:
-        self.epoch, self.tiles = epoch, {}
-
-    def drop_gone(self) -> None:
-        """Drop tiles that were not repeated in this epoch."""
-        known = self.disregarded.items()
-        self.disregarded = {place: bits for place, bits in known if place in self.tiles}
-
-    @property
-    def count(self) -> int:
-        """Number of cells that count."""
-        counted = [self.counted(place) for place in self.tiles]
-        return int(_ONES[np.concatenate(counted)].sum()) if counted else 0
-
-    def counted(self, place: Cell) -> Bits:
-        tile, without = self.tiles[place], self.disregarded.get(place)
-        return tile if without is None else tile & ~without
 
 
 class SharedProgress:
     """The cells that other robots have swept, on this robot's lattice.
+
+    Args:
+        place: where its map lies in the frame of the fleet; None without such a frame.
 
     Attributes:
         epoch: epoch of this robot's own cells; 0 without a fleet.
         version: counter of changes.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, place: MapPlace | None = None) -> None:
+        self._place = place
         self.epoch = 0
         self.version = 0
-        self._robots: dict[str, _Heard] = {}
+        self._robots: dict[str, Heard] = {}
         # The last query and its result; the tiles that have gained cells since.
         self._known: tuple[Window | None, NDArray[np.bool_]]
         self._known = None, np.zeros((0, 0), np.bool_)
@@ -115,6 +90,7 @@ class SharedProgress:
         tiles: Iterable[Placed],
         members: Collection[str] = (),
         kept: Iterable[Placed] | None = None,
+        lattice: Pose2D = SAME_LATTICE,
     ) -> bool:
         """Take in a robot's report; tell whether cells need sweeping again because of it.
 
@@ -124,6 +100,8 @@ class SharedProgress:
             tiles: places, with TILE_BYTES of bits each.
             members: names of robots that must not be displaced.
             kept: as the tiles, their cells swept before the epoch; None where that is not known.
+            lattice: pose of its lattice in this robot's [m]; where it is another one than before,
+                nothing that it has told before counts.
 
         Raises:
             FleetError: there is no room for its data.
@@ -131,8 +109,12 @@ class SharedProgress:
         heard, has_lost = self._robots.get(robot), False
         if heard is None:
             has_lost = self._make_room(robot, members)
-            heard = self._robots[robot] = _Heard(epoch)
-        if heard.epoch != epoch:
+            heard = self._robots[robot] = Heard(epoch, lattice)
+        if heard.lattice != lattice:
+            has_lost = bool(heard.tiles)
+            heard.move(epoch, lattice)
+            self._note_lost()
+        elif heard.epoch != epoch:
             has_lost = bool(heard.tiles)
             if sum(len(one.disregarded) for one in self._robots.values()) > MOST_TILES:
                 heard.drop_gone()
@@ -150,6 +132,8 @@ class SharedProgress:
             after = bits if before is None else before | bits
             if before is None or not np.array_equal(before, after):
                 heard.tiles[place] = after
+                if heard.is_doubtful:
+                    heard.disregarded[place] = after
                 self.version += 1
                 self._grown.add(place)
         return has_lost
@@ -229,15 +213,16 @@ class SharedProgress:
     def encode(self) -> bytes:
         """Return everything as bytes, to be kept with the ledger; b"" for nothing."""
         if self._kept[0] != self.version:
-            robots = {
-                name: _Kept(heard.epoch, _listed(heard.tiles), _listed(heard.disregarded))
-                for name, heard in self._robots.items()
-            }
-            self._kept = self.version, msgspec.json.encode(_Note(_VERSION, self.epoch, robots))
+            robots = {name: heard.kept() for name, heard in self._robots.items()}
+            note = _Note(_VERSION, self.epoch, robots, self._origin)
+            self._kept = self.version, msgspec.json.encode(note)
         return self._kept[1]
 
     def resume(self, kept: bytes) -> None:
-        """Restore the bytes of ``encode``; those of another release are ignored."""
+        """Restore the bytes of ``encode``; those of another release are ignored.
+
+        So are cells that were placed while this robot's map had another place.
+        """
         try:
             if not kept or msgspec.json.decode(kept, type=_Head).version != _VERSION:
                 return
@@ -246,10 +231,13 @@ class SharedProgress:
             return
         self.epoch = note.epoch
         self._note_lost()
-        self._robots = {
-            name: _Heard(one.epoch, _placed(one.tiles), _placed(one.disregarded))
-            for name, one in note.robots.items()
-        }
+        is_in_place = note.origin == self._origin
+        robots = note.robots.items()
+        self._robots = {name: kept.heard(is_in_place=is_in_place) for name, kept in robots}
+
+    @property
+    def _origin(self) -> tuple[float, float, float] | None:
+        return None if self._place is None else self._place.origin
 
     def _make_room(self, robot: str, members: Collection[str]) -> bool:
         """Make room for another robot; tell whether cells need sweeping again because of it."""
@@ -271,13 +259,6 @@ class SharedProgress:
 
 # Version of the bytes.
 _VERSION = 1
-_Tile = tuple[int, int, Annotated[bytes, Meta(min_length=TILE_BYTES, max_length=TILE_BYTES)]]
-
-
-class _Kept(msgspec.Struct, frozen=True, array_like=True):
-    epoch: int
-    tiles: list[_Tile]
-    disregarded: list[_Tile]
 
 
 class _Head(msgspec.Struct, frozen=True):
@@ -289,7 +270,9 @@ class _Head(msgspec.Struct, frozen=True):
 class _Note(msgspec.Struct, frozen=True):
     version: int
     epoch: int
-    robots: dict[str, _Kept]
+    robots: dict[str, Kept]
+    # Of this robot's map in the frame of the fleet.
+    origin: tuple[float, float, float] | None = None
 
 
 class Telling:
@@ -325,11 +308,3 @@ class Telling:
 def tile_bits(tile: NDArray[np.uint16]) -> bytes:
     """Return the visited cells of a ledger's tile as TILE_BYTES of bits."""
     return packed(tile > 0)
-
-
-def _listed(tiles: Tiles) -> list[_Tile]:
-    return [(*place, tiles[place].tobytes()) for place in sorted(tiles)]
-
-
-def _placed(tiles: list[_Tile]) -> Tiles:
-    return {(row, col): bits_of(bits) for row, col, bits in tiles}
