@@ -29,7 +29,7 @@ from fasaco_edge.planners.registry import PLANNER_NAMES
 from fasaco_edge.text import shown
 from fasaco_edge.wire import schemas
 from fasaco_edge.wire.keys import Keys
-from fasaco_edge.wire.limits import MAX_GRID_CELLS
+from fasaco_edge.wire.limits import MAX_GRID_CELLS, MAX_STRING_BYTES
 from fasaco_edge.wire.messages.poses import PoseDecoder
 
 if TYPE_CHECKING:
@@ -215,7 +215,8 @@ class FleetConfig(Section, frozen=True):
 
     That frame has one origin: only its name is compared. With maps of their own they give one
     ``frame``, and where the origin of their map lies in it: ``x_m``, ``y_m`` [m], ``yaw_deg``
-    [deg].
+    [deg]. That holds for the map in ``map_frame``, or else for the first that the daemon gets with
+    them: on another floor, with another map, the robot takes no part.
     """
 
     name: Annotated[str, Meta(min_length=1, max_length=64)]
@@ -223,11 +224,14 @@ class FleetConfig(Section, frozen=True):
     x_m: Annotated[float, Meta(ge=-FARTHEST_M, le=FARTHEST_M)] = 0.0
     y_m: Annotated[float, Meta(ge=-FARTHEST_M, le=FARTHEST_M)] = 0.0
     yaw_deg: Annotated[float, Meta(ge=-360, le=360)] = 0.0
+    map_frame: Annotated[str, Meta(max_length=MAX_STRING_BYTES)] = ""
 
     @property
     def map_place(self) -> MapPlace | None:
         """Where the map lies in that frame; None without one."""
-        return MapPlace((self.x_m, self.y_m, self.yaw_deg)) if self.frame else None
+        if not self.frame:
+            return None
+        return MapPlace((self.x_m, self.y_m, self.yaw_deg), self.map_frame)
 
 
 class BatteryConfig(Section, BatteryPolicy, frozen=True, kw_only=True):

@@ -10,7 +10,7 @@ from pathlib import Path
 import msgspec
 from msgspec import structs
 
-from fasaco_edge.config.config import DaemonConfig
+from fasaco_edge.config.config import DaemonConfig, FleetConfig
 from fasaco_edge.config.endpoints import endpoint_faults
 from fasaco_edge.config.reading import Fault, read_text, section_faults, with_credentials
 from fasaco_edge.config.ros import RosConfig
@@ -141,11 +141,8 @@ def _misfits(config: DaemonConfig) -> Iterator[BadConfiguration]:
             "battery.enough must be at least 0.1 above battery.low and battery.reserve, got "
             f"{battery.enough:g}, {battery.low:g} and {battery.reserve:g}"
         )
-    if (fleet := config.fleet) and not fleet.frame and (fleet.x_m or fleet.y_m or fleet.yaw_deg):
-        yield BadConfiguration(
-            "fleet.frame: expected the name of the frame that fleet.x_m, fleet.y_m and "
-            "fleet.yaw_deg are given in"
-        )
+    if config.fleet:
+        yield from _fleet_misfits(config.fleet)
     if config.ros2:
         yield from _ros_misfits(config, config.ros2)
     yield from _refused("bus.", lambda: Keys(base=config.bus.base))
@@ -168,6 +165,19 @@ def _misfits(config: DaemonConfig) -> Iterator[BadConfiguration]:
     if config.mission.keep_out_topic and mask and not mask.startswith(INLINE):
         yield BadConfiguration(
             f"mission.keep_out_mask must be left out beside mission.keep_out_topic, got {mask!r}"
+        )
+
+
+def _fleet_misfits(fleet: FleetConfig) -> Iterator[BadConfiguration]:
+    if not fleet.frame and (fleet.x_m or fleet.y_m or fleet.yaw_deg):
+        yield BadConfiguration(
+            "fleet.frame: expected the name of the frame that fleet.x_m, fleet.y_m and "
+            "fleet.yaw_deg are given in"
+        )
+    if not fleet.frame and fleet.map_frame:
+        yield BadConfiguration(
+            "fleet.map_frame: expected fleet.frame beside it, the name of the frame in which "
+            "that map has a place"
         )
 
 

@@ -131,9 +131,11 @@ class MapPlace:
 
     Attributes:
         origin: its origin's x, y [m], and the angle of its x axis [deg].
+        frame: the frame of the map that this is said of; "" for the first map that comes.
     """
 
     origin: tuple[float, float, float]
+    frame: str = ""
 
 
 @dataclass(frozen=True, slots=True)

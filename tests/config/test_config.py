@@ -112,6 +112,11 @@ def test_every_section_is_read(load):
             "fleet.yaw_deg are given in",
         ),
         (
+            "fleet: {name: hall, map_frame: floor1}",
+            "fleet.map_frame: expected fleet.frame beside it, the name of the frame in which "
+            "that map has a place",
+        ),
+        (
             "map: {free_at_most: 65}",
             "map.free_at_most must be below map.occupied_at_least, got 65 and 65",
         ),

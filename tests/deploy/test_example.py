@@ -6,7 +6,7 @@ from pathlib import Path
 import msgspec
 import yaml
 
-from fasaco_edge.config.config import DaemonConfig
+from fasaco_edge.config.config import DaemonConfig, FleetConfig
 from fasaco_edge.config.loading import load_config
 from fasaco_edge.config.ros import RosConfig
 
@@ -20,6 +20,13 @@ def test_example_configuration_holds_every_key_with_its_default():
     assert written == shown
     # `check-config --show` has the keys in the same order.
     assert json.dumps(written) == json.dumps(shown)
+
+
+def test_the_block_for_a_fleet_holds_every_key_with_its_default():
+    block = EXAMPLE.read_text(encoding="utf-8").partition("\n#fleet:")[2].partition("\n\n")[0]
+    lines = [line for line in block.splitlines() if line.startswith("#  ")]
+    written = yaml.safe_load("\n".join(line[1:] for line in lines))
+    assert written == msgspec.json.decode(msgspec.json.encode(FleetConfig("building_7")))
 
 
 def test_the_block_for_ros_holds_every_key_with_its_default_once_it_is_no_comment(tmp_path):

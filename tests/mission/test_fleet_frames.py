@@ -11,9 +11,8 @@ from fasaco_edge.bus.arrival import Sample
 from fasaco_edge.config.config import DaemonConfig, FleetConfig
 from fasaco_edge.config.robot import RobotConfig
 from fasaco_edge.daemon.loop.fleet import PERIOD_S, FleetEar, FleetVoice
-from fasaco_edge.grid.geometry import Pose2D, StampedPose, Window
+from fasaco_edge.grid.geometry import Pose2D, StampedPose
 from fasaco_edge.grid.lattice import CoverageLattice
-from fasaco_edge.mission.config import MapPlace
 from fasaco_edge.mission.core.events import MapReceived, MemberHeard, Part, PoseReceived
 from fasaco_edge.mission.coverage.ledger import TILE
 from fasaco_edge.mission.fleet.division import Division
@@ -25,8 +24,6 @@ from fasaco_edge.mission.fleet.frames import (
     placed_point,
     seen_from,
 )
-from fasaco_edge.mission.fleet.shared import SharedProgress
-from fasaco_edge.mission.map.reachable_area import ReachableArea
 from fasaco_edge.wire.documents.fleet import CellTile, FleetMember, FleetPart
 from fasaco_edge.wire.documents.json_text import encode_json
 from tests.mission.world import CELL, CONFIG, Drive, building
@@ -132,84 +129,6 @@ def test_places_and_seeds_come_in_this_robots_frames():
         heard, Pose2D(1.0, 0.0), math.degrees(0.5)
     )
     assert placed.parts == heard.parts
-
-
-HALL = DaemonConfig(
-    robot=RobotConfig(name="r1", overlap=0.0, tool_width_m=CELL, radius_m=CELL / 2),
-    fleet=FleetConfig("hall", "house"),
-)
-IN_HOUSE = replace(CONFIG, robot="r1", map_place=HALL.fleet.map_place)
-BLOCK = {(row, col) for row in range(5, 10) for col in range(5, 10)}
-
-
-def told_from(x_m, **changes):
-    tiles = (CellTile(0, 0, bits_of(BLOCK)),)
-    said = FleetMember(1, "hall", CELL, "house", "covering", 2.0, 2.0, 1.0, 1, 0, 5, tiles)
-    said = structs.replace(said, ground=tiles, origin=(x_m, 0.0, 0.0), **changes)
-    return Sample("fasaco/@v1/r2/fleet", encode_json(said))
-
-
-def cells_in(window, mask):
-    return {(window.row0 + int(row), window.col0 + int(col)) for row, col in np.argwhere(mask)}
-
-
-def swept_by_others(mission):
-    window = mission.lattice.window
-    return cells_in(window, mission.shared.swept(window))
-
-
-def test_where_another_robots_map_lies_elsewhere_all_that_it_told_before_is_dropped():
-    """It was restarted with an origin put right, and keeps its epoch."""
-    ear, drive = FleetEar(HALL), Drive((3, 3), config=IN_HOUSE)
-    drive.mission.shared.begin(1)
-    drive.tell(MapReceived(building(*["." * 60] * 20)))
-    drive.tell(ear.event(told_from(0.0)))
-    assert swept_by_others(drive.mission) == BLOCK
-    drive.tell(ear.event(told_from(20 * CELL)))
-    moved = {(row, col + 20) for row, col in BLOCK}
-    assert swept_by_others(drive.mission) == moved
-    nothing = ReachableArea(drive.mission.lattice, np.zeros((20, 60), np.bool_))
-    ground = drive.mission.fleet.others.ground.joint(nothing).common
-    assert cells_in(ground.window, ground.coverable) == moved
-
-
-def test_cells_of_a_robot_that_moved_count_anew_only_where_none_were_disregarded():
-    shared, tiles = SharedProgress(), (((0, 0), bits_of(BLOCK)),)
-    shared.begin(1)
-    shared.hear("r2", 1, tiles)
-    assert shared.hear("r2", 1, tiles, lattice=AT)
-    assert shared.cells_of("r2") == 25
-    # Which of its cells these are is not known at the new place.
-    shared.disregard(lambda rows, _: rows < 7)
-    assert shared.cells_of("r2") == 15
-    kept = shared.encode()
-    for again in (shared, SharedProgress()):
-        again.resume(kept)
-        again.hear("r2", 1, tiles, lattice=Pose2D(0.0, 0.0))
-        again.hear("r2", 1, tiles, lattice=Pose2D(0.0, 0.0))
-        assert again.cells_of("r2") == 0
-        more = (((0, 0), bits_of(BLOCK | {(20, 20), (20, 21)})),)
-        again.hear("r2", 2, more, lattice=Pose2D(0.0, 0.0))
-        assert again.cells_of("r2") == 2
-
-
-@pytest.mark.parametrize(
-    "place", [None, MapPlace((0.0, 2.0, 0.0)), MapPlace((1.0, 2.0, 90.0))], ids=str
-)
-def test_cells_kept_from_before_this_robots_map_was_put_right_do_not_count(place):
-    shared, tiles = SharedProgress(MapPlace((1.0, 2.0, 0.0))), (((0, 0), bits_of(BLOCK)),)
-    shared.begin(5)
-    shared.hear("r2", 1, tiles, lattice=AT)
-    shared.hear("r3", 1, tiles)
-    same, other = SharedProgress(MapPlace((1.0, 2.0, 0.0))), SharedProgress(place)
-    for again in (same, other):
-        again.resume(shared.encode())
-        assert again.epoch == 5
-    assert [same.cells_of(robot) for robot in ("r2", "r3")] == [25, 25]
-    assert not other.swept(Window(0, 0, 99, 99)).any()
-    other.resume(other.encode())
-    other.hear("r2", 1, tiles)
-    assert other.cells_of("r2") == 25
 
 
 @pytest.mark.parametrize("sign", [-1, 1])

@@ -183,7 +183,7 @@ class FleetVoice:
             fleet=self._fleet,
             cell_m=self._cell_m,
             lattice_deg=mission.rotation.deg,
-            frame=self._frame or mission.ledger.frame,
+            frame=self._frame_told(mission),
             state=str(mission.state),
             x=round(stamped.pose.x, 3),
             y=round(stamped.pose.y, 3),
@@ -205,6 +205,14 @@ class FleetVoice:
             kept=None if kept is None else tuple(CellTile(*place, bits) for place, bits in kept),
         )
         self._publisher.put(encode_json(member))
+
+    def _frame_told(self, mission: Mission) -> str:
+        """Return the frame of the fleet; that of the map where the map has no place in it."""
+        frame = mission.ledger.frame
+        if not (self._frame and mission.shared.why_misplaced(frame)):
+            return self._frame or frame
+        # Nobody may take it for the fleet's.
+        return frame if frame != self._frame else f"{frame} of another map"
 
 
 def _thinned(points: Points) -> list[list[float]]:

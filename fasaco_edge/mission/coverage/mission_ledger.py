@@ -312,6 +312,7 @@ class MissionLedger:
 
     def move_to(self, frame: str) -> LedgerMismatchError | None:
         """Move to ``frame``; start over and report it if the ledger has cells in another frame."""
+        self.shared.enter(frame)
         was = self.current.frame
         if was in ("", frame):
             self.current.move_to(frame)
@@ -333,6 +334,8 @@ class MissionLedger:
 
     def check(self, lattice: CoverageLattice, frame: str) -> LedgerMismatchError | None:
         """Start over and report it if a map shows that the ledger belongs to another building."""
+        if frame == self.current.frame:
+            self.shared.enter(frame)
         if self._resumed is None:
             return None
         before, since = self._resumed

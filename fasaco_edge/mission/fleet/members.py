@@ -172,7 +172,7 @@ class Members:
         if not self._robot:
             return ""
         before, frame = self.known.get(event.robot), self._ledger.current.frame
-        left_out = event.misfit
+        left_out = event.misfit or self._ledger.shared.why_misplaced(frame)
         if not left_out and event.frame not in ("", frame):
             left_out = f"its frame is {event.frame!r}, here it is {frame!r}"
         place, moved_at = (event.x, event.y), now

@@ -62,6 +62,8 @@ class SharedProgress:
 
     def __init__(self, place: MapPlace | None = None) -> None:
         self._place = place
+        # The frame of the map that has this place; "" while none has come.
+        self._map_frame = "" if place is None else place.frame
         self.epoch = 0
         self.version = 0
         self._robots: dict[str, Heard] = {}
@@ -82,6 +84,23 @@ class SharedProgress:
         if self.epoch:
             self.epoch += 1
             self.version += 1
+
+    def enter(self, frame: str) -> None:
+        """Note the active frame: unless one is given, the first has the place in the fleet's frame.
+
+        A robot on another floor has another map, and nobody has told where that one lies.
+        """
+        if self._place is not None and not self._map_frame:
+            self._map_frame = frame
+            self.version += 1
+
+    def why_misplaced(self, frame: str) -> str:
+        """Return why nothing in a map frame has a place in the frame of the fleet; "" if it has."""
+        if self._place is None or self._map_frame in ("", frame):
+            return ""
+        here = f"the map frame is {frame!r} here" if frame else "no map frame is known here"
+        place = f"fleet.x_m, y_m and yaw_deg belong to {self._map_frame!r} (fleet.map_frame)"
+        return f"{here}, {place}"
 
     def hear(
         self,
@@ -214,7 +233,7 @@ class SharedProgress:
         """Return everything as bytes, to be kept with the ledger; b"" for nothing."""
         if self._kept[0] != self.version:
             robots = {name: heard.kept() for name, heard in self._robots.items()}
-            note = _Note(_VERSION, self.epoch, robots, self._origin)
+            note = _Note(_VERSION, self.epoch, robots, self._origin, self._map_frame)
             self._kept = self.version, msgspec.json.encode(note)
         return self._kept[1]
 
@@ -232,6 +251,8 @@ class SharedProgress:
         self.epoch = note.epoch
         self._note_lost()
         is_in_place = note.origin == self._origin
+        if is_in_place:
+            self._map_frame = self._map_frame or note.map_frame
         robots = note.robots.items()
         self._robots = {name: kept.heard(is_in_place=is_in_place) for name, kept in robots}
 
@@ -271,8 +292,9 @@ class _Note(msgspec.Struct, frozen=True):
     version: int
     epoch: int
     robots: dict[str, Kept]
-    # Of this robot's map in the frame of the fleet.
+    # Of this robot's map in the frame of the fleet, and which map that is.
     origin: tuple[float, float, float] | None = None
+    map_frame: str = ""
 
 
 class Telling:
