@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -102,6 +103,20 @@ class UpdatedGrid:
     grid: OccupancyGrid
     windows: tuple[Window, ...]
     faults: list[FasacoError]
+
+
+def coarser(grid: OccupancyGrid, most_pixels: int) -> OccupancyGrid:
+    """Return a map of at most about so many pixels: larger ones, of the most occupied in each."""
+    factor = math.ceil(math.sqrt(grid.cells.size / most_pixels))
+    if factor <= 1:
+        return grid
+    rows, cols = -(-grid.cells.shape[0] // factor), -(-grid.cells.shape[1] // factor)
+    padded = np.full((rows * factor, cols * factor), UNKNOWN, np.int8)
+    padded[: grid.cells.shape[0], : grid.cells.shape[1]] = grid.cells
+    cells = padded.reshape(rows, factor, cols, factor).max(axis=(1, 3))
+    resolution = grid.geometry.resolution * factor
+    geometry = replace(grid.geometry, rows=rows, cols=cols, resolution=resolution)
+    return replace(grid, geometry=geometry, cells=cells)
 
 
 def without_base(patches: Iterable[MapPatch], *, updates_lost: bool) -> list[FasacoError]:

@@ -17,8 +17,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.grid.geometry import Window
-from fasaco_edge.recording.fleet.cells import (
+from fasaco_edge.fleet.cells import (
     FAR,
     Cells,
     Place,
@@ -29,6 +28,7 @@ from fasaco_edge.recording.fleet.cells import (
     together,
     window_of,
 )
+from fasaco_edge.grid.geometry import Window
 from fasaco_edge.recording.fleet.notes import Note, NoteBatch, NotedRobot, read_notes
 
 AT_WORK = ("planning", "covering", "degraded")

@@ -13,7 +13,7 @@ from hypothesis.extra import numpy as some
 
 pytest.importorskip("rerun")
 
-from fasaco_edge.recording.fleet.cells import (
+from fasaco_edge.fleet.cells import (
     FAR,
     MOST_SPAN,
     Seat,

@@ -16,9 +16,10 @@ from fasaco_edge.cli import review
 from fasaco_edge.cli.console.arguments import Exit
 from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.errors import FleetError, UnreadableRecording
+from fasaco_edge.fleet import members
 from fasaco_edge.mission.fleet.frames import MOST_HEARD
 from fasaco_edge.recording import entities
-from fasaco_edge.recording.fleet import members, recorder, scene
+from fasaco_edge.recording.fleet import recorder, scene
 from fasaco_edge.recording.fleet.notes import is_fleet_recording, read_notes
 from fasaco_edge.recording.fleet.recorder import FleetRecorder
 from fasaco_edge.recording.write.process import Output
@@ -193,7 +194,7 @@ def test_nothing_is_kept_of_names_without_end(studio, monkeypatch):
         studio.pass_time(0.1)
     studio.pass_time(1.2)
     kept = studio.recorder
-    assert len(kept._poses) == len(kept._rates) == len(kept._subscriptions) == 1
+    assert len(kept._poses) == len(kept._rates) == len(kept._ears) == 1
     assert len(kept._faults) <= 8 + 2
     (part,) = studio.parts()
     log = log_of(part)
@@ -264,7 +265,7 @@ def test_a_later_part_can_be_read_alone(studio):
 
 def test_one_robot_too_many_is_named_and_gets_the_place_of_one_long_gone(monkeypatch):
     monkeypatch.setattr(members, "MOST_MEMBERS", 2)
-    fleet, second = members.Members(), 1_000_000_000
+    fleet, second = members.Members(members.Member), 1_000_000_000
     for name, at_s in (("a", 1), ("b", 50)):
         assert fleet.hear(name, member(), at_s * second)[1] == members.JOINED
     with pytest.raises(FleetError, match="c: 2 robots"):
@@ -275,7 +276,7 @@ def test_one_robot_too_many_is_named_and_gets_the_place_of_one_long_gone(monkeyp
 
 
 def test_all_robots_that_a_division_may_have_are_recorded():
-    fleet = members.Members()
+    fleet = members.Members(members.Member)
     for number in range(MAX_FLEET_PARTS):
         fleet.hear(f"r{number}", member(), 1)
     assert [one.number for one in fleet] == list(range(MAX_FLEET_PARTS))

@@ -10,11 +10,11 @@ from hypothesis import strategies as st
 pytest.importorskip("rerun")
 
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D
-from fasaco_edge.grid.occupancy import OccupancyGrid
+from fasaco_edge.grid.occupancy import OccupancyGrid, coarser
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.scene import archetypes
 from fasaco_edge.recording.scene.blueprint import build_blueprint
-from fasaco_edge.recording.scene.layers import BURST_S, RATES, Layers, coarser, size_in_file
+from fasaco_edge.recording.scene.layers import BURST_S, RATES, Layers, size_in_file
 from fasaco_edge.recording.write.quota import DiskBudget
 from fasaco_edge.recording.write.writer import RecordingWriter
 

@@ -11,19 +11,19 @@ from __future__ import annotations
 import re
 import time
 from collections import Counter
-from functools import partial
 
-from fasaco_edge.bus.arrival import Arrival, Sample
-from fasaco_edge.bus.latched import Subscription
+from fasaco_edge.bus.arrival import Arrival
 from fasaco_edge.bus.session import Bus
 from fasaco_edge.bus.settings import BusSettings
 from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.errors import FasacoError
+from fasaco_edge.fleet.ears import Ears
+from fasaco_edge.fleet.inbox import FleetInbox, Heard
+from fasaco_edge.fleet.members import JOINED
 from fasaco_edge.host.processes import memory_limit
 from fasaco_edge.recording import entities
-from fasaco_edge.recording.fleet.inbox import FleetInbox, Heard
 from fasaco_edge.recording.fleet.layout import build_layout
-from fasaco_edge.recording.fleet.members import JOINED, Members, RecordedMember
+from fasaco_edge.recording.fleet.members import RecordedMember, RecordedMembers
 from fasaco_edge.recording.fleet.notes import NOTES_VERSION, Note, NoteBatch, encode_notes
 from fasaco_edge.recording.fleet.scene import FleetScene
 from fasaco_edge.recording.scene.blueprint import NO_MAP
@@ -33,15 +33,12 @@ from fasaco_edge.text import is_reported, one_line
 from fasaco_edge.wire.documents.fleet import decode_member
 from fasaco_edge.wire.documents.json_text import decode_tolerant
 from fasaco_edge.wire.documents.status import Status
-from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.messages.maps import decode_occupancy_grid
 from fasaco_edge.wire.messages.paths import decode_path
 from fasaco_edge.wire.messages.poses import PoseDecoder
 from fasaco_edge.wire.topics import FLEET, MAP, PATH, POSE, STATUS
 
 NOTE_NS, WRITE_NS = 1_000_000_000, 5_000_000_000
-# How long a robot is asked for its map before it is the next one's turn.
-MAP_TURN_NS = 2_000_000_000
 # A robot's rate of messages is plotted over this time.
 RATE_NOTES = 5
 # Robots and topics whose faults are counted apart, beside those of the robots recorded.
@@ -70,19 +67,18 @@ class FleetRecorder:
     """Connects the bus to the writer: ``step`` takes samples, writes and draws them."""
 
     def __init__(self, config: DaemonConfig, bus: Bus, fleet: str, output: Output) -> None:
-        self._bus, self._fleet, self._keys = bus, fleet, config.keys()
+        self._fleet = fleet
         self._schema = config.pose.schema
         recording = output.begin(file_name(fleet), build_layout((), NO_MAP))
         self._writer, self._clock = recording.writer, recording.clock
         self._began_ns = recording.began_ns
         self._title = f"fleet {fleet} {recording.began} UTC"
         self._writer.describe(self._title, {"fleet": fleet, "began": recording.began})
-        self._members = Members()
+        self._members = RecordedMembers()
         self._scene = FleetScene(self._writer, self._members)
         self._inbox = FleetInbox(afforded_bytes(memory_limit()), self._clock.arrival)
+        self._ears = Ears(bus, config.keys(), (STATUS, PATH, POSE), self._inbox.post)
         self._poses: dict[str, PoseDecoder] = {}
-        self._subscriptions: dict[str, list[Subscription]] = {}
-        self._map_turn: tuple[str, Subscription, int] | None = None
         self._notes: list[Note] = []
         self._rates: dict[str, list[int]] = {}
         self._next_note_ns = self._next_write_ns = self._began_ns
@@ -92,11 +88,7 @@ class FleetRecorder:
 
     def listen(self) -> None:
         """Subscribe to what all robots tell their fleets."""
-
-        def post(sample: Sample) -> None:
-            self._inbox.post(self._keys.robot_of(sample.key), FLEET.name, sample)
-
-        self._bus.subscribe(self._keys.of_all(FLEET), post)
+        self._ears.listen()
 
     def step(self, timeout_s: float) -> None:
         """Write and draw what arrives within ``timeout_s`` [s], and what is due."""
@@ -112,7 +104,7 @@ class FleetRecorder:
         if now_ns >= self._next_write_ns:
             self._next_write_ns = now_ns + WRITE_NS
             self._write()
-        self._ask_for_maps(now_ns)
+        self._ears.ask_for_maps([member.name for member in self._members], now_ns)
         self._scene.catch_up()
         self._writer.sync(time.monotonic_ns())
 
@@ -177,7 +169,7 @@ class FleetRecorder:
         elif arrival.topic == PATH.name:
             self._scene.add_path(member, decode_path(sample.payload).xy)
         elif arrival.topic == MAP.name:
-            self._end_map_turn(robot)
+            self._ears.end_map_turn(robot)
             self._scene.add_map(member, decode_occupancy_grid(sample.payload))
         elif arrival.topic == STATUS.name:
             status = decode_tolerant(sample.payload, Status)
@@ -205,50 +197,19 @@ class FleetRecorder:
 
     def _join(self, member: RecordedMember) -> None:
         """Hear a robot from now on."""
-        keys = Keys(member.name, self._keys.base)
         self._poses[member.name] = PoseDecoder(self._schema)
-        self._subscriptions[member.name] = [
-            self._bus.listen(keys, topic, partial(self._inbox.post, member.name, topic.name))
-            for topic in (STATUS, PATH, POSE)
-        ]
+        self._ears.hear(member.name)
         self._scene.add_line(f"{member.name}: joined, cells of {member.seat.cell_m:g} m")
         self._scene.join(member)
 
     def _leave(self, robot: str) -> None:
-        for subscription in self._subscriptions.pop(robot, ()):
-            self._bus.unsubscribe(subscription)
-        self._end_map_turn(robot)
+        self._ears.leave(robot)
         self._inbox.forget(robot)
         self._scene.leave(robot)
         for kept in (self._poses, self._rates):
             kept.pop(robot, None)
         for fault in [fault for fault in self._faults if fault[0] == robot]:
             del self._faults[fault]
-
-    def _ask_for_maps(self, now_ns: int) -> None:
-        """Ask the robots for their maps, one after another."""
-        if self._map_turn is not None and now_ns < self._map_turn[2]:
-            return
-        names = [member.name for member in self._members]
-        if not names:
-            return
-        last = "" if self._map_turn is None else self._map_turn[0]
-        self._end_map_turn(last)
-        after = (names.index(last) + 1) % len(names) if last in names else 0
-        name = names[after]
-        post = partial(self._inbox.post, name, MAP.name)
-        subscription = self._bus.listen(Keys(name, self._keys.base), MAP, post)
-        self._subscriptions[name].append(subscription)
-        self._map_turn = name, subscription, now_ns + MAP_TURN_NS
-
-    def _end_map_turn(self, robot: str) -> None:
-        """Hear no more maps of a robot until its next turn."""
-        if self._map_turn is None or self._map_turn[0] != robot:
-            return
-        subscription, subscribed = self._map_turn[1], self._subscriptions.get(robot, [])
-        if subscription in subscribed:
-            subscribed.remove(subscription)
-            self._bus.unsubscribe(subscription)
 
     def _note(self, now_ns: int) -> None:
         """Note what was heard since the last note, and show it."""

@@ -13,18 +13,19 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from fasaco_edge.fleet.cells import mask_of, window_of
+from fasaco_edge.fleet.inbox import LEAST_SHARING
+from fasaco_edge.fleet.members import GONE
+from fasaco_edge.fleet.shares import shares_of, swept_twice
 from fasaco_edge.grid.geometry import Bounds, GridGeometry, Pose2D, union_bounds
-from fasaco_edge.grid.occupancy import OccupancyGrid, known_bounds
+from fasaco_edge.grid.occupancy import OccupancyGrid, coarser, known_bounds
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.fleet.card import RobotRow, card_of, colour_of
-from fasaco_edge.recording.fleet.cells import mask_of, window_of
-from fasaco_edge.recording.fleet.inbox import LEAST_SHARING
 from fasaco_edge.recording.fleet.layout import build_layout, robot_entity
-from fasaco_edge.recording.fleet.members import GONE, Members, RecordedMember
-from fasaco_edge.recording.fleet.shares import shares_of, swept_twice
+from fasaco_edge.recording.fleet.members import RecordedMember, RecordedMembers
 from fasaco_edge.recording.scene import archetypes as draw
 from fasaco_edge.recording.scene.blueprint import NO_MAP
-from fasaco_edge.recording.scene.layers import Anchor, Layers, coarser, is_far_from, size_in_file
+from fasaco_edge.recording.scene.layers import Anchor, Layers, is_far_from, size_in_file
 from fasaco_edge.recording.sdk import rr
 from fasaco_edge.recording.write.writer import RecordingWriter
 
@@ -67,7 +68,7 @@ class _Drawn:
 class FleetScene:
     """Draws a fleet into a writer; the caller sets the time."""
 
-    def __init__(self, writer: RecordingWriter, members: Members) -> None:
+    def __init__(self, writer: RecordingWriter, members: RecordedMembers) -> None:
         self._writer = writer
         self._members = members
         self._layers = Layers(FLEET_RATES)

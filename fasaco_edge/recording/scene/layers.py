@@ -10,7 +10,6 @@ otherwise the newest waits for tokens, and those before it are skipped.
 
 from __future__ import annotations
 
-import math
 import zlib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
@@ -116,20 +115,6 @@ def is_far_from(framed: Bounds, bounds: Bounds, share: float) -> bool:
     size = max(framed[2] - framed[0], framed[3] - framed[1])
     moved = max(abs(a - b) for a, b in zip(framed, bounds, strict=True))
     return moved > share * size
-
-
-def coarser(grid: OccupancyGrid, most_pixels: int) -> OccupancyGrid:
-    """Return a map of at most about so many pixels: larger ones, of the most occupied in each."""
-    factor = math.ceil(math.sqrt(grid.cells.size / most_pixels))
-    if factor <= 1:
-        return grid
-    rows, cols = -(-grid.cells.shape[0] // factor), -(-grid.cells.shape[1] // factor)
-    padded = np.full((rows * factor, cols * factor), UNKNOWN, np.int8)
-    padded[: grid.cells.shape[0], : grid.cells.shape[1]] = grid.cells
-    cells = padded.reshape(rows, factor, cols, factor).max(axis=(1, 3))
-    resolution = grid.geometry.resolution * factor
-    geometry = replace(grid.geometry, rows=rows, cols=cols, resolution=resolution)
-    return replace(grid, geometry=geometry, cells=cells)
 
 
 BURST_S = 60.0

@@ -9,8 +9,8 @@ from fasaco_edge.drawing import palette
 from fasaco_edge.drawing.fleet import robot_tint
 from fasaco_edge.drawing.plot import MapLayer, Plot, View
 from fasaco_edge.drawing.sheet import KeyEntry, Sheet
+from fasaco_edge.fleet.cells import Cells, mask_of, together, window_of
 from fasaco_edge.grid.geometry import Window
-from fasaco_edge.recording.fleet.cells import Cells, mask_of, together, window_of
 from fasaco_edge.review.fleet import FleetReview
 from fasaco_edge.review.wording import clock
 

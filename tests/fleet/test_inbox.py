@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from fasaco_edge.bus.arrival import Arrival, Sample
+from fasaco_edge.fleet.inbox import DEPTHS, FleetInbox
 from fasaco_edge.mission.fleet.frames import MOST_HEARD
-from fasaco_edge.recording.fleet.inbox import DEPTHS, FleetInbox
 
 CAPACITY = 4_000
 

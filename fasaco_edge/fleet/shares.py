@@ -12,8 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.grid.geometry import GridGeometry, Window
-from fasaco_edge.recording.fleet.cells import (
+from fasaco_edge.fleet.cells import (
     FAR,
     Cells,
     Seat,
@@ -22,7 +21,8 @@ from fasaco_edge.recording.fleet.cells import (
     together,
     window_of,
 )
-from fasaco_edge.recording.fleet.members import Members, RecordedMember
+from fasaco_edge.fleet.members import M, Members
+from fasaco_edge.grid.geometry import GridGeometry, Window
 
 NOBODY = -1
 
@@ -42,12 +42,12 @@ class Shares:
     cells: Counter[str]
 
 
-def union_on(seat: Seat, members: Members, what: str) -> Cells:
+def union_on(seat: Seat, members: Members[M], what: str) -> Cells:
     """Return cells of all robots on one robot's lattice, int64 (n, 2); ``what``: of which set."""
     return together(member.seat.carried(getattr(member, what).cells(), seat) for member in members)
 
 
-def shares_of(members: Members, now_ns: int) -> Shares | None:
+def shares_of(members: Members[M], now_ns: int) -> Shares | None:
     """Return the shares by the division in force at a time; None before there is one."""
     telling = members.dividing(now_ns)
     if telling is None:
@@ -66,7 +66,7 @@ def shares_of(members: Members, now_ns: int) -> Shares | None:
 
 
 def _owners(
-    telling: RecordedMember, members: Members, known: NDArray[np.bool_], window: Window
+    telling: M, members: Members[M], known: NDArray[np.bool_], window: Window
 ) -> NDArray[np.int16]:
     first = np.full(known.shape, np.float32(np.inf))
     owners = np.full(known.shape, NOBODY, np.int16)
@@ -85,7 +85,7 @@ def _owners(
     return owners
 
 
-def swept_twice(members: Members) -> tuple[GridGeometry, NDArray[np.bool_]] | None:
+def swept_twice(members: Members[M]) -> tuple[GridGeometry, NDArray[np.bool_]] | None:
     """Return the cells that two or more robots swept, and where they lie; None for none."""
     seats = [member.seat for member in members]
     if len(seats) < 2:

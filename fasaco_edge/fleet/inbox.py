@@ -1,7 +1,6 @@
-"""The queues between Zenoh's threads and the recorder of a fleet: one of its own for each robot.
+"""The queues between Zenoh's threads and an observer of a fleet: one of its own for each robot.
 
-A robot that floods fills its own queues only, and of its messages the newest count. All queues
-together hold no more than one robot's recorder does (``recording.write.inbox``).
+A robot that floods fills its own queues only, and of its messages the newest count.
 """
 
 from __future__ import annotations

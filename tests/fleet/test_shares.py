@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-pytest.importorskip("rerun")
-
-from fasaco_edge.recording.fleet.members import GONE_NS, Members
-from fasaco_edge.recording.fleet.shares import shares_of
+from fasaco_edge.fleet.members import GONE_NS, Member, Members
+from fasaco_edge.fleet.shares import shares_of
 from fasaco_edge.wire.documents.fleet import FleetPart
 from tests.support.fleet_told import member
 
@@ -19,7 +17,7 @@ PARTS = tuple(FleetPart(name, *cell, 0.0, 1.2) for name, cell in (("a", (0, 0)),
 @pytest.fixture
 def halved():
     """Two robots that have divided a hall."""
-    members = Members()
+    members = Members(Member)
     assert shares_of(members, 0) is None
     for name in ("a", "b"):
         members.hear(name, member(division=7, by="a", parts=PARTS), SECOND)
