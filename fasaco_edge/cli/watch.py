@@ -5,9 +5,8 @@ from __future__ import annotations
 import argparse
 import os
 import sys
-from typing import NoReturn
-
-from rich.console import Console
+from collections.abc import Callable
+from typing import TYPE_CHECKING, NoReturn
 
 from fasaco_edge.cli.ask import nobody_answers
 from fasaco_edge.cli.console.arguments import (
@@ -21,10 +20,12 @@ from fasaco_edge.cli.console.logs import say_why
 from fasaco_edge.cli.console.terminal import out
 from fasaco_edge.errors import BusUnavailable, FasacoError
 from fasaco_edge.watch import live
-from fasaco_edge.watch.feed import Feed
-from fasaco_edge.watch.page import Page
+from fasaco_edge.watch.live import Watched
 from fasaco_edge.watch.phrases import steady_now
-from fasaco_edge.watch.robot_view import RobotView
+from fasaco_edge.wire.keys import Keys
+
+if TYPE_CHECKING:
+    from fasaco_edge.bus.settings import BusSettings
 
 EPILOG = """\
 examples:
@@ -59,25 +60,16 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Watch until a signal."""
     keys, bus, _ = robot_on_bus(args)
-    console, view = out(), RobotView(keys.robot)
-    with Feed(bus, keys) as feed:
-        try:
-            if args.once:
-                _once(args, keys.prefix, feed, view, console)
-            elif args.json:
-                live.watch_as_json(feed, view)
-            elif sys.stdout.isatty() and os.environ.get("TERM", "dumb") not in ("dumb", "unknown"):
-                live.watch_on_screen(feed, view, console)
-            else:
-                live.watch_in_lines(feed, view)
-            sys.stdout.flush()
-            code = Exit.OK
-        except FasacoError as error:
-            say_why(error)
-            code = Exit.ERROR
-        except OSError:
-            # The terminal is gone, or the reader of a pipe has seen enough.
-            code = Exit.ERROR
+    try:
+        _watch_robot(args, keys, bus)
+        sys.stdout.flush()
+        code = Exit.OK
+    except FasacoError as error:
+        say_why(error)
+        code = Exit.ERROR
+    except OSError:
+        # The terminal is gone, or the reader of a pipe has seen enough.
+        code = Exit.ERROR
     return _leave(code)
 
 
@@ -91,19 +83,39 @@ def _leave(code: int) -> NoReturn:
     os._exit(code)
 
 
-def _once(
-    args: argparse.Namespace, prefix: str, feed: Feed, view: RobotView, console: Console
-) -> None:
-    if not live.look_once(feed, view, args.timeout):
-        if view.trouble:
-            raise BusUnavailable(view.trouble)
-        raise nobody_answers(prefix, view.robots)
+def _watch_robot(args: argparse.Namespace, keys: Keys, bus: BusSettings) -> None:
+    from fasaco_edge.watch.feed import Feed
+    from fasaco_edge.watch.robot_view import RobotView
+    from fasaco_edge.watch.robot_watch import RobotWatch
+
+    view = RobotView(keys.robot)
+    with Feed(bus, keys) as feed:
+        _watch(
+            args, RobotWatch(feed, view, out()), lambda: nobody_answers(keys.prefix, view.robots)
+        )
+
+
+def _watch(args: argparse.Namespace, watched: Watched, nobody: Callable[[], FasacoError]) -> None:
+    """Watch in the form that the options ask for; ``nobody``: the error if nothing is heard."""
+    if args.once:
+        _once(args, watched, nobody)
+    elif args.json:
+        live.watch_as_json(watched)
+    elif sys.stdout.isatty() and os.environ.get("TERM", "dumb") not in ("dumb", "unknown"):
+        live.watch_on_screen(watched)
+    else:
+        live.watch_in_lines(watched)
+
+
+def _once(args: argparse.Namespace, watched: Watched, nobody: Callable[[], FasacoError]) -> None:
+    if not live.look_once(watched, args.timeout):
+        raise BusUnavailable(watched.trouble) if watched.trouble else nobody()
     if args.json:
-        live.print_json(view.document)
+        live.print_json(watched.document())
         return
+    console = out()
     # The prompt takes a line.
-    width, height = console.width, console.height - 1
-    for line in Page(console).lines(view, steady_now(), width, height):
+    for line in watched.page(steady_now(), console.width, console.height - 1):
         # Its colours have to go through; its texts are clean.
         console.file.write(f"{line.rstrip()}\n")
 

@@ -1,18 +1,17 @@
-"""The feed of samples from the bus; it connects as soon as possible, and stays connected."""
+"""The feed of samples of one robot from the bus."""
 
 from __future__ import annotations
 
-import threading
 from functools import partial
-from typing import Self
 
 from fasaco_edge.bus.arrival import Sample
 from fasaco_edge.bus.latched import Subscription
 from fasaco_edge.bus.mailbox import Mailbox, Queue
 from fasaco_edge.bus.queries import Reply
-from fasaco_edge.bus.session import Bus, open_bus
+from fasaco_edge.bus.session import Bus
 from fasaco_edge.bus.settings import BusSettings
 from fasaco_edge.errors import BusUnavailable
+from fasaco_edge.watch.joining import Joining
 from fasaco_edge.watch.robot_state import Token
 from fasaco_edge.wire.keys import VERSION, Keys
 from fasaco_edge.wire.limits import MAX_JSON_BYTES, MAX_MESSAGE_BYTES
@@ -30,22 +29,16 @@ QUEUED = {"token": Queue(256), FLEET.name: Queue(FLEET_WAITING, MAX_JSON_BYTES)}
     for topic in WATCHED
     if topic.queues.watch is not None and topic.queues.watch > NEWEST
 }
-RETRY_S = 0.5
-# Timeout at the end for a host that does not answer.
-END_S = 0.5
 
 
 def _size_of(item: object) -> int:
     return item.size if isinstance(item, Sample) else 0
 
 
-class Feed:
+class Feed(Joining):
     """The samples of one robot, and the names of all robots; a context manager.
 
     ``hears_fleet``: also the fleet messages of all robots.
-
-    Attributes:
-        trouble: why the bus cannot be joined yet; "" once it is.
     """
 
     def __init__(
@@ -55,30 +48,12 @@ class Feed:
         *,
         hears_fleet: bool = False,
     ) -> None:
-        self.trouble = ""
-        self._settings = settings
+        super().__init__(settings)
         self._keys = keys
         self._mailbox: Mailbox[object] = Mailbox(QUEUED, size_of=_size_of)
-        self._ended = threading.Event()
-        self._bus: Bus | None = None
         self._hears_fleet = hears_fleet
         self._wanted: set[Topic] = set()
         self._requested: dict[Topic, Subscription] = {}
-        self._lock = threading.Lock()
-        # In a thread: a host that does not answer would block the caller.
-        self._joining = threading.Thread(target=self._join, name="join-bus", daemon=True)
-        self._joining.start()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._ended.set()
-        # An interpreter that ends while a thread returns from Zenoh aborts.
-        self._joining.join(END_S)
-        with self._lock:
-            if self._bus is not None:
-                self._bus.close()
 
     def take(self, timeout_s: float) -> list[tuple[str, object]]:
         """Return arrivals as (topic, Sample or Token); wait up to ``timeout_s`` [s] for one."""
@@ -113,23 +88,6 @@ class Feed:
             self._requested[topic] = self._subscribe(bus, topic)
         for topic in self._requested.keys() - self._wanted:
             bus.unsubscribe(self._requested.pop(topic))
-
-    def _join(self) -> None:
-        while not self._ended.is_set():
-            try:
-                bus = open_bus(self._settings)
-            except BusUnavailable as error:
-                self.trouble = f"{', '.join(self._settings.connect)}: {error}"
-                self._ended.wait(RETRY_S)
-                continue
-            with self._lock:
-                if self._ended.is_set():
-                    bus.close()
-                    return
-                self._bus = bus
-                self._listen(bus)
-                self.trouble = ""
-            return
 
     def _listen(self, bus: Bus) -> None:
         prefix = f"{self._keys.base}/{VERSION}"

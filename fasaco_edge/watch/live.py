@@ -11,19 +11,12 @@ import termios
 import time
 import tty
 from types import FrameType
-from typing import Any, Self, TextIO
+from typing import Any, Protocol, Self, TextIO
 
-from rich.console import Console
-
-from fasaco_edge.bus.arrival import Sample
 from fasaco_edge.host.processes import stop_event
-from fasaco_edge.text import json_line, one_line
+from fasaco_edge.text import json_line
 from fasaco_edge.watch import phrases
-from fasaco_edge.watch.feed import Feed
-from fasaco_edge.watch.page import Page
-from fasaco_edge.watch.robot_view import RobotView
-from fasaco_edge.wire.documents.json_text import decode_json
-from fasaco_edge.wire.topics import PHEROMONE
+from fasaco_edge.watch.events import EventLog
 
 END_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 # At most ten pages a second, and only if the content or the clock changed [s].
@@ -31,110 +24,116 @@ FRAME_S = 0.1
 LINE_EVERY_S = 1.0
 # The largest page. A terminal may claim 65,535 x 65,535, and a page would take gigabytes.
 MOST_COLUMNS, MOST_LINES = 800, 400
-# Time to wait for the rest after a status [s].
-REST_S = 1.0
 
 
-def take(feed: Feed, view: RobotView, timeout_s: float) -> list[tuple[str, object]]:
-    """Take in arrivals, and return them; wait up to ``timeout_s`` [s] for one."""
-    items = feed.take(timeout_s)
-    now = phrases.steady_now()
-    for topic, item in items:
-        view.take(topic, item, now)
-    view.trouble = feed.trouble
-    return items
+class Watched(Protocol):
+    """What is watched: one robot, or a fleet.
+
+    Attributes:
+        rest_s: how long to wait for the rest once something is known [s].
+    """
+
+    rest_s: float
+
+    @property
+    def events(self) -> EventLog:
+        """What happened."""
+
+    @property
+    def trouble(self) -> str:
+        """Why the bus cannot be reached; "" if it can."""
+
+    def take(self, timeout_s: float) -> bool:
+        """Take in what arrives within ``timeout_s`` [s]; return whether something has."""
+
+    def documents(self) -> list[dict[str, object]]:
+        """Return the JSON objects that are due since the last ``take``."""
+
+    def document(self) -> dict[str, object]:
+        """Return all that is known now as a JSON object."""
+
+    def line(self, now: float) -> str:
+        """Return the state in a line."""
+
+    def page(self, now: float, width: int, height: int) -> list[str]:
+        """Return a page of lines."""
+
+    def press(self, keys: str) -> bool:
+        """Do what typed keys say; return whether that is another page."""
+
+    def is_known(self) -> bool:
+        """Tell whether there is something to show."""
+
+    def is_whole(self) -> bool:
+        """Tell whether all is known that a picture shows."""
 
 
-def watch_on_screen(feed: Feed, view: RobotView, console: Console) -> None:
-    """Show the mission until q is typed or a signal arrives.
-
-    f shows the living trail in place of coverage and path, and back.
+def watch_on_screen(watched: Watched) -> None:
+    """Show pages until q is typed or a signal arrives.
 
     Raises:
         OSError: the terminal is gone.
     """
-    page, shown_at = Page(console), (0, (0, 0), "")
+    shown_at = (0, (0, 0), "")
     with stop_event(*END_SIGNALS) as stop, Screen(sys.stdout) as screen:
         while not stop.is_set():
-            came = take(feed, view, 0.0)
+            came = watched.take(0.0)
             now = phrases.steady_now()
-            key = (int(now), screen.size(), view.trouble)
+            key = (int(now), screen.size(), watched.trouble)
             if came or key != shown_at:
                 shown_at, size = key, key[1]
-                screen.show(page.lines(view, now, *size), size)
+                screen.show(watched.page(now, *size), size)
             typed = screen.keys(FRAME_S).lower()
             if "q" in typed:
                 return
-            if typed.count("f") % 2:
+            if watched.press(typed):
                 shown_at = (0, (0, 0), "")
-                feed.want(PHEROMONE, page.toggle_field())
 
 
-def watch_in_lines(feed: Feed, view: RobotView) -> None:
+def watch_in_lines(watched: Watched) -> None:
     """Print events, and once a second the state, until a signal arrives."""
     # What exists already arrives within the first second.
     printed, last_line, next_line_at = 0, "", phrases.steady_now() + LINE_EVERY_S
     with stop_event(*END_SIGNALS) as stop:
         while not stop.is_set():
-            take(feed, view, FRAME_S)
+            watched.take(FRAME_S)
             now = phrases.steady_now()
-            for entry in view.events.since(printed):
+            for entry in watched.events.since(printed):
                 _print_line(entry.at_s, entry.text)
-            printed = view.events.count
+            printed = watched.events.count
             if now >= next_line_at:
-                next_line_at, line = now + LINE_EVERY_S, status_line(view, now)
+                next_line_at, line = now + LINE_EVERY_S, watched.line(now)
                 if line != last_line:
                     last_line = line
                     _print_line(now, line)
 
 
-def watch_as_json(feed: Feed, view: RobotView) -> None:
-    """Print each status as a line of JSON, until a signal arrives."""
+def watch_as_json(watched: Watched) -> None:
+    """Print JSON objects, each on a line, until a signal arrives."""
     with stop_event(*END_SIGNALS) as stop:
         while not stop.is_set():
-            for topic, item in take(feed, view, FRAME_S):
-                if topic == "status" and isinstance(item, Sample):
-                    print_json(item.payload)
+            watched.take(FRAME_S)
+            for document in watched.documents():
+                print_json(document)
 
 
-def look_once(feed: Feed, view: RobotView, timeout_s: float) -> bool:
+def look_once(watched: Watched, timeout_s: float) -> bool:
     """Wait up to ``timeout_s`` [s] until enough is known for a picture; return whether it is."""
     deadline = time.monotonic() + timeout_s
     with stop_event(*END_SIGNALS) as stop:
-        while view.status is None or not view.is_here:
+        while not watched.is_known():
             if stop.is_set() or time.monotonic() > deadline:
                 return False
-            take(feed, view, FRAME_S)
-        deadline = time.monotonic() + REST_S
-        while not (stop.is_set() or _is_whole(view)) and time.monotonic() < deadline:
-            take(feed, view, FRAME_S)
+            watched.take(FRAME_S)
+        deadline = time.monotonic() + watched.rest_s
+        while not (stop.is_set() or watched.is_whole()) and time.monotonic() < deadline:
+            watched.take(FRAME_S)
     return True
 
 
-def status_line(view: RobotView, now: float) -> str:
-    """Return the state in a line."""
-    status = view.status
-    if view.trouble:
-        return f"waiting for the bus at {one_line(view.trouble)}"
-    if view.gone_since is not None:
-        return "waiting for the daemon to return"
-    if not view.is_here:
-        return f"waiting for a daemon of robot {view.robot}"
-    if status is None:
-        return "no status from the daemon yet"
-    if view.silent_s(now):
-        return "the daemon is silent"
-    fraction = status.coverage.fraction if status.coverage else 0.0
-    return f"{phrases.percent(fraction)} of cells  {phrases.figures(status)}"
-
-
-def print_json(payload: bytes) -> None:
-    """Print a JSON object as one line, whatever its layout."""
-    print(json_line(decode_json(payload)), flush=True)
-
-
-def _is_whole(view: RobotView) -> bool:
-    return view.map is not None and view.coverage is not None and view.walk.revision > 0
+def print_json(document: dict[str, object]) -> None:
+    """Print a JSON object as one line."""
+    print(json_line(document), flush=True)
 
 
 def _print_line(at_s: float, text: str) -> None:

@@ -2,24 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
-from rich.console import Console, RenderableType
+from rich.console import Console
 from rich.text import Text
 
 from fasaco_edge.text import one_line
 from fasaco_edge.watch import picture
-from fasaco_edge.watch.events import BAD, GOOD, ORDER, PLAIN, Event
-from fasaco_edge.watch.glyphs import GlyphSet
+from fasaco_edge.watch.blocks import FAINT, Blocks, on_a_line
 from fasaco_edge.watch.phrases import age, clock, percent
 from fasaco_edge.watch.picture import MissionPicture
 from fasaco_edge.watch.robot_view import RobotView
 from fasaco_edge.watch.status_table import figures, state_colour
 from fasaco_edge.wire.documents.status import Status
 
-FAINT = "bright_black"
-TONES = {PLAIN: "", GOOD: "green", BAD: "red", ORDER: "yellow"}
 LEGEND = (
     (picture.COVERED, "covered"),
     (picture.RECOVERED, "twice"),
@@ -68,10 +64,8 @@ class Page:
     """Draws a robot view as lines of text; caches unchanged parts."""
 
     def __init__(self, console: Console) -> None:
-        self._glyphs = GlyphSet.of(console)
-        self._console = console
+        self._blocks = Blocks(console)
         self._picture = MissionPicture()
-        self._kept: dict[str, tuple[object, list[str]]] = {}
 
     def lines(self, view: RobotView, now: float, width: int, height: int) -> list[str]:
         """Return ``height`` lines, each ``width`` characters wide.
@@ -82,15 +76,17 @@ class Page:
             width, height: size of the screen, each at least 1 [characters].
         """
         layout = Layout.of(width, height)
-        page = self._block(headline(view, now), width, 1)
+        page = self._blocks.block(headline(view, now), width, 1)
         if layout.lines:
             page += self._middle(view, layout)
             whole, field = self._picture.path_is_whole, self._picture.shows_field
             key: object = (width, whole, field)
-            page += self._keep("legend", key, lambda: self._block(self._legend(whole), width, 1))
+            page += self._blocks.keep(
+                "legend", key, lambda: self._blocks.block(self._legend(whole), width, 1)
+            )
         if layout.entries:
             key = (view.events.count, self._picture.pixel_m, width, layout)
-            page += self._keep("log", key, lambda: self._log(view, width, layout))
+            page += self._blocks.keep("log", key, lambda: self._log(view, width, layout))
         page += [" " * width] * (height - len(page))
         return page[:height]
 
@@ -102,50 +98,35 @@ class Page:
     def _middle(self, view: RobotView, layout: Layout) -> list[str]:
         drawn = self._picture.kinds(view, layout.columns, layout.lines)
         if drawn is None:
-            left = self._block(Text("no map, no coverage yet", FAINT), layout.columns, layout.lines)
+            left = self._blocks.block(
+                Text("no map, no coverage yet", FAINT), layout.columns, layout.lines
+            )
         else:
-            left = self._glyphs.lines(drawn)
+            left = self._blocks.glyphs.lines(drawn)
         if not layout.figures:
             return left
         # The status is a value: a new one is another object.
         key = (view.status, layout)
-        right = self._keep("figures", key, lambda: self._figures(view.status, layout))
+        right = self._blocks.keep("figures", key, lambda: self._figures(view.status, layout))
         return [f"{a} {b}" for a, b in zip(left, right, strict=True)]
 
     def _figures(self, status: Status | None, layout: Layout) -> list[str]:
-        shown = Text("") if status is None else figures(status, layout.figures, self._glyphs)
-        return self._block(shown, layout.figures, layout.lines)
+        shown = Text("") if status is None else figures(status, layout.figures, self._blocks.glyphs)
+        return self._blocks.block(shown, layout.figures, layout.lines)
 
     def _legend(self, path_is_whole: bool) -> Text:
-        legend = Text()
-        for kind, name in FIELD_LEGEND if self._picture.shows_field else LEGEND:
-            cut = kind == picture.AHEAD and not path_is_whole
-            label = f"to {picture.NEAR_M:g} m" if cut else name
-            legend.append_text(self._glyphs.sample(kind)).append(f" {label} ", FAINT)
-        return _on_a_line(legend)
+        if self._picture.shows_field:
+            return self._blocks.legend(FIELD_LEGEND)
+        near = f"to {picture.NEAR_M:g} m"
+        return self._blocks.legend(
+            (kind, near if kind == picture.AHEAD and not path_is_whole else name)
+            for kind, name in LEGEND
+        )
 
     def _log(self, view: RobotView, width: int, layout: Layout) -> list[str]:
-        rule, scale = "─" if self._glyphs.unicode else "-", ""
-        if self._picture.pixel_m is not None:
-            scale = self._glyphs.scale(self._picture.pixel_m, max(layout.columns // 4, 4))
-        title = f" {scale}  lately " if scale else " lately "
-        lines = self._block(_on_a_line(Text(f"{title}{rule * width}", FAINT)), width, 1)
-        for entry in list(view.events.entries)[-layout.entries :]:
-            lines += self._block(_entry(entry), width, 1)
-        return lines
-
-    def _block(self, shown: RenderableType, width: int, height: int) -> list[str]:
-        """Return a renderable of rich as lines and columns of a given number."""
-        options = self._console.options.update(width=width, height=None)
-        lines = self._console.render_lines(shown, options, pad=True)[:height]
-        drawn = [self._glyphs.drawn(line) for line in lines]
-        return drawn + [" " * width] * (height - len(drawn))
-
-    def _keep(self, name: str, key: object, draw: Callable[[], list[str]]) -> list[str]:
-        kept = self._kept.get(name)
-        if kept is None or kept[0] != key:
-            kept = self._kept[name] = key, draw()
-        return kept[1]
+        pixel_m = self._picture.pixel_m
+        scale = None if pixel_m is None else (pixel_m, max(layout.columns // 4, 4))
+        return self._blocks.log(view.events, width, layout.entries, scale)
 
 
 def headline(view: RobotView, now: float) -> Text:
@@ -171,15 +152,4 @@ def headline(view: RobotView, now: float) -> Text:
             line.append(f"  {percent(status.coverage.fraction)} of cells")
         if status.path is not None:
             line.append(f"  path {status.path.revision}")
-    return _on_a_line(line.append(f"   {clock(now)}   f trail   q quits", FAINT))
-
-
-def _entry(entry: Event) -> Text:
-    return _on_a_line(
-        Text().append(f"{clock(entry.at_s)} ", FAINT).append(entry.text, TONES[entry.tone])
-    )
-
-
-def _on_a_line(text: Text) -> Text:
-    text.no_wrap, text.overflow = True, "crop"
-    return text
+    return on_a_line(line.append(f"   {clock(now)}   f trail   q quits", FAINT))

@@ -1,0 +1,79 @@
+"""Blocks of a page: renderables of rich as lines of a given width, kept while they are the same."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+
+from rich.console import Console, RenderableType
+from rich.text import Text
+
+from fasaco_edge.watch.events import BAD, GOOD, ORDER, PLAIN, Event, EventLog
+from fasaco_edge.watch.glyphs import GlyphSet
+from fasaco_edge.watch.phrases import clock
+
+FAINT = "bright_black"
+TONES = {PLAIN: "", GOOD: "green", BAD: "red", ORDER: "yellow"}
+
+
+class Blocks:
+    """Draws blocks of lines for a terminal.
+
+    Attributes:
+        glyphs: what it can show.
+    """
+
+    def __init__(self, console: Console) -> None:
+        self.glyphs = GlyphSet.of(console)
+        self._console = console
+        self._kept: dict[str, tuple[object, list[str]]] = {}
+
+    def block(self, shown: RenderableType, width: int, height: int) -> list[str]:
+        """Return a renderable of rich as lines and columns of a given number."""
+        options = self._console.options.update(width=width, height=None)
+        lines = self._console.render_lines(shown, options, pad=True)[:height]
+        drawn = [self.glyphs.drawn(line) for line in lines]
+        return drawn + [" " * width] * (height - len(drawn))
+
+    def keep(self, name: str, key: object, draw: Callable[[], list[str]]) -> list[str]:
+        """Return the block of a name; drawn again if the key is another than before."""
+        kept = self._kept.get(name)
+        if kept is None or kept[0] != key:
+            kept = self._kept[name] = key, draw()
+        return kept[1]
+
+    def legend(self, entries: Iterable[tuple[int, str]]) -> Text:
+        """Return kinds and their names on a line."""
+        legend = Text()
+        for kind, name in entries:
+            legend.append_text(self.glyphs.sample(kind)).append(f" {name} ", FAINT)
+        return on_a_line(legend)
+
+    def log(
+        self, events: EventLog, width: int, entries: int, scale: tuple[float, int] | None
+    ) -> list[str]:
+        """Return the newest events below a rule.
+
+        Args:
+            events: all events.
+            width: of the lines.
+            entries: how many events are shown at most.
+            scale: edge of a pixel [m] and length of the longest scale bar; None for no scale.
+        """
+        rule = "─" if self.glyphs.unicode else "-"
+        bar = f" {self.glyphs.scale(*scale)} " if scale is not None else ""
+        lines = self.block(on_a_line(Text(f"{bar} lately {rule * width}", FAINT)), width, 1)
+        for entry in list(events.entries)[-entries:]:
+            lines += self.block(_entry(entry), width, 1)
+        return lines
+
+
+def on_a_line(text: Text) -> Text:
+    """Return a text that is cut where its line ends."""
+    text.no_wrap, text.overflow = True, "crop"
+    return text
+
+
+def _entry(entry: Event) -> Text:
+    return on_a_line(
+        Text().append(f"{clock(entry.at_s)} ", FAINT).append(entry.text, TONES[entry.tone])
+    )
