@@ -57,7 +57,7 @@ def shares_of(members: Members[M], now_ns: int) -> Shares | None:
     if window is None:
         return None
     known = mask_of(ground, window)
-    owners = _owners(telling, members, known, window)
+    owners = owners_of(telling, members, known, window)
     owners[mask_of(union_on(telling.seat, members, "swept"), window)] = NOBODY
     names = {member.number: member.name for member in members}
     counted = zip(*np.unique(owners[owners != NOBODY], return_counts=True), strict=True)
@@ -65,9 +65,22 @@ def shares_of(members: Members[M], now_ns: int) -> Shares | None:
     return Shares(telling.seat.geometry(window), owners, cells)
 
 
-def _owners(
-    telling: M, members: Members[M], known: NDArray[np.bool_], window: Window
+def owners_of(
+    telling: M,
+    members: Members[M],
+    known: NDArray[np.bool_],
+    window: Window,
+    most_steps: int | None = None,
 ) -> NDArray[np.int16]:
+    """Return the number of the robot that a division gives each cell to; NOBODY for none.
+
+    Args:
+        telling: a robot that tells the division.
+        members: the robots.
+        known: cells within reach, bool (rows, cols).
+        window: of these cells, on the telling robot's lattice.
+        most_steps: how far cells are looked for, all robots together; None for any distance.
+    """
     first = np.full(known.shape, np.float32(np.inf))
     owners = np.full(known.shape, NOBODY, np.int16)
     if not telling.newest.parts:
@@ -77,7 +90,9 @@ def _owners(
         member = members.get(part.robot)
         if member is None:
             continue
-        away = distances(known, (part.row - window.row0, part.col - window.col0))
+        away = distances(known, (part.row - window.row0, part.col - window.col0), most_steps)
+        if most_steps is not None:
+            most_steps -= int(away[away < FAR].max(initial=0))
         times_s = away * np.float32(part.step_s) + np.float32(part.handicap_s)
         is_earlier = (times_s < first) & (away < FAR)
         owners[is_earlier] = member.number

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 from fasaco_edge.fleet.members import GONE_NS, Member, Members
-from fasaco_edge.fleet.shares import shares_of
+from fasaco_edge.fleet.shares import NOBODY, owners_of, shares_of
+from fasaco_edge.grid.geometry import Window
 from fasaco_edge.wire.documents.fleet import FleetPart
 from tests.support.fleet_told import member
 
@@ -52,3 +54,14 @@ def test_what_a_robot_that_is_gone_told_is_not_in_force(halved):
     assert shares_of(halved, now + 1).cells.keys() == {"a", "b"}
     # Once all are gone the last division stays drawn.
     assert shares_of(halved, now + GONE_NS + 1).cells == {"c": HALL}
+
+
+def test_cells_beyond_the_steps_that_are_looked_for_are_nobodys(halved):
+    telling = halved.dividing(SECOND)
+    window = Window(0, 0, 20, 30)
+    known = np.ones((20, 30), np.bool_)
+    owners = owners_of(telling, halved, known, window, 10)
+    # Both together: the second one has what the first one leaves.
+    assert np.count_nonzero(owners == 0) == 11 * 12 // 2
+    assert np.count_nonzero(owners == 1) <= 3
+    assert (owners_of(telling, halved, known, window) != NOBODY).all()
