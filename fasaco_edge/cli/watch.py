@@ -1,4 +1,4 @@
-"""``fasaco-edge watch``: a robot's mission in a terminal, as it goes."""
+"""``fasaco-edge watch``: a robot's mission, or that of a fleet, in a terminal, as it goes."""
 
 from __future__ import annotations
 
@@ -18,19 +18,23 @@ from fasaco_edge.cli.console.arguments import (
 )
 from fasaco_edge.cli.console.logs import say_why
 from fasaco_edge.cli.console.terminal import out
-from fasaco_edge.errors import BusUnavailable, FasacoError
+from fasaco_edge.errors import BusUnavailable, FasacoError, NobodyAnswersError
+from fasaco_edge.text import one_line
 from fasaco_edge.watch import live
 from fasaco_edge.watch.live import Watched
 from fasaco_edge.watch.phrases import steady_now
-from fasaco_edge.wire.keys import Keys
+from fasaco_edge.wire.keys import VERSION, Keys
 
 if TYPE_CHECKING:
     from fasaco_edge.bus.settings import BusSettings
+    from fasaco_edge.watch.fleet_feed import FleetFeed
+    from fasaco_edge.watch.fleet_view import FleetView
 
 EPILOG = """\
 examples:
   fasaco-edge watch                                    a daemon on this machine
   fasaco-edge watch --connect tcp/192.168.1.20:7447 --robot hall2
+  fasaco-edge watch --connect tcp/192.168.1.20:7447 --fleet building_7
   fasaco-edge watch --once                             one picture of the current state
   fasaco-edge watch | tee mission.log                  lines of text, without a terminal
   fasaco-edge watch --json | jq .coverage.fraction
@@ -39,6 +43,10 @@ f toggles between the pheromone trail and coverage with path: bright is where th
 lead. q or Ctrl-C quits. The picture shows the map with north up: y grows upwards. If no map is
 published on the native key `map` (under ROS 2, say) only the coverage is drawn. NO_COLOR=1 and
 TERM=dumb are honoured.
+
+--fleet shows all robots of a fleet on one map, also those that come later: what each has swept, its
+part of what is left and its next metres, in its colour; and what it does, as a table. It asks one
+robot every two seconds for its map. With --json a line a second, if something has changed.
 
 exit codes: 0 quit by the user; 1 --once without an answer, or the terminal is gone
 """
@@ -54,14 +62,20 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         metavar="S",
         help="with --once, how long to wait for the daemon (default: %(default)s)",
     )
+    parser.add_argument(
+        "--fleet",
+        metavar="NAME",
+        help="show all robots of this fleet (`fleet: {name: NAME}`) in place of one robot",
+    )
     add_robot_on_bus(parser)
 
 
 def run(args: argparse.Namespace) -> int:
     """Watch until a signal."""
     keys, bus, _ = robot_on_bus(args)
+    watch = _watch_robot if args.fleet is None else _watch_fleet
     try:
-        _watch_robot(args, keys, bus)
+        watch(args, keys, bus)
         sys.stdout.flush()
         code = Exit.OK
     except FasacoError as error:
@@ -95,6 +109,16 @@ def _watch_robot(args: argparse.Namespace, keys: Keys, bus: BusSettings) -> None
         )
 
 
+def _watch_fleet(args: argparse.Namespace, keys: Keys, bus: BusSettings) -> None:
+    from fasaco_edge.watch.fleet_feed import FleetFeed
+    from fasaco_edge.watch.fleet_view import FleetView
+    from fasaco_edge.watch.fleet_watch import FleetWatch
+
+    view = FleetView(args.fleet)
+    with FleetFeed(bus, keys) as feed:
+        _watch(args, FleetWatch(feed, view, out()), lambda: _no_robot(keys, feed, view))
+
+
 def _watch(args: argparse.Namespace, watched: Watched, nobody: Callable[[], FasacoError]) -> None:
     """Watch in the form that the options ask for; ``nobody``: the error if nothing is heard."""
     if args.once:
@@ -120,9 +144,23 @@ def _once(args: argparse.Namespace, watched: Watched, nobody: Callable[[], Fasac
         console.file.write(f"{line.rstrip()}\n")
 
 
+def _no_robot(keys: Keys, feed: FleetFeed, view: FleetView) -> NobodyAnswersError:
+    """Return the error that no robot of a fleet is heard."""
+    robots = len(feed.robots())
+    if not robots and not view.others:
+        return nobody_answers(f"{keys.base}/{VERSION}/*", ())
+    fleets = ", ".join(sorted(view.others)) or "none"
+    return NobodyAnswersError(
+        f"no robot of a fleet {one_line(view.fleet)!r} is heard",
+        hint=f"{robots} robots are on this bus, of these fleets: {fleets}; "
+        "`fleet: {name: ...}` in its configuration makes a robot one of a fleet",
+    )
+
+
 COMMAND = Command(
     description="Show map, coverage, the path ahead and the robot, with state, figures and "
-    "what happened lately, as they come over Zenoh; on the robot or on any other machine.",
+    "what happened lately, as they come over Zenoh; on the robot or on any other machine. With "
+    "--fleet one map of all robots of a fleet, and who does what.",
     run=run,
     add_options=_add_options,
     epilog=EPILOG,

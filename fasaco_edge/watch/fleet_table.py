@@ -1,0 +1,83 @@
+"""The table beside the picture of a fleet: who does what, a row a robot."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from rich.table import Table
+from rich.text import Text
+
+from fasaco_edge.watch import phrases, picture
+from fasaco_edge.watch.blocks import FAINT
+from fasaco_edge.watch.fleet_floor import FleetFloor
+from fasaco_edge.watch.fleet_robot import FleetRobot, short
+from fasaco_edge.watch.glyphs import GlyphSet
+from fasaco_edge.watch.status_table import LONGEST_BAR, state_colour
+
+# Longest name [characters], and the width from which units and rates are shown.
+LONGEST_NAME, UNITS, RATES = 12, 40, 47
+GONE_COLOUR, WAITING_COLOUR = "red", "yellow"
+
+
+def robot_table(robots: Sequence[FleetRobot], width: int, lines: int, glyphs: GlyphSet) -> Table:
+    """Return a table of robots of a given width, in at most so many lines, at least 1."""
+    table = Table.grid(padding=(0, 1), pad_edge=False)
+    table.width = width
+    longest = max([len(robot.name) for robot in robots], default=5)
+    # Where each has room for a second line, what it does is told whole.
+    is_folded = 2 * len(robots) < lines
+    table.add_column(width=1)
+    table.add_column(width=min(max(longest, 5), LONGEST_NAME), no_wrap=True, overflow="ellipsis")
+    table.add_column(ratio=1, no_wrap=not is_folded, overflow="fold" if is_folded else "ellipsis")
+    unit = " m2" if width >= UNITS else ""
+    heads = [f"swept{unit}", f"left{unit}", *(["kB/s"] if width >= RATES else [])]
+    for head in heads:
+        table.add_column(width=max(len(head), 6 if unit else 5), justify="right", no_wrap=True)
+    table.add_row("", *(Text(head, FAINT) for head in ("robot", "does", *heads)))
+    shown = robots if len(robots) < lines else robots[: max(lines - 2, 0)]
+    for robot in shown:
+        table.add_row(*_row(robot, glyphs)[: 3 + len(heads)])
+    if more := len(robots) - len(shown):
+        table.add_row("", "", Text(f"{more} more", FAINT))
+    return table
+
+
+def _row(robot: FleetRobot, glyphs: GlyphSet) -> list[Text]:
+    left = "-" if robot.left_m2 is None else f"{robot.left_m2:.1f}"
+    return [
+        glyphs.sample(picture.DISCS[robot.place % picture.COLOURS]),
+        Text(robot.name, FAINT if robot.silent_s is not None else ""),
+        _doing(robot),
+        Text(f"{robot.swept_m2:.1f}"),
+        Text(left),
+        Text(f"{robot.kb_s:.1f}", FAINT),
+    ]
+
+
+def _doing(robot: FleetRobot) -> Text:
+    if robot.silent_s is not None:
+        return Text(f"gone for {phrases.age(robot.silent_s)}", GONE_COLOUR)
+    colour = WAITING_COLOUR if robot.waits_for else state_colour(robot.state)
+    doing = Text(robot.doing, colour)
+    if robot.away and robot.away != robot.state:
+        doing.append(f" ({robot.away})", WAITING_COLOUR)
+    return doing
+
+
+def total_rows(
+    floor: FleetFloor, unheard: Sequence[str], width: int, glyphs: GlyphSet
+) -> list[Text]:
+    """Return what all robots have done together, and the names of those not heard, in lines."""
+    silent = [Text(f"not heard: {', '.join(unheard)}", GONE_COLOUR)] if unheard else []
+    if floor.fraction is None:
+        return silent
+    swept_m2, area_m2 = floor.swept * floor.cell_m2, floor.area * floor.cell_m2
+    share = Text(phrases.percent(floor.fraction), "bold")
+    share.append(f" swept: {swept_m2:.1f} of {area_m2:.1f} m2", "not bold")
+    lines = [share, glyphs.bar(floor.fraction, min(width, LONGEST_BAR))]
+    if floor.twice:
+        lines.append(Text(f"{floor.twice * floor.cell_m2:.1f} m2 swept by two or more"))
+    if floor.division:
+        by = f" by {short(floor.by)}" if floor.by else ""
+        lines.append(Text(f"division {floor.division}{by}", FAINT))
+    return lines + silent
