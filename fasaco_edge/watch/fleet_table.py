@@ -60,7 +60,8 @@ def _doing(robot: FleetRobot) -> Text:
     colour = WAITING_COLOUR if robot.waits_for else state_colour(robot.state)
     doing = Text(robot.doing, colour)
     if robot.away and robot.away != robot.state:
-        doing.append(f" ({robot.away})", WAITING_COLOUR)
+        away = "not heard by others" if robot.away == "gone" else robot.away
+        doing.append(f" ({away})", WAITING_COLOUR)
     return doing
 
 

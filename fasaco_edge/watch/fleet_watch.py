@@ -102,8 +102,10 @@ class FleetWatch:
 
     def is_whole(self) -> bool:
         """Tell whether all robots have had the time to tell of themselves, and have shown maps."""
+        view = self._view
         is_told = phrases.steady_now() - self._known_at > TOLD_S
-        return is_told and self._view.floor.area > 0 and not self._view.without_map()
+        telling = (member.name for member in view.members if member.ground.count)
+        return is_told and not view.without_map() and view.floor.cells.keys() >= set(telling)
 
     def _count(self, now: float) -> None:
         passed_s = now - self._counted_at

@@ -96,6 +96,9 @@ def test_what_others_leave_out_is_told():
     others = [{"name": "a", "away": "stands"}]
     tell(view, "b", "status", status(fleet={"name": "house", "members": others}))
     assert "(stands)" in page_of(view)
+    others = [{"name": "a", "away": "gone"}]
+    tell(view, "b", "status", status(fleet={"name": "house", "members": others}))
+    assert "others)" in page_of(view)
 
 
 def test_done_is_done():

@@ -232,6 +232,20 @@ def test_json_is_a_status_a_line(covering):
     assert documents[0]["coverage"]["coverable"] == 234
 
 
+def test_json_goes_on_after_a_status_that_cannot_be_read(covering):
+    with (
+        Outsider(covering.endpoint) as outsider,
+        _piped("--connect", covering.endpoint, "--json") as process,
+    ):
+        assert process.stdout is not None
+        process.stdout.readline()
+        for broken in (b"\xff", b"[]"):
+            outsider.session.put(f"{outsider.prefix}/status", broken)
+            assert json.loads(process.stdout.readline())["state"] == "covering"
+        process.send_signal(signal.SIGINT)
+        assert process.wait(60.0) == 0
+
+
 def test_once_is_one_picture(covering):
     ended = fasaco_edge("watch", "--once", "--connect", covering.endpoint)
     assert ended.code == 0
