@@ -220,7 +220,7 @@ class FleetView:
         said = decode_member(sample.payload, self.fleet)
         if said is None or not robot:
             if not self._seen and len(self.others) < MOST_FLEETS:
-                self.others |= {short(fleet_of(sample.payload))} - {""}
+                self.others |= {short(fleet_of(sample.payload) or "")} - {""}
             return
         _, news = self.members.hear(robot, said, at_ns)
         if news == JOINED:

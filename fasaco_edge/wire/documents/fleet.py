@@ -157,11 +157,3 @@ def decode_member(payload: bytes, fleet: str) -> FleetMember | None:
         return msgspec.json.decode(payload, type=FleetMember)
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
         raise MalformedMessage(f"fleet: {error}") from error
-
-
-def fleet_of(payload: bytes) -> str:
-    """Return the name of the fleet that a message is for; "" if it cannot be read."""
-    try:
-        return msgspec.json.decode(payload[:MAX_JSON_BYTES], type=_Head).fleet
-    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError):
-        return ""
