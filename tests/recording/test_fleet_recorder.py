@@ -116,6 +116,18 @@ def test_each_robot_has_a_tree_of_its_own_also_one_that_comes_later(studio):
     assert any("late: waiting for r1" in line for line in log_of(part))
 
 
+def test_robots_that_are_there_at_first_have_colours_by_their_names(studio):
+    # By which was heard first, they differed from one recording to the next, and from pictures.
+    for name in ("r2", "r3", "r1"):
+        Teller(studio.bus, name).tell(cells=[(2, 2)])
+        studio.pass_time(0.1)
+    studio.until(lambda: studio.joined("r1", "r2", "r3"))
+    late = Teller(studio.bus, "a-late-one")
+    late.tell(cells=[(9, 9)])
+    studio.until(lambda: studio.joined("a-late-one"))
+    assert [member.name for member in studio.recorder._members] == ["r1", "r2", "r3", "a-late-one"]
+
+
 def test_one_that_floods_lies_or_sends_rubbish_harms_no_other(studio):
     bad, good = Teller(studio.bus, "bad"), Teller(studio.bus, "good")
     bad.tell()

@@ -39,6 +39,9 @@ from fasaco_edge.wire.messages.poses import PoseDecoder
 from fasaco_edge.wire.topics import FLEET, MAP, PATH, POSE, STATUS
 
 NOTE_NS, WRITE_NS = 1_000_000_000, 5_000_000_000
+# Robots heard within so long of the first are recorded in the order of their names; of so many
+# messages at most.
+GATHER_NS, MOST_GATHERED = 2_000_000_000, 1_000
 # A robot's rate of messages is plotted over this time.
 RATE_NOTES = 5
 # Robots and topics whose faults are counted apart, beside those of the robots recorded.
@@ -78,6 +81,8 @@ class FleetRecorder:
         self._scene = FleetScene(self._writer, self._members)
         self._inbox = FleetInbox(afforded_bytes(memory_limit()), self._clock.arrival)
         self._ears = Ears(bus, config.keys(), (STATUS, PATH, POSE), self._inbox.post)
+        self._first: list[Heard] = []
+        self._gathers = True
         self._poses: dict[str, PoseDecoder] = {}
         self._notes: list[Note] = []
         self._rates: dict[str, list[int]] = {}
@@ -92,7 +97,7 @@ class FleetRecorder:
 
     def step(self, timeout_s: float) -> None:
         """Write and draw what arrives within ``timeout_s`` [s], and what is due."""
-        for heard in self._inbox.take(timeout_s):
+        for heard in self._gathered(self._inbox.take(timeout_s)):
             self._writer.message(heard.arrival.wall_ns)
             self._attempt(heard)
             self._writer.sync(time.monotonic_ns())
@@ -110,7 +115,8 @@ class FleetRecorder:
 
     def end(self) -> bool:
         """Write what waits, and the footer; False if the disk fails."""
-        for heard in self._inbox.take(0.0):
+        self._gathers = False
+        for heard in self._gathered(self._inbox.take(0.0)):
             self._attempt(heard)
         now_ns = self._clock.now_ns()
         self._writer.at(now_ns)
@@ -118,6 +124,20 @@ class FleetRecorder:
         self._write()
         self._scene.finish()
         return self._writer.close()
+
+    def _gathered(self, arrived: list[Heard]) -> list[Heard]:
+        """Return what to take in now: of the robots heard at first all at once, by name.
+
+        In the order of names they have the same colours in all recordings and pictures.
+        """
+        self._first += arrived
+        if self._gathers and self._first:
+            since_ns = time.monotonic_ns() - self._first[0].arrival.at_ns
+            self._gathers = since_ns < GATHER_NS and len(self._first) < MOST_GATHERED
+        if self._gathers:
+            return []
+        first, self._first = self._first, []
+        return sorted(first, key=lambda heard: heard.robot)
 
     @property
     def hangs(self) -> bool:
