@@ -7,9 +7,11 @@ import pytest
 
 from fasaco_edge.mission.config import Place
 from fasaco_edge.mission.core.events import MapReceived, MemberHeard, State
+from fasaco_edge.mission.fleet.tiles import TILE_BYTES
 from fasaco_edge.mission.fleet.traffic import PATIENCE_S
+from fasaco_edge.mission.orders.order_state import OrderState, Stage
 from tests.mission.fleets import FleetDrive, FleetRobot
-from tests.mission.world import CELL, CONFIG, Drive, building, pose_at, with_policy
+from tests.mission.world import CELL, CONFIG, Drive, building, pose_at, rectangle, with_policy
 
 HALL = ("." * 24,) * 5
 # Room for one robot beside the passage.
@@ -53,6 +55,43 @@ def test_a_robot_on_its_way_home_waits_and_goes_on(drive):
     while drive.walk:
         drive.go(member((4, 23)))
     assert drive.cell == (2, 20)
+
+
+def test_a_robot_held_up_on_its_way_home_for_a_minute_says_so():
+    config = with_policy(replace(CONFIG, robot="r1"), home=at(0, 20))
+    drive = Drive((0, 4), config=config)
+    drive.tell(MapReceived(building("." * 24)), pose_at(0, 4))
+    drive.plan()
+    drive.command("home")
+    states = []
+    for _ in range(150):
+        if drive.walk and drive.walk[0][1] < 10:
+            drive.cell = drive.walk.pop(0)
+        drive.tell(pose_at(*drive.cell), member((0, 11), state="charging"), after=1.0)
+        states.append(drive.mission.state)
+    # Every 30 s it tries once whether it can pass.
+    assert set(states[90:]) == {State.DEGRADED}
+    assert drive.mission.reason == "r2 stands in the way for more than a minute"
+
+
+def test_a_robot_that_returns_home_waits_though_nothing_is_left():
+    # Its wait was in vain, it held, as no cell was left: it went on and waited in turn.
+    config = with_policy(replace(CONFIG, robot="r1"), home=at(2, 20))
+    order = {"zones": [{"name": "z", "polygon": rectangle(2, 0, 3, 6)}], "return_home": True}
+    drive = Drive((2, 4), config=config, order_state=OrderState.idle("no order yet"))
+    drive.tell(MapReceived(building(*HALL)), pose_at(2, 4))
+    drive.command("start", order)
+    drive.plan()
+    drive.tell(pose_at(2, 4), member((4, 23), tiles=(((0, 0), b"\xff" * TILE_BYTES),)), after=2.0)
+    drive.tell(pose_at(2, 4), after=2.0)
+    assert drive.mission.order_state.stage is Stage.RETURNING
+    row, col = drive.cell
+    revision, over = drive.revision, member((row, col + 2), waits_for="r3")
+    for _ in range(20):
+        drive.tell(pose_at(row, col), over)
+    assert drive.mission.giving_way.waits_for == "r2"
+    assert drive.mission.state is State.RETURNING
+    assert drive.revision <= revision + 2
 
 
 def test_a_way_home_leads_round_a_robot_that_stands_in_it(drive):

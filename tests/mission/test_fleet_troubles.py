@@ -6,6 +6,8 @@ from dataclasses import replace
 
 import pytest
 
+from fasaco_edge.mission.core.events import Part
+from fasaco_edge.mission.fleet.shared import MOST_ROBOTS
 from fasaco_edge.mission.fleet.traffic import OLD_S
 from tests.mission.fleets import FleetDrive
 from tests.mission.world import CONFIG, MapReceived, building, pose_at
@@ -129,3 +131,18 @@ def test_one_that_is_gone_is_missed_though_another_has_made_the_division():
         assert dead not in {part.robot for part in robot.mission.fleet.parts}
     fleet.finish()
     assert not fleet.left_out()
+
+
+def test_a_division_names_no_more_robots_than_others_read():
+    fleet = FleetDrive(["." * 24] * 6, {"a": (0, 0), "b": (5, 23), "c": (0, 23)})
+    ghosts = tuple(Part(f"g{number:02}", (0, number % 24), 0.0, 1.0) for number in range(31))
+    mine = (Part("a", (0, 0), 0.0, 1.0), Part("z", (5, 0), 0.0, 1.0))
+    robot = fleet.robots["a"]
+    said = replace(
+        fleet.robots["b"].report(), robot="z", division=9, by="z", parts=(*mine, *ghosts)
+    )
+    for _ in range(4):
+        robot.tick()
+        others = [fleet.robots[name].report() for name in "bc"]
+        robot.tell(said, *others, after=0.0)
+    assert 2 < len(robot.mission.fleet.parts) <= MOST_ROBOTS + 1

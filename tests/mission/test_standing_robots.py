@@ -74,6 +74,13 @@ def test_cells_stay_closed_where_the_poses_of_a_robot_that_stands_scatter(area, 
     assert members.closed(area, RADIUS_M).sum() == closed.sum()
 
 
+def test_no_cells_stay_closed_for_a_robot_on_another_map(area, members):
+    members.hear(member(1.125, 1.125), 0.0)
+    members.avoid("r2")
+    members.hear(replace(member(1.125, 1.125), misfit="its map is another"), 1.0)
+    assert members.closed(area, RADIUS_M) is None
+
+
 def test_where_a_silent_robot_is_only_the_map_shows(area, members):
     members.hear(member(1.125, 1.125), 0.0)
     members.avoid("r2")
@@ -133,22 +140,6 @@ def test_one_that_stands_in_the_way_is_planned_around_though_its_poses_scatter(s
         raise AssertionError(drive.mission.reason)
     # Those around its disc, and what that closes in a corner of the grid of cells.
     assert len(drive.visited) >= 24 * 5 - 10
-
-
-def test_one_held_up_for_a_minute_says_so():
-    drive = planned()
-    row, col = drive.walk[1]
-    x, y = (col + 0.5) * CELL_M, (row + 0.5) * CELL_M
-    away = (x + (col - 4) * CELL_M, y + (row - 2) * CELL_M)
-    for second in range(70):
-        # It drives, it says, and never gets anywhere; between walls there would be no way around.
-        there = replace(member(x, y), ahead=(away,), waits_for="r1" if second % 9 else "")
-        drive.mission.fleet.others.avoid = lambda robot: None
-        drive.tell(pose_at(2, 4), there, after=1.0)
-        if drive.request is not None:
-            drive.plan()
-    assert drive.mission.state == "degraded"
-    assert "for more than a minute" in drive.mission.reason
 
 
 def test_whether_another_is_near_is_told_at_rest_too():

@@ -177,6 +177,17 @@ def test_a_robot_that_does_not_drive_its_path_is_told_and_gets_it_again():
     drive.finish()
 
 
+def test_a_robot_that_stood_is_not_told_of_with_another_order():
+    drive = driving(*ROOM, config=CONFIG)
+    for _ in range(65):
+        drive.tell(pose_at(*drive.cell), after=1.0)
+    assert drive.mission.state is State.DEGRADED
+    drive.command("cancel")
+    drive.command("start", {"zones": [{"name": "z", "polygon": rectangle(3, 8, 4, 12)}]})
+    drive.plan()
+    assert drive.mission.state is State.COVERING
+
+
 def test_a_robot_that_does_not_drive_home_is_told():
     drive = driving(*ROOM, config=CONFIG)
     drive.command("home")

@@ -148,13 +148,14 @@ class Executive:
             way.end()
             return None
         # Others may have swept meanwhile what this robot waits to drive to.
-        is_vain = bool(way.waits_for) and not self.orders.cells.left()
+        is_homing = order.stage is Stage.RETURNING
+        is_vain = bool(way.waits_for) and not is_homing and not self.orders.cells.left()
         has_work = bool(order.errand) or (order.is_open and not is_vain)
         update = way.look(self._now, has_work=has_work, errand=order.errand)
         if not way.waits_for:
             return None
         cell = self.map.robot_cell()
-        if order.errand or order.stage is Stage.RETURNING:
+        if order.errand or is_homing:
             self._state = State.RETURNING
         elif self._state is not State.DONE and cell is not None:
             self._state = State.COVERING if order.is_open else State.DONE

@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from functools import partial
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +18,7 @@ from fasaco_edge.mission.config import MissionConfig
 from fasaco_edge.mission.core.events import PathUpdate
 from fasaco_edge.mission.core.route import NO_CELLS, Route
 from fasaco_edge.mission.fleet.layer import FleetLayer
-from fasaco_edge.mission.fleet.refuge import comes_nearer, discs, refuge
+from fasaco_edge.mission.fleet.refuge import discs, refuge
 from fasaco_edge.mission.fleet.traffic import (
     AHEAD_M,
     NEAR_M,
@@ -30,6 +29,7 @@ from fasaco_edge.mission.fleet.traffic import (
     Neighbour,
     Obstruction,
     Points,
+    least_apart_m,
     obstruction,
     spaced,
 )
@@ -44,6 +44,8 @@ BESIDE_M, MOVED_M = 0.4, 0.1
 ARRIVED_M = 0.05
 # On its way there it looks so far ahead for others that have come in its way [points].
 LOOK_POINTS = int(WAIT_M / 2 / SPACING_M)
+# One has come in its way that is nearer to it by this than when the way was chosen [m].
+COMES_M = 0.05
 # A robot that has not got farther than this for so long plans around whoever keeps it, and is
 # reported after so long [m], [s], [s]: the poses of the other scatter perhaps, as if it moved.
 STAYS_M, LONG_S, TOO_LONG_S = 0.2, 30.0, 60.0
@@ -71,6 +73,8 @@ class GivingWay:
         self._map, self._route, self._fleet = map_state, route, fleet
         self._since = self._sought_at = 0.0
         self._refuge: Cell | None = None
+        # How near the way there led to others when it was chosen [m].
+        self._apart_m: dict[str, float] = {}
         self._has_work = True
         # The path that it waits to go on with, and the errand that leads along it.
         self._held, self._errand = NO_CELLS, ""
@@ -78,6 +82,8 @@ class GivingWay:
         self._place, self._free_since = (math.inf, math.inf), 0.0
         # Where it stays, and since when.
         self._stays_at, self._stays_since = (math.inf, math.inf), 0.0
+        # Why it waited last, and when.
+        self._waited, self._waited_at = "", -math.inf
 
     def line(self) -> Points:
         """Return the next metres, from the robot's place on, points (x, y) [m], float64 (n, 2)."""
@@ -109,8 +115,8 @@ class GivingWay:
 
     def why_stuck(self, now: float) -> str:
         """Return why the robot is thought to be held up for good, or ""."""
-        is_stuck = bool(self.waits_for) and now - self._stays_since > TOO_LONG_S
-        return f"{self.reason} for more than a minute" if is_stuck else ""
+        is_stuck = now - self._waited_at <= STANDS_S and now - self._stays_since > TOO_LONG_S
+        return f"{self._waited} for more than a minute" if is_stuck else ""
 
     def end(self) -> None:
         """Wait no longer."""
@@ -159,7 +165,11 @@ class GivingWay:
         """Note where the robot is, and since when it has been free to drive on from there."""
         if math.dist(here, self._place) > MOVED_M or len(self._cells()) < 2:
             self._place, self._free_since = here, now
-        if math.dist(here, self._stays_at) > STAYS_M or not self.waits_for:
+        if self.waits_for:
+            self._waited, self._waited_at = self.reason, now
+        # Let go for a moment, it has not got on.
+        has_waited = now - self._waited_at <= STANDS_S
+        if math.dist(here, self._stays_at) > STAYS_M or not has_waited:
             self._stays_at, self._stays_since = here, now
 
     def _is_underway(
@@ -171,8 +181,24 @@ class GivingWay:
         is_stuck = now - self._sought_at > PATIENCE_S
         if is_there or is_stuck or not len(ahead):
             return False
-        line, beside = spaced(self.line())[: LOOK_POINTS + 1], discs(self._radius_m, neighbours)
-        return not any(comes_nearer(a, b, beside) for a, b in pairwise(line))
+        line = spaced(self.line())[: LOOK_POINTS + 1]
+        return all(
+            apart_m >= self._apart_m.get(name, self._clear_m(neighbours[name])) - COMES_M
+            for name, apart_m in self._apart_of(line, neighbours).items()
+        )
+
+    def _apart_of(self, line: Points, neighbours: Mapping[str, Neighbour]) -> dict[str, float]:
+        """Return how near a line comes to others, at most what is kept clear of them [m]."""
+        return {
+            name: min(
+                self._clear_m(near),
+                float(np.hypot(*(line - (near.heard.x, near.heard.y)).T).min()),
+            )
+            for name, near in neighbours.items()
+        }
+
+    def _clear_m(self, near: Neighbour) -> float:
+        return least_apart_m(self._radius_m, near.heard)
 
     def _is_in(self, refuge: Cell, here: tuple[float, float]) -> bool:
         """Tell whether the robot has come to its refuge: at the edge it may be in the way."""
@@ -231,9 +257,10 @@ class GivingWay:
         was_waiting = bool(self.waits_for)
         self.waits_for, self.reason = found.robot, found.reason
         has_path = len(route.path.cells) > 0
-        if not was_waiting:
-            self._held = route.path.ahead
-        route.set_aside()
+        ahead = route.path.ahead
+        # After a new order the path set aside is another.
+        if route.set_aside() or not was_waiting:
+            self._held = ahead
         is_long = now - self._since > PATIENCE_S or self._hangs(now)
         # While it is held it stands for that reason: let go, it has all the time to drive again.
         self._free_since = now
@@ -249,7 +276,9 @@ class GivingWay:
             if way is not None and to is not None and not self._is_in(to, here):
                 self._refuge = to
                 beside = discs(self._radius_m, neighbours)
-                return route.publish(way, self.reason, now, beside=beside)
+                update = route.publish(way, self.reason, now, beside=beside)
+                self._apart_m = self._apart_of(spaced(self.line()), neighbours)
+                return update
             if self._fleet.others.is_avoided(found.robot):
                 self.end()
                 return None

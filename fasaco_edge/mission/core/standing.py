@@ -35,8 +35,8 @@ class Standing:
         # clock, and by the robot's [ns].
         self._place = math.inf, math.inf
         self._since = 0.0, 0
-        # How often it has had the same path again in that place.
-        self._tries = 0
+        # How often it has had the same path again in that place, and where that ends.
+        self._tries, self._again_to = 0, self._end()
 
     def look(self, cell: Cell, now: float) -> None:
         """Note the robot's cell, and its place."""
@@ -79,13 +79,23 @@ class Standing:
 
     def note_again(self) -> None:
         """Note that the robot gets the path that it stands on again."""
-        self._tries += 1
+        end = self._end()
+        self._tries, self._again_to = (self._tries + 1 if end == self._again_to else 1), end
 
     @property
     def why_stuck(self) -> str:
         """Why the robot is thought to be unable to drive its path; "" if it is not."""
-        tries = self._tries
-        return f"the robot stands: it got the same path {tries + 1} times" if tries >= TRIES else ""
+        stamped, end = self._map.pose, self._end()
+        if stamped is None or end is None or end != self._again_to or self._tries < TRIES:
+            return ""
+        if math.dist((stamped.pose.x, stamped.pose.y), self._place) > STANDING_M:
+            return ""
+        return f"the robot stands: it got the same path {self._tries + 1} times"
+
+    def _end(self) -> Cell | None:
+        """Return the last cell of the path; None where there is nothing to drive."""
+        ahead = self._route.path.ahead
+        return (int(ahead[-1, 0]), int(ahead[-1, 1])) if len(ahead) > 1 else None
 
     def _note_place(self) -> None:
         """Note the robot's place, and whether it has had another path since."""

@@ -4,15 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from fasaco_edge.grid.geometry import Pose2D
+from fasaco_edge.grid.geometry import MOST_INDEX, Pose2D
 from fasaco_edge.grid.lattice import CoverageLattice
 from fasaco_edge.mission.fleet.division import Division, Robot
 from fasaco_edge.mission.fleet.division_numbers import DivisionNumbers
 from fasaco_edge.mission.fleet.members import GONE, GONE_S, Members
 from fasaco_edge.mission.map.reachable_area import ReachableArea, anchor_cell
-
-# Limit on the numbers of a seed's cell, as others are told.
-FARTHEST = 2**30
 
 
 class AtWork:
@@ -65,7 +62,7 @@ class AtWork:
                 continue
             row, col = lattice.cell_at(member.newest.x, member.newest.y)
             # Others could not be told of a seed farther off.
-            if max(abs(row), abs(col)) < FARTHEST:
+            if max(abs(row), abs(col)) <= MOST_INDEX:
                 found.append(Robot(robot.name, (row, col), member.newest.step_s))
         return found
 

@@ -23,6 +23,7 @@ from fasaco_edge.mission.fleet.division_numbers import DivisionNumbers
 from fasaco_edge.mission.fleet.ground import JointGround, viewpoint
 from fasaco_edge.mission.fleet.members import Member, Members
 from fasaco_edge.mission.fleet.remainder import Remainder
+from fasaco_edge.mission.fleet.shared import MOST_ROBOTS
 from fasaco_edge.mission.map.map_state import MapState
 from fasaco_edge.mission.map.reachable_area import ReachableArea
 from fasaco_edge.planners.cost import CoverageCost
@@ -201,6 +202,8 @@ class FleetLayer:
             if not (why := self._why_anew(joint, left, robots, now, at_once=at_once)):
                 return self._why_by_taken()
             robots += self._at_work.unseen(before, joint.common, robots, self._divided_at, now)
+            # Others refuse more parts.
+            robots = robots[: MOST_ROBOTS + 1]
             divided = divide(joint.common, left, robots, before, self._turn_steps)
             if before is None or not divided.is_like(before):
                 self.numbers.count_on()

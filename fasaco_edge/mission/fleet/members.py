@@ -112,7 +112,7 @@ class Members:
     def _is_at_avoided(self, robot: str) -> bool:
         """Tell whether paths are planned around a robot, and it is still there."""
         place, member = self._avoided.get(robot), self.known.get(robot)
-        if place is None or member is None:
+        if place is None or member is None or member.left_out:
             return False
         return math.dist(place, (member.newest.x, member.newest.y)) < LEFT_M
 

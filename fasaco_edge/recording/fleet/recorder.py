@@ -30,7 +30,7 @@ from fasaco_edge.recording.scene.blueprint import NO_MAP
 from fasaco_edge.recording.write.inbox import afforded_bytes
 from fasaco_edge.recording.write.process import Output, record
 from fasaco_edge.text import is_reported, one_line
-from fasaco_edge.wire.documents.fleet import decode_member
+from fasaco_edge.wire.documents.fleet import decode_member, fleet_of
 from fasaco_edge.wire.documents.json_text import decode_tolerant
 from fasaco_edge.wire.documents.status import Status
 from fasaco_edge.wire.messages.maps import decode_occupancy_grid
@@ -130,6 +130,13 @@ class FleetRecorder:
 
         In the order of names they have the same colours in all recordings and pictures.
         """
+        if self._gathers:
+            strange = {
+                one.robot for one in arrived if fleet_of(one.arrival.sample.payload) != self._fleet
+            }
+            for robot in strange:
+                self._inbox.forget(robot)
+            arrived = [one for one in arrived if one.robot not in strange]
         self._first += arrived
         if self._gathers and self._first:
             since_ns = time.monotonic_ns() - self._first[0].arrival.at_ns
