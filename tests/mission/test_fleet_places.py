@@ -14,6 +14,7 @@ from fasaco_edge.config.robot import RobotConfig
 from fasaco_edge.daemon.loop.fleet import FleetEar, FleetVoice
 from fasaco_edge.daemon.loop.loader import mission_config
 from fasaco_edge.grid.geometry import Pose2D, Window
+from fasaco_edge.grid.lattice import UNKNOWN, CoverageLattice
 from fasaco_edge.mission.config import MapPlace
 from fasaco_edge.mission.core.events import MapReceived
 from fasaco_edge.mission.fleet.shared import SharedProgress
@@ -58,8 +59,12 @@ def test_where_another_robots_map_lies_elsewhere_all_that_it_told_before_is_drop
     drive.tell(ear.event(told_from(20 * CELL)))
     moved = {(row, col + 20) for row, col in BLOCK}
     assert swept_by_others(drive.mission) == moved
-    nothing = ReachableArea(drive.mission.lattice, np.zeros((20, 60), np.bool_))
-    ground = drive.mission.fleet.others.ground.joint(nothing).common
+    lattice = drive.mission.lattice
+    unknown = np.full_like(lattice.states, UNKNOWN), np.zeros_like(lattice.steps)
+    nothing = ReachableArea(
+        CoverageLattice(lattice.window, lattice.cell_m, *unknown), np.zeros((20, 60), np.bool_)
+    )
+    ground = drive.mission.fleet.others.ground.joint(nothing).lattice
     assert cells_in(ground.window, ground.coverable) == moved
 
 

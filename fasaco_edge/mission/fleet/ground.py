@@ -1,15 +1,12 @@
 """Shared ground: the cells that the robots of a fleet can reach, each on its own map.
 
-Cells that only others' maps show take part in the division. Paths are planned on this robot's own
-map alone, which decides where it shows anything. Travel times of a division are counted over the
-cells that any robot can reach: a door that one map shows shut would give each robot other times,
-and so other parts.
+Cells that only others' maps show take part in the division, so that all robots divide nearly the
+same area. This robot's own map decides where it shows anything; paths are planned on it alone.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,18 +24,6 @@ from fasaco_edge.mission.map.reachable_area import ReachableArea
 MOST_ADDED = 1_000_000
 
 
-class JointGround(NamedTuple):
-    """The ground of all robots, in one window.
-
-    Attributes:
-        area: what this robot can reach, with the ground of others where its map shows nothing.
-        common: the cells that any robot can reach, and the steps between them.
-    """
-
-    area: ReachableArea
-    common: CoverageLattice
-
-
 class SharedGround:
     """The cells that other robots can reach; its user drops robots that it keeps no longer.
 
@@ -49,8 +34,8 @@ class SharedGround:
     def __init__(self) -> None:
         self.version = 0
         self._robots: dict[str, dict[Cell, bytes]] = {}
-        # The last joint ground, and what it was made of.
-        self._joint: tuple[ReachableArea, int, JointGround] | None = None
+        # The last joint area, and what it was made of.
+        self._joint: tuple[ReachableArea, int, ReachableArea] | None = None
 
     def hear(self, robot: str, tiles: Iterable[Placed]) -> None:
         """Take in a robot's tiles, each with TILE_BYTES of bits; the newest of a place counts."""
@@ -71,11 +56,11 @@ class SharedGround:
         self._robots.clear()
         self.version += 1
 
-    def joint(self, area: ReachableArea) -> JointGround:
-        """Return what this robot can reach together with the ground of others."""
+    def joint(self, area: ReachableArea) -> ReachableArea:
+        """Return an area with the ground of others, where its map shows nothing."""
         if self._joint and self._joint[0] is area and self._joint[1] == self.version:
             return self._joint[2]
-        joined = _joined(area, self._merged())
+        joined = _joined(area, self._merged()) if self._robots else area
         self._joint = area, self.version, joined
         return joined
 
@@ -143,46 +128,10 @@ class GroundTelling:
         return tuple((place, tiles[place]) for place in chosen)
 
 
-def _joined(area: ReachableArea, tiles: dict[Cell, NDArray[np.uint8]]) -> JointGround:
-    """Return the ground of a robot and of those whose tiles are given."""
+def _joined(area: ReachableArea, tiles: dict[Cell, NDArray[np.uint8]]) -> ReachableArea:
+    """Return an area with the cells of tiles where its lattice knows nothing."""
     lattice, window = area.lattice, area.lattice.window
-    around, told = _placed(tiles, window)
-    inside = window.slices_in(around)
-    ground = told.copy()
-    ground[inside] &= lattice.states == UNKNOWN
-    is_alone = not ground.any()
-    if is_alone:
-        around, told, inside = window, told[inside], np.s_[:, :]
-    own = carried(lattice.coverable, window, around)
-    own_steps = carried(lattice.steps, window, around)
-    reached = carried(area.reachable, window, around)
-    any_of = told | reached
-    states = np.where(any_of, np.uint8(COVERABLE), np.uint8(UNKNOWN))
-    steps = _steps(any_of, own, own_steps)
-    common = CoverageLattice(around, lattice.cell_m, states, steps)
-    if is_alone:
-        return JointGround(area, common)
-    states = np.full(told.shape, UNKNOWN, np.uint8)
-    states[inside] = lattice.states
-    states[ground] = COVERABLE
-    steps = _steps(ground | own, own, own_steps)
-    whole = CoverageLattice(around, lattice.cell_m, states, steps)
-    seeds = np.argwhere(reached)
-    if not len(seeds):
-        return JointGround(ReachableArea(whole, reached), common)
-    first = int(seeds[0, 0]) + around.row0, int(seeds[0, 1]) + around.col0
-    joined = ReachableArea.around(whole, first).reachable
-    # Own cells beyond the ground of others, which nobody can reach, may lie behind a wall there.
-    return JointGround(ReachableArea(whole, joined & any_of), common)
-
-
-def _placed(
-    tiles: dict[Cell, NDArray[np.uint8]], window: Window
-) -> tuple[Window, NDArray[np.bool_]]:
-    """Return a window around another one and the tiles, and their cells in it, bool (rows, cols).
-
-    The nearest tiles first: those far away may be of a robot that lies.
-    """
+    # The nearest tiles first: those far away may be of a robot that lies.
     row, col = (window.row0 + window.row1) / 2, (window.col0 + window.col1) / 2
     places = sorted(tiles, key=lambda at: (abs(at[0] * TILE - row) + abs(at[1] * TILE - col), at))
     around = window
@@ -192,24 +141,36 @@ def _placed(
         if larger.rows * larger.cols - window.rows * window.cols > MOST_ADDED:
             break
         around = larger
-    told = np.zeros((around.rows, around.cols), np.bool_)
+    ground = np.zeros((around.rows, around.cols), np.bool_)
     for place in places:
         whole = window_of(place)
         if common := whole.intersection(around):
             cells = unpacked(tiles[place])
-            told[common.slices_in(around)] |= cells[common.slices_in(whole)]
-    return around, told
-
-
-def _steps(
-    free: NDArray[np.bool_], own: NDArray[np.bool_], own_steps: NDArray[np.uint8]
-) -> NDArray[np.uint8]:
-    """Return the step masks between free cells, uint8 (rows, cols).
-
-    Between two cells of one's own map its own steps hold.
-    """
-    between = CoverageLattice.from_free(own & free).steps
-    return CoverageLattice.from_free(free).steps & ~(between & ~own_steps)
+            ground[common.slices_in(around)] |= cells[common.slices_in(whole)]
+    inside, told = window.slices_in(around), ground.copy()
+    ground[inside] &= lattice.states == UNKNOWN
+    if not ground.any():
+        return area
+    own = np.zeros_like(ground)
+    own[inside] = lattice.coverable
+    # Between two cells of one's own map its own steps hold.
+    free = ground | own
+    steps = CoverageLattice.from_free(free).steps.copy()
+    between = CoverageLattice.from_free(own).steps
+    steps &= ~between
+    steps[inside] |= lattice.steps
+    states = np.zeros(ground.shape, np.uint8)
+    states[inside] = lattice.states
+    states[ground] = COVERABLE
+    whole_lattice = CoverageLattice(around, lattice.cell_m, states, steps)
+    reached = carried(area.reachable, window, around)
+    seeds = np.argwhere(reached)
+    if not len(seeds):
+        return ReachableArea(whole_lattice, reached)
+    first = int(seeds[0, 0]) + around.row0, int(seeds[0, 1]) + around.col0
+    joined = ReachableArea.around(whole_lattice, first).reachable
+    # Own cells beyond the ground of others, which nobody can reach, may lie behind a wall there.
+    return ReachableArea(whole_lattice, joined & (reached | told))
 
 
 def _tiles_of(area: ReachableArea) -> dict[Cell, bytes]:

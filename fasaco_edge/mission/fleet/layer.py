@@ -20,7 +20,7 @@ from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
 from fasaco_edge.mission.fleet.at_work import AtWork
 from fasaco_edge.mission.fleet.division import Division, Robot, divide
 from fasaco_edge.mission.fleet.division_numbers import DivisionNumbers
-from fasaco_edge.mission.fleet.ground import JointGround, viewpoint
+from fasaco_edge.mission.fleet.ground import viewpoint
 from fasaco_edge.mission.fleet.members import Member, Members
 from fasaco_edge.mission.fleet.remainder import Remainder
 from fasaco_edge.mission.fleet.shared import MOST_ROBOTS
@@ -65,11 +65,11 @@ class FleetLayer:
         self._map, self._ledger = map_state, ledger
         self._division: Division | None = None
         self._divided_at = self._looked_at = float("-inf")
-        # The owners of the cells of a joint ground.
-        self._owners: tuple[JointGround | None, NDArray[np.int8]]
+        # The owners of the cells of a joint area.
+        self._owners: tuple[ReachableArea | None, NDArray[np.int8]]
         self._owners = None, np.zeros((0, 0), np.int8)
-        # The joint ground of an area at the last look: others tell of theirs many times a second.
-        self._seen: tuple[ReachableArea, JointGround] | None = None
+        # The joint area of an area at the last look: others tell of theirs many times a second.
+        self._seen: tuple[ReachableArea, ReachableArea] | None = None
         # Cells of an area that this robot tried in vain, while others are at work.
         self._tried: tuple[ReachableArea | None, NDArray[np.bool_]]
         self._tried = None, np.zeros((0, 0), np.bool_)
@@ -102,23 +102,20 @@ class FleetLayer:
         if area is None or division is None:
             return None
         joint, left = self._left(open_cells, area)
-        return viewpoint(area, joint.area, left & self._of_me(division, joint), cell)
+        return viewpoint(area, joint, left & self._of_me(division, joint), cell)
 
     def _left(
         self, open_cells: OpenCells, area: ReachableArea
-    ) -> tuple[JointGround, NDArray[np.bool_]]:
-        """Return the joint ground, and which of its cells are left and untried, bool (rows, cols).
-
-        Of the cells of this robot's map these are such as it can reach.
-        """
+    ) -> tuple[ReachableArea, NDArray[np.bool_]]:
+        """Return the joint area, and which of its cells are left and untried, bool (rows, cols)."""
         joint = self._joint(area)
-        left = open_cells(joint.common.window) & joint.area.reachable
-        inside = area.lattice.window.slices_in(joint.common.window)
+        left = open_cells(joint.lattice.window) & joint.reachable
+        inside = area.lattice.window.slices_in(joint.lattice.window)
         left[inside] = self.untried(left[inside], area)
         return joint, left
 
-    def _joint(self, area: ReachableArea) -> JointGround:
-        """Return the joint ground, of this area as at the last look."""
+    def _joint(self, area: ReachableArea) -> ReachableArea:
+        """Return the joint area, of this area as at the last look."""
         if self._seen is None or self._seen[0] is not area:
             self._seen = area, self.others.ground.joint(area)
         return self._seen[1]
@@ -183,11 +180,11 @@ class FleetLayer:
             return self._why_by_taken()
         self._looked_at, self._seen = now, None
         (joint, left), before = self._left(open_cells, area), self._division
-        inside = area.lattice.window.slices_in(joint.common.window)
+        inside = area.lattice.window.slices_in(joint.lattice.window)
         own = left if before is None else left & self._of_me(before, joint)
         at_work = [one.newest for one in self.members.values() if not one.absence(now)]
         self._remainder.note_others(now, wait=all(heard.waits_for for heard in at_work))
-        swept = self._ledger.shared.swept(joint.common.window) & joint.area.reachable
+        swept = self._ledger.shared.swept(joint.lattice.window) & joint.reachable
         swept_cells = int(np.count_nonzero(swept))
         self._remainder.note(int(left.sum()), int(own.sum()), swept_cells, now)
         if newer := self.numbers.newer():
@@ -197,14 +194,14 @@ class FleetLayer:
         else:
             robots = [
                 Robot(self._robot, cell, self.step_s),
-                *self._at_work.in_reach(joint.area, now),
+                *self._at_work.in_reach(joint, now),
             ]
             if not (why := self._why_anew(joint, left, robots, now, at_once=at_once)):
                 return self._why_by_taken()
-            robots += self._at_work.unseen(before, joint.common, robots, self._divided_at, now)
+            robots += self._at_work.unseen(before, joint.lattice, robots, self._divided_at, now)
             # Others refuse more parts.
             robots = robots[: MOST_ROBOTS + 1]
-            divided = divide(joint.common, left, robots, before, self._turn_steps)
+            divided = divide(joint.lattice, left, robots, before, self._turn_steps)
             if before is None or not divided.is_like(before):
                 self.numbers.count_on()
                 self._division = divided if len(robots) > 1 else None
@@ -228,7 +225,7 @@ class FleetLayer:
 
     def _why_anew(
         self,
-        joint: JointGround,
+        joint: ReachableArea,
         left: NDArray[np.bool_],
         robots: list[Robot],
         now: float,
@@ -260,7 +257,7 @@ class FleetLayer:
     def _why_by_parts(
         self,
         division: Division,
-        joint: JointGround,
+        joint: ReachableArea,
         left: NDArray[np.bool_],
         names: set[str],
         now: float,
@@ -288,20 +285,20 @@ class FleetLayer:
     def _is_own(self, division: Division, area: ReachableArea) -> NDArray[np.bool_]:
         """Return which cells of this robot's area are in its part."""
         joint = self._joint(area)
-        return self._of_me(division, joint)[area.lattice.window.slices_in(joint.common.window)]
+        return self._of_me(division, joint)[area.lattice.window.slices_in(joint.lattice.window)]
 
-    def _of_me(self, division: Division, joint: JointGround) -> NDArray[np.bool_]:
-        """Return which cells of the joint ground are in this robot's part."""
+    def _of_me(self, division: Division, joint: ReachableArea) -> NDArray[np.bool_]:
+        """Return which cells of a joint area are in this robot's part."""
         own: NDArray[np.bool_] = self._owners_on(division, joint) == division.names.index(
             self._robot
         )
         return own
 
-    def _owners_on(self, division: Division, joint: JointGround) -> NDArray[np.int8]:
+    def _owners_on(self, division: Division, joint: ReachableArea) -> NDArray[np.int8]:
         if division is not self._division:
-            return division.owners(joint.common)
+            return division.owners(joint.lattice)
         if self._owners[0] is not joint:
-            self._owners = joint, division.owners(joint.common)
+            self._owners = joint, division.owners(joint.lattice)
         return self._owners[1]
 
     def _why_by_taken(self) -> str:
