@@ -13,7 +13,8 @@ Read in this order:
     map/reachable_area   reachable cells, updated incrementally
     map/loop_closure     whether a map has moved, and which cells are uncertain then
 
-    coverage/mission_ledger  owns the ledger; whether a map contradicts it
+    coverage/mission_ledger  owns the ledger, until a map contradicts it
+    coverage/fit         whether a map does
     coverage/ledger      covered cells
     coverage/progress    progress on the path, of the coverage, of each zone
     coverage/unreached   uncovered cells, and the causes

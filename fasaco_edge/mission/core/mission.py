@@ -112,7 +112,7 @@ class Mission:
         """Continue a ledger from before a restart, unless the map contradicts it.
 
         To be called before the first step, and before ``restore_order``. A contradiction, see
-        ``coverage.mission_ledger``, is reported as a fault (LedgerMismatchError) with the map that
+        ``coverage.fit``, is reported as a fault (LedgerMismatchError) with the map that
         shows it; coverage since the restart is kept then.
         """
         if self._angle.resume(before.lattice_deg):
