@@ -25,7 +25,7 @@ from fasaco_edge.grid.fine_raster import (
     stand_placement,
 )
 from fasaco_edge.grid.floor import StandLattice, states_of
-from fasaco_edge.grid.geometry import GridGeometry, Point, Polygon, Window, polygon_bounds
+from fasaco_edge.grid.geometry import GridGeometry, Point, Polygon, Window
 from fasaco_edge.grid.lattice import (
     UNKNOWN,
     Cell,
@@ -34,6 +34,7 @@ from fasaco_edge.grid.lattice import (
     placement_of,
 )
 from fasaco_edge.grid.occupancy import OccupancyGrid
+from fasaco_edge.grid.reach import REACH_CELLS, REACH_PX, Reach
 from fasaco_edge.kernels.floor.bits import WORD, Bits, unpacked
 from fasaco_edge.kernels.floor.places import (
     disc_rows,
@@ -43,8 +44,6 @@ from fasaco_edge.kernels.floor.places import (
 )
 from fasaco_edge.kernels.lattice.footprint import Placement
 
-# A step may bend over places this far from the centres of its two cells; one pixel for rounding.
-REACH_CELLS, REACH_PX = 2.5, 2.0
 # The raster spans whole chunks of so many pixels of the map: for a map of 5 cm pixels 3.2 m.
 CHUNK = WORD
 # All bits of a word: what lies beyond a raster is blocked.
@@ -96,7 +95,7 @@ class FloorMap:
         Raises:
             MapTooLarge: the raster would have more pixels.
         """
-        self.discs = discs
+        self.discs, self._reach = discs, Reach(discs, footprint.cell_m)
         self._footprint, self._most_pixels, self._keep_out = footprint, most_pixels, keep_out
         # The keep-out polygons on the raster, with the geometry they were converted for.
         self._kept_out: tuple[GridGeometry, PolygonsOnRaster] | None = None
@@ -132,7 +131,8 @@ class FloorMap:
         self.shift = geometry.corner_of(self.geometry)
         # A map that grows on two sides has new cells all along these, and little new floor.
         self.touched = Window.around(
-            self._pixels_of(near, plain.window, geometry), self._forgotten(grids, geometry, parts)
+            self._reach.pixels_of(near, plain.window, geometry),
+            self._reach.lost(grids, geometry, parts),
         )
         is_same = geometry == self.geometry
         if self.touched is None and is_same and plain.window == before.window:
@@ -159,31 +159,14 @@ class FloorMap:
         other = copy(self)
         other._keep_out, other._kept_out = polygons, None
         other.blocked, other.places = self.blocked.copy(), self.places.copy()
-        stale = self._cells_near(polygons, grid.geometry.resolution, plain.window)
-        near = self._pixels_of(stale, plain.window, geometry)
+        stale = self._reach.cells_near(polygons, grid.geometry.resolution, plain.window)
+        near = self._reach.pixels_of(stale, plain.window, geometry)
         if near is not None:
             other.shift = 0, 0
             other._look(grid, parts, near.row0, near.row1)
             other._settle(plain, stale)
         other.shift, other.touched = None, Window(0, 0, geometry.rows, geometry.cols)
         return other
-
-    def _cells_near(
-        self, polygons: tuple[Polygon, ...], resolution: float, window: Window
-    ) -> NDArray[np.bool_]:
-        """Return the cells, bool (rows, cols), whose stands or steps polygons may affect."""
-        cell_m = self._footprint.cell_m
-        # As far as a changed pixel of the map has effects, at any yaw.
-        reach_m = self.discs.radius_m + (REACH_CELLS + 1.0) * cell_m + (REACH_PX + 1.0) * resolution
-        reach_m *= math.sqrt(2.0)
-        near = np.zeros((window.rows, window.cols), np.bool_)
-        for polygon in polygons:
-            x0, y0, x1, y1 = polygon_bounds(polygon)
-            low = math.floor((y0 - reach_m) / cell_m), math.floor((x0 - reach_m) / cell_m)
-            high = math.ceil((y1 + reach_m) / cell_m), math.ceil((x1 + reach_m) / cell_m)
-            if box := Window(*low, *high).intersection(window):
-                near[box.slices_in(window)] = True
-        return near
 
     def stand_xy(self, cell: Cell) -> Point | None:
         """Return the stand of a cell, x, y [m]; None for none."""
@@ -197,7 +180,7 @@ class FloorMap:
         """Return the bounding box of a cell on the raster, with a rim around it."""
         window = Window(cell[0], cell[1], cell[0] + 1, cell[1] + 1)
         rim = round(rim_m / self.geometry.resolution)
-        return self._box_around(window, self.geometry, rim) or Window(0, 0, 0, 0)
+        return self._reach.box(window, self.geometry, rim) or Window(0, 0, 0, 0)
 
     def reached(self, cells: NDArray[np.bool_], part: Window) -> NDArray[np.bool_]:
         """Return the pixels in a window of the raster that the tool reaches from places in cells.
@@ -234,7 +217,7 @@ class FloorMap:
         Args:
             cells: bool (rows, cols) of the lattice.
         """
-        return self._pixels_of(cells, self.stands.lattice.window, self.geometry)
+        return self._reach.pixels_of(cells, self.stands.lattice.window, self.geometry)
 
     def _see(self, grid: OccupancyGrid, plain: CoverageLattice) -> None:
         self.geometry, parts = self._geometry_of(grid)
@@ -246,31 +229,6 @@ class FloorMap:
 
     def _geometry_of(self, grid: OccupancyGrid) -> tuple[GridGeometry, int]:
         return fine_geometry(grid.geometry, self.discs, self._most_pixels, CHUNK)
-
-    def _forgotten(
-        self, grids: tuple[OccupancyGrid, OccupancyGrid], geometry: GridGeometry, parts: int
-    ) -> Window | None:
-        """Return a window of the raster around free pixels that the new map does not show.
-
-        They may lie beyond its cells.
-        """
-        old, new = (grid.geometry.on_raster()[1] for grid in grids)
-        lost = []
-        for part in old.without(new):
-            values = grids[0].cells[part.slices_in(old)]
-            free = Window.of((values >= 0) & (values <= self.discs.free_at_most))
-            lost.append(free and free.moved(part.row0 - new.row0, part.col0 - new.col0))
-        around = Window.around(*lost)
-        if around is None:
-            return None
-        (row, col), margin = geometry.corner_of(grids[1].geometry.snapped()), self._margin(geometry)
-        low, high = (around.row0, around.col0), (around.row1, around.col1)
-        return Window(
-            low[0] * parts + row - margin,
-            low[1] * parts + col - margin,
-            high[0] * parts + row + margin,
-            high[1] * parts + col + margin,
-        ).intersection(Window(0, 0, geometry.rows, geometry.cols))
 
     def _move(self, geometry: GridGeometry, by: tuple[int, int]) -> bool:
         """Move the bits to a larger raster, shifted by rows and columns; False if impossible."""
@@ -333,36 +291,3 @@ class FloorMap:
         lattice = CoverageLattice(before.window, before.cell_m, states, before.steps)
         self.stands = StandLattice(lattice, self.stands.stands, self.stands.bends)
         return lattice
-
-    def _pixels_of(
-        self, stale: NDArray[np.bool_], window: Window, geometry: GridGeometry
-    ) -> Window | None:
-        """Return a window of pixels around cells that robot and tool reach; None without any."""
-        cells = Window.of(stale)
-        if cells is None:
-            return None
-        cells = cells.moved(window.row0, window.col0)
-        return self._box_around(cells, geometry, self._margin(geometry))
-
-    def _margin(self, geometry: GridGeometry) -> int:
-        """Return how far robot and tool reach from a pixel, in pixels."""
-        return int(max(self.discs.radius_m, self.discs.tool_m / 2) / geometry.resolution) + 2
-
-    def _box_around(self, cells: Window, geometry: GridGeometry, margin: int) -> Window | None:
-        """Return the bounding box in pixels of a window of cells; None for none."""
-        placement = stand_placement(geometry, self._footprint.cell_m, self.discs.radius_m)
-        corners = [
-            (
-                placement.x0 + placement.ux * col - placement.uy * row,
-                placement.y0 + placement.uy * col + placement.ux * row,
-            )
-            for row in (cells.row0, cells.row1)
-            for col in (cells.col0, cells.col1)
-        ]
-        xs, ys = zip(*corners, strict=True)
-        low, high = (
-            (math.ceil(min(ys)), math.ceil(min(xs))),
-            (math.ceil(max(ys)), math.ceil(max(xs))),
-        )
-        around = Window(low[0] - margin, low[1] - margin, high[0] + margin, high[1] + margin)
-        return around.intersection(Window(0, 0, geometry.rows, geometry.cols))
