@@ -7,7 +7,7 @@ import pytest
 
 from fasaco_edge.daemon.loop.outbox import path_attachment
 from fasaco_edge.mission.core.events import MapReceived, PlanReady
-from fasaco_edge.mission.core.spare_time import SKIPPED_S, Attempt
+from fasaco_edge.mission.core.spare_time import SKIPPED_S, Attempt, SpareTime
 from fasaco_edge.planners.bound import lower_bound_steps
 from fasaco_edge.planners.cost import CoverageCost, SearchWork
 from fasaco_edge.planners.planner import WorkLimit, never
@@ -67,6 +67,34 @@ def test_a_poor_path_is_made_better_further_on():
     verdict = check_walk(lattice.steps, lattice.coverable, update.cells, (0, 0))
     assert verdict.legal
     assert verdict.complete
+
+
+def test_every_other_attempt_is_a_search_of_the_whole_rest():
+    drive, kinds = driving(), []
+    while len(kinds) < 4:
+        request, drive.request = drive.request, None
+        if request is not None:
+            kinds.append(request.problem.is_full)
+            drive.tell(plan(request, whole(request, request.problem.before)), after=1.0)
+        else:
+            drive.tell(after=1.0)
+    assert kinds == [True, False, True, False]
+
+
+@pytest.mark.parametrize(("times", "is_taken"), [(4, False), (6, True)])
+def test_another_walk_altogether_has_to_save_a_percent(times, is_taken):
+    """Its line is laid and polished anew."""
+    side, cost = 30, CoverageCost()
+    best = lanes(side, side, side)
+    poor = np.concatenate((best, *[best[[-2, -1]]] * times))
+    hall = MapReceived(building(*["." * side] * side))
+    config = replace(CONFIG, spare_share=SHARE, cost=cost)
+    drive = Drive((0, 0), hall, pose_at(0, 0), config=config)
+    for cells in (poor, best):
+        request, drive.request = drive.request, None
+        drive.tell(plan(request, cells))
+    assert (cost.of_walk(poor) > 1.01 * cost.of_walk(best)) is is_taken
+    assert (drive.updates[-1].reason == BETTER) is is_taken
 
 
 def test_another_line_along_the_same_cells_leaves_the_attempt_as_it_is():
@@ -208,3 +236,12 @@ def test_what_is_needed_comes_next():
     drive.tell(plan(request, whole(request, request.problem.before)))
     assert not drive.request.problem.only_better
     assert not drive.mission.route.wanted
+
+
+def test_a_new_walk_is_attempted_though_attempts_at_the_last_were_in_vain():
+    spare = SpareTime(SHARE)
+    for attempt in range(4):
+        spare.spend(0.05, attempt, walk=1)
+    assert not spare.is_available(3.0 + 0.05 / SHARE, walk=1)
+    assert not spare.is_available(3.0 + 0.05 / SHARE / 2, walk=2), "it has its share all the same"
+    assert spare.is_available(3.0 + 0.05 / SHARE, walk=2)

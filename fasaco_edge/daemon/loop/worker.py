@@ -17,15 +17,17 @@ from fasaco_edge.planners.planner import (
     ColonySnapshot,
     CoveragePlanner,
     Interrupt,
+    Observer,
     SearchProgress,
     StopRecorder,
     TimeBudget,
+    ignore,
 )
 
 LOG = logging.getLogger(__name__)
 
-# Duration of an attempt to improve a path [s].
-SPARE_S = 0.05
+# Duration of an attempt to improve a path: by repairs, and by a full search [s].
+SPARE_S, SPARE_FULL_S = 0.05, 0.3
 
 
 class PlanningWorker:
@@ -85,11 +87,15 @@ class PlanningWorker:
         self._interrupt.clear()
         if self._stopping.is_set():
             return
-        budget_s = SPARE_S if request.problem.only_better else self._budget_s
+        observe: Observer = partial(self._observe, request.number)
+        budget_s, problem = self._budget_s, request.problem
+        if problem.only_better:
+            # Only the trail of needed plans is shown.
+            budget_s, observe = SPARE_FULL_S if problem.is_full else SPARE_S, ignore
         stop = StopRecorder(AnyOf(self._count, TimeBudget(budget_s), Interrupt(self._interrupt)))
         try:
             # This takes some percent of a full plan, nothing for a repair.
-            path = self._planner.plan(request.problem, stop, partial(self._observe, request.number))
+            path = self._planner.plan(problem, stop, observe)
         except Exception as error:
             # The same map comes again after a restart: exiting would not help.
             LOG.exception("plan %d", request.number, extra={"event": "plan_failed"})

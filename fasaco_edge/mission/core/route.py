@@ -168,7 +168,7 @@ class Route(PlanRequests):
 
     def request_improvement(self, now: float) -> PlanRequest | None:
         """Request a better path; None without spare time, or if too little of the path is left."""
-        if not self._spare.is_available(now):
+        if not self._spare.is_available(now, self._walks):
             return None
         attempt = Attempt.at(self.path, self._numberings, self._orders, self.attempts + 1)
         if attempt is None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,8 +14,9 @@ from fasaco_edge.planners.cost import CoverageCost
 from fasaco_edge.planners.problem import CoverageProblem
 from fasaco_edge.planners.walk_before import HELD_CELLS
 
-# A path is replaced only if that saves this many steps and this share of what is left.
-LEAST_STEPS, LEAST_SHARE = 2, 0.002
+# A path is replaced only if that saves this many steps and this share of what is left: the second
+# share for another walk altogether, whose line is laid and polished anew.
+LEAST_STEPS, LEAST_SHARE, LEAST_SHARE_ANEW = 2, 0.002, 0.01
 # The share of time is halved at most this many times.
 MOST_VAIN = 4
 # Pause after an attempt that found nothing to improve [s]: it takes a search of the whole lattice,
@@ -32,19 +33,23 @@ class SpareTime:
     def __init__(self, share: float) -> None:
         self._share = share
         self._resting_until = 0.0
-        # The walk of the last attempt, and how many attempts at it brought nothing.
+        # The walk of the last attempt, how many attempts at it brought nothing, how long the last
+        # one took [s], and when it ended [s].
         self._walk = self._vain = 0
+        self._last = 0.0, 0.0
 
-    def is_available(self, now: float) -> bool:
-        """Tell whether another attempt may start at ``now`` [s]."""
-        return self._share > 0.0 and now >= self._resting_until
+    def is_available(self, now: float, walk: int) -> bool:
+        """Tell whether another attempt, at walk ``walk``, may start at ``now`` [s]."""
+        if not self._share or now < self._resting_until:
+            return False
+        seconds, ended_at = self._last
+        share = self._share / (1 << self._vain if walk == self._walk else 1)
+        return now >= ended_at + seconds * (1.0 / share - 1.0)
 
     def spend(self, seconds: float, now: float, walk: int) -> None:
         """Note that an attempt at walk ``walk`` took ``seconds`` and ended at ``now`` [s]."""
         self._vain = min(self._vain + 1, MOST_VAIN) if walk == self._walk else 0
-        self._walk = walk
-        share = self._share / 2**self._vain
-        self._resting_until = now + seconds * (1.0 / share - 1.0)
+        self._walk, self._last = walk, (seconds, now)
 
     def rest(self, seconds: float, now: float) -> None:
         """Make no attempt for ``seconds`` from ``now`` [s]: a plan failed."""
@@ -85,6 +90,9 @@ class Attempt:
             problem = orders.problem((row, col), path.ahead, attempt=number).after(HELD_CELLS)
         except FasacoError:
             return None  # the map has changed: a repair is due
+        # A walk that grows with the map, or is cut to a part, becomes worse as a whole: it turns
+        # up to a third more often than one that is searched anew. So every other attempt is.
+        problem = replace(problem, is_full=number % 2 == 1)
         return cls(numbering, path.index, joint, problem)
 
     def joined(self, path: PathProgress, better: NDArray[np.int32]) -> NDArray[np.int32] | None:
@@ -92,10 +100,13 @@ class Attempt:
         if path.index > self.joint:
             return None
         ahead = better[path.index - self.index :]
-        return ahead if _is_worth_it(self.problem.cost, path.ahead, ahead) else None
+        share = LEAST_SHARE_ANEW if self.problem.is_full else LEAST_SHARE
+        return ahead if _is_worth_it(self.problem.cost, path.ahead, ahead, share) else None
 
 
-def _is_worth_it(cost: CoverageCost, before: NDArray[np.int32], after: NDArray[np.int32]) -> bool:
+def _is_worth_it(
+    cost: CoverageCost, before: NDArray[np.int32], after: NDArray[np.int32], share: float
+) -> bool:
     cost_s = cost.of_walk(before)
-    least_s = max(LEAST_STEPS * cost.step_s, LEAST_SHARE * cost_s)
+    least_s = max(LEAST_STEPS * cost.step_s, share * cost_s)
     return cost_s - cost.of_walk(after) >= least_s

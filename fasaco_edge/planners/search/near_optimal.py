@@ -6,9 +6,11 @@
 from __future__ import annotations
 
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
-from fasaco_edge.planners.bound import lower_bound_steps
+import numpy as np
+
+from fasaco_edge.planners.bound import GLANCE, lower_bound_of, lower_bound_steps
 from fasaco_edge.planners.cost import SearchWork
 from fasaco_edge.planners.paper.colony import ColonyConfig
 from fasaco_edge.planners.path import CoveragePath
@@ -66,13 +68,13 @@ class NearOptimal:
 
         A walk from before (``problem.before``) is repaired; only if that leaves it far above its
         bound, a short search follows. Without one, or where a full search is wanted, the colony
-        walks until stopped.
+        walks until stopped; of a walk from before only what is as good is kept.
         """
         if not can_repair(problem):
-            return self._search(problem, stop, observe)
+            return _with_lead(problem, self._search(problem, stop, observe))
         path = repaired(problem, self.name, self.config.seed, stop)
         if problem.only_better or not is_poor(problem, path):
-            return path
+            return _with_lead(problem, path)
         proposals = SHORT_SEARCH + SHORT_SEARCH_PER_CELL * problem.cells
         short = WorkLimit(SearchWork(proposals=proposals))
         found = self._search(problem, AnyOf(stop, short), observe)
@@ -91,3 +93,23 @@ class NearOptimal:
             if observe is not ignore:
                 search.show()
             return path
+
+
+def _with_lead(problem: CoverageProblem, path: CoveragePath) -> CoveragePath:
+    """Return a path with its lead; steps, cost and bound are of the whole problem."""
+    whole = problem.whole
+    if whole is None:
+        return path
+    cells = np.concatenate((problem.lead, path.cells))
+    cost_s = whole.cost.of_walk(cells)
+    # A path that is no better is dropped, so its bound is not needed.
+    if problem.before is not None and np.array_equal(path.cells, problem.before):
+        return replace(path, cells=cells, cost_s=cost_s, lower_bound_steps=0, lower_bound_cost_s=0)
+    bound = lower_bound_of(whole, GLANCE)
+    return replace(
+        path,
+        cells=cells,
+        cost_s=cost_s,
+        lower_bound_steps=bound.steps,
+        lower_bound_cost_s=bound.cost_s,
+    )

@@ -48,7 +48,7 @@ BOUNDED_CELLS = 2_000
 def repaired(
     problem: CoverageProblem, name: str, seed: int, stop: StoppingCriterion
 ) -> CoveragePath:
-    """Return a complete walk that keeps the valid parts of ``problem.before``.
+    """Return a complete walk that keeps the valid parts of ``problem.before``, without its lead.
 
     Args:
         problem: with a walk ``before``, see ``can_repair``.
@@ -59,7 +59,7 @@ def repaired(
     is_stopped = _run(repair, stop)
     path = repair.path(name, seed)
     if problem.whole is not None:
-        return _with_lead(problem, problem.whole, path)
+        return path
     assert problem.before is not None
     next_cells = problem.before[: HELD_CELLS + 1]
     held = common_beginning(next_cells, repair.completed)
@@ -105,26 +105,6 @@ def _steady(
     cost_s = cost_us / MICROSECONDS
     saved = Saved(local_search=(completed_us - cost_us) / MICROSECONDS)
     return replace(path, cells=cells, work=other.work, cost_s=cost_s, saved=saved)
-
-
-def _with_lead(
-    problem: CoverageProblem, whole: CoverageProblem, path: CoveragePath
-) -> CoveragePath:
-    """Return a path with its lead; steps, cost and bound are of the whole problem."""
-    assert problem.before is not None
-    cells = np.concatenate((problem.lead, path.cells))
-    cost_s = whole.cost.of_walk(cells)
-    # A path that is no better is dropped, so its bound is not needed.
-    if np.array_equal(path.cells, problem.before):
-        return replace(path, cells=cells, cost_s=cost_s, lower_bound_steps=0, lower_bound_cost_s=0)
-    bound = lower_bound_of(whole, GLANCE)
-    return replace(
-        path,
-        cells=cells,
-        cost_s=cost_s,
-        lower_bound_steps=bound.steps,
-        lower_bound_cost_s=bound.cost_s,
-    )
 
 
 class _Repair:

@@ -25,6 +25,7 @@ from fasaco_edge.mission.core.events import (
     MapReceived,
     MemberHeard,
     PlanReady,
+    PlanRequest,
     PoseReceived,
     State,
 )
@@ -43,6 +44,9 @@ from fasaco_edge.simulation.world import World
 TOOL_M, RADIUS_M, OVERLAP = 0.3, 0.18, 0.08
 SPEED_M_S, TURN_S = 0.25, 1.5
 PROPOSALS = 1_000_000
+# Of an attempt at a better path, by repairs and by a full search; and how long each would take [s].
+SPARE_PROPOSALS, SPARE_FULL_PROPOSALS = 200_000, 1_000_000
+SPARE_SHARE, SPARE_S, SPARE_FULL_S = 0.05, 0.05, 0.3
 MOST_TILES = 4
 # A run that is not over by then has failed, in simulated time [s].
 LONGEST_S = 20_000.0
@@ -93,7 +97,9 @@ class Fleet:
             line = replace(LINES[self.line], speed_m_s=self.speed_m_s, turning=turning)
             sweeping = Sweeping(TOOL_M, 25_000_000, line)
         footprint = Footprint(cell_m, self.radius_m)
-        return MissionConfig(footprint, cost=cost, sweeping=sweeping, robot=name)
+        return MissionConfig(
+            footprint, cost=cost, sweeping=sweeping, robot=name, spare_share=SPARE_SHARE
+        )
 
 
 @dataclass(slots=True)
@@ -231,11 +237,20 @@ class FleetRun:
                 robot.world.follow(xy)
             if decision.plan is None:
                 return
-            robot.plans += 1
-            problem = decision.plan.problem
-            path = _timed(robot.plan_ms, partial(self._planner.plan, problem, self._limit))
-            ready = PlanReady(decision.plan.number, path, 0.0)
+            ready = self._planned(robot, decision.plan)
             decision = _timed(robot.step_ms, partial(robot.mission.step, [ready], self.now))
+
+    def _planned(self, robot: FleetRobot, request: PlanRequest) -> PlanReady:
+        problem = request.problem
+        if problem.only_better:
+            many, long_s = SPARE_FULL_PROPOSALS, SPARE_FULL_S
+            few, short_s = SPARE_PROPOSALS, SPARE_S
+            proposals, seconds = (many, long_s) if problem.is_full else (few, short_s)
+            limit = WorkLimit(SearchWork(proposals=proposals))
+            return PlanReady(request.number, self._planner.plan(problem, limit), seconds)
+        robot.plans += 1
+        path = _timed(robot.plan_ms, partial(self._planner.plan, problem, self._limit))
+        return PlanReady(request.number, path, 0.0)
 
     def _tell(self) -> None:
         for number, speaker in enumerate(self.robots):
