@@ -18,7 +18,7 @@ from fasaco_edge.mission.fleet.shared import MOST_ROBOTS, MOST_TILES_OF_ONE
 from fasaco_edge.mission.fleet.tiles import TILE_BYTES
 from fasaco_edge.mission.map.inputs import PATIENCE_S
 from fasaco_edge.mission.map.reachable_area import ReachableArea
-from tests.mission.fleets import FleetDrive
+from tests.mission.fleets import FleetDrive, FleetRobot
 from tests.mission.world import CELL, building, pose_at, reachable_cells
 
 CORRIDOR = ["." * 40] * 3
@@ -48,13 +48,36 @@ def test_what_another_can_reach_joins_on_where_the_own_map_shows_nothing():
     assert cells_of(own) == reachable_cells(building("....", "...."), (0, 0))
 
 
-def test_the_own_map_decides_where_it_shows_a_wall():
+def test_beyond_a_wall_of_the_own_map_the_ground_of_others_counts_but_not_in_it():
+    """It may be a door that was seen in part."""
     own, other = area_of("..#", "..#"), area_of("......", "......")
     ground = SharedGround()
     ground.hear("r2", GroundTelling().next(other, 10))
     joint = ground.joint(own)
-    assert cells_of(joint) == cells_of(own)
+    assert cells_of(joint) == {(row, col) for row in range(2) for col in (0, 1, 3, 4, 5)}
     assert (joint.lattice.states[:2, 2] == BLOCKED).all()
+
+
+HALLS = ["." * 9 + "#" + "." * 20 if row != 2 else "." * 30 for row in range(5)]
+SHUT = [row[:9] + "#" + row[10:] for row in HALLS]
+
+
+@pytest.mark.parametrize("is_open", [True, False])
+def test_a_robot_goes_to_look_at_a_door_that_its_map_shows_shut_and_others_came_through(is_open):
+    fleet = FleetDrive(HALLS, {"r2": (0, 28)})
+    ours = fleet.robots["r1"] = FleetRobot("r1", (0, 0), SHUT)
+    fleet.swept.add(ours.cell)
+    while ours.mission.reason != "looks for its part, which others see":
+        assert ours.mission.state != "done"
+        fleet.tick()
+    assert ours.cell == (2, 8)
+    assert len(set(fleet.robots["r2"].driven)) < 60
+    if is_open:
+        ours.tell(MapReceived(building(*HALLS)))
+    fleet.finish()
+    assert not fleet.left_out()
+    beyond = {cell for cell in ours.driven if cell[1] > 9}
+    assert bool(beyond) is is_open
 
 
 @pytest.mark.parametrize("told", [5, 8])
@@ -245,3 +268,15 @@ def test_a_robot_just_off_the_ground_gets_no_more_than_its_share():
     lattice = CoverageLattice.from_free(free)
     counts = np.bincount(divide(lattice, free, robots).owners(lattice)[free], minlength=3)
     assert counts.max() - counts.min() < 30
+
+
+def test_a_robot_without_a_part_takes_over_cells_though_it_comes_from_far_away():
+    """Only a robot with a part has a path that changes with its cells."""
+    lattice = CoverageLattice.from_free(np.ones((3, 100), np.bool_))
+    wanted = np.zeros((3, 100), np.bool_)
+    wanted[:, 60:] = True
+    robots = [Robot("r1", (1, 0), 1.0), Robot("r2", (1, 99), 1.0)]
+    before = Division(tuple(robots), ((1, 20), (1, 80)), (0.0, 0.0))
+    assert (before.owners(lattice)[wanted] == 1).all()
+    owners = divide(lattice, wanted, robots, before).owners(lattice)
+    assert 20 < np.count_nonzero(owners[wanted] == 0) < 50

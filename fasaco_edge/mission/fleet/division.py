@@ -28,7 +28,7 @@ ROUNDS, CHANGES, DAMPING = 3, 30, 0.85
 # times that a cell took each robot.
 EVENED = 3
 # Seeds are kept unless others end before this share of their time. The share of cells that go to
-# another robot, of the mean time, counts as so much time of the last robot.
+# another robot with a part, of the mean time, counts as so much time of the last robot.
 STABLE, CHANGED = 0.9, 1.0
 
 
@@ -193,6 +193,8 @@ class _Choice:
         self.seeds: list[Cell] = []
         self.handicaps_s = np.zeros(0, np.float32)
         self._travel, self._before, self._turn_steps = travel, before, turn_steps
+        # Which robots had cells: the others have no path that changes.
+        self._had = np.bincount(before[before >= 0], minlength=len(starts)) > 0
         self._steps_s = steps_s
         lattice, cols = travel.lattice, travel.lattice.steps.shape[1]
         ground = [on_ground(lattice, *lattice.local(start)) for start in starts]
@@ -217,7 +219,7 @@ class _Choice:
         """
         owner: NDArray[np.int64] = (times_s + handicaps_s[:, None]).argmin(axis=0)
         ends_s = self._ends_s(owner)
-        changed = np.count_nonzero((self._before >= 0) & (owner != self._before))
+        changed = np.count_nonzero((self._before >= 0) & (owner != self._before) & self._had[owner])
         changed_s = changed / len(owner) * float(ends_s.mean())
         cost_s = factor * float(ends_s.max()) + CHANGED * changed_s
         if cost_s < self._cost_s:

@@ -1,7 +1,8 @@
 """Shared ground: the cells that the robots of a fleet can reach, each on its own map.
 
 Cells that only others' maps show take part in the division, so that all robots divide nearly the
-same area. This robot's own map decides where it shows anything; paths are planned on it alone.
+same area. This robot's own map decides which cells it shows free or blocked; the area beyond a
+blocked cell that others can reach counts as reachable, too. Paths are planned on its own map alone.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from numpy.typing import NDArray
 
 from fasaco_edge.grid.changes import carried
 from fasaco_edge.grid.geometry import Window
-from fasaco_edge.grid.lattice import COVERABLE, UNKNOWN, Cell, CoverageLattice
+from fasaco_edge.grid.lattice import BLOCKED, COVERABLE, UNKNOWN, Cell, CoverageLattice
 from fasaco_edge.kernels.fleet.split import FAR, ways_from
 from fasaco_edge.mission.coverage.ledger import TILE
 from fasaco_edge.mission.fleet.shared import MOST_TILES_OF_ONE
@@ -149,12 +150,16 @@ def _joined(area: ReachableArea, tiles: dict[Cell, NDArray[np.uint8]]) -> Reacha
             ground[common.slices_in(around)] |= cells[common.slices_in(whole)]
     inside, told = window.slices_in(around), ground.copy()
     ground[inside] &= lattice.states == UNKNOWN
-    if not ground.any():
+    # A door seen in part is shut, on this map; others came through it. It leads on, and may be open
+    # when the robot has come to look; until then nothing is to be swept in it.
+    door = np.zeros_like(ground)
+    door[inside] = told[inside] & (lattice.states == BLOCKED)
+    if not (ground | door).any():
         return area
     own = np.zeros_like(ground)
     own[inside] = lattice.coverable
     # Between two cells of one's own map its own steps hold.
-    free = ground | own
+    free = ground | own | door
     steps = CoverageLattice.from_free(free).steps.copy()
     between = CoverageLattice.from_free(own).steps
     steps &= ~between
@@ -170,7 +175,7 @@ def _joined(area: ReachableArea, tiles: dict[Cell, NDArray[np.uint8]]) -> Reacha
     first = int(seeds[0, 0]) + around.row0, int(seeds[0, 1]) + around.col0
     joined = ReachableArea.around(whole_lattice, first).reachable
     # Own cells beyond the ground of others, which nobody can reach, may lie behind a wall there.
-    return ReachableArea(whole_lattice, joined & (reached | told))
+    return ReachableArea(whole_lattice, joined & (reached | told) & ~door)
 
 
 def _tiles_of(area: ReachableArea) -> dict[Cell, bytes]:

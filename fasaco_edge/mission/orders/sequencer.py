@@ -232,11 +232,24 @@ class Sequencer:
 
     def _leave_to_others(self) -> bool:
         """Give up what this robot has tried in vain; tell whether nothing untried is left."""
+        self.leaves_to_others()
         area = self._map.area
         assert area is not None
         unswept = self.cells.unswept(area.lattice.window) & area.reachable
-        self._fleet.give_up(self._fleet.mine(unswept, area), area)
         return not self._fleet.untried(unswept, area).any()
+
+    def leaves_to_others(self) -> bool:
+        """Give up what this robot cannot come to now, in a fleet; tell whether there was any.
+
+        What it can come to of the others' parts comes before a retry.
+        """
+        area = self._map.area
+        if area is None or not self._fleet.has_company:
+            return False
+        unswept = self.cells.unswept(area.lattice.window) & area.reachable
+        mine = self._fleet.mine(unswept, area)
+        self._fleet.give_up(mine, area)
+        return bool(mine.any())
 
     def advance(self, now: float) -> None:
         """Continue with the next part: nothing more can be done in this one now."""
