@@ -7,7 +7,14 @@ import pytest
 
 from fasaco_edge.daemon.loop.outbox import path_attachment
 from fasaco_edge.mission.core.events import MapReceived, PlanReady
-from fasaco_edge.mission.core.spare_time import SKIPPED_S, Attempt, SpareTime
+from fasaco_edge.mission.core.spare_time import (
+    CHANGING_SHARE,
+    SETTLED_S,
+    SETTLED_SHARE,
+    SKIPPED_S,
+    Attempt,
+    SpareTime,
+)
 from fasaco_edge.planners.bound import lower_bound_steps
 from fasaco_edge.planners.cost import CoverageCost, SearchWork
 from fasaco_edge.planners.planner import WorkLimit, never
@@ -81,19 +88,26 @@ def test_every_other_attempt_is_a_search_of_the_whole_rest():
     assert kinds == [True, False, True, False]
 
 
-@pytest.mark.parametrize(("times", "is_taken"), [(4, False), (6, True)])
-def test_another_walk_altogether_has_to_save_a_percent(times, is_taken):
-    """Its line is laid and polished anew."""
+@pytest.mark.parametrize(
+    ("times", "after_s", "is_taken"),
+    [(4, SETTLED_S, False), (6, SETTLED_S, True), (6, 1.0, False), (30, 1.0, True)],
+)
+def test_another_walk_altogether_has_to_save_a_percent_and_more_of_a_walk_that_changes(
+    times, after_s, is_taken
+):
+    """Its line is laid and polished anew, and a map that grows soon undoes what it would save."""
     side, cost = 30, CoverageCost()
     best = lanes(side, side, side)
     poor = np.concatenate((best, *[best[[-2, -1]]] * times))
     hall = MapReceived(building(*["." * side] * side))
     config = replace(CONFIG, spare_share=SHARE, cost=cost)
     drive = Drive((0, 0), hall, pose_at(0, 0), config=config)
-    for cells in (poor, best):
-        request, drive.request = drive.request, None
-        drive.tell(plan(request, cells))
-    assert (cost.of_walk(poor) > 1.01 * cost.of_walk(best)) is is_taken
+    request, drive.request = drive.request, None
+    drive.tell(plan(request, poor))
+    request, drive.request = drive.request, None
+    drive.tell(plan(request, best), after=after_s)
+    least = 1.0 + (SETTLED_SHARE if after_s >= SETTLED_S else CHANGING_SHARE)
+    assert (cost.of_walk(poor) > least * cost.of_walk(best)) is is_taken
     assert (drive.updates[-1].reason == BETTER) is is_taken
 
 

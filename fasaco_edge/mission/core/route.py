@@ -49,8 +49,10 @@ class Route(PlanRequests):
         # motion.
         self._before_motion: NDArray[np.int32] | None = None
         self.revision = 0
-        # Count the numberings of cells, and the walks: paths over other cells.
+        # Count the numberings of cells, and the walks: paths over other cells; and when the last
+        # of these came [s].
         self._numberings = self._walks = 0
+        self._walk_came_at = 0.0
         self.unchanged = self.outdated = 0
         self.published_at = 0.0
         self.beside: NDArray[np.float64] | None = None
@@ -216,7 +218,7 @@ class Route(PlanRequests):
         """Publish the path with a better rest; None if that saves too little."""
         if attempt.numbering != self._numberings:
             return None
-        cells = attempt.joined(self.path, event.path.cells)
+        cells = attempt.joined(self.path, event.path.cells, now - self._walk_came_at)
         if cells is None or area.drivable_prefix(cells) < len(cells):
             return None
         return self.publish(cells, "better further on", now, event)
@@ -258,7 +260,8 @@ class Route(PlanRequests):
         """Publish a path that replaces the current one."""
         self.revision += 1
         self._numberings += 1
-        self._walks += not np.array_equal(cells, self.path.ahead)
+        if not np.array_equal(cells, self.path.ahead):
+            self._walks, self._walk_came_at = self._walks + 1, now
         self.published_at = now
         self.path, self._kept = PathProgress(cells), PathProgress(NO_CELLS)
         self._end_yaw, self.beside = end_yaw, beside
