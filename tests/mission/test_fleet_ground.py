@@ -48,14 +48,15 @@ def test_what_another_can_reach_joins_on_where_the_own_map_shows_nothing():
     assert cells_of(own) == reachable_cells(building("....", "...."), (0, 0))
 
 
-def test_beyond_a_wall_of_the_own_map_the_ground_of_others_counts_but_not_in_it():
-    """It may be a door that was seen in part."""
+def test_the_own_map_decides_where_it_shows_a_wall_but_it_may_be_a_door_seen_in_part():
     own, other = area_of("..#", "..#"), area_of("......", "......")
     ground = SharedGround()
     ground.hear("r2", GroundTelling().next(other, 10))
-    joint = ground.joint(own)
-    assert cells_of(joint) == {(row, col) for row in range(2) for col in (0, 1, 3, 4, 5)}
-    assert (joint.lattice.states[:2, 2] == BLOCKED).all()
+    joint, beyond = ground.joint(own), ground.with_doors(own)
+    assert cells_of(joint) == cells_of(own)
+    assert cells_of(beyond) == {(row, col) for row in range(2) for col in (0, 1, 3, 4, 5)}
+    for area in (joint, beyond):
+        assert (area.lattice.states[:2, 2] == BLOCKED).all()
 
 
 HALLS = ["." * 9 + "#" + "." * 20 if row != 2 else "." * 30 for row in range(5)]
@@ -91,6 +92,33 @@ def test_own_cells_beyond_the_ground_of_others_count_only_if_somebody_can_reach_
     bits = np.packbits(np.arange(TILE * TILE) < told).tobytes()
     ground.hear("r2", [((0, 0), bits)])
     assert cells_of(ground.joint(own)) == {(0, col) for col in range(told)}
+
+
+def test_an_opening_that_it_has_not_seen_is_looked_for_before_a_door_that_is_shut():
+    side = range(8, -1, -1)
+    rows = ["." * 10 + ("." if row in (0, 6) else "#") + "." * 19 for row in side]
+    # In row 6 r1 does not fit through; in row 0 it has not looked yet.
+    own = ["." * 10 + ("#" if row else "?") + "?" * 19 for row in side]
+    seen = ["." * 10 + ("#" if row else ".") + "." * 19 for row in side]
+    fleet = FleetDrive(rows, {"r2": (8, 28)})
+    ours = fleet.robots["r1"] = FleetRobot("r1", (8, 0), own)
+    while ours.mission.reason != "looks for its part, which others see":
+        assert ours.mission.state != "done"
+        fleet.tick()
+    assert ours.cell == (0, 9)
+    ours.tell(MapReceived(building(*seen)))
+    fleet.finish()
+    assert len({cell for cell in ours.driven if cell[1] > 10}) > 20
+
+
+def test_a_robot_too_wide_for_a_door_keeps_to_its_part_of_its_hall():
+    """Else it sweeps what the others are at, as a part beyond the door is none for it."""
+    rows = ["." * 24 + ("." if row == 4 else "#") + "." * 12 for row in range(8)]
+    fleet = FleetDrive(rows, {"r2": (7, 0), "r3": (0, 23)})
+    fleet.robots["r1"] = FleetRobot("r1", (0, 0), ["." * 24 + "#" + "." * 12] * 8)
+    fleet.finish(most=150)
+    cells = [cell for robot in fleet.robots.values() for cell in robot.driven]
+    assert len(cells) - len(set(cells)) < 40
 
 
 def test_ground_that_is_lost_again_is_told():
@@ -271,7 +299,6 @@ def test_a_robot_just_off_the_ground_gets_no_more_than_its_share():
 
 
 def test_a_robot_without_a_part_takes_over_cells_though_it_comes_from_far_away():
-    """Only a robot with a part has a path that changes with its cells."""
     lattice = CoverageLattice.from_free(np.ones((3, 100), np.bool_))
     wanted = np.zeros((3, 100), np.bool_)
     wanted[:, 60:] = True

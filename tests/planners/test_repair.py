@@ -234,3 +234,28 @@ def test_attempts_at_a_better_walk_never_lose_and_each_looks_elsewhere():
     assert max(costs[1:]) <= costs[0]
     assert min(costs[1:]) < costs[0]
     assert len(found) == 8
+
+
+def test_a_search_of_the_rest_keeps_its_lead_and_finds_what_no_repair_does():
+    """A walk over all of a floor is cut to a half of it, as to a robot's part of a fleet's area."""
+    lattice = CoverageLattice.from_free(ground(3, rows=24, cols=40, blocked=0.05))
+    start = tuple(np.argwhere(lattice.coverable)[0].tolist())
+    enough = WorkLimit(SearchWork(proposals=1_000_000))
+    walk = NearOptimal().plan(CoverageProblem.of(lattice, start, cost=TURNS), enough).cells
+    covered = np.zeros(lattice.states.shape, np.bool_)
+    covered[:, 20:] = True
+    half = CoverageProblem.of(lattice, start, cost=TURNS, covered=covered, before=walk)
+    cut = NearOptimal().plan(half, enough)
+    rest = CoverageProblem.of(
+        lattice, start, cost=TURNS, covered=covered, before=cut.cells, attempt=1
+    ).after(HELD_CELLS)
+    full = replace(rest, is_full=True)
+    for limit in (enough, lambda _: True):
+        found = NearOptimal().plan(full, limit)
+        verdict = check_walk(lattice.steps, half.to_cover, found.cells, start)
+        assert verdict.legal
+        assert verdict.complete
+        assert np.array_equal(found.cells[:HELD_CELLS], cut.cells[:HELD_CELLS])
+        assert found.cost_s == TURNS.of_walk(found.cells)
+    better = NearOptimal().plan(full, enough)
+    assert better.cost_s < 0.99 * NearOptimal().plan(rest, enough).cost_s

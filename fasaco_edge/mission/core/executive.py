@@ -232,7 +232,8 @@ class Executive:
                     continue
                 if why := orders.why_looking(cell, self._now):
                     return self._rest(State.COVERING, why, update)
-                if orders.leaves_to_others():
+                if orders.give_up_unreachable():
+                    self._share(cell, at_once=True)
                     continue
                 orders.advance(self._now)
                 if orders.is_waiting or orders.order_state.stage is Stage.OVER:

@@ -49,10 +49,10 @@ class Route(PlanRequests):
         # motion.
         self._before_motion: NDArray[np.int32] | None = None
         self.revision = 0
-        # Count the numberings of cells, and the walks: paths over other cells; and when the last
-        # of these came [s].
-        self._numberings = self._walks = 0
-        self._walk_came_at = 0.0
+        # Count the numberings of cells, and the walks: paths over other cells. Which walk was
+        # searched as a whole last, and when a needed plan last changed it [s].
+        self._numberings = self._walks = self._searched = 0
+        self._changed_at = 0.0
         self.unchanged = self.outdated = 0
         self.published_at = 0.0
         self.beside: NDArray[np.float64] | None = None
@@ -172,10 +172,17 @@ class Route(PlanRequests):
         """Request a better path; None without spare time, or if too little of the path is left."""
         if not self._spare.is_available(now, self._walks):
             return None
-        attempt = Attempt.at(self.path, self._numberings, self._orders, self.attempts + 1)
+        number = self.attempts + 1
+        # A walk that grows with the map, or is cut to a part, becomes worse as a whole: it turns up
+        # to a third more often than one that is searched anew. So every other attempt searches the
+        # whole rest, once for each walk.
+        is_full = number % 2 == 1 and self._searched != self._walks
+        attempt = Attempt.at(self.path, self._numberings, self._orders, number, is_full=is_full)
         if attempt is None:
             self._spare.skip(now)
             return None
+        if is_full:
+            self._searched = self._walks
         return self._request_attempt(attempt)
 
     def fail(self, event: PlanBroken, now: float) -> None:
@@ -210,6 +217,7 @@ class Route(PlanRequests):
             self.unchanged += 1
             self.published_at = now
             return None
+        self._changed_at = now
         return self.publish(cells, request.reason, now, event, request.changed)
 
     def _accept_better(
@@ -218,7 +226,7 @@ class Route(PlanRequests):
         """Publish the path with a better rest; None if that saves too little."""
         if attempt.numbering != self._numberings:
             return None
-        cells = attempt.joined(self.path, event.path.cells, now - self._walk_came_at)
+        cells = attempt.joined(self.path, event.path.cells, now - self._changed_at)
         if cells is None or area.drivable_prefix(cells) < len(cells):
             return None
         return self.publish(cells, "better further on", now, event)
@@ -260,8 +268,7 @@ class Route(PlanRequests):
         """Publish a path that replaces the current one."""
         self.revision += 1
         self._numberings += 1
-        if not np.array_equal(cells, self.path.ahead):
-            self._walks, self._walk_came_at = self._walks + 1, now
+        self._walks += not np.array_equal(cells, self.path.ahead)
         self.published_at = now
         self.path, self._kept = PathProgress(cells), PathProgress(NO_CELLS)
         self._end_yaw, self.beside = end_yaw, beside

@@ -16,9 +16,9 @@ from fasaco_edge.planners.walk_before import HELD_CELLS
 
 # A path is replaced only if that saves this many steps and this share of what is left.
 LEAST_STEPS, LEAST_SHARE = 2, 0.002
-# The same share for another walk altogether, whose line is laid and polished anew: where the walk
-# has been the same for so long [s], and where it still changes with the map, which soon undoes
-# what it would save. In unknown buildings 0.01 cost four robots 6 % of their time.
+# The same share for another walk altogether, whose line is laid and polished anew: where no plan
+# was needed for so long [s], and where one was, as the next change of the map may undo what it
+# would save. In unknown buildings 0.01 cost four robots some percent of their time.
 SETTLED_S, SETTLED_SHARE, CHANGING_SHARE = 20.0, 0.01, 0.06
 # The share of time is halved at most this many times.
 MOST_VAIN = 4
@@ -81,9 +81,18 @@ class Attempt:
 
     @classmethod
     def at(
-        cls, path: PathProgress, numbering: int, orders: Sequencer, number: int
+        cls,
+        path: PathProgress,
+        numbering: int,
+        orders: Sequencer,
+        number: int,
+        *,
+        is_full: bool = False,
     ) -> Attempt | None:
-        """Return attempt ``number`` at a path; None if too little of it is left."""
+        """Return attempt ``number`` at a path; None if too little of it is left.
+
+        ``is_full``: whether to search the whole rest, see ``CoverageProblem``.
+        """
         # The next cells ahead of the robot stay fixed; a shorter rest is not worth a search.
         joint = path.index + HELD_CELLS
         if joint + HELD_CELLS > len(path.cells):
@@ -93,27 +102,25 @@ class Attempt:
             problem = orders.problem((row, col), path.ahead, attempt=number).after(HELD_CELLS)
         except FasacoError:
             return None  # the map has changed: a repair is due
-        # A walk that grows with the map, or is cut to a part, becomes worse as a whole: it turns
-        # up to a third more often than one that is searched anew. So every other attempt is.
-        problem = replace(problem, is_full=number % 2 == 1)
+        problem = replace(problem, is_full=is_full)
         return cls(numbering, path.index, joint, problem)
 
     def joined(
-        self, path: PathProgress, better: NDArray[np.int32], same_s: float
+        self, path: PathProgress, better: NDArray[np.int32], settled_s: float
     ) -> NDArray[np.int32] | None:
         """Return the improved cells ahead, int32 (n, 2); None if they save too little.
 
         Args:
             path: the path now.
             better: the improved one, int32 (n, 2).
-            same_s: for how long the walk has been the same [s].
+            settled_s: for how long no plan was needed [s].
         """
         if path.index > self.joint:
             return None
         ahead = better[path.index - self.index :]
         share = LEAST_SHARE
         if self.problem.is_full:
-            share = SETTLED_SHARE if same_s >= SETTLED_S else CHANGING_SHARE
+            share = SETTLED_SHARE if settled_s >= SETTLED_S else CHANGING_SHARE
         return ahead if _is_worth_it(self.problem.cost, path.ahead, ahead, share) else None
 
 

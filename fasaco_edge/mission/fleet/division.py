@@ -193,7 +193,7 @@ class _Choice:
         self.seeds: list[Cell] = []
         self.handicaps_s = np.zeros(0, np.float32)
         self._travel, self._before, self._turn_steps = travel, before, turn_steps
-        # Which robots had cells: the others have no path that changes.
+        # Which robots had cells: one without waits for some, whoever has to give them.
         self._had = np.bincount(before[before >= 0], minlength=len(starts)) > 0
         self._steps_s = steps_s
         lattice, cols = travel.lattice, travel.lattice.steps.shape[1]

@@ -1,8 +1,8 @@
 """Shared ground: the cells that the robots of a fleet can reach, each on its own map.
 
 Cells that only others' maps show take part in the division, so that all robots divide nearly the
-same area. This robot's own map decides which cells it shows free or blocked; the area beyond a
-blocked cell that others can reach counts as reachable, too. Paths are planned on its own map alone.
+same area. This robot's own map decides where it shows anything; paths are planned on it alone. A
+door that was seen in part is shut on it: ``with_doors`` shows what lies beyond.
 """
 
 from __future__ import annotations
@@ -64,6 +64,14 @@ class SharedGround:
         joined = _joined(area, self._merged()) if self._robots else area
         self._joint = area, self.version, joined
         return joined
+
+    def with_doors(self, area: ReachableArea) -> ReachableArea:
+        """Return what ``joint`` does, also of ground beyond doors that only others show open.
+
+        Those are cells that the area shows blocked and another robot can reach: seen in part, or
+        shut to this robot. They lead on, but are not reachable themselves.
+        """
+        return _joined(area, self._merged(), doors=True) if self._robots else area
 
     def _merged(self) -> dict[Cell, NDArray[np.uint8]]:
         merged: dict[Cell, NDArray[np.uint8]] = {}
@@ -129,8 +137,13 @@ class GroundTelling:
         return tuple((place, tiles[place]) for place in chosen)
 
 
-def _joined(area: ReachableArea, tiles: dict[Cell, NDArray[np.uint8]]) -> ReachableArea:
-    """Return an area with the cells of tiles where its lattice knows nothing."""
+def _joined(
+    area: ReachableArea, tiles: dict[Cell, NDArray[np.uint8]], *, doors: bool = False
+) -> ReachableArea:
+    """Return an area with the cells of tiles where its lattice knows nothing.
+
+    With ``doors`` those that it shows blocked lead on.
+    """
     lattice, window = area.lattice, area.lattice.window
     # The nearest tiles first: those far away may be of a robot that lies.
     row, col = (window.row0 + window.row1) / 2, (window.col0 + window.col1) / 2
@@ -150,10 +163,9 @@ def _joined(area: ReachableArea, tiles: dict[Cell, NDArray[np.uint8]]) -> Reacha
             ground[common.slices_in(around)] |= cells[common.slices_in(whole)]
     inside, told = window.slices_in(around), ground.copy()
     ground[inside] &= lattice.states == UNKNOWN
-    # A door seen in part is shut, on this map; others came through it. It leads on, and may be open
-    # when the robot has come to look; until then nothing is to be swept in it.
     door = np.zeros_like(ground)
-    door[inside] = told[inside] & (lattice.states == BLOCKED)
+    if doors:
+        door[inside] = told[inside] & (lattice.states == BLOCKED)
     if not (ground | door).any():
         return area
     own = np.zeros_like(ground)

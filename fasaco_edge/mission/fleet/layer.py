@@ -8,7 +8,7 @@ takes over a part of the remaining area.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 import numpy as np
 from numpy.typing import NDArray
@@ -96,13 +96,21 @@ class FleetLayer:
         joint, left = self._left(open_cells, area)
         return division.busiest(self._owners_on(division, joint)[left], self._robot)
 
-    def viewpoint(self, open_cells: OpenCells, cell: Cell) -> Cell | None:
-        """Return where to look for this robot's part, where others alone see it; None for none."""
+    def viewpoints(self, open_cells: OpenCells, cell: Cell) -> Iterator[Cell]:
+        """Yield where to look for work that others alone see.
+
+        For this robot's part, then for any cells left, beyond a door that others show open.
+        """
         area, division = self._map.area, self._division
-        if area is None or division is None:
-            return None
-        joint, left = self._left(open_cells, area)
-        return viewpoint(area, joint, left & self._of_me(division, joint), cell)
+        if area is None or not self.members:
+            return
+        if division is not None:
+            joint, left = self._left(open_cells, area)
+            if at := viewpoint(area, joint, left & self._of_me(division, joint), cell):
+                yield at
+        beyond = self.others.ground.with_doors(area)
+        if at := viewpoint(area, beyond, open_cells(beyond.lattice.window), cell):
+            yield at
 
     def _left(
         self, open_cells: OpenCells, area: ReachableArea

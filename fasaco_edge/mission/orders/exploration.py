@@ -123,12 +123,12 @@ class Exploration:
         """Tell whether it is too soon to look again for a way past others."""
         return self._shut_since is not None and now - self._shut_looked < AGAIN_S
 
-    def look_beyond(self, viewpoint: Cell | None, cell: Cell) -> str:
+    def look_beyond(self, viewpoint: Cell, cell: Cell) -> str:
         """Look from where ground begins that others see; return why a plan is wanted, or "".
 
         Each place is looked from once: what others tell may be wrong, or closed to this robot.
         """
-        if viewpoint is None or any(_is_beside(viewpoint, at) for at in (cell, *self.looked)):
+        if any(_is_beside(viewpoint, at) for at in (cell, *self.looked)):
             return ""
         self.looked.add(viewpoint)
         self.viewpoints, self.seeks_zone = {viewpoint}, False

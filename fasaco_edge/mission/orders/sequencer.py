@@ -189,7 +189,8 @@ class Sequencer:
         free = None if area is None else self.passable(area, cell)
         if reason := exploration.seek(zone, area, free, cell):
             return reason
-        return exploration.look_beyond(self._fleet.viewpoint(self.cells.open_cells, cell), cell)
+        viewpoints = self._fleet.viewpoints(self.cells.open_cells, cell)
+        return next(filter(None, (exploration.look_beyond(at, cell) for at in viewpoints)), "")
 
     def why_standing(self, now: float) -> str:
         """Return why the robot stands, though a plan is wanted, or ""."""
@@ -232,13 +233,13 @@ class Sequencer:
 
     def _leave_to_others(self) -> bool:
         """Give up what this robot has tried in vain; tell whether nothing untried is left."""
-        self.leaves_to_others()
+        self.give_up_unreachable()
         area = self._map.area
         assert area is not None
         unswept = self.cells.unswept(area.lattice.window) & area.reachable
         return not self._fleet.untried(unswept, area).any()
 
-    def leaves_to_others(self) -> bool:
+    def give_up_unreachable(self) -> bool:
         """Give up what this robot cannot come to now, in a fleet; tell whether there was any.
 
         What it can come to of the others' parts comes before a retry.

@@ -68,13 +68,19 @@ class NearOptimal:
 
         A walk from before (``problem.before``) is repaired; only if that leaves it far above its
         bound, a short search follows. Without one, or where a full search is wanted, the colony
-        walks until stopped; of a walk from before only what is as good is kept.
+        walks until stopped: it starts from the walk from before, if that costs no more than the
+        first simple walk.
         """
+        return _with_lead(problem, self._plan(problem, stop, observe))
+
+    def _plan(
+        self, problem: CoverageProblem, stop: StoppingCriterion, observe: Observer
+    ) -> CoveragePath:
         if not can_repair(problem):
-            return _with_lead(problem, self._search(problem, stop, observe))
+            return self._search(problem, stop, observe)
         path = repaired(problem, self.name, self.config.seed, stop)
         if problem.only_better or not is_poor(problem, path):
-            return _with_lead(problem, path)
+            return path
         proposals = SHORT_SEARCH + SHORT_SEARCH_PER_CELL * problem.cells
         short = WorkLimit(SearchWork(proposals=proposals))
         found = self._search(problem, AnyOf(stop, short), observe)
@@ -103,7 +109,7 @@ def _with_lead(problem: CoverageProblem, path: CoveragePath) -> CoveragePath:
     cells = np.concatenate((problem.lead, path.cells))
     cost_s = whole.cost.of_walk(cells)
     # A path that is no better is dropped, so its bound is not needed.
-    if problem.before is not None and np.array_equal(path.cells, problem.before):
+    if problem.before is not None and path.cost_s >= problem.cost.of_walk(problem.before):
         return replace(path, cells=cells, cost_s=cost_s, lower_bound_steps=0, lower_bound_cost_s=0)
     bound = lower_bound_of(whole, GLANCE)
     return replace(
