@@ -22,7 +22,15 @@ from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.daemon.loop.inbox import Received, take_batch
 from fasaco_edge.daemon.loop.loop import TICK_S
 from fasaco_edge.errors import BadConfiguration, FasacoError, MalformedMessage
-from fasaco_edge.mission.core.events import CommandReceived, PathUpdate, PlanReady, PlanRequest
+from fasaco_edge.mission.core.events import (
+    BETTER,
+    SPARE,
+    CommandReceived,
+    PathUpdate,
+    PlanReady,
+    PlanRequest,
+)
+from fasaco_edge.mission.core.spare_time import most_s
 from fasaco_edge.mission.orders.order import read_command
 from fasaco_edge.planners.cost import SearchWork
 from fasaco_edge.planners.planner import AnyOf, CoveragePlanner, WorkLimit, ignore
@@ -283,8 +291,10 @@ class ReplayPlanner:
     def ask(self, request: PlanRequest, revision: int, now: float) -> None:
         """Make a plan that would be published as path ``revision``."""
         recorded = self._recorded(request, revision, now)
-        due = now + self._budget_s if recorded is None else max(1e-9 * recorded.at_ns, now)
-        path = self._planner.plan(request.problem, self._limit(recorded), ignore)
+        problem = request.problem
+        took_s = most_s(problem) if problem.only_better else self._budget_s
+        due = now + took_s if recorded is None else max(1e-9 * recorded.at_ns, now)
+        path = self._planner.plan(problem, self._limit(recorded), ignore)
         self.due, self._ready = due, PlanReady(request.number, path, due - now)
 
     def take(self, now: float) -> list[PlanReady]:
@@ -297,7 +307,8 @@ class ReplayPlanner:
     def _recorded(self, request: PlanRequest, revision: int, now: float) -> RecordedPath | None:
         """Return the recorded path that comes of the same request, as far as one can tell."""
         path = self._run.paths.get(revision)
-        if path is None or path.work is None or path.reason != request.reason:
+        reason = BETTER if request.reason == SPARE else request.reason
+        if path is None or path.work is None or path.reason != reason:
             return None
         after = 1e-9 * path.at_ns - now
         return path if abs(after) <= self._budget_s + LATE_S else None

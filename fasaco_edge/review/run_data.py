@@ -17,6 +17,7 @@ from fasaco_edge.errors import BadConfiguration, FasacoError, MalformedMessage
 from fasaco_edge.grid.geometry import Polygon
 from fasaco_edge.grid.lattice import Footprint
 from fasaco_edge.grid.occupancy import OccupancyGrid
+from fasaco_edge.mission.core.events import BETTER, SPARE
 from fasaco_edge.mission.coverage.ledger import JUMP_CELLS
 from fasaco_edge.mission.orders.mask import mask_polygons
 from fasaco_edge.mission.orders.order import MissionOrder, Zone, read_command
@@ -29,10 +30,6 @@ from fasaco_edge.wire.documents.turns import Cycle, TurnBatch, decode_turns
 from fasaco_edge.wire.messages.maps import decode_map_update, decode_occupancy_grid
 from fasaco_edge.wire.messages.poses import PoseDecoder
 from fasaco_edge.wire.schemas import POSE_STAMPED
-
-# The mission's reasons for requesting a better path, and for accepting one.
-SPARE, BETTER = "spare time", "better further on"
-
 
 # Less is in the noise of poses and times [m2].
 SURELY_SWEPT_M2 = 0.1

@@ -26,12 +26,13 @@ from fasaco_edge.bench.pixels import Mask, Patches, within
 from fasaco_edge.grid.geometry import GridGeometry, Polygon, Window
 from fasaco_edge.grid.lattice import Footprint
 from fasaco_edge.grid.occupancy import FREE, OccupancyGrid
+from fasaco_edge.mission.core.events import BETTER
 from fasaco_edge.mission.orders.zones import cells_inside
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.read.drawn import DrawnLine, drawings
 from fasaco_edge.recording.read.run import RecordedSamples
 from fasaco_edge.review.drive import swept_floor
-from fasaco_edge.review.run_data import BETTER, maps_of
+from fasaco_edge.review.run_data import maps_of
 from fasaco_edge.review.wording import clock
 from fasaco_edge.wire.documents.settings import known_settings
 

@@ -12,6 +12,7 @@ from fasaco_edge.bus.mailbox import LatestSlot
 from fasaco_edge.daemon.loop.inbox import PlanSnapshot
 from fasaco_edge.errors import PlanFailed
 from fasaco_edge.mission.core.events import PlanBroken, PlanReady, PlanRequest
+from fasaco_edge.mission.core.spare_time import most_s
 from fasaco_edge.planners.planner import (
     AnyOf,
     ColonySnapshot,
@@ -25,9 +26,6 @@ from fasaco_edge.planners.planner import (
 )
 
 LOG = logging.getLogger(__name__)
-
-# Duration of an attempt to improve a path: by repairs, and by a full search [s].
-SPARE_S, SPARE_FULL_S = 0.05, 0.3
 
 
 class PlanningWorker:
@@ -91,7 +89,7 @@ class PlanningWorker:
         budget_s, problem = self._budget_s, request.problem
         if problem.only_better:
             # Only the trail of needed plans is shown.
-            budget_s, observe = SPARE_FULL_S if problem.is_full else SPARE_S, ignore
+            budget_s, observe = most_s(problem), ignore
         stop = StopRecorder(AnyOf(self._count, TimeBudget(budget_s), Interrupt(self._interrupt)))
         try:
             # This takes some percent of a full plan, nothing for a repair.

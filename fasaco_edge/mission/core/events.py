@@ -195,6 +195,10 @@ def in_runs(events: Iterable[Event]) -> Iterator[Event | PatchRun]:
             yield from run
 
 
+# Reason of a request for a better path, and of the path that comes of it.
+SPARE, BETTER = "spare time", "better further on"
+
+
 @dataclass(frozen=True, slots=True)
 class PlanRequest:
     """A plan to make.

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from fasaco_edge.grid.geometry import Window
-from fasaco_edge.mission.core.events import PlanBroken, PlanRequest
+from fasaco_edge.mission.core.events import SPARE, PlanBroken, PlanRequest
 from fasaco_edge.mission.core.spare_time import Attempt
 from fasaco_edge.planners.problem import CoverageProblem
 
@@ -94,7 +94,7 @@ class PlanRequests:
 
     def _request_attempt(self, attempt: Attempt) -> PlanRequest:
         self._attempt = attempt
-        return self._request(attempt.problem, "spare time")
+        return self._request(attempt.problem, SPARE)
 
     def _request(
         self, problem: CoverageProblem, reason: str, changed: Window | None = None

@@ -10,7 +10,13 @@ from numpy.typing import NDArray
 
 from fasaco_edge.grid.geometry import Window
 from fasaco_edge.grid.lattice import Cell
-from fasaco_edge.mission.core.events import PathUpdate, PlanBroken, PlanReady, PlanRequest
+from fasaco_edge.mission.core.events import (
+    BETTER,
+    PathUpdate,
+    PlanBroken,
+    PlanReady,
+    PlanRequest,
+)
 from fasaco_edge.mission.core.plan_requests import BROKEN_S, PlanRequests
 from fasaco_edge.mission.core.spare_time import Attempt, SpareTime
 from fasaco_edge.mission.coverage.progress import PathProgress
@@ -229,7 +235,7 @@ class Route(PlanRequests):
         cells = attempt.joined(self.path, event.path.cells, now - self._changed_at)
         if cells is None or area.drivable_prefix(cells) < len(cells):
             return None
-        return self.publish(cells, "better further on", now, event)
+        return self.publish(cells, BETTER, now, event)
 
     def _from_here(
         self, cells: NDArray[np.int32], here: Cell, area: ReachableArea

@@ -14,6 +14,8 @@ from fasaco_edge.planners.cost import CoverageCost
 from fasaco_edge.planners.problem import CoverageProblem
 from fasaco_edge.planners.walk_before import HELD_CELLS
 
+# How long an attempt may take: by repairs, and by a search of the whole rest [s].
+REPAIR_S, SEARCH_S = 0.05, 0.3
 # A path is replaced only if that saves this many steps and this share of what is left.
 LEAST_STEPS, LEAST_SHARE = 2, 0.002
 # The same share for another walk altogether, whose line is laid and polished anew: where no plan
@@ -25,6 +27,11 @@ MOST_VAIN = 4
 # Pause after an attempt that found nothing to improve [s]: it takes a search of the whole lattice,
 # and the answer rarely changes between poses.
 SKIPPED_S = 1.0
+
+
+def most_s(problem: CoverageProblem) -> float:
+    """Return how long an attempt at a better path may take [s]."""
+    return SEARCH_S if problem.is_full else REPAIR_S
 
 
 class SpareTime:

@@ -30,6 +30,7 @@ from fasaco_edge.mission.core.events import (
     State,
 )
 from fasaco_edge.mission.core.mission import Mission
+from fasaco_edge.mission.core.spare_time import most_s
 from fasaco_edge.mission.coverage.ledger import CoverageLedger
 from fasaco_edge.mission.fleet.ground import GroundTelling
 from fasaco_edge.mission.fleet.shared import Telling
@@ -44,9 +45,9 @@ from fasaco_edge.simulation.world import World
 TOOL_M, RADIUS_M, OVERLAP = 0.3, 0.18, 0.08
 SPEED_M_S, TURN_S = 0.25, 1.5
 PROPOSALS = 1_000_000
-# Of an attempt at a better path, by repairs and by a full search; and how long each would take [s].
-SPARE_PROPOSALS, SPARE_FULL_PROPOSALS = 200_000, 1_000_000
-SPARE_SHARE, SPARE_S, SPARE_FULL_S = 0.05, 0.05, 0.3
+# Of an attempt at a better path by repairs; a search of the rest has as many as a needed plan.
+REPAIR_PROPOSALS = 200_000
+SPARE_SHARE = 0.05
 MOST_TILES = 4
 # A run that is not over by then has failed, in simulated time [s].
 LONGEST_S = 20_000.0
@@ -183,6 +184,7 @@ class FleetRun:
         self.unheard = 0
         self._swept_by: dict[Cell, set[str]] = {}
         self._planner, self._limit = NearOptimal(), WorkLimit(SearchWork(proposals=PROPOSALS))
+        self._repair_limit = WorkLimit(SearchWork(proposals=REPAIR_PROPOSALS))
         self._next_report = [
             number * fleet.period_s / len(self.robots) for number in range(len(self.robots))
         ]
@@ -243,11 +245,9 @@ class FleetRun:
     def _planned(self, robot: FleetRobot, request: PlanRequest) -> PlanReady:
         problem = request.problem
         if problem.only_better:
-            many, long_s = SPARE_FULL_PROPOSALS, SPARE_FULL_S
-            few, short_s = SPARE_PROPOSALS, SPARE_S
-            proposals, seconds = (many, long_s) if problem.is_full else (few, short_s)
-            limit = WorkLimit(SearchWork(proposals=proposals))
-            return PlanReady(request.number, self._planner.plan(problem, limit), seconds)
+            limit = self._limit if problem.is_full else self._repair_limit
+            path = self._planner.plan(problem, limit)
+            return PlanReady(request.number, path, most_s(problem))
         robot.plans += 1
         path = _timed(robot.plan_ms, partial(self._planner.plan, problem, self._limit))
         return PlanReady(request.number, path, 0.0)
