@@ -109,6 +109,7 @@ def test_robots_of_a_fleet_cover_a_building_together(tmp_path, building):
     options = ("--map", building, "--robots", 2, "--speed", 20, "--timeout", 1200)
     ended = fasaco_edge("demo", *options, "--out", out, "--json")
     assert ended.code == 0, ended.err
+    assert "fasaco-edge watch --fleet demo --connect tcp/127.0.0.1:" in ended.err
     summary = json.loads(ended.out)
     assert summary["complete"] is True
     assert [robot["name"] for robot in summary["robots"]] == ["r1", "r2"]

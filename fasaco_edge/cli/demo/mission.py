@@ -23,7 +23,7 @@ from fasaco_edge.bus.session import Bus, open_bus
 from fasaco_edge.bus.settings import BusSettings
 from fasaco_edge.cli.console.terminal import err
 from fasaco_edge.cli.demo.mishaps import Mishaps
-from fasaco_edge.cli.demo.robots import DemoRobot, fleet_recorder
+from fasaco_edge.cli.demo.robots import FLEET, DemoRobot, fleet_recorder
 from fasaco_edge.errors import ProcessEnded
 from fasaco_edge.host.processes import python_program
 from fasaco_edge.watch import phrases
@@ -131,6 +131,9 @@ class DemoMission:
             stack.callback(self._stop)
             self._start(bus)
             self._stack = stack.pop_all()
+        what = f"--fleet {FLEET}" if len(self._robots) > 1 else f"--robot {self._robots[0].name}"
+        watch = f"fasaco-edge watch {what} --connect {self._endpoint}"
+        err().print(f"watch it from another terminal: {watch}", soft_wrap=True)
         return self
 
     def __exit__(self, *_: object) -> None:
