@@ -57,6 +57,9 @@ def test_the_own_map_decides_where_it_shows_a_wall_but_it_may_be_a_door_seen_in_
     assert cells_of(beyond) == {(row, col) for row in range(2) for col in (0, 1, 3, 4, 5)}
     for area in (joint, beyond):
         assert (area.lattice.states[:2, 2] == BLOCKED).all()
+    # Asked for in each step of a robot that looks.
+    assert ground.joint(own) is joint
+    assert ground.with_doors(own) is beyond
 
 
 HALLS = ["." * 9 + "#" + "." * 20 if row != 2 else "." * 30 for row in range(5)]

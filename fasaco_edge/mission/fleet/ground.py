@@ -35,8 +35,8 @@ class SharedGround:
     def __init__(self) -> None:
         self.version = 0
         self._robots: dict[str, dict[Cell, bytes]] = {}
-        # The last joint area, and what it was made of.
-        self._joint: tuple[ReachableArea, int, ReachableArea] | None = None
+        # The last joint areas, without and with doors, and what each was made of.
+        self._last: dict[bool, tuple[ReachableArea, int, ReachableArea]] = {}
 
     def hear(self, robot: str, tiles: Iterable[Placed]) -> None:
         """Take in a robot's tiles, each with TILE_BYTES of bits; the newest of a place counts."""
@@ -59,11 +59,7 @@ class SharedGround:
 
     def joint(self, area: ReachableArea) -> ReachableArea:
         """Return an area with the ground of others, where its map shows nothing."""
-        if self._joint and self._joint[0] is area and self._joint[1] == self.version:
-            return self._joint[2]
-        joined = _joined(area, self._merged()) if self._robots else area
-        self._joint = area, self.version, joined
-        return joined
+        return self._with(area, doors=False)
 
     def with_doors(self, area: ReachableArea) -> ReachableArea:
         """Return what ``joint`` does, also of ground beyond doors that only others show open.
@@ -71,7 +67,15 @@ class SharedGround:
         Those are cells that the area shows blocked and another robot can reach: seen in part, or
         shut to this robot. They lead on, but are not reachable themselves.
         """
-        return _joined(area, self._merged(), doors=True) if self._robots else area
+        return self._with(area, doors=True)
+
+    def _with(self, area: ReachableArea, *, doors: bool) -> ReachableArea:
+        # A robot that looks at a door asks in each step.
+        last = self._last.get(doors)
+        if last is None or last[0] is not area or last[1] != self.version:
+            joined = _joined(area, self._merged(), doors=doors) if self._robots else area
+            last = self._last[doors] = area, self.version, joined
+        return last[2]
 
     def _merged(self) -> dict[Cell, NDArray[np.uint8]]:
         merged: dict[Cell, NDArray[np.uint8]] = {}
@@ -138,7 +142,7 @@ class GroundTelling:
 
 
 def _joined(
-    area: ReachableArea, tiles: dict[Cell, NDArray[np.uint8]], *, doors: bool = False
+    area: ReachableArea, tiles: dict[Cell, NDArray[np.uint8]], *, doors: bool
 ) -> ReachableArea:
     """Return an area with the cells of tiles where its lattice knows nothing.
 
