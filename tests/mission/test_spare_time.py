@@ -7,6 +7,7 @@ import pytest
 
 from fasaco_edge.daemon.loop.outbox import path_attachment
 from fasaco_edge.mission.core.events import MapReceived, PlanReady
+from fasaco_edge.mission.core.path_exit import PublishedPath
 from fasaco_edge.mission.core.spare_time import (
     CHANGING_SHARE,
     SETTLED_S,
@@ -138,7 +139,8 @@ def test_all_figures_of_a_path_are_of_one_problem():
             drive.tell(PlanReady(request.number, NearOptimal().plan(request.problem, limit), 0.05))
         drive.go()
         for update in drive.updates[known:]:
-            notes.append((path_attachment(drive.mission, update), request, update))
+            about = path_attachment(PublishedPath.of(drive.mission, update))
+            notes.append((about, request, update))
     assert drive.mission.state == "done"
     better = [note for note in notes if note[0].reason == BETTER]
     assert better

@@ -76,7 +76,10 @@ def test_every_decision_is_as_it_was(which, request):
     assert replay.turns == record.turns > 100
     paths = [step.as_recorded for step in steps if step.decision.path is not None]
     assert all(paths)
-    assert len(paths) == len(read_run(samples).paths) == recording.status["path"]["revision"]
+    recorded = read_run(samples).paths.values()
+    # A mission that drives when its daemon ends has its path withdrawn after the last step.
+    assert len(paths) == len([path for path in recorded if path.reason != "the daemon ends"])
+    assert len(paths) == recording.status["path"]["revision"]
     assert replay.plans > 2
     assert replay.mission.state == recording.status["state"]
     assert bool(record.beginning.ledger) == (which == "recording")

@@ -22,6 +22,8 @@ TIMEOUT_S = 150.0
 MAP = "nav_msgs/msg/OccupancyGrid"
 MAP_UPDATE = "map_msgs/msg/OccupancyGridUpdate"
 POSE = "geometry_msgs/msg/PoseStamped"
+# In the attachment of the empty path with which a daemon begins to plan.
+BEGINS = b'"revision":0,"map_stamp_ns"'
 SCHEMAS = {"map": MAP, "map_update": MAP_UPDATE, "pose": POSE}
 
 
@@ -39,16 +41,24 @@ class Heard:
 
 
 class Ear:
-    """What came in on one key, in order."""
+    """What came in on one key, in order.
 
-    def __init__(self) -> None:
+    Args:
+        begins: take the empty path with which a daemon begins, too.
+    """
+
+    def __init__(self, *, begins: bool = False) -> None:
+        self._begins = begins
         self.heard: list[Heard] = []
         self._came = threading.Condition()
 
     def __call__(self, sample: zenoh.Sample) -> None:
         """Take a sample in, on a Zenoh thread."""
+        heard = _heard(sample)
+        if not self._begins and BEGINS in (heard.attachment or b""):
+            return
         with self._came:
-            self.heard.append(_heard(sample))
+            self.heard.append(heard)
             self._came.notify_all()
 
     def wait(self, holds: Callable[[Heard], bool], since: int = 0) -> Heard:
@@ -94,6 +104,12 @@ class Outsider:
             zenoh.ext.declare_advanced_subscriber(self.session, key, ear, history=history)
         else:
             self.session.declare_subscriber(key, ear)
+        return ear
+
+    def listen_to_all(self, name: str) -> Ear:
+        """Subscribe to what comes from now on, also to the empty path of a daemon that begins."""
+        ear = Ear(begins=True)
+        self.session.declare_subscriber(f"{self.prefix}/{name}", ear)
         return ear
 
     def put(self, name: str, payload: bytes, schema: str | None = None) -> None:

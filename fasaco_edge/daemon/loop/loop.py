@@ -36,19 +36,19 @@ from fasaco_edge.mission.core.events import (
     CommandReceived,
     Decision,
     Event,
-    PathUpdate,
     PlanReady,
 )
 
 if TYPE_CHECKING:
     from fasaco_edge.daemon.loop.fleet import FleetVoice
     from fasaco_edge.daemon.metrics import MetricsServer
-    from fasaco_edge.mission.core.mission import Mission
 
 LOG = logging.getLogger(__name__)
 
 # How long a cycle waits for samples [s]: with a mission, and before the first map.
 TICK_S, IDLE_TICK_S = 0.1, 0.5
+# The frame of what is published before the first map.
+DEFAULT_FRAME = "map"
 # A mission that fails again within this time [s] failed on the map it has.
 SOON_S = 60.0
 
@@ -139,7 +139,9 @@ class Loop:
         self._publish_status(time.monotonic())
 
     def close(self, timeout_s: float) -> None:
-        """Flush turn log and ledger, and end the planning thread."""
+        """Withdraw the path, flush turn log and ledger, and end the planning thread."""
+        self._runner.paths.withdraw("the daemon ends")
+        self._send_path()
         self._guard.attempt("turns", self._bus.turns.publish)
         self._keeper.keep(self._runner.mission, float("inf"))
         self._runner.close(timeout_s)
@@ -154,12 +156,15 @@ class Loop:
             if claim.state.is_waiting:
                 self._bus.turns.end(claim.reason)
                 if mission is not None:
-                    self._withdraw_path(mission, claim.reason)
-                    self._bus.outbox.forget()
                     self._restart(claim.reason)
+                    self._bus.outbox.forget()
+                self._runner.paths.forget()
+            else:
+                self._void_path("this daemon plans from now on")
             claim.announce()
         elif claim.rival_yielded and mission is not None:
-            # The robot may have received the other's last, empty path after ours.
+            # The robot may have received the other's path after ours.
+            self._void_path("another daemon planned, too")
             self._restart("another daemon planned, too")
         elif self._status.yield_reason:
             self._status.yield_reason = claim.reason
@@ -205,7 +210,9 @@ class Loop:
         self._bus.turns.end(why)
         if config is not None:
             self._status.show(config)
-        self._runner.restart(config or self.config, self._runner.held() if held is None else held)
+        held = self._runner.held() if held is None else held
+        self._runner.restart(config or self.config, held, why)
+        self._send_path()
         self._latency = MapLatency()
         self._coverage.forget()
 
@@ -218,7 +225,7 @@ class Loop:
     def _note(self, batch: Batch) -> None:
         """Take data that is not the mission's: snapshots of the search, and times."""
         mission = self._runner.mission
-        frame = mission.grid.frame if mission and mission.grid else "map"
+        frame = self._runner.map_frame or DEFAULT_FRAME
         for seen in batch.snapshots:
             self._bus.outbox.pheromone(seen, frame, mission.rotation.deg if mission else 0.0)
         for plan in batch.plans:
@@ -247,16 +254,16 @@ class Loop:
             self._has_begun = True
         maps = mission.map_revision
         try:
-            decision = mission.step([*events, *commands, *batch.plans], now)
+            decision = self._runner.step(mission, [*events, *commands, *batch.plans], now)
         except Exception as error:
-            return self._recover(mission, commands, error)
+            return self._recover(commands, error)
         if mission.map_revision > maps:
             self._status.ingest_s = time.monotonic() - now
             if decision.plan is not None or mission.route.wanted:
                 self._latency.call_for_plan()
         if mission.route.wanted and mission.route.is_improving:
             self._runner.interrupt()  # a needed plan comes before one that only improves
-        self._perform(mission, decision)
+        self._perform(decision)
         self._guard.attempt("coverage", partial(self._coverage.publish, mission, now))
         self._guard.attempt("floor", partial(self._floor.publish, mission, now))
         self._guard.attempt("pheromone", partial(self._trail.publish, mission, now))
@@ -264,7 +271,7 @@ class Loop:
             self._guard.attempt("fleet", partial(self._bus.fleet.publish, mission, now))
         return decision
 
-    def _perform(self, mission: Mission, decision: Decision) -> None:
+    def _perform(self, decision: Decision) -> None:
         self._count_faults(decision.faults)
         self._keeper.note_faults(decision.faults)
         if decision.forgotten:
@@ -272,14 +279,11 @@ class Loop:
         if decision.plan is not None:
             self._latency.ask()
             self._runner.submit(decision.plan)
-        if decision.path is not None:
-            if decision.plan is None and decision.path.plan is None:
-                self._runner.interrupt()  # the robot had to stop: the plan is for another map
-            self._publish_path(mission, decision.path)
+        if decision.path is not None and decision.plan is None and decision.path.plan is None:
+            self._runner.interrupt()  # the robot had to stop: the plan is for another map
+        self._send_path()
 
-    def _recover(
-        self, mission: Mission, commands: Sequence[CommandReceived], error: Exception
-    ) -> Decision:
+    def _recover(self, commands: Sequence[CommandReceived], error: Exception) -> Decision:
         """Stop the robot, and let another mission continue from the ledger.
 
         Exiting would not help: a latched map comes again after a restart. The map gets a second
@@ -291,29 +295,24 @@ class Loop:
         now, failed_at = time.monotonic(), self._failed_at
         self._failed_at = now
         self._status.waits = f"{fault}: waits for another map"
-        self._withdraw_path(mission, str(fault))
         held = self._runner.held() if now - failed_at > SOON_S else []
-        self._restart("the mission failed", held=held)
+        self._restart(str(fault), held=held)
         return Decision(answers=tuple(Answer(asked.number, fault) for asked in commands))
-
-    def _withdraw_path(self, mission: Mission, reason: str) -> None:
-        """Replace the path of a mission that ends by an empty one."""
-        if (
-            mission.grid is not None
-            and mission.lattice is not None
-            and len(mission.route.path.cells)
-        ):
-            stop = PathUpdate(mission.route.revision + 1, mission.route.path.cells[:0], reason)
-            self._publish_path(mission, stop)
 
     # Publishing.
 
-    def _publish_path(self, mission: Mission, update: PathUpdate) -> None:
-        self._bus.outbox.path(mission, update)
-        self._status.path = update
-        if update.plan is not None and (seconds := self._latency.answer()) is not None:
+    def _void_path(self, reason: str) -> None:
+        """Replace any path that followers may have from elsewhere by an empty one."""
+        self._runner.paths.void(reason, self._runner.map_frame or DEFAULT_FRAME)
+        self._send_path()
+
+    def _send_path(self) -> None:
+        path = self._runner.paths.send(self._bus.outbox.path)
+        if path is None or path.plan is None:
+            return
+        if (seconds := self._latency.answer()) is not None:
             self._status.map_to_path_s = seconds
-        if update.plan is not None and not self._is_warm:
+        if not self._is_warm:
             gc.freeze()
             self._is_warm = True
 

@@ -20,10 +20,12 @@ from fasaco_edge.errors import CommandError, FasacoError
 from fasaco_edge.mission.core.events import (
     Answer,
     CommandReceived,
+    Decision,
     Event,
     MapReceived,
     PoseReceived,
 )
+from fasaco_edge.mission.core.path_exit import PathExit
 from fasaco_edge.mission.orders.order import located
 from fasaco_edge.mission.orders.order_state import OrderState
 
@@ -38,6 +40,7 @@ class MissionRunner:
 
     Attributes:
         config: the configuration in force.
+        paths: what is published of the paths of its missions.
         mission: the mission; None during startup.
         worker: its planning thread; None during startup.
     """
@@ -50,6 +53,7 @@ class MissionRunner:
         load: Callable[[DaemonConfig, Mailbox[object]], Loader] | None = None,
     ) -> None:
         self.config = config
+        self.paths = PathExit()
         self.mission: Mission | None = None
         self.worker: PlanningWorker | None = None
         self._keeper = keeper
@@ -136,8 +140,18 @@ class MissionRunner:
             *([PoseReceived(pose)] if pose is not None else []),
         ]
 
-    def restart(self, config: DaemonConfig, held: Sequence[Event]) -> None:
-        """Go back to startup, with these events; coverage and order continue from the ledger."""
+    def step(self, mission: Mission, events: Sequence[Event], now: float) -> Decision:
+        """Step the mission; its path is due afterwards."""
+        decision = mission.step(events, now)
+        self.paths.follow(mission, decision.path)
+        return decision
+
+    def restart(self, config: DaemonConfig, held: Sequence[Event], why: str) -> None:
+        """Go back to startup, with these events; coverage and order continue from the ledger.
+
+        The path of the mission that ends is withdrawn for the reason given.
+        """
+        self.paths.withdraw(why)
         if self.mission is not None and self.worker is not None:
             self.worker.disown()
             self._keeper.take_back(self.mission)

@@ -35,9 +35,7 @@ from fasaco_edge.wire.messages.paths import encode_path
 from fasaco_edge.wire.messages.pheromone import encode_pheromone
 
 if TYPE_CHECKING:
-    from fasaco_edge.grid.geometry import Window
-    from fasaco_edge.mission.core.events import PathUpdate
-    from fasaco_edge.mission.core.mission import Mission
+    from fasaco_edge.mission.core.path_exit import PublishedPath
 
 LOG = logging.getLogger(__name__)
 
@@ -66,37 +64,21 @@ class Outbox:
         self._status = bus.advertise(keys, topics.STATUS)
         self._command = bus.advertise(keys, topics.COMMAND)
 
-    def path(self, mission: Mission, update: PathUpdate) -> None:
-        """Publish the line to drive, or a path through centres of cells, facing along the way.
+    def path(self, path: PublishedPath) -> bool:
+        """Publish a path, facing along the way; tell whether that succeeded."""
+        return self.guard.attempt("path", lambda: self._put_path(path))
 
-        On failure an empty path is published: the robot must not follow the previous path.
-        """
-        assert mission.grid is not None
-        assert mission.lattice is not None
-        grid = mission.grid
-        xy = mission.lattice.centres(update.cells) if update.xy is None else update.xy
-        yaw = headings(xy)
-        if len(yaw) and update.end_yaw is not None:
-            yaw[-1] = update.end_yaw
-        about = path_attachment(mission, update)
-        if not self.guard.attempt("path", lambda: self._say_path(xy, yaw, grid, about)):
-            nothing = replace(about, steps=0)
-            self.guard.attempt("path", lambda: self._say_path(xy[:0], yaw[:0], grid, nothing))
-
-    def _say_path(
-        self,
-        xy: NDArray[np.float64],
-        yaw: NDArray[np.float64],
-        grid: OccupancyGrid,
-        about: PathAttachment,
-    ) -> None:
-        attachment = encode_json(about)
-        payload = encode_path(xy, yaw, grid.frame, grid.stamp_ns)
-        path = Shared.of(payload, schemas.PATH, attachment)
-        self._last.keep("path", path)
-        self._path.put(path.payload, attachment)
+    def _put_path(self, path: PublishedPath) -> None:
+        yaw = headings(path.xy)
+        if len(yaw) and path.end_yaw is not None:
+            yaw[-1] = path.end_yaw
+        attachment = encode_json(path_attachment(path))
+        payload = encode_path(path.xy, yaw, path.frame, path.map_stamp_ns)
+        message = Shared.of(payload, schemas.PATH, attachment)
+        self._last.keep("path", message)
+        self._path.put(message.payload, attachment)
         if self._ros is not None:
-            self._ros.path.put(path.payload)
+            self._ros.path.put(message.payload)
 
     def forget(self) -> None:
         """Drop samples cached for late joiners: another daemon publishes them."""
@@ -179,28 +161,19 @@ def headings(xy: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.append(yaw, yaw[-1])
 
 
-def path_attachment(mission: Mission, update: PathUpdate) -> PathAttachment:
+def path_attachment(path: PublishedPath) -> PathAttachment:
     """Return the attachment of a path."""
-    assert mission.grid is not None
-    assert mission.lattice is not None
+    changed = path.changed and Rectangle(*(round(edge, 3) for edge in path.changed))
     return replace(
-        PathAttachment.of(update.plan),
-        revision=update.revision,
-        map_stamp_ns=mission.grid.stamp_ns,
-        map_revision=mission.map_revision,
-        reason=update.reason,
-        steps=max(len(update.cells) - 1, 0),
-        plan_ms=round(1e3 * update.plan_s, 3),
-        changed=rectangle(update.changed, mission),
+        PathAttachment.of(path.plan),
+        revision=path.revision,
+        map_stamp_ns=path.map_stamp_ns,
+        map_revision=path.map_revision,
+        reason=path.reason,
+        steps=path.steps,
+        plan_ms=round(1e3 * path.plan_s, 3),
+        changed=changed,
     )
-
-
-def rectangle(window: Window | None, mission: Mission) -> Rectangle | None:
-    """Return the rectangle around a window of the lattice, in the map frame [m]; None if none."""
-    if window is None or mission.lattice is None:
-        return None
-    bounds = mission.rotation.cells(window, mission.lattice.cell_m).bounds()
-    return Rectangle(*(round(edge, 3) for edge in bounds))
 
 
 class PublishGuard:

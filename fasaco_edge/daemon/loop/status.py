@@ -42,8 +42,8 @@ from fasaco_edge.wire.documents.status import (
 
 if TYPE_CHECKING:
     from fasaco_edge.daemon.loop.mission_runner import MissionRunner
-    from fasaco_edge.mission.core.events import PathUpdate
     from fasaco_edge.mission.core.mission import Mission
+    from fasaco_edge.mission.core.path_exit import PublishedPath
 
 HEARTBEAT_S = 1.0
 # Changes closer together than this go out as one.
@@ -66,7 +66,6 @@ class StatusBoard:
         self.map_to_path_s: float | None = None
         self.recorder: SupervisedRecorder | None = None
         self.ledger = LedgerReport()
-        self.path: PathUpdate | None = None
         self.waits = "no map yet"
         self.claim = ClaimReport()
         self.yield_reason = ""
@@ -90,7 +89,8 @@ class StatusBoard:
         mission, order_state = runner.mission, runner.order_state
         state, reason = self._state(runner)
         recorder = self.recorder and self.recorder.state
-        revision = self.path and self.path.revision
+        path = runner.paths.newest
+        revision = path and path.revision
         claim = self.claim.stand
         key = (state, reason, revision, recorder, self.ledger.fault, order_state, claim)
         # Many small faults do not get a message each: the heartbeat has their count.
@@ -110,7 +110,7 @@ class StatusBoard:
             pose=pose_report(mission),
             coverage=coverage_report(mission),
             floor=floor_report(mission),
-            path=self._path(mission),
+            path=_path_report(path, mission),
             plan=plan_counts(mission),
             latency_ms=Latencies(_ms(self.ingest_s), _ms(self.plan_s), _ms(self.map_to_path_s)),
             loop_ms=self.turns.report(),
@@ -184,17 +184,18 @@ class StatusBoard:
             times.turns,
         )
 
-    def _path(self, mission: Mission | None) -> PathReport | None:
-        update = self.path
-        if update is None or mission is None:
-            return None
-        return replace(
-            PathReport.of(update.plan),
-            revision=update.revision,
-            steps=max(len(update.cells) - 1, 0),
-            remaining_steps=max(len(mission.route.path.ahead) - 1, 0),
-            reason=update.reason,
-        )
+
+def _path_report(path: PublishedPath | None, mission: Mission | None) -> PathReport | None:
+    """Return this part of the status; None before the first path of a mission."""
+    if path is None or not path.revision or mission is None:
+        return None
+    return replace(
+        PathReport.of(path.plan),
+        revision=path.revision,
+        steps=path.steps,
+        remaining_steps=max(len(mission.route.path.ahead) - 1, 0),
+        reason=path.reason,
+    )
 
 
 def _ms(seconds: float | None) -> float | None:

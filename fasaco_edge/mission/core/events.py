@@ -290,3 +290,8 @@ class State(StrEnum):
     BLOCKED = "blocked"
     DEGRADED = "degraded"
     DONE = "done"
+
+    @property
+    def is_at_rest(self) -> bool:
+        """Whether the robot stands, and no path is published."""
+        return self not in (State.PLANNING, State.COVERING, State.RETURNING, State.DEGRADED)

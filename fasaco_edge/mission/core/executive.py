@@ -81,6 +81,9 @@ class Executive:
         stuck = self.giving_way.why_stuck(self._now) or self._standing.why_stuck
         if self._state in DRIVING and stuck:
             return State.DEGRADED, stuck
+        makes_way = bool(self.giving_way.waits_for) and len(self.route.path.cells) > 0
+        if self._state is State.DONE and makes_way:
+            return State.RETURNING, self._reason
         return self._state, self._reason
 
     def decide(self, now: float) -> Decision:
@@ -195,9 +198,14 @@ class Executive:
         )
 
     def _rest(self, state: State, reason: str, update: PathUpdate | None = None) -> Decision:
-        """Rest in a state; a driving robot is stopped, else ``update`` is published."""
+        """Rest in a state: the mission then withdraws the path; else ``update`` is published."""
         self._state, self._reason = state, reason
-        return Decision(path=self.route.stop(reason, self._now) or update)
+        return Decision(path=update)
+
+    def _stand_by(self, reason: str, update: PathUpdate | None) -> Decision:
+        """Stand in the middle of an order, without a path."""
+        stop = self.route.stop(reason, self._now)
+        return self._rest(State.COVERING, reason, stop or update)
 
     def _settle(self, update: PathUpdate | None) -> Decision:
         """Stop: all is covered, or the rest waits for a retry."""
@@ -223,7 +231,7 @@ class Executive:
         self._share(cell, at_once=not stands)
         while orders.order_state.stage is not Stage.RETURNING:
             if why := orders.why_standing(self._now):
-                return self._rest(State.COVERING, why, update)
+                return self._stand_by(why, update)
             try:
                 problem = orders.problem(cell, route.path_to_keep)
             except NothingToCover:
@@ -231,7 +239,7 @@ class Executive:
                     route.want(reason)
                     continue
                 if why := orders.why_looking(cell, self._now):
-                    return self._rest(State.COVERING, why, update)
+                    return self._stand_by(why, update)
                 if orders.give_up_unreachable():
                     self._share(cell, at_once=True)
                     continue

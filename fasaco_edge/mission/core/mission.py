@@ -144,7 +144,8 @@ class Mission:
         happened = self._along_walls(self._handle(events, now), now)
         decided = self._executive.decide(now)
         self.state, self.reason = self._executive.status()
-        path = decided.path or happened.path or begun
+        stop = self.route.stop(self.reason, now) if self.state.is_at_rest else None
+        path = stop or decided.path or happened.path or begun
         self._trail.finish(path)
         path = self._line.finish(path, now)
         if path is not None:

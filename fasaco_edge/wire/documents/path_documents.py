@@ -101,9 +101,10 @@ class PathAttachment(PlanFigures, frozen=True):
     """The Zenoh attachment of each path.
 
     Attributes:
-        revision: counts the published paths.
-        map_stamp_ns: stamp of the map it was planned on [ns].
-        map_revision: revision of that map, as in the status.
+        revision: counts the published paths of a mission, from 1; 0 for the empty path with which
+            a daemon begins to plan.
+        map_stamp_ns: stamp of the map it was planned on [ns]; 0 without one.
+        map_revision: revision of that map, as in the status; 0 without one.
         reason: why it replaces the previous one.
         steps: steps from pose to pose.
         plan_ms: duration of planning; 0 if no plan was needed.
@@ -111,9 +112,9 @@ class PathAttachment(PlanFigures, frozen=True):
             null if that is not the reason.
     """
 
-    revision: Ordinal = 0
+    revision: Count = 0
     map_stamp_ns: int = 0
-    map_revision: Ordinal = 0
+    map_revision: Count = 0
     reason: Name = ""
     steps: Count = 0
     plan_ms: Amount = 0.0

@@ -1,0 +1,156 @@
+"""The path exit: the one way out for paths, and the owner of the path that is published.
+
+It outlives the missions of a daemon. A path is in force while the mission that made it drives: when
+that mission comes to rest or ends, the exit replaces the path by an empty one, which stops the
+robot. So two things hold, whatever ends, replaces or fails:
+
+- a mission at rest has published an empty path last;
+- a path that is not empty is of the mission in force.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fasaco_edge.grid.geometry import Bounds
+
+if TYPE_CHECKING:
+    from fasaco_edge.mission.core.events import PathUpdate
+    from fasaco_edge.mission.core.mission import Mission
+    from fasaco_edge.planners.path import CoveragePath
+
+
+def no_points() -> NDArray[np.float64]:
+    """Return the points of an empty path, float64 (0, 2)."""
+    return np.empty((0, 2))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PublishedPath:
+    """A path as it is published, in the map frame.
+
+    Attributes:
+        frame: the map frame.
+        reason: why it replaces the previous one.
+        revision: counts the paths of a mission, from 1; the path that withdraws a mission's last
+            one has the next number. 0 if there was no mission.
+        xy: float64 (n, 2), x, y [m]; n = 0 stops the robot.
+        steps: steps from cell to cell.
+        end_yaw: heading at the end [rad]; None for the heading of the last segment.
+        map_stamp_ns, map_revision: stamp [ns] and revision of the map it was planned on.
+        plan: the plan that it comes from; None where none was needed.
+        plan_s: planning time [s].
+        changed: bounds of the cells whose change is the reason [m]; None where that is not the
+            reason.
+    """
+
+    frame: str
+    reason: str
+    revision: int = 0
+    xy: NDArray[np.float64] = field(default_factory=no_points)
+    steps: int = 0
+    end_yaw: float | None = None
+    map_stamp_ns: int = 0
+    map_revision: int = 0
+    plan: CoveragePath | None = None
+    plan_s: float = 0.0
+    changed: Bounds | None = None
+
+    @classmethod
+    def of(cls, mission: Mission, update: PathUpdate) -> PublishedPath:
+        """Return the path that a mission has decided on in its last step."""
+        grid, lattice = mission.grid, mission.lattice
+        assert grid is not None
+        assert lattice is not None
+        changed = None
+        if update.changed is not None:
+            changed = mission.rotation.cells(update.changed, lattice.cell_m).bounds()
+        return cls(
+            frame=grid.frame,
+            reason=update.reason,
+            revision=update.revision,
+            xy=lattice.centres(update.cells) if update.xy is None else update.xy,
+            steps=max(len(update.cells) - 1, 0),
+            end_yaw=update.end_yaw,
+            map_stamp_ns=grid.stamp_ns,
+            map_revision=mission.map_revision,
+            plan=update.plan,
+            plan_s=update.plan_s,
+            changed=changed,
+        )
+
+    @property
+    def stops(self) -> bool:
+        """Whether it is empty, and stops the robot."""
+        return not len(self.xy)
+
+    def withdrawn(self, reason: str) -> PublishedPath:
+        """Return the empty path that replaces this one."""
+        return PublishedPath(
+            self.frame,
+            reason,
+            self.revision + 1,
+            map_stamp_ns=self.map_stamp_ns,
+            map_revision=self.map_revision,
+        )
+
+
+class PathExit:
+    """Decides which path is published next, and keeps it until it is sent."""
+
+    def __init__(self) -> None:
+        # The path sent last, None if unknown; and the one to send, None for none.
+        self._sent: PublishedPath | None = None
+        self._due: PublishedPath | None = None
+
+    @property
+    def newest(self) -> PublishedPath | None:
+        """The path to send, or else the one sent last; None before there was one."""
+        return self._due or self._sent
+
+    def follow(self, mission: Mission, update: PathUpdate | None) -> None:
+        """Take the path of a mission's step, if any; withdraw its path if it is at rest."""
+        if update is not None:
+            self._due = PublishedPath.of(mission, update)
+        if mission.state.is_at_rest:
+            self.withdraw(mission.reason)
+
+    def withdraw(self, reason: str) -> None:
+        """Replace the newest path by an empty one, unless it is empty."""
+        newest = self.newest
+        if newest is not None and not newest.stops:
+            self._due = newest.withdrawn(reason)
+
+    def void(self, reason: str, frame: str) -> None:
+        """Replace any path by an empty one, also one of another daemon or an earlier process."""
+        self.withdraw(reason)
+        self._due = self._due or PublishedPath(frame, reason)
+
+    def forget(self) -> None:
+        """Send nothing more: another daemon publishes from now on."""
+        self._sent = self._due = None
+
+    def send(self, publish: Callable[[PublishedPath], bool]) -> PublishedPath | None:
+        """Send what is due, and return it; None if nothing is, or if it cannot be sent.
+
+        Where a path cannot be sent, an empty one is due: the robot must not follow the previous
+        path. It is tried again with each call until it is sent.
+
+        Args:
+            publish: sends a path, and tells whether it did.
+        """
+        if self._due is None:
+            return None
+        if not publish(self._due):
+            if self._due.stops:
+                return None
+            self._due = replace(self._due, xy=no_points(), steps=0, end_yaw=None)
+            if not publish(self._due):
+                return None
+        self._sent, self._due = self._due, None
+        return self._sent

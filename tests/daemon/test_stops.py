@@ -1,0 +1,135 @@
+"""A stop reaches the wheels: whatever ends a mission, its path is withdrawn on the bus."""
+
+from __future__ import annotations
+
+import signal
+import time
+
+import pytest
+import yaml
+
+from tests.daemon.test_mask_topic import MISSION, put_mask
+from tests.daemon.test_mission import planned
+from tests.support.outsider import TIMEOUT_S, Outsider
+from tests.support.processes import daemon_process, free_endpoint
+from tests.support.rooms import FREE, WALL, fill, map_bytes, pose_bytes, room
+from tests.support.router import router_process
+from tests.support.service_manager import Manager
+
+ROOM = room(6.0, 4.0)
+BLANK = fill(ROOM, 0.0, 0.0, 6.0, 4.0, FREE)
+OVER_ROBOT = fill(BLANK, 0.3, 0.3, 2.0, 2.0, WALL)
+KEEP_OUT = [[0.3, 0.3], [2.0, 0.3], [2.0, 2.0], [0.3, 2.0]]
+
+
+def drive(outsider, paths):
+    """Send map and pose until there is a path to drive; return how many paths have come."""
+    deadline = time.monotonic() + TIMEOUT_S
+    while not any(map(is_driven, paths.heard)):
+        assert time.monotonic() < deadline, outsider.ask_status()
+        outsider.put("map", map_bytes(ROOM))
+        outsider.put("pose", pose_bytes(1.0, 1.0))
+        time.sleep(0.2)
+    outsider.wait_status(lambda status: status["state"] == "covering")
+    return len(paths.heard)
+
+
+def is_driven(heard):
+    return len(planned(heard)[0]) > 0
+
+
+def stops(heard):
+    return not is_driven(heard)
+
+
+@pytest.fixture
+def manager(tmp_path):
+    running = Manager(tmp_path)
+    yield running
+    running.close()
+
+
+def test_a_mask_over_a_driving_robot(tmp_path):
+    with (
+        daemon_process(tmp_path, mission=dict(MISSION)) as running,
+        Outsider(running.endpoint) as outsider,
+    ):
+        put_mask(outsider, BLANK)
+        paths = outsider.listen("path")
+        since = drive(outsider, paths)
+        put_mask(outsider, OVER_ROBOT)
+        paths.wait(stops, since)
+        status = outsider.wait_status(lambda status: status["state"] == "blocked")
+        assert status["reason"].startswith("robot is in a keep-out zone")
+        assert stops(paths.heard[-1])
+
+
+def test_a_keep_out_zone_over_a_driving_robot_by_reload(tmp_path, manager):
+    with (
+        daemon_process(tmp_path, env={"NOTIFY_SOCKET": manager.address}) as running,
+        Outsider(running.endpoint) as outsider,
+    ):
+        paths = outsider.listen("path")
+        since = drive(outsider, paths)
+        file = running.log.with_suffix(".yaml")
+        settings = yaml.safe_load(file.read_text())
+        settings.setdefault("mission", {})["keep_out"] = [KEEP_OUT]
+        file.write_text(yaml.safe_dump(settings))
+        running.process.send_signal(signal.SIGHUP)
+        paths.wait(stops, since)
+        outsider.wait_status(lambda status: status["state"] == "blocked")
+        assert stops(paths.heard[-1])
+
+
+def test_the_end_of_the_daemon(tmp_path):
+    endpoint = free_endpoint()
+    bus = {"listen": [], "connect": [endpoint], "mode": "client"}
+    with (
+        router_process(endpoint),
+        daemon_process(tmp_path, bus=bus) as running,
+        Outsider(endpoint) as outsider,
+    ):
+        paths = outsider.listen("path")
+        since = drive(outsider, paths)
+        running.stop()
+        assert b"the daemon ends" in paths.wait(stops, since).attachment
+
+
+def test_a_daemon_that_was_killed_and_started_again(tmp_path):
+    """Its follower may still have the path of before."""
+    endpoint = free_endpoint()
+    bus = {"listen": [], "connect": [endpoint], "mode": "client"}
+    with (
+        router_process(endpoint),
+        daemon_process(tmp_path, bus=bus) as running,
+        Outsider(endpoint) as outsider,
+    ):
+        drive(outsider, outsider.listen("path"))
+        running.kill()
+        begun = outsider.listen_to_all("path")
+        with daemon_process(tmp_path, bus=bus):
+            # No map and no pose has come since.
+            assert stops(begun.wait(lambda heard: True))
+            assert outsider.ask_status()["state"] in ("waiting for map", "loading")
+
+
+def test_a_daemon_that_takes_over_from_a_frozen_one(tmp_path):
+    endpoint = free_endpoint()
+    bus = {"listen": [], "connect": [endpoint], "mode": "client"}
+    folders = [tmp_path / name for name in ("first", "second")]
+    for folder in folders:
+        folder.mkdir()
+    with (
+        router_process(endpoint),
+        daemon_process(folders[0], bus=bus) as first,
+        Outsider(endpoint) as outsider,
+        daemon_process(folders[1], bus=bus),
+    ):
+        paths = outsider.listen_to_all("path")
+        drive(outsider, paths)
+        first.process.send_signal(signal.SIGSTOP)
+        since = len(paths.heard)
+        # The second plans once the first is taken for dead.
+        void = paths.wait(lambda heard: b"this daemon plans" in heard.attachment, since)
+        assert void is paths.heard[since]
+        first.process.send_signal(signal.SIGCONT)
