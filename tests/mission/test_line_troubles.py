@@ -10,13 +10,16 @@ import numpy as np
 import pytest
 
 from fasaco_edge.bench.floor import SweepingRobot, judge_floor
+from fasaco_edge.grid.fine_raster import RobotDiscs
+from fasaco_edge.grid.floor_map import FloorMap
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D
-from fasaco_edge.grid.lattice import Footprint
+from fasaco_edge.grid.lattice import CoverageLattice, Footprint
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.host.processes import peak_mb
 from fasaco_edge.mission.config import Sweeping
 from fasaco_edge.mission.core.events import MapReceived, State
 from fasaco_edge.mission.core.mission import Mission
+from fasaco_edge.mission.line.line_ahead import LineAhead
 from tests.grid.test_floor import room
 from tests.mission.test_line import CONFIG, RADIUS_M, ROBOT, Robot, assert_clear
 
@@ -129,3 +132,19 @@ def test_a_map_that_jumps_far_away_and_back_costs_no_more_memory_than_one(far_m)
     robot.tell(MapReceived(near))
     assert peak_mb(os.getpid()) < before_mb + 100.0
     robot.finish()
+
+
+def test_a_robot_beside_a_long_straight_line_gets_one_that_turns_off_it():
+    """Of the line that both walks begin with, only its first point was left, and it is passed."""
+    grid = grid_of(np.ones((120, 120), bool))
+    footprint = Footprint(0.25, 0.12)
+    plain = CoverageLattice.from_map(grid, footprint)
+    ahead = LineAhead(FloorMap(grid, plain, footprint, RobotDiscs(0.12, 0.27), 10_000_000))
+    straight = [(2, col) for col in range(2, 20)]
+    ahead.lay(np.array(straight, np.int32), Pose2D(0.625, 0.625), keeps=False)
+    aside = Pose2D(0.9, 3.0)
+    ahead.drive(aside)
+    turns_off = [*straight[:15], *((row, 16) for row in range(3, 9))]
+    ahead.lay(np.array(turns_off, np.int32), aside)
+    assert ahead.xy()[0].tolist() == pytest.approx([aside.x, aside.y])
+    assert ahead.xy()[-1].tolist() == pytest.approx([16.5 * 0.25, 8.5 * 0.25], abs=0.03)

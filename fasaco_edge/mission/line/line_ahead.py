@@ -157,7 +157,8 @@ class LineAhead:
             pieces = kept_pieces(line, ahead, walk) if keeps and len(line) and len(walk) else []
             if pieces and pieces[0].begin == 0 and not self.is_followed:
                 # The robot is not behind its first point any more.
-                pieces[0] = pieces[0].without_first()
+                rest = pieces[0].without_first()
+                pieces[:1] = [rest] if len(rest.line) else []
             self._walk, self.cell, self._cut = walk, 0, None
             self._join(pieces, skips=beside is None)
             if not keeps and len(self.line):
