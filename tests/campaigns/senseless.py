@@ -35,7 +35,7 @@ QUERIES = ("path", "status", "coverage", "pheromone", "config", "version", "miss
 # Times that a stamp can be near: the epoch, today, and both ends of an int32 of seconds.
 EPOCHS = (1, 1_750_000_000 * 10**9, -(2**31) * 10**9, (2**31 - 10**4) * 10**9)
 # Events that are no message: they pass the time, or look whether all is well.
-SILENT = ("wait", "checkpoint")
+SILENT = ("wait", "checkpoint", "freeze")
 
 
 class Senseless:
@@ -44,7 +44,8 @@ class Senseless:
     Args:
         seed: of everything.
         most_pixels: of one map.
-        check_every, restart_every, reload_every, router_every: events between two of those.
+        check_every, restart_every, reload_every, router_every, rival_every: events between two
+            of those.
     """
 
     def __init__(
@@ -55,6 +56,7 @@ class Senseless:
         restart_every: int = 9_000,
         reload_every: int = 3_500,
         router_every: int = 60_000,
+        rival_every: int = 12_000,
     ) -> None:
         self._rng = random.Random(seed)
         self._most_pixels = most_pixels
@@ -63,6 +65,7 @@ class Senseless:
             "restart": restart_every,
             "reload": reload_every,
             "router": router_every,
+            "rival": rival_every,
         }
         self._serial = 0
         self._map: Event = self._honest_map()
@@ -84,6 +87,8 @@ class Senseless:
             (6, self._ask),
             (3, self._keep_silent),
             (1, self._come_and_go),
+            (1, self._freeze),
+            (2, self._mask),
             (1, self._flood),
         ]
 
@@ -107,6 +112,7 @@ class Senseless:
             "restart": self._restart,
             "router": lambda: iter([{"do": "router", "away_s": self._rng.choice([0.0, 0.3, 1.5])}]),
             "checkpoint": lambda: iter([{"do": "checkpoint", "map": self._honest_map()}]),
+            "rival": self._rival,
         }
 
     # Poses.
@@ -326,6 +332,11 @@ class Senseless:
         turns = [math.tau * (corner + ahead) / corners for corner in range(corners)]
         return [[x + radius * math.cos(turn), y + radius * math.sin(turn)] for turn in turns]
 
+    def _near_polygons(self) -> list[list[list[float]]]:
+        """Return keep-out zones of a configuration: with one out of bounds none would start."""
+        polygons = [self._polygon() for _ in range(self._rng.choice([0, 0, 1, 3]))]
+        return [each for each in polygons if np.abs(each).max() < MAX_COORDINATE_M / 2]
+
     def _ask(self) -> Iterator[Event]:
         for _ in range(self._rng.randint(1, 12)):
             name = self._rng.choice(QUERIES)
@@ -343,6 +354,25 @@ class Senseless:
         """Let the mapper be another one, whose latched map stands, or goes with it."""
         yield {"do": "publisher", "stays": self._rng.random() < 0.7}
         yield self._map | {"stamp": self._stamp(), "topic": "map"}
+
+    def _freeze(self) -> Iterator[Event]:
+        yield {"do": "freeze", "s": self._rng.choice([0.2, 0.5, 3.0])}
+
+    def _rival(self) -> Iterator[Event]:
+        """Let another daemon of this name come and go while the robot drives."""
+        yield from self._behave()
+        yield {
+            "do": "rival",
+            "s": self._rng.choice([1.5, 3.0]),
+            "takes_over": self._rng.random() < 0.3,
+            "kill": self._rng.random() < 0.5,
+        }
+
+    def _mask(self) -> Iterator[Event]:
+        """Draw keep-out zones over the map while the robot drives, and take them away."""
+        for kind in (self._rng.choice(["rooms", "checkers", "noise"]), "free"):
+            yield self._map | {"do": "mask", "stamp": self._stamp(), "kind": kind}
+            yield from self._drive()
 
     def _flood(self) -> Iterator[Event]:
         """Say one thing again and again, oftener than anybody listens."""
@@ -375,6 +405,7 @@ class Senseless:
             "kill": self._rng.random() < 0.5,
             "fresh": self._rng.random() < 0.1,
             "mode": self._rng.choice(["client", "peer"]),
+            "masks": self._rng.random() < 0.5,
             "sections": sections | ({"ros2": ros} if self._rng.random() < 0.3 else {}),
         }
 
@@ -396,6 +427,7 @@ class Senseless:
                 "retry_s": self._rng.choice([0.2, 30.0]),
                 "lost_pose_s": self._rng.choice([0.0, 1.0, 3.0]),
                 "stale_map_s": self._rng.choice([0.0, 0.0, 2.0]),
+                "keep_out": self._near_polygons(),
             },
         }
 

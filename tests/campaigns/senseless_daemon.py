@@ -40,6 +40,7 @@ from fasaco_edge.wire.messages.maps import decode_occupancy_grid
 from fasaco_edge.wire.messages.paths import decode_path
 from fasaco_edge.wire.messages.pheromone import decode_pheromone
 from tests.campaigns import raw_messages
+from tests.campaigns.path_in_force import PathInForce
 from tests.campaigns.senseless import SILENT, Event, pixels_of
 from tests.campaigns.senseless_mission import NEAR_PX
 from tests.support.processes import Daemon, daemon_process, free_endpoint
@@ -62,6 +63,8 @@ MOST_JUDGED_PIXELS = 100_000
 SOON = {"period_init_ms": 100, "period_max_ms": 500}
 # An honest mapper says its map again every so many poses.
 MAP_AGAIN_EVERY = 50
+# A session silent for this long is dead to the others [s].
+LEASE_S = 10.0
 # Puts between two looks at what was heard.
 LOOK_EVERY = 100
 
@@ -91,7 +94,8 @@ class Judge:
         self.driven = 0
         self.status: dict[str, Any] = {}
         self.configs: deque[Event] = deque(maxlen=3)
-        self._heard: deque[tuple[str, bytes, bytes | None]] = deque()
+        self.in_force = PathInForce()
+        self._heard: deque[tuple[str, bytes, bytes | None, float]] = deque()
         self._maps: OrderedDict[int, Event] = OrderedDict()
         self._lattices: OrderedDict[tuple[int, str], CoverageLattice | None] = OrderedDict()
 
@@ -99,7 +103,8 @@ class Judge:
         """Note a sample, on a Zenoh thread."""
         beside = sample.attachment
         payload = sample.payload.to_bytes()
-        self._heard.append((name, payload, None if beside is None else beside.to_bytes()))
+        attachment = None if beside is None else beside.to_bytes()
+        self._heard.append((name, payload, attachment, time.monotonic()))
 
     def expect(self, event: Event) -> None:
         """Note a map that was sent."""
@@ -110,14 +115,15 @@ class Judge:
     def forget(self) -> None:
         """Forget what was heard of a daemon that is gone."""
         self._heard.clear()
+        self.in_force = PathInForce()
 
     def look(self) -> None:
         """Look at all that was heard since the last time."""
         while self._heard:
-            name, payload, beside = self._heard.popleft()
+            name, payload, beside, at = self._heard.popleft()
             self.counts[f"heard: {name}"] += 1
             if name == "status":
-                self._see_status(json.loads(payload))
+                self._see_status(json.loads(payload), at)
             elif name == "path":
                 self.see_path(payload, json.loads(beside or b"{}"))
             elif name == "coverage":
@@ -127,8 +133,11 @@ class Judge:
             else:
                 check("mission.json", json.loads(payload))
 
-    def _see_status(self, status: dict[str, Any]) -> None:
+    def _see_status(self, status: dict[str, Any], at: float) -> None:
         check("status.json", status)
+        broken = self.in_force.why_broken(status, at)
+        promise(not broken, broken)
+        self.counts["statuses judged by the path"] = self.in_force.judged
         self.status = status
         coverage = status["coverage"]
         if coverage is not None:
@@ -141,6 +150,7 @@ class Judge:
         """Judge a path by itself, and on the map that what comes beside it names."""
         check("path_attachment.json", about)
         path = decode_path(payload)
+        self.in_force.see_path(len(path.xy), about["revision"])
         self.walk, self.driven = path.xy, 0
         lines = [config.get("line", "cells") != "cells" for config in list(self.configs)[-2:]]
         if any(lines):
@@ -238,6 +248,13 @@ class Campaign:
             self._viewer.declare_subscriber(f"{PREFIX}/{name}", hear)
         self._sessions.callback(self._viewer.close)
         self._mapper: zenoh.Session | None = None
+        self._masks: Any = zenoh.ext.declare_advanced_publisher(
+            self._viewer,
+            f"{PREFIX}/keep_out_mask",
+            encoding=zenoh.Encoding(f"application/cdr;{schemas.OCCUPANCY_GRID}"),
+            cache=zenoh.ext.CacheConfig(max_samples=1),
+            publisher_detection=True,
+        )
         self._another_mapper(stays=False)
         self._start({"mode": "client", "fresh": False, "sections": {}})
         return self
@@ -256,14 +273,10 @@ class Campaign:
                 time.sleep(event["s"])
             case "checkpoint":
                 self._check(event["map"])
-            case "restart":
-                self._restart(event)
-            case "reload":
-                self._reload(event["sections"])
-            case "router":
-                self._restart_router(event["away_s"])
-            case "publisher":
-                self._another_mapper(stays=event["stays"])
+            case "restart" | "reload" | "router" | "publisher" | "freeze" | "rival":
+                self._happen(name, event)
+            case "mask":
+                self._put_mask(event)
             case "command":
                 self._ask("mission", event["document"])
             case "ask":
@@ -280,6 +293,22 @@ class Campaign:
         if self._puts % LOOK_EVERY == 0:
             self.look()
         return event
+
+    def _happen(self, name: str, event: Event) -> None:
+        """Do to processes and sessions what an event says."""
+        match name:
+            case "restart":
+                self._restart(event)
+            case "reload":
+                self._reload(event["sections"])
+            case "router":
+                self._restart_router(event["away_s"])
+            case "publisher":
+                self._another_mapper(stays=event["stays"])
+            case "freeze":
+                self._freeze(event["s"])
+            case "rival":
+                self._rival(event)
 
     def look(self) -> None:
         """Look at what was heard and answered, and whether the daemon lives."""
@@ -319,6 +348,9 @@ class Campaign:
         block = zenoh.CongestionControl.BLOCK
         assert self._mapper is not None
         self._mapper.put(key, payload, encoding=encoding, congestion_control=block)
+
+    def _put_mask(self, event: Event) -> None:
+        self._masks.put(raw_messages.occupancy_grid(event, pixels_of(event)))
 
     def _driven(self, event: Event) -> Event:
         """Return the pose of a robot that has driven to the next cell of its path."""
@@ -409,6 +441,7 @@ class Campaign:
         robot = {"tool_width_m": 0.3, "radius_m": 0.18} | sections.pop("robot", {})
         self._robot = {key: robot[key] for key in ("tool_width_m", "radius_m")}
         mission = {"lost_pose_s": 3.0} | sections.pop("mission", {})
+        mission["keep_out_topic"] = bool(event.get("masks"))
         maps = {"free_at_most": 25} | sections.pop("map", {})
         notes = self._folder / f"life{self.counts['lives']}"
         notes.mkdir()
@@ -468,6 +501,32 @@ class Campaign:
         self._another_mapper(stays=False)
         self._start({"mode": "client", "fresh": True, "sections": {}})
 
+    def _freeze(self, seconds: float) -> None:
+        """Stop the daemon's process for a while."""
+        self.look()
+        self._daemon.process.send_signal(signal.SIGSTOP)
+        time.sleep(seconds)
+        self._daemon.process.send_signal(signal.SIGCONT)
+
+    def _rival(self, event: Event) -> None:
+        """Let another daemon of this name come, take over from a frozen one if so, and go."""
+        folder = self._folder / f"rival{self.counts['rival']}"
+        folder.mkdir()
+        bus = {"mode": "client", "listen": [], "connect": [self._endpoint]}
+        settings = {"robot": self._robot, "map": self.judge.configs[-1]["map"]}
+        with daemon_process(folder, bus=bus, **settings, planner={"line": self._line}) as rival:
+            time.sleep(event["s"])
+            if event["takes_over"]:
+                self._freeze(LEASE_S + 2.0)
+                time.sleep(event["s"])
+            if event["kill"]:
+                rival.kill()
+        self._wait("this one plans again", self._plans)
+
+    def _plans(self) -> bool:
+        status = self._asked_status()
+        return status is not None and status["claim"]["stand"] == "plans"
+
     def _reload(self, sections: Event) -> None:
         file = self._daemon.log.with_suffix(".yaml")
         before = yaml.safe_load(file.read_text())
@@ -505,6 +564,7 @@ class Campaign:
             self.memory["most_resident_mb"], resident_mb(self._daemon.pid)
         )
         started = time.monotonic()
+        self._put_mask(event | {"kind": "free"})
         for command in ("reset", "start"):
             self._ask("mission", {"command": command})
         # One mapper: of two whose maps stand, the daemon has the one it was given last.

@@ -3,7 +3,8 @@
 Payloads are decoded, the mission steps, a real planner plans for a counted number of questions, all
 that would be published is encoded, and what would be kept is written and read again. After each
 turn hold what has to: the lattice that was kept up to date is the one that is made afresh, a walk
-is legal on it, counts add up. The same events make the same turns.
+is legal on it, counts add up; a mission at rest has published an empty path last, and a path that
+is not empty is that of the mission in force. The same events make the same turns.
 """
 
 from __future__ import annotations
@@ -30,6 +31,7 @@ from fasaco_edge.errors import FasacoError
 from fasaco_edge.grid.fine_raster import map_to_raster
 from fasaco_edge.grid.geometry import GridGeometry
 from fasaco_edge.grid.occupancy import OccupancyGrid
+from fasaco_edge.grid.rotation import rotated_points
 from fasaco_edge.kernels.floor.capsule import is_clear
 from fasaco_edge.mission.core.events import (
     CommandReceived,
@@ -42,6 +44,7 @@ from fasaco_edge.mission.core.events import (
     PoseReceived,
 )
 from fasaco_edge.mission.core.mission import Mission
+from fasaco_edge.mission.core.path_exit import PathExit, PublishedPath
 from fasaco_edge.mission.map.ground import Ground
 from fasaco_edge.mission.orders.order import read_command
 from fasaco_edge.mission.orders.order_state import OrderState
@@ -91,7 +94,12 @@ class MissionTrial:
         self._turns = 0
         self._batch: list[Any] = []
         self._size = 1
+        self._paths = PathExit()
+        # The path that followers have: they begin with one of a daemon that was killed.
+        self._driven = PublishedPath("map", "left behind", 1, np.ones((2, 2)))
         self._begin({}, None)
+        self._paths.void("begun", "map")
+        self._send_path()
 
     def perform(self, event: Event) -> None:
         """Take an event, and turn when there are enough of them.
@@ -135,6 +143,9 @@ class MissionTrial:
         mission = Mission(self._config)
         self._poses = PoseDecoder(config.pose.schema)
         self._asked: PlanRequest | None = None
+        self._paths.withdraw("another mission")
+        self._send_path()
+        _hold(self._driven.stops or before is None, "the path of a mission that has ended")
         if before is not None:
             kept = before.snapshot()
             snapshot = decode_ledger(encode_ledger(kept), kept.cell_m)
@@ -199,7 +210,26 @@ class MissionTrial:
         for fault in decision.faults:
             self.counts[f"fault: {fault.code}"] += 1
         self._publish(decision)
+        self._check_path(decision)
         self._check()
+
+    def _check_path(self, decision: Decision) -> None:
+        """Check that followers have the path of the mission in force, and none at rest."""
+        mission = self._mission
+        self._paths.follow(mission, decision.path)
+        self._send_path()
+        route, driven = mission.route, self._driven
+        about = f"{mission.state} ({mission.reason}), path {driven.revision}: {driven.reason}"
+        rests = mission.state not in ("planning", "covering", "returning", "degraded")
+        _hold(driven.stops or not rests, f"a path at rest: {about}")
+        _hold(driven.stops == (not len(route.path.cells)), f"another path than driven: {about}")
+        if not driven.stops:
+            _hold(driven.revision == route.revision, f"{route.revision} is driven, {about}")
+            self.counts["turns with a path in force"] += 1
+        self.counts["turns at rest"] += rests
+
+    def _send_path(self) -> None:
+        self._driven = self._paths.send(lambda path: True) or self._driven
 
     def _plan(self, request: PlanRequest) -> PlanReady:
         """Plan for a counted number of questions, so that the same events lead to the same path."""
@@ -299,11 +329,13 @@ class MissionTrial:
     def _check_lattice(self) -> None:
         """Check that the lattice is, bit for bit, the one that the newest map has."""
         mission, order = self._mission, self._mission.order_state.order
-        if mission.grid is None or mission.lattice is None or (order and order.keep_out):
+        keeps_out = (order and order.keep_out) or self._config.policy.keep_out
+        grid = mission._map.grid
+        if grid is None or mission.lattice is None or keeps_out:
             return
-        fresh = Ground(self._config)
-        fresh.begin(mission.grid)
-        geometry = mission.grid.geometry
+        fresh = Ground(mission.rotation.config(self._config))
+        fresh.begin(grid)
+        geometry = grid.geometry
         for name in ("window", "states", "steps"):
             now, anew = getattr(mission.lattice, name), getattr(fresh.lattice, name)
             _hold(np.array_equal(now, anew), f"{name} over {geometry}")
@@ -331,7 +363,8 @@ class MissionTrial:
         assert floor is not None
         _hold(bool(np.isfinite(xy).all()), "a line that leads nowhere")
         radius = floor.discs.radius_m / floor.geometry.resolution - NEAR_PX
-        points = [map_to_raster(floor.geometry, x, y) for x, y in xy.tolist()]
+        laid = rotated_points(xy, -self._mission.rotation.deg)
+        points = [map_to_raster(floor.geometry, x, y) for x, y in laid.tolist()]
         # On its way to the line it may stand anywhere: too near to a wall, say.
         for start, end in pairwise(points[1:]):
             _hold(bool(is_clear(floor.blocked, *start, *end, radius)), f"a wall at {start}, {end}")

@@ -11,6 +11,7 @@ import pytest
 
 from fasaco_edge.mission.map.reachable_area import ReachableArea
 from fasaco_edge.wire.messages.paths import encode_path
+from tests.campaigns.path_in_force import PathInForce
 from tests.campaigns.semantic_fuzz import (
     Findings,
     fuzz_daemon,
@@ -119,3 +120,35 @@ def test_a_path_is_judged_on_the_map_it_names(xy, holds):
         return
     with pytest.raises(BrokenPromiseError):
         judge.see_path(payload, about)
+
+
+def status(state, path=None, stand="plans"):
+    return {
+        "state": state,
+        "reason": "so",
+        "claim": {"id": "a1", "stand": stand},
+        "path": None if path is None else {"revision": path},
+    }
+
+
+@pytest.mark.parametrize(
+    ("path", "said", "holds"),
+    [
+        ((5, 2), status("blocked", 2), False),
+        ((5, 2), status("covering", 3), False),
+        ((5, 2), status("loading"), False),
+        ((5, 2), status("covering", 2), True),
+        ((0, 3), status("blocked", 3), True),
+        ((0, 0), status("waiting for map"), True),
+        ((5, 2), status("blocked", stand="waits"), True),
+    ],
+    ids=["rests", "another path", "no mission", "drives", "stopped", "begins", "another daemon"],
+)
+def test_a_path_is_judged_by_the_planners_state(path, said, holds):
+    judge = PathInForce()
+    judge.see_path(*path)
+    assert judge.why_broken(said, 1.0) == ""
+    assert bool(judge.why_broken(said, 2.0)) is not holds
+    # The path may be a moment late.
+    judge.see_path(0, path[1] + 1)
+    assert judge.why_broken(status("blocked", path[1] + 1), 3.0) == ""
