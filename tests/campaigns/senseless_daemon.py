@@ -11,6 +11,7 @@ import json
 import re
 import shutil
 import signal
+import tempfile
 import time
 from collections import Counter, OrderedDict, deque
 from contextlib import ExitStack, suppress
@@ -510,11 +511,11 @@ class Campaign:
 
     def _rival(self, event: Event) -> None:
         """Let another daemon of this name come, take over from a frozen one if so, and go."""
-        folder = self._folder / f"rival{self.counts['rival']}"
-        folder.mkdir()
+        folder = Path(tempfile.mkdtemp(dir=self._folder))
         bus = {"mode": "client", "listen": [], "connect": [self._endpoint]}
         settings = {"robot": self._robot, "map": self.judge.configs[-1]["map"]}
         with daemon_process(folder, bus=bus, **settings, planner={"line": self._line}) as rival:
+            self._wait("the other one is there", lambda: "ready after" in rival.log_text())
             time.sleep(event["s"])
             if event["takes_over"]:
                 self._freeze(LEASE_S + 2.0)

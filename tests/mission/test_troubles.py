@@ -171,10 +171,25 @@ def test_a_robot_that_does_not_drive_its_path_is_told_and_gets_it_again():
     again = [path for path in got if path is not None]
     assert [path.reason for path in again] == ["robot stands"] * 2
     assert drive.mission.state is State.DEGRADED
-    assert drive.mission.reason == "the robot stands: it got the same path 3 times"
+    assert drive.mission.reason == "the robot stands: it got a path 3 times"
     drive.go()
     assert drive.mission.state is State.COVERING
     drive.finish()
+
+
+def test_a_robot_that_stands_is_reported_though_each_map_leads_to_another_path():
+    """As with furniture that flickers far from it: no path makes it drive."""
+    drive, far = driving(*ROOM, config=CONFIG), (3, 11)
+    for tick in range(70):
+        flickering = patch("#."[tick % 2], at=far)
+        drive.tell(flickering, pose_at(*drive.cell), after=1.0)
+        if drive.request is not None:
+            drive.plan()
+    assert len(drive.updates) > 30
+    assert drive.mission.state is State.DEGRADED
+    assert drive.mission.reason.startswith("the robot stands")
+    drive.go()
+    assert drive.mission.state is State.COVERING
 
 
 def test_a_robot_that_stood_is_not_told_of_with_another_order():
@@ -195,7 +210,7 @@ def test_a_robot_that_does_not_drive_home_is_told():
         drive.tell(pose_at(*drive.cell), after=1.0)
     assert (drive.mission.state, drive.mission.reason) == (
         "degraded",
-        "the robot stands: it got the same path 3 times",
+        "the robot stands: it got a path 3 times",
     )
     while drive.walk:
         assert drive.go() is not None

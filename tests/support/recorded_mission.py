@@ -215,8 +215,11 @@ class MappingRobot:
         return self._world.track
 
     def _take_path(self, sample: Sample) -> None:
-        self.notes.append((time.monotonic(), decode_json(sample.attachment)))
-        self._newest_path.put(sample)
+        note = decode_json(sample.attachment)
+        # The empty path with which the daemon begins is none of its mission's.
+        if note["revision"]:
+            self.notes.append((time.monotonic(), note))
+            self._newest_path.put(sample)
 
     def _hear(self, sample: Sample) -> None:
         self.status = decode_json(sample.payload)

@@ -38,6 +38,7 @@ class Route(PlanRequests):
         unchanged, outdated: count the plans that were not published because they equal the current
             path, or because they no longer hold.
         published_at: when a path was last published or confirmed by a plan.
+        begun_at: when there was something to drive again, after a path without.
         beside: other robots that the path's line keeps clear of, float64 (k, 3): x, y, least
             distance [m]; where it begins nearer to one, it comes no nearer. None for any line.
     """
@@ -60,7 +61,7 @@ class Route(PlanRequests):
         self._numberings = self._walks = self._searched = 0
         self._changed_at = 0.0
         self.unchanged = self.outdated = 0
-        self.published_at = 0.0
+        self.published_at = self.begun_at = 0.0
         self.beside: NDArray[np.float64] | None = None
         self._map = map_state
         self._orders = orders
@@ -276,6 +277,8 @@ class Route(PlanRequests):
         self._numberings += 1
         self._walks += not np.array_equal(cells, self.path.ahead)
         self.published_at = now
+        if len(self.path.ahead) < 2:
+            self.begun_at = now
         self.path, self._kept = PathProgress(cells), PathProgress(NO_CELLS)
         self._end_yaw, self.beside = end_yaw, beside
         plan, seconds = (ready.path, ready.seconds) if ready else (None, 0.0)

@@ -1,4 +1,8 @@
-"""Standing: since when the robot is in its cell, in one place, and has its path. Times are [s]."""
+"""Standing: how long the robot has been in its cell, and in one place with a path to drive.
+
+Another path does not make a robot that stands drive: only a move, or a time without any path,
+begins the count anew. Times are [s].
+"""
 
 from __future__ import annotations
 
@@ -31,12 +35,12 @@ class Standing:
         self._now = 0.0
         self._cell: Cell | None = None
         self._entered_at = 0.0
-        # The robot's position, to STANDING_M, and since when it has had its path there: by our
-        # clock, and by the robot's [ns].
+        # The robot's position, to STANDING_M, and since when it has had a path there, or was last
+        # given it again: by our clock, and by the robot's [ns].
         self._place = math.inf, math.inf
         self._since = 0.0, 0
-        # How often it has had the same path again in that place, and where that ends.
-        self._tries, self._again_to = 0, self._end()
+        # How often it was given its path again in that place.
+        self._tries = 0
 
     def look(self, cell: Cell, now: float) -> None:
         """Note the robot's cell, and its place."""
@@ -69,47 +73,47 @@ class Standing:
         """Whether the robot stands in another cell than its index on the path."""
         ahead = self._route.path.ahead
         is_beside = len(ahead) > 1 and self._cell != tuple(ahead[0].tolist())
-        return is_beside and self._in_place_s() >= BESIDE_S
+        has_path_s = self._now - self._route.published_at
+        return is_beside and has_path_s >= BESIDE_S and self._in_place_s() >= BESIDE_S
 
     @property
     def is_on_path(self) -> bool:
         """Whether the robot has stood in one place for long, with a path to drive."""
-        stood_s = self._in_place_s()
-        return len(self._route.path.ahead) > 1 and stood_s >= STANDING_S
+        return self._has_path and self._in_place_s() >= STANDING_S
 
     def note_again(self) -> None:
         """Note that the robot gets the path that it stands on again."""
-        end = self._end()
-        self._tries, self._again_to = (self._tries + 1 if end == self._again_to else 1), end
+        assert self._map.pose is not None
+        self._tries += 1
+        self._since = self._now, self._map.pose.stamp_ns
 
     @property
     def why_stuck(self) -> str:
         """Why the robot is thought to be unable to drive its path; "" if it is not."""
-        stamped, end = self._map.pose, self._end()
-        if stamped is None or end is None or end != self._again_to or self._tries < TRIES:
+        stamped = self._map.pose
+        if stamped is None or not self._has_path or self._tries < TRIES:
             return ""
         if math.dist((stamped.pose.x, stamped.pose.y), self._place) > STANDING_M:
             return ""
-        return f"the robot stands: it got the same path {self._tries + 1} times"
+        return f"the robot stands: it got a path {self._tries + 1} times"
 
-    def _end(self) -> Cell | None:
-        """Return the last cell of the path; None where there is nothing to drive."""
-        ahead = self._route.path.ahead
-        return (int(ahead[-1, 0]), int(ahead[-1, 1])) if len(ahead) > 1 else None
+    @property
+    def _has_path(self) -> bool:
+        """Whether there is something to drive."""
+        return len(self._route.path.ahead) > 1
 
     def _note_place(self) -> None:
-        """Note the robot's place, and whether it has had another path since."""
+        """Note the robot's place, and whether it has a path to drive."""
         assert self._map.pose is not None
-        stamped, published_at = self._map.pose, self._route.published_at
+        stamped = self._map.pose
         here = stamped.pose.x, stamped.pose.y
         if math.dist(here, self._place) > STANDING_M:
-            self._place, self._since = here, (self._now, stamped.stamp_ns)
-            self._tries = 0
-        elif published_at > self._since[0]:
-            self._since = published_at, stamped.stamp_ns
+            self._place, self._since, self._tries = here, (self._now, stamped.stamp_ns), 0
+        elif (begun_at := self._route.begun_at) > self._since[0]:
+            self._since, self._tries = (begun_at, stamped.stamp_ns), 0
 
     def _in_place_s(self) -> float:
-        """Return how long the robot has stood in one place with its present path.
+        """Return how long the robot has stood in one place with a path to drive.
 
         By our clock or the robot's, whichever says longer: stamps may stand still.
         """
