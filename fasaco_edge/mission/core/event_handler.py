@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
+from functools import partial
 
 from fasaco_edge.errors import CommandError, FasacoError, LedgerMismatchError
-from fasaco_edge.grid.geometry import Polygon, StampedPose
+from fasaco_edge.grid.geometry import Polygon, Pose2D, StampedPose
 from fasaco_edge.mission.config import MissionPolicy
 from fasaco_edge.mission.core.charging import BatteryGauge
 from fasaco_edge.mission.core.events import (
@@ -75,18 +76,25 @@ class EventHandler:
         """
         self._now, self._path, self._is_forgotten = now, None, False
         self._faults, self._answers = [], []
+        stood = bool(self.map.building.why)
         for event in in_runs(events):
-            try:
-                self._apply(event)
-            except FasacoError as error:
-                # Its traceback would hold the map until garbage is collected.
-                self._faults.append(error.with_traceback(None))
+            self._attempt(partial(self._apply, event))
+        self._attempt(self._look_for_another_building)
+        if stood and not self.map.building.why:
+            self.route.want("the map shows the building of the ledger again")
         return Decision(
             path=self._path,
             faults=tuple(self._faults),
             answers=tuple(self._answers),
             forgotten=self._is_forgotten,
         )
+
+    def _attempt(self, change: Callable[[], None]) -> None:
+        try:
+            change()
+        except FasacoError as error:
+            # Its traceback would hold the map until garbage is collected.
+            self._faults.append(error.with_traceback(None))
 
     def begin_order(self, order: OrderState) -> None:
         """Begin another order, or none; ``update_area`` must be called next."""
@@ -145,17 +153,37 @@ class EventHandler:
         self.monitor.note_map(self._now)
         self.line.note_map()
         self.route.forget_failure()
-        if self.map.has_moved and self.map.pose is not None:
-            self.ledger.note_map_motion(self.map.pose.pose)
+        before = self._compare_buildings()
+        if before is not None and (self.map.has_moved or self.map.building.is_foreign):
+            self.ledger.note_map_motion(before)
             self.trail.note_map_motion()
             self.route.note_map_motion()
         else:
             self._record()  # the pose may have come before the map
         self._go_on(self.ledger.check(self.map.free, self.map.grid.frame))
 
+    def _compare_buildings(self) -> Pose2D | None:
+        """Compare the newest map with those before; return the robot's pose on these."""
+        if self.map.plain is None or self.map.free is None:
+            return None
+        pose = None if self.map.pose is None else self.map.pose.pose
+        contradicts = partial(self.ledger.contradicts, self.map.free)
+        return self.map.building.note_map(self.map.plain, pose, self._now, contradicts)
+
+    def _look_for_another_building(self) -> None:
+        """Raise LedgerMismatchError once the map has shown another building for long enough."""
+        if self.map.grid is None or not self.map.building.look(self._now):
+            return
+        misfit = self.ledger.begin_elsewhere(self.map.grid.frame)
+        self.map.building.accept(self._now)
+        self.fleet.others.ground.clear()
+        self._record()
+        self._go_on(misfit)
+
     def _go_on(self, misfit: LedgerMismatchError | None) -> None:
         """Update the reachable area; start over if the ledger belongs to another place."""
         if misfit is not None:
+            self._path = self.route.stop(str(misfit), self._now) or self._path
             self.trail.begin_anew()
             self.begin_order(self.orders.order_state.in_other_building(str(misfit)))
         self.update_area()
@@ -179,6 +207,7 @@ class EventHandler:
         self._leave_map(f"map and poses are in frame {frame!r} now")
         self.monitor.note_map(self._now)
         self.line.note_map()
+        self._compare_buildings()
         if misfit is not None:
             self._record()
         self._go_on(misfit)
@@ -193,23 +222,31 @@ class EventHandler:
     def _take_pose(self, stamped: StampedPose) -> None:
         if self.map.frames.note_pose(stamped, self._now):
             self._enter_frame(stamped.frame)
+        before = self.map.pose
         self.map.take_pose(stamped)
         has_jumped = self.monitor.note_pose(stamped.pose, self._now)
         if has_jumped:
             self.ledger.break_track()
             self.drive.break_track()
+            if before is not None:
+                self.map.building.note_jump(before.pose, stamped.pose, self._now)
         self.drive.note(stamped)
-        motion = self.ledger.map_motion(stamped.pose)
-        self.trail.note_motion(motion)
-        uncertain = self.ledger.forget_uncertain(stamped.pose)
-        self._record()
+        motion, uncertain = None, 0
+        # On the map of another building neither the pose nor the floor under it says anything.
+        is_known = self.map.building.note_pose(stamped.pose, self._now)
+        if is_known:
+            motion = self.ledger.map_motion(stamped.pose)
+            self.trail.note_motion(motion)
+            uncertain = self.ledger.forget_uncertain(stamped.pose)
+            self._record()
         self.line.note_pose(stamped.pose)
         cell = self.map.robot_cell()
         if cell is None:
             return
         if has_jumped or self.map.area is None or not self.map.area.contains(cell):
             self.update_area()
-        self._path = self.route.note_motion(motion, self._now) or self._path
+        if is_known:
+            self._path = self.route.note_motion(motion, self._now) or self._path
         if uncertain:
             self.route.want(f"map and pose moved: {uncertain} cells to be covered again")
         self.orders.note_cell(cell)
@@ -274,6 +311,8 @@ class EventHandler:
             self.line.note_map()
         self.ledger.reset(self.map.frames.active)
         self.trail.begin_anew()
+        self.map.building.begin_anew()
+        self._compare_buildings()
         self.route.forget_failure()
         self._record()
 

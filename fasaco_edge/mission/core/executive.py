@@ -146,7 +146,8 @@ class Executive:
         way.look_around(self._now)
         is_going = (order.order is not None or order.errand) and not order.paused
         is_docked = order.errand == "charge" and self._why_in_dock() is not None
-        may_drive = not self.monitor.trouble(self._now) and not self._why_no_mask()
+        lacks_map = self.map.building.why or self._why_no_mask()
+        may_drive = not self.monitor.trouble(self._now) and not lacks_map
         if not (is_going and self.fleet.members and may_drive) or is_docked:
             way.end()
             return None
@@ -170,8 +171,9 @@ class Executive:
     def _why_resting(self) -> tuple[State, str] | None:
         """Return state and reason where there is nothing to decide; else None."""
         order = self.orders.order_state
-        if order.paused:
-            return State.PAUSED, order.why_paused
+        doubt = self.map.building.why if order.order is not None or order.errand else ""
+        if order.paused or doubt:
+            return (State.PAUSED, order.why_paused) if order.paused else (State.BLOCKED, doubt)
         if order.errand == "charge" and (docked := self._why_in_dock()):
             return docked
         if not order.errand and not order.is_open:

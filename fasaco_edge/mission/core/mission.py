@@ -159,7 +159,9 @@ class Mission:
         """Rotate the lattice to the walls once these are certain; return the combined decision."""
         self._angle.note_faults(happened.faults)
         # A path kept for an errand is given in present cells.
-        if self._angle.is_settled or self.order_state.errand:
+        # A building that is in doubt may soon be another.
+        is_doubtful = self._map.building.is_foreign or self._map.building.why
+        if self._angle.is_settled or self.order_state.errand or is_doubtful:
             return happened
         pose, grid = self.pose, self.grid
         if pose is None or grid is None or not self._angle.rotates_to_walls(grid, pose):
@@ -179,7 +181,7 @@ class Mission:
     def _rotate_lattice(self, why: str, now: float) -> PathUpdate | None:
         """Continue on a lattice at the new angle; return the path that stops the robot, if any."""
         before, order, route = self.snapshot(), self.order_state, self.route
-        is_confirmed = self._ledger.is_confirmed
+        is_confirmed = self._ledger.is_confirmed and not self._map.building.is_foreign
         held: list[Event] = [MapReceived(self.grid)] if self.grid is not None else []
         held += [PoseReceived(self.pose)] if self.pose is not None else []
         # No path may be driven that is no longer checked.

@@ -1,7 +1,8 @@
 """Mission ledger: the covered cells and swept floor, while no map contradicts them.
 
 A ledger from before a restart may belong to another building than the map now shows (``fit``).
-Until a map knows enough to decide, the ledger holds, and the next map is compared.
+Until a map knows enough to decide, the ledger holds, and the next map is compared. From then on
+each map is compared with the building before (``map.building_watch``).
 """
 
 from __future__ import annotations
@@ -35,6 +36,9 @@ from fasaco_edge.mission.coverage.swept_floor import (
 )
 from fasaco_edge.mission.fleet.shared import SharedProgress
 from fasaco_edge.mission.map.loop_closure import Motion, certain_floor, uncertain_cells
+
+# Share of blocked among the known covered cells that no furniture blocks from one map to the next.
+MANY_AT_ONCE = 0.2
 
 PlaceOf = Callable[[Cell], Point | None]
 
@@ -257,14 +261,30 @@ class MissionLedger:
         if verdict is Verdict.OPEN:
             return None
         self._resumed = None
-        if verdict is Verdict.SAME:
-            return None
+        return None if verdict is Verdict.SAME else self._leave_building(before.cells, since, frame)
+
+    def contradicts(self, lattice: CoverageLattice) -> bool:
+        """Tell whether so many covered cells are blocked on a map that it is of another building.
+
+        For a map whose walls are not those before: new furniture alone would block fewer.
+        """
+        fit = Fit.of(self.current.snapshot(), lattice)
+        return fit.verdict is Verdict.OTHER and fit.blocked >= MANY_AT_ONCE * fit.known
+
+    def begin_elsewhere(self, frame: str) -> LedgerMismatchError:
+        """Start over in another building, whose map is in ``frame``; return what to report."""
+        cells = self.current.snapshot().cells
+        self._resumed = self._pose_before_motion = None
+        self.passed.clear()
+        return self._leave_building(cells, self._nothing(""), frame)
+
+    def _leave_building(self, cells: int, since: _Covered, frame: str) -> LedgerMismatchError:
         self._covered = since
         self.shared.clear()
         self.shared.note_forgotten()
         self.current.move_to(frame)
         return self._begun_anew(
-            f"the ledger of {before.cells} covered cells is of another building than the map"
+            f"the ledger of {cells} covered cells is of another building than the map"
         )
 
     def _replace(self, covered: _Covered) -> None:

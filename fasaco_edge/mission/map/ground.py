@@ -25,6 +25,7 @@ class Ground:
     """Lattices and floor, updated with each map.
 
     Attributes:
+        plain: the lattice of cell centres, without keep-out zones.
         free: the lattice without keep-out zones.
         lattice: the lattice with the cells of keep-out zones removed.
         change: change from the previous ``lattice``; None before there is one.
@@ -40,8 +41,7 @@ class Ground:
         self.free_floor: FloorMap | None = None
         self._config = config
         self._keep_out: tuple[Polygon, ...] = ()
-        # The lattice of cell centres.
-        self._plain: CoverageLattice | None = None
+        self.plain: CoverageLattice | None = None
 
     def begin(self, grid: OccupancyGrid) -> LatticeChange:
         """Take the first map; return its lattice of cell centres.
@@ -51,7 +51,7 @@ class Ground:
         """
         change = LatticeChange.first(grid, self._config.footprint, self._config.max_lattice_cells)
         free_floor = self._floor_of(grid, change.after)
-        self._plain, self.free_floor = change.after, free_floor
+        self.plain, self.free_floor = change.after, free_floor
         self._set_free(change if free_floor is None else None, grid)
         return change
 
@@ -65,16 +65,16 @@ class Ground:
         Raises:
             MapTooLarge, MapTooFar: see there.
         """
-        assert self._plain is not None
+        assert self.plain is not None
         footprint, most = self._config.footprint, self._config.max_lattice_cells
-        plain = LatticeChange.between(maps, self._plain, footprint, most, within)
+        plain = LatticeChange.between(maps, self.plain, footprint, most, within)
         if self.free_floor is None:
-            self._plain = plain.after
+            self.plain = plain.after
             if plain.after is not self.free:
                 self._set_free(plain, maps[1])
             return plain
         change = self.free_floor.change(maps, plain.after, within)
-        self._plain, self.free = plain.after, change.after
+        self.plain, self.free = plain.after, change.after
         if self.floor is not self.free_floor and self.floor is not None:
             change = self.floor.change(maps, plain.after, within)
         if change.after is not self.lattice:
@@ -95,7 +95,7 @@ class Ground:
         Returns:
             bool (rows, cols); None where cells are counted, or for another window.
         """
-        plain = self._plain
+        plain = self.plain
         if self.floor is None or plain is None or plain.window != window:
             return None
         decided: NDArray[np.bool_] = plain.states != UNKNOWN
@@ -126,15 +126,15 @@ class Ground:
         """
         before, free = self.lattice, self.free_floor
         if free is None:
-            assert self._plain is not None
-            self.free, self.lattice = self._plain, self._without_kept_out(self._plain)
+            assert self.plain is not None
+            self.free, self.lattice = self.plain, self._without_kept_out(self.plain)
             if change is not None:
                 self.change = LatticeChange(before, self.lattice, change.cells)
             return
         self.floor = free
         if self._keep_out:
-            assert self._plain is not None
-            self.floor = free.keeping_out(self._keep_out, grid, self._plain)
+            assert self.plain is not None
+            self.floor = free.keeping_out(self._keep_out, grid, self.plain)
         self.free, self.lattice = free.stands.lattice, self.floor.stands.lattice
 
     def _floor_of(self, grid: OccupancyGrid, plain: CoverageLattice) -> FloorMap | None:

@@ -25,6 +25,7 @@ from fasaco_edge.grid.rotation import rotated_geometry
 from fasaco_edge.mission.config import MissionConfig
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
 from fasaco_edge.mission.coverage.progress import Coverage, FreeArea
+from fasaco_edge.mission.map.building_watch import BuildingWatch
 from fasaco_edge.mission.map.ground import Ground
 from fasaco_edge.mission.map.inputs import FrameSelector
 from fasaco_edge.mission.map.loop_closure import has_moved
@@ -47,6 +48,7 @@ class MapState:
         area: the reachable area as of the last ``update_area``; None while the robot's pose is on
             no coverable cell.
         frames: selects the active frame; keeps the inputs of another.
+        building: whether the newest map still shows the same building.
         path_cell: the robot's cell by its place on the line; None off the line.
     """
 
@@ -57,6 +59,7 @@ class MapState:
         self.area: ReachableArea | None = None
         self.has_moved = False
         self.frames = FrameSelector()
+        self.building = BuildingWatch()
         self._config = config
         self.path_cell: Cell | None = None
         self._ground = Ground(config)
@@ -124,6 +127,7 @@ class MapState:
     def _take_map(self, grid: OccupancyGrid, within: Window | None = None) -> None:
         if self.grid is None or self.grid.frame != grid.frame:
             change = self._ground.begin(grid)
+            self.building.begin_anew()
             self.area = None
         else:
             change = self._ground.follow((self.grid, grid), within)
@@ -136,6 +140,11 @@ class MapState:
     def keep_out(self, polygons: tuple[Polygon, ...]) -> None:
         """Replace the keep-out polygons (x, y) [m]."""
         self._ground.keep_out(polygons, self.grid)
+
+    @property
+    def plain(self) -> CoverageLattice | None:
+        """The lattice of cell centres, without keep-out zones; None before there is a map."""
+        return self._ground.plain
 
     @property
     def free(self) -> CoverageLattice | None:

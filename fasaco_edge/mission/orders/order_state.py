@@ -171,7 +171,10 @@ class OrderState:
         """Return the state in another building, where its zones are invalid."""
         if self.automatic:
             return replace(OrderState.autostart(), paused=self.paused)
-        return self if self.order is None else OrderState.idle(f"{why}: the order was dropped")
+        if self.order is not None:
+            return OrderState.idle(f"{why}: the order was dropped")
+        # It led to a place that lies in the building before.
+        return replace(self, home=None, errand="", paused=self.paused and not self.errand)
 
     def in_other_frame(self, why: str) -> OrderState:
         """Return the state in another frame, before anything was covered.

@@ -1,0 +1,261 @@
+"""Building watch: whether the newest map still shows the building that the ledger was swept in.
+
+Another floor, a saved map of another building or a map laid the other way round may come in the
+frame of the map before. Then walls and floor of the cells that both maps know agree no better than
+by chance: Cohen's kappa of blocked and free, 1 for equal maps, is about 0. After a loop closure
+they agree once the map before is moved as the robot's pose has moved. Where neither is so, the
+robot stands, and a map that stays like that for a while is another building's. A mapper that shows
+two buildings in turn decides nothing: the robot stands until one of them stays.
+
+A map is compared with one of some seconds before (the reference), not with the last: a map sent in
+parts, or one of a mapper that begins anew and shows next to nothing at first, is another one, too.
+
+Measured on 5 buildings, cells of 0.3 m: the highest kappa of two buildings is 0.22, of the first
+2 m that a scanner sees in another one 0.35; the lowest in one building 0.59 for maps 0.3 m apart,
+0.32 for 0.6 m, 0.67 and 0.34 with furniture moved from and to 10 and 30 % of the coverable cells.
+Floors whose walls are alike are one building to this watch: they need frames of their own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+
+from fasaco_edge.grid.geometry import Pose2D
+from fasaco_edge.grid.lattice import BLOCKED, UNKNOWN, CoverageLattice
+from fasaco_edge.mission.map.loop_closure import LEAST_CELLS, Motion
+
+# Share of the cells known to both maps that differ: below, maps are taken for alike.
+LEAST_SHARE = 0.05
+# Kappa below which two maps show different buildings; above ALIKE they show the same one, whatever
+# covered cells are blocked.
+FOREIGN, ALIKE = 0.3, 0.7
+# By how much the kappa of maps has to rise with a motion of the map that explains their difference.
+BETTER = 0.1
+# Most cells compared under a motion.
+MOST_CELLS = 20_000
+# How long after the map the pose that shows its motion may come, before the robot stops [s].
+GRACE_S = 0.5
+# How long a map has to show another building, or again the one before, to be believed [s]; the
+# first doubles with each change of building within SOON_S, at most LONGEST-fold.
+PATIENCE_S, SETTLED_S, SOON_S, LONGEST = 5.0, 5.0, 600.0, 16
+# Age at which the reference is replaced [s], by a map that knows at least this share of its cells.
+AGE_S, KNOWN_SHARE = 10.0, 0.5
+# A pose that jumped this long before the map has moved with it [s].
+JUMP_S = 6.0
+
+
+@dataclass(frozen=True, slots=True)
+class Agreement:
+    """Counts of the cells that two maps know.
+
+    Attributes:
+        known: number of cells known to both.
+        blocked: number of those that are blocked on the first and on the second.
+        both: number of those that are blocked on both.
+    """
+
+    known: int
+    blocked: tuple[int, int]
+    both: int
+
+    @classmethod
+    def of(cls, before: CoverageLattice, after: CoverageLattice) -> Self:
+        """Compare two lattices cell by cell."""
+        common = before.window.intersection(after.window)
+        if common is None:
+            return cls(0, (0, 0), 0)
+        then = before.states[common.slices_in(before.window)]
+        now = after.states[common.slices_in(after.window)]
+        is_known = (then != UNKNOWN) & (now != UNKNOWN)
+        was_blocked, is_blocked = is_known & (then == BLOCKED), is_known & (now == BLOCKED)
+        return cls(
+            int(np.count_nonzero(is_known)),
+            (int(np.count_nonzero(was_blocked)), int(np.count_nonzero(is_blocked))),
+            int(np.count_nonzero(was_blocked & is_blocked)),
+        )
+
+    @classmethod
+    def moved(cls, before: CoverageLattice, after: CoverageLattice, motion: Motion) -> Self:
+        """Compare two lattices, the first one moved with the map; large ones by a sample."""
+        places = np.flatnonzero(after.states != UNKNOWN)
+        stride = 1 + len(places) // MOST_CELLS
+        places = places[::stride]
+        rows, cols = np.divmod(places, max(after.window.cols, 1))
+        y, x = (
+            (cells + first + 0.5) * after.cell_m
+            for cells, first in ((rows, after.window.row0), (cols, after.window.col0))
+        )
+        x, y = motion.back(1.0, x, y)
+        cells = np.floor(np.stack((y, x), axis=1) / before.cell_m).astype(np.int32)
+        then = before.window.values_at(before.states, cells, UNKNOWN)
+        is_known = then != UNKNOWN
+        was_blocked = then[is_known] == BLOCKED
+        is_blocked = after.states.ravel()[places][is_known] == BLOCKED
+        first, second, both = (
+            stride * int(np.count_nonzero(blocked))
+            for blocked in (was_blocked, is_blocked, was_blocked & is_blocked)
+        )
+        return cls(stride * len(was_blocked), (first, second), both)
+
+    @property
+    def changed(self) -> int:
+        """Number of cells that are blocked on one of the maps and free on the other."""
+        return sum(self.blocked) - 2 * self.both
+
+    @property
+    def is_close(self) -> bool:
+        """Whether too few cells differ to say anything."""
+        return self.changed < max(LEAST_CELLS, LEAST_SHARE * self.known)
+
+    @property
+    def kappa(self) -> float:
+        """Cohen's kappa: 1 for equal maps, 0 for maps as alike as by chance."""
+        if not self.known:
+            return 1.0
+        first, second = (count / self.known for count in self.blocked)
+        by_chance = first * second + (1.0 - first) * (1.0 - second)
+        alike = 1.0 - self.changed / self.known
+        return 1.0 if by_chance >= 1.0 else (alike - by_chance) / (1.0 - by_chance)
+
+
+class BuildingWatch:
+    """Compares each map with the building before. All times are [s]; lattices of cell centres.
+
+    Attributes:
+        why: why the robot has to stand; "" if it need not.
+    """
+
+    def __init__(self) -> None:
+        self.why = ""
+        self._reference: CoverageLattice | None = None
+        self._reference_at = 0.0
+        self._newest: CoverageLattice | None = None
+        # Since when all maps disagree with the reference, how the first one does, and the pose by
+        # then; None while the newest agrees.
+        self._foreign: tuple[float, Agreement, Pose2D | None] | None = None
+        self._agreed_at = 0.0
+        # Changes of building, and the last one.
+        self._changes, self._changed_at = 0, float("-inf")
+        # The last jump of the pose, and when.
+        self._jump: tuple[Motion, float] | None = None
+
+    @property
+    def is_foreign(self) -> bool:
+        """Whether the newest map shows another building, as far as the pose has said."""
+        return self._foreign is not None
+
+    def begin_anew(self) -> None:
+        """Take the next map as the first one."""
+        self.why, self._reference, self._newest = "", None, None
+        self._foreign = self._jump = None
+
+    def accept(self, now: float) -> None:
+        """Take the newest map's building for the one that the robot is in from now on."""
+        self._changes = 1 + (self._changes if now - self._changed_at < SOON_S else 0)
+        self._changed_at = now
+        self._end(now)
+        self.why = ""
+
+    def note_jump(self, start: Pose2D, end: Pose2D, now: float) -> None:
+        """Note that the pose has jumped: a map that has moved with it may still come."""
+        self._jump = Motion(start, end), now
+
+    def note_map(
+        self,
+        lattice: CoverageLattice,
+        pose: Pose2D | None,
+        now: float,
+        contradicts: Callable[[], bool],
+    ) -> Pose2D | None:
+        """Compare a map with the building before.
+
+        Args:
+            lattice: cell centres of the map.
+            pose: the robot's, on the map before.
+            now: time.
+            contradicts: whether the covered cells speak against the map; asked where its walls
+                leave that open.
+
+        Returns:
+            The robot's pose on the map before, which differs from ``pose`` if that moved first.
+        """
+        self._newest, before = lattice, self._reference
+        if before is None:
+            self._reference, self._reference_at, self._agreed_at = lattice, now, now
+            return pose
+        seen = Agreement.of(before, lattice)
+        is_alike = seen.is_close or seen.kappa >= ALIKE
+        if is_alike or not (seen.kappa < FOREIGN or contradicts()):
+            self._agree(lattice, now)
+            return pose
+        jump, self._jump = self._jump, None
+        is_recent = jump is not None and now - jump[1] <= JUMP_S
+        if jump is not None and is_recent and pose is not None and self._explains(jump[0], seen):
+            self._end(now)
+            return _before(jump[0], pose)
+        if self._foreign is None:
+            self._foreign = now, seen, pose
+        return pose
+
+    def note_pose(self, pose: Pose2D, now: float) -> bool:
+        """Note a pose; return whether it explains the newest map, as after a loop closure."""
+        if self._foreign is None:
+            return True
+        _, seen, before = self._foreign
+        if before is None or not self._explains(Motion(before, pose), seen):
+            return False
+        self._end(now)
+        self.why = ""
+        return True
+
+    def look(self, now: float) -> bool:
+        """Update ``why``; return whether the map has shown another building for long enough."""
+        if self._foreign is None:
+            if now - self._agreed_at >= SETTLED_S:
+                self.why = ""
+            return False
+        for_s = now - self._foreign[0]
+        is_soon = now - self._changed_at < SOON_S
+        patience_s = PATIENCE_S * min(2**self._changes, LONGEST) if is_soon else PATIENCE_S
+        if for_s >= GRACE_S:
+            self.why = (
+                "the map shows another building, or another floor, and the pose has not moved "
+                f"with it: waits until the map has stayed so for {patience_s:g} s, or has shown "
+                f"the one before for {SETTLED_S:g} s"
+            )
+        return for_s >= patience_s
+
+    def _explains(self, motion: Motion, seen: Agreement) -> bool:
+        """Tell whether the newest map is that of the building before, moved like this."""
+        if motion.is_still or self._reference is None or self._newest is None:
+            return False
+        moved = Agreement.moved(self._reference, self._newest, motion)
+        is_known = moved.known >= KNOWN_SHARE * seen.known
+        return is_known and moved.kappa >= max(FOREIGN, seen.kappa + BETTER)
+
+    def _agree(self, lattice: CoverageLattice, now: float) -> None:
+        assert self._reference is not None
+        if self._foreign is not None:
+            self._foreign, self._agreed_at = None, now
+        if now - self._reference_at < AGE_S or self.why:
+            return
+        known, before = (
+            int(np.count_nonzero(one.states != UNKNOWN)) for one in (lattice, self._reference)
+        )
+        if known >= KNOWN_SHARE * before:
+            self._reference, self._reference_at = lattice, now
+
+    def _end(self, now: float) -> None:
+        """Take the newest map as the reference."""
+        self._reference, self._reference_at, self._agreed_at = self._newest, now, now
+        self._foreign = self._jump = None
+
+
+def _before(motion: Motion, pose: Pose2D) -> Pose2D:
+    """Return where a pose was before a motion of the map."""
+    (x,), (y,) = motion.back(1.0, np.array([pose.x]), np.array([pose.y]))
+    return Pose2D(float(x), float(y), pose.yaw - motion.end.yaw + motion.start.yaw)
