@@ -252,6 +252,16 @@ class LedgerMismatchError(FasacoError):
     hint = "it was renamed and a new one started; nothing has to be done to continue"
 
 
+class PlacesElsewhere(FasacoError):
+    """Zones, keep-out zones, home or dock of the configuration belong to another map."""
+
+    code = "places_elsewhere"
+    hint = (
+        "they are not used here: go back to their map; or give those of this one, its frame as "
+        "mission.map_frame, and reload; or `mission reset`, after which they count on this map"
+    )
+
+
 class FleetError(FasacoError):
     """There is no room for what another robot of the fleet says; it is left out.
 

@@ -46,6 +46,7 @@ CHANGEABLE = frozenset(
         "mission.keep_out_mask",
         "mission.home",
         "mission.dock",
+        "mission.map_frame",
     }
 )
 # Exceptions in a section that can change: they determine the ledger's cells.

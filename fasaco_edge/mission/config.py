@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from fasaco_edge.grid.lattice import Footprint
     from fasaco_edge.planners.line import LineConfig
 
+LONGEST_FRAME = 255
+
 Period = Annotated[float, Meta(ge=0, le=86_400)]
 Coordinate = Annotated[float, Meta(ge=-FARTHEST_M, le=FARTHEST_M)]
 
@@ -63,6 +65,8 @@ class MissionPolicy(msgspec.Struct, frozen=True, kw_only=True):
         keep_out_topic: whether the mask comes as a message; there is no mission before it has come.
         home: where the robot returns to; None for the dock, or else where an order began.
         dock: where it charges; None where it does not.
+        map_frame: frame of the map that zones, keep_out, a mask of a file, home and dock are given
+            for; "" for the first that is in use with them.
     """
 
     autostart: bool = True
@@ -76,6 +80,7 @@ class MissionPolicy(msgspec.Struct, frozen=True, kw_only=True):
     keep_out_topic: bool = False
     home: Place | None = None
     dock: Dock | None = None
+    map_frame: Annotated[str, Meta(max_length=LONGEST_FRAME)] = ""
 
     @property
     def waits_for_mask(self) -> bool:
@@ -157,6 +162,7 @@ class MissionConfig:
         lattice_deg: angle of the cells' rows to the x axis of the map frame [deg]; None to align
             them with the walls, once their direction is certain.
         map_place: where its map lies in the frame of its fleet; None without such a frame.
+        given: the policy with its places as given, if those in ``policy`` are rotated.
     """
 
     footprint: Footprint
@@ -171,3 +177,4 @@ class MissionConfig:
     battery: BatteryPolicy | None = None
     lattice_deg: float | None = 0.0
     map_place: MapPlace | None = None
+    given: MissionPolicy | None = None

@@ -134,11 +134,10 @@ class LedgerKeeper:
             log_fault(LOG, error)
             self._faults.append(error)
             return OrderState.idle(str(error))
-        if autostart and kept == OrderState.idle(NO_ORDER):
-            return OrderState.autostart()
-        if not autostart and kept.automatic:
-            return OrderState.idle(NO_ORDER)
-        return kept
+        first = OrderState.autostart() if autostart else OrderState.idle(NO_ORDER)
+        first = replace(first, frame=kept.frame, places=kept.places)
+        is_idle = kept == replace(OrderState.idle(NO_ORDER), frame=kept.frame, places=kept.places)
+        return first if is_idle or (kept.automatic and not autostart) else kept
 
 
 def open_ledger(folder: Path, robot: str, cell_m: float, *, fresh: bool = False) -> LedgerWriter:

@@ -209,10 +209,10 @@ class FleetVoice:
     def _frame_told(self, mission: Mission) -> str:
         """Return the frame of the fleet; that of the map where the map has no place in it."""
         frame = mission.ledger.frame
-        if not (self._frame and mission.shared.why_misplaced(frame)):
+        if not mission.shared.why_misplaced(frame):
             return self._frame or frame
         # Nobody may take it for the fleet's.
-        return frame if frame != self._frame else f"{frame} of another map"
+        return frame if self._frame not in ("", frame) else f"{frame} of another map"
 
 
 def _thinned(points: Points) -> list[list[float]]:

@@ -173,6 +173,11 @@ class Charging:
         jumps = ", it jumps to and fro" if now - self.gauge.heard_at <= silent_s else ""
         return f"no charge of the battery for {silent_s:g} s{jumps}"
 
+    def why_no_dock(self) -> str:
+        """Return why the robot has nowhere to charge on this map; "" where it has."""
+        why = self.map.places.why_no_dock if self.policy is not None else ""
+        return f"the robot does not go to charge: {why}" if why else ""
+
     def is_due(self, now: float) -> bool:
         """Tell whether the robot has to go and charge now.
 

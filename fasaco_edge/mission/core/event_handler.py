@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 
 from fasaco_edge.errors import CommandError, FasacoError, LedgerMismatchError
@@ -35,7 +35,7 @@ from fasaco_edge.mission.line.layer import LineLayer
 from fasaco_edge.mission.map.inputs import InputMonitor
 from fasaco_edge.mission.map.map_state import MapState
 from fasaco_edge.mission.orders.mask import mask_polygons
-from fasaco_edge.mission.orders.order import located, rotated_order
+from fasaco_edge.mission.orders.order import rotated_order
 from fasaco_edge.mission.orders.order_state import OrderState, Stage
 from fasaco_edge.mission.orders.sequencer import Sequencer
 
@@ -80,6 +80,7 @@ class EventHandler:
         for event in in_runs(events):
             self._attempt(partial(self._apply, event))
         self._attempt(self._look_for_another_building)
+        self._note_frame()
         if stood and not self.map.building.why:
             self.route.want("the map shows the building of the ledger again")
         return Decision(
@@ -160,7 +161,7 @@ class EventHandler:
             self.route.note_map_motion()
         else:
             self._record()  # the pose may have come before the map
-        self._go_on(self.ledger.check(self.map.free, self.map.grid.frame))
+        self._change_building(self.ledger.check(self.map.free, self.map.grid.frame))
 
     def _compare_buildings(self) -> Pose2D | None:
         """Compare the newest map with those before; return the robot's pose on these."""
@@ -170,6 +171,22 @@ class EventHandler:
         contradicts = partial(self.ledger.contradicts, self.map.free)
         return self.map.building.note_map(self.map.plain, pose, self._now, contradicts)
 
+    def _note_frame(self) -> None:
+        """Bind places that have no map yet to the one in use; leave those of another frame."""
+        grid, frames = self.map.grid, self.map.frames
+        if grid is None or grid.frame != frames.active or not frames.is_settled:
+            return
+        if fault := self.map.places.enter(grid.frame):
+            self._faults.append(fault)
+        order = self.orders.order_state
+        if not order.frame:
+            self.orders.set_state(replace(order, frame=grid.frame))
+        elif order.frame != grid.frame:
+            why = f"it was given in frame {order.frame!r}, the map is in {grid.frame!r}"
+            after = order.in_other_frame(why)
+            self.begin_order(replace(after, frame=grid.frame))
+            self.update_area()
+
     def _look_for_another_building(self) -> None:
         """Raise LedgerMismatchError once the map has shown another building for long enough."""
         if self.map.grid is None or not self.map.building.look(self._now):
@@ -178,6 +195,12 @@ class EventHandler:
         self.map.building.accept(self._now)
         self.fleet.others.ground.clear()
         self._record()
+        self._change_building(misfit)
+
+    def _change_building(self, misfit: LedgerMismatchError | None) -> None:
+        """Go on with a new map; without the places of the building before where it is another."""
+        if misfit is not None:
+            self.map.places.leave_building(self.ledger.current.frame)
         self._go_on(misfit)
 
     def _go_on(self, misfit: LedgerMismatchError | None) -> None:
@@ -274,10 +297,10 @@ class EventHandler:
         """Carry out a command; an error becomes its answer."""
         before = self.orders.order_state
         try:
-            order = rotated_order(located(event.order, self.policy.zones), -self.lattice_deg)
+            order = rotated_order(self.map.places.located(event.order), -self.lattice_deg)
             if event.command == "start":
                 self.map.check_zones(order)
-            has_home = self.policy.place("home") is not None
+            has_home = self.map.places.place("home") is not None
             after = before.commanded(event.command, order, has_home=has_home)
             plan = self._replan() if event.command == "replan" else None
         except FasacoError as error:
@@ -304,6 +327,7 @@ class EventHandler:
     def _reset(self) -> None:
         """Forget all coverage except under the tool, and deselect the active frame."""
         self._is_forgotten = True
+        self.map.places.begin_anew()
         self.map.frames.reset()
         if self.map.switch_frame():
             self._leave_map("reset")

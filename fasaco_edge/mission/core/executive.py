@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from fasaco_edge.errors import NothingToCover
 from fasaco_edge.grid.lattice import Cell
-from fasaco_edge.mission.config import MissionPolicy
 from fasaco_edge.mission.core.charging import Charging
 from fasaco_edge.mission.core.events import Decision, PathUpdate, State
 from fasaco_edge.mission.core.giving_way import GivingWay
@@ -56,7 +55,6 @@ class Executive:
     charging: Charging
     giving_way: GivingWay
     dock: InDock
-    policy: MissionPolicy
     mask_frame: str
     _state: State = field(default=State.WAITING_FOR_MAP, init=False)
     _reason: str = field(default="no map yet", init=False)
@@ -78,6 +76,8 @@ class Executive:
             return State.DEGRADED, trouble + (self.map.why_other_frame() if lost else "")
         if self._state in DRIVING and (silence := self.charging.silence(self._now)):
             return State.DEGRADED, f"{silence}: when to charge is not known"
+        if self._state in DRIVING and (why := self.charging.why_no_dock()):
+            return State.DEGRADED, why
         stuck = self.giving_way.why_stuck(self._now) or self._standing.why_stuck
         if self._state in DRIVING and stuck:
             return State.DEGRADED, stuck
@@ -187,10 +187,12 @@ class Executive:
         return (State.BLOCKED, no_mask) if no_mask else None
 
     def _why_no_mask(self) -> str:
-        """Return why there is no keep-out mask for this map; "" where there is one, or none is due.
+        """Return why keep-out zones for this map are missing; "" where none is due, or none is.
 
-        In another frame it would keep out of other places.
+        Those of another map would keep out of other places.
         """
+        if why := self.map.places.why_no_keep_out:
+            return why
         grid = self.map.grid
         if grid is None or self.mask_frame in ("", grid.frame):
             return ""
@@ -289,7 +291,7 @@ class Executive:
 
     def _lead(self, path: NDArray[np.int32], reason: str, errand: Errand) -> PathUpdate:
         """Publish a path to the destination of an errand, with the heading there."""
-        place = self.policy.place(errand)
+        place = self.map.places.place(errand)
         yaw = None if place is None else place.stand.yaw
         return self.route.publish(path, reason, self._now, end_yaw=yaw)
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from fasaco_edge.mission.config import MissionPolicy
 from fasaco_edge.mission.core.charging import BatteryGauge
 from fasaco_edge.mission.map.map_state import MapState
 
@@ -22,7 +21,6 @@ class InDock:
 
     map: MapState
     gauge: BatteryGauge
-    policy: MissionPolicy
 
     def holds(self, *, is_charging: bool) -> bool:
         """Tell whether the robot is in its dock, including where its base moved it into the dock.
@@ -32,7 +30,7 @@ class InDock:
         Args:
             is_charging: whether the mission counts it as docked already.
         """
-        place, stamped = self.policy.dock or self.policy.home, self.map.pose
+        place, stamped = self.map.places.place("charge"), self.map.pose
         if place is None or stamped is None:
             return False
         pose, yaw = stamped.pose, place.stand.yaw
@@ -43,7 +41,7 @@ class InDock:
 
     def is_near(self) -> bool:
         """Tell whether the robot is near enough to the dock to have been moved in by its base."""
-        place, stamped = self.policy.dock or self.policy.home, self.map.pose
+        place, stamped = self.map.places.place("charge"), self.map.pose
         if place is None or stamped is None:
             return False
         pose, stand = stamped.pose, place.stand

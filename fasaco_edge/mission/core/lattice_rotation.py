@@ -60,7 +60,7 @@ class LatticeRotation:
                 home=self._place(policy.home),
                 dock=self._place(policy.dock),
             )
-        return replace(config, policy=policy, lattice_deg=self.deg)
+        return replace(config, policy=policy, lattice_deg=self.deg, given=config.policy)
 
     def event(self, event: Event) -> Event:
         """Return an event in the mission's frame; an order is rotated once it is located."""

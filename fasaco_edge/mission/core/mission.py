@@ -104,9 +104,9 @@ class Mission:
         )
         self.giving_way = GivingWay(config, self._map, self.route, self.fleet)
         decided_by = self._line, self._trail, self.fleet, self.charging, self.giving_way
-        in_dock = InDock(self._map, self._gauge, config.policy)
+        in_dock = InDock(self._map, self._gauge)
         mask = mask_frame(self._config.policy.keep_out_mask)
-        self._executive = Executive(*owners, *decided_by, in_dock, config.policy, mask)
+        self._executive = Executive(*owners, *decided_by, in_dock, mask)
 
     def restore_ledger(self, before: LedgerSnapshot) -> None:
         """Continue a ledger from before a restart, unless the map contradicts it.
@@ -128,6 +128,7 @@ class Mission:
 
     def restore_order(self, order: OrderState) -> None:
         """Continue an order from before a restart; to be called before the first step."""
+        self._map.places.resume(order.places)
         self._handler.begin_order(self._rotation.order(order, self._rotated_by_deg))
         self.state, self.reason = self._executive.status()
 
@@ -229,7 +230,8 @@ class Mission:
     @property
     def order_state(self) -> OrderState:
         """The order and its progress."""
-        return self._orders.order_state
+        state, places = self._orders.order_state, self._map.places.note
+        return state if state.places == places else replace(state, places=places)
 
     @property
     def home(self) -> Cell | None:

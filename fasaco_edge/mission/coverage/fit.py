@@ -6,6 +6,9 @@ number expected by chance: the obstacle density among the other known cells arou
 ``OTHER_FROM`` times that, and too many to be new furniture, the ledger belongs to another building;
 also if ``MANY_BLOCKED`` of the known covered cells are blocked, whatever is around them.
 
+A map that changes in mid-mission is compared with the map before (``map.building_watch``), and with
+the ledger where their walls leave it open.
+
 Unknown cells, and cells outside of the map, are no contradiction: a restarted mapper has seen next
 to nothing. A map that knows half of the covered cells without contradiction confirms them for good.
 

@@ -247,6 +247,7 @@ class MissionLedger:
     def reset(self, frame: str) -> None:
         """Forget everything; ``frame`` is that of the poses, "" where none is active."""
         self._replace(self._nothing(frame))
+        self.shared.begin_anew()
         self.shared.disregard(lambda rows, _: np.ones(len(rows), np.bool_))
         self.first_plan_reason = "first plan"
 
@@ -276,6 +277,7 @@ class MissionLedger:
         cells = self.current.snapshot().cells
         self._resumed = self._pose_before_motion = None
         self.passed.clear()
+        self.shared.leave_building(frame)
         return self._leave_building(cells, self._nothing(""), frame)
 
     def _leave_building(self, cells: int, since: _Covered, frame: str) -> LedgerMismatchError:

@@ -64,6 +64,8 @@ class SharedProgress:
         self._place = place
         # The frame of the map that has this place; "" while none has come.
         self._map_frame = "" if place is None else place.frame
+        # The frame whose map has become that of another building; "" for none.
+        self._left = ""
         self.epoch = 0
         self.version = 0
         self._robots: dict[str, Heard] = {}
@@ -94,8 +96,22 @@ class SharedProgress:
             self._map_frame = frame
             self.version += 1
 
+    def leave_building(self, frame: str) -> None:
+        """Note that the map in a frame shows another building: others do not mean this one."""
+        self._left = frame
+        self.version += 1
+
+    def begin_anew(self) -> None:
+        """Take the next map for one that the fleet shares."""
+        self._left = ""
+        self.version += 1
+
     def why_misplaced(self, frame: str) -> str:
         """Return why nothing in a map frame has a place in the frame of the fleet; "" if it has."""
+        if self._left and frame == self._left:
+            return (
+                "the map shows another building than before: `mission reset` makes it the fleet's"
+            )
         if self._place is None or self._map_frame in ("", frame):
             return ""
         here = f"the map frame is {frame!r} here" if frame else "no map frame is known here"
@@ -233,7 +249,7 @@ class SharedProgress:
         """Return everything as bytes, to be kept with the ledger; b"" for nothing."""
         if self._kept[0] != self.version:
             robots = {name: heard.kept() for name, heard in self._robots.items()}
-            note = _Note(_VERSION, self.epoch, robots, self._origin, self._map_frame)
+            note = _Note(_VERSION, self.epoch, robots, self._origin, self._map_frame, self._left)
             self._kept = self.version, msgspec.json.encode(note)
         return self._kept[1]
 
@@ -248,7 +264,7 @@ class SharedProgress:
             note = msgspec.json.decode(kept, type=_Note)
         except (msgspec.DecodeError, UnicodeDecodeError, RecursionError):
             return
-        self.epoch = note.epoch
+        self.epoch, self._left = note.epoch, note.left
         self._note_lost()
         is_in_place = note.origin == self._origin
         if is_in_place:
@@ -295,6 +311,8 @@ class _Note(msgspec.Struct, frozen=True):
     # Of this robot's map in the frame of the fleet, and which map that is.
     origin: tuple[float, float, float] | None = None
     map_frame: str = ""
+    # The frame whose map has become that of another building.
+    left: str = ""
 
 
 class Telling:

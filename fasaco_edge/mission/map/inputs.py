@@ -90,6 +90,11 @@ class FrameSelector:
         return True
 
     @property
+    def is_settled(self) -> bool:
+        """Whether a frame is active, and no reset has left it to the next map and pose."""
+        return bool(self.active) and not self._is_open
+
+    @property
     def _may_change(self) -> bool:
         """Whether the next map and pose in another frame activate it at once."""
         return self._is_open or not self.active

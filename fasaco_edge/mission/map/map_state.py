@@ -30,6 +30,7 @@ from fasaco_edge.mission.map.ground import Ground
 from fasaco_edge.mission.map.inputs import FrameSelector
 from fasaco_edge.mission.map.loop_closure import has_moved
 from fasaco_edge.mission.map.reachable_area import ReachableArea, anchor_cell
+from fasaco_edge.mission.map.standing_places import StandingPlaces
 from fasaco_edge.mission.orders.order import MissionOrder
 
 # A robot this close to its dock's pose is in the dock [m].
@@ -49,6 +50,7 @@ class MapState:
             no coverable cell.
         frames: selects the active frame; keeps the inputs of another.
         building: whether the newest map still shows the same building.
+        places: the places of the configuration.
         path_cell: the robot's cell by its place on the line; None off the line.
     """
 
@@ -60,6 +62,7 @@ class MapState:
         self.has_moved = False
         self.frames = FrameSelector()
         self.building = BuildingWatch()
+        self.places = StandingPlaces(config.policy, config.given or config.policy)
         self._config = config
         self.path_cell: Cell | None = None
         self._ground = Ground(config)
@@ -224,7 +227,7 @@ class MapState:
             and lattice.states[lattice.local(cell)] == COVERABLE
         ):
             return cell
-        pose, dock = self.pose.pose, self._config.policy.dock
+        pose, dock = self.pose.pose, self.places.dock
         own = anchor_cell(lattice, pose)
         if own is not None or dock is None:
             return own

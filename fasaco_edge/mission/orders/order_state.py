@@ -38,6 +38,24 @@ class Stage(StrEnum):
 
 
 @dataclass(frozen=True, slots=True)
+class PlacesNote:
+    """Which map the places of the configuration belong to.
+
+    Attributes:
+        of: checksum of these places; "" while they belong to none.
+        frame: frame of that map.
+        is_left: whether the map in that frame has shown another building since.
+    """
+
+    of: str = ""
+    frame: str = ""
+    is_left: bool = False
+
+
+NO_PLACES = PlacesNote()
+
+
+@dataclass(frozen=True, slots=True)
 class OrderState:
     """An order and its progress.
 
@@ -54,6 +72,9 @@ class OrderState:
         paused: whether the robot must stand.
         errand: destination to drive to first.
         why: why there is no order; for a paused order, what led to the pause.
+        frame: frame of the map that zones, keep-out zones and home were given for; "" while no
+            frame is in use.
+        places: which map the places of the configuration belong to.
     """
 
     order: MissionOrder | None = None
@@ -67,6 +88,8 @@ class OrderState:
     paused: bool = False
     errand: Errand = ""
     why: str = ""
+    frame: str = ""
+    places: PlacesNote = NO_PLACES
 
     @classmethod
     def autostart(cls) -> OrderState:
@@ -162,7 +185,7 @@ class OrderState:
                     why = "the mission is paused" if self.paused else "there is no mission"
                     raise CommandError(f"nothing to plan: {why}")
             case "cancel" if self.order is not None or self.errand:
-                return replace(OrderState.idle("cancelled"), home=self.home)
+                return replace(self._without_order("cancelled"), home=self.home)
             case "reset":
                 return OrderState.idle("reset: what was covered is forgotten")
         return self
@@ -174,7 +197,8 @@ class OrderState:
         if self.order is not None:
             return OrderState.idle(f"{why}: the order was dropped")
         # It led to a place that lies in the building before.
-        return replace(self, home=None, errand="", paused=self.paused and not self.errand)
+        is_paused = self.paused and not self.errand
+        return replace(self, home=None, errand="", paused=is_paused, frame="")
 
     def in_other_frame(self, why: str) -> OrderState:
         """Return the state in another frame, before anything was covered.
@@ -195,7 +219,11 @@ class OrderState:
         if same and self.stage is not Stage.OVER:
             errand: Errand = "" if self.errand == "home" else self.errand
             return replace(self, paused=False, errand=errand, why="")
-        return OrderState(order)
+        return replace(self._without_order(""), order=order)
+
+    def _without_order(self, why: str) -> OrderState:
+        """Return the state without an order on the same map."""
+        return OrderState(why=why, frame=self.frame, places=self.places)
 
     def to_json(self) -> str:
         """Return it as JSON, to be kept with the ledger."""
@@ -234,7 +262,7 @@ class _Note(
 ):
     """An order state as kept on disk; member names are those of the files.
 
-    Without an errand the form is the one that older daemons read.
+    Notes of older daemons lack the last members. They do not read a note that has them.
     """
 
     version: Literal[1]
@@ -249,3 +277,5 @@ class _Note(
     paused: bool
     why: str
     errand: Errand = ""
+    frame: str = ""
+    places: PlacesNote = NO_PLACES

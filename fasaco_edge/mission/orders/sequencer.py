@@ -92,9 +92,11 @@ class Sequencer:
 
     def goal(self, errand: Errand = "home") -> Cell | None:
         """Return the destination cell (row, col) of an errand; None for none."""
-        place, lattice = self._config.policy.place(errand), self._map.lattice
+        places, lattice = self._map.places, self._map.lattice
+        place = places.place(errand)
         if place is None or lattice is None:
-            return self.order_state.home
+            is_elsewhere = errand == "charge" and places.why_no_dock
+            return None if is_elsewhere else self.order_state.home
         pose = place.stand
         return anchor_cell(lattice, pose) or lattice.cell_at(pose.x, pose.y)
 

@@ -1,0 +1,118 @@
+"""Standing places: zones, keep-out zones, home and dock of the configuration, on their map alone.
+
+Their coordinates mean something on the map that they were given for: that in the frame
+``map_frame`` of the configuration, or without one in the first frame in use with these places,
+which is kept with the ledger. On a map in another frame, and on one in this frame that shows
+another building, they are not used, and where there are keep-out zones nothing is driven: those of
+this map are not known. After a command ``reset`` they belong to the map that is in use then.
+"""
+
+from __future__ import annotations
+
+import zlib
+
+import msgspec
+
+from fasaco_edge.errors import OrderError, PlacesElsewhere
+from fasaco_edge.mission.config import Dock, MissionPolicy, Place
+from fasaco_edge.mission.orders.mask import mask_frame
+from fasaco_edge.mission.orders.order import Errand, MissionOrder, located
+from fasaco_edge.mission.orders.order_state import NO_PLACES, PlacesNote
+
+
+class StandingPlaces:
+    """Gives the places of the configuration out while the map is theirs.
+
+    Attributes:
+        note: which map they belong to; kept with the order.
+    """
+
+    def __init__(self, policy: MissionPolicy, given: MissionPolicy) -> None:
+        """Begin before the first map.
+
+        Args:
+            policy: with the places in the frame of the lattice.
+            given: the same, with the places as given.
+        """
+        self.note = NO_PLACES
+        self._policy, self._given = policy, given
+        self._names = [
+            name for name in ("zones", "keep_out", "home", "dock") if getattr(given, name)
+        ]
+        # A mask that came as a message has a frame of its own.
+        has_mask = bool(given.keep_out_mask) and not mask_frame(given.keep_out_mask)
+        self._names += ["keep_out_mask"] if has_mask else []
+        values = {name: getattr(given, name) for name in self._names}
+        of = msgspec.json.encode((values, given.map_frame))
+        self._of = f"{zlib.crc32(of):08x}"
+        # The frame in use, "" before there is one; and what was last said of it.
+        self._here = self._said = ""
+
+    def enter(self, frame: str) -> PlacesElsewhere | None:
+        """Note the frame in use; return a fault if the places belong to another one now."""
+        self._here = frame
+        if self.note.of != self._of:
+            self.note = PlacesNote(self._of, self._given.map_frame or frame)
+        before, self._said = self._said, self.why
+        return PlacesElsewhere(self._said) if self._said not in ("", before) else None
+
+    def leave_building(self, frame: str) -> None:
+        """Note that the map in a frame shows another building; ``enter`` returns the fault.
+
+        Places that are new in the configuration are given for that one.
+        """
+        if self.note.of == self._of and self.note.frame == frame:
+            self.note = PlacesNote(self._of, frame, is_left=True)
+
+    def resume(self, note: PlacesNote) -> None:
+        """Continue with the map noted before a restart."""
+        self.note = note
+
+    def begin_anew(self) -> None:
+        """Take them for places of the next map in use."""
+        self.note = NO_PLACES
+
+    @property
+    def why(self) -> str:
+        """Why no place of the configuration is used; "" if they are, or if there are none."""
+        note = self.note
+        if not self._names or note.of != self._of or not self._here:
+            return ""
+        places = ", ".join(f"mission.{name}" for name in self._names)
+        if note.frame != self._here:
+            return (
+                f"{places}: given for the map in frame {note.frame!r} (mission.map_frame), this "
+                f"one is in {self._here!r}"
+            )
+        return f"{places}: given for another building than the map shows" if note.is_left else ""
+
+    @property
+    def why_no_keep_out(self) -> str:
+        """Why the keep-out zones of this map are not known; "" if they are, or none are given."""
+        is_given = "keep_out" in self._names or "keep_out_mask" in self._names
+        return f"{self.why}: waits for its own, or for that map" if is_given and self.why else ""
+
+    @property
+    def why_no_dock(self) -> str:
+        """Why the robot cannot charge here; "" if it can, or if no place is given."""
+        return self.why if self._policy.place("charge") else ""
+
+    @property
+    def dock(self) -> Dock | None:
+        """The dock; None without one on this map."""
+        return None if self.why else self._policy.dock
+
+    def place(self, errand: Errand) -> Place | None:
+        """Return the destination of an errand; None without one on this map."""
+        return None if self.why else self._policy.place(errand)
+
+    def located(self, order: MissionOrder) -> MissionOrder:
+        """Return an order with its named zones replaced by those of the configuration.
+
+        Raises:
+            OrderError: there is no zone of that name, or it is on another map.
+        """
+        names = [zone.name for zone in order.zones if zone.polygon == ()]
+        if names and self.why:
+            raise OrderError(f"zone {names[0]!r}: {self.why}", hint=PlacesElsewhere.hint)
+        return located(order, self._policy.zones)
