@@ -7,6 +7,7 @@ import pytest
 from fasaco_edge.errors import PlacesElsewhere
 from fasaco_edge.mission.config import BatteryPolicy, Dock, Place
 from fasaco_edge.mission.core.events import BatteryReceived, MapReceived, State
+from fasaco_edge.mission.orders.mask import inline_grid
 from fasaco_edge.mission.orders.order import StandingZone
 from fasaco_edge.mission.orders.order_state import OrderState
 from tests.mission.test_other_building import FLOOR, OTHER
@@ -163,6 +164,22 @@ def test_a_ledger_of_another_building_found_after_a_restart_leaves_them_too():
     again = restarted(first, WITH_ALL)
     assert codes(stand(again, "map", 3, OTHER)) == ["ledger_mismatch", "places_elsewhere"]
     assert again.mission.state is State.BLOCKED
+
+
+def test_a_mask_that_came_for_the_building_before_is_not_used_in_the_other():
+    """Its frame is that of both maps; one for this building may come, which has the mission begin
+    anew, with the mask in its configuration."""
+    mask, other = (inline_grid(building("##", at=(row, 2)), 65) for row in (2, 3))
+    config = with_policy(CONFIG, keep_out_mask=mask, keep_out_topic=True, home=HOME)
+    drive = Drive(HERE, *floor("map"), config=config)
+    drive.plan()
+    assert codes(stand(drive, "map", 9, OTHER)) == ["ledger_mismatch", "places_elsewhere"]
+    assert drive.mission.state is State.BLOCKED
+    assert drive.mission.reason.startswith("keep_out_mask: given for another building")
+    again = restarted(drive, with_policy(config, keep_out_mask=other))
+    stand(again, "map", 2, OTHER)
+    assert again.mission.state is not State.BLOCKED
+    assert again.mission.home == HERE, "and not that of the configuration"
 
 
 def test_without_places_nothing_is_said():

@@ -10,6 +10,7 @@ this map are not known. After a command ``reset`` they belong to the map that is
 from __future__ import annotations
 
 import zlib
+from dataclasses import replace
 
 import msgspec
 
@@ -39,9 +40,11 @@ class StandingPlaces:
         self._names = [
             name for name in ("zones", "keep_out", "home", "dock") if getattr(given, name)
         ]
-        # A mask that came as a message has a frame of its own.
-        has_mask = bool(given.keep_out_mask) and not mask_frame(given.keep_out_mask)
-        self._names += ["keep_out_mask"] if has_mask else []
+        # A mask that came as a message has a frame of its own, and another may come.
+        mask = given.keep_out_mask
+        self._mask_frame = mask_frame(mask)
+        self._mask = f"{zlib.crc32(mask.encode()):08x}" if self._mask_frame else ""
+        self._names += ["keep_out_mask"] if mask and not self._mask else []
         values = {name: getattr(given, name) for name in self._names}
         of = msgspec.json.encode((values, given.map_frame))
         self._of = f"{zlib.crc32(of):08x}"
@@ -52,8 +55,10 @@ class StandingPlaces:
         """Note the frame in use; return a fault if the places belong to another one now."""
         self._here = frame
         if self.note.of != self._of:
-            self.note = PlacesNote(self._of, self._given.map_frame or frame)
-        before, self._said = self._said, self.why
+            self.note = replace(
+                self.note, of=self._of, frame=self._given.map_frame or frame, is_left=False
+            )
+        before, self._said = self._said, self.why or self._why_no_mask
         return PlacesElsewhere(self._said) if self._said not in ("", before) else None
 
     def leave_building(self, frame: str) -> None:
@@ -62,7 +67,9 @@ class StandingPlaces:
         Places that are new in the configuration are given for that one.
         """
         if self.note.of == self._of and self.note.frame == frame:
-            self.note = PlacesNote(self._of, frame, is_left=True)
+            self.note = replace(self.note, is_left=True)
+        if self._mask_frame == frame:
+            self.note = replace(self.note, left_mask=self._mask)
 
     def resume(self, note: PlacesNote) -> None:
         """Continue with the map noted before a restart."""
@@ -90,7 +97,13 @@ class StandingPlaces:
     def why_no_keep_out(self) -> str:
         """Why the keep-out zones of this map are not known; "" if they are, or none are given."""
         is_given = "keep_out" in self._names or "keep_out_mask" in self._names
-        return f"{self.why}: waits for its own, or for that map" if is_given and self.why else ""
+        why = self.why if is_given and self.why else self._why_no_mask
+        return f"{why}: waits for its own, or for that map" if why else ""
+
+    @property
+    def _why_no_mask(self) -> str:
+        is_left = bool(self._mask) and self.note.left_mask == self._mask
+        return "keep_out_mask: given for another building than the map shows" if is_left else ""
 
     @property
     def why_no_dock(self) -> str:

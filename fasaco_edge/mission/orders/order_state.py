@@ -45,11 +45,14 @@ class PlacesNote:
         of: checksum of these places; "" while they belong to none.
         frame: frame of that map.
         is_left: whether the map in that frame has shown another building since.
+        left_mask: checksum of a keep-out mask that came as a message, whose map has shown another
+            building since; "" for none.
     """
 
     of: str = ""
     frame: str = ""
     is_left: bool = False
+    left_mask: str = ""
 
 
 NO_PLACES = PlacesNote()
