@@ -152,6 +152,7 @@ def test_a_loop_closure_keeps_what_moved_with_it(order):
     faults = [fault for events in steps for fault in drive.tell(*events).faults]
     faults += stand(drive, 10.0, moved)
     assert faults == []
+    assert drive.mission.home == (1, 5), "it has moved with the building"
     # Those under the tool wherever the map may have lain in between.
     assert drive.mission.ledger.snapshot().cells == 20
     assert all(col >= 4 for _, col in drive.visited)
@@ -260,3 +261,19 @@ def test_what_others_of_a_fleet_swept_on_the_floor_before_does_not_count():
     assert "another building" in drive.mission.shared.why_misplaced("map")
     drive.command("reset")
     assert drive.mission.shared.why_misplaced("map") == ""
+
+
+@pytest.mark.parametrize("other", [OTHER, OPEN], ids=["walls elsewhere", "walls gone"])
+def test_a_mission_that_replaces_another_goes_on_with_its_doubt(other):
+    """As after a reload of the configuration, while the robot stands between the floors."""
+    first = swept(*FLOOR)
+    shown = MapReceived(building(*other))
+    stand(first, 3.0, shown)
+    again = Drive(HERE)
+    again.mission.restore_ledger(first.mission.snapshot())
+    again.mission.restore_order(first.mission.order_state)
+    again.mission.succeed(first.mission)
+    again.now = first.now
+    faults = stand(again, 4.0, shown)
+    assert [type(fault) for fault in faults] == [LedgerMismatchError]
+    again.finish()

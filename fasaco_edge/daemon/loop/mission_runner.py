@@ -61,6 +61,8 @@ class MissionRunner:
         self._load = load or Loader
         self._loader: Loader | None = None
         self._held = HeldEvents()
+        # The mission that the next one replaces, if that doubts which building it is in.
+        self._before: Mission | None = None
 
     @property
     def order_state(self) -> OrderState:
@@ -99,6 +101,9 @@ class MissionRunner:
         if loaded is not None:
             self.mission, self.worker = loaded
             self._keeper.restore(self.mission)
+            if self._before is not None:
+                self.mission.succeed(self._before)
+            self._before = None
             if self.config.fleet:
                 # No ledger that was set aside has this order.
                 self.mission.shared.begin(time.time_ns() // 1_000_000)
@@ -155,6 +160,7 @@ class MissionRunner:
         if self.mission is not None and self.worker is not None:
             self.worker.disown()
             self._keeper.take_back(self.mission)
+            self._before = self.mission if self.mission.is_in_doubt else None
         elif self._loader is not None:
             self._loader.drop()
         self.config = config

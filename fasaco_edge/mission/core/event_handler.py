@@ -192,7 +192,6 @@ class EventHandler:
         if self.map.grid is None or not self.map.building.look(self._now):
             return
         misfit = self.ledger.begin_elsewhere(self.map.grid.frame)
-        self.map.building.accept(self._now)
         self.fleet.others.ground.clear()
         self._record()
         self._change_building(misfit)
@@ -200,6 +199,7 @@ class EventHandler:
     def _change_building(self, misfit: LedgerMismatchError | None) -> None:
         """Go on with a new map; without the places of the building before where it is another."""
         if misfit is not None:
+            self.map.building.accept(self._now)
             self.map.places.leave_building(self.ledger.current.frame)
         self._go_on(misfit)
 
@@ -261,6 +261,8 @@ class EventHandler:
             motion = self.ledger.map_motion(stamped.pose)
             self.trail.note_motion(motion)
             uncertain = self.ledger.forget_uncertain(stamped.pose)
+            if motion is not None and self.map.building.take_closure():
+                self.orders.move_home(motion)
             self._record()
         self.line.note_pose(stamped.pose)
         cell = self.map.robot_cell()

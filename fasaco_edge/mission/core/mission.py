@@ -132,6 +132,16 @@ class Mission:
         self._handler.begin_order(self._rotation.order(order, self._rotated_by_deg))
         self.state, self.reason = self._executive.status()
 
+    def succeed(self, before: Mission) -> None:
+        """Go on with the doubt of another mission about the building; before the first step."""
+        if before.is_in_doubt and before.rotation == self.rotation:
+            self._map.watch_on(before._map.building)
+
+    @property
+    def is_in_doubt(self) -> bool:
+        """Whether the map may show another building than before."""
+        return self._map.building.is_foreign or bool(self._map.building.why)
+
     def step(self, events: Iterable[Event], now: float) -> Decision:
         """Apply events in order and decide.
 
@@ -161,8 +171,7 @@ class Mission:
         self._angle.note_faults(happened.faults)
         # A path kept for an errand is given in present cells.
         # A building that is in doubt may soon be another.
-        is_doubtful = self._map.building.is_foreign or self._map.building.why
-        if self._angle.is_settled or self.order_state.errand or is_doubtful:
+        if self._angle.is_settled or self.order_state.errand or self.is_in_doubt:
             return happened
         pose, grid = self.pose, self.grid
         if pose is None or grid is None or not self._angle.rotates_to_walls(grid, pose):

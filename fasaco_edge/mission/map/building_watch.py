@@ -140,6 +140,8 @@ class BuildingWatch:
         self._agreed_at = 0.0
         # Changes of building, and the last one.
         self._changes, self._changed_at = 0, float("-inf")
+        # Whether a loop closure was found that nobody has asked for yet.
+        self._has_closed = False
         # The last jump of the pose, and when.
         self._jump: tuple[Motion, float] | None = None
 
@@ -152,6 +154,7 @@ class BuildingWatch:
         """Take the next map as the first one."""
         self.why, self._reference, self._newest = "", None, None
         self._foreign = self._jump = None
+        self._has_closed = False
 
     def accept(self, now: float) -> None:
         """Take the newest map's building for the one that the robot is in from now on."""
@@ -196,6 +199,7 @@ class BuildingWatch:
         is_recent = jump is not None and now - jump[1] <= JUMP_S
         if jump is not None and is_recent and pose is not None and self._explains(jump[0], seen):
             self._end(now)
+            self._has_closed = True
             return _before(jump[0], pose)
         if self._foreign is None:
             self._foreign = now, seen, pose
@@ -209,8 +213,13 @@ class BuildingWatch:
         if before is None or not self._explains(Motion(before, pose), seen):
             return False
         self._end(now)
-        self.why = ""
+        self.why, self._has_closed = "", True
         return True
+
+    def take_closure(self) -> bool:
+        """Return whether a loop closure has been found since the last call."""
+        has_closed, self._has_closed = self._has_closed, False
+        return has_closed
 
     def look(self, now: float) -> bool:
         """Update ``why``; return whether the map has shown another building for long enough."""

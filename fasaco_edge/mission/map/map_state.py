@@ -130,7 +130,8 @@ class MapState:
     def _take_map(self, grid: OccupancyGrid, within: Window | None = None) -> None:
         if self.grid is None or self.grid.frame != grid.frame:
             change = self._ground.begin(grid)
-            self.building.begin_anew()
+            if self.grid is not None:
+                self.building.begin_anew()
             self.area = None
         else:
             change = self._ground.follow((self.grid, grid), within)
@@ -139,6 +140,10 @@ class MapState:
         self.map_revision += 1
         if self.pose is not None and self.pose.frame != grid.frame:
             self.pose = self.frames.pose_in(grid.frame)
+
+    def watch_on(self, building: BuildingWatch) -> None:
+        """Compare maps with the building that another mission, on the same cells, was in."""
+        self.building = building
 
     def keep_out(self, polygons: tuple[Polygon, ...]) -> None:
         """Replace the keep-out polygons (x, y) [m]."""

@@ -13,6 +13,7 @@ from fasaco_edge.mission.config import MissionConfig
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
 from fasaco_edge.mission.coverage.unreached import Unreached, UnreachedFinder
 from fasaco_edge.mission.fleet.layer import FleetLayer
+from fasaco_edge.mission.map.loop_closure import Motion, moved_cells
 from fasaco_edge.mission.map.map_state import MapState
 from fasaco_edge.mission.map.reachable_area import ReachableArea, anchor_cell
 from fasaco_edge.mission.orders.cells_left import CellsLeft
@@ -115,6 +116,13 @@ class Sequencer:
     def set_state(self, state: OrderState) -> None:
         """Continue with the same order in another state, after a command."""
         self.order_state = state
+
+    def move_home(self, motion: Motion) -> None:
+        """Move home, where it is a cell, with the map."""
+        if (home := self.order_state.home) is not None:
+            cells = np.array([home], np.int32)
+            ((row, col),) = moved_cells(cells, motion, self._config.footprint.cell_m).tolist()
+            self.order_state = replace(self.order_state, home=(row, col))
 
     def note_area(self) -> None:
         """Remember the cells that are reachable now."""
