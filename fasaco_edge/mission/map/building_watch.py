@@ -43,7 +43,7 @@ GRACE_S = 0.5
 # first doubles with each change of building within SOON_S, at most LONGEST-fold.
 PATIENCE_S, SETTLED_S, SOON_S, LONGEST = 5.0, 5.0, 600.0, 16
 # Age at which the reference is replaced [s], by a map that knows at least this share of its cells.
-AGE_S, KNOWN_SHARE = 10.0, 0.5
+AGE_S, KNOWN_SHARE = 5.0, 0.5
 # A pose that jumped this long before the map has moved with it [s].
 JUMP_S = 6.0
 
@@ -140,6 +140,9 @@ class BuildingWatch:
         self._agreed_at = 0.0
         # Changes of building, and the last one.
         self._changes, self._changed_at = 0, float("-inf")
+        # How a map that still shows the building before agrees with the reference, and the pose by
+        # then, until the next pose; None for a map that is all but equal.
+        self._shifted: tuple[Agreement, Pose2D] | None = None
         # Whether a loop closure was found that nobody has asked for yet.
         self._has_closed = False
         # The last jump of the pose, and when.
@@ -153,7 +156,7 @@ class BuildingWatch:
     def begin_anew(self) -> None:
         """Take the next map as the first one."""
         self.why, self._reference, self._newest = "", None, None
-        self._foreign = self._jump = None
+        self._foreign = self._jump = self._shifted = None
         self._has_closed = False
 
     def accept(self, now: float) -> None:
@@ -191,8 +194,7 @@ class BuildingWatch:
             self._reference, self._reference_at, self._agreed_at = lattice, now, now
             return pose
         seen = Agreement.of(before, lattice)
-        is_alike = seen.is_close or seen.kappa >= ALIKE
-        if is_alike or not (seen.kappa < FOREIGN or contradicts()):
+        if seen.is_close:
             self._agree(lattice, now)
             return pose
         jump, self._jump = self._jump, None
@@ -201,17 +203,24 @@ class BuildingWatch:
             self._end(now)
             self._has_closed = True
             return _before(jump[0], pose)
-        if self._foreign is None:
+        if seen.kappa >= ALIKE or not (seen.kappa < FOREIGN or contradicts()):
+            self._agree(lattice, now)
+            self._shifted = None if pose is None else (seen, pose)
+        elif self._foreign is None:
             self._foreign = now, seen, pose
         return pose
 
     def note_pose(self, pose: Pose2D, now: float) -> bool:
         """Note a pose; return whether it explains the newest map, as after a loop closure."""
-        if self._foreign is None:
+        shifted, self._shifted = self._shifted, None
+        if self._foreign is not None:
+            _, seen, before = self._foreign
+        elif shifted is not None:
+            seen, before = shifted
+        else:
             return True
-        _, seen, before = self._foreign
         if before is None or not self._explains(Motion(before, pose), seen):
-            return False
+            return self._foreign is None
         self._end(now)
         self.why, self._has_closed = "", True
         return True
@@ -261,7 +270,7 @@ class BuildingWatch:
     def _end(self, now: float) -> None:
         """Take the newest map as the reference."""
         self._reference, self._reference_at, self._agreed_at = self._newest, now, now
-        self._foreign = self._jump = None
+        self._foreign = self._jump = self._shifted = None
 
 
 def _before(motion: Motion, pose: Pose2D) -> Pose2D:
