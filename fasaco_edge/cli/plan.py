@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import signal
 from collections import deque
 from collections.abc import Sequence
 from contextlib import nullcontext
@@ -20,7 +21,7 @@ from fasaco_edge.cli.planning.request import read_request, require_frame
 from fasaco_edge.cli.warmup import compile_kernels
 from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.grid.map_files import find_map, map_sources
-from fasaco_edge.host.processes import ctrl_c_asks
+from fasaco_edge.host.processes import first_signal_calls
 from fasaco_edge.planners.planner import ColonySnapshot, Interrupt, ignore
 
 if TYPE_CHECKING:
@@ -58,7 +59,7 @@ def run(args: argparse.Namespace) -> int:
     total = search.most_s if search.has_local_search else search.ants
     counted = not search.has_local_search
     # Nobody asks a planner of the user's own to end.
-    on_ctrl_c = nullcontext() if request.own else ctrl_c_asks(asked.asked.set)
+    on_ctrl_c = nullcontext() if request.own else first_signal_calls(signal.SIGINT, asked.asked.set)
     trails: deque[ColonySnapshot] = deque(maxlen=1)
     with on_ctrl_c, watching(total, counted=counted) as show:
         planned = plan(

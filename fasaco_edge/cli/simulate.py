@@ -17,7 +17,7 @@ from fasaco_edge.cli.console.arguments import (
     robot_on_bus,
     writing,
 )
-from fasaco_edge.cli.console.terminal import err
+from fasaco_edge.cli.console.terminal import ProgressLines
 from fasaco_edge.grid.geometry import Pose2D
 from fasaco_edge.grid.map_files import find_map, map_sources, read_map
 
@@ -87,16 +87,18 @@ def run(args: argparse.Namespace) -> int:
     x, y = args.start_xy or start_point(path, truth, args.robot_radius)
     world = World(truth, Pose2D(x, y), config)
     here = robot_on_bus(args)
-    result = run_simulation(
-        world,
-        here.keys,
-        here.bus,
-        speed=args.speed,
-        driver=args.driver,
-        meets_others=args.meets_others,
-        waits=True,
-        report=_report,
-    )
+    with ProgressLines("{task.description}") as shown:
+        task = shown.add_task("waits for a router")
+        result = run_simulation(
+            world,
+            here.keys,
+            here.bus,
+            speed=args.speed,
+            driver=args.driver,
+            meets_others=args.meets_others,
+            waits=True,
+            report=lambda progress: shown.update(task, description=_words(progress)),
+        )
     if result is None:
         return 0
     if args.trail_out is not None:
@@ -115,16 +117,13 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def _report(progress: Progress) -> None:
-    """Overwrite one line of a terminal; say nothing into a file."""
-    console = err()
-    if console.is_terminal:
-        pose = progress.pose
-        # Past what keeps others from controlling the terminal.
-        console.file.write(
-            f"\r{progress.sim_s:8.1f} s  x {progress.speed:5.1f}  ({pose.x:7.2f}, {pose.y:7.2f}) m"
-            f"  {progress.distance_m:7.1f} m driven  {progress.collisions} collisions "
-        )
+def _words(progress: Progress) -> str:
+    """Return how the robot is, for one line."""
+    pose = progress.pose
+    return (
+        f"{progress.sim_s:8.1f} s  x {progress.speed:5.1f}  ({pose.x:7.2f}, {pose.y:7.2f}) m"
+        f"  {progress.distance_m:7.1f} m driven  {progress.collisions} collisions"
+    )
 
 
 COMMAND = Command(

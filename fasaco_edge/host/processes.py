@@ -230,14 +230,17 @@ def stop_event(*numbers: int) -> Iterator[threading.Event]:
 
 
 @contextmanager
-def ctrl_c_asks(ask: Callable[[], None]) -> Iterator[None]:
-    """Call ``ask`` on the first Ctrl-C; a second one has its usual effect."""
+def first_signal_calls(number: int, call: Callable[[], None]) -> Iterator[None]:
+    """Call ``call`` on the first of these signals; a second one has its usual effect.
+
+    It is called on a thread of its own, see ``call_on``.
+    """
 
     def once() -> None:
         restore()
-        _call_apart(ask)
+        _call_apart(call)
 
-    restore = _handle([signal.SIGINT], once)
+    restore = _handle([number], once)
     try:
         yield
     finally:

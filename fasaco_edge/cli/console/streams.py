@@ -8,7 +8,9 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Iterable
+import threading
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import ExitStack, contextmanager
 from io import TextIOWrapper
 from typing import Any, TextIO, cast
 
@@ -16,16 +18,41 @@ from fasaco_edge.text import json_line, lines
 
 
 class CleanStream:
-    """A text stream that escapes control characters, except line ends and tabs."""
+    """A text stream that escapes control characters, except line ends and tabs.
+
+    While a progress bar is drawn on the terminal, the bar's console prints the lines, above it.
+    The stream stays the same object meanwhile: the handler of the log keeps it, too.
+    """
 
     def __init__(self, stream: TextIO) -> None:
         # By this name rich finds the stream itself: its own escapes have to go through.
         self.rich_proxied_file = stream
+        self._print: Callable[[str], None] | None = None
+        self._begun = ""
+        self._lock = threading.RLock()
 
     def write(self, text: str) -> int:
         """Write; return how much of ``text`` that was, all of it."""
-        self.rich_proxied_file.write(lines(text))
+        with self._lock:
+            if self._print is None:
+                self.rich_proxied_file.write(lines(text))
+            else:
+                whole, end, self._begun = (self._begun + lines(text)).rpartition("\n")
+                if end:
+                    self._print(whole)
         return len(text)
+
+    @contextmanager
+    def printed_by(self, print_lines: Callable[[str], None]) -> Iterator[None]:
+        """Pass whole lines to ``print_lines`` meanwhile; what has no line end waits for the end."""
+        with self._lock:
+            self._print = print_lines
+        try:
+            yield
+        finally:
+            with self._lock:
+                self._print, begun, self._begun = None, self._begun, ""
+                self.rich_proxied_file.write(begun)
 
     def writelines(self, texts: Iterable[str]) -> None:
         """Write one after the other."""
@@ -60,6 +87,16 @@ def clean_streams() -> None:
             if isinstance(stream, TextIOWrapper):
                 stream.reconfigure(errors="backslashreplace")
             setattr(sys, name, cast("TextIO", CleanStream(stream)))
+
+
+@contextmanager
+def printed_by(print_lines: Callable[[str], None]) -> Iterator[None]:
+    """Pass the lines of both outputs to ``print_lines``, of those that lead to a terminal."""
+    with ExitStack() as stack:
+        for stream in (sys.stdout, sys.stderr):
+            if isinstance(stream, CleanStream) and stream.isatty():
+                stack.enter_context(stream.printed_by(print_lines))
+        yield
 
 
 def print_json(document: object) -> None:

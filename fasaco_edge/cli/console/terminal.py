@@ -2,15 +2,29 @@
 
 from __future__ import annotations
 
+import os
+import signal
 from collections.abc import Iterable
+from contextlib import ExitStack
+from functools import cache
 from typing import Any
 
 from rich.console import Console, ConsoleOptions, RenderableType
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.constrain import Constrain
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    ProgressColumn,
+    TextColumn,
+    TimeElapsedColumn,
+)
 from rich.segment import Segment
 from rich.table import Table
 from rich.text import Text
 
+from fasaco_edge.cli.console.streams import printed_by
+from fasaco_edge.host.processes import first_signal_calls
 from fasaco_edge.text import lines, one_line
 
 
@@ -32,27 +46,76 @@ class CleanConsole(Console):
             yield segment if segment.control else segment._replace(text=lines(segment.text))
 
 
+@cache
 def out() -> Console:
     """Return the console for results."""
     return CleanConsole()
 
 
+@cache
 def err() -> Console:
-    """Return the console for progress and remarks."""
+    """Return the console for progress and remarks; all share one, which knows of the bar."""
     return CleanConsole(stderr=True)
 
 
+class ProgressLines(Progress):
+    """Lines at the lower end of the terminal that show progress, and leave nothing behind.
+
+    What is printed and logged meanwhile appears above them. Without a terminal that can move its
+    cursor they are ``disable``d, and nothing is written.
+    """
+
+    def __init__(self, *columns: ProgressColumn | str, expand: bool = False) -> None:
+        console = err()
+        super().__init__(
+            *columns,
+            console=console,
+            expand=expand,
+            transient=True,
+            # Rich would put a stream of its own before ours, and then write escapes into ours.
+            redirect_stdout=False,
+            redirect_stderr=False,
+            # Rich also takes for a terminal what is none, if the environment asks for colour.
+            disable=not (console.is_interactive and console.file.isatty()),
+        )
+        self._while_shown = ExitStack()
+
+    def start(self) -> None:
+        """Show the lines."""
+        if self.disable:
+            return
+        super().start()
+        self._while_shown.enter_context(printed_by(self._print_above))
+        # It ends the process without a way out that would show the cursor again.
+        if signal.getsignal(signal.SIGTERM) is signal.SIG_DFL:
+            self._while_shown.enter_context(first_signal_calls(signal.SIGTERM, self._terminate))
+
+    def stop(self) -> None:
+        """Remove the lines."""
+        if not self.disable:
+            super().stop()
+            self._while_shown.close()
+
+    def get_renderable(self) -> RenderableType:
+        """Return what is shown, with room beside it for the ``^C`` that a terminal adds."""
+        return Constrain(super().get_renderable(), max(err().width - 2, 1))
+
+    def _print_above(self, text: str) -> None:
+        self.console.print(Text(text), soft_wrap=True)
+
+    def _terminate(self) -> None:
+        self.live.stop()
+        os.kill(os.getpid(), signal.SIGTERM)
+
+
 def progress(*, counted: bool = True) -> Progress:
-    """Return a progress bar that leaves nothing behind; ``counted`` shows how much is done."""
+    """Return a progress bar; ``counted`` shows how much is done."""
     count = (MofNCompleteColumn(),) if counted else ()
-    return Progress(
+    return ProgressLines(
         TextColumn("{task.description}", markup=False),
         BarColumn(bar_width=32),
         *count,
         TimeElapsedColumn(),
-        console=err(),
-        transient=True,
-        disable=not err().is_terminal,
     )
 
 

@@ -15,13 +15,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Self
 
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.progress import BarColumn, TextColumn, TimeElapsedColumn
+from rich.table import Column
 
 from fasaco_edge.bus.arrival import Sample
 from fasaco_edge.bus.mailbox import LatestSlot
 from fasaco_edge.bus.session import Bus, open_bus
 from fasaco_edge.bus.settings import BusSettings
-from fasaco_edge.cli.console.terminal import err
+from fasaco_edge.cli.console.terminal import ProgressLines, err
 from fasaco_edge.cli.demo.mishaps import Mishaps
 from fasaco_edge.cli.demo.robots import FLEET, DemoRobot, fleet_recorder
 from fasaco_edge.errors import ProcessEnded
@@ -46,16 +47,18 @@ class DemoView:
     """Shows the daemons' status as it comes in, a line a robot."""
 
     def __init__(self, titles: Sequence[str]) -> None:
-        self._console = err()
-        self._bar = Progress(
+        self._bar = ProgressLines(
             TextColumn("{task.description}", style="bold", markup=False),
-            BarColumn(bar_width=28),
+            BarColumn(bar_width=16),
             TextColumn("{task.percentage:>3.0f} % of cells", markup=False),
-            TextColumn("{task.fields[figures]}", markup=False),
             TimeElapsedColumn(),
-            console=self._console,
-            transient=True,
-            disable=not self._console.is_terminal,
+            # In a narrow terminal the figures are cut, and nothing else.
+            TextColumn(
+                "{task.fields[figures]}",
+                markup=False,
+                table_column=Column(ratio=1, no_wrap=True),
+            ),
+            expand=True,
         )
         self._titles = titles
         self._tasks = [self._bar.add_task(text, total=1.0, figures="starting") for text in titles]
@@ -74,12 +77,12 @@ class DemoView:
         text = phrases.figures(status)
         self._bar.update(self._tasks[robot], completed=fraction, figures=text)
         now = time.monotonic()
-        if self._console.is_terminal or now - self._printed_at[robot] < PLAIN_LINE_EVERY_S:
+        if not self._bar.disable or now - self._printed_at[robot] < PLAIN_LINE_EVERY_S:
             return
         self._printed_at[robot] = now
         name = f"{self._titles[robot]}  " if len(self._tasks) > 1 else ""
         line = f"{elapsed_s:6.1f} s  {name}{100 * fraction:5.1f} % of cells  {text}"
-        self._console.print(line, soft_wrap=True)
+        err().print(line, soft_wrap=True)
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import signal
 import time
 from collections.abc import Sequence
 from itertools import combinations
@@ -19,7 +20,7 @@ from fasaco_edge.cli.planning.progress import watching
 from fasaco_edge.cli.planning.request import require_frame
 from fasaco_edge.cli.warmup import compile_kernels
 from fasaco_edge.errors import BadConfiguration
-from fasaco_edge.host.processes import ctrl_c_asks
+from fasaco_edge.host.processes import first_signal_calls
 from fasaco_edge.offline.settings import ANYWHERE, CELLS, HOME
 from fasaco_edge.planners.cost import count_turns
 from fasaco_edge.planners.planner import Interrupt, SearchProgress, TimeBudget
@@ -50,7 +51,7 @@ def plan_fleet(args: argparse.Namespace, request: PlanRequest) -> int:
     fleet = Fleet(starts, robot.cost(lattice.cell_m), args.end == HOME, search.seed, search.threads)
     asked = Interrupt()
     began, cpu = time.perf_counter(), time.process_time()
-    with ctrl_c_asks(asked.asked.set), watching(search.most_s) as show:
+    with first_signal_calls(signal.SIGINT, asked.asked.set), watching(search.most_s) as show:
         assert search.most_s is not None
         is_over = TimeBudget(search.most_s)
 

@@ -1,0 +1,191 @@
+"""Commands that show progress, each in a terminal as people have it; and where there is none."""
+
+from __future__ import annotations
+
+import lzma
+import re
+import signal
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests.support.processes import ENVIRONMENT, fasaco_edge, free_endpoint
+from tests.support.terminal import Terminal, seen
+
+COLOURS = re.compile(r"\x1b\[[0-9;]*m")
+RECORDING = Path(__file__).parents[1] / "data/mission.rrd.xz"
+# What a bar is drawn of.
+BAR = ("━", "╸", "╺")
+PLAN = ("plan", "flat", "--budget", "0.5")
+SIMULATE = ("simulate", "flat", "--speed", "10", "--connect")
+
+
+def no_escape_is_shown(shell: Terminal) -> None:
+    """Check that all escapes reached the terminal as such."""
+    assert "\\x1b" not in shell.written
+    text = "\n".join(shell.screen())
+    assert not re.search(r"\^\[|\[2K|\[\d*A|\[\?25|\[\d[\d;]*m", text), text
+
+
+def ended_well(shell: Terminal, code: int = 0) -> str:
+    """Return what is seen after the command; check that nothing is left of its progress."""
+    assert shell.end() == code, shell.written
+    no_escape_is_shown(shell)
+    assert shell.is_clean()
+    text = "\n".join(shell.screen())
+    assert not any(sign in text for sign in BAR), text
+    return text
+
+
+@pytest.fixture
+def recording(tmp_path):
+    """A recorded mission."""
+    pytest.importorskip("rerun")
+    path = tmp_path / "mission.rrd"
+    path.write_bytes(lzma.decompress(RECORDING.read_bytes()))
+    return path
+
+
+@pytest.mark.parametrize(
+    ("words", "shown", "first_line"),
+    [
+        (PLAN, "steps, [0-9.]+% above the bound ", "┌──.*"),
+        (("plan", "flat", "--ants", "40", "--no-local-search"), "ants ━* +0/40 ", "┌──.*"),
+        ((*PLAN, "--robots", "1,1", "2,2"), "steps ━", "┌──.*"),
+        (("warmup",), "loading numba ", "kernels ready after [0-9.]+ s in .*"),
+        (
+            ("bench", "latency", "--samples", "2"),
+            "warming the kernels' cache ━* 0/2 ",
+            "from map.*",
+        ),
+        (("bench", "speed", "--maps", "flat"), "speed ━* +0/10 ", ".*"),
+    ],
+    ids=["plan", "ants", "fleet", "warmup", "latency", "speed"],
+)
+def test_progress_is_drawn_and_leaves_nothing_behind(words, shown, first_line):
+    with Terminal(*words, columns=120) as shell:
+        text = ended_well(shell)
+        assert re.search(shown, COLOURS.sub("", shell.written))
+        assert not re.search(shown, text)
+        assert re.fullmatch(first_line, text.partition("\n")[0]), text
+
+
+def test_a_review_shows_what_it_reads(recording):
+    with Terminal("review", recording, columns=120) as shell:
+        text = ended_well(shell)
+        assert "recording ━" in COLOURS.sub("", shell.written)
+        assert re.match("complete: every reachable cell", text)
+
+
+def test_the_simulation_shows_its_robot_in_one_line():
+    with Terminal(*SIMULATE, free_endpoint(), columns=120) as shell:
+        screen = shell.wait_text("waits for a router")
+        assert "Connection refused" not in screen.splitlines()[-1]
+        # Ctrl-C, as it is typed.
+        shell.type("\x03")
+        text = ended_well(shell)
+        assert "waits for" not in text.splitlines()[-1]
+
+
+def test_the_demo_shows_its_robot_below_its_messages(tmp_path):
+    pytest.importorskip("rerun")
+    out = tmp_path / "demo"
+    with Terminal("demo", "--out", out) as shell:
+        # In eighty columns nothing of it is left out but some figures.
+        progress = re.compile(
+            r"^flat ━{16} +[1-9]\d* % of cells \d:\d\d:\d\d \w+: \d+/", re.MULTILINE
+        )
+        screen = shell.wait(lambda seen: progress.search(seen) is not None)
+        no_escape_is_shown(shell)
+        lines = screen.rstrip("\n").split("\n")
+        # Each in its line, the progress below them all, and that once.
+        assert lines[0].startswith("kernels ready")
+        assert "\nwatch it from another terminal" in screen
+        assert [line for line in lines if "of cells" in line] == lines[-1:]
+        shell.type("\x03")
+        text = ended_well(shell, 130)
+        assert "of cells" not in text
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_shows_the_cursor_again(number):
+    with Terminal("plan", "office", "--budget", "300", columns=120) as shell:
+        shell.wait_text("above the bound")
+        assert not shell.is_clean()
+        shell.process.send_signal(number)
+        code = shell.end()
+        assert code == (130 if number == signal.SIGINT else -signal.SIGTERM)
+        no_escape_is_shown(shell)
+        assert shell.is_clean()
+
+
+@pytest.mark.parametrize("words", [PLAN, ("warmup",), ("bench", "latency", "--samples", "2")])
+def test_a_dumb_terminal_gets_no_escapes(words):
+    with Terminal(*words, columns=120, TERM="dumb") as shell:
+        assert shell.end() == 0
+        assert "\x1b" not in shell.written
+        assert "\\x1b" not in shell.written
+        assert not any(sign in shell.written for sign in BAR)
+
+
+@pytest.mark.parametrize("colour", [{}, {"FORCE_COLOR": "1", "TERM": "xterm-256color"}])
+def test_a_file_gets_no_progress(monkeypatch, colour):
+    for name, value in colour.items():
+        monkeypatch.setitem(ENVIRONMENT, name, value)
+    ended = fasaco_edge(*PLAN)
+    assert ended.code == 0
+    assert ended.err == ""
+    assert "\x1b" not in COLOURS.sub("", ended.out)
+
+
+# Run in a terminal: what a log, a warning, a second console and a thread print meanwhile.
+MEANWHILE = r"""
+import logging, sys, threading, time
+from fasaco_edge.cli.console import logs, streams, terminal
+streams.clean_streams()
+logs.begin_logging("info")
+def say():
+    logging.getLogger("bus").warning("no router, name \x1b[31mred\x1b[0m")
+with terminal.progress() as bar:
+    bar.add_task("at work", total=3, completed=1)
+    time.sleep(0.2)
+    thread = threading.Thread(target=say)
+    thread.start(); thread.join()
+    print("begun", end=" ")
+    print("and ended", file=sys.stderr)
+    terminal.err().print("a remark")
+    print("in stdout")
+    time.sleep(0.2)
+    print("no line end", end="")
+print()
+"""
+
+
+def test_what_is_printed_meanwhile_stands_above_the_progress(tmp_path):
+    script = tmp_path / "meanwhile.py"
+    script.write_text(MEANWHILE)
+    with Terminal(program=(sys.executable, str(script)), columns=120) as shell:
+        assert shell.end() == 0
+        assert shell.is_clean()
+        told = [
+            r"WARNING bus: no router, name \x1b[31mred\x1b[0m",
+            "and ended",
+            "a remark",
+            "begun in stdout",
+        ]
+        assert shell.screen() == [*told, "no line end", ""]
+        during = seen(shell.written.partition("no line end")[0].rpartition("\x1b[?25h")[0], 120)
+        assert during[:4] == told
+        assert during[4].startswith("at work ━")
+        assert len([line for line in during if "at work" in line]) == 1
+
+
+def test_what_is_printed_into_a_file_meanwhile_goes_there(tmp_path):
+    script, out = tmp_path / "meanwhile.py", tmp_path / "out"
+    script.write_text(MEANWHILE)
+    command = ("sh", "-c", f'"$0" "$1" > "{out}"', sys.executable, str(script))
+    with Terminal(program=command, columns=120) as shell:
+        assert shell.end() == 0
+        assert out.read_text() == "begun in stdout\nno line end\n"
+        assert "stdout" not in shell.written
