@@ -43,14 +43,26 @@ def open_own(path: str | Path, flags: int, mode: int = 0o644) -> int:
     return descriptor
 
 
-def read_own(path: str | Path, most: int = -1) -> bytes:
-    """Return the content of a plain file of ours, or of root's, that is no link; ``most`` bytes.
+class FileTooLongError(OSError):
+    """A file is longer than what reads it allows; the text says how long both are."""
+
+    def __init__(self, path: str | Path, size: int, most: int) -> None:
+        super().__init__(errno.EFBIG, f"{size} bytes, at most {most} are read", str(path))
+
+
+def read_own(path: str | Path, most: int) -> bytes:
+    """Return the whole content of a plain file of ours, or of root's, that is no link.
 
     Raises:
+        FileTooLongError: it has more than ``most`` bytes.
         OSError: that failed, or it belongs to another user.
     """
     with _open_plain(path, partial(_check_owner, path)) as file:
-        return file.read(most)
+        content = file.read(most + 1)
+        if len(content) > most:
+            size = os.fstat(file.fileno()).st_size
+            raise FileTooLongError(path, max(size, len(content)), most)
+    return content
 
 
 def _open_plain(path: str | Path, check: Callable[[os.stat_result], None]) -> BinaryIO:

@@ -38,6 +38,7 @@ from fasaco_edge.wire.documents.turns import (
     TurnBatch,
     decode_turns,
 )
+from fasaco_edge.wire.limits import MAX_MESSAGE_BYTES
 from fasaco_edge.wire.topics import TURNS
 
 # A sample that waits longer than this was taken in no cycle [ns].
@@ -142,12 +143,18 @@ def inflated_sample(told: EarlySample) -> Sample:
     """Return a sample that is in the turn log itself.
 
     Raises:
-        MalformedMessage: it cannot be inflated.
+        MalformedMessage: it cannot be inflated, or is longer than any message.
     """
+    inflater = zlib.decompressobj()
     try:
-        return Sample(told.key, zlib.decompress(told.deflated), told.schema)
+        payload = inflater.decompress(told.deflated, MAX_MESSAGE_BYTES)
     except zlib.error as error:
         raise MalformedMessage(f"turn log: sample of {told.key}: {error}") from error
+    if inflater.unconsumed_tail or not inflater.eof:
+        raise MalformedMessage(
+            f"turn log: sample of {told.key}: torn, or more than {MAX_MESSAGE_BYTES} bytes"
+        )
+    return Sample(told.key, payload, told.schema)
 
 
 @dataclass(frozen=True, slots=True)

@@ -20,10 +20,11 @@ from typing import get_args
 from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.host.addresses import Address
 from fasaco_edge.host.durable import write_through
-from fasaco_edge.host.files import read_own
+from fasaco_edge.host.files import FileTooLongError, read_own
 from fasaco_edge.host.outputs import whole
 from fasaco_edge.serve.messages import Role
 
+# Of a file with tokens: some forty.
 MOST_BYTES = 4096
 _TOKEN = re.compile(r"[\w.~-]{16,200}", re.ASCII)
 ROLES: tuple[Role, ...] = get_args(Role)
@@ -116,6 +117,11 @@ def read_tokens(file: Path) -> tuple[tuple[Role, str], ...]:
                 write_through(new, made.encode(), mode=0o600)
         open_to = stat.S_IMODE(file.stat().st_mode) & 0o077
         text = read_own(file, MOST_BYTES).decode()
+    except FileTooLongError as error:
+        raise BadConfiguration(
+            f"--tokens: {file}: {error.strerror}",
+            hint="take tokens and remarks out: all who have a role may use the same token",
+        ) from error
     except (OSError, UnicodeDecodeError) as error:
         why = error.strerror if isinstance(error, OSError) else "not a text"
         raise BadConfiguration(f"--tokens: {file}: {why}") from error

@@ -291,7 +291,7 @@ def test_a_file_too_large_is_not_read_but_kept(written):
         file.truncate(10**9)
     found = load(written)
     assert contents(found.ledger) == contents(lane(3))
-    assert f"robot.ledger: over {MOST_BYTES} bytes" in str(found.fault)
+    assert f"bytes, at most {MOST_BYTES} are read" in str(found.fault)
     (aside,) = set(names(written)) - set(NAMES)
     assert (written / aside).stat().st_size == 10**9
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from fasaco_edge.host.durable import write_through
-from fasaco_edge.host.files import make_own_folder, open_own, read_own
+from fasaco_edge.host.files import FileTooLongError, make_own_folder, open_own, read_own
 
 NOBODY = 65534
 
@@ -28,6 +28,14 @@ def test_a_link_is_not_followed(tmp_path: Path):
     assert (tmp_path / "shadow").read_text() == "root's"
 
 
+def test_a_file_is_read_whole_or_refused(tmp_path: Path):
+    file = tmp_path / "a"
+    file.write_bytes(b"123456")
+    assert read_own(file, 6) == b"123456"
+    with pytest.raises(FileTooLongError, match="6 bytes, at most 5 are read"):
+        read_own(file, 5)
+
+
 @pytest.mark.skipif(os.geteuid() != 0, reason="only root can give a file away")
 def test_another_users_file_is_not_taken(tmp_path: Path):
     file = tmp_path / "a"
@@ -36,7 +44,7 @@ def test_another_users_file_is_not_taken(tmp_path: Path):
     with pytest.raises(PermissionError, match="another user"):
         open_own(file, os.O_WRONLY | os.O_TRUNC)
     with pytest.raises(PermissionError, match="another user"):
-        read_own(file)
+        read_own(file, 6)
     assert file.read_text() == "theirs"
 
 

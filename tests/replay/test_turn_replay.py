@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import zlib
 from zlib import crc32
 
 import pytest
@@ -11,11 +12,13 @@ import pytest
 pytest.importorskip("rerun")
 
 from fasaco_edge.cli import main
+from fasaco_edge.errors import MalformedMessage
 from fasaco_edge.recording.read.run import RecordedSamples
-from fasaco_edge.replay.cycle_replay import CycleReplay, read_turns
+from fasaco_edge.replay.cycle_replay import CycleReplay, inflated_sample, read_turns
 from fasaco_edge.replay.replay import read_run
 from fasaco_edge.wire.documents.json_text import encode_json
-from fasaco_edge.wire.documents.turns import decode_turns
+from fasaco_edge.wire.documents.turns import EarlySample, decode_turns
+from fasaco_edge.wire.limits import MAX_MESSAGE_BYTES
 from fasaco_edge.wire.messages.maps import decode_map_update
 from tests.replay.scenarios import changed, places, without
 from tests.support.recorded_mission import record_mission
@@ -224,3 +227,12 @@ def test_the_command_says_that_it_is_equal(recording, capsys):
 
 def _turns(arrival):
     return decode_turns(arrival.sample.payload).turns
+
+
+def test_an_embedded_sample_is_inflated_whole_or_refused():
+    """A megabyte of a recording may claim to be a gigabyte, and half of a sample is none."""
+    assert inflated_sample(EarlySample("key", None, zlib.compress(b"pose"))).payload == b"pose"
+    longer = zlib.compress(bytes(MAX_MESSAGE_BYTES + 1))
+    for deflated in (longer, zlib.compress(bytes(1000))[:-1]):
+        with pytest.raises(MalformedMessage, match=f"torn, or more than {MAX_MESSAGE_BYTES} bytes"):
+            inflated_sample(EarlySample("key", None, deflated))

@@ -258,7 +258,12 @@ def test_it_listens_to_others_only_where_it_is_told_who_may(tmp_path):
     open_ = tmp_path / "open"
     open_.write_text(f"operator: {'x' * 20}\n")
     open_.chmod(0o644)
+    # Cut where reading ended, the first twenty letters of a token would be one.
+    long = tmp_path / "long"
+    long.write_text("# a remark\n".ljust(4065, "#") + f"\noperator: {'x' * 40}\n")
+    long.chmod(0o600)
     for more, said in (
+        (("127.0.0.1:8465", "--tokens", long), f"{long}: 4117 bytes, at most 4096 are read"),
         (("0.0.0.0:8465",), "nothing says who may"),
         (("[::]:8465",), "nothing says who may"),
         (("somewhere:8465",), "must be an address and a port"),

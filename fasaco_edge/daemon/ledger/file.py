@@ -21,7 +21,7 @@ from pathlib import Path
 from fasaco_edge.daemon.ledger.codec import MOST_BYTES, decode_ledger, encode_ledger
 from fasaco_edge.errors import FasacoError, LedgerFileError, LedgerMismatchError
 from fasaco_edge.host.durable import make_folder, sync_folder, write_through
-from fasaco_edge.host.files import open_own, read_own
+from fasaco_edge.host.files import FileTooLongError, open_own, read_own
 from fasaco_edge.mission.coverage.ledger import LedgerSnapshot
 
 # Number of renamed files of each kind that are kept, beside the largest.
@@ -240,10 +240,10 @@ def _reasons(broken: dict[Path, str]) -> str:
 
 
 def _read(path: Path) -> bytes:
-    payload = read_own(path, MOST_BYTES + 1)
-    if len(payload) > MOST_BYTES:
-        raise LedgerFileError(f"over {MOST_BYTES} bytes")
-    return payload
+    try:
+        return read_own(path, MOST_BYTES)
+    except FileTooLongError as error:
+        raise LedgerFileError(str(error.strerror)) from error
 
 
 def _is_empty(path: Path) -> bool:
