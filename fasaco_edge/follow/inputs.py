@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import json
-import threading
 import time
 from collections import deque
 from collections.abc import Callable
 
 from fasaco_edge.bus.arrival import Sample
-from fasaco_edge.bus.mailbox import LatestSlot
 from fasaco_edge.bus.session import Bus
 from fasaco_edge.errors import FasacoError
 from fasaco_edge.follow.clock import Clock, RealClock, SimulatedClock
+from fasaco_edge.follow.daemons import Daemons
 from fasaco_edge.follow.settings import FollowSettings, PoseSource
 from fasaco_edge.follow.supervision import LINK_S, Patience, Supervision
 from fasaco_edge.wire import topics
@@ -40,18 +38,13 @@ class Inputs:
         self._clock: Clock = RealClock() if real else SimulatedClock(settings.pace)
         self._decoder = PoseDecoder(settings.pose_schema, settings.frames)
         self._poses = deque[tuple[Sample, PoseSource, float]](maxlen=MOST_POSES)
-        self._path: LatestSlot[Sample] = LatestSlot()
-        # Ids of the daemons that plan, and when one of them was heard; on Zenoh's threads.
-        self._planners: set[str] = set()
-        self._heard_at: float | None = None
-        self._status = b""
-        self._lock = threading.Lock()
+        self._daemons = Daemons()
         keys = Keys(settings.robot, settings.base)
         for source in settings.poses:
             bus.subscribe(source.key, self._pose_taker(source), source.latched, source.depth)
-        bus.watch_tokens(keys.of(topics.CLAIM), self._on_claim)
-        bus.listen(keys, topics.STATUS, self._on_status)
-        bus.listen(keys, topics.PATH, self._path.put)
+        bus.watch_tokens(keys.of(topics.CLAIM), self._daemons.take_claim)
+        bus.listen(keys, topics.STATUS, self._take_status)
+        bus.listen(keys, topics.PATH, self._daemons.take_path)
 
     def now(self) -> float:
         """Return the time by the clock of the robot's seconds [s]."""
@@ -59,21 +52,15 @@ class Inputs:
 
     @property
     def daemon_state(self) -> str:
-        """The daemon's state by its newest status; "" for none."""
-        try:
-            state = json.loads(self._status)["state"]
-        except (ValueError, KeyError, TypeError):
-            return ""
-        return state if isinstance(state, str) else ""
+        """The state of the daemon that plans, by its newest status; "" for none."""
+        return self._daemons.state
 
     def feed(self, follower: Supervision) -> None:
         """Pass the inputs to a follower."""
-        with self._lock:
-            planner = min(self._planners, default="")
-            heard_at, self._heard_at = self._heard_at, None
-        follower.take_planner(planner, self.now())
-        if heard_at is not None:
-            follower.heard_status(heard_at)
+        news = self._daemons.news()
+        follower.take_planner(news.planner)
+        if news.status_at is not None:
+            follower.heard_status(news.status_at)
         while self._poses:
             sample, source, came_at = self._poses.popleft()
             at = self._clock.at(came_at)
@@ -91,8 +78,10 @@ class Inputs:
                 follower.take_pose(pose, self._clock.hear(pose.stamp_ns, came_at))
             if (link := self._decoder.oldest_link) is not None:
                 follower.heard_link(link)
-        if (path := self._path.take(0.0)) is not None:
-            follower.take_path(path.payload)
+        if news.path is not None:
+            follower.take_path(news.path.payload)
+        if news.unnamed is not None:
+            follower.take_unnamed_path(news.unnamed.payload)
 
     def _pose_taker(self, source: PoseSource) -> Callable[[Sample], None]:
         def take(sample: Sample) -> None:
@@ -100,13 +89,5 @@ class Inputs:
 
         return take
 
-    def _on_claim(self, key: str, is_there: bool) -> None:
-        _, _, claim = key.rpartition("/claim/")
-        planner, _, stand = claim.partition("/")
-        if stand == "plans":
-            with self._lock:
-                (self._planners.add if is_there else self._planners.discard)(planner)
-
-    def _on_status(self, sample: Sample) -> None:
-        with self._lock:
-            self._heard_at, self._status = self.now(), sample.payload
+    def _take_status(self, sample: Sample) -> None:
+        self._daemons.take_status(sample.payload, self.now())

@@ -6,6 +6,7 @@ No clock, no session: the caller passes the monotonic time.
 from __future__ import annotations
 
 import enum
+import math
 from abc import abstractmethod
 from dataclasses import dataclass
 
@@ -88,7 +89,7 @@ class Supervision:
         self._path_detail = ""
         self._planner = ""
         self._path_of = ""
-        self._status_at = -float("inf")
+        self._statuses, self._status_at = 0, -math.inf
 
     def take_pose(self, stamped: StampedPose, now: float) -> None:
         """Take in a pose on arrival; one with the previous stamp is not new."""
@@ -109,7 +110,7 @@ class Supervision:
         self._pose_fault = error
 
     def take_path(self, payload: bytes) -> None:
-        """Follow another path from now on; an empty or malformed one stops the robot."""
+        """Follow another path of the planner; an empty or malformed one stops the robot."""
         self._path_of = self._planner
         try:
             points = PathPoints(payload)
@@ -122,16 +123,22 @@ class Supervision:
         self._path_frame = points.frame
         self._have(points)
 
-    def take_planner(self, planner: str, now: float) -> None:
+    def take_unnamed_path(self, payload: bytes) -> None:
+        """Stop for a path of an unknown daemon: it may be the planner's, and is never driven."""
+        self.take_path(payload)
+        if self._has_path:
+            self._have_none(
+                State.BAD_PATH, "it does not name its daemon: is that an older release?"
+            )
+
+    def take_planner(self, planner: str) -> None:
         """Note which daemon plans, "" for none; a path of the previous one is dropped."""
         if planner == self._planner:
             return
-        self._planner, self._status_at = planner, now
-        if planner and self._path_of and planner != self._path_of:
+        self._planner, self._statuses, self._status_at = planner, 0, -math.inf
+        if planner and planner != self._path_of:
             self._have_none(State.NO_PATH)
             self._path_of = ""
-        elif planner and not self._path_of:
-            self._path_of = planner
 
     def hold(self, why: str) -> None:
         """Have the robot stand, whatever its path; "" lets it drive."""
@@ -148,8 +155,10 @@ class Supervision:
         return self._has_path
 
     def heard_status(self, now: float) -> None:
-        """Note a heartbeat of the daemon."""
-        self._status_at = now
+        """Note a heartbeat of the planner: a status, but for the first one, which may be cached."""
+        self._statuses += 1
+        if self._statuses > 1:
+            self._status_at = now
 
     @abstractmethod
     def _moved_to(self, pose: Pose2D, now: float) -> None:
@@ -187,7 +196,8 @@ class Supervision:
         if not self._planner:
             return State.NO_DAEMON, "none plans for this robot"
         if (silent_s := now - self._status_at) > self._patience.status_s:
-            return State.SILENT_DAEMON, f"for {silent_s:.1f} s"
+            sent_any = silent_s < math.inf
+            return State.SILENT_DAEMON, f"for {silent_s:.1f} s" if sent_any else "no status yet"
         if not self._has_path:
             return self._path_state, self._path_detail
         if self._held:

@@ -5,8 +5,9 @@
 A follower in a process of its own drives a base along a path; then one thing fails, chosen at
 random, and it is measured how long after that the last velocity but zero came. What fails: poses
 stay away, are none, jump, or are in another frame; the path becomes empty or is none; the daemon's
-token goes, its process is killed or frozen; the follower is asked to end. For poses that stay away
-the time counts from when the newest is too old, for a frozen daemon from when it is too silent.
+token goes, its process is killed or frozen, alone or beside another daemon; the follower is asked
+to end. For poses that stay away the time counts from when the newest is too old, for a frozen
+daemon from when it is too silent.
 Exit code 1 where one took longer than 0.2 s.
 """
 
@@ -77,8 +78,10 @@ def other_daemon(stage: Stage) -> Iterator[subprocess.Popen[bytes]]:
         assert daemon.stdout is not None
         assert daemon.stdout.readline() == b"plans\n"
         stage.base.plans(False)
+        stage.base.daemon = "b2"
         try:
-            # Another daemon has another path.
+            # Another daemon has another path, and is trusted from its second status on.
+            stage.base.stopped_after(time.monotonic())
             stage.drive(random.Random(0))
             yield daemon
         finally:
@@ -151,6 +154,15 @@ def daemon_is_frozen(stage: Stage) -> float:
         return stage.base.stopped_after(since + SILENT_S)
 
 
+def daemon_is_frozen_beside_another(stage: Stage) -> float:
+    """kill -STOP, while a daemon that waits publishes its status."""
+    stage.base.has_second = True
+    try:
+        return daemon_is_frozen(stage)
+    finally:
+        stage.base.has_second = False
+
+
 def follower_ends(stage: Stage) -> float:
     """As by `systemctl stop`."""
     assert stage.process is not None
@@ -173,6 +185,7 @@ CAUSES: dict[Callable[[Stage], float], float] = {
     token_goes: 3.0,
     daemon_is_killed: 1.0,
     daemon_is_frozen: 0.5,
+    daemon_is_frozen_beside_another: 0.5,
     follower_ends: 0.5,
 }
 """How often each is tried, beside the others."""

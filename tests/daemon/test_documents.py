@@ -50,7 +50,9 @@ def test_from_the_first_status_to_the_last_each_is_one(tmp_path):
         for heard in outsider.status.heard:
             check("status.json", heard.json())
         for heard in path.heard:
-            check("path_attachment.json", json.loads(heard.attachment))
+            about = json.loads(heard.attachment)
+            check("path_attachment.json", about)
+            assert about["daemon"] == outsider.status.heard[-1].json()["claim"]["id"]
         for heard in commands.heard:
             check("mission.json", heard.json())
         told = [heard.json()["command"] for heard in commands.heard]

@@ -40,7 +40,8 @@ class ClosedLoop:
                  noise=0.0, turn_gain=1.0, pose_hz=10.0, late_s=0.0, seed=0):  # fmt: skip
         self.world = World(truth, start, CONFIG)
         self.follower = Follower(LIMITS)
-        self.follower.take_planner("a1", 0.0)
+        self.follower.take_planner("a1")
+        self.follower.heard_status(0.0)
         self.now = 0.0
         self.states: Counter[State] = Counter()
         self.truth_at: list[Pose2D] = []

@@ -36,7 +36,6 @@ def test_it_docks_and_comes_out_again(base, tmp_path, domain, wanted, nav2, dock
     dock = {"pose": (1.5, 0.0, 0.0), "failures": wanted.get("failures", 0)}
     robot = {"endpoint": base.endpoint, "domain": domain, "start": (0.0, 0.0), "dock": dock}
     ros2 = {**kind_of(domain), "dock": "nav2", "nav2": nav2}
-    base.status = b'{"state":"covering"}'
     with (
         nav2_robot(**robot, **wanted) as look_alike,
         nav2_follower(tmp_path, base.endpoint, ros2, mission={"dock": DOCK}) as log,
@@ -47,12 +46,12 @@ def test_it_docks_and_comes_out_again(base, tmp_path, domain, wanted, nav2, dock
         until(log, "standing, the path is driven")
         # As the daemon does it: the path ends, and it says that the robot charges.
         base.send_path()
-        base.status = b'{"state":"charging"}'
+        base.state = "charging"
         tries, line = docking.count("Dock"), "INFO fasaco_edge.follow.docking_node: dock: docking\n"
         wait(lambda: log.read_text().count(line) == tries, log)
         base.send_path(*OUT)
         until(log, "dock: in its dock")
-        base.status = b'{"state":"covering"}'
+        base.state = "covering"
         wait(lambda: math.dist((poses[-1].x, poses[-1].y), OUT[-1]) < 0.15, log)
     done = look_alike.end()
     assert done["refused"] == []

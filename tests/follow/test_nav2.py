@@ -44,7 +44,9 @@ class Drive:
             NEAR, SPEED, lambda: next(ids).to_bytes(16, "big"), Patience(status_s=1e9)
         )
         self.now = 0.0
-        self.follower.take_planner("a1", 0.0)
+        self.follower.take_planner("a1")
+        for _ in range(2):
+            self.follower.heard_status(0.0)
         if points:
             self.path(*points)
 

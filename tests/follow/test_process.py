@@ -91,6 +91,24 @@ def test_it_stops_in_time_whatever_fails():
     assert [one for one in done if one[1] > 10 * stop_tries.LIMIT_S] == []
 
 
+def test_only_a_path_of_the_daemon_that_plans_is_driven(base, tmp_path):
+    log = tmp_path / "log"
+    with follower_process(base.endpoint, log):
+        base.plans()
+        base.send_path(*AHEAD, of="b2")
+        until(lambda: "standing, no path" in log.read_text())
+        # The path of one that plans later may come before its claim.
+        assert base.newest() is None
+        base.plans(name="b2")
+        base.wait_until_it_moves()
+        base.send_path(of="a1")
+        time.sleep(1.0)
+        base.wait_until_it_moves()
+        base.send_path(*AHEAD, of="")
+        until(lambda: "it does not name its daemon" in log.read_text())
+        until(lambda: base.newest() in (None, Command()))
+
+
 def test_a_dry_run_says_what_it_would_send_and_sends_nothing(base, tmp_path):
     base.plans()
     base.send_path(*AHEAD)

@@ -23,6 +23,9 @@ from fasaco_edge.bus.settings import BusSettings
 from fasaco_edge.follow.estimate import Command, moved
 from fasaco_edge.grid.geometry import Pose2D, StampedPose
 from fasaco_edge.wire import topics
+from fasaco_edge.wire.documents.json_text import encode_json
+from fasaco_edge.wire.documents.path_documents import PathAttachment
+from fasaco_edge.wire.documents.status import ClaimReport, Status
 from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.messages.paths import encode_path
 from fasaco_edge.wire.messages.poses import encode_pose_stamped
@@ -45,9 +48,11 @@ class DrivenBase:
         self.heard: list[tuple[float, Command]] = []
         self.pose = Pose2D(0.0, 0.0)
         self.frame = "map"
-        # What the daemon says of itself.
-        self.status = b"{}"
+        # The state that the daemon says, and its Zenoh id.
+        self.state, self.daemon = "covering", "a1"
         self.says_poses = self.says_status = True
+        # Whether a second daemon waits, and says so.
+        self.has_second = False
         self.last_pose_at = 0.0
         self._path = self.bus.advertise(self.keys, topics.PATH)
         self._pose = self.bus.advertise(self.keys, topics.POSE)
@@ -64,17 +69,21 @@ class DrivenBase:
             self.bus.withdraw(self._token)
             self._token = None
         if yes:
+            self.daemon = name
             self._token = self.bus.token(self.keys.claim(name, "plans"))
 
-    def send_path(self, *points: tuple[float, float], frame: str = "map") -> float:
-        """Publish a path; return when."""
+    def send_path(
+        self, *points: tuple[float, float], frame: str = "map", of: str | None = None
+    ) -> float:
+        """Publish a path of this daemon, or of another, "" for none; return when."""
         xy = np.array(points, np.float64).reshape(-1, 2)
-        self._path.put(encode_path(xy, np.zeros(len(xy)), frame, 1))
+        about = b"" if of == "" else named(of or self.daemon)
+        self._path.put(encode_path(xy, np.zeros(len(xy)), frame, 1), about)
         return time.monotonic()
 
     def send_raw_path(self, payload: bytes) -> float:
         """Publish bytes as a path; return when."""
-        self._path.put(payload)
+        self._path.put(payload, named(self.daemon))
         return time.monotonic()
 
     def send_raw_pose(self, payload: bytes) -> float:
@@ -128,9 +137,23 @@ class DrivenBase:
                 stamped = StampedPose(self.pose, self.frame, time.time_ns())
                 self._pose.put(encode_pose_stamped(stamped))
                 self.last_pose_at = now
-            if self.says_status and self._token is not None and now - told > 0.5:
-                told = now
-                self._status.put(self.status)
+            if now - told <= 0.5:
+                continue
+            told = now
+            if self.says_status and self._token is not None:
+                self._status.put(status_of(self.daemon, self.state))
+            if self.has_second:
+                self._status.put(status_of("c3", stand="waits"))
+
+
+def named(daemon: str) -> bytes:
+    """Return the attachment of a daemon's path."""
+    return encode_json(PathAttachment(daemon=daemon))
+
+
+def status_of(daemon: str, state: str = "covering", stand: str = "plans") -> bytes:
+    """Return the status of a daemon."""
+    return encode_json(Status(state=state, claim=ClaimReport(daemon, stand)))
 
 
 @contextmanager
@@ -155,7 +178,7 @@ def daemon_that_only_plans(endpoint: str) -> Bus:
     keys = Keys()
     status = bus.advertise(keys, topics.STATUS)
     bus.token(keys.claim("b2", "plans"))
-    status.put(b"{}")
+    status.put(status_of("b2"))
     return bus
 
 
@@ -166,7 +189,7 @@ def main() -> None:
     print("plans", flush=True)
     while True:
         time.sleep(0.5)
-        status.put(b"{}")
+        status.put(status_of("b2"))
 
 
 if __name__ == "__main__":

@@ -54,6 +54,7 @@ class Outbox:
 
     def __init__(self, bus: Bus, keys: Keys, ros: RosBridge | None = None) -> None:
         self.guard = PublishGuard()
+        self._id = bus.id
         self._ros = ros
         self._last = LastSamples(bus, keys)
         self._path = bus.advertise(keys, topics.PATH)
@@ -72,7 +73,7 @@ class Outbox:
         yaw = headings(path.xy)
         if len(yaw) and path.end_yaw is not None:
             yaw[-1] = path.end_yaw
-        attachment = encode_json(path_attachment(path))
+        attachment = encode_json(replace(path_attachment(path), daemon=self._id))
         payload = encode_path(path.xy, yaw, path.frame, path.map_stamp_ns)
         message = Shared.of(payload, schemas.PATH, attachment)
         self._last.keep("path", message)

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING, Annotated, Self
 
-from fasaco_edge.wire.documents.json_text import Amount, Count, Document, Name, Ordinal
+from fasaco_edge.wire.documents.json_text import Amount, Count, Document, Name, Ordinal, allowed
 
 if TYPE_CHECKING:
     from fasaco_edge.planners.path import CoveragePath
@@ -101,6 +101,7 @@ class PathAttachment(PlanFigures, frozen=True):
     """The Zenoh attachment of each path.
 
     Attributes:
+        daemon: Zenoh id of the daemon that published it, ``claim.id`` of its status.
         revision: counts the published paths of a mission, from 1; 0 for the empty path with which
             a daemon begins to plan.
         map_stamp_ns: stamp of the map it was planned on [ns]; 0 without one.
@@ -112,6 +113,7 @@ class PathAttachment(PlanFigures, frozen=True):
             null if that is not the reason.
     """
 
+    daemon: Annotated[str, allowed(pattern="^[0-9a-f]{1,32}$")] = ""
     revision: Count = 0
     map_stamp_ns: int = 0
     map_revision: Count = 0

@@ -1,0 +1,93 @@
+"""Of all that a robot's daemons send, the follower takes what the one that plans sends."""
+
+import pytest
+
+from fasaco_edge.bus.arrival import Sample
+from fasaco_edge.follow.daemons import MOST_DAEMONS, Daemons
+from fasaco_edge.wire.keys import Keys
+from tests.support.driven_base import named, status_of
+
+A, B = "0a", "0b"
+
+
+@pytest.fixture
+def daemons():
+    daemons = Daemons()
+    claim(daemons, A)
+    return daemons
+
+
+def claim(daemons, own, stand="plans", is_there=True):
+    daemons.take_claim(Keys().claim(own, stand), is_there)
+
+
+def path(own, payload=b"path"):
+    return Sample("path", payload, attachment=named(own) if own else b"")
+
+
+@pytest.mark.parametrize(
+    "status",
+    [
+        status_of(B),
+        status_of(A, stand="waits"),
+        status_of(A, stand="looks"),
+        b"{}",
+        b"[]",
+        b"\xff",
+        b'{"claim":7}',
+        b'{"claim":{"id":["0a"],"stand":"plans"}}',
+        b'{"claim":{"id":"0a","stand":["plans"]}}',
+        b"[" * 100_000,
+    ],
+)
+def test_no_other_status_is_a_sign_of_life(daemons, status):
+    daemons.take_status(status, 1.0)
+    assert daemons.news().status_at is None
+    assert daemons.state == ""
+    daemons.take_status(status_of(A, "charging"), 2.0)
+    daemons.take_status(status, 3.0)
+    assert daemons.news().status_at == 2.0
+    assert daemons.state == "charging"
+
+
+def test_each_sample_is_news_once(daemons):
+    daemons.take_status(status_of(A), 1.0)
+    daemons.take_path(path(A))
+    news = daemons.news()
+    assert (news.planner, news.status_at, news.path) == (A, 1.0, path(A))
+    news = daemons.news()
+    assert (news.planner, news.status_at, news.path) == (A, None, None)
+
+
+def test_a_path_that_comes_before_its_claim_waits_for_it(daemons):
+    daemons.take_path(path(B))
+    assert daemons.news().path is None
+    claim(daemons, A, is_there=False)
+    assert daemons.news().planner == ""
+    claim(daemons, B)
+    assert daemons.news().path == path(B)
+
+
+def test_of_two_that_plan_it_is_the_one_that_will_go_on(daemons):
+    claim(daemons, B)
+    daemons.take_path(path(B))
+    assert (daemons.news().planner, daemons.news().path) == (A, None)
+
+
+def test_a_path_without_a_daemon_is_handed_over_apart(daemons):
+    daemons.take_path(path(""))
+    news = daemons.news()
+    assert (news.path, news.unnamed) == (None, path(""))
+    assert daemons.news().unnamed is None
+
+
+def test_a_flood_of_daemons_takes_no_memory_and_not_the_place_of_the_one_that_plans(daemons):
+    daemons.take_path(path(A))
+    for number in range(100 * MOST_DAEMONS):
+        own = f"1{number:08x}"
+        claim(daemons, own)
+        daemons.take_path(path(own))
+        daemons.take_status(status_of(own), 1.0)
+    assert daemons.news().path == path(A)
+    assert len(daemons._daemons) <= 2 * MOST_DAEMONS
+    assert len(daemons._planners) <= MOST_DAEMONS
