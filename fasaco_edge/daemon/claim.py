@@ -1,18 +1,10 @@
-"""The claim on a robot's name: of several daemons with one name, only one plans.
-
-Each shows a liveliness token ``claim/<its Zenoh id>/<waits, yields or plans>``. A daemon that
-finds another planning waits until that one is gone. The id alone decides which of several waiting
-daemons is next, and which of two active daemons continues after a network partition: so both
-agree, whatever their clocks say.
-"""
+"""The claim on a robot's name: of several daemons with one name, only one plans."""
 
 from __future__ import annotations
 
 import logging
-import re
-from collections.abc import Iterable, Mapping
-from enum import StrEnum
 
+from fasaco_edge.bus.claim import BusClaim
 from fasaco_edge.bus.session import Bus
 from fasaco_edge.wire import topics
 from fasaco_edge.wire.documents.status import ClaimReport
@@ -20,136 +12,12 @@ from fasaco_edge.wire.keys import Keys
 
 LOG = logging.getLogger(__name__)
 
-# Time within which two that start together see each other's tokens [s].
-SETTLE_S = 0.2
-# Period of token queries while one daemon plans [s]; otherwise every cycle.
-ASK_PERIOD_S = 1.0
-# Time that the others need to reconnect to a restarted router [s].
-REJOIN_S = 3.0
-# A session silent for this long is dead to the others: Zenoh's lease [s].
-LEASE_S = 10.0
-# Longest wait for a daemon that could plan and does not [s]: its lease and a margin.
-PATIENCE_S = 15.0
 
-_ID = re.compile(r"[0-9a-f]{1,32}")
-
-
-class ClaimState(StrEnum):
-    """State of a daemon's claim; all but the first are chunks of tokens.
-
-    A daemon that ``yields`` waits now and planned before: it published an empty path to stop the
-    robot.
-    """
-
-    LOOKS = "looks"
-    WAITS = "waits"
-    YIELDS = "yields"
-    PLANS = "plans"
-
-    @property
-    def is_waiting(self) -> bool:
-        """Whether another daemon is to plan."""
-        return self in (ClaimState.WAITS, ClaimState.YIELDS)
-
-
-_SHOWN = (ClaimState.WAITS, ClaimState.YIELDS, ClaimState.PLANS)
-
-
-class Claim:
-    """The decision which daemon of a name plans: a pure function of observations and times.
-
-    Attributes:
-        state: of this daemon.
-        rival: id of the daemon it waits for, or last waited for; "" for none.
-        rival_yielded: whether this one plans, and another active one has just yielded.
-    """
-
-    def __init__(self, own: str) -> None:
-        self.state = ClaimState.LOOKS
-        self.rival = ""
-        self.rival_yielded = False
-        self._own = own
-        self._calm_since: float | None = None
-        self._calm_s = SETTLE_S
-        self._uncertain_until = float("-inf")
-        self._was_in_touch = True
-        self._yielding: set[str] = set()
-        self._decided_at: float | None = None
-
-    def is_uncertain(self, now: float) -> bool:
-        """Tell whether another may plan unseen by now: publish nothing until that is known.
-
-        This is so after a pause in which the others may have taken this daemon for dead.
-        """
-        return self.state is ClaimState.PLANS and now < self._uncertain_until
-
-    def decide(
-        self, others: Mapping[str, ClaimState], now: float, *, in_touch: bool = True
-    ) -> None:
-        """Update the state.
-
-        Args:
-            others: the other daemons by id.
-            now: time of any monotonic clock [s].
-            in_touch: whether others are visible; otherwise nothing changes.
-        """
-        self.rival_yielded = False
-        self._notice_absence(now, in_touch=in_touch)
-        if not in_touch:
-            return
-        planning = {one for one, state in others.items() if state is ClaimState.PLANS}
-        yielding = {one for one, state in others.items() if state is ClaimState.YIELDS}
-        plans = self.state is ClaimState.PLANS
-        if planning and (not plans or min(planning) < self._own):
-            yields = plans or self.state is ClaimState.YIELDS
-            self.state = ClaimState.YIELDS if yields else ClaimState.WAITS
-            self.rival, self._calm_since = min(planning), None
-        elif plans:
-            self.rival_yielded = bool(yielding - self._yielding)
-        else:
-            self._wait_for_calm(min(others, default=""), now)
-        self._yielding = yielding
-
-    def _notice_absence(self, now: float, *, in_touch: bool) -> None:
-        """Be uncertain for a while after the others were not visible."""
-        paused_s = 0.0 if self._decided_at is None else now - self._decided_at
-        self._decided_at = now
-        if paused_s > LEASE_S or (in_touch and not self._was_in_touch):
-            self._calm_since, self._calm_s = None, REJOIN_S
-            self._uncertain_until = now + (REJOIN_S if paused_s > LEASE_S else SETTLE_S)
-        self._was_in_touch = in_touch
-
-    def _wait_for_calm(self, first: str, now: float) -> None:
-        """Plan once no other has planned for a while, and no other id is smaller."""
-        if self._calm_since is None:
-            self._calm_since = now
-        is_calm_for_s = now - self._calm_since - self._calm_s
-        if is_calm_for_s < 0.0:
-            return
-        if first and first < self._own and is_calm_for_s < PATIENCE_S:
-            self.rival = first
-            if self.state is ClaimState.LOOKS:
-                self.state = ClaimState.WAITS
-        else:
-            self.state, self._calm_s = ClaimState.PLANS, SETTLE_S
-
-
-class NameClaim(Claim):
-    """The claim of this daemon, and its token on the bus.
-
-    Attributes:
-        is_settled: whether it is known that a daemon of this name plans.
-    """
+class NameClaim(BusClaim):
+    """The claim of this daemon."""
 
     def __init__(self, bus: Bus, keys: Keys) -> None:
-        super().__init__(bus.id)
-        self._bus = bus
-        self._keys = keys
-        self._roll = bus.roll(keys.of(topics.CLAIM))
-        self._token = bus.token(keys.claim(bus.id, ClaimState.WAITS))
-        self._others: dict[str, ClaimState] = {}
-        self._version = 0
-        self.is_settled = False
+        super().__init__(bus, keys, topics.CLAIM)
         self._was_waiting = False
 
     def report(self) -> ClaimReport:
@@ -166,44 +34,19 @@ class NameClaim(Claim):
 
         The token follows with ``announce``, once the previous path is withdrawn.
         """
-        before = self.state
-        in_touch = self._bus.keep_in_touch(now)
-        is_settled = self.is_settled and not self.is_uncertain(now)
-        self._roll.ask(ASK_PERIOD_S if is_settled else 0.0)
-        if not self._roll.version:
-            return False
-        if self._roll.version != self._version:
-            self._version = self._roll.version
-            self._others = claims_in(self._roll.there())
-            self._others.pop(self._bus.id, None)
-            # If none plans, one soon will.
-            self.is_settled = ClaimState.PLANS in (self.state, *self._others.values())
-        self.decide(self._others, now, in_touch=in_touch)
+        has_changed = super().update(now)
         if self.rival_yielded:
             LOG.warning("another daemon of this name was planning, too, and has yielded")
-        return self.state is not before
+        return has_changed
 
     def announce(self) -> None:
         """Show the state by the token, and log it once."""
-        state, before = self.state, self._token
+        state = self.state
         if self._was_waiting is not state.is_waiting:
             self._was_waiting = state.is_waiting
             self._bus.let_others_answer(state.is_waiting)
-        self._token = self._bus.token(self._keys.claim(self._bus.id, state))
-        self._bus.withdraw(before)
+        self.show()
         if state.is_waiting:
             LOG.warning("%s; this one waits", self.reason, extra={"event": "name_taken"})
         elif self.rival:
             LOG.warning("%s is gone: this daemon plans", self.rival)
-
-
-def claims_in(keys: Iterable[str]) -> dict[str, ClaimState]:
-    """Return the states of the daemons with these tokens, by id; other keys are left out."""
-    claims: dict[str, ClaimState] = {}
-    for key in keys:
-        _, own, state = key.rsplit("/", 2)
-        if _ID.fullmatch(own) and state in _SHOWN:
-            # A daemon that changes its state has two tokens for a moment: PLANS comes first.
-            before = claims.get(own, ClaimState.WAITS)
-            claims[own] = max(ClaimState(state), before, key=_SHOWN.index)
-    return claims

@@ -15,10 +15,10 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from fasaco_edge.bus.arrival import Sample
+from fasaco_edge.bus.claim import claims_in
 from fasaco_edge.bus.session import Bus, open_bus
 from fasaco_edge.bus.settings import BusSettings, check_settings
 from fasaco_edge.config.endpoints import from_here, host_of, protocol_of
-from fasaco_edge.daemon.claim import claims_in
 from fasaco_edge.doctor.finding import CheckContext, Finding, fail, ok, warn
 from fasaco_edge.errors import BadConfiguration, BusUnavailable, MalformedMessage
 from fasaco_edge.text import one_line

@@ -126,7 +126,8 @@ class Docking:
         return requests
 
     def end(self) -> list[DockRequest]:
-        """Return the requests that end all goals."""
+        """Return the requests that end all goals; the next pose says anew whether it is docked."""
+        self._is_docked = None
         if (goal := self._goal) is None:
             return []
         self._goal = None

@@ -15,7 +15,7 @@ from fasaco_edge.follow.action_client import ActionClient
 from fasaco_edge.follow.inputs import Inputs, patience_of
 from fasaco_edge.follow.nav2 import Nav2Follower
 from fasaco_edge.follow.nav2_requests import AskResult, CancelGoal, Request, SendGoal
-from fasaco_edge.follow.node import StateLog, docking_of
+from fasaco_edge.follow.node import Role, StateLog
 from fasaco_edge.follow.settings import FollowSettings
 from fasaco_edge.wire.messages.follow_path import (
     GOAL_ID_BYTES,
@@ -59,7 +59,7 @@ class Nav2Node:
         # Replies of Nav2, from Zenoh's threads.
         self._answers = deque[Callable[[], None]]()
         self._client = ActionClient(bus, ros, self._action, FOLLOW_PATH)
-        self._docking = docking_of(bus, settings)
+        self._role = Role(bus, settings)
         if ros["kind"] == "rmw_zenoh":
             bus.token(RosNode(self._domain, bus.id, ros["namespace"], ros["node"]).token)
 
@@ -68,16 +68,14 @@ class Nav2Node:
         self._client.look()
         self._take_answers()
         self._inputs.feed(self._follower)
-        if self._docking is not None:
-            self._docking.turn(self._inputs, self._follower)
+        self._role.turn(self._inputs, self._follower)
         for request in self._follower.step(self._inputs.now()):
             self._ask(request)
         self._states.note(self._follower.state, self._follower.detail)
 
     def end(self) -> None:
         """Stop the robot."""
-        if self._docking is not None:
-            self._docking.end()
+        self._role.end()
         requests = self._follower.end()
         for request in requests:
             self._ask(request)

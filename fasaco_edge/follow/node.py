@@ -12,11 +12,12 @@ from typing import TYPE_CHECKING, Protocol
 from fasaco_edge.bus.joining import join
 from fasaco_edge.bus.session import Bus
 from fasaco_edge.bus.settings import BusSettings
+from fasaco_edge.follow.base_claim import BaseClaim
 from fasaco_edge.follow.estimate import STAND, Command, Limits
 from fasaco_edge.follow.follower import RATE_HZ, Follower
 from fasaco_edge.follow.inputs import Inputs, patience_of
 from fasaco_edge.follow.settings import FollowSettings
-from fasaco_edge.follow.supervision import State
+from fasaco_edge.follow.supervision import State, Supervision
 from fasaco_edge.host.processes import release_unused
 from fasaco_edge.wire import topics
 from fasaco_edge.wire.messages.twists import Velocity, encode_velocity
@@ -104,6 +105,31 @@ def _take_turns(node: Node, period_s: float, stop: threading.Event) -> None:
         stop.wait(due - now)
 
 
+class Role:
+    """The follower's right to the base, and what has Nav2 dock the robot."""
+
+    def __init__(self, bus: Bus, settings: FollowSettings) -> None:
+        self._claim = None if settings.dry_run else BaseClaim(bus, settings)
+        self._docking = docking_of(bus, settings)
+        self.is_on_standby = self._claim is not None
+
+    def turn(self, inputs: Inputs, follower: Supervision) -> None:
+        """Run a cycle: have the follower stand by while another one drives; dock."""
+        why = self._claim.standby(time.monotonic()) if self._claim is not None else None
+        self.is_on_standby = why is not None
+        follower.stand_by(why)
+        if self._docking is not None:
+            if self.is_on_standby:
+                self._docking.end()
+            else:
+                self._docking.turn(inputs, follower)
+
+    def end(self) -> None:
+        """End what Nav2 does."""
+        if self._docking is not None:
+            self._docking.end()
+
+
 class FollowerNode:
     """Takes the inputs, steps the follower, and sends its commands."""
 
@@ -125,7 +151,7 @@ class FollowerNode:
             moves=not settings.dry_run,
         )
         self._inputs = Inputs(settings, bus)
-        self._docking = docking_of(bus, settings)
+        self._role = Role(bus, settings)
         self._states = StateLog()
         self._reported_at = -math.inf
         self._due = -math.inf
@@ -137,8 +163,7 @@ class FollowerNode:
         now = self._inputs.now()
         if self._settings.pace != 1.0 and not self._is_due(now):
             return
-        if self._docking is not None:
-            self._docking.turn(self._inputs, follower)
+        self._role.turn(self._inputs, follower)
         command = follower.step(now)
         if command is not None:
             self._send(command)
@@ -148,8 +173,7 @@ class FollowerNode:
 
     def end(self) -> None:
         """Have the robot stand."""
-        if self._docking is not None:
-            self._docking.end()
+        self._role.end()
         self._send(STAND)
 
     def _is_due(self, now: float) -> bool:
@@ -161,8 +185,8 @@ class FollowerNode:
         return True
 
     def _send(self, command: Command) -> None:
-        """Send a command; in a dry run none."""
-        if self._settings.dry_run:
+        """Send a command; in a dry run, or while another follower drives, none."""
+        if self._settings.dry_run or self._role.is_on_standby:
             return
         velocity = Velocity(command.speed, command.turn_rate)
         if self._settings.schema == TWIST_STAMPED:

@@ -36,6 +36,9 @@ class State(enum.Enum):
     BAD_POSE = "pose refused"
     POSE_JUMPED = "pose jumped"
     WRONG_FRAME = "wrong frame"
+    LOOKS = "looks for other followers"
+    SECOND = "another follower drives"
+    NO_RIGHT = "no right to drive"
     NO_DAEMON = "no daemon"
     SILENT_DAEMON = "daemon silent"
     STANDS = "Nav2's controller stands"
@@ -79,6 +82,7 @@ class Supervision:
         self.state, self.detail = State.NO_DAEMON, ""
         self._patience = patience
         self._held = ""
+        self._standby: tuple[State, str] | None = None
         self._newest: Pose2D | None = None
         self._frame, self._stamp_ns = "", 0
         self._repeats = False
@@ -144,6 +148,10 @@ class Supervision:
         """Have the robot stand, whatever its path; "" lets it drive."""
         self._held = why
 
+    def stand_by(self, why: tuple[State, str] | None) -> None:
+        """Have the robot left alone, for a reason with figures; None ends that."""
+        self._standby = why
+
     @property
     def newest_pose(self) -> Pose2D | None:
         """The newest pose; None before there is one."""
@@ -193,6 +201,8 @@ class Supervision:
 
     def _trouble(self, now: float) -> tuple[State, str]:
         """Return why the robot must stand, with figures; or that it may drive."""
+        if self._standby is not None:
+            return self._standby
         if not self._planner:
             return State.NO_DAEMON, "none plans for this robot"
         if (silent_s := now - self._status_at) > self._patience.status_s:

@@ -6,10 +6,10 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from fasaco_edge.bus.claim import ClaimState
 from fasaco_edge.bus.latched import Subscription
 from fasaco_edge.bus.session import Bus
 from fasaco_edge.config.config import DaemonConfig
-from fasaco_edge.daemon.claim import ClaimState
 from fasaco_edge.daemon.ledger.writer import LedgerKeeper, LedgerWriter
 from fasaco_edge.daemon.loop.fleet import FleetEar
 from fasaco_edge.daemon.loop.inbox import Batch, Inbox, make_mailbox

@@ -52,9 +52,10 @@ class Keys:
         robot = key.removeprefix(f"{self.base}/{VERSION}/").partition("/")[0]
         return robot if is_chunk(robot) else ""
 
-    def claim(self, own: str, stand: str) -> str:
-        """Return the token of the daemon with the Zenoh id ``own``, which "plans" or "waits"."""
-        return self.of(CLAIM).replace("*/*", f"{own}/{stand}")
+    def claim(self, own: str, stand: str, topic: Topic = CLAIM) -> str:
+        """Return the token of the daemon with the Zenoh id ``own``, which "plans" or "waits"; or
+        that of another topic whose key ends so."""
+        return self.of(topic).replace("*/*", f"{own}/{stand}")
 
     def rpc(self, name: str) -> str:
         """Return the key of the queryable ``name``.

@@ -106,6 +106,15 @@ CMD_VEL = Topic(
         "interactive_high", express=True, why="the next velocity is better than one sent again"
     ),
 )
+DRIVER = Topic(
+    name="driver",
+    direction="liveliness token",
+    when="each follower of this robot has one; its key says whether it drives or waits",
+    speaker="driver",
+    # The followers of one robot find each other by these.
+    listeners=("viewer",),
+    key="driver/*/*",
+)
 COVERAGE = Topic(
     name="coverage",
     direction="out",
@@ -255,7 +264,7 @@ TOPICS = (
     *(MAP, MAP_UPDATE, POSE, BATTERY, KEEP_OUT_MASK),
     *(PATH, COVERAGE, FLOOR, PHEROMONE, DIRECTIONS, STATUS, COMMAND, TURNS, FLEET, ALIVE, CLAIM),
     *(RECORDER, RECORDER_ALIVE),
-    CMD_VEL,
+    *(CMD_VEL, DRIVER),
 )
 # These keep the order of their one publisher: an update changes the map before it.
 IN_ORDER = frozenset({MAP.name, MAP_UPDATE.name})

@@ -30,7 +30,7 @@ MATCHED = {
     "**": set(),
     "fasaco/@v1/**": topics(*TOPICS, robots=ROBOTS),
     "fasaco/@v1/robot/**": topics(*TOPICS),
-    "fasaco/@v1/robot/*": topics(*TOPICS.keys() - {"recorder_alive", "claim"}),
+    "fasaco/@v1/robot/*": topics(*TOPICS.keys() - {"recorder_alive", "claim", "driver"}),
     "fasaco/@v1/*/status": topics("status", robots=ROBOTS),
     "fasaco/@v1/*/alive": topics("alive", robots=ROBOTS),
     "fasaco/@v1/**/alive": topics("alive", "recorder_alive", robots=ROBOTS),

@@ -32,7 +32,7 @@ import yaml
 import zenoh
 
 from fasaco_edge.bench.processes import warm_kernels
-from fasaco_edge.daemon.claim import ClaimState, claims_in
+from fasaco_edge.bus.claim import ClaimState, claims_in
 from tests.campaigns import passing_mappers
 from tests.campaigns.services import show
 from tests.support.outsider import Outsider, open_client

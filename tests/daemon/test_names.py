@@ -12,8 +12,8 @@ import pytest
 import zenoh
 from msgspec import convert
 
+from fasaco_edge.bus.claim import ClaimState, claims_in
 from fasaco_edge.config.config import BusConfig, DaemonConfig
-from fasaco_edge.daemon.claim import ClaimState, claims_in
 from fasaco_edge.daemon.memory import needed_bytes
 from fasaco_edge.doctor import session
 from fasaco_edge.doctor.finding import CheckContext, Level

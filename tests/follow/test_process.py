@@ -159,6 +159,14 @@ def test_it_starts_without_standard_input(tmp_path):
     assert process.returncode == 0
 
 
+def config_file(folder, endpoint, ros2):
+    """Return a configuration of a follower, in ROS 2 or, with nothing, by the native keys."""
+    config = folder / "config.yaml"
+    bus = {"listen": [], "connect": [endpoint], "mode": "client"}
+    config.write_text(yaml.safe_dump({"bus": bus} | ({"ros2": ros2} if ros2 else {})))
+    return config
+
+
 def test_limits_names_and_topics_come_from_the_configuration(base, tmp_path):
     """Under ROS 2 by rmw_zenoh: its key, its attachment, its tokens."""
     config = tmp_path / "config.yaml"

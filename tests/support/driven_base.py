@@ -11,13 +11,15 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from fasaco_edge.bus.arrival import Sample
+from fasaco_edge.bus.publisher import Publisher
 from fasaco_edge.bus.session import Bus, open_bus
 from fasaco_edge.bus.settings import BusSettings
 from fasaco_edge.follow.estimate import Command, moved
@@ -30,6 +32,7 @@ from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.messages.paths import encode_path
 from fasaco_edge.wire.messages.poses import encode_pose_stamped
 from fasaco_edge.wire.messages.twists import decode_velocity
+from fasaco_edge.wire.schemas import TWIST
 from tests.support.processes import ENVIRONMENT, PROGRAM, free_endpoint
 
 # Whoever has not stopped by then will not [s].
@@ -40,10 +43,10 @@ POSE_S = 0.05
 class DrivenBase:
     """A base without inertia, beside a token and a status as of a daemon that plans."""
 
-    def __init__(self) -> None:
+    def __init__(self, secured: Mapping[str, Any] | None = None) -> None:
         self.endpoint = free_endpoint()
         self.keys = Keys()
-        self.bus = open_bus(BusSettings(mode="router", connect=(), listen=(self.endpoint,)))
+        self.bus = open_bus(BusSettings("router", (), (self.endpoint,), secured or {}))
         # When each velocity came [s, monotonic], and what it was.
         self.heard: list[tuple[float, Command]] = []
         self.pose = Pose2D(0.0, 0.0)
@@ -57,11 +60,18 @@ class DrivenBase:
         self._path = self.bus.advertise(self.keys, topics.PATH)
         self._pose = self.bus.advertise(self.keys, topics.POSE)
         self._status = self.bus.advertise(self.keys, topics.STATUS)
+        self._ros_pose: Publisher | None = None
         self._token: object | None = None
         self._stop = threading.Event()
         self.bus.listen(self.keys, topics.CMD_VEL, self._hear)
         self._thread = threading.Thread(target=self._move)
         self._thread.start()
+
+    def take_ros(self, domain: int) -> None:
+        """Move as ROS 2 velocities say, and publish poses there, too."""
+        self.bus.subscribe(f"{domain}/cmd_vel/**", self._hear)
+        key = f"{domain}/pose/geometry_msgs::msg::dds_::PoseStamped_/RIHS01_0"
+        self._ros_pose = self.bus.publisher(key, "")
 
     def plans(self, yes: bool = True, name: str = "a1") -> None:
         """Have the token of a daemon that plans, or not."""
@@ -124,7 +134,7 @@ class DrivenBase:
         self.bus.close()
 
     def _hear(self, sample: Sample) -> None:
-        velocity = decode_velocity(sample.payload, sample.schema)
+        velocity = decode_velocity(sample.payload, sample.schema or TWIST)
         self.heard.append((time.monotonic(), Command(velocity.speed_m_s, velocity.turn_rad_s)))
 
     def _move(self) -> None:
@@ -136,6 +146,8 @@ class DrivenBase:
             if self.says_poses:
                 stamped = StampedPose(self.pose, self.frame, time.time_ns())
                 self._pose.put(encode_pose_stamped(stamped))
+                if self._ros_pose is not None:
+                    self._ros_pose.put(encode_pose_stamped(stamped))
                 self.last_pose_at = now
             if now - told <= 0.5:
                 continue

@@ -29,7 +29,7 @@ WILDCARDS: dict[str, str] = {
     "**": "nothing",
     "fasaco/@v1/**": "all but the queries",
     "fasaco/@v1/robot/**": "all but the queries",
-    "fasaco/@v1/robot/*": "all but the queries, `recorder/alive` and claims",
+    "fasaco/@v1/robot/*": "all but the queries, `recorder/alive`, claims and drivers",
     "fasaco/@v1/*/status": "`status` of every robot",
     "fasaco/@v1/*/alive": "`alive` of every robot",
     "fasaco/@v1/**/alive": "`alive` and `recorder/alive` of every robot",

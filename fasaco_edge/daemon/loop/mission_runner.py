@@ -10,9 +10,9 @@ import time
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
+from fasaco_edge.bus.claim import ClaimState
 from fasaco_edge.bus.mailbox import Mailbox
 from fasaco_edge.config.config import DaemonConfig
-from fasaco_edge.daemon.claim import ClaimState
 from fasaco_edge.daemon.ledger.writer import LedgerKeeper
 from fasaco_edge.daemon.loop.held_events import HeldEvents
 from fasaco_edge.daemon.loop.loader import Loader

@@ -6,7 +6,7 @@ import random
 
 import pytest
 
-from fasaco_edge.daemon.claim import (
+from fasaco_edge.bus.claim import (
     LEASE_S,
     PATIENCE_S,
     REJOIN_S,
@@ -122,10 +122,10 @@ def test_out_of_touch_nobody_takes_over():
     claim = planning(A)
     claim.decide({}, 1.0, in_touch=False)
     assert not claim.is_uncertain(1.0)
-    claim.decide({}, 9.0)
+    claim.decide({}, 6.0)
     assert claim.state is ClaimState.PLANS
-    assert claim.is_uncertain(9.0)
-    assert not claim.is_uncertain(9.0 + SETTLE_S)
+    assert claim.is_uncertain(6.0)
+    assert not claim.is_uncertain(6.0 + SETTLE_S)
 
 
 def test_who_was_frozen_says_nothing_until_it_has_seen_who_plans_now():
@@ -137,6 +137,21 @@ def test_who_was_frozen_says_nothing_until_it_has_seen_who_plans_now():
     assert claim.is_uncertain(woken)
     claim.decide({A: ClaimState.PLANS}, woken + 1.0)
     assert claim.state is ClaimState.YIELDS
+
+
+def test_a_pause_shorter_than_the_lease_may_have_been_too_long():
+    """The others count from the last sign of life, which may be a quarter of the lease older."""
+    claim = planning(A)
+    woken = CALM_S + 0.8 * LEASE_S
+    claim.decide({}, woken)
+    assert claim.is_uncertain(woken)
+
+
+def test_the_word_for_the_active_one_is_the_roles_own():
+    keys = ["x/driver/0a/drives", "x/driver/0b/waits", "x/driver/0c/yields"]
+    stands = (ClaimState.PLANS, ClaimState.WAITS, ClaimState.YIELDS)
+    assert claims_in(keys, "drives") == dict(zip((A, B, C), stands, strict=True))
+    assert A not in claims_in(keys)
 
 
 def test_only_what_is_a_claim_counts():

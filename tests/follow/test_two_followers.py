@@ -1,0 +1,158 @@
+"""Of several followers of one robot one drives; the others send nothing and say why."""
+
+import contextlib
+import signal
+import subprocess
+import time
+
+import pytest
+
+from fasaco_edge.bus import access
+from fasaco_edge.follow.base_claim import NO_RIGHT
+from fasaco_edge.follow.estimate import Command
+from fasaco_edge.wire import topics
+from tests.follow.nav2_missions import kind_of, nav2_follower, nav2_robot
+from tests.follow.test_process import AHEAD, config_file, until
+from tests.support.driven_base import DrivenBase, follower_process
+
+# As in a long hall, so that the robot drives through each test.
+FAR = ((0.0, 0.0), (30.0, 0.0))
+RMW = {"kind": "rmw_zenoh", "domain": 7, "pose": "geometry_msgs/msg/PoseStamped"}
+SECOND = "standing, another follower drives: Zenoh id"
+
+
+@pytest.fixture
+def base():
+    base = DrivenBase()
+    base.plans()
+    base.send_path(*FAR)
+    yield base
+    base.close()
+
+
+def standing(base):
+    """Return the last chunk of each follower's token, sorted."""
+    return sorted(key.rpartition("/")[2] for key in base.bus.alive(base.keys.of(topics.DRIVER)))
+
+
+def commands_a_second(base, seconds=1.5):
+    count = len(base.heard)
+    time.sleep(seconds)
+    return (len(base.heard) - count) / seconds
+
+
+@pytest.mark.parametrize("ros2", [{}, RMW], ids=["native", "ROS 2"])
+@pytest.mark.parametrize("ends", [signal.SIGTERM, signal.SIGKILL], ids=["ends", "is killed"])
+def test_the_second_waits_in_silence_and_takes_over(base, tmp_path, ends, ros2):
+    if ros2:
+        base.take_ros(7)
+    config = config_file(tmp_path, base.endpoint, ros2)
+    first_log, second_log = tmp_path / "first", tmp_path / "second"
+    with follower_process(base.endpoint, first_log, "--config", str(config)) as first:
+        base.wait_until_it_moves()
+        with follower_process(base.endpoint, second_log, "--config", str(config)):
+            until(lambda: SECOND in second_log.read_text())
+            assert standing(base) == ["drives", "waits"]
+            assert commands_a_second(base) < 23.0
+            assert all(command.speed > 0.0 for _, command in base.heard[-10:])
+            first.send_signal(ends)
+            first.wait(30)
+            until(lambda: standing(base) == ["drives"])
+            until(lambda: "this one drives" in second_log.read_text())
+            base.wait_until_it_moves()
+    assert base.heard[-1][1] == Command()
+    assert "Traceback" not in first_log.read_text() + second_log.read_text()
+
+
+def test_the_end_of_one_that_waits_leaves_the_robot_driving(base, tmp_path):
+    first_log, second_log = tmp_path / "first", tmp_path / "second"
+    with follower_process(base.endpoint, first_log):
+        base.wait_until_it_moves()
+        with follower_process(base.endpoint, second_log):
+            until(lambda: SECOND in second_log.read_text())
+            count = len(base.heard)
+        time.sleep(1.0)
+        assert all(command.speed > 0.0 for _, command in base.heard[count:])
+
+
+def test_of_three_that_start_at_once_one_drives(base, tmp_path):
+    logs = [tmp_path / name for name in "abc"]
+    with contextlib.ExitStack() as stack:
+        for log in logs:
+            stack.enter_context(follower_process(base.endpoint, log))
+        base.wait_until_it_moves()
+        until(lambda: standing(base) == ["drives", "waits", "waits"])
+        assert commands_a_second(base) < 23.0
+    assert sum("INFO fasaco_edge.follow.node: driving" in log.read_text() for log in logs) >= 1
+
+
+def test_one_that_was_frozen_for_long_does_not_drive_beside_its_successor(base, tmp_path):
+    """Its token is gone by then, and it does not know."""
+    logs = tmp_path / "first", tmp_path / "second"
+    with follower_process(base.endpoint, logs[0]) as first:
+        base.wait_until_it_moves()
+        with follower_process(base.endpoint, logs[1]):
+            until(lambda: SECOND in logs[1].read_text())
+            first.send_signal(signal.SIGSTOP)
+            until(lambda: "this one drives" in logs[1].read_text())
+            base.wait_until_it_moves()
+            first.send_signal(signal.SIGCONT)
+            assert commands_a_second(base, 6.0) < 23.0
+            until(lambda: standing(base) == ["drives", "yields"])
+
+
+def test_nav2_gets_goals_from_one_of_two(base, tmp_path):
+    base.says_poses = False
+    robot = {"endpoint": base.endpoint, "domain": 7, "start": (0.0, 0.0), "speed": 0.4}
+    (tmp_path / "second").mkdir()
+    with (
+        nav2_robot(**robot) as nav2,
+        nav2_follower(tmp_path, base.endpoint, kind_of(7)) as first,
+    ):
+        until(lambda: "driving" in first.read_text())
+        with nav2_follower(tmp_path / "second", base.endpoint, kind_of(7)) as second:
+            until(lambda: SECOND in second.read_text())
+            base.send_path((0.0, 0.0), (2.0, 0.0))
+            until(lambda: "the path is driven" in first.read_text())
+    done = nav2.end()
+    assert done["counts"]["goals"] <= 2
+    assert "driving" not in second.read_text()
+
+
+@pytest.mark.parametrize("is_granted", [True, False], ids=["the right", "no right"])
+def test_a_follower_drives_only_if_others_may_see_its_token(tmp_path, is_granted):
+    grant = access.Grant("driver", ["x"], "fasaco/@v1/robot")
+    rules = access.access_control([grant], "usernames")
+    # To whoever connects.
+    rules["subjects"] = [{"id": "driver"}]
+    rules["policies"][0]["subjects"] = ["driver"]
+    if not is_granted:
+        # As templates of older releases have it.
+        for rule in rules["rules"]:
+            rule["key_exprs"] = [key for key in rule["key_exprs"] if "/driver/" not in key]
+    base = DrivenBase({"access_control": rules})
+    log = tmp_path / "log"
+    try:
+        base.plans()
+        base.send_path(*AHEAD)
+        with follower_process(base.endpoint, log):
+            if is_granted:
+                base.wait_until_it_moves()
+            else:
+                until(lambda: f"standing, no right to drive: {NO_RIGHT}" in log.read_text())
+                time.sleep(1.0)
+                assert base.heard == []
+    finally:
+        base.close()
+
+
+def test_a_dry_run_claims_nothing(base, tmp_path):
+    with follower_process(
+        base.endpoint, tmp_path / "dry", "--dry-run", out=subprocess.PIPE
+    ) as process:
+        assert b"m/s" in process.stdout.readline()
+        assert standing(base) == []
+        with follower_process(base.endpoint, tmp_path / "log"):
+            base.wait_until_it_moves()
+            assert b"driving" in b"".join(process.stdout.readline() for _ in range(3))
+        process.stdout.close()
