@@ -38,12 +38,14 @@ The robot is told to stand, within 0.2 s, while
   the newest pose is older than --pose-age, or is none, or has jumped; of poses from tf, odometry
     is older than --pose-age, or the localiser's transform older than 2 s (or --pose-age, if longer)
   the path is empty (mission pause, cancel; done), is driven, or is none
-  it is further than 0.3 m off the path, or does not move as it is told (three tries, 2 s apart)
+  it is further than 0.3 m off the path, or does not move as it is told (three tries in a place and
+    a direction, 2 and 4 s apart)
   no daemon plans for it, or the one that plans has sent no status for 2.5 s
   another follower of this robot drives: then nothing is sent at all, and this one takes over once
     that one is gone; or access rules keep others from seeing that this one drives
 and when this program ends. It drives on by itself when that is over: after the third try once the
-pose has moved by 0.1 m, or another path comes. A pose with the stamp of the one before is no new
+pose has moved by 0.1 m, or the path leads elsewhere (by 45 degrees); a path that leads the same way
+brings no new try. A pose with the stamp of the one before is no new
 one. Zeros are sent for a second after a stop, then nothing. A base has to stop by itself where
 nothing comes for 0.5 s: nobody else can, if this program or its computer dies.
 

@@ -20,6 +20,8 @@ from fasaco_edge.wire.messages.path_points import PathPoints
 RATE_HZ = 20.0
 # Zeros are sent for this long after a stop; then another program may drive [s].
 ZEROS_S = 1.0
+# The direction in which the path leads is that of its point so far ahead [m].
+LEADS_M = 0.5
 # Largest distance of the robot from its leg; beyond it the robot has left the path [m].
 OFF_PATH_M = 0.3
 
@@ -78,7 +80,6 @@ class Follower(Supervision):
             self._before = self._route
         self._route = Route(points.take, self._limits.steered)
         self._is_new = True
-        self._grip.try_again()
 
     def _withdraw(self) -> None:
         self._route, self._before, self._is_new = None, None, False
@@ -99,9 +100,6 @@ class Follower(Supervision):
 
     def _steer(self, now: float) -> Command | None:
         assert self._route is not None
-        if self._grip.is_lost(self._estimate.measured, now):
-            self.state, self.detail = State.NOT_MOVING, f"tried {self._grip.tries} times"
-            return None
         pose = self._estimate.at(now)
         here = (pose.x, pose.y)
         if self._is_new:
@@ -114,6 +112,10 @@ class Follower(Supervision):
                 return None
             self._is_new, self._before = False, None
         leg = self._route.leg
+        toward = self._route.toward(here, LEADS_M)
+        if leg is not None and self._grip.is_lost(self._estimate.measured, toward, now):
+            self.state, self.detail = State.NOT_MOVING, f"tried {self._grip.tries} times"
+            return None
         if leg is not None and (off := leg.distance(here)) > OFF_PATH_M:
             self.state, self.detail = State.OFF_PATH, f"by {off:.2f} m"
             return None

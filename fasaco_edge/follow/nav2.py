@@ -18,6 +18,7 @@ from fasaco_edge.follow.goals import COAST_M, TIP_M, Goal, PathDriven
 from fasaco_edge.follow.nav2_requests import AskResult, Cancellations, Request, SendGoal
 from fasaco_edge.follow.pieces import STEP_M, Line, end_of_piece
 from fasaco_edge.follow.supervision import Patience, State, Supervision
+from fasaco_edge.follow.tries import Tries
 from fasaco_edge.grid.geometry import Point, Pose2D
 from fasaco_edge.wire.messages.follow_path import (
     ABORTED,
@@ -39,8 +40,10 @@ BEGINNING_M = 1.0
 DRIVES_M = 0.15
 # A goal that Nav2 reports as done is not done at this distance from its end [m].
 DONE_M = 0.5
-# Pause after an error before the next goal [s], doubled each time up to the maximum.
+# Pause after an error before the next goal [s], doubled each time up to the maximum until the robot
+# has moved this far [m] or the path leads elsewhere, by its direction this far ahead [m].
 RETRY_S, MOST_RETRY_S = 1.0, 30.0
+PROGRESS_M, LEADS_M = 0.5, 0.5
 # A robot that has moved less than this in this time is standing [m, s], near the end of its goal
 # sooner; then the result is queried again, as it may have been lost, and after a longer timeout the
 # goal is given up [s].
@@ -92,7 +95,8 @@ class Nav2Follower(Supervision):
         self._cancellations = Cancellations()
         self._moved_last: tuple[Point, float] | None = None
         self._asked_again = -math.inf
-        self._retry_at, self._retry_s = -math.inf, RETRY_S
+        self._tries = Tries(PROGRESS_M, RETRY_S, MOST_RETRY_S)
+        self._is_canceled = False
         self._trouble_of_nav2: tuple[State, str] | None = None
         self._requests: list[Request] = []
         # Requests that follow from answers, sent at the next step.
@@ -133,8 +137,10 @@ class Nav2Follower(Supervision):
             return
         goal, self._pending = self._pending, None
         if accepted:
-            self._active = goal
-            self._moved_last = None
+            if self._active is None:
+                # From goal to goal a robot that stands goes on standing.
+                self._moved_last = None
+            self._active, self._is_canceled = goal, False
             self._trouble_of_nav2 = None
             self._asked_again = now
             self._requests_later.append(AskResult(goal_id))
@@ -167,7 +173,8 @@ class Nav2Follower(Supervision):
             said = f": {ending.message}" if ending.message else ""
             self._fail(State.GIVEN_UP, f"{code}{what}{said}", now)
         elif ending.status == CANCELED:
-            self._fail(State.CANCELED, "goes on with the next path", math.inf)
+            self._is_canceled = True
+            self._fail(State.CANCELED, "goes on with a path elsewhere", now, for_good=True)
         else:
             self._fail(State.NO_NAV2, "it knows nothing of its goal: was it started anew?", now)
 
@@ -180,6 +187,7 @@ class Nav2Follower(Supervision):
         self._requests_later.clear()
         if self._path is not None:
             assert self._here is not None
+            self._tries.moved_to(self._here)
             # Also on a goal without an answer: that may be lost, and the robot drives it.
             self._path.advance(self._here, self._active or self._pending)
             self._believe_motion(self._path, now)
@@ -211,7 +219,7 @@ class Nav2Follower(Supervision):
             self.state, self.detail = self._trouble_of_nav2
         if whole - path.way <= STEP_M:
             self.state, self.detail = State.DRIVEN, ""
-        elif now >= self._retry_at:
+        elif self._tries.may_try(self._toward(path), now):
             self._send(path, path.way)
 
     def _send_next(self, path: PathDriven, goal: Goal) -> None:
@@ -246,8 +254,8 @@ class Nav2Follower(Supervision):
             return False
         goal, before = self._active, self._path
         self._path, self._next = (path := PathDriven(line, way)), None
-        self._retry_at, self._retry_s = now, RETRY_S
-        self._trouble_of_nav2 = None
+        if self._tries.may_try(self._toward(path), now):
+            self._trouble_of_nav2 = None
         if goal is None:
             return True
         assert before is not None
@@ -266,8 +274,6 @@ class Nav2Follower(Supervision):
         assert self._here is not None
         if self._moved_last is None or math.dist(self._here, self._moved_last[0]) > MOVED_M:
             self._moved_last = (self._here, now)
-        if path.way - goal.start > BEGINNING_M:
-            self._retry_s = RETRY_S
         stands_s = now - self._moved_last[1]
         longest_s = ARRIVED_S if goal.end - path.way <= DONE_M else STANDS_S
         if stands_s <= longest_s:
@@ -290,13 +296,18 @@ class Nav2Follower(Supervision):
             self._fail(State.GIVEN_UP, f"done, it says, {far:.1f} m before the end", now)
             return
         self._path.finish(goal)
-        self._retry_at, self._retry_s = now, RETRY_S
 
-    def _fail(self, state: State, detail: str, now: float) -> None:
+    def _fail(self, state: State, detail: str, now: float, *, for_good: bool = False) -> None:
         self.tally.errors += 1
         self._trouble_of_nav2 = (state, detail)
-        self._retry_at = now + self._retry_s
-        self._retry_s = min(2.0 * self._retry_s, MOST_RETRY_S)
+        if self._path is not None and self._here is not None:
+            self._tries.failed(self._here, self._toward(self._path), now, for_good=for_good)
+
+    def _toward(self, path: PathDriven) -> float:
+        """Return the direction from the robot to where a path leads [rad]."""
+        assert self._here is not None
+        x, y = path.line.at(path.way + LEADS_M)
+        return math.atan2(y - self._here[1], x - self._here[0])
 
     def _stop(self) -> None:
         """End all goals."""
@@ -315,6 +326,9 @@ class Nav2Follower(Supervision):
     def _withdraw(self) -> None:
         self._path = self._next = None
         self._stop()
+        if self._is_canceled:
+            self._is_canceled = False
+            self._tries.forget()
 
     @property
     def _has_path(self) -> bool:

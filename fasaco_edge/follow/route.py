@@ -138,6 +138,21 @@ class Route:
             leg, index = after, index + 1
         return leg.at(to)
 
+    def toward(self, here: Point, ahead: float) -> float:
+        """Return the direction from ``here`` to the point ``ahead`` along the route [rad].
+
+        Past corners, too: a path that begins a little beside the robot leads the same way.
+        """
+        leg, index = self._leg(0), 0
+        if leg is None:
+            return 0.0
+        to = min(max(leg.placed(here)[0], 0.0), leg.length) + ahead
+        while to > leg.length and (after := self._leg(index + 1)):
+            to -= leg.length
+            leg, index = after, index + 1
+        x, y = leg.at(min(to, leg.length))
+        return math.atan2(y - here[1], x - here[0])
+
     def join(self, here: Point, heading: float | None, before: Route | None) -> Joining:
         """Find the leg that passes the robot, near the beginning of a new path.
 

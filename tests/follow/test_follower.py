@@ -2,12 +2,14 @@
 
 import math
 from dataclasses import replace
+from itertools import groupby
 
 import pytest
 
 from fasaco_edge.errors import MalformedMessage
 from fasaco_edge.follow.estimate import STAND, moved
 from fasaco_edge.follow.follower import ZEROS_S, Follower
+from fasaco_edge.follow.grip import REST_S
 from fasaco_edge.follow.supervision import Patience, State
 from fasaco_edge.grid.geometry import Pose2D, StampedPose
 from tests.follow.closed_loop import LIMITS, PERIOD_S, path_message
@@ -241,19 +243,65 @@ def test_a_robot_that_does_not_move_is_left_alone_for_a_while(told):
     assert told.follower.state is State.DRIVING
 
 
-def test_after_a_few_tries_it_stands_until_it_is_moved_or_has_another_path(told):
+def pushed_s(states):
+    return states.count(State.DRIVING) * PERIOD_S
+
+
+def test_after_a_few_tries_it_stands_until_it_is_moved(told):
     """A localiser that says the same pose for ever must not make it drive blind for ever."""
-    for _ in range(2):
-        states = told.states_where_it_is(60.0)
-        assert {*states[-900:]} == {State.NOT_MOVING}
-        assert 2.0 < states.count(State.DRIVING) * PERIOD_S < 8.0
-        assert told.follower.detail == "tried 3 times"
-        told.follower.take_path(path_message([(told.x, 0.0), (5.0, 0.0)]))
-    assert {*told.states_where_it_is(60.0)[-900:]} == {State.NOT_MOVING}
+    states = told.states_where_it_is(60.0)
+    assert {*states[-900:]} == {State.NOT_MOVING}
+    assert 2.0 < pushed_s(states) < 8.0
+    assert told.follower.detail == "tried 3 times"
+    # The pauses between the tries become longer.
+    rests = [len(list(run)) for state, run in groupby(states) if state is State.NOT_MOVING]
+    assert rests[0] * PERIOD_S == pytest.approx(REST_S, abs=0.2)
+    assert rests[1] * PERIOD_S == pytest.approx(2 * REST_S, abs=0.2)
     told.x += 0.15
     told.drive(5.0)
     assert told.follower.state is State.DRIVING
     assert told.x > 1.0
+
+
+@pytest.mark.parametrize("every_s", [0.2, 1.0, 5.0, 30.0])
+def test_a_path_that_comes_again_brings_no_more_tries(told, every_s):
+    """As with a map that changes, or the daemon's own repeat: it differs a little each time."""
+    pushed = 0.0
+    for number in range(round(120.0 / every_s)):
+        beside = 0.03 * (number % 3 - 1)
+        told.follower.take_path(path_message([(told.x, beside), (told.x + 5.0, -beside)]))
+        pushed += pushed_s(told.states_where_it_is(every_s))
+    # Where each path has it brake first, it takes longer to push as far.
+    assert 2.0 < pushed < (8.0 if every_s >= 1.0 else 15.0)
+    assert told.follower.state is State.NOT_MOVING
+
+
+def test_a_path_that_leads_elsewhere_has_tries_of_its_own_and_no_more(told):
+    """The robot is stuck: paths to all sides, again and again, are tried three times each."""
+    ways, pushed = [(5.0, 0.0), (0.0, 5.0), (-5.0, 0.0), (0.0, -5.0)], 0.0
+    told.states_where_it_is(30.0)
+    assert told.follower.state is State.NOT_MOVING
+    for round_ in range(3):
+        for number, (dx, dy) in enumerate(ways):
+            told.follower.take_path(path_message([(told.x, 0.0), (told.x + dx, dy)]))
+            states = told.states_where_it_is(30.0)
+            is_new = round_ == 0 and number > 0
+            assert (State.DRIVING in states) is is_new
+            pushed += pushed_s(states)
+    assert pushed < 3 * 8.0
+    # A way out of there ends that.
+    told.x += 0.15
+    told.follower.take_path(path_message([(told.x, 0.0), (told.x + 5.0, 0.0)]))
+    told.drive(2.0)
+    assert told.follower.state is State.DRIVING
+
+
+def test_a_robot_that_somebody_turns_may_try_again(told):
+    told.states_where_it_is(30.0)
+    for step in range(40):
+        told.pose(yaw=0.02 * step)
+        told.step()
+    assert told.follower.state is State.DRIVING
 
 
 @pytest.mark.parametrize(

@@ -229,14 +229,55 @@ def test_a_goal_that_ends_without_a_code_may_have_been_replaced_by_somebody_else
     assert drive.follower.detail == "without a code; does another program send goals, too?"
 
 
-def test_what_somebody_else_cancels_stays_canceled_until_the_next_path():
+@pytest.mark.parametrize("goes_on", ["elsewhere", "withdrawn", "moved"])
+def test_what_somebody_else_cancels_stays_canceled_whatever_path_comes(goes_on):
     drive = Drive(*LONG)
     drive.end(drive.begun(), CANCELED)
     assert drive.step(0.0, after=100.0) == []
-    assert drive.state is State.CANCELED
-    drive.path(*LONG)
+    for number in range(20):
+        drive.path((0.0, 0.0), (8.0, 0.01 * number))
+        assert drive.step(0.0) == []
+        assert drive.state is State.CANCELED
+    if goes_on == "withdrawn":
+        drive.path()
+        drive.step(0.0)
+        drive.path(*LONG)
+    elif goes_on == "elsewhere":
+        drive.path((0.0, 0.0), (0.0, 8.0))
+    (goal,) = drive.step(0.6 if goes_on == "moved" else 0.0)
+    assert isinstance(goal, SendGoal)
+
+
+def test_a_new_path_that_leads_the_same_way_does_not_hasten_the_next_goal():
+    """As with a map that changes: after four errors the pause is 8 s, whatever path comes."""
+    drive, sent = Drive(*LONG), []
+    for number in range(300):
+        drive.path((0.0, 0.0), (8.0, 0.001 * number))
+        for request in drive.step(0.0):
+            if isinstance(request, SendGoal):
+                sent.append(drive.now)
+                drive.accept(request)
+                drive.end(request, ABORTED, 105)
+    pauses = [after - before for before, after in itertools.pairwise(sent)]
+    assert pauses == pytest.approx([1.0, 2.0, 4.0, 8.0], abs=0.15)
+    drive.path((0.0, 0.0), (0.0, 8.0))
     (goal,) = drive.step(0.0)
     assert isinstance(goal, SendGoal)
+
+
+def test_goals_that_replace_each_other_do_not_let_a_standing_robot_push_for_ever():
+    """Each path is another one: Nav2 gets it at once, and its own progress checker begins anew."""
+    drive, canceled_at = Drive(*LONG), None
+    while canceled_at is None and drive.now < 3 * GIVE_UP_S:
+        drive.path((0.0, 0.0), (8.0, 0.5 * (round(drive.now / 2.0) % 2)))
+        for request in drive.step(0.0):
+            if isinstance(request, SendGoal):
+                drive.accept(request)
+            elif isinstance(request, CancelGoal):
+                canceled_at = drive.now
+    assert canceled_at == pytest.approx(GIVE_UP_S, abs=1.0)
+    drive.step(0.0)
+    assert drive.state is State.GIVEN_UP
 
 
 @pytest.mark.parametrize("ending", [Ending(UNKNOWN), NO_ANSWER])
