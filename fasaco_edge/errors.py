@@ -288,6 +288,16 @@ class CommandError(FasacoError):
     hint = "check the status, and start a mission first"
 
 
+class WouldForget(FasacoError):
+    """A command that would forget what is covered, and does not say that it may."""
+
+    code = "would_forget"
+    hint = (
+        "give it with --yes (`discard: true`) to forget that; `start` with --keep-covered "
+        "(`keep_covered: true`) goes on with the rest, `cancel` drops an order alone"
+    )
+
+
 class NobodyAnswersError(FasacoError):
     """No daemon of that robot is on the bus."""
 

@@ -10,7 +10,8 @@ import msgspec
 from msgspec import Meta
 
 from fasaco_edge.grid.geometry import FARTHEST_M, MAX_LATTICE_CELLS, Polygon, Pose2D
-from fasaco_edge.mission.orders.order import MOST_KEEP_OUT, MOST_ZONES, Errand, StandingZone
+from fasaco_edge.mission.orders.keep_outs import MOST_KEEP_OUT
+from fasaco_edge.mission.orders.order import MOST_ZONES, Errand, StandingZone
 from fasaco_edge.planners.cost import STEPS_ALONE, CoverageCost
 from fasaco_edge.planners.living_trail import PAPERS_RULES, TrailRules
 

@@ -24,7 +24,7 @@ from fasaco_edge.daemon.loop.turn_log import (
 )
 from fasaco_edge.errors import MalformedMessage
 from fasaco_edge.mission.core.events import CommandReceived, PlanReady, PlanRequest
-from fasaco_edge.mission.orders.order import read_command
+from fasaco_edge.mission.orders.order import read_recorded
 from fasaco_edge.planners.planner import StopAt, ignore
 from fasaco_edge.replay.mission_drive import MissionDrive, ReplayStep
 from fasaco_edge.samples import SampleDecoder
@@ -242,7 +242,7 @@ class CycleReplay:
     def _cycle(self, turn: Cycle, now: float) -> ReplayStep:
         drive = self._drive
         commands = [
-            CommandReceived(number, *read_command(document)) for number, document in turn.commands
+            CommandReceived(number, *read_recorded(document)) for number, document in turn.commands
         ]
         batch = Batch(samples=self._received(turn), updates_lost=turn.patches_lost)
         plans, before = self._plans(turn), drive.state

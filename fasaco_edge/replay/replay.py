@@ -248,12 +248,13 @@ class Replay:
             if arrival.topic != COMMAND.name:
                 continue
             try:
-                name, order = read_command(decode_json(arrival.sample.payload))
+                asked = read_command(decode_json(arrival.sample.payload))
             except FasacoError as error:
                 refused.append(error)
                 continue
             self._commands += 1
-            commands.append(CommandReceived(self._commands, name, order))
+            # It was taken, so nothing was forgotten that should not be.
+            commands.append(CommandReceived(self._commands, *asked._replace(discard=True)))
         return commands, refused
 
     def _as_recorded(self, update: PathUpdate) -> bool | None:

@@ -178,9 +178,11 @@ class RunData:
 
     @property
     def keep_out(self) -> tuple[Polygon, ...]:
-        """Keep-out zones in force at the end: of the last order and of the configuration."""
+        """Keep-out zones in force at the end: of last order, configuration and operator."""
         always = known_settings(self.config).mission
         polygons = self.ordered_keep_out + always.keep_out
+        drawn = self.statuses[-1].status.mission.keep_outs if self.statuses else ()
+        polygons += tuple(each.polygon for each in drawn if each.by == "operator" and each.polygon)
         with suppress(BadConfiguration):
             polygons += mask_polygons(always.keep_out_mask)
         return polygons
@@ -306,7 +308,7 @@ class _SampleReader:
         self.data.poses.append((pose.x, pose.y, pose.yaw))
 
     def _command(self, arrival: Arrival) -> None:
-        name, order = read_command(decode_json(arrival.sample.payload))
+        name, order, _, _ = read_command(decode_json(arrival.sample.payload))
         self.data.commands.append((self._now, name, order))
         if name == "start":
             self.data.ordered_keep_out = order.keep_out

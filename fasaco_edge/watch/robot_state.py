@@ -156,6 +156,8 @@ class RobotState:
         order = document.get("order")
         names = [str(zone["name"]) for zone in _zones(order)]
         about = f" with {', '.join(names)}" if names else ""
+        if isinstance(keep_out := document.get("keep_out"), dict):
+            about = f" {keep_out.get('name')}"
         self.events.add(now, f"command {document.get('command')}{about}", ORDER)
 
     def _move(self, pose: Pose2D) -> None:

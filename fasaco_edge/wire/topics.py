@@ -291,7 +291,7 @@ QUERIES = (
         payload="mission.json",
         answered="loop",
         timeout_s=5.0,
-        errors=("bad_order", "not_now", "malformed_message"),
+        errors=("bad_order", "not_now", "would_forget", "malformed_message"),
     ),
     Query(
         "replan",

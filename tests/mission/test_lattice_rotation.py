@@ -23,6 +23,7 @@ from fasaco_edge.mission.core.events import (
 from fasaco_edge.mission.core.mission import Mission
 from fasaco_edge.mission.coverage.rotated_ledger import rotated_ledger
 from fasaco_edge.mission.map.wall_watch import WallWatch
+from fasaco_edge.mission.orders.keep_outs import KeepOut
 from fasaco_edge.mission.orders.order import read_order
 from fasaco_edge.mission.orders.order_state import OrderState
 from fasaco_edge.planners.cost import SearchWork
@@ -93,6 +94,17 @@ def test_a_turned_building_is_driven_as_the_same_building_is_that_lies_straight(
     told = askew.pose.pose
     assert (told.x, told.y, told.yaw) == pytest.approx((*rotated_point(*START, DEG), 0.0))
     assert askew.grid.geometry.origin.yaw == pytest.approx(math.radians(DEG))
+
+
+def test_a_keep_out_that_is_added_lies_where_one_of_an_order_lies():
+    ordered, added = (Mission(replace(CONFIG, lattice_deg=DEG)) for _ in range(2))
+    corners = tuple(rotated_point(x, y, DEG) for x, y in COLUMN)
+    grid, start = in_yaw(room(3.0, 2.4), DEG), rotated_point(*START, DEG)
+    path, _ = first_path(ordered, grid, start, {"keep_out": [corners]})
+    added.step([CommandReceived(1, "keep_out_add", keep_out=KeepOut("column", corners))], 0.0)
+    other, _ = first_path(added, grid, start, {})
+    assert (other.cells == path.cells).all()
+    assert OrderState.from_json(added.snapshot().note).keep_out[0].polygon == corners
 
 
 def test_a_way_home_ends_at_the_place_and_the_heading_of_the_map_frame():

@@ -10,14 +10,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fasaco_edge.errors import CommandError, OrderError
+from fasaco_edge.mission.orders.keep_outs import KeepOut
 from fasaco_edge.mission.orders.order import (
     EVERYTHING_ONCE,
+    Command,
     MissionOrder,
     Zone,
     command_document,
     order_document,
     read_command,
     read_order,
+    read_recorded,
 )
 from fasaco_edge.mission.orders.order_state import OrderState, Stage
 from tests.support.examples import examples
@@ -104,22 +107,55 @@ def test_a_polygon_of_a_thousand_points_is_no_burden():
 
 
 def test_commands():
-    assert read_command({"command": "pause"}) == ("pause", EVERYTHING_ONCE)
-    assert read_command({"command": "start", "order": {"passes": 2}})[1].zones[0].passes == 2
-    for command in read_command({"command": "reset"}), ("start", TWO):
-        assert read_command(json.loads(json.dumps(command_document(*command)))) == command
+    assert read_command({"command": "pause"}) == Command("pause")
+    assert read_command({"command": "start", "order": {"passes": 2}}).order.zones[0].passes == 2
+    for command in (
+        Command("reset"),
+        Command("reset", discard=True),
+        Command("start", TWO),
+        Command("keep_out_add", keep_out=KeepOut("vase", ((0.0, 0.0), (1.0, 0.0), (1.0, 1.0)))),
+        Command("keep_out_remove", keep_out=KeepOut("vase")),
+    ):
+        assert read_command(json.loads(json.dumps(command_document(command)))) == command
     for document, said in (
         ({}, "the order: missing member command"),
         (
             {"command": "go"},
-            "expected start, pause, resume, home, cancel, reset, replan, status, got 'go'",
+            "expected start, pause, resume, home, cancel, reset, replan, status, keep_out_add, "
+            "keep_out_remove, got 'go'",
         ),
         ({"command": "pause", "order": {}}, "order goes with start alone"),
         ({"command": "start", "order": {"zones": 3}}, "order.zones: expected array, got 3"),
+        ({"command": "pause", "discard": True}, "discard goes with start and reset alone"),
+        ({"command": "reset", "discard": 1}, "discard: expected bool, got 1"),
+        ({"command": "pause", "keep_out": {"name": "a"}}, "keep_out goes with keep_out_add and"),
+        ({"command": "keep_out_add"}, "keep_out goes with keep_out_add and keep_out_remove, miss"),
+        (added({}), "keep_out: missing member name"),
+        (added({"name": "a"}), "keep_out.polygon: goes with keep_out_add, missing"),
+        (added({"name": " a", "polygon": SQUARE}), "keep_out.name must be 1..64 printable"),
+        (added({"name": "a" * 65, "polygon": SQUARE}), "keep_out.name: expected str of length <="),
+        (added({"name": "a", "polygon": SQUARE[:2]}), "keep_out.polygon: expected array of length"),
+        (added({"name": "a", "polygon": [[0, 0], [2, 2], [2, 0], [0, 2]]}), "keep_out.polygon cro"),
+        (added({"name": "a", "polygon": [[0, 0], [1, 0], [1, math.nan]]}), "keep_out.polygon[2] m"),
+        (
+            {"command": "keep_out_remove", "keep_out": {"name": "a", "polygon": SQUARE}},
+            "keep_out.polygon: goes with keep_out_add, got it with keep_out_remove",
+        ),
     ):
         with pytest.raises(OrderError) as caught:
             read_command(document)
         assert said in str(caught.value)
+
+
+def added(keep_out):
+    return {"command": "keep_out_add", "keep_out": keep_out}
+
+
+def test_commands_recorded_before_they_were_asked_for_consent_had_it():
+    assert read_recorded({"command": "reset"}).discard
+    assert read_recorded({"command": "start"}).discard
+    assert not read_recorded({"command": "reset", "discard": False}).discard
+    assert read_recorded({"command": "pause"}) == Command("pause")
 
 
 anything = st.recursive(
@@ -145,6 +181,7 @@ def test_whatever_is_written_is_an_order_or_refused(document):
 
 
 TWO = read_order(zones(SQUARE, SQUARE, passes=2))
+VASE = KeepOut("vase", ((0.5, 0.5), (1.0, 0.5), (1.0, 1.0)))
 
 
 def test_the_legs_of_an_order():
@@ -166,6 +203,8 @@ def test_the_legs_of_an_order():
         OrderState(TWO, paused=True, zone=1, pass_number=2, begun=True, home=(-3, 4)),
         OrderState(TWO, stage=Stage.RETRYING, tries=2),
         OrderState(MissionOrder(return_home=True), stage=Stage.OVER),
+        OrderState.idle("cancelled").commanded(Command("keep_out_add", keep_out=VASE)),
+        OrderState(TWO, errand="home", paused=True, home=(2, 1), keep_out=(VASE,)),
     ],
 )
 def test_what_is_kept_is_what_was(order_state):
@@ -184,6 +223,8 @@ def test_what_is_kept_is_what_was(order_state):
         {"home": [1]},
         {"more": 1},
         {"order": {"zones": [{"name": "a", "polygon": [[0, 0], [0, 0], [0, 0]]}]}},
+        {"keep_out": [{"name": "a", "polygon": [[0, 0], [0, 0], [0, 0]]}]},
+        {"keep_out": [{"name": "a", "polygon": SQUARE}] * 101},
     ],
 )
 def test_a_note_that_cannot_be_right_is_refused(change):
@@ -197,24 +238,31 @@ def test_a_note_that_cannot_be_right_is_refused(change):
 
 def test_commands_may_come_twice():
     running = OrderState(TWO, zone=1)
-    assert running.commanded("start", TWO) == running
-    paused = running.commanded("pause", TWO)
+    assert running.commanded(Command("start", TWO)) == running
+    paused = running.commanded(Command("pause", TWO))
     assert paused.paused
-    assert paused.commanded("pause", TWO) == paused
-    assert paused.commanded("start", TWO) == paused.commanded("resume", TWO) == running
-    assert running.commanded("resume", TWO) == running
-    idle = running.commanded("cancel", TWO)
+    assert paused.commanded(Command("pause", TWO)) == paused
+    assert (
+        paused.commanded(Command("start", TWO))
+        == paused.commanded(Command("resume", TWO))
+        == running
+    )
+    assert running.commanded(Command("resume", TWO)) == running
+    idle = running.commanded(Command("cancel", TWO))
     assert idle.order is None
-    assert idle.commanded("cancel", TWO) == idle
+    assert idle.commanded(Command("cancel", TWO)) == idle
     # The one that began by itself is the same as one for everything.
-    assert OrderState.autostart().commanded("start", EVERYTHING_ONCE) == OrderState.autostart()
+    assert (
+        OrderState.autostart().commanded(Command("start", EVERYTHING_ONCE))
+        == OrderState.autostart()
+    )
 
 
 def test_another_order_replaces_the_one_before_and_the_same_one_begins_again_when_over():
     running = OrderState(TWO, zone=1)
-    assert running.commanded("start", EVERYTHING_ONCE) == OrderState(EVERYTHING_ONCE)
+    assert running.commanded(Command("start", EVERYTHING_ONCE)) == OrderState(EVERYTHING_ONCE)
     over = OrderState(TWO, zone=1, stage=Stage.OVER)
-    assert over.commanded("start", TWO) == OrderState(TWO)
+    assert over.commanded(Command("start", TWO)) == OrderState(TWO)
 
 
 @pytest.mark.parametrize("command", ["pause", "resume"])
@@ -223,4 +271,4 @@ def test_another_order_replaces_the_one_before_and_the_same_one_begins_again_whe
 )
 def test_there_has_to_be_a_mission_to_pause(command, order_state):
     with pytest.raises(CommandError, match=f"there is no mission to {command}"):
-        order_state.commanded(command, TWO)
+        order_state.commanded(Command(command))

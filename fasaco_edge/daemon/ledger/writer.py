@@ -15,7 +15,13 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from fasaco_edge.daemon.figures import fault_text, log_fault
 from fasaco_edge.daemon.ledger.file import LedgerFile, LoadedLedger, reason_of
-from fasaco_edge.errors import FasacoError, LedgerFileError, LedgerMismatchError, OrderError
+from fasaco_edge.errors import (
+    FasacoError,
+    LedgerFileError,
+    LedgerMismatchError,
+    OrderError,
+    WouldForget,
+)
 from fasaco_edge.mission.coverage.ledger import LedgerSnapshot
 from fasaco_edge.mission.orders.order_state import NO_ORDER, OrderState
 from fasaco_edge.wire.documents.status import LedgerReport
@@ -115,6 +121,17 @@ class LedgerKeeper:
             if isinstance(fault, LedgerMismatchError):
                 self._begin_anew(fault, "mismatch")
 
+    def check_loss(self, command: str) -> None:
+        """Check that there is nothing to forget; which zone it lies in is not known yet.
+
+        Raises:
+            WouldForget: there is; it says how much.
+        """
+        before = self._before
+        if cells := max(before.cells - len(before.under_tool), 0):
+            m2 = cells * before.cell_m**2
+            raise WouldForget(f"{command} forgets up to {cells} covered cells ({m2:.1f} m2)")
+
     def forget(self) -> None:
         """Set the files aside: everything has to be covered again."""
         self._begin_anew(None, "reset")
@@ -135,9 +152,10 @@ class LedgerKeeper:
             self._faults.append(error)
             return OrderState.idle(str(error))
         first = OrderState.autostart() if autostart else OrderState.idle(NO_ORDER)
-        first = replace(first, frame=kept.frame, places=kept.places)
-        is_idle = kept == replace(OrderState.idle(NO_ORDER), frame=kept.frame, places=kept.places)
-        return first if is_idle or (kept.automatic and not autostart) else kept
+        held = {name: getattr(kept, name) for name in ("home", "keep_out", "frame", "places")}
+        is_none_yet = kept.order is None and not kept.errand and kept.why == NO_ORDER
+        is_first = is_none_yet or (kept.automatic and not autostart)
+        return replace(first, **held) if is_first else kept
 
 
 def open_ledger(folder: Path, robot: str, cell_m: float, *, fresh: bool = False) -> LedgerWriter:

@@ -23,9 +23,7 @@ from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.errors import BadQuery, CommandError, FasacoError, UnknownQuery
 from fasaco_edge.mission.core.events import Answer, CommandReceived
 from fasaco_edge.mission.orders.order import (
-    EVERYTHING_ONCE,
-    CommandName,
-    MissionOrder,
+    Command,
     read_command,
 )
 from fasaco_edge.wire import topics
@@ -166,35 +164,35 @@ class Commands:
         commands = []
         for question in questions:
             try:
-                name, order = self._read(question, now)
+                asked = self._read(question, now)
             except FasacoError as error:
                 self._refuse(question, error)
                 continue
-            if name == "status":
+            if asked.name == "status":
                 self._status_questions.append(question)
                 continue
             self._count += 1
             self._open[self._count] = question
-            commands.append(CommandReceived(self._count, name, order))
+            commands.append(CommandReceived(self._count, *asked))
         return commands
 
-    def _read(self, question: Question, now: float) -> tuple[CommandName, MissionOrder]:
+    def _read(self, question: Question, now: float) -> Command:
         request = question.request
         if (triggered := self._services.get(question.key)) is not None:
             check_request(request.payload)
             if "*" in request.key:
                 raise BadQuery("a service has to be called by its name")
-            return triggered, EVERYTHING_ONCE
+            return Command(triggered)
         if question.key == self._replan_key:
             check(request)
             if request.key.endswith("*"):
                 # A wildcard query must change nothing.
                 raise BadQuery("replan has to be asked for by its name")
-            command: tuple[CommandName, MissionOrder] = ("replan", EVERYTHING_ONCE)
+            command = Command("replan")
         else:
             check(request, payload=True)
             command = read_command(decode_json(request.payload or b'{"command":"status"}'))
-        if command[0] == "replan":
+        if command.name == "replan":
             waits_s = self._replanned_at + REPLAN_PERIOD_S - now
             if waits_s > 0:
                 raise CommandError(

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
+from fasaco_edge.grid.geometry import Polygon
 from fasaco_edge.mission.orders.order_state import OrderState
 from fasaco_edge.wire.documents.replies import (
     CoverageReport,
     FloorLeft,
     FloorReport,
+    KeepOutReport,
     MissionReport,
     Point,
     UnreachedArea,
@@ -128,6 +131,7 @@ def mission_report(
     """Return the order and its progress; ``standing``: keep-out zones in force for all orders."""
     order, zone = order_state.order, order_state.current_zone
     home = mission.home if mission else order_state.home
+    keep_outs = tuple(_keep_outs(order_state))
     return MissionReport(
         ordered=None if order is None else ("itself" if order_state.automatic else "command"),
         stage=None if order is None else str(order_state.stage),
@@ -136,12 +140,26 @@ def mission_report(
         pass_number=None if zone is None else order_state.pass_number,
         passes=None if zone is None else zone.passes,
         zones=_zones(mission, order_state),
-        keep_out=(0 if order is None else len(order.keep_out)) + standing,
+        keep_out=len(keep_outs) + standing,
         return_home=bool(order and order.return_home),
         home=None if home is None or mission is None else _place(mission, home),
         tries=order_state.tries,
         unreached=_unreached(mission),
+        keep_outs=keep_outs,
     )
+
+
+def _keep_outs(order_state: OrderState) -> Iterator[KeepOutReport]:
+    """Yield the keep-outs of the operator, then those of the order, in the map frame."""
+    for keep_out in order_state.keep_out:
+        yield KeepOutReport(keep_out.name, _corners(keep_out.polygon))
+    if order_state.order is not None:
+        for polygon in order_state.order.as_given.keep_out:
+            yield KeepOutReport(polygon=_corners(polygon), by="order")
+
+
+def _corners(polygon: Polygon) -> tuple[tuple[float, float], ...]:
+    return tuple((round(x, 3), round(y, 3)) for x, y in polygon)
 
 
 def _zones(mission: Mission | None, order_state: OrderState) -> tuple[ZoneReport, ...]:

@@ -124,11 +124,13 @@ class MissionRunner:
                 raise CommandError(rival, hint="command the one that plans")
             order = located(asked.order, self.config.mission.zones)
             has_home = self.config.mission.place("home") is not None
-            self._keeper.order_state = self.order_state.commanded(
-                asked.command, order, has_home=has_home
-            )
+            before, command = self.order_state, asked.asked._replace(order=order)
+            after = before.commanded(command, has_home=has_home)
+            if not asked.discard and before.forgets(command, after):
+                self._keeper.check_loss(asked.command)
             if asked.command == "replan":
                 raise CommandError("nothing to plan: the first plan is still to come")
+            self._keeper.order_state = after
         except FasacoError as error:
             return error
         if asked.command == "reset":

@@ -108,7 +108,7 @@ class Outbox:
                 self.guard.attempt("command", partial(self._say_command, asked))
 
     def _say_command(self, asked: CommandReceived) -> None:
-        self._command.put(encode_json(command_document(asked.command, asked.order)))
+        self._command.put(encode_json(command_document(asked.asked)))
 
     def coverage(self, grid: OccupancyGrid) -> None:
         """Publish the coverage, a grid on the lattice; the caller catches failures."""

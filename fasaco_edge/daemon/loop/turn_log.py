@@ -133,8 +133,7 @@ class TurnLog:
                     samples=samples,
                     patches_lost=batch.updates_lost,
                     commands=[
-                        (asked.number, command_document(asked.command, asked.order))
-                        for asked in turn.commands
+                        (asked.number, command_document(asked.asked)) for asked in turn.commands
                     ],
                     plan=_plan_taken(plans[-1]) if plans else None,
                     decided=decided,

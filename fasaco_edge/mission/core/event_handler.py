@@ -8,6 +8,7 @@ from functools import partial
 
 from fasaco_edge.errors import CommandError, FasacoError, LedgerMismatchError
 from fasaco_edge.grid.geometry import Polygon, Pose2D, StampedPose
+from fasaco_edge.grid.rotation import rotated_polygon
 from fasaco_edge.mission.config import MissionPolicy
 from fasaco_edge.mission.core.charging import BatteryGauge
 from fasaco_edge.mission.core.events import (
@@ -29,6 +30,7 @@ from fasaco_edge.mission.core.events import (
 from fasaco_edge.mission.core.route import Route
 from fasaco_edge.mission.core.trail_layer import TrailLayer
 from fasaco_edge.mission.coverage.drive_meter import DriveMeter
+from fasaco_edge.mission.coverage.loss import loss_in
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
 from fasaco_edge.mission.fleet.layer import FleetLayer
 from fasaco_edge.mission.line.layer import LineLayer
@@ -100,9 +102,17 @@ class EventHandler:
     def begin_order(self, order: OrderState) -> None:
         """Begin another order, or none; ``update_area`` must be called next."""
         self.route.abandon()
-        self.map.keep_out(self._standing + (order.order.keep_out if order.order else ()))
-        self.line.note_map()
+        self._keep_out(order)
         self.orders.start(order)
+
+    def _keep_out(self, order: OrderState) -> None:
+        """Keep out of all areas under an order; ``update_area`` must be called next."""
+        ordered = order.order.keep_out if order.order else ()
+        drawn = tuple(keep_out.polygon for keep_out in order.keep_out)
+        if self.lattice_deg:
+            drawn = tuple(rotated_polygon(polygon, -self.lattice_deg) for polygon in drawn)
+        self.map.keep_out(self._standing + ordered + drawn)
+        self.line.note_map()
 
     def update_area(self) -> None:
         """Update the reachable area; want a new plan if it changed."""
@@ -302,8 +312,11 @@ class EventHandler:
             order = rotated_order(self.map.places.located(event.order), -self.lattice_deg)
             if event.command == "start":
                 self.map.check_zones(order)
+            asked = event.asked._replace(order=order)
             has_home = self.map.places.place("home") is not None
-            after = before.commanded(event.command, order, has_home=has_home)
+            after = before.commanded(asked, has_home=has_home)
+            if not asked.discard:
+                loss_in(before.forgets(asked, after), self.ledger, self.map).check(asked.name)
             plan = self._replan() if event.command == "replan" else None
         except FasacoError as error:
             self._answers.append(Answer(event.number, error))
@@ -314,11 +327,23 @@ class EventHandler:
         if after.order is not before.order:
             self.begin_order(after)
             self.update_area()
+        elif after.keep_out != before.keep_out:
+            self._change_keep_outs(after)
         elif after.paused and not before.paused:
             self.route.pause()
         elif before.paused and not (after.paused or after.errand):
             self._path = self._resume(after) or self._path
         self.orders.set_state(after)
+
+    def _change_keep_outs(self, order: OrderState) -> None:
+        """Follow other keep-outs under the same order; stop a robot that is in one of them."""
+        self._keep_out(order)
+        self.route.forget_failure()
+        self.update_area()
+        if self.map.is_kept_out:
+            # Its border may be near enough to go on from there, but not by this path.
+            self.map.follow_path(None)
+            self._path = self.route.stop("robot is in a keep-out zone", self._now) or self._path
 
     def _resume(self, order: OrderState) -> PathUpdate | None:
         if order.begun and order.stage is not Stage.RETURNING:

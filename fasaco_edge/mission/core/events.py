@@ -14,7 +14,13 @@ from numpy.typing import NDArray
 from fasaco_edge.errors import FasacoError, PlanFailed
 from fasaco_edge.grid.geometry import Pose2D, StampedPose, Window
 from fasaco_edge.grid.occupancy import MapPatch, OccupancyGrid
-from fasaco_edge.mission.orders.order import EVERYTHING_ONCE, CommandName, MissionOrder
+from fasaco_edge.mission.orders.keep_outs import KeepOut
+from fasaco_edge.mission.orders.order import (
+    EVERYTHING_ONCE,
+    Command,
+    CommandName,
+    MissionOrder,
+)
 
 if TYPE_CHECKING:
     # For types only: the daemon receives events before the planners are loaded.
@@ -92,11 +98,18 @@ class PlanBroken:
 
 @dataclass(frozen=True, slots=True)
 class CommandReceived:
-    """Command ``number``; ``order`` goes with ``start``."""
+    """Command ``number``; the rest as in ``Command``."""
 
     number: int
     command: CommandName
     order: MissionOrder = EVERYTHING_ONCE
+    keep_out: KeepOut | None = None
+    discard: bool = False
+
+    @property
+    def asked(self) -> Command:
+        """The command itself."""
+        return Command(self.command, self.order, self.keep_out, self.discard)
 
 
 @dataclass(frozen=True, slots=True)

@@ -269,6 +269,17 @@ class MapState:
         other = self.grid is not None and self.frames.last_pose_frame not in ("", self.grid.frame)
         return f"; {self.why_no_pose()}" if other else ""
 
+    @property
+    def is_kept_out(self) -> bool:
+        """Whether the robot fits where it is, but for a keep-out zone."""
+        if self.lattice is None or self.free is None or self.pose is None:
+            return False
+        cell = self.lattice.cell_at(self.pose.pose.x, self.pose.pose.y)
+        if not self.lattice.contains(cell):
+            return False
+        place = self.lattice.local(cell)
+        return bool(self.free.states[place] == COVERABLE != self.lattice.states[place])
+
     def why_misplaced(self) -> str:
         """Return why the robot's position is unusable, and what it waits for."""
         assert self.free is not None
@@ -279,7 +290,7 @@ class MapState:
         if not self.lattice.contains(cell):
             return f"robot is outside of the map: {waits}"
         place = self.lattice.local(cell)
-        if self.free.states[place] == COVERABLE:
+        if self.is_kept_out:
             return "robot is in a keep-out zone: waits to be driven out of it, or for another order"
         if self.free.states[place] == UNKNOWN:
             return f"robot is on unknown ground: {waits}"

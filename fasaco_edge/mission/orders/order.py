@@ -5,26 +5,30 @@
 
 from __future__ import annotations
 
-import math
 import re
 from dataclasses import dataclass, field, replace
-from typing import Annotated, Any, Literal, TypeVar, get_args
+from typing import Annotated, Any, Literal, NamedTuple, TypeVar, get_args
 
 import msgspec
 from msgspec import Meta
 
 from fasaco_edge.errors import OrderError
-from fasaco_edge.grid.geometry import FARTHEST_M, Polygon
-from fasaco_edge.grid.polygons import polygon_flaw
+from fasaco_edge.grid.geometry import Polygon
 from fasaco_edge.grid.rotation import rotated_polygon
+from fasaco_edge.mission.orders.keep_outs import (
+    MOST_KEEP_OUT,
+    Corners,
+    KeepOut,
+    KeepOutDocument,
+    PlaceName,
+    check_name,
+    check_polygons,
+    keep_out_document,
+    keep_out_of,
+)
 
-# Limit on the zones of an order: it is kept with the ledger, which is written once a second.
 MOST_ZONES = 100
-MOST_KEEP_OUT = 100
-MOST_POINTS = 1_000
-MOST_POINTS_IN_ALL = 5_000
 MOST_PASSES = 100
-LONGEST_NAME = 64
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,36 +77,59 @@ class MissionOrder:
 
 EVERYTHING_ONCE = MissionOrder()
 
-CommandName = Literal["start", "pause", "resume", "home", "cancel", "reset", "replan", "status"]
+CommandName = Literal[
+    "start",
+    "pause",
+    "resume",
+    "home",
+    "cancel",
+    "reset",
+    "replan",
+    "status",
+    "keep_out_add",
+    "keep_out_remove",
+]
+FORGETFUL = ("start", "reset")
+"""The commands that may forget what is covered."""
 # Why a robot drives somewhere outside of its order; "" for none.
 Errand = Literal["", "home", "charge"]
 
+
+class Command(NamedTuple):
+    """A command to a mission.
+
+    Attributes:
+        name: which.
+        order: what to cover, for ``start``.
+        keep_out: what to add or remove, for ``keep_out_add`` and ``keep_out_remove``.
+        discard: whether ``start`` and ``reset`` may forget what is covered.
+    """
+
+    name: CommandName
+    order: MissionOrder = EVERYTHING_ONCE
+    keep_out: KeepOut | None = None
+    discard: bool = False
+
+
 _Passes = Annotated[int, Meta(ge=1, le=MOST_PASSES, description="how often to cover")]
-_Polygon = Annotated[
-    list[Annotated[tuple[float, float], Meta(description="x, y [m] in the map frame")]],
-    Meta(min_length=3, max_length=MOST_POINTS, description="corners; the last joins the first"),
-]
 
 
 class _Document(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Unknown members are errors."""
 
 
-_Name = Annotated[str, Meta(min_length=1, max_length=LONGEST_NAME)]
-
-
 class StandingZone(_Document, frozen=True):
     """A zone of the configuration, referred to by its name."""
 
-    name: _Name
-    polygon: _Polygon
+    name: PlaceName
+    polygon: Corners
 
 
 class ZoneDocument(_Document, frozen=True):
     """An area to cover; without a polygon, the standing zone of that name."""
 
-    name: _Name
-    polygon: _Polygon | None = None
+    name: PlaceName
+    polygon: Corners | None = None
     passes: _Passes | None = None
 
 
@@ -110,17 +137,26 @@ class OrderDocument(_Document, frozen=True):
     """What to cover. Without zones: everything the robot can reach."""
 
     zones: Annotated[list[ZoneDocument], Meta(max_length=MOST_ZONES)] = []
-    keep_out: Annotated[list[_Polygon], Meta(max_length=MOST_KEEP_OUT)] = []
+    keep_out: Annotated[list[Corners], Meta(max_length=MOST_KEEP_OUT)] = []
     passes: _Passes = 1
     return_home: bool = False
     keep_covered: bool = False
 
 
 class CommandDocument(_Document, frozen=True):
-    """A command to a mission; ``order`` is for ``start`` only."""
+    """A command to a mission.
+
+    Attributes:
+        order: for `start` only.
+        keep_out: for `keep_out_add` and, by its name alone, `keep_out_remove`.
+        discard: for `start` and `reset`: whether they may forget what is covered; where they would
+            and this is not true, they are refused (`would_forget`).
+    """
 
     command: CommandName
     order: OrderDocument | None = None
+    keep_out: KeepOutDocument | None = None
+    discard: bool = False
 
 
 _Read = TypeVar("_Read", bound=_Document)
@@ -135,16 +171,36 @@ def read_order(document: object) -> MissionOrder:
     return order_of(_converted(document if document is not None else {}, OrderDocument))
 
 
-def read_command(document: object) -> tuple[CommandName, MissionOrder]:
-    """Return the command, and its order, in a parsed document.
+def read_command(document: object) -> Command:
+    """Return the command in a parsed document.
 
     Raises:
         OrderError: naming the member, what was expected and what came.
     """
     asked = _converted(document, CommandDocument)
-    if asked.order is not None and asked.command != "start":
-        raise OrderError(f"order goes with start alone, got it with {asked.command}")
-    return asked.command, order_of(asked.order or OrderDocument())
+    name = asked.command
+    if asked.order is not None and name != "start":
+        raise OrderError(f"order goes with start alone, got it with {name}")
+    if asked.discard and name not in FORGETFUL:
+        raise OrderError(f"discard goes with {' and '.join(FORGETFUL)} alone, got it with {name}")
+    if (asked.keep_out is not None) != (name in ("keep_out_add", "keep_out_remove")):
+        got = f"got it with {name}" if asked.keep_out else f"missing with {name}"
+        raise OrderError(f"keep_out goes with keep_out_add and keep_out_remove, {got}")
+    keep_out = None if asked.keep_out is None else keep_out_of(asked.keep_out)
+    if keep_out is not None and bool(keep_out.polygon) != (name == "keep_out_add"):
+        got = "missing" if name == "keep_out_add" else "got it with keep_out_remove"
+        raise OrderError(f"keep_out.polygon: goes with keep_out_add, {got}")
+    return Command(name, order_of(asked.order or OrderDocument()), keep_out, asked.discard)
+
+
+def read_recorded(document: dict[str, object]) -> Command:
+    """Return a command of a recording; a release before ``discard`` forgot without a question.
+
+    Raises:
+        OrderError: as ``read_command``.
+    """
+    forgets = document.get("command") in FORGETFUL
+    return read_command({"discard": True} | document if forgets else document)
 
 
 def order_document(order: MissionOrder) -> dict[str, object]:
@@ -201,11 +257,16 @@ def rotated_order(order: MissionOrder, by_deg: float) -> MissionOrder:
     return replace(given, zones=zones, keep_out=keep_out, given=given)
 
 
-def command_document(command: CommandName, order: MissionOrder) -> dict[str, object]:
+def command_document(command: Command) -> dict[str, object]:
     """Return the document of a command; ``read_command`` reads it."""
-    if command != "start":
-        return {"command": command}
-    return {"command": command, "order": order_document(order)}
+    document: dict[str, object] = {"command": command.name}
+    if command.name == "start":
+        document["order"] = order_document(command.order)
+    if command.name in FORGETFUL:
+        document["discard"] = command.discard
+    if command.keep_out is not None:
+        document["keep_out"] = keep_out_document(command.keep_out)
+    return document
 
 
 def order_of(document: OrderDocument) -> MissionOrder:
@@ -228,10 +289,7 @@ def order_of(document: OrderDocument) -> MissionOrder:
     names = [zone.name for zone in order.zones]
     for index, name in enumerate(names):
         where = f"zones[{index}].name"
-        if not (name.isprintable() and name.strip() == name):
-            raise OrderError(
-                f"{where} must be 1..{LONGEST_NAME} printable characters, got {name!r:.80}"
-            )
+        check_name(where, name)
         if name in names[:index]:
             raise OrderError(f"{where}: there is a zone {name!r} already")
     polygons = {
@@ -239,19 +297,7 @@ def order_of(document: OrderDocument) -> MissionOrder:
         for index, zone in enumerate(order.zones)
         if zone.polygon
     } | {f"keep_out[{index}]": polygon for index, polygon in enumerate(order.keep_out)}
-    points = sum(map(len, polygons.values()))
-    if points > MOST_POINTS_IN_ALL:
-        raise OrderError(f"polygons must have at most {MOST_POINTS_IN_ALL} points, got {points}")
-    for where, polygon in polygons.items():
-        for index, (x, y) in enumerate(polygon):
-            # A negated comparison, so that NaN is caught too.
-            if not math.hypot(x, y) <= FARTHEST_M:
-                raise OrderError(
-                    f"{where}[{index}] must be finite and within {FARTHEST_M:g} m of 0, "
-                    f"got ({x}, {y})"
-                )
-        if why := polygon_flaw(polygon):
-            raise OrderError(f"{where} {why}")
+    check_polygons(polygons)
     return order
 
 

@@ -13,8 +13,18 @@ import msgspec
 from msgspec import Meta
 
 from fasaco_edge.errors import CommandError, OrderError
+from fasaco_edge.mission.orders.keep_outs import (
+    MOST_KEEP_OUT,
+    KeepOutDocument,
+    KeepOuts,
+    added,
+    keep_out_document,
+    keep_out_of,
+    removed,
+)
 from fasaco_edge.mission.orders.order import (
-    CommandName,
+    EVERYTHING_ONCE,
+    Command,
     Errand,
     MissionOrder,
     OrderDocument,
@@ -71,13 +81,14 @@ class OrderState:
         pass_number: number of the pass over it, from 1.
         begun: whether that pass has begun.
         tries: number of retries so far.
-        home: the cell (row, col) where the mission began.
+        home: the cell (row, col) where the first order began, since a reset or a change of map.
         paused: whether the robot must stand.
         errand: destination to drive to first.
         why: why there is no order; for a paused order, what led to the pause.
         frame: frame of the map that zones, keep-out zones and home were given for; "" while no
             frame is in use.
         places: which map the places of the configuration belong to.
+        keep_out: keep-outs of the operator, under any order.
     """
 
     order: MissionOrder | None = None
@@ -93,6 +104,7 @@ class OrderState:
     why: str = ""
     frame: str = ""
     places: PlacesNote = NO_PLACES
+    keep_out: KeepOuts = ()
 
     @classmethod
     def autostart(cls) -> OrderState:
@@ -150,9 +162,7 @@ class OrderState:
         """Return the state of a robot that has come home by command, and stays there."""
         return replace(self, errand="", paused=self.is_open, why=AT_HOME)
 
-    def commanded(
-        self, command: CommandName, order: MissionOrder, *, has_home: bool = False
-    ) -> OrderState:
+    def commanded(self, command: Command, *, has_home: bool = False) -> OrderState:
         """Return the state after a command.
 
         A repeated command changes nothing. ``start`` replaces another order; the same order
@@ -160,17 +170,13 @@ class OrderState:
 
         Raises:
             CommandError: there is nothing to pause, to resume or to plan, or no home.
+            OrderError: a keep-out cannot be added, or there is none of that name.
         """
-        match command:
+        match command.name:
             case "start":
-                return self._started(order)
+                return self._started(command.order)
             case "pause" | "resume":
-                if not (self.is_open or self.errand):
-                    raise CommandError(f"there is no mission to {command}")
-                why = self.why if self.order is None or command == "pause" else ""
-                goes_on = command == "resume" and self.is_open and self.errand == "home"
-                errand: Errand = "" if goes_on else self.errand
-                return replace(self, paused=command == "pause", errand=errand, why=why)
+                return self._interrupted(is_paused=command.name == "pause")
             case "home":
                 if not has_home and self.home is None:
                     raise CommandError(
@@ -187,52 +193,88 @@ class OrderState:
                 if self.order is None or self.paused:
                     why = "the mission is paused" if self.paused else "there is no mission"
                     raise CommandError(f"nothing to plan: {why}")
-            case "cancel" if self.order is not None or self.errand:
-                return replace(self._without_order("cancelled"), home=self.home)
-            case "reset":
-                return OrderState.idle("reset: what was covered is forgotten")
+            case "cancel" | "reset":
+                return self._dropped(is_reset=command.name == "reset")
+            case "keep_out_add" | "keep_out_remove":
+                assert command.keep_out is not None
+                is_new = command.name == "keep_out_add"
+                change = added if is_new else removed
+                return replace(self, keep_out=change(self.keep_out, command.keep_out))
         return self
 
+    def forgets(self, command: Command, after: OrderState) -> tuple[Zone, ...]:
+        """Return the zones whose coverage a command forgets, though their order is not over."""
+        if command.name == "reset":
+            return EVERYTHING_ONCE.zones
+        order = after.order
+        if order is None or order is self.order or order.keep_covered or self.stage is Stage.OVER:
+            return ()
+        return order.zones
+
     def in_other_building(self, why: str) -> OrderState:
-        """Return the state in another building, where its zones are invalid."""
+        """Return the state in another building, where zones, keep-outs and home are invalid."""
         if self.automatic:
-            return replace(OrderState.autostart(), paused=self.paused)
+            # Sent home, it does not sweep there instead.
+            is_to_stand = self.paused or self.errand == "home"
+            return replace(OrderState.autostart(), paused=is_to_stand)
         if self.order is not None:
             return OrderState.idle(f"{why}: the order was dropped")
-        # It led to a place that lies in the building before.
+        # Its errand led to a place that lies in the building before.
         is_paused = self.paused and not self.errand
-        return replace(self, home=None, errand="", paused=is_paused, frame="")
+        here = replace(self, home=None, errand="", paused=is_paused)
+        return replace(here, frame="", keep_out=())
 
     def in_other_frame(self, why: str) -> OrderState:
         """Return the state in another frame, before anything was covered.
 
-        An order for everything stays valid there; zones do not.
+        An order for everything stays valid there; zones and keep-outs do not.
         """
         has_places = self.order is not None and (
-            bool(self.order.keep_out) or any(zone.polygon for zone in self.order.zones)
+            bool(self.order.keep_out or self.keep_out)
+            or any(zone.polygon for zone in self.order.zones)
         )
         if self.order is None or self.automatic or has_places:
             return self.in_other_building(why)
-        return OrderState(self.order, paused=self.paused)
+        return OrderState(self.order, paused=self.paused or self.errand == "home")
+
+    def _interrupted(self, *, is_paused: bool) -> OrderState:
+        """Return the state after ``pause`` or ``resume``: what was interrupted goes on later."""
+        if not (self.is_open or self.errand):
+            name = "pause" if is_paused else "resume"
+            raise CommandError(f"there is no mission to {name}")
+        why = self.why if is_paused or self.order is None else ""
+        return replace(self, paused=is_paused, why=why)
+
+    def _dropped(self, *, is_reset: bool) -> OrderState:
+        """Return the state after ``cancel`` or ``reset``; a reset forgets home, too."""
+        if is_reset:
+            idle = OrderState.idle("reset: what was covered is forgotten")
+            return replace(idle, keep_out=self.keep_out)
+        if self.order is None and not self.errand:
+            return self
+        return self._without_order("cancelled")
 
     def _started(self, order: MissionOrder) -> OrderState:
         same = self.order is not None and order == replace(
             self.order, keep_covered=order.keep_covered
         )
+        errand: Errand = "" if self.errand == "home" else self.errand
         if same and self.stage is not Stage.OVER:
-            errand: Errand = "" if self.errand == "home" else self.errand
             return replace(self, paused=False, errand=errand, why="")
-        return replace(self._without_order(""), order=order)
+        return replace(self._without_order(""), order=order, errand=errand)
 
     def _without_order(self, why: str) -> OrderState:
-        """Return the state without an order on the same map."""
-        return OrderState(why=why, frame=self.frame, places=self.places)
+        """Return the state without an order on the same map: home and keep-outs stay."""
+        here = OrderState(why=why, home=self.home, keep_out=self.keep_out)
+        return replace(here, frame=self.frame, places=self.places)
 
     def to_json(self) -> str:
         """Return it as JSON, to be kept with the ledger."""
         state = {field.name: getattr(self, field.name) for field in fields(self)}
         order = None if self.order is None else order_document(self.order)
-        return msgspec.json.encode(_Note(**state | {"version": 1, "order": order})).decode()
+        keep_out = msgspec.convert(list(map(keep_out_document, self.keep_out)), _KeepOuts)
+        note = _Note(**state | {"version": 1, "order": order, "keep_out": keep_out})
+        return msgspec.json.encode(note).decode()
 
     @classmethod
     def from_json(cls, note: str) -> OrderState:
@@ -255,9 +297,13 @@ class OrderState:
             raise OrderError(
                 f"the order kept has no zone {kept.zone} with a pass {kept.pass_number}"
             )
-        state = msgspec.structs.asdict(kept) | {"order": order}
+        keep_out = tuple(map(keep_out_of, kept.keep_out))
+        state = msgspec.structs.asdict(kept) | {"order": order, "keep_out": keep_out}
         del state["version"]
         return cls(**state)
+
+
+_KeepOuts = Annotated[list[KeepOutDocument], Meta(max_length=MOST_KEEP_OUT)]
 
 
 class _Note(
@@ -265,7 +311,7 @@ class _Note(
 ):
     """An order state as kept on disk; member names are those of the files.
 
-    Notes of older daemons lack the last members. They do not read a note that has them.
+    Without errand, keep-outs, frame and places the form is the one that older daemons read.
     """
 
     version: Literal[1]
@@ -282,3 +328,4 @@ class _Note(
     errand: Errand = ""
     frame: str = ""
     places: PlacesNote = NO_PLACES
+    keep_out: _KeepOuts = []

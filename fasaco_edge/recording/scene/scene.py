@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 
 from fasaco_edge.errors import PatchWithoutBase
-from fasaco_edge.grid.geometry import Bounds, Pose2D, StampedPose, union_bounds
+from fasaco_edge.grid.geometry import Bounds, Polygon, Pose2D, StampedPose, union_bounds
 from fasaco_edge.grid.occupancy import MapPatch, OccupancyGrid, known_bounds
-from fasaco_edge.mission.orders.order import MissionOrder
+from fasaco_edge.mission.orders.order import EVERYTHING_ONCE, Command
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.scene import archetypes as draw
 from fasaco_edge.recording.scene.archetypes import log_styles
@@ -64,6 +64,9 @@ class Scene:
         self._errors = self._restored = self._cohorts = 0
         self._robot: Pose2D | None = None
         self._states: dict[str, str] = {}
+        # The order, by the last command, and the operator's keep-outs, by the last status.
+        self._order = EVERYTHING_ONCE
+        self._kept_out: list[tuple[str, Polygon]] = []
         self._layers = Layers()
         self._curves = Curves(writer)
         self._driven = DrivenPathDrawing(writer)
@@ -111,14 +114,20 @@ class Scene:
         self._robot = pose
         self._driven.add(pose.x, pose.y)
 
-    def add_command(self, command: str, order: MissionOrder) -> None:
+    def add_command(self, command: Command) -> None:
         """Log a command accepted by the mission; draw the zones of the new order."""
-        self.add_line(entities.MISSION_LOG, f"command: {command}")
-        if command not in ("start", "cancel", "reset"):
-            return
-        # Only a start has an order; other commands remove its zones.
+        which = f" {command.keep_out.name!r}" if command.keep_out else ""
+        self.add_line(entities.MISSION_LOG, f"command: {command.name}{which}")
+        if command.name in ("start", "cancel", "reset"):
+            # Only a start has an order; other commands remove its zones.
+            self._order = command.order
+            self._draw_areas()
+
+    def _draw_areas(self) -> None:
+        """Draw the zones of the order, its keep-outs and the operator's."""
+        order = self._order
         zones = [(zone.name, zone.polygon) for zone in order.zones if zone.polygon is not None]
-        keep_out = [("keep out", polygon) for polygon in order.keep_out]
+        keep_out = [("keep out", polygon) for polygon in order.keep_out] + self._kept_out
         for entity, style, polygons in (
             (entities.ZONES, draw.ZONE, zones),
             (entities.KEEP_OUT, draw.KEEP_OUT, keep_out),
@@ -226,6 +235,14 @@ class Scene:
         self._figures.add(status)
         self._add_configuration(status)
         self._add_restored(status.ledger.restored_cells)
+        kept_out = [
+            (f"keep out: {keep_out.name}", keep_out.polygon)
+            for keep_out in status.mission.keep_outs
+            if keep_out.by == "operator" and keep_out.polygon
+        ]
+        if kept_out != self._kept_out:
+            self._kept_out = kept_out
+            self._draw_areas()
         self.enter(entities.MISSION_STATE, status.state, status.reason)
         self.enter(entities.PLANNER_STATE, "planning" if status.plan.planning else "idle")
         self._add_errors(status.errors)

@@ -200,7 +200,7 @@ class Recorder:
             self._scene.add_pose(pose)
 
     def _draw_command(self, sample: Sample) -> None:
-        self._scene.add_command(*read_command(decode_json(sample.payload)))
+        self._scene.add_command(read_command(decode_json(sample.payload)))
 
     def _draw_path(self, sample: Sample) -> None:
         about = decode_tolerant(sample.attachment, PathAttachment)

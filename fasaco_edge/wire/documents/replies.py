@@ -130,6 +130,20 @@ class UnreachedReport(Document, frozen=True):
     areas_left_out: Count = 0
 
 
+class KeepOutReport(Document, frozen=True):
+    """A keep-out in force, of the order or of the operator.
+
+    Attributes:
+        name: of one of the operator's, by which it is removed; "" for one of the order.
+        polygon: corners x, y [m] in the frame of the map.
+        by: whose it is.
+    """
+
+    name: str = ""
+    polygon: Annotated[tuple[tuple[float, float], ...], allowed(maxItems=1000)] = ()
+    by: Annotated[str, allowed(enum=("operator", "order"))] = "operator"
+
+
 class MissionReport(Document, frozen=True):
     """The order and its progress.
 
@@ -139,7 +153,8 @@ class MissionReport(Document, frozen=True):
         pass: number of the present pass; null without an order.
         passes: number of all passes.
         keep_out: number of keep-out zones, with those of the configuration; a mask counts as one.
-        home: position the robot returns to; by default the position where the mission began.
+        keep_outs: the keep-out zones in force, without those of the configuration.
+        home: position the robot returns to; by default where the first order began since a reset.
         tries: retries of cells left over.
         unreached: part of the order that stays uncovered as things are.
     """
@@ -158,6 +173,7 @@ class MissionReport(Document, frozen=True):
     home: Point | None = None
     tries: Count = 0
     unreached: UnreachedReport = UnreachedReport()
+    keep_outs: Annotated[tuple[KeepOutReport, ...], allowed(maxItems=200)] = ()
 
 
 class Reply(Document, frozen=True):

@@ -1,0 +1,69 @@
+"""Loss: how much of what is covered a command would forget."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fasaco_edge.errors import WouldForget
+from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
+from fasaco_edge.mission.map.map_state import MapState
+from fasaco_edge.mission.orders.order import Zone
+from fasaco_edge.mission.orders.zones import in_zones
+
+
+@dataclass(frozen=True, slots=True)
+class Loss:
+    """Covered cells that have to be covered again.
+
+    Attributes:
+        cells: their number; those under the tool do not count, as they stay covered.
+        m2: their area [m2].
+        share: of the cells that the robot can reach; None where these are not known.
+    """
+
+    cells: int
+    m2: float
+    share: float | None = None
+
+    def __str__(self) -> str:
+        cells = "cell" if self.cells == 1 else "cells"
+        percent = "" if self.share is None else f", {percents(self.share)} of the floor in reach"
+        return f"{self.cells} covered {cells} ({self.m2:.1f} m2){percent}"
+
+    def check(self, command: str) -> None:
+        """Refuse a command by which this would be lost.
+
+        Raises:
+            WouldForget: there is a loss; it says how much.
+        """
+        if self.cells:
+            raise WouldForget(f"{command} forgets {self}")
+
+
+def percents(share: float) -> str:
+    """Return a share in words, never 0 % for some."""
+    return "less than 1 %" if share < 0.01 else f"{100 * share:.0f} %"
+
+
+def loss_in(zones: tuple[Zone, ...], ledger: MissionLedger, on: MapState) -> Loss:
+    """Return what is covered in zones; without a map, all that is covered anywhere."""
+    if not zones:
+        return Loss(0, 0.0)
+    lattice, own = on.lattice, ledger.current.snapshot()
+    cells = max(own.cells - len(own.under_tool), 0)
+    if lattice is None:
+        return Loss(cells, cells * own.cell_m**2)
+    window = lattice.window
+    covered = (ledger.visits(window) > 0) & in_zones(zones, window, lattice.cell_m)
+    for cell in own.under_tool:
+        if lattice.contains(cell):
+            covered[lattice.local(cell)] = False
+    cells = int(np.count_nonzero(covered))
+    if on.area is None:
+        return Loss(cells, cells * lattice.cell_m**2)
+    reachable = on.area.reachable
+    all_cells = int(np.count_nonzero(reachable))
+    share = int(np.count_nonzero(covered & reachable)) / all_cells if all_cells else 0.0
+    return Loss(cells, cells * lattice.cell_m**2, share)

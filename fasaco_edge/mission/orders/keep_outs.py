@@ -1,0 +1,149 @@
+"""Keep-outs of the operator: named areas that hold under every order until they are removed.
+
+They are part of the order's state, so they are kept with the ledger; those of an order end with it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Annotated
+
+import msgspec
+from msgspec import Meta
+
+from fasaco_edge.errors import OrderError
+from fasaco_edge.grid.geometry import FARTHEST_M, Polygon
+from fasaco_edge.grid.polygons import polygon_flaw
+
+# Limits on the places of an order: it is kept with the ledger, which is written once a second.
+MOST_KEEP_OUT = 100
+MOST_POINTS = 1_000
+MOST_POINTS_IN_ALL = 5_000
+LONGEST_NAME = 64
+
+Corners = Annotated[
+    list[Annotated[tuple[float, float], Meta(description="x, y [m] in the map frame")]],
+    Meta(min_length=3, max_length=MOST_POINTS, description="corners; the last joins the first"),
+]
+PlaceName = Annotated[str, Meta(min_length=1, max_length=LONGEST_NAME)]
+
+
+class KeepOutDocument(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """A keep-out of the operator; without a polygon, to be removed."""
+
+    name: PlaceName
+    polygon: Corners | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class KeepOut:
+    """An area that the robot must not touch.
+
+    Attributes:
+        name: unique among the operator's keep-outs.
+        polygon: corners (x, y) [m] in the map frame, on any lattice; () for one to be removed.
+    """
+
+    name: str
+    polygon: Polygon = ()
+
+
+KeepOuts = tuple[KeepOut, ...]
+
+
+def keep_out_of(document: KeepOutDocument) -> KeepOut:
+    """Return the keep-out in a document.
+
+    Raises:
+        OrderError: naming the member, and what is wrong with it.
+    """
+    check_name("keep_out.name", document.name)
+    polygon = tuple(document.polygon or ())
+    check_polygons({"keep_out.polygon": polygon} if polygon else {})
+    return KeepOut(document.name, polygon)
+
+
+def keep_out_document(keep_out: KeepOut) -> dict[str, object]:
+    """Return the document of a keep-out; ``keep_out_of`` reads it."""
+    named: dict[str, object] = {"name": keep_out.name}
+    return named | ({"polygon": keep_out.polygon} if keep_out.polygon else {})
+
+
+def added(keep_outs: KeepOuts, new: KeepOut) -> KeepOuts:
+    """Return keep-outs with another one; unchanged with one that is there already.
+
+    Raises:
+        OrderError: another one has that name, or there are too many, or too many corners.
+    """
+    if new in keep_outs:
+        return keep_outs
+    if any(new.name == known.name for known in keep_outs):
+        raise OrderError(
+            f"keep_out.name: there is a keep-out {new.name!r} already, with other corners",
+            hint="give it another name, or remove that one first",
+        )
+    together = (*keep_outs, new)
+    if len(together) > MOST_KEEP_OUT:
+        raise OrderError(
+            f"there are {MOST_KEEP_OUT} keep-outs already", hint="remove one of them first"
+        )
+    points = sum(len(known.polygon) for known in together)
+    if points > MOST_POINTS_IN_ALL:
+        raise OrderError(
+            f"keep-outs must have at most {MOST_POINTS_IN_ALL} corners in all, got {points}",
+            hint="draw it with fewer corners, or remove another one first",
+        )
+    return together
+
+
+def removed(keep_outs: KeepOuts, unwanted: KeepOut) -> KeepOuts:
+    """Return keep-outs without the one of a name.
+
+    Raises:
+        OrderError: there is none.
+    """
+    rest = tuple(known for known in keep_outs if known.name != unwanted.name)
+    if rest == keep_outs:
+        names = ", ".join(repr(known.name) for known in keep_outs)
+        there = f"there are {names:.400}" if names else "there are none"
+        raise OrderError(
+            f"keep_out.name: no keep-out {unwanted.name!r} was added; {there}",
+            hint="name one of those; keep-outs of an order end with it, and those of the "
+            "configuration are changed there",
+        )
+    return rest
+
+
+def check_name(where: str, name: str) -> None:
+    """Check the name of a place.
+
+    Raises:
+        OrderError: it is not printable, or has spaces around it.
+    """
+    if not (name.isprintable() and name.strip() == name):
+        raise OrderError(
+            f"{where} must be 1..{LONGEST_NAME} printable characters, got {name!r:.80}"
+        )
+
+
+def check_polygons(polygons: Mapping[str, Polygon]) -> None:
+    """Check polygons, by the members they are in, beyond their types; it needs no map.
+
+    Raises:
+        OrderError: naming the member, and what is wrong with it.
+    """
+    points = sum(map(len, polygons.values()))
+    if points > MOST_POINTS_IN_ALL:
+        raise OrderError(f"polygons must have at most {MOST_POINTS_IN_ALL} points, got {points}")
+    for where, polygon in polygons.items():
+        for index, (x, y) in enumerate(polygon):
+            # A negated comparison, so that NaN is caught too.
+            if not math.hypot(x, y) <= FARTHEST_M:
+                raise OrderError(
+                    f"{where}[{index}] must be finite and within {FARTHEST_M:g} m of 0, "
+                    f"got ({x}, {y})"
+                )
+        if why := polygon_flaw(polygon):
+            raise OrderError(f"{where} {why}")

@@ -1,0 +1,212 @@
+"""Keep-outs that are added and removed while a mission runs: the order goes on."""
+
+import pytest
+
+from fasaco_edge.errors import OrderError
+from fasaco_edge.mission.core.events import MapReceived, State
+from fasaco_edge.mission.orders.keep_outs import MOST_KEEP_OUT, KeepOut
+from fasaco_edge.mission.orders.order_state import OrderState
+from tests.mission.world import CELL, Drive, building, pose_at, rectangle, started
+
+ROOM = ("........",) * 6
+ALL = {(row, col) for row in range(6) for col in range(8)}
+
+
+def keep_out(name, *bounds):
+    return KeepOut(name, tuple(map(tuple, rectangle(*bounds))))
+
+
+def inside(row0, col0, row1, col1):
+    return {(row, col) for row in range(row0, row1) for col in range(col0, col1)}
+
+
+VASE = keep_out("vase", 1, 3, 4, 5)
+
+
+def add(drive, new):
+    return drive.command("keep_out_add", keep_out=new)
+
+
+def remove(drive, name):
+    return drive.command("keep_out_remove", keep_out=KeepOut(name))
+
+
+def finish(drive, ticks=300):
+    for _ in range(ticks):
+        if drive.mission.state is State.DONE:
+            return
+        drive.plan() if drive.request else None
+        drive.go()
+    raise AssertionError(drive.mission.reason)
+
+
+def test_in_mid_mission_coverage_stays_and_the_order_goes_on():
+    drive = started(*ROOM)
+    for _ in range(12):
+        drive.go()
+    before, covered = drive.mission.order_state, drive.visited
+    decision = add(drive, keep_out("vase", *_ahead(drive)))
+    assert drive.visited == covered
+    assert drive.mission.order_state.order is before.order
+    assert decision.path is not None, "the path led there"
+    assert decision.plan.reason.startswith("path blocked at cell")
+    finish(drive)
+    assert covered < drive.visited
+    assert len(drive.visited) == 47
+
+
+def _ahead(drive):
+    row, col = drive.walk[3]
+    return row, col, row + 1, col + 1
+
+
+def test_no_path_leads_into_it_from_that_step_on():
+    drive = started("..........")
+    drive.go()
+    assert add(drive, keep_out("door", 0, 6, 1, 7)).path.cells.tolist()[-1] == [0, 5]
+    finish(drive)
+    assert drive.driven[-1] == (0, 5)
+
+
+def test_a_robot_inside_stops_at_once_and_goes_on_once_it_is_removed():
+    drive = started(*ROOM)
+    for _ in range(12):
+        drive.go()
+    covered = drive.visited
+    decision = add(drive, keep_out("here", 0, 0, 6, 8))
+    assert decision.path.cells.shape == (0, 2)
+    assert (drive.mission.state, drive.walk) == (State.BLOCKED, [])
+    assert "robot is in a keep-out zone" in drive.mission.reason
+    remove(drive, "here")
+    drive.tell(after=3.0)
+    finish(drive)
+    assert covered < drive.visited == ALL
+
+
+def test_a_robot_at_its_border_stops_too_and_is_led_out_by_another_path():
+    drive = started(*ROOM)
+    for _ in range(3):
+        drive.go()
+    row, col = drive.cell
+    decision = add(drive, keep_out("here", row, col, row + 1, col + 1))
+    assert decision.path.cells.shape == (0, 2)
+    drive.plan()
+    drive.cell = drive.walk.pop(0)
+    assert drive.cell in ((row, col - 1), (row, col + 1), (row + 1, col), (row - 1, col))
+    drive.tell(pose_at(*drive.cell))
+    finish(drive)
+    assert (row, col) not in drive.driven[4:]
+
+
+def test_what_is_kept_out_is_covered_once_it_is_removed():
+    drive = started(*ROOM)
+    add(drive, VASE)
+    for _ in range(10):
+        drive.plan() if drive.request else None
+        drive.go()
+    remove(drive, "vase")
+    finish(drive)
+    assert drive.visited == ALL
+
+
+def test_it_holds_under_every_order_until_it_is_removed():
+    drive = Drive(
+        (0, 0),
+        MapReceived(building(*ROOM)),
+        pose_at(0, 0),
+        order_state=OrderState.idle("no order yet"),
+    )
+    add(drive, VASE)
+    assert drive.mission.state is State.IDLE
+    for order in ({"keep_out": [rectangle(0, 7, 1, 8)]}, {}):
+        drive.command("start", order)
+        drive.driven.clear()
+        finish(drive)
+        assert not set(drive.driven) & inside(1, 3, 4, 5)
+    drive.command("cancel")
+    drive.command("reset")
+    assert drive.mission.order_state.keep_out == (VASE,)
+    drive.command("start")
+    remove(drive, "vase")
+    finish(drive)
+    assert drive.visited == ALL
+
+
+def test_it_outlives_the_daemon():
+    drive = started(*ROOM)
+    add(drive, VASE)
+    kept = drive.mission.snapshot()
+    again = Drive(drive.cell, order_state=OrderState.from_json(kept.note))
+    again.mission.restore_ledger(kept)
+    again.tell(MapReceived(building(*ROOM)), pose_at(*drive.cell))
+    finish(again)
+    assert again.visited == ALL - inside(1, 3, 4, 5)
+
+
+def test_without_one_the_note_is_as_older_daemons_read_it():
+    drive = started(*ROOM)
+    before = drive.mission.snapshot().note
+    add(drive, VASE)
+    assert drive.mission.snapshot().note != before
+    remove(drive, "vase")
+    assert drive.mission.snapshot().note == before
+
+
+def test_before_there_is_a_map():
+    drive = Drive((0, 0))
+    add(drive, VASE)
+    drive.tell(MapReceived(building(*ROOM)), pose_at(0, 0))
+    finish(drive)
+    assert drive.visited == ALL - inside(1, 3, 4, 5)
+
+
+def test_paused_and_sent_home_it_stays_so():
+    drive = started(*ROOM)
+    for _ in range(12):
+        drive.go()
+    drive.command("pause")
+    add(drive, VASE)
+    assert (drive.mission.state, drive.walk) == (State.PAUSED, [])
+    drive.command("home")
+    add(drive, keep_out("way", *_ahead(drive)))
+    for _ in range(60):
+        drive.go()
+    assert (drive.cell, drive.mission.reason) == ((0, 0), "at home, paused by command")
+
+
+def test_added_twice_it_is_added_once():
+    drive = started(*ROOM)
+    add(drive, VASE)
+    revision = drive.mission.route.revision
+    assert add(drive, VASE).path is None
+    assert drive.refused is None
+    assert drive.mission.order_state.keep_out == (VASE,)
+    assert drive.mission.route.revision == revision
+
+
+def test_what_cannot_be_is_refused_by_name_and_changes_nothing():
+    drive = started(*ROOM)
+    add(drive, VASE)
+    for give, said in (
+        (lambda: add(drive, keep_out("vase", 0, 0, 1, 1)), "a keep-out 'vase' already, with other"),
+        (lambda: remove(drive, "vase "), "no keep-out 'vase ' was added; there are 'vase'"),
+    ):
+        before = drive.mission.order_state
+        assert give().path is None
+        assert isinstance(drive.refused, OrderError)
+        assert said in str(drive.refused)
+        assert drive.mission.order_state is before
+
+
+@pytest.mark.parametrize(
+    ("count", "corners", "said"),
+    [(MOST_KEEP_OUT, 4, "there are 100 keep-outs already"), (5, 1000, "at most 5000 corners")],
+)
+def test_they_are_bounded(count, corners, said):
+    polygon = tuple((CELL * index, 0.0) for index in range(corners))
+    drive = Drive((0, 0))
+    for number in range(count):
+        add(drive, KeepOut(str(number), polygon))
+        assert drive.refused is None
+    add(drive, KeepOut("more", polygon))
+    assert said in str(drive.refused)

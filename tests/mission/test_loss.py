@@ -1,0 +1,117 @@
+"""No command forgets what is covered unless it says so: the refusal says how much."""
+
+import pytest
+
+from fasaco_edge.errors import WouldForget
+from fasaco_edge.mission.core.events import MapReceived
+from fasaco_edge.mission.orders.order_state import OrderState
+from tests.mission.world import Drive, building, pose_at, rectangle, started
+
+ROOM = ("........",) * 6
+EAST = {"zones": [{"name": "east", "polygon": rectangle(0, 6, 6, 8)}]}
+OTHER = {"passes": 2}
+
+
+def covering(cells=12):
+    drive = started(*ROOM)
+    while len(drive.visited) < cells:
+        drive.go()
+    return drive
+
+
+def refused(drive, name, order=None):
+    """Give a command that does not say so; return why it is refused, None if it is not."""
+    state, covered, path = drive.mission.order_state, drive.visited, drive.mission.route.path
+    decision = drive.command(name, order, discard=False)
+    if drive.refused is None:
+        return None
+    assert isinstance(drive.refused, WouldForget)
+    assert drive.mission.order_state is state
+    assert drive.visited == covered
+    assert drive.mission.route.path is path
+    assert (decision.path, decision.plan, decision.forgotten) == (None, None, False)
+    return str(drive.refused)
+
+
+def test_another_order_says_how_much_it_would_forget():
+    drive = covering(12)
+    # The cell under the tool stays covered.
+    said = "start forgets 11 covered cells (0.7 m2), 23 % of the floor in reach"
+    assert refused(drive, "start", OTHER) == said
+    drive.command("start", OTHER, discard=True)
+    assert drive.refused is None
+    assert drive.visited == {drive.cell}
+
+
+def test_a_reset_says_how_much_it_would_forget():
+    drive = covering(2)
+    said = "reset forgets 1 covered cell (0.1 m2), 2 % of the floor in reach"
+    assert refused(drive, "reset") == said
+    drive.command("reset", discard=True)
+    assert drive.visited == {drive.cell}
+    assert refused(drive, "reset") is None, "there is nothing left to forget"
+
+
+def test_a_keep_out_by_another_order_would_forget_what_one_by_name_keeps():
+    drive = covering(12)
+    assert "11 covered cells" in refused(drive, "start", {"keep_out": [rectangle(4, 4, 5, 5)]})
+
+
+@pytest.mark.parametrize("order", [None, {"keep_covered": True}, {**OTHER, "keep_covered": True}])
+def test_the_same_order_and_one_that_keeps_what_is_covered_need_no_consent(order):
+    drive = covering(12)
+    covered = drive.visited
+    assert refused(drive, "start", order) is None
+    assert covered <= drive.visited
+
+
+def test_a_zone_where_nothing_is_covered_needs_no_consent():
+    drive = covering(6)
+    assert not any(col >= 6 for _, col in drive.visited)
+    assert refused(drive, "start", EAST) is None
+
+
+def test_after_a_cancelled_order_what_is_covered_is_not_forgotten_unasked():
+    drive = covering(12)
+    assert refused(drive, "cancel") is None
+    assert "11 covered cells" in refused(drive, "start")
+    assert refused(drive, "start", {"keep_covered": True}) is None
+
+
+def test_an_order_that_is_over_loses_nothing_to_the_next():
+    drive = started(*ROOM)
+    drive.finish()
+    assert refused(drive, "start", OTHER) is None
+    assert drive.visited == {drive.cell}
+
+
+def test_a_robot_that_only_stands_there_loses_nothing():
+    drive = Drive(
+        (0, 0),
+        MapReceived(building(*ROOM)),
+        pose_at(0, 0),
+        order_state=OrderState.idle("no order yet"),
+    )
+    assert drive.visited == {(0, 0)}
+    assert refused(drive, "start") is None
+
+
+def test_before_there_is_a_map_all_that_was_covered_counts():
+    kept = covering(12).mission.snapshot()
+    again = Drive((0, 0), order_state=OrderState.from_json(kept.note))
+    again.mission.restore_ledger(kept)
+    assert refused_without_map(again) == "start forgets 11 covered cells (0.7 m2)"
+
+
+def refused_without_map(drive):
+    drive.command("start", OTHER, discard=False)
+    return str(drive.refused)
+
+
+def test_none_is_said_to_be_less_than_it_is():
+    """A share never rounds to nothing."""
+    drive = Drive((0, 0), MapReceived(building(*("." * 20,) * 20)), pose_at(0, 0))
+    drive.plan()
+    for _ in range(2):
+        drive.go()
+    assert "2 covered cells (0.1 m2), less than 1 % of the floor" in refused(drive, "reset")
