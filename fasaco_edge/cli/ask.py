@@ -171,7 +171,8 @@ def _rows(answer: replies.Reply) -> list[tuple[str, str]]:
     if answer.floor is not None:
         rows.append(("floor swept", phrases.swept(answer.floor)))
     if mission.keep_out:
-        rows.append(("keep-out zones", str(mission.keep_out)))
+        names = ", ".join(each.name for each in mission.keep_outs if each.by == "operator")
+        rows.append(("keep-out zones", f"{mission.keep_out}{f', with {names}' if names else ''}"))
     if mission.return_home:
         home = mission.home
         rows.append(("home", f"({home.x:.2f}, {home.y:.2f}) m" if home else "not known yet"))

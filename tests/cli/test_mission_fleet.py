@@ -117,6 +117,30 @@ def answering(key, payload):
     return lambda query: query.reply(key, payload)
 
 
+def test_who_would_forget_what_is_covered_is_named_and_forgets_it_only_then(router, capsys):
+    def words(*more):
+        return "start", "--passes", "2", "--fleet", "hall", *more
+
+    with Outsider(router, "r1") as first:
+        for step in range(1, 4):
+            first.put("pose", pose_bytes(0.75 + 0.3 * step, 0.75))
+        first.wait_status(lambda status: status["coverage"]["covered"] >= 4)
+        assert command(router, *words()) == 1
+        shown = " ".join(capsys.readouterr().out.split())
+        assert "start forgets 3 covered cells" in shown
+        assert "--yes" in shown
+        assert first.ask_status()["coverage"]["covered"] >= 4
+        assert command(router, *words("--yes")) == 0
+        first.wait_status(lambda status: status["coverage"]["covered"] == 1)
+    area = "keep-out", "add", "--name", "vase", "1.5,1.5;2,1.5;2,2", "--fleet", "hall"
+    assert command(router, *area) == 0
+    capsys.readouterr()
+    assert command(router, "keep-out", "list", "--fleet", "hall") == 0
+    assert capsys.readouterr().out.count("vase") == 2
+    assert command(router, "keep-out", "remove", "vase", "--fleet", "hall") == 0
+    capsys.readouterr()
+
+
 def test_a_robot_that_is_frozen_is_told_and_holds_up_no_other(router, daemons, capsys):
     with Outsider(router, "r2") as second, Outsider(router, "r1") as first:
         second.put("map", map_bytes(room(3.0, 3.0)))

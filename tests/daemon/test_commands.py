@@ -22,9 +22,13 @@ KITCHEN = {"name": "kitchen", "polygon": [[0.3, 0.9], [1.5, 0.9], [1.5, 1.5], [0
 KITCHEN_CELLS = {(row, col) for row in (3, 4) for col in range(1, 5)}
 
 
-def command(outsider: Outsider, name: str, order: dict[str, Any] | None = None) -> dict[str, Any]:
+def command(
+    outsider: Outsider, name: str, order: dict[str, Any] | None = None, *, discard: bool = True
+) -> dict[str, Any]:
     """Give a command; return the answer, or the error."""
-    asked = {"command": name} | ({"order": order} if order is not None else {})
+    asked: dict[str, Any] = {"command": name} | ({"order": order} if order is not None else {})
+    if name in ("start", "reset"):
+        asked["discard"] = discard
     return ask(outsider, json.dumps(asked).encode())
 
 
@@ -283,7 +287,7 @@ def test_the_command_line(tmp_path):
             assert word in shown.out
         file = tmp_path / "order.yaml"
         file.write_text("keep_out:\n  - [[1, 1], [2, 1], [2, 2]]\npasses: 3\n")
-        mission = told(running, "start", "--order", str(file))["mission"]
+        mission = told(running, "start", "--order", str(file), "--yes")["mission"]
         assert (mission["passes"], mission["zones"]) == (3, [])
         assert told(running, "reset")["reason"] == "reset: what was covered is forgotten"
         assert told(running, "cancel")["state"] == "idle"

@@ -103,6 +103,29 @@ def test_cells_along_askew_walls_are_found_once_more(tmp_path):
     assert replay.mission.coverage().covered == recording.status["coverage"]["covered"]
 
 
+KEEP_OUT = {"name": "crate", "polygon": [[2.4, 0.6], [2.9, 0.6], [2.9, 1.1], [2.4, 1.1]]}
+
+
+def test_keep_outs_and_what_was_not_to_be_forgotten_are_repeated(tmp_path):
+    commands = (
+        (8.0, {"command": "keep_out_add", "keep_out": KEEP_OUT}, ""),
+        (12.0, {"command": "start", "order": {"passes": 2}}, "would_forget"),
+        (14.0, {"command": "reset"}, "would_forget"),
+        (16.0, {"command": "keep_out_remove", "keep_out": {"name": "lamp"}}, "bad_order"),
+        (18.0, {"command": "keep_out_remove", "keep_out": {"name": "crate"}}, ""),
+        (22.0, {"command": "start", "order": {"return_home": True}, "discard": True}, ""),
+    )
+    recording = record_mission(tmp_path, commands=commands)
+    samples = list(RecordedSamples(recording.paths))
+    replay, record, steps = played(samples)
+    assert (record.gap, replay.difference, replay.lacking) == ("", None, [])
+    assert all(step.as_recorded for step in steps if step.decision.path is not None)
+    answers = [answer for step in steps for answer in step.decision.answers]
+    codes = [answer.error.code if answer.error else "" for answer in answers]
+    assert [code for code in codes if code] == ["would_forget", "would_forget", "bad_order"]
+    assert replay.mission.coverage().covered == recording.status["coverage"]["covered"]
+
+
 def test_what_is_said_on_the_bus_is_that_of_the_contract(samples):
     for place in places(samples, TURNS):
         check("turns.json", json.loads(samples[place].sample.payload))

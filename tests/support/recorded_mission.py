@@ -38,8 +38,12 @@ START = Pose2D(0.75, 0.75)
 # Where the crate is said to stand [m], and from when to when [simulated s].
 CRATE = (2.4, 1.2, 2.7, 1.5)
 CRATE_S = (8.0, 25.0)
-# What is commanded when [simulated s].
-COMMANDS = ((14.0, "pause"), (16.0, "resume"), (19.0, "replan"))
+# What is commanded when [simulated s], and the code of the error that it gets, "" for none.
+COMMANDS = (
+    (14.0, {"command": "pause"}, ""),
+    (16.0, {"command": "resume"}, ""),
+    (19.0, {"command": "replan"}, ""),
+)
 # From the first path to the first command, at least [s]: when the daemon took what a recording
 # tells no more exactly than that.
 DRIVES_S = 0.5
@@ -78,6 +82,7 @@ def record_mission(
     broken_poses: int = 0,
     line: str = "cells",
     yaw_deg: float = 0.0,
+    commands=COMMANDS,
 ) -> Recording:
     """Record a mission from its first map until a status ends it; some poses may be none.
 
@@ -92,7 +97,7 @@ def record_mission(
             assert time.monotonic() < deadline, daemon.log_text()
             time.sleep(0.05)
         with bus:
-            robot = MappingRobot(bus, broken_poses, yaw_deg)
+            robot = MappingRobot(bus, broken_poses, yaw_deg, commands)
             robot.wait(lambda status: (status["recorder"] or {}).get("state") == "recording")
             robot.drive(ends)
         # With the recorder's last words it may take a while on a busy machine.
@@ -113,11 +118,13 @@ def _joined(endpoint: str) -> Bus | None:
 class MappingRobot:
     """A robot on the bus, and the newest status of the daemon."""
 
-    def __init__(self, bus: Bus, broken_poses: int = 0, yaw_deg: float = 0.0) -> None:
+    def __init__(
+        self, bus: Bus, broken_poses: int = 0, yaw_deg: float = 0.0, commands=COMMANDS
+    ) -> None:
         self._bus, self._keys = bus, Keys()
         self._broken_poses, self._broken_sent = broken_poses, 0
         keys = self._keys
-        self._commands = list(COMMANDS)
+        self._commands = list(commands)
         pixels = fill(room(*SIZE_M), 1.5, 0.0, 1.6, 1.2, WALL)
         geometry = GridGeometry(*pixels.shape, RESOLUTION_M, Pose2D(0.0, 0.0))
         geometry, start = rotated_geometry(geometry, yaw_deg), rotated_pose(START, yaw_deg)
@@ -151,7 +158,7 @@ class MappingRobot:
                 self._world.follow(decode_path(sample.payload).xy)
             self._publish()
             if self._is_time():
-                self._command(self._commands.pop(0)[1])
+                self._command(*self._commands.pop(0)[1:])
                 due = time.monotonic()
             due += tick_s
             time.sleep(max(due - time.monotonic(), 0.0))
@@ -164,7 +171,7 @@ class MappingRobot:
             return False
         if not self.notes or time.monotonic() - self.notes[0][0] < DRIVES_S:
             return False
-        return self._commands[0][1] == "resume" or self.status.get("state") == "covering"
+        return self._commands[0][1]["command"] == "resume" or self.status.get("state") == "covering"
 
     def _publish(self) -> None:
         emission = self._world.tick()
@@ -179,10 +186,10 @@ class MappingRobot:
                 # The next pose would take its place, were the daemon busy.
                 self.wait(lambda status: status["errors"]["total"] >= self._broken_sent)
 
-    def _command(self, name: str) -> None:
-        payload = encode_json({"command": name})
+    def _command(self, document: dict, code: str) -> None:
+        payload = encode_json(document)
         (reply,) = self._bus.get(self._keys.rpc("mission"), timeout_s=TIMEOUT_S, payload=payload)
-        assert not reply.is_error, reply.payload
+        assert decode_json(reply.payload).get("code", "") == code, reply.payload
 
     def _believed(self, grid: OccupancyGrid) -> OccupancyGrid:
         if not CRATE_S[0] <= 1e-9 * self._world.stamp_ns < CRATE_S[1]:

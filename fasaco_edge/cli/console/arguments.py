@@ -135,7 +135,8 @@ def with_negative_pairs(words: Sequence[str]) -> list[str]:
             name, has_value, _ = word.partition("=")
             takes_more = name in WITH_PAIRS or (name in WITH_PAIR and not has_value)
             option = name if takes_more else ""
-            joined.append(word)
+            # A pair that is no option's value stands for itself: with a space argparse sees it so.
+            joined.append(f" {word}" if re.match(r"-[\d.]+,", word) else word)
             continue
         else:
             if option and joined[-1].startswith(f"{option}="):

@@ -5,15 +5,27 @@ from __future__ import annotations
 import argparse
 import json
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from fasaco_edge.cli.ask import add_question, ask, show_mission
+import msgspec
+
+from fasaco_edge.cli.ask import RefusedError, add_question, ask, show_mission
 from fasaco_edge.cli.console.arguments import Command, Exit, add_common
+from fasaco_edge.cli.console.question import agrees, may_ask
 from fasaco_edge.cli.console.streams import print_json
+from fasaco_edge.cli.console.terminal import err
 from fasaco_edge.cli.mission.fleet import command_fleet
-from fasaco_edge.errors import OrderError
+from fasaco_edge.cli.mission.keep_outs import add_actions, asked_by, names_of, show_keep_outs
+from fasaco_edge.errors import OrderError, WouldForget
 from fasaco_edge.host.plain_yaml import load, read_bounded
-from fasaco_edge.mission.orders.order import order_document, read_order
-from fasaco_edge.wire.documents.json_text import decode_json, encode_json
+from fasaco_edge.mission.orders.order import FORGETFUL, order_document, read_order
+from fasaco_edge.wire.documents.json_text import decode_json, decode_tolerant, encode_json
+from fasaco_edge.wire.documents.replies import Reply
+
+if TYPE_CHECKING:
+    from fasaco_edge.bus.queries import Reply as Answer
+
+KEPT = "what is covered is kept: `mission start --keep-covered` goes on with the rest"
 
 EPILOG = """\
 examples:
@@ -26,6 +38,7 @@ examples:
   fasaco-edge mission start --order evening.yaml
   fasaco-edge mission start --fleet building_7      to each of its robots: they share the floor
   fasaco-edge mission pause && fasaco-edge mission resume
+  fasaco-edge mission keep-out add --name vase "1,1;2,1;2,2;1,2"   in mid-mission, nothing is lost
 
 evening.yaml, or the same as JSON; all lengths in metres in the frame of the map:
   zones:                      # one after the other; if none: everything reachable
@@ -43,6 +56,11 @@ Each pass starts from zero: what was covered before is covered again. An order, 
 whether it is paused survive a restart of the daemon. A daemon without an order covers everything
 by itself (mission.autostart of its configuration).
 
+Another order, and a reset, forget what is covered where the order before is not over: on a
+terminal they say how much and ask first; elsewhere they are refused without --yes.
+`start --keep-covered` goes on with the rest. `resume` goes on with what was paused, also the way
+home.
+
 With --fleet all its robots get the same command, those that others heard within ten minutes, too.
 Some may refuse or not answer while the others obey: the exit code is 1 then, and one without an
 answer may still be driving. Robots share a zone; corners are in the frame of each robot's own map:
@@ -55,12 +73,13 @@ name
 COMMANDS = {
     "start": "start an order in place of the current one; the same order continues",
     "pause": "stop the robot; what it passes over still counts as covered",
-    "resume": "continue a paused mission",
+    "resume": "continue what was paused: the order, or the way home or to charge",
     "home": "drive home and stay there: an order goes on after resume",
     "cancel": "stop and drop the order; what is covered is kept",
     "stop": "the same as cancel; to go on later with the same order, pause it",
     "replan": "plan in full now, starting from the current path",
     "reset": "stop and drop the order and what is covered; the ledger's file is renamed",
+    "keep-out": "areas to keep out of, changed in mid-mission: add, remove, list",
     "status": "show state, progress, and what could not be reached",
 }
 
@@ -70,16 +89,30 @@ def _add_commands(parser: argparse.ArgumentParser) -> None:
     for name, text in COMMANDS.items():
         described = text[0].upper() + text[1:] + "."
         command = names.add_parser(name, help=text, description=described)
-        add_common(command)
+        command.set_defaults(mission_command=name)
+        if name == "keep-out":
+            add_actions(command, _polygon, _add_receiver)
+            continue
         if name == "start":
             _add_order(command)
-        command.add_argument(
-            "--fleet",
-            metavar="NAME",
-            help="not to one robot but to each of this fleet (`fleet.name` of their configuration)",
-        )
-        add_question(command)
-        command.set_defaults(mission_command=name)
+        if name in FORGETFUL:
+            command.add_argument(
+                "--yes",
+                action="store_true",
+                help="forget what is covered without a question, as scripts have to say",
+            )
+        _add_receiver(command)
+
+
+def _add_receiver(parser: argparse.ArgumentParser) -> None:
+    """Add the options of all commands: which robots, and how to show their answers."""
+    add_common(parser)
+    parser.add_argument(
+        "--fleet",
+        metavar="NAME",
+        help="not to one robot but to each of this fleet (`fleet.name` of their configuration)",
+    )
+    add_question(parser)
 
 
 def _add_order(parser: argparse.ArgumentParser) -> None:
@@ -117,14 +150,40 @@ def run(args: argparse.Namespace) -> int:
     asked: dict[str, object] = {"command": command}
     if args.mission_command == "start":
         asked["order"] = _order(args)
+    elif args.mission_command == "keep-out":
+        asked = asked_by(args)
+    if command in FORGETFUL and args.yes:
+        asked["discard"] = True
+    is_list = args.mission_command == "keep-out" and args.keep_out_action == "list"
     if args.fleet is not None:
-        return command_fleet(args, encode_json(asked))
-    reply = ask(args, "mission", payload=encode_json(asked))
+        return command_fleet(args, asked, names_of if is_list else None)
+    reply = _answer(args, asked)
+    if reply is None:
+        return Exit.ERROR
+    answer = decode_tolerant(reply.payload, Reply)
     if args.json:
-        print_json(decode_json(reply.payload))
+        document = decode_json(reply.payload)
+        print_json(msgspec.to_builtins(answer.mission.keep_outs) if is_list else document)
+    elif is_list:
+        show_keep_outs(answer)
     else:
         show_mission(reply)
+        if command == "cancel" and answer.coverage and answer.coverage.covered > 1:
+            err().print(KEPT)
     return Exit.OK
+
+
+def _answer(args: argparse.Namespace, asked: dict[str, object]) -> Answer | None:
+    """Return the answer to a command; None if it would lose something, and is not to go on."""
+    try:
+        return ask(args, "mission", payload=encode_json(asked))
+    except RefusedError as error:
+        if error.code != WouldForget.code or args.json or not may_ask():
+            raise
+        if not agrees(f"{error}."):
+            err().print("nothing was changed")
+            return None
+    return ask(args, "mission", payload=encode_json(asked | {"discard": True}))
 
 
 def _order(args: argparse.Namespace) -> dict[str, object]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import dataclass
@@ -12,13 +13,14 @@ from rich.table import Table
 
 from fasaco_edge.cli.ask import nobody_answers
 from fasaco_edge.cli.console.arguments import Exit, robot_on_bus
+from fasaco_edge.cli.console.question import agrees, may_ask
 from fasaco_edge.cli.console.streams import print_json
 from fasaco_edge.cli.console.terminal import out
-from fasaco_edge.errors import MalformedMessage, NobodyAnswersError
+from fasaco_edge.errors import MalformedMessage, NobodyAnswersError, WouldForget
 from fasaco_edge.text import one_line
 from fasaco_edge.watch import phrases
 from fasaco_edge.wire.documents import replies
-from fasaco_edge.wire.documents.json_text import decode_json, decode_tolerant, tolerant
+from fasaco_edge.wire.documents.json_text import decode_json, decode_tolerant, encode_json, tolerant
 from fasaco_edge.wire.documents.status import Status
 from fasaco_edge.wire.keys import VERSION, Keys, is_chunk
 
@@ -39,15 +41,29 @@ class _Member:
 
     Attributes:
         refused: why it has not taken the command; "" where it has.
+        would_forget: whether that is because it would forget what is covered.
     """
 
     robot: str
     document: dict[str, object] | None
     refused: str
+    would_forget: bool = False
 
 
-def command_fleet(args: argparse.Namespace, payload: bytes) -> int:
+Shown = Callable[[replies.Reply], str]
+
+
+def command_fleet(
+    args: argparse.Namespace, asked: dict[str, object], shown: Shown | None = None
+) -> int:
     """Send a command to each robot of the fleet, and show the answers; 0 if all have taken it.
+
+    Robots that would forget what is covered are asked about together, on a terminal.
+
+    Args:
+        args: of the command line.
+        asked: the command as a document.
+        shown: what to show of an answer; None for the reason of the robot's state.
 
     Raises:
         NobodyAnswersError: no robot of this fleet answers.
@@ -59,16 +75,28 @@ def command_fleet(args: argparse.Namespace, payload: bytes) -> int:
     with open_bus(settings) as bus:
         robots = _robots(bus, keys, args.fleet, args.timeout)
 
-        def command(robot: str) -> _Member:
-            key = Keys(robot, keys.base).rpc("mission")
-            return _member(robot, bus.get(key, args.timeout, payload))
+        def command(robots: list[str], asked: dict[str, object]) -> dict[str, _Member]:
+            payload = encode_json(asked)
 
-        with ThreadPoolExecutor(min(len(robots), AT_ONCE)) as pool:
-            members = list(pool.map(command, robots))
+            def command_one(robot: str) -> _Member:
+                key = Keys(robot, keys.base).rpc("mission")
+                return _member(robot, bus.get(key, args.timeout, payload))
+
+            with ThreadPoolExecutor(min(len(robots), AT_ONCE)) as pool:
+                return {member.robot: member for member in pool.map(command_one, robots)}
+
+        answers = command(robots, asked)
+        losing = [member for member in answers.values() if member.would_forget]
+        if losing and not args.json and may_ask():
+            facts = [f"{one_line(member.robot)}: {one_line(member.refused)}" for member in losing]
+            if agrees(*facts):
+                more = [member.robot for member in losing]
+                answers |= command(more, asked | {"discard": True})
+        members = list(answers.values())
     if args.json:
         print_json({member.robot: member.document for member in members})
     else:
-        out().print(_table(args.fleet, members))
+        out().print(_table(args.fleet, members, shown))
     return Exit.ERROR if any(member.refused for member in members) else Exit.OK
 
 
@@ -111,21 +139,26 @@ def _member(robot: str, found: list[Reply]) -> _Member:
         document = decode_json(found[0].payload)
     except MalformedMessage as error:
         return _Member(robot, None, f"its answer cannot be read: {error}")
-    refused = f"refused: {tolerant(document, replies.Error).message}" if found[0].is_error else ""
-    return _Member(robot, document, refused)
+    if not found[0].is_error:
+        return _Member(robot, document, "")
+    refusal = tolerant(document, replies.Error)
+    is_loss = refusal.code == WouldForget.code
+    yes = "; to forget that, give it with --yes" if is_loss else ""
+    return _Member(robot, document, f"refused: {refusal.message}{yes}", is_loss)
 
 
-def _table(fleet: str, members: list[_Member]) -> Table:
+def _table(fleet: str, members: list[_Member], shown: Shown | None) -> Table:
     title = f"Fleet {one_line(fleet)}"
     table = Table("robot", "state", "covered", "answer", title=title, title_justify="left")
     for member in members:
-        table.add_row(one_line(member.robot), *_cells(member))
+        table.add_row(one_line(member.robot), *_cells(member, shown))
     return table
 
 
-def _cells(member: _Member) -> tuple[str, str, str]:
+def _cells(member: _Member, shown: Shown | None) -> tuple[str, str, str]:
     if member.refused or member.document is None:
         return "-", "-", one_line(member.refused)
     answer = tolerant(member.document, replies.Reply)
     covered = phrases.covered(answer.coverage) if answer.coverage else "-"
-    return one_line(answer.state), covered, one_line(answer.reason)
+    said = shown(answer) if shown else answer.reason
+    return one_line(answer.state), covered, one_line(said)

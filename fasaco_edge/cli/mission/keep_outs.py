@@ -1,0 +1,123 @@
+"""``fasaco-edge mission keep-out``: keep-outs of a running mission, added, removed and listed."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable, Sequence
+
+from rich.table import Table
+
+from fasaco_edge.cli.console.terminal import out
+from fasaco_edge.mission.orders.order import read_command
+from fasaco_edge.wire.documents import replies
+
+EPILOG = """\
+examples:
+  fasaco-edge mission keep-out add --name vase "1,1;2,1;2,2;1,2"
+  fasaco-edge mission keep-out add --name vase 1,1 2,1 2,2 1,2       the same
+  fasaco-edge mission keep-out list
+  fasaco-edge mission keep-out remove vase
+
+The robot keeps out of the area from now on: a path into it is cut off at once and planned anew,
+and a robot that is in it stops. The order goes on, and what is covered is kept. The area holds
+under every order, also without one, until it is removed; a restart or a reset does not remove it.
+Areas of an order (`mission start --keep-out`) end with it: they are listed, but have no name to be
+removed by. Those of the configuration (mission.keep_out) are changed there.
+
+exit codes: 0 done; 1 refused, or no answer, by one robot at least; 2 usage error; 78 invalid robot
+name
+"""
+
+ACTIONS = {
+    "add": "keep out of an area from now on; the order goes on, what is covered is kept",
+    "remove": "let the robot drive there again",
+    "list": "show the areas that the robot keeps out of",
+}
+
+
+def add_actions(
+    parser: argparse.ArgumentParser,
+    polygon: Callable[[str], list[list[float]]],
+    add_options: Callable[[argparse.ArgumentParser], None],
+) -> None:
+    """Add the commands of ``keep-out``; ``polygon`` reads corners, ``add_options`` is for all."""
+    parser.formatter_class = argparse.RawDescriptionHelpFormatter
+    parser.epilog = EPILOG
+    actions = parser.add_subparsers(title="commands", required=True, metavar="COMMAND")
+    for name, text in ACTIONS.items():
+        action = actions.add_parser(name, help=text, description=f"{text.capitalize()}.")
+        if name == "add":
+            action.add_argument(
+                "corners",
+                nargs="+",
+                action=_Corners,
+                polygon=polygon,
+                metavar="X,Y",
+                help='corners [m] in the frame of the map: "X,Y;X,Y;X,Y" or X,Y X,Y X,Y',
+            )
+            action.add_argument(
+                "--name", required=True, metavar="NAME", help="its name, to remove it by"
+            )
+        elif name == "remove":
+            action.add_argument("name", metavar="NAME", help="the name that it was added by")
+        add_options(action)
+        action.set_defaults(keep_out_action=name)
+
+
+class _Corners(argparse.Action):
+    """Corners in one word, or a word for each."""
+
+    def __init__(self, *, polygon: Callable[[str], list[list[float]]], **options: object) -> None:
+        super().__init__(**options)  # type: ignore[arg-type]
+        self._polygon = polygon
+
+    def __call__(
+        self,
+        parser: argparse.ArgumentParser,
+        namespace: argparse.Namespace,
+        values: str | Sequence[object] | None,
+        option_string: str | None = None,
+    ) -> None:
+        words = [str(value).strip() for value in values or ()]
+        try:
+            namespace.corners = self._polygon(";".join(words))
+        except argparse.ArgumentTypeError as error:
+            raise argparse.ArgumentError(self, str(error)) from error
+
+
+def asked_by(args: argparse.Namespace) -> dict[str, object]:
+    """Return the command as a document, checked: faults are reported without a daemon.
+
+    Raises:
+        OrderError: the area or its name is none.
+    """
+    if args.keep_out_action == "list":
+        return {"command": "status"}
+    corners = args.corners if args.keep_out_action == "add" else None
+    keep_out = {"name": args.name} | ({"polygon": corners} if corners else {})
+    asked: dict[str, object] = {"command": f"keep_out_{args.keep_out_action}", "keep_out": keep_out}
+    read_command(asked)
+    return asked
+
+
+def show_keep_outs(answer: replies.Reply) -> None:
+    """Print the keep-outs in an answer."""
+    mission = answer.mission
+    table = Table("name", "of", "corners", title="Keep-outs", title_justify="left")
+    for keep_out in mission.keep_outs:
+        corners = " ".join(f"({x:.2f}, {y:.2f})" for x, y in keep_out.polygon[:MOST_CORNERS])
+        more = " ..." if len(keep_out.polygon) > MOST_CORNERS else ""
+        table.add_row(keep_out.name or "-", f"the {keep_out.by}", f"{corners}{more}")
+    if others := mission.keep_out - len(mission.keep_outs):
+        table.caption = f"and {others} of the configuration"
+    out().print(table)
+
+
+# Shown of one keep-out; `--json` has all.
+MOST_CORNERS = 8
+
+
+def names_of(answer: replies.Reply) -> str:
+    """Return the names of the operator's keep-outs."""
+    names = ", ".join(each.name for each in answer.mission.keep_outs if each.by == "operator")
+    return names or "none"

@@ -1,0 +1,148 @@
+"""What a command would lose: asked for on a terminal, refused elsewhere; keep-outs lose nothing."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import pty
+import select
+import subprocess
+import time
+
+import pytest
+
+from tests.support.outsider import TIMEOUT_S, Outsider
+from tests.support.processes import ENVIRONMENT, PROGRAM, daemon_process, fasaco_edge
+from tests.support.rooms import begin, drive, lanes
+
+LOSS = "start forgets 11 covered cells (1.0 m2)"
+VASE = "0.9,0.9;2.1,0.9;2.1,2.1;0.9,2.1"
+
+
+@pytest.fixture
+def robot(tmp_path):
+    """A robot that has covered 12 cells."""
+    with daemon_process(tmp_path) as running, Outsider(running.endpoint) as outsider:
+        begin(outsider)
+        drive(outsider, lanes(12))
+        yield running, outsider
+
+
+def mission(running, *words):
+    return fasaco_edge("mission", *words, "--connect", running.endpoint)
+
+
+def covered(outsider):
+    return outsider.ask_status()["coverage"]["covered"]
+
+
+def on_terminal(answer, *words):
+    """Run a command on a terminal, answer its question; return its code and what it wrote."""
+    master, slave = pty.openpty()
+    with subprocess.Popen(
+        ["setsid", "--ctty", *PROGRAM, *words],
+        stdin=slave,
+        stdout=slave,
+        stderr=slave,
+        env=ENVIRONMENT | {"TERM": "xterm-256color", "COLUMNS": "200"},
+    ) as process:
+        os.close(slave)
+        written, deadline, is_answered = "", time.monotonic() + TIMEOUT_S, False
+        with contextlib.suppress(OSError):  # the end of a terminal whose last program is gone
+            while time.monotonic() < deadline:
+                if select.select([master], [], [], 0.1)[0]:
+                    written += os.read(master, 4096).decode()
+                if "[y/N]" in written and not is_answered:
+                    os.write(master, answer.encode())
+                    is_answered = True
+        code = process.wait(TIMEOUT_S)
+    os.close(master)
+    return code, written
+
+
+def test_without_a_terminal_it_is_refused_and_says_how_much(robot):
+    running, outsider = robot
+    for words in (("start", "--passes", "2"), ("reset",)):
+        refused = mission(running, *words)
+        assert (refused.code, refused.out) == (1, "")
+        assert f"{words[0]} forgets 11 covered cells (1.0 m2)" in refused.err
+        assert " % of the floor in reach" in refused.err
+        assert "--yes" in refused.err
+        document = mission(running, *words, "--json")
+        assert (document.code, json.loads(document.out)["code"]) == (1, "would_forget")
+    assert covered(outsider) == 12
+    assert mission(running, "start").code == 0, "the same order goes on"
+    assert mission(running, "start", "--passes", "2", "--keep-covered").code == 0
+    assert covered(outsider) == 12
+    assert mission(running, "start", "--passes", "3", "--yes").code == 0
+    outsider.wait_status(lambda status: status["coverage"]["covered"] == 1)
+
+
+def test_on_a_terminal_it_is_asked_and_anything_but_yes_changes_nothing(robot):
+    running, outsider = robot
+    words = "mission", "start", "--passes", "2", "--connect", running.endpoint
+    for answer in ("n\n", "\n", "\x04"):
+        code, written = on_terminal(answer, *words)
+        assert code == 1, written
+        assert LOSS in written
+        assert "nothing was changed" in written
+        assert covered(outsider) == 12
+    code, written = on_terminal("y\n", *words)
+    assert code == 0, written
+    assert "pass 1 of 2" in written
+    outsider.wait_status(lambda status: status["coverage"]["covered"] == 1)
+
+
+def test_cancel_asks_nothing_as_it_stops_the_robot_and_says_how_to_go_on(robot):
+    running, outsider = robot
+    stopped = mission(running, "stop")
+    assert stopped.code == 0
+    assert "`mission start --keep-covered` goes on with the rest" in stopped.err
+    assert covered(outsider) == 12
+
+
+def test_a_keep_out_in_mid_mission_loses_nothing(robot):
+    running, outsider = robot
+    added = mission(running, "keep-out", "add", "--name", "vase", VASE)
+    assert added.code == 0
+    assert "1, with vase" in added.out
+    corners = "0.3,2.4", "0.6,2.4", "0.6,2.7"
+    assert mission(running, "keep-out", "add", "--name", "lamp", *corners).code == 0
+    assert covered(outsider) == 12
+    listed = mission(running, "keep-out", "list")
+    for word in ("vase", "lamp", "the operator", "(0.90, 0.90)"):
+        assert word in listed.out
+    document = json.loads(mission(running, "keep-out", "list", "--json").out)
+    assert [(each["name"], len(each["polygon"])) for each in document] == [("vase", 4), ("lamp", 3)]
+    assert mission(running, "keep-out", "remove", "vase").code == 0
+    again = mission(running, "keep-out", "remove", "vase")
+    assert again.code == 1
+    assert "no keep-out 'vase' was added; there are 'lamp'" in again.err
+    assert outsider.ask_status()["mission"]["keep_out"] == 1
+    assert covered(outsider) == 12
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "said"),
+    [
+        (("add", "1,1;2,1;2,2"), 2, "the following arguments are required: --name"),
+        (("add", "--name", "a", "-1,1", "2,1"), 2, "must be x,y;x,y;x,y;... in metres, got '-1,1"),
+        (("add", "--name", "a", "0,0;1,1;1,0;0,1"), 1, "keep_out.polygon crosses or touches"),
+        (("add", "--name", " a", "0,0;1,1;1,0"), 1, "keep_out.name must be 1..64 printable"),
+        (("remove",), 2, "the following arguments are required: NAME"),
+        ((), 2, "the following arguments are required: COMMAND"),
+    ],
+)
+def test_mistakes_need_no_daemon(words, code, said):
+    ended = fasaco_edge("mission", "keep-out", *words)
+    assert ended.code == code
+    assert said in ended.err
+
+
+def test_corners_left_of_the_origin_are_no_options(robot):
+    running, outsider = robot
+    words = "keep-out", "add", "--name", "a", "-3,-1", "-2,-1", "-2,0"
+    assert mission(running, *words).code == 0
+    (area,) = outsider.ask_status()["mission"]["keep_outs"]
+    assert area["polygon"] == [[-3, -1], [-2, -1], [-2, 0]]

@@ -1,0 +1,145 @@
+"""Keep-outs and consent on a real bus: a command each, and what a kill leaves of them."""
+
+from __future__ import annotations
+
+import json
+import signal
+from typing import Any
+
+import pytest
+
+from tests.daemon.test_commands import ask, command
+from tests.daemon.test_mission import about, planned
+from tests.support.outsider import Outsider
+from tests.support.processes import daemon_process
+from tests.support.rooms import begin, cells_of, drive, lanes
+from tests.wire.schemas import check
+
+# A square of 4 x 4 cells in the hall, and the cells that the robot's rim would touch it from.
+VASE = {"name": "vase", "polygon": [[0.9, 0.9], [2.1, 0.9], [2.1, 2.1], [0.9, 2.1]]}
+AROUND = {(row, col) for row in range(2, 8) for col in range(2, 8)}
+HERE = {"name": "here", "polygon": [[0.1, 0.1], [5.0, 0.1], [5.0, 4.0], [0.1, 4.0]]}
+
+
+def keep_out(outsider: Outsider, action: str, area: dict[str, Any]) -> dict[str, Any]:
+    asked = {"command": f"keep_out_{action}", "keep_out": area}
+    check("mission.json", asked)
+    return ask(outsider, json.dumps(asked).encode())
+
+
+def test_in_mid_mission_what_is_covered_stays_and_no_path_leads_there(tmp_path):
+    with daemon_process(tmp_path) as running, Outsider(running.endpoint) as outsider:
+        paths, taken = outsider.listen("path"), outsider.listen("command", late=False)
+        begin(outsider)
+        covered = drive(outsider, lanes(12))["coverage"]["covered"]
+        before = len(paths.heard)
+        answer = keep_out(outsider, "add", VASE)
+        check("reply.json", answer)
+        assert answer["coverage"]["covered"] == covered == 12
+        assert answer["mission"]["keep_out"] == 1
+        assert answer["mission"]["keep_outs"] == [{**VASE, "by": "operator"}]
+        paths.wait(lambda heard: about(heard)["plan_ms"] > 0, since=before)
+        for heard in paths.heard[before:]:
+            assert not set(cells_of(planned(heard)[0])) & AROUND
+        assert taken.wait(lambda _: True).json() == {"command": "keep_out_add", "keep_out": VASE}
+        status = outsider.wait_status(lambda status: status["mission"]["keep_outs"])
+        assert status["mission"]["keep_outs"][0]["name"] == "vase"
+
+        # The same once more changes nothing; others are refused by name.
+        assert keep_out(outsider, "add", VASE)["mission"]["keep_out"] == 1
+        other = {"name": "vase", "polygon": HERE["polygon"]}
+        assert keep_out(outsider, "add", other)["code"] == "bad_order"
+        wrong = keep_out(outsider, "remove", {"name": "lamp"})
+        assert wrong["message"] == "keep_out.name: no keep-out 'lamp' was added; there are 'vase'"
+        gone = keep_out(outsider, "remove", {"name": "vase"})
+        assert (gone["mission"]["keep_out"], gone["coverage"]["covered"]) == (0, 12)
+
+
+def test_a_robot_inside_gets_an_empty_path_at_once(tmp_path):
+    with daemon_process(tmp_path) as running, Outsider(running.endpoint) as outsider:
+        paths = outsider.listen("path")
+        begin(outsider)
+        drive(outsider, lanes(12))
+        paths.wait(lambda heard: len(planned(heard)[0]) > 0)
+        before = len(paths.heard)
+        answer = keep_out(outsider, "add", HERE)
+        assert answer["state"] == "blocked"
+        stop = paths.wait(lambda heard: not len(planned(heard)[0]), since=before)
+        assert "robot is in a keep-out zone" in about(stop)["reason"]
+        keep_out(outsider, "remove", {"name": "here"})
+        status = outsider.wait_status(lambda status: status["state"] == "covering")
+        assert status["coverage"]["covered"] == 12
+
+
+def test_it_outlives_a_kill_and_comes_before_any_map(tmp_path):
+    with daemon_process(tmp_path) as running, Outsider(running.endpoint) as outsider:
+        assert keep_out(outsider, "add", VASE)["state"] == "waiting for map"
+        running.process.send_signal(signal.SIGKILL)
+        running.process.wait()
+    with daemon_process(tmp_path) as running, Outsider(running.endpoint) as outsider:
+        paths = outsider.listen("path")
+        assert outsider.ask_status()["mission"]["keep_outs"] == [{**VASE, "by": "operator"}]
+        begin(outsider)
+        heard = paths.wait(lambda heard: len(planned(heard)[0]) > 0)
+        assert not set(cells_of(planned(heard)[0])) & AROUND
+        running.process.send_signal(signal.SIGKILL)
+        running.process.wait()
+    # Without a map, too, it can be removed.
+    with daemon_process(tmp_path) as running, Outsider(running.endpoint) as outsider:
+        assert keep_out(outsider, "remove", {"name": "vase"})["mission"]["keep_outs"] == []
+
+
+def test_without_autostart_a_keep_out_starts_nothing(tmp_path):
+    for _ in range(2):
+        with (
+            daemon_process(tmp_path, mission={"autostart": False}) as running,
+            Outsider(running.endpoint) as outsider,
+        ):
+            assert keep_out(outsider, "add", VASE)["state"] == "idle"
+
+
+def test_with_autostart_a_daemon_that_has_one_still_starts(tmp_path):
+    """A robot that waits for orders gets one; then its configuration is changed."""
+    with (
+        daemon_process(tmp_path, mission={"autostart": False}) as running,
+        Outsider(running.endpoint) as outsider,
+    ):
+        keep_out(outsider, "add", VASE)
+    with daemon_process(tmp_path) as running, Outsider(running.endpoint) as outsider:
+        mission = outsider.ask_status()["mission"]
+        assert (mission["ordered"], mission["keep_out"]) == ("itself", 1)
+
+
+@pytest.mark.parametrize("name", ["start", "reset"])
+def test_what_is_covered_is_not_forgotten_without_consent(tmp_path, name):
+    order = {"passes": 2} if name == "start" else None
+    with daemon_process(tmp_path) as running, Outsider(running.endpoint) as outsider:
+        taken = outsider.listen("command", late=False)
+        begin(outsider)
+        drive(outsider, lanes(12))
+        error = command(outsider, name, order, discard=False)
+        check("error.json", error)
+        assert error["code"] == "would_forget"
+        assert error["message"].startswith(f"{name} forgets 11 covered cells (1.0 m2), ")
+        assert error["message"].endswith(" % of the floor in reach")
+        assert "--yes" in error["hint"]
+        status = outsider.ask_status()
+        assert (status["state"], status["coverage"]["covered"]) == ("covering", 12)
+        assert command(outsider, name, order, discard=True)["coverage"]["covered"] == 1
+        assert [heard.json()["command"] for heard in taken.heard] == [name]
+
+
+def test_before_there_is_a_map_what_the_ledger_holds_is_not_forgotten(tmp_path):
+    with daemon_process(tmp_path) as running, Outsider(running.endpoint) as outsider:
+        begin(outsider)
+        drive(outsider, lanes(12))
+    with daemon_process(tmp_path) as running, Outsider(running.endpoint) as outsider:
+        for name, order in (("start", {"passes": 2}), ("reset", None)):
+            error = command(outsider, name, order, discard=False)
+            assert error["code"] == "would_forget"
+            assert error["message"] == f"{name} forgets up to 11 covered cells (1.0 m2)"
+        assert outsider.ask_status()["mission"]["ordered"] == "itself"
+        # The same order, and one that keeps what is covered, lose nothing.
+        for order in ({}, {"passes": 2, "keep_covered": True}):
+            assert "code" not in command(outsider, "start", order, discard=False)
+        assert outsider.ask_status()["ledger"]["restored_cells"] == 12
