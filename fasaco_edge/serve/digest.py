@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 from fasaco_edge.serve.pace import Way
 from fasaco_edge.watch import phrases
 from fasaco_edge.watch.events import EventLog
 from fasaco_edge.watch.robot_state import RobotState
-from fasaco_edge.wire.documents.replies import FloorLeft, FloorReport, MissionReport
+from fasaco_edge.wire.documents.replies import (
+    FloorLeft,
+    FloorReport,
+    KeepOutReport,
+    MissionReport,
+)
 from fasaco_edge.wire.documents.settings import KnownSettings
 from fasaco_edge.wire.documents.status import FleetReport, Status
 
@@ -19,6 +24,8 @@ Digest = dict[str, object]
 # Most entries shown of received lists.
 MOST_ENTRIES, MOST_AREAS, MOST_ROBOTS = 40, 100, 50
 MOST_CORNERS = 1_000
+# Of the operator and of the order, each.
+MOST_KEEP_OUTS = 2 * MOST_AREAS
 # A longer time means a speed of almost 0 [s].
 MOST_TO_GO_S = 1e8
 # Coordinates beyond this are invalid [m].
@@ -149,8 +156,10 @@ def _fleet(fleet: FleetReport) -> list[Digest]:
     ]
 
 
-def areas(settings: KnownSettings, order: dict[str, Any]) -> Digest:
-    """Return zones and keep-outs: of the configuration, and of the order if it was received."""
+def areas(
+    settings: KnownSettings, order: dict[str, Any], keep_outs: Sequence[KeepOutReport]
+) -> Digest:
+    """Return zones, also of the order if it was received, and the keep-outs in force."""
     mission = settings.mission
     standing = [
         {"name": zone.name, "polygon": zone.polygon[:MOST_CORNERS], "is": "standing"}
@@ -162,14 +171,14 @@ def areas(settings: KnownSettings, order: dict[str, Any]) -> Digest:
         if isinstance(zone, dict) and (polygon := _polygon(zone.get("polygon")))
     ]
     kept_out = [
-        *({"polygon": each[:MOST_CORNERS], "is": "standing"} for each in mission.keep_out),
         *(
-            {"polygon": polygon, "is": "ordered"}
-            for each in _items(order.get("keep_out"))
-            if (polygon := _polygon(each))
+            {"name": each.name, "polygon": polygon, "is": each.by}
+            for each in keep_outs[:MOST_KEEP_OUTS]
+            if (polygon := _polygon(list(map(list, each.polygon))))
         ),
+        *({"polygon": each[:MOST_CORNERS], "is": "standing"} for each in mission.keep_out),
     ]
-    return {"zones": standing + ordered, "keep_out": kept_out[:MOST_AREAS]}
+    return {"zones": standing + ordered, "keep_out": kept_out[: MOST_KEEP_OUTS + MOST_AREAS]}
 
 
 def _items(value: object, most: int = MOST_AREAS) -> list[object]:

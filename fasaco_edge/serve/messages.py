@@ -18,7 +18,9 @@ _LENGTH = struct.Struct("<I")
 
 Role = Literal["viewer", "operator"]
 # Commands of the page: all but a reset of the coverage.
-Command = Literal["start", "pause", "resume", "home", "cancel", "replan"]
+Command = Literal[
+    "start", "pause", "resume", "home", "cancel", "replan", "keep_out_add", "keep_out_remove"
+]
 
 
 class Hello(msgspec.Struct, tag="hello", tag_field="kind", forbid_unknown_fields=True):
@@ -40,11 +42,15 @@ class Order(msgspec.Struct, tag="command", tag_field="kind", forbid_unknown_fiel
         id: returned with the reply.
         command: one of the page's commands.
         order: what to cover, as in ``protocol/schema/mission.json``; only with ``start``.
+        discard: whether it may forget what is covered; only with ``start``.
+        keep_out: as there; only with ``keep_out_add`` and ``keep_out_remove``.
     """
 
     id: int
     command: Command
     order: dict[str, Any] | None = None
+    discard: bool = False
+    keep_out: dict[str, Any] | None = None
 
 
 FromPage = Hello | Wants | Order

@@ -23,6 +23,7 @@ from fasaco_edge.watch.robot_state import PathProgress, RobotState
 from fasaco_edge.wire.documents.fleet import decode_member
 from fasaco_edge.wire.documents.json_text import decode_document
 from fasaco_edge.wire.documents.path_documents import PathAttachment
+from fasaco_edge.wire.documents.replies import KeepOutReport
 from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.messages.grid_octets import GridOctets, read_field, read_grid, with_update
 from fasaco_edge.wire.messages.path_points import PathPoints
@@ -52,7 +53,7 @@ class ServedView(RobotState):
         super().__init__(keys.robot)
         self._keys = keys
         self._grids: dict[str, GridOctets] = {}
-        # Zones and keep-outs of the order; the status only names them.
+        # The order, for the corners of its zones; the status only names them.
         self._order: dict[str, object] = {}
         self._others: dict[str, tuple[float, float, float]] = {}
         self._path: Sample | None = None
@@ -70,7 +71,9 @@ class ServedView(RobotState):
             "pose": lambda _: self._pose_message(),
             "state": lambda now: message_text("state", **state(self, self._way, now)),
             "path": self._path_message,
-            "areas": lambda _: message_text("areas", **areas(self.settings, self._order)),
+            "areas": lambda _: message_text(
+                "areas", **areas(self.settings, self._order, self._keep_outs)
+            ),
             "events": lambda _: message_text("events", entries=lately(self.events)),
             "map": lambda _: self._map_message(),
             "floor": lambda _: self._grid_message("floor", FLOOR_MARKS),
@@ -109,7 +112,7 @@ class ServedView(RobotState):
             "pose": (self.pose, self.walk, self.walk.at),
             "path": self._path,
             "events": self.events.count,
-            "areas": (self.settings, self._order),
+            "areas": (self.settings, self._order, self._keep_outs),
             "map": (self._grids.get("map", self._grids.get("coverage")), self.settings.map),
             "floor": self._grids.get("floor"),
             "field": self._grids.get("field"),
@@ -117,6 +120,10 @@ class ServedView(RobotState):
         # The others tell of time, too.
         now_too = self.document, self.trouble, len(self.robots), int(now)
         return made_of.get(kind, now_too)
+
+    @property
+    def _keep_outs(self) -> tuple[KeepOutReport, ...]:
+        return self.status.mission.keep_outs if self.status else ()
 
     def _read_map(self, sample: Sample, _: float) -> None:
         self._grids["map"] = read_grid(sample.payload)

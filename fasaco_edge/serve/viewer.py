@@ -114,7 +114,9 @@ class Viewer:
             return message_text("answer", id=order.id, ok=False, text=why, hint="")
         asked: dict[str, object] = {"command": order.command}
         if order.command == "start":
-            asked["order"] = order.order or {}
+            asked |= {"order": order.order or {}, "discard": order.discard}
+        elif order.keep_out is not None:
+            asked["keep_out"] = order.keep_out
         try:
             payload = encode_json(asked)
             found = await asyncio.to_thread(self._source.ask, "mission", payload, ANSWER_S)
@@ -123,9 +125,8 @@ class Viewer:
                 return message_text("answer", id=order.id, ok=False, text=why, hint="")
             if found[0].is_error:
                 wrong = decode_tolerant(found[0].payload, Error)
-                return message_text(
-                    "answer", id=order.id, ok=False, text=wrong.message, hint=wrong.hint
-                )
+                said = {"text": wrong.message, "hint": wrong.hint, "code": wrong.code}
+                return message_text("answer", id=order.id, ok=False, **said)
             answer = decode_tolerant(found[0].payload, Answer)
         except FasacoError as error:
             return message_text("answer", id=order.id, ok=False, text=str(error), hint=error.hint)

@@ -124,10 +124,12 @@ class Looker:
                 return message
             assert time.monotonic() < deadline, self.seen.get(kind)
 
-    def command(self, name: str, order: dict[str, Any] | None = None) -> dict[str, Any]:
+    def command(
+        self, name: str, order: dict[str, Any] | None = None, **more: Any
+    ) -> dict[str, Any]:
         """Command; return the answer."""
         self.asked += 1
-        more = {} if order is None else {"order": order}
+        more |= {} if order is None else {"order": order}
         self.send(kind="command", id=self.asked, command=name, **more)
         answer: dict[str, Any] = self.wait("answer", lambda said: said["id"] == self.asked)
         return answer

@@ -28,7 +28,7 @@ from websockets.sync.client import ClientConnection, connect
 from tests.serve.serving import served, until
 from tests.support.outsider import TIMEOUT_S, Outsider
 from tests.support.processes import daemon_process
-from tests.support.rooms import HALL, lanes, map_bytes, pose_bytes
+from tests.support.rooms import HALL, begin, drive, lanes, map_bytes, pose_bytes
 
 BROWSER = shutil.which("chromium")
 needs_browser = pytest.mark.skipif(BROWSER is None, reason="needs chromium")
@@ -190,6 +190,92 @@ def test_a_mission_is_ordered_by_finger(tmp_path):
         tab.click("trail")
         until(lambda: tab.js("Boolean(model.field)"))
         assert tab.complaints == []
+
+
+@needs_browser
+def test_a_keep_out_is_applied_in_mid_mission_and_starting_anew_is_asked_for(tmp_path):
+    with daemon_process(tmp_path) as daemon, Outsider(daemon.endpoint) as outsider:
+        begin(outsider)
+        drive(outsider, lanes(12))
+        with (
+            served(tmp_path, daemon.endpoint, "--allow-commands") as page,
+            browsing(page.url, tmp_path / "browser") as tab,
+        ):
+            until(lambda: tab.js("model.role") == "operator")
+            until(lambda: tab.js("Boolean(model.map && model.pose && model.state)"))
+            tab.js("find('plan').open = true")
+            draw_keep_out(tab, (2.0, 2.0), (2.4, 2.4))
+            assert button(tab, "Apply now")
+            photograph(tab, "apply_now")
+            press(tab, "Apply now")
+            until(lambda: tab.js("keptOut().length") == 1)
+            until(lambda: tab.js("drafts.length") == 0)
+            mission = outsider.wait_status(lambda s: s["mission"]["keep_outs"])["mission"]
+            assert [area["name"] for area in mission["keep_outs"]] == ["keep-out 1"]
+            assert outsider.ask_status()["coverage"]["covered"] == 12
+
+            # With another order the page asks, and says what would be lost.
+            draw_keep_out(tab, (3.0, 2.0), (3.4, 2.4))
+            assert tab.js("find('order').textContent") == "Start anew with these"
+            tab.click("order")
+            until(lambda: tab.js("find('loss').open"))
+            said = tab.js("find('losstext').textContent")
+            assert said.startswith("Start forgets 11 covered cells (1.0 m2), ")
+            photograph(tab, "question")
+            press(tab, "Back")
+            assert outsider.ask_status()["coverage"]["covered"] == 12
+            assert tab.js("drafts.length") == 1
+            tab.click("order")
+            until(lambda: tab.js("find('loss').open"))
+            press(tab, "Keep it, sweep the rest")
+            outsider.wait_status(lambda status: status["mission"]["keep_out"] == 2)
+            assert outsider.ask_status()["coverage"]["covered"] == 12
+            until(lambda: tab.js("drafts.length") == 0)
+
+            # Tapped on the map it can be removed; one of the order cannot.
+            tab.js("canvas.scrollIntoView()")
+            tab.touch(tab.on_screen(3.2, 2.2))
+            assert tab.js("find('pickbar').hidden")
+            tab.touch(tab.on_screen(2.2, 2.2))
+            until(lambda: not tab.js("find('pickbar').hidden"))
+            assert tab.js("find('pickname').textContent") == "keep-out 1"
+            photograph(tab, "picked")
+            tab.click("unkeep")
+            outsider.wait_status(lambda status: status["mission"]["keep_out"] == 1)
+            until(lambda: tab.js("find('pickbar').hidden"))
+            tab.click("order")
+            until(lambda: tab.js("find('loss').open"))
+            press(tab, "Forget it and start anew")
+            outsider.wait_status(lambda status: status["coverage"]["covered"] == 1)
+            assert tab.complaints == []
+
+
+def draw_keep_out(tab: Tab, low: tuple[float, float], high: tuple[float, float]) -> None:
+    """Draw a keep-out by a finger, from corner to corner."""
+    count = tab.js("drafts.length")
+    tab.click("draw-keepout")
+    (x0, y0), (x1, y1) = tab.on_screen(*low), tab.on_screen(*high)
+    tab.touch((x0, y0), ((x0 + x1) / 2, (y0 + y1) / 2), (x1, y1))
+    until(lambda: tab.js("drafts.length") == count + 1)
+
+
+def button(tab: Tab, text: str) -> bool:
+    """Tell whether a button with that text can be seen."""
+    every = f"[...document.querySelectorAll('button')].filter((b) => b.textContent === {text!r})"
+    return bool(tab.js(f"{every}.some((b) => b.offsetParent !== null)"))
+
+
+def press(tab: Tab, text: str) -> None:
+    """Press the button that has that text."""
+    until(lambda: button(tab, text), lambda: text)
+    every = f"[...document.querySelectorAll('button')].filter((b) => b.textContent === {text!r})"
+    tab.js(f"{every}.find((b) => b.offsetParent !== null).click()")
+
+
+def photograph(tab: Tab, name: str) -> None:
+    """Keep what is seen where PHOTOGRAPHS says, for people to look at."""
+    if folder := os.environ.get("PHOTOGRAPHS"):
+        Image.fromarray(tab.picture()).save(Path(folder) / f"{name}.png")
 
 
 @needs_browser

@@ -38,7 +38,7 @@ from tests.support.processes import (
     mapped_files,
     resident_mb,
 )
-from tests.support.rooms import HALL, begin, lanes, map_bytes, pose_bytes, update_bytes
+from tests.support.rooms import HALL, begin, drive, lanes, map_bytes, pose_bytes, update_bytes
 
 # What it may be resident with [MB]; half of it is Zenoh's and Python's code, shared with a daemon.
 SERVE_MB = 46.0
@@ -182,6 +182,38 @@ def test_nonsense_ends_that_viewer_alone(page, said):
         other.command("pause")
 
 
+VASE = {"name": "vase", "polygon": [[2.0, 2.0], [2.4, 2.0], [2.4, 2.4], [2.0, 2.4]]}
+
+
+def test_a_keep_out_in_mid_mission_keeps_what_is_covered_and_another_order_asks(tmp_path):
+    words = ("--allow-commands",)
+    with daemon_process(tmp_path) as daemon, Outsider(daemon.endpoint) as outsider:
+        begin(outsider)
+        drive(outsider, lanes(12))
+        with served(tmp_path, daemon.endpoint, *words) as page, looking(page) as looker:
+            assert looker.command("keep_out_add", keep_out=VASE)["ok"]
+            areas = looker.wait("areas", lambda areas: areas["keep_out"])
+            assert areas["keep_out"] == [{**VASE, "is": "operator"}]
+            # The same by another order would forget what is covered: it is asked for.
+            order = {"keep_out": [VASE["polygon"]]}
+            answer = looker.command("start", order)
+            assert (answer["ok"], answer["code"]) == (False, "would_forget")
+            assert answer["text"].startswith("start forgets 11 covered cells (1.0 m2), ")
+            assert outsider.ask_status()["coverage"]["covered"] == 12
+            assert looker.command("start", {**order, "keep_covered": True})["ok"]
+            assert outsider.ask_status()["coverage"]["covered"] == 12
+        # After a restart of the page's server it is still shown, and can be removed.
+        with served(tmp_path, daemon.endpoint, *words) as page, looking(page) as looker:
+            areas = looker.wait("areas", lambda areas: areas["keep_out"])
+            assert [area["is"] for area in areas["keep_out"]] == ["operator", "order"]
+            wrong = looker.command("keep_out_remove", keep_out={"name": "lamp"})
+            assert (wrong["ok"], wrong["code"]) == (False, "bad_order")
+            assert looker.command("keep_out_remove", keep_out={"name": "vase"})["ok"]
+            looker.wait("areas", lambda areas: len(areas["keep_out"]) == 1)
+            assert looker.command("start", {"passes": 3}, discard=True)["ok"]
+            outsider.wait_status(lambda status: status["coverage"]["covered"] == 1)
+
+
 def test_a_mission_is_run_from_the_page(tmp_path):
     with daemon_process(tmp_path, mission={"autostart": False}) as daemon:
         words = ("--allow-commands",)
@@ -206,7 +238,7 @@ def test_a_mission_is_run_from_the_page(tmp_path):
             assert mission["return_home"]
             areas = looker.wait("areas", lambda areas: areas["keep_out"])
             assert areas["zones"] == [{**ROOM, "is": "ordered"}]
-            assert areas["keep_out"] == [{"polygon": keep_out, "is": "ordered"}]
+            assert areas["keep_out"] == [{"name": "", "polygon": keep_out, "is": "order"}]
             zones = lambda state: state.get("mission", {}).get("zones")  # noqa: E731
             assert looker.wait("state", zones)["mission"]["zones"][0]["name"] == "by the door"
             assert looker.command("pause")["ok"]

@@ -45,13 +45,11 @@ def test_an_order_is_drawn_until_it_is_cancelled():
     view = ServedView(Keys())
     order = {
         "zones": [{"name": "hall", "polygon": CORNERS}, {"name": "of old"}],
-        "keep_out": [CORNERS],
     }
     tell(view, "command", {"command": "start", "order": order}, 1.0)
     tell(view, "command", {"command": "pause"}, 1.0)
     areas = heard(view, "areas", 1.0)
     assert [zone["name"] for zone in areas["zones"]] == ["hall"]
-    assert areas["keep_out"] == [{"polygon": CORNERS, "is": "ordered"}]
     tell(view, "command", {"command": "cancel"}, 2.0)
     assert heard(view, "areas", 2.0)["zones"] == []
 
@@ -60,12 +58,30 @@ def test_an_order_is_drawn_with_all_its_corners_and_without_what_is_no_place():
     view = ServedView(Keys())
     many = [[float(index), float(index % 2)] for index in range(300)]
     places = [CORNERS[0], [10**400, 0], [1.0, True], *CORNERS[1:]]
-    order = {"zones": [{"name": "hall", "polygon": many}], "keep_out": [places]}
-    payload = json.dumps({"command": "start", "order": order}).encode()
+    zones = [{"name": "hall", "polygon": many}, {"name": "den", "polygon": places}]
+    payload = json.dumps({"command": "start", "order": {"zones": zones}}).encode()
     view.take("command", Sample("", payload), 1.0)
     areas = heard(view, "areas", 1.0)
     assert areas["zones"][0]["polygon"] == many
-    assert [0.0, 0.0] in areas["keep_out"][0]["polygon"]
+    assert [0.0, 0.0] in areas["zones"][1]["polygon"]
+
+
+def test_the_keep_outs_in_force_are_drawn_by_the_status_alone():
+    """As after a restart of the server, which has received no command."""
+    view = ServedView(Keys())
+    keep_outs = [
+        {"name": "vase", "polygon": CORNERS, "by": "operator"},
+        {"name": "", "polygon": CORNERS, "by": "order"},
+        {"name": "far", "polygon": [[1e9, 0], [1, 0], [1, 1]], "by": "operator"},
+        {"name": "line", "polygon": CORNERS[:2], "by": "operator"},
+    ]
+    tell(view, "status", {"state": "covering", "mission": {"keep_outs": keep_outs}}, 1.0)
+    assert heard(view, "areas", 1.0)["keep_out"] == [
+        {"name": "vase", "polygon": CORNERS, "is": "operator"},
+        {"name": "", "polygon": CORNERS, "is": "order"},
+    ]
+    tell(view, "status", {"state": "covering", "mission": {"keep_outs": []}}, 2.0)
+    assert heard(view, "areas", 2.0)["keep_out"] == []
 
 
 def test_what_has_not_changed_is_not_said_again():

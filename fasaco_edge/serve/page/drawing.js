@@ -37,13 +37,41 @@ const rounded = (corners) => corners.map((corner) => corner.map((value) => Math.
 
 function finish(corners) {
   const kind = drawing.kind;
-  const taken = new Set(drafts.map((draft) => draft.name));
+  const taken = new Set([...drafts, ...keptOut()].map((area) => area.name));
+  const what = kind === "zone" ? "room" : "keep-out";
   let number = 1;
-  while (taken.has(`room ${number}`)) number++;
-  drafts.push({ kind, polygon: rounded(corners), name: kind === "zone" ? `room ${number}` : "" });
+  while (taken.has(`${what} ${number}`)) number++;
+  drafts.push({ kind, polygon: rounded(corners), name: `${what} ${number}` });
   Object.assign(drawing, { kind: "", corners: [] });
   showDrafts();
   document.getElementById("plan").scrollIntoView({ block: "nearest" });
+}
+
+// Keep-outs in force: those with a name are the operator's, and may be removed by a tap on the map.
+const keptOut = () => (model.areas && model.areas.keep_out) || [];
+let picked = "";
+
+function isInside([x, y], polygon) {
+  let inside = false;
+  polygon.forEach(([ax, ay], i) => {
+    const [bx, by] = polygon[(i + 1) % polygon.length];
+    if (ay > y !== by > y && x < ax + ((y - ay) / (by - ay)) * (bx - ax)) inside = !inside;
+  });
+  return inside;
+}
+
+function pick(at) {
+  const area = keptOut().find((each) => each.name && isInside(toMap(...at), each.polygon));
+  picked = area && model.role === "operator" ? area.name : "";
+  if (picked) canvas.scrollIntoView({ block: "nearest" });
+  showPicked();
+}
+
+function showPicked() {
+  if (!keptOut().some((area) => area.name === picked)) picked = "";
+  document.getElementById("pickbar").hidden = !picked;
+  document.getElementById("pickname").textContent = picked;
+  redraw();
 }
 
 function showDrawing() {
@@ -80,6 +108,7 @@ function drawDrafts(context) {
   }
 }
 
+document.getElementById("unpick").addEventListener("click", () => { picked = ""; showPicked(); });
 document.getElementById("draw-zone").addEventListener("click", () => beginDrawing("zone"));
 document.getElementById("draw-keepout").addEventListener("click", () => beginDrawing("keepout"));
 document.getElementById("drawdone").addEventListener("click", () => { finish(drawing.corners); showDrawing(); });

@@ -1,5 +1,5 @@
 // The link to the server: it comes back by itself; of a page nobody sees it goes.
-let socket = null, asked = 0, startId = -1, pause = 500, taking = Promise.resolve();
+let socket = null, asked = 0, pause = 500, taking = Promise.resolve();
 const HIDDEN_MS = 30000;
 let token = "";
 
@@ -17,16 +17,18 @@ function remembered() {
 const send = (message) => socket && socket.readyState === WebSocket.OPEN && socket.send(JSON.stringify(message));
 const wants = () => send({ kind: "wants", field: showsField });
 
-function command(name, what) {
+// What to do once a command was taken, or refused, by its number.
+const awaited = new Map();
+
+function command(name, members, then = {}) {
   if (!socket || socket.readyState !== WebSocket.OPEN) {
     say("no connection to the server", "bad");
     return;
   }
   asked += 1;
-  if (name === "start") startId = asked;
-  const sent = { kind: "command", id: asked, command: name };
-  if (what) sent.order = what;
-  send(sent);
+  awaited.set(asked, then);
+  say("sent …", "");
+  send({ kind: "command", id: asked, command: name, ...members });
 }
 
 function showLink(on, title) {
@@ -77,7 +79,7 @@ function show(message) {
     case "answer": showAnswer(message); break;
     case "state": showState(); redraw(); break;
     case "events": showEvents(); break;
-    case "areas": showDrafts(); redraw(); break;
+    case "areas": showDrafts(); showPicked(); break;
     default: redraw();
   }
 }

@@ -93,7 +93,7 @@ function showCommands() {
   const underway = mission.ordered !== null && mission.stage !== "over" && mission.ordered !== undefined;
   const chose = drafts.length > 0 || chosen.size > 0;
   find("start").hidden = underway || mission.paused || chose;
-  find("order").textContent = chose ? "Start with these" : underway ? "Start anew with everything" : "Start with everything";
+  find("order").textContent = chose && underway ? "Start anew with these" : chose ? "Start with these" : underway ? "Start anew with everything" : "Start with everything";
   find("pause").hidden = Boolean(mission.paused) || !underway;
   find("resume").hidden = !mission.paused;
   find("cancel").hidden = !underway;
@@ -112,24 +112,45 @@ function showDrafts() {
     line.append(label);
     return line;
   });
+  for (const area of keptOut().filter((each) => each.name)) {
+    lines.push(draftLine("out", namedSpan(`${area.name}, in force`), action("Remove", (event) => isSure(event.target) && drop(area.name))));
+  }
   drafts.forEach((draft, index) => {
-    const line = item(["i", draft.kind === "zone" ? "" : "out", ""]), name = document.createElement(draft.kind === "zone" ? "input" : "span");
+    const name = document.createElement("input"), isZone = draft.kind === "zone";
     name.className = "name";
-    if (draft.kind === "zone") {
-      name.value = draft.name;
-      name.maxLength = 64;
-      name.setAttribute("aria-label", "name of the room");
-      name.addEventListener("input", () => { draft.name = name.value; redraw(); });
-    } else name.textContent = "keep-out";
-    const remove = document.createElement("button");
-    remove.textContent = "Remove";
-    remove.addEventListener("click", () => { drafts.splice(index, 1); showDrafts(); redraw(); });
-    line.append(name, remove);
-    lines.push(line);
+    name.value = draft.name;
+    name.maxLength = 64;
+    name.setAttribute("aria-label", isZone ? "name of the room" : "name of the keep-out");
+    name.addEventListener("input", () => { draft.name = name.value; redraw(); });
+    const remove = action("Remove", () => { drafts.splice(index, 1); showDrafts(); redraw(); });
+    const now = isZone ? [] : [action("Apply now", () => apply(draft), "primary")];
+    lines.push(draftLine(isZone ? "" : "out", name, ...now, remove));
   });
   find("drafts").replaceChildren(...lines);
   showCommands();
 }
+
+function draftLine(kind, ...parts) {
+  const line = item(["i", kind, ""]);
+  line.append(...parts);
+  return line;
+}
+
+function namedSpan(text) {
+  const span = document.createElement("span");
+  span.className = "name";
+  span.textContent = text;
+  return span;
+}
+
+function action(text, act, look = "") {
+  const button = document.createElement("button");
+  button.textContent = text;
+  button.className = look;
+  button.addEventListener("click", act);
+  return button;
+}
+
 const chosen = new Set();
 
 function order() {
@@ -148,29 +169,67 @@ function order() {
 // What cannot be taken back is asked for twice.
 let sure = null;
 find("order").addEventListener("click", () => find("start").click());
-for (const name of ["start", "pause", "resume", "home", "cancel"]) {
-  const button = find(name);
-  button.addEventListener("click", () => {
-    if (name === "cancel" && sure !== button) {
-      sure = button;
-      button.textContent = "Tap again";
-      button.classList.add("sure");
-      setTimeout(calm, 4000);
-      return;
-    }
-    calm();
-    say("sent …", "");
-    command(name, name === "start" ? order() : null);
+find("start").addEventListener("click", () => start(order()));
+for (const name of ["pause", "resume", "home", "cancel"]) {
+  find(name).addEventListener("click", () => {
+    if (name !== "cancel" || isSure(find(name))) command(name);
   });
+}
+
+function isSure(button) {
+  const again = sure === button;
+  calm();
+  if (again) return true;
+  sure = button;
+  button.dataset.text = button.textContent;
+  button.textContent = "Tap again";
+  button.classList.add("sure");
+  setTimeout(() => sure === button && calm(), 4000);
+  return false;
 }
 
 function calm() {
   if (sure) {
-    sure.textContent = "Cancel";
+    sure.textContent = sure.dataset.text;
     sure.classList.remove("sure");
   }
   sure = null;
 }
+
+// A start that would forget what is covered is refused: then it is asked what to do.
+let refused = null;
+function start(what, discard = false) {
+  command("start", { order: what, discard }, {
+    taken: () => { drafts.length = 0; chosen.clear(); showDrafts(); redraw(); },
+    refused: (answer) => {
+      if (answer.code !== "would_forget") return;
+      refused = what;
+      find("losstext").textContent = `${answer.text[0].toUpperCase()}${answer.text.slice(1)}.`;
+      say("", "");
+      find("loss").showModal();
+    },
+  });
+}
+find("loss").addEventListener("close", () => {
+  const choice = find("loss").returnValue;
+  find("loss").returnValue = "";
+  if (choice === "forget") start(refused, true);
+  if (choice === "keep") start({ ...refused, keep_covered: true });
+});
+
+// Keep-outs: the order under way goes on with them.
+function apply(draft) {
+  command("keep_out_add", { keep_out: { name: draft.name.trim(), polygon: draft.polygon } }, {
+    taken: () => { drafts.splice(drafts.indexOf(draft), 1); showDrafts(); redraw(); },
+  });
+}
+
+function drop(name) {
+  picked = "";
+  showPicked();
+  command("keep_out_remove", { keep_out: { name } });
+}
+find("unkeep").addEventListener("click", () => drop(picked));
 
 function say(text, tone) {
   find("answer").textContent = text;
@@ -178,13 +237,11 @@ function say(text, tone) {
 }
 
 function showAnswer(answer) {
+  const then = awaited.get(answer.id) || {};
+  awaited.delete(answer.id);
   say(answer.hint ? `${answer.text} (${answer.hint})` : answer.text, answer.ok ? "good" : "bad");
-  if (answer.ok && answer.id === startId) {
-    drafts.length = 0;
-    chosen.clear();
-    showDrafts();
-    redraw();
-  }
+  const next = answer.ok ? then.taken : then.refused;
+  if (next) next(answer);
 }
 
 find("trail").addEventListener("click", () => {

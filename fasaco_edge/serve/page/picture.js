@@ -200,7 +200,7 @@ function draw() {
   if (showsField) drawGrid(context, model.field);
   else drawGrid(context, model.floor);
   for (const zone of (model.areas && model.areas.zones) || []) drawArea(context, zone.polygon, colours.zone, zone.name, zone.is === "standing", zone.is === "standing" ? 0.03 : 0.14);
-  for (const area of (model.areas && model.areas.keep_out) || []) drawArea(context, area.polygon, colours.keepout, "", area.is === "standing");
+  for (const area of (model.areas && model.areas.keep_out) || []) drawArea(context, area.polygon, colours.keepout, area.name || "", area.is === "standing", area.name && area.name === picked ? 0.4 : 0.14);
   if (!showsField) drawPath(context);
   drawHome(context);
   drawDrafts(context);

@@ -45,6 +45,7 @@ function moveBy(dx, dy) {
 
 // Fingers and mouse: one moves or draws, two zoom.
 const fingers = new Map();
+let tapped = null;
 const place = (event) => {
   const box = canvas.getBoundingClientRect();
   return [event.clientX - box.left, event.clientY - box.top];
@@ -53,6 +54,7 @@ const place = (event) => {
 canvas.addEventListener("pointerdown", (event) => {
   canvas.setPointerCapture(event.pointerId);
   fingers.set(event.pointerId, place(event));
+  tapped = fingers.size === 1 && !drawing.kind ? place(event) : null;
   if (fingers.size === 1 && drawing.kind) beginStroke(place(event));
   if (fingers.size === 2) dropStroke();
 });
@@ -73,7 +75,10 @@ canvas.addEventListener("pointermove", (event) => {
 });
 for (const name of ["pointerup", "pointercancel"]) {
   canvas.addEventListener(name, (event) => {
-    if (fingers.size === 1 && drawing.kind && name === "pointerup") endStroke(place(event));
+    const at = place(event);
+    if (fingers.size === 1 && drawing.kind && name === "pointerup") endStroke(at);
+    if (tapped && name === "pointerup" && Math.hypot(at[0] - tapped[0], at[1] - tapped[1]) < TAP_PIXELS) pick(at);
+    tapped = null;
     fingers.delete(event.pointerId);
   });
 }
