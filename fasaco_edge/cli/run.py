@@ -45,7 +45,8 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--fresh",
         action="store_true",
-        help="cover everything again; existing progress is set aside in a file of its own",
+        help="cover everything again; existing progress is set aside in a file of its own, "
+        "keep-outs that were added stay",
     )
 
 

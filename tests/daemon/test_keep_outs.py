@@ -143,3 +143,25 @@ def test_before_there_is_a_map_what_the_ledger_holds_is_not_forgotten(tmp_path):
         for order in ({}, {"passes": 2, "keep_covered": True}):
             assert "code" not in command(outsider, "start", order, discard=False)
         assert outsider.ask_status()["ledger"]["restored_cells"] == 12
+
+
+@pytest.mark.parametrize("change", ["fresh", "another tool"])
+def test_starting_over_keeps_the_keep_outs(tmp_path, change):
+    """Progress is set aside, as it was asked for, or as cells are others; keep-outs are not."""
+    with daemon_process(tmp_path) as running, Outsider(running.endpoint) as outsider:
+        begin(outsider)
+        drive(outsider, lanes(12))
+        keep_out(outsider, "add", VASE)
+    words, more = (["--fresh"], {}) if change == "fresh" else ([], {"tool_width_m": 0.4})
+    for again in (words, []):
+        # The second time as after a kill before anything was covered.
+        with (
+            daemon_process(tmp_path, *again, robot=more) as running,
+            Outsider(running.endpoint) as outsider,
+        ):
+            status = outsider.ask_status()
+            assert status["ledger"]["restored_cells"] == 0
+            assert [area["name"] for area in status["mission"]["keep_outs"]] == ["vase"]
+            assert status["mission"]["ordered"] == "itself"
+            running.process.send_signal(signal.SIGKILL)
+            running.process.wait()

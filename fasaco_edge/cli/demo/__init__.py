@@ -123,6 +123,13 @@ def run(args: argparse.Namespace) -> int:
     seconds = compile_kernels()
     err().print(f"kernels ready ({seconds:.1f} s); results go to {out}")
     robots = demo_robots(args, out)
+    for robot in robots:
+        # A demo writes its own: another's would be lost.
+        if robot.config.exists() and not (robot.folder / "daemon.log").exists():
+            raise BadConfiguration(
+                f"--out {out}: {robot.config} is there already, and is no demo's",
+                hint="name another folder",
+            )
     with DemoMission(args, robots) as mission:
         ending = mission.watch()
     summary = summarise(args, out, robots, ending)

@@ -30,10 +30,15 @@ KEPT_ASIDE = 3
 
 @dataclass(frozen=True, slots=True)
 class LoadedLedger:
-    """Result of reading the disk: a ledger or none, and the fault, if any."""
+    """Result of reading the disk: a ledger or none, and the fault, if any.
+
+    Attributes:
+        note: the note of a ledger that has other cells than required; "" for none.
+    """
 
     ledger: LedgerSnapshot | None = None
     fault: FasacoError | None = None
+    note: str = ""
 
 
 def lock_file(folder: Path, robot: str) -> Path:
@@ -93,8 +98,9 @@ class LedgerFile:
             except (FileNotFoundError, NotADirectoryError):
                 continue
             except LedgerMismatchError as error:
+                note = _note_of(path)
                 fault = self._after_aside(error, self._generations, "mismatch")
-                return LoadedLedger(fault=fault)
+                return LoadedLedger(fault=fault, note=note)
             except (OSError, LedgerFileError) as error:
                 # An interrupted write is no fault: the previous ledger is intact. A file that the
                 # disk fails to read may be complete.
@@ -244,6 +250,13 @@ def _read(path: Path) -> bytes:
         return read_own(path, MOST_BYTES)
     except FileTooLongError as error:
         raise LedgerFileError(str(error.strerror)) from error
+
+
+def _note_of(path: Path) -> str:
+    """Return the note of a ledger, whatever its cells; "" where it cannot be read."""
+    with contextlib.suppress(OSError, FasacoError):
+        return decode_ledger(_read(path), None).note
+    return ""
 
 
 def _is_empty(path: Path) -> bool:

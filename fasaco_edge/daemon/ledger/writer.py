@@ -9,6 +9,7 @@ import logging
 import threading
 import time
 from collections import deque
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
@@ -23,6 +24,7 @@ from fasaco_edge.errors import (
     WouldForget,
 )
 from fasaco_edge.mission.coverage.ledger import LedgerSnapshot
+from fasaco_edge.mission.orders.keep_outs import KeepOuts
 from fasaco_edge.mission.orders.order_state import NO_ORDER, OrderState
 from fasaco_edge.wire.documents.status import LedgerReport
 
@@ -172,15 +174,32 @@ def open_ledger(folder: Path, robot: str, cell_m: float, *, fresh: bool = False)
     """
     file = LedgerFile(folder, robot)
     file.lock()
+    found = file.load(cell_m)
     if not fresh:
-        return LedgerWriter(file, file.load(cell_m))
+        return _writing_on(file, found, cell_m)
     try:
         kept = file.set_aside("fresh")
         if kept:
             LOG.info("started over; what was covered before is kept as %s", ", ".join(kept))
-        return LedgerWriter(file, LoadedLedger())
+        note = found.ledger.note if found.ledger else found.note
+        return _writing_on(file, LoadedLedger(note=note), cell_m)
     except OSError as error:
         return LedgerWriter(file, LoadedLedger(fault=_cannot_write(file, error)))
+
+
+def _writing_on(file: LedgerFile, found: LoadedLedger, cell_m: float) -> LedgerWriter:
+    """Continue a ledger; where that is left, begin one with the operator's keep-outs alone."""
+    keep_outs: KeepOuts = ()
+    with suppress(OrderError):
+        keep_outs = OrderState.from_json(found.note).keep_out if found.note else ()
+    if found.ledger is not None or not keep_outs:
+        return LedgerWriter(file, found)
+    note = replace(OrderState.idle(NO_ORDER), keep_out=keep_outs).to_json()
+    begun = LedgerSnapshot(cell_m, "", 0, {}, note=note)
+    writer = LedgerWriter(file, replace(found, ledger=begun))
+    # The files with them were set aside: a kill must not lose them.
+    writer.put(begun)
+    return writer
 
 
 class LedgerWriter:
