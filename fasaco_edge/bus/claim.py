@@ -57,10 +57,13 @@ class Claim:
     """The decision which daemon of a name plans: a pure function of observations and times.
 
     Attributes:
+        rejoin_s: how long an active one is uncertain after it was out of touch [s].
         state: of this daemon.
         rival: id of the daemon it waits for, or last waited for; "" for none.
         rival_yielded: whether this one plans, and another active one has just yielded.
     """
+
+    rejoin_s = SETTLE_S
 
     def __init__(self, own: str) -> None:
         self.state = ClaimState.LOOKS
@@ -114,7 +117,7 @@ class Claim:
         self._decided_at = now
         if paused_s > PAUSE_S or (in_touch and not self._was_in_touch):
             self._calm_since, self._calm_s = None, REJOIN_S
-            self._uncertain_until = now + (REJOIN_S if paused_s > PAUSE_S else SETTLE_S)
+            self._uncertain_until = now + (REJOIN_S if paused_s > PAUSE_S else self.rejoin_s)
         self._was_in_touch = in_touch
 
     def _wait_for_calm(self, first: str, now: float) -> None:

@@ -12,7 +12,7 @@ import math
 import time
 from collections.abc import Callable
 
-from fasaco_edge.bus.claim import BusClaim, ClaimState
+from fasaco_edge.bus.claim import ASK_PERIOD_S, SETTLE_S, BusClaim, ClaimState
 from fasaco_edge.bus.session import Bus, open_bus
 from fasaco_edge.bus.settings import BusSettings
 from fasaco_edge.errors import BusUnavailable
@@ -39,6 +39,10 @@ class BaseClaim(BusClaim):
         bus: its session.
         settings: the follower's.
     """
+
+    # Another one that drives finds this one's token by its next query: the two must not drive
+    # until then.
+    rejoin_s = ASK_PERIOD_S + 2.0 * SETTLE_S
 
     def __init__(self, bus: Bus, settings: FollowSettings) -> None:
         super().__init__(bus, Keys(settings.robot, settings.base), topics.DRIVER, DRIVES)

@@ -11,6 +11,7 @@ from fasaco_edge.bus import access
 from fasaco_edge.follow.base_claim import NO_RIGHT
 from fasaco_edge.follow.estimate import Command
 from fasaco_edge.wire import topics
+from tests.campaigns.fault_links import Link
 from tests.follow.nav2_missions import kind_of, nav2_follower, nav2_robot
 from tests.follow.test_process import AHEAD, config_file, until
 from tests.support.driven_base import DrivenBase, follower_process
@@ -99,6 +100,34 @@ def test_one_that_was_frozen_for_long_does_not_drive_beside_its_successor(base, 
             first.send_signal(signal.SIGCONT)
             assert commands_a_second(base, 6.0) < 23.0
             until(lambda: standing(base) == ["drives", "yields"])
+
+
+@pytest.mark.parametrize("first_is_cut", [True, False])
+def test_two_that_were_apart_do_not_drive_together_once_they_meet(base, tmp_path, first_is_cut):
+    """Both believe that they drive by then; the id decides which goes on."""
+    logs, links = (tmp_path / "first", tmp_path / "second"), [Link(base.endpoint) for _ in "ab"]
+    try:
+        with follower_process(links[0].endpoint, logs[0]):
+            base.wait_until_it_moves()
+            with follower_process(links[1].endpoint, logs[1]):
+                until(lambda: SECOND in logs[1].read_text())
+                links[0].cut()
+                until(lambda: "this one drives" in logs[1].read_text())
+                base.wait_until_it_moves()
+                links[0].mend()
+                if not first_is_cut:
+                    # The other one, too, has to find its way back.
+                    links[1].cut()
+                    time.sleep(12.0)
+                    links[1].mend()
+                ends = time.monotonic() + 30.0
+                while standing(base) != ["drives", "yields"]:
+                    assert time.monotonic() < ends
+                    assert commands_a_second(base, 1.0) < 23.0
+                base.wait_until_it_moves()
+    finally:
+        for link in links:
+            link.close()
 
 
 def test_nav2_gets_goals_from_one_of_two(base, tmp_path):
