@@ -1,0 +1,28 @@
+"""The fault matrix's short form: three of its combinations, on a machine that may be busy."""
+
+from __future__ import annotations
+
+from tests.campaigns.fault_matrix import DRIVES, LIMIT_S, STOPS, Cell, run_cell
+
+# A busy machine takes its time for a cycle, and for the start of what follows a fault [s].
+BUSY_S = 2.0
+WATCH_S = 6.0
+
+
+def test_a_planner_that_hangs_stops_the_robot_though_a_second_daemon_comes_again_and_again():
+    cell = run_cell(Cell((("second daemon", "restarted"), ("planner", "frozen")), STOPS), WATCH_S)
+    assert cell.last_s is None or cell.last_s <= LIMIT_S + BUSY_S
+    assert cell.together == 0
+
+
+def test_the_end_of_a_second_follower_leaves_the_robot_driving():
+    cell = run_cell(Cell((("second follower", "killed"),), DRIVES), WATCH_S)
+    assert cell.longest_gap_s <= BUSY_S
+    assert cell.together == 0
+
+
+def test_a_second_follower_goes_on_where_the_first_was_killed():
+    cell = run_cell(Cell((("follower", "killed"),), STOPS), WATCH_S)
+    assert cell.last_s is None or cell.last_s <= LIMIT_S
+    assert cell.successor_s is not None
+    assert cell.together <= 1
