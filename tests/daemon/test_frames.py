@@ -21,9 +21,8 @@ from tests.support.rooms import (
 
 
 def command(client, name):
-    (reply,) = client.session.get(
-        f"{client.prefix}/@rpc/mission", payload=json.dumps({"command": name}).encode(), timeout=5.0
-    )
+    payload = json.dumps({"command": name, "discard": True}).encode()
+    (reply,) = client.session.get(f"{client.prefix}/@rpc/mission", payload=payload, timeout=5.0)
     return json.loads(reply.ok.payload.to_bytes())
 
 

@@ -195,7 +195,7 @@ def test_what_cannot_be_is_refused_by_name_and_changes_nothing():
         assert give().path is None
         assert isinstance(drive.refused, OrderError)
         assert said in str(drive.refused)
-        assert drive.mission.order_state is before
+        assert drive.mission.order_state == before
 
 
 @pytest.mark.parametrize(

@@ -26,7 +26,7 @@ def refused(drive, name, order=None):
     if drive.refused is None:
         return None
     assert isinstance(drive.refused, WouldForget)
-    assert drive.mission.order_state is state
+    assert drive.mission.order_state == state
     assert drive.visited == covered
     assert drive.mission.route.path is path
     assert (decision.path, decision.plan, decision.forgotten) == (None, None, False)
