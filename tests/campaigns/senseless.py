@@ -16,7 +16,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.mission.orders.order import FARTHEST_M, MOST_KEEP_OUT, MOST_PASSES, MOST_ZONES
+from fasaco_edge.grid.geometry import FARTHEST_M
+from fasaco_edge.mission.orders.order import MOST_KEEP_OUT, MOST_PASSES, MOST_ZONES
 from fasaco_edge.wire.limits import (
     MAX_COORDINATE_M,
     MAX_RESOLUTION_M,
@@ -30,7 +31,8 @@ Pixels = NDArray[np.int8]
 FREE, WALL, UNKNOWN = 0, 100, -1
 HONEST_FRAME = "map"
 FRAMES = ("odom", "", "x" * MAX_STRING_BYTES, "地図", "\u202e\x1b[2J", "map\n")
-COMMANDS = ("pause", "resume", "cancel", "reset", "replan", "status")
+KEEP_OUTS = ("keep_out_add", "keep_out_remove")
+COMMANDS = ("pause", "resume", "home", "cancel", "reset", "replan", "status", *KEEP_OUTS)
 QUERIES = ("path", "status", "coverage", "pheromone", "config", "version", "mission", "replan", "*")
 # Times that a stamp can be near: the epoch, today, and both ends of an int32 of seconds.
 EPOCHS = (1, 1_750_000_000 * 10**9, -(2**31) * 10**9, (2**31 - 10**4) * 10**9)
@@ -119,7 +121,7 @@ class Senseless:
 
     def _behave(self) -> Iterator[Event]:
         """Do for a while what a robot should."""
-        yield {"do": "command", "document": {"command": "start"}}
+        yield {"do": "command", "document": {"command": "start", "discard": True}}
         yield self._show(self._honest_map())
         yield self._pose(1.0, 1.0)
         for _ in range(self._rng.randint(1, 4)):
@@ -300,6 +302,11 @@ class Senseless:
         for _ in range(self._rng.randint(1, 8)):
             command = self._rng.choice([*COMMANDS, "start", "start", "start"])
             document: Event = {"command": command}
+            if command in ("start", "reset"):
+                document["discard"] = self._rng.random() < 0.8
+            if command in KEEP_OUTS:
+                polygon = {"polygon": self._polygon()} if command == "keep_out_add" else {}
+                document["keep_out"] = {"name": f"k{self._rng.randint(1, 4)}", **polygon}
             if command == "start" and self._rng.random() < 0.8:
                 document["order"] = self._order()
             yield {"do": "command", "document": document}
@@ -388,7 +395,8 @@ class Senseless:
                 yield self._pose(self._x + 1e-3 * number, self._y) | {"type": "PoseStamped"}
         else:
             for _ in range(40):
-                yield {"do": "command", "document": {"command": self._rng.choice(COMMANDS)}}
+                plain = [each for each in COMMANDS if each not in KEEP_OUTS]
+                yield {"do": "command", "document": {"command": self._rng.choice(plain)}}
 
     def _restart(self) -> Iterator[Event]:
         """End the daemon and start another one; the maps that are latched stand meanwhile."""

@@ -567,7 +567,7 @@ class Campaign:
         started = time.monotonic()
         self._put_mask(event | {"kind": "free"})
         for command in ("reset", "start"):
-            self._ask("mission", {"command": command})
+            self._ask("mission", {"command": command, "discard": True})
         # One mapper: of two whose maps stand, the daemon has the one it was given last.
         while len(self._mappers) > 1:
             self._mappers.pop(0)[0].close()

@@ -185,9 +185,9 @@ class MissionTrial:
                     self._batch += [] if told is None else [PoseReceived(told)]
                 case "command":
                     self._commands += 1
-                    command, order = read_command(event["document"])
-                    if command != "status":
-                        self._batch.append(CommandReceived(self._commands, command, order))
+                    asked = read_command(event["document"])
+                    if asked.name != "status":
+                        self._batch.append(CommandReceived(self._commands, *asked))
                 case "publisher":
                     self._batch.append(PatchesLost(2))
         except FasacoError as error:
@@ -330,6 +330,7 @@ class MissionTrial:
         """Check that the lattice is, bit for bit, the one that the newest map has."""
         mission, order = self._mission, self._mission.order_state.order
         keeps_out = (order and order.keep_out) or self._config.policy.keep_out
+        keeps_out = keeps_out or mission.order_state.keep_out
         grid = mission._map.grid
         if grid is None or mission.lattice is None or keeps_out:
             return
@@ -375,7 +376,7 @@ class MissionTrial:
         self._turn()
         # Whatever was ordered, however it stands: now everything is.
         for command in ("reset", "start"):
-            self._take("command", {"document": {"command": command}})
+            self._take("command", {"document": {"command": command, "discard": True}})
         self._take("map", event)
         for turn in range(HONEST_TURNS):
             pose = {"type": "PoseStamped", "frame": event["frame"], "stamp": 1, "yaw": 0.0}
