@@ -117,7 +117,9 @@ def test_keep_outs_and_what_was_not_to_be_forgotten_are_repeated(tmp_path):
     )
     recording = record_mission(tmp_path, commands=commands)
     samples = list(RecordedSamples(recording.paths))
-    replay, record, steps = played(samples)
+    record = read_turns(samples)
+    replay = CycleReplay(read_run(samples).daemon_config(), record)
+    steps = list(replay.steps(samples))
     assert (record.gap, replay.difference, replay.lacking) == ("", None, [])
     assert all(step.as_recorded for step in steps if step.decision.path is not None)
     answers = [answer for step in steps for answer in step.decision.answers]
