@@ -9,7 +9,7 @@ from msgspec import UnsetType
 
 from fasaco_edge.text import one_line
 from fasaco_edge.wire.documents.replies import STATES
-from fasaco_edge.wire.documents.status import Status
+from fasaco_edge.wire.documents.status import TROUBLES, Status
 
 CONTENT_TYPE = "text/plain; version=0.0.4; charset=utf-8"
 PREFIX = "fasaco_edge"
@@ -61,6 +61,11 @@ def _seconds(milliseconds: float | None) -> float | None:
     return None if milliseconds is None else milliseconds / 1000.0
 
 
+def _troubles(status: Status) -> list[Sample]:
+    present = {trouble.code for trouble in status.troubles}
+    return [({"code": code}, code in present) for code in TROUBLES]
+
+
 def _errors(status: Status) -> list[Sample]:
     return [({"code": code}, count) for code, count in sorted(status.errors.by_code.items())]
 
@@ -78,6 +83,7 @@ FIGURES = (
         "1 for the state of the mission, 0 for the others",
         lambda status: [({"state": name}, name == status.state) for name in STATES],
     ),
+    Figure("trouble", "gauge", "1 for what is wrong in that state, 0 for the others", _troubles),
     Figure("uptime_seconds", "gauge", "since the daemon began", _one(lambda s: s.uptime_s)),
     Figure("covered_ratio", "gauge", "covered share of cells", _member("coverage", "fraction")),
     Figure("covered_cells", "gauge", "cells covered", _member("coverage", "covered")),

@@ -109,6 +109,7 @@ class Watchdog:
         self._notified_at = float("-inf")
         self._progress = -1
         self._state = ""
+        self._troubles: frozenset[str] = frozenset()
 
     def beat(self, worker: PlanningWorker | None, now: float) -> None:
         """Feed the watchdog if due, and if the worker, if any, has made progress."""
@@ -122,10 +123,15 @@ class Watchdog:
         self._manager.alive()
 
     def tell(self, status: Status) -> None:
-        """Set a status as the service's status line; log it when the state changes."""
+        """Set a status as the service's status line; log changes of state and troubles."""
         if status.state != self._state:
             self._state = status.state
             LOG.info("%s", _doing(status), extra={"event": "state", "state": self._state})
+        for each in status.troubles:
+            if each.code not in self._troubles:
+                about = {"event": "trouble", "code": each.code}
+                LOG.warning("%s: %s", each.text, each.do, extra=about)
+        self._troubles = frozenset(each.code for each in status.troubles)
         remark = f"; {self.remark}" if self.remark else ""
         self._manager.status(status_line(status) + remark)
 
@@ -143,6 +149,8 @@ def status_line(status: Status) -> str:
         parts.append(f"{areas} m2 of floor swept")
     if path := status.path:
         parts.append(f"path {path.revision} with {path.remaining_steps} steps to go")
+    # Of a degraded mission a trouble is the reason.
+    parts += [each.text for each in status.troubles if each.text != status.reason]
     if fault := status.ledger.fault:
         parts.append(fault)
     return "; ".join(parts)

@@ -174,7 +174,7 @@ def test_the_status_says_all_there_is_to_know(path, pixels, outsider, daemon):
         *("robot", "version", "state", "reason", "uptime_s", "map", "pose", "coverage", "path"),
         "battery",
         *("plan", "latency_ms", "loop_ms", "errors", "ledger", "recorder", "rss_mb", "cpu_s"),
-        *("threads", "config", "mission", "claim", "floor", "drive", "fleet"),
+        *("threads", "config", "mission", "claim", "floor", "drive", "fleet", "troubles"),
     }
     assert (status["robot"], status["state"], status["reason"]) == ("robot", "covering", "path 1")
     assert status["map"] == {
@@ -223,6 +223,7 @@ def test_the_status_says_all_there_is_to_know(path, pixels, outsider, daemon):
     assert status["ledger"]["restored_cells"] == 0
     assert status["ledger"]["fault"] is None
     assert status["recorder"] is None
+    assert status["troubles"] == []
     assert 50 < status["rss_mb"] < 400
     assert status["config"]["bus"]["listen"] == [daemon.endpoint]
     assert status["config"]["planner"]["velocities"] == "8:1"

@@ -1,52 +1,16 @@
 """A robot with a battery: when it goes to its dock, what it believes, and when it goes on."""
 
 import math
-from dataclasses import replace
 
 import pytest
 
 from fasaco_edge.grid.geometry import Pose2D, StampedPose
-from fasaco_edge.mission.config import BatteryPolicy, Dock
+from fasaco_edge.mission.config import Dock
 from fasaco_edge.mission.core.charging import ALL_AFTER_S, BatteryGauge
-from fasaco_edge.mission.core.events import BatteryReceived, MapReceived, PoseReceived, State
+from fasaco_edge.mission.core.events import BatteryReceived, PoseReceived, State
 from fasaco_edge.mission.orders.order_state import NO_ORDER, OrderState
-from tests.mission.world import CELL, CONFIG, Drive, building, patch, pose_at, with_policy
-
-ROOM = ("........",) * 6
-WALLED = ("##########", *("#" + row + "#" for row in ROOM), "##########")
-DOCK = Dock(x_m=0.5 * CELL, y_m=5.5 * CELL, approach_m=0.0)
-AT_DOCK = (5, 0)
-POLICY = BatteryPolicy()
-
-
-class Battery(Drive):
-    """A robot whose battery says once a tick how full it is."""
-
-    def __init__(self, level, cell=(0, 0), order_state=None, battery=POLICY, rows=ROOM, **policy):
-        at = (-1, -1) if "#" in rows[0] else (0, 0)
-        config = replace(with_policy(CONFIG, **{"dock": DOCK} | policy), battery=battery)
-        self.level, self.power = level, "discharging"
-        events = MapReceived(building(*rows, at=at)), pose_at(*cell)
-        super().__init__(cell, *events, config=config, order_state=order_state)
-
-    def tell(self, *events, after=1.0):
-        heard = [] if self.level is None else [BatteryReceived(self.level, self.power)]
-        return super().tell(*heard, *events, after=after)
-
-    def run(self, until, ticks=200):
-        """Drive on until the mission is in a state."""
-        for _ in range(ticks):
-            if self.mission.state is until:
-                return
-            if self.request is not None:
-                self.plan()
-            self.go()
-        raise AssertionError(f"{self.mission.state}: {self.mission.reason}")
-
-    def charge(self, to):
-        while self.mission.state is State.CHARGING and self.level < to:
-            self.level, self.power = min(self.level + 0.02, 1.0), "charging"
-            self.go()
+from tests.mission.battery import AT_DOCK, WALLED, Battery
+from tests.mission.world import CELL, patch, pose_at
 
 
 def test_below_its_level_it_drives_to_the_dock_charges_and_goes_on_where_it_was():

@@ -13,6 +13,8 @@ from fasaco_edge.wire.documents.status import (
     ErrorCounts,
     LedgerReport,
     Status,
+    SupervisedRecorder,
+    TroubleReport,
 )
 from fasaco_edge.wire.messages.diagnostics import (
     ERROR,
@@ -89,4 +91,7 @@ def test_each_state_has_its_level() -> None:
     ]
     assert level_of(Status(state="covering", ledger=LedgerReport(fault="disk full"))) == WARN
     assert level_of(Status(state="covering")) == OK
+    assert level_of(Status(state="charging", troubles=(TroubleReport("no_current"),))) == WARN
+    assert level_of(Status(state="done", recorder=SupervisedRecorder("disk full"))) == WARN
+    assert level_of(Status(state="done", recorder=SupervisedRecorder("recording"))) == OK
     assert level_of(Status(state="blocked", claim=ClaimReport(stand="waits"))) == STALE

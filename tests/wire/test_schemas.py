@@ -11,6 +11,7 @@ from jsonschema import Draft202012Validator, ValidationError
 
 from fasaco_edge.errors import NotYet
 from fasaco_edge.wire.documents.replies import STATES, encode_error
+from fasaco_edge.wire.documents.status import TROUBLES
 from tests.wire.contract_files import PROTOCOL, load
 from tests.wire.make_schemas import files
 from tests.wire.schemas import NAMES, check, schema
@@ -71,6 +72,11 @@ def test_the_readme_has_the_states():
     table = README.partition("\n| state |")[2].partition("\n\n")[0]
     cells = "".join(line.split(" | ")[0] for line in table.splitlines()[2:])
     assert re.findall(r"`([^`]+)`", cells) == list(STATES)
+
+
+def test_the_readme_has_the_troubles():
+    table = README.partition("\n| trouble |")[2].partition("\n\n")[0]
+    assert re.findall(r"^\| `(\w+)`", table, re.MULTILINE) == list(TROUBLES)
 
 
 def test_the_readme_has_the_commands():

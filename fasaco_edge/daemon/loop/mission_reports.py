@@ -23,6 +23,7 @@ from fasaco_edge.wire.documents.status import (
     MapReport,
     PlanCounts,
     PoseReport,
+    TroubleReport,
 )
 
 if TYPE_CHECKING:
@@ -118,6 +119,14 @@ def plan_counts(mission: Mission | None) -> PlanCounts:
     route = mission.route
     counts = (route.plans, route.unchanged, route.outdated, route.attempts)
     return PlanCounts(*counts, planning=route.is_planning)
+
+
+def trouble_reports(mission: Mission, now: float) -> tuple[TroubleReport, ...]:
+    """Return what is wrong with a mission at ``now`` [s]."""
+    return tuple(
+        TroubleReport(each.code, each.text, each.do, round(max(now - each.since, 0.0), 1))
+        for each in mission.troubles
+    )
 
 
 def rounded(value: float | None) -> float | None:

@@ -23,6 +23,7 @@ from fasaco_edge.daemon.loop.mission_reports import (
     plan_counts,
     pose_report,
     rounded,
+    trouble_reports,
 )
 from fasaco_edge.host.processes import resident_mb, thread_count
 from fasaco_edge.wire.documents.path_documents import PathReport
@@ -38,6 +39,7 @@ from fasaco_edge.wire.documents.status import (
     MemberReport,
     Status,
     SupervisedRecorder,
+    TroubleReport,
 )
 
 if TYPE_CHECKING:
@@ -46,6 +48,8 @@ if TYPE_CHECKING:
     from fasaco_edge.mission.core.path_exit import PublishedPath
 
 HEARTBEAT_S = 1.0
+# A mission that has not begun after this time is a trouble [s].
+BEGUN_S = 30.0
 # Changes closer together than this go out as one.
 LEAST_INTERVAL_S = 0.05
 
@@ -74,6 +78,8 @@ class StatusBoard:
         self._started = time.monotonic()
         self._sent_at = float("-inf")
         self._sent_key: tuple[object, ...] = ()
+        # Since when there is no mission and nothing is loaded for one; None while there is.
+        self._unbegun_at: float | None = None
 
     def show(self, config: DaemonConfig) -> None:
         """Show this configuration as the one in force."""
@@ -92,7 +98,9 @@ class StatusBoard:
         path = runner.paths.newest
         revision = path and path.revision
         claim = self.claim.stand
-        key = (state, reason, revision, recorder, self.ledger.fault, order_state, claim)
+        troubles = self._troubles(runner, now)
+        faults = (*(each.code for each in troubles), self.ledger.fault)
+        key = (state, reason, revision, recorder, faults, order_state, claim)
         # Many small faults do not get a message each: the heartbeat has their count.
         heartbeat_s = float("inf") if self.yield_reason else HEARTBEAT_S
         wait = LEAST_INTERVAL_S if key != self._sent_key else heartbeat_s
@@ -125,6 +133,7 @@ class StatusBoard:
             config=self._shown_config,
             mission=mission_report(mission, order_state, self._standing),
             fleet=self._fleet(mission, now),
+            troubles=troubles,
         )
 
     def reply(self, runner: MissionRunner) -> Reply:
@@ -150,6 +159,18 @@ class StatusBoard:
         if order_state.order is None:
             return "idle", order_state.why
         return ("loading", loading) if loading else ("waiting for map", self.waits)
+
+    def _troubles(self, runner: MissionRunner, now: float) -> tuple[TroubleReport, ...]:
+        is_unbegun = runner.mission is None and not runner.loading and not self.yield_reason
+        if not is_unbegun or runner.order_state.order is None:
+            self._unbegun_at = None
+            # A mission whose daemon yields takes in nothing more.
+            ran = None if self.yield_reason else runner.mission
+            return trouble_reports(ran, now) if ran is not None else ()
+        self._unbegun_at = now if self._unbegun_at is None else self._unbegun_at
+        since_s = round(now - self._unbegun_at - BEGUN_S, 1)
+        text, to_do = f"the mission cannot begin: {self.waits}", "publish what it waits for"
+        return (TroubleReport("not_begun", text, to_do, since_s),) if since_s >= 0.0 else ()
 
     def _fleet(self, mission: Mission | None, now: float) -> FleetReport | None:
         fleet = self._config.fleet

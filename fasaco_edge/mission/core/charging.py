@@ -59,7 +59,9 @@ class BatteryGauge:
         self.level: float | None = None
         self.power = ""
         self.heard_at = float("-inf")
-        self._told_at = 0.0
+        # When the last message came, and the last accepted level; before, when one began to be due.
+        self._noted_at = float("-inf")
+        self._told_at: float | None = None
         # A level that is not accepted yet, and since when it has been reported.
         self._claim: tuple[float, float] | None = None
         # Time and level where the current stretch of driving began.
@@ -73,15 +75,21 @@ class BatteryGauge:
 
     def silent_s(self, now: float) -> float:
         """Return the time since a level was last accepted, or since the beginning [s]."""
-        return now - self._told_at
+        return 0.0 if self._told_at is None else now - self._told_at
+
+    def why_silent(self, since: float) -> str:
+        """Return why no level has been accepted since then [s], as the end of a sentence."""
+        if self.heard_at >= since:
+            return ", it jumps to and fro"
+        return ", its messages give none" if self._noted_at >= since else ""
 
     def begin(self, now: float) -> None:
-        """Start the timeout for the first level at ``now`` [s]."""
-        self._told_at = now
+        """Start the timeout for the first level at ``now`` [s], unless it has begun."""
+        self._told_at = now if self._told_at is None else self._told_at
 
     def note(self, event: BatteryReceived, now: float, *, drives: bool) -> None:
         """Take in a message at ``now`` [s]; ``drives``: whether the robot is driving."""
-        self.power = event.power
+        self.power, self._noted_at = event.power, now
         if event.level is None:
             return
         self.heard_at = now
@@ -170,8 +178,8 @@ class Charging:
         if self.gauge.silent_s(now) <= self.policy.silent_s:
             return ""
         silent_s = self.policy.silent_s
-        jumps = ", it jumps to and fro" if now - self.gauge.heard_at <= silent_s else ""
-        return f"no charge of the battery for {silent_s:g} s{jumps}"
+        why = self.gauge.why_silent(now - silent_s)
+        return f"no charge of the battery for {silent_s:g} s{why}"
 
     def why_no_dock(self) -> str:
         """Return why the robot has nowhere to charge on this map; "" where it has."""

@@ -17,6 +17,7 @@ from fasaco_edge.mission.core.path_checks import PathChecks
 from fasaco_edge.mission.core.route import NO_CELLS, Route
 from fasaco_edge.mission.core.standing import Standing
 from fasaco_edge.mission.core.trail_layer import TrailLayer
+from fasaco_edge.mission.core.trouble import DRIVING, Troubles
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
 from fasaco_edge.mission.fleet.layer import FleetLayer
 from fasaco_edge.mission.line.layer import LineLayer
@@ -32,9 +33,6 @@ from fasaco_edge.mission.orders.sequencer import Sequencer
 ARRIVAL_S = 2.0
 PLACES: dict[Errand, str] = {"home": "home", "charge": "to the dock"}
 
-# The states of a robot that drives, or soon will.
-DRIVING = (State.PLANNING, State.COVERING, State.RETURNING)
-
 
 @dataclass(slots=True, eq=False)
 class Executive:
@@ -42,6 +40,7 @@ class Executive:
 
     Attributes:
         mask_frame: the frame of the map that the keep-out mask belongs to; "" for any.
+        troubles: what is wrong meanwhile; read-only.
     """
 
     map: MapState
@@ -56,6 +55,7 @@ class Executive:
     giving_way: GivingWay
     dock: InDock
     mask_frame: str
+    troubles: Troubles = field(init=False)
     _state: State = field(default=State.WAITING_FOR_MAP, init=False)
     _reason: str = field(default="no map yet", init=False)
     _now: float = field(default=0.0, init=False)
@@ -67,27 +67,29 @@ class Executive:
         self._checks = PathChecks(
             self.ledger, self.monitor, self.orders, self.route, self.line, self._standing
         )
+        drives = self.charging, self.giving_way, self._standing
+        self.troubles = Troubles(self.map, self.monitor, *drives, self.dock)
 
     def status(self) -> tuple[State, str]:
-        """Return the reported state and its reason."""
-        trouble = self.monitor.trouble(self._now)
-        if trouble and self._state in DRIVING:
-            lost = self.monitor.is_pose_lost(self._now)
-            return State.DEGRADED, trouble + (self.map.why_other_frame() if lost else "")
-        if self._state in DRIVING and (silence := self.charging.silence(self._now)):
-            return State.DEGRADED, f"{silence}: when to charge is not known"
-        if self._state in DRIVING and (why := self.charging.why_no_dock()):
-            return State.DEGRADED, why
-        stuck = self.giving_way.why_stuck(self._now) or self._standing.why_stuck
-        if self._state in DRIVING and stuck:
-            return State.DEGRADED, stuck
+        """Return the reported state and its reason, by the last decision."""
+        found = self.troubles.found
+        if found and self._doing in DRIVING:
+            return State.DEGRADED, found[0].text
+        return self._doing, self._reason
+
+    @property
+    def _doing(self) -> State:
+        """What the mission does, with or without troubles."""
         makes_way = bool(self.giving_way.waits_for) and len(self.route.path.cells) > 0
-        if self._state is State.DONE and makes_way:
-            return State.RETURNING, self._reason
-        return self._state, self._reason
+        return State.RETURNING if self._state is State.DONE and makes_way else self._state
 
     def decide(self, now: float) -> Decision:
         """Return what is to be done at ``now`` [s]."""
+        decision = self._decide(now)
+        self.troubles.look(self._doing, now)
+        return decision
+
+    def _decide(self, now: float) -> Decision:
         self._now = now
         self._consider_charging()
         if held := self._give_way():
@@ -147,7 +149,7 @@ class Executive:
         is_going = (order.order is not None or order.errand) and not order.paused
         is_docked = order.errand == "charge" and self._why_in_dock() is not None
         lacks_map = self.map.building.why or self._why_no_mask()
-        may_drive = not self.monitor.trouble(self._now) and not lacks_map
+        may_drive = self.monitor.is_sound(self._now) and not lacks_map
         if not (is_going and self.fleet.members and may_drive) or is_docked:
             way.end()
             return None

@@ -31,6 +31,7 @@ from fasaco_edge.mission.core.lattice_angle import LatticeAngle
 from fasaco_edge.mission.core.lattice_rotation import LatticeRotation
 from fasaco_edge.mission.core.route import Route
 from fasaco_edge.mission.core.trail_layer import TrailLayer
+from fasaco_edge.mission.core.trouble import Trouble
 from fasaco_edge.mission.coverage.drive_meter import DriveMeter, DriveTimes
 from fasaco_edge.mission.coverage.ledger import CoverageLedger, LedgerSnapshot
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
@@ -204,6 +205,11 @@ class Mission:
         self._handle(held, now)
         self.route.want(why)
         return stop
+
+    @property
+    def troubles(self) -> tuple[Trouble, ...]:
+        """What is wrong in the present state, the weightiest first."""
+        return self._executive.troubles.found
 
     def coverage(self) -> Coverage | None:
         """Return the counts of coverage; None before there is a map."""

@@ -174,10 +174,16 @@ class InputMonitor:
         self.doubt_since = 0.0
         self._config = config
         self._pose: Pose2D | None = None
-        self._pose_at = 0.0
-        self._map_at = 0.0
+        # When the last ones came; before that, when they began to be due.
+        self._pose_at: float | None = None
+        self._map_at: float | None = None
         # Number of the plan requested from the doubtful pose.
         self._answered_by = -1
+
+    def begin(self, now: float) -> None:
+        """Note that map and pose are due from ``now`` on, unless they have come."""
+        self._pose_at = now if self._pose_at is None else self._pose_at
+        self._map_at = now if self._map_at is None else self._map_at
 
     def note_map(self, now: float) -> None:
         """Note a map or an update."""
@@ -216,21 +222,23 @@ class InputMonitor:
         if number == self._answered_by:
             self.doubt = ""
 
+    def pose_silent_s(self, now: float) -> float:
+        """Return the time since the last pose, or since the beginning [s]."""
+        return 0.0 if self._pose_at is None else now - self._pose_at
+
+    def map_silent_s(self, now: float) -> float:
+        """Return the time since the last map or update, or since the beginning [s]."""
+        return 0.0 if self._map_at is None else now - self._map_at
+
     def is_pose_lost(self, now: float) -> bool:
         """Tell whether poses have timed out."""
         limit = self._config.policy.lost_pose_s
-        return self._pose is not None and 0 < limit < now - self._pose_at
+        return self._pose is not None and 0 < limit < self.pose_silent_s(now)
 
-    def trouble(self, now: float) -> str:
-        """Return what is wrong with the inputs; "" for nothing."""
-        if self.is_pose_lost(now):
-            return (
-                f"no pose for {self._config.policy.lost_pose_s:g} s: the path is kept, but nothing "
-                "counts as covered until one comes"
-            )
-        if self.doubt:
-            return self.doubt
-        limit = self._config.policy.stale_map_s
-        if 0 < limit < now - self._map_at:
-            return f"no map or update for {limit:g} s: going on with the last one"
-        return ""
+    def is_map_stale(self, now: float) -> bool:
+        """Tell whether maps and updates have timed out."""
+        return 0 < self._config.policy.stale_map_s < self.map_silent_s(now)
+
+    def is_sound(self, now: float) -> bool:
+        """Tell whether pose and map can be relied on."""
+        return not (self.is_pose_lost(now) or self.doubt or self.is_map_stale(now))

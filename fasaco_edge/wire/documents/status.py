@@ -25,6 +25,10 @@ from fasaco_edge.wire.documents.settings import Settings
 RECORDER_STATES: Final = ("recording", "disk full", "stalled", "stopping")
 SUPERVISED_STATES: Final = ("starting", *RECORDER_STATES, "silent", "restarting")
 CLAIMS: Final = ("looks", "waits", "yields", "plans")
+TROUBLES: Final = (
+    *("not_begun", "no_pose", "pose_jumped", "no_map", "no_battery", "no_dock", "no_current"),
+    "stands",
+)
 
 
 class ClaimReport(Document, frozen=True):
@@ -245,6 +249,21 @@ class SupervisedRecorder(Document, frozen=True):
     pid: Ordinal | UnsetType = UNSET
 
 
+class TroubleReport(Document, frozen=True):
+    """What is wrong while the mission is in its state.
+
+    Attributes:
+        text: what is wrong, for a person.
+        do: what to do about it.
+        since_s: for how long it has been reported [s].
+    """
+
+    code: Annotated[str, allowed(enum=TROUBLES)] = ""
+    text: str = ""
+    do: str = ""
+    since_s: Amount = 0.0
+
+
 class MemberReport(Document, frozen=True):
     """Another robot of the fleet.
 
@@ -285,6 +304,7 @@ class Status(Document, frozen=True):
     Attributes:
         version: of the package.
         reason: why it is in that state.
+        troubles: what is wrong in that state; one of each code at most.
         rss_mb: memory of the process [MB].
         cpu_s: processor time the process has used [s].
         threads: of the process.
@@ -317,3 +337,4 @@ class Status(Document, frozen=True):
     )
     mission: MissionReport = MissionReport()
     fleet: FleetReport | None = None
+    troubles: Annotated[tuple[TroubleReport, ...], allowed(maxItems=len(TROUBLES))] = ()

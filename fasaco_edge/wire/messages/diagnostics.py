@@ -18,6 +18,8 @@ LEVELS: Final = {
     "blocked": ERROR,
 }
 """Of the states that are not in order; a daemon that does not plan is stale."""
+IN_ORDER: Final = ("starting", "recording", "stopping")
+"""The states of a recorder that are."""
 
 
 def level_of(status: Status) -> int:
@@ -25,7 +27,18 @@ def level_of(status: Status) -> int:
     if status.claim.stand != "plans":
         return STALE
     level = LEVELS.get(status.state, OK)
-    return max(level, WARN) if status.ledger.fault else level
+    recorder = status.recorder
+    is_recorded = recorder is None or recorder.state in IN_ORDER
+    is_faulty = status.troubles or status.ledger.fault or not is_recorded
+    return max(level, WARN) if is_faulty else level
+
+
+def message_of(status: Status) -> str:
+    """Return state, reason and troubles of a status in a line."""
+    parts = [f"{status.state}: {status.reason}"]
+    # Of a degraded mission a trouble is the reason.
+    parts += [each.text for each in status.troubles if each.text != status.reason]
+    return "; ".join(parts)
 
 
 def values_of(status: Status) -> dict[str, str]:
@@ -45,6 +58,11 @@ def values_of(status: Status) -> dict[str, str]:
         values["last refused"] = status.errors.last
     if status.ledger.fault:
         values["ledger"] = status.ledger.fault
+    if status.recorder is not None:
+        values["recorder"] = status.recorder.state
+    for trouble in status.troubles:
+        since = f"for {trouble.since_s:.0f} s"
+        values[f"trouble {trouble.code}"] = f"{trouble.text} ({since}): {trouble.do}"
     return values
 
 
@@ -57,7 +75,7 @@ def encode_diagnostics(status: Status, node: str, stamp_ns: int) -> bytes:
     values = values_of(status)
     for name, text in (
         ("name", f"{node}: mission"),
-        ("message", f"{status.state}: {status.reason}"),
+        ("message", message_of(status)),
         ("hardware_id", status.robot),
     ):
         writer.string(clipped(text), name)

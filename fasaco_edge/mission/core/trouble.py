@@ -1,0 +1,188 @@
+"""Troubles: what is wrong with robot and inputs, whatever state the mission is in.
+
+The state says what the mission does, troubles say what is wrong meanwhile. A mission that drives
+with a trouble is ``degraded``; a state at rest stays as it is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+from fasaco_edge.mission.config import MissionPolicy
+from fasaco_edge.mission.core.charging import Charging
+from fasaco_edge.mission.core.dock_current import DockCurrent
+from fasaco_edge.mission.core.events import State
+from fasaco_edge.mission.core.giving_way import GivingWay
+from fasaco_edge.mission.core.in_dock import InDock
+from fasaco_edge.mission.core.standing import Standing
+from fasaco_edge.mission.map.inputs import InputMonitor
+from fasaco_edge.mission.map.map_state import MapState
+
+# Poses of a robot at rest may come less often than ``lost_pose_s``; also the time to wait for the
+# first map and pose [s].
+REST_S = 30.0
+
+# States of a robot that drives, or soon will.
+DRIVING = frozenset((State.PLANNING, State.COVERING, State.RETURNING))
+# States of a mission that is not over. A robot without an order may be switched off.
+UNDER_WAY = frozenset(State) - {State.IDLE, State.DONE}
+
+
+@dataclass(frozen=True, slots=True)
+class Trouble:
+    """What is wrong.
+
+    Attributes:
+        code: one of ``wire.documents.status.TROUBLES``.
+        text: what is wrong.
+        do: what to do about it.
+        since: when it was first found, by the mission's time [s].
+    """
+
+    code: str
+    text: str
+    do: str
+    since: float
+
+
+@dataclass(frozen=True, slots=True)
+class Rule:
+    """A trouble, the states in which it counts, and how it is found.
+
+    Attributes:
+        why: from the mission's parts, state and time [s], what is wrong; "" for nothing.
+    """
+
+    code: str
+    states: frozenset[State]
+    why: Callable[[Troubles, State, float], str]
+    do: str
+
+
+@dataclass(slots=True, eq=False)
+class Troubles:
+    """Finds the troubles of a mission.
+
+    Attributes:
+        found: by the last ``look``, in the order of ``RULES``.
+    """
+
+    map: MapState
+    monitor: InputMonitor
+    charging: Charging
+    giving_way: GivingWay
+    standing: Standing
+    dock: InDock
+    found: tuple[Trouble, ...] = field(default=(), init=False)
+    _current: DockCurrent = field(init=False)
+
+    def __post_init__(self) -> None:
+        self._current = DockCurrent(self.charging.gauge)
+
+    @property
+    def policy(self) -> MissionPolicy:
+        """Its limits."""
+        return self.charging.config.policy
+
+    def look(self, state: State, now: float) -> None:
+        """Find the troubles at ``now`` [s] of a mission that is in a state; once in each step."""
+        self.monitor.begin(now)
+        is_docked = state is State.CHARGING or (
+            state.is_at_rest and self.dock.holds(is_charging=False)
+        )
+        self._current.look(now, is_docked=is_docked)
+        before = {trouble.code: trouble.since for trouble in self.found}
+        self.found = tuple(
+            Trouble(rule.code, why, rule.do, before.get(rule.code, now))
+            for rule in RULES
+            if state in rule.states and (why := rule.why(self, state, now))
+        )
+
+    def no_pose(self, state: State, now: float) -> str:
+        """Return why there is no current pose."""
+        monitor, limit = self.monitor, self.policy.lost_pose_s
+        if state not in DRIVING:
+            limit = max(limit, REST_S) if limit else 0.0
+            if self.map.pose is None:
+                return self.map.why_no_pose() if monitor.pose_silent_s(now) > REST_S else ""
+        if not monitor.is_pose_lost(now) or monitor.pose_silent_s(now) <= limit:
+            return ""
+        kept = ": the path is kept, but nothing counts as covered until one comes"
+        path = kept if state in DRIVING else ""
+        return f"no pose for {limit:g} s{path}{self.map.why_other_frame()}"
+
+    def no_map(self, _: State, now: float) -> str:
+        """Return why there is no current map."""
+        if self.map.lattice is None:
+            return self.map.why_no_map() if self.monitor.map_silent_s(now) > REST_S else ""
+        if not self.monitor.is_map_stale(now):
+            return ""
+        return f"no map or update for {self.policy.stale_map_s:g} s: going on with the last one"
+
+    def no_battery(self, state: State, now: float) -> str:
+        """Return why the charge of the battery is not known."""
+        what = "how full it is" if state is State.CHARGING else "when to charge"
+        why = self.charging.silence(now)
+        return f"{why}: {what} is not known" if why else ""
+
+    def no_current(self, _: State, now: float) -> str:
+        """Return why the dock is thought to give no current."""
+        policy, level = self.charging.policy, self.charging.gauge.level
+        if policy is None or level is None or self.charging.silence(now) or level >= policy.enough:
+            return ""
+        why = self._current.why_none(now)
+        return f"in the dock the battery, at {level:.0%}, does not charge: {why}" if why else ""
+
+    def stands(self, _: State, now: float) -> str:
+        """Return why the robot is thought to be stuck; without poses that is not known."""
+        if self.monitor.is_pose_lost(now):
+            return ""
+        return self.giving_way.why_stuck(now) or self.standing.why_stuck
+
+
+RULES = (
+    Rule(
+        "no_pose",
+        UNDER_WAY,
+        Troubles.no_pose,
+        "check the localiser, the frame of its poses, and the key they come on",
+    ),
+    Rule(
+        "pose_jumped",
+        DRIVING,
+        lambda troubles, state, now: troubles.monitor.doubt,
+        "nothing if it ends by itself; else check the localiser",
+    ),
+    Rule(
+        "no_map",
+        UNDER_WAY,
+        Troubles.no_map,
+        "check the mapper or map server, and the key its maps come on",
+    ),
+    Rule(
+        "no_battery",
+        UNDER_WAY,
+        Troubles.no_battery,
+        "check the battery's driver: percentage has to be a number from 0 to 1",
+    ),
+    Rule(
+        "no_dock",
+        UNDER_WAY,
+        lambda troubles, state, now: troubles.charging.why_no_dock(),
+        "set mission.dock for this map, or bring the robot back to the dock's",
+    ),
+    Rule(
+        "no_current",
+        frozenset(State) - DRIVING,
+        Troubles.no_current,
+        "check the dock's power and contacts, and whether the robot stands in it",
+    ),
+    Rule(
+        "stands",
+        DRIVING,
+        Troubles.stands,
+        "look at what holds the robot; check that its base drives",
+    ),
+)
+"""In order of their weight: the first is the reason of a degraded mission."""

@@ -1,0 +1,265 @@
+"""Trouble has a name in every state: lost poses, stale maps, silent batteries, dead docks."""
+
+import pytest
+
+from fasaco_edge.mission.core.dock_current import FLAT_S
+from fasaco_edge.mission.core.events import BatteryReceived, MapReceived, State
+from fasaco_edge.mission.core.trouble import RULES
+from fasaco_edge.wire.documents.status import TROUBLES
+from tests.mission.battery import AT_DOCK, Battery
+from tests.mission.world import CONFIG, Drive, building, patch, pose_at, with_policy
+
+ROOM = (*["??????????"] * 2, *["##########"] * 3, *["........??"] * 6)
+PATIENT = {"lost_pose_s": 3.0, "stale_map_s": 40.0}
+A_MINUTE_S = 60
+
+
+def codes(drive):
+    return [trouble.code for trouble in drive.mission.troubles]
+
+
+def live(drive, seconds, without="", **battery):
+    """Let a robot stand; all its inputs come once a second, but one."""
+    for _ in range(round(seconds)):
+        heard = [] if without == "pose" else [pose_at(*drive.cell)]
+        heard += [] if without == "map" else [patch(".", at=(0, 0))]
+        if without == "battery":
+            drive.level = None
+        elif "fall" in battery:
+            drive.level = max(drive.level - battery["fall"], 0.0)
+        elif "rise" in battery:
+            drive.level = min(drive.level + battery["rise"], 1.0)
+        drive.tell(*heard)
+
+
+def covering(level=0.8):
+    drive = Battery(level, rows=ROOM, **PATIENT)
+    drive.run(State.COVERING)
+    for _ in range(6):
+        drive.go()
+    return drive
+
+
+def paused():
+    drive = covering()
+    drive.command("pause")
+    return drive
+
+
+def blocked():
+    drive = covering()
+    drive.cell = (7, 3)
+    return drive
+
+
+def returning():
+    drive = covering()
+    drive.command("home")
+    return drive
+
+
+def charging(power="charging", level=0.15):
+    drive = Battery(level, rows=ROOM, **PATIENT)
+    drive.run(State.CHARGING)
+    drive.power = power
+    return drive
+
+
+def done():
+    drive = covering()
+    drive.finish()
+    return drive
+
+
+def idle():
+    drive = covering()
+    drive.command("cancel")
+    return drive
+
+
+AT_REST = {State.PAUSED: paused, State.BLOCKED: blocked, State.CHARGING: charging}
+DRIVING = {State.COVERING: covering, State.RETURNING: returning}
+OVER = {State.DONE: done, State.IDLE: idle}
+SILENT = {"pose": "no_pose", "map": "no_map", "battery": "no_battery"}
+
+
+@pytest.mark.parametrize("kind", SILENT)
+@pytest.mark.parametrize("state", AT_REST)
+def test_what_is_silent_is_said_within_a_minute_in_each_state_at_rest(state, kind):
+    drive = AT_REST[state]()
+    live(drive, 5, rise=0.001)
+    assert (drive.mission.state, codes(drive)) == (state, [])
+    live(drive, A_MINUTE_S + 1, without=kind, rise=0.001)
+    assert drive.mission.state is state, "what it does stays in sight"
+    assert codes(drive) == [SILENT[kind]]
+    assert not drive.walk
+    if kind != "battery":
+        live(drive, 1, rise=0.001)
+        assert codes(drive) == []
+
+
+@pytest.mark.parametrize("kind", SILENT)
+@pytest.mark.parametrize("state", DRIVING)
+def test_a_robot_that_drives_is_degraded_and_the_trouble_is_listed(state, kind):
+    drive = DRIVING[state]()
+    # It moves to and fro, so that nobody takes it for one that is stuck.
+    for second in range(A_MINUTE_S + 1):
+        row, col = drive.cell
+        heard = [] if kind == "pose" else [pose_at(row, col + 0.45 * (second % 2))]
+        heard += [] if kind == "map" else [patch(".", at=(0, 0))]
+        drive.level = None if kind == "battery" else drive.level
+        drive.tell(*heard)
+    assert drive.mission.state is State.DEGRADED
+    assert codes(drive) == [SILENT[kind]]
+    assert drive.mission.reason == drive.mission.troubles[0].text
+
+
+@pytest.mark.parametrize("kind", SILENT)
+@pytest.mark.parametrize("state", OVER)
+def test_a_robot_without_work_may_be_switched_off(state, kind):
+    drive = OVER[state]()
+    live(drive, 200, without=kind)
+    assert (drive.mission.state, codes(drive)) == (state, [])
+
+
+def test_what_never_came_is_missing_too():
+    drive = Drive((0, 0), config=with_policy(CONFIG, **PATIENT))
+    drive.tell(after=31.0)
+    assert (drive.mission.state, codes(drive)) == (State.WAITING_FOR_MAP, ["no_pose", "no_map"])
+    drive.tell(MapReceived(building("....")))
+    assert (drive.mission.state, codes(drive)) == (State.WAITING_FOR_POSE, ["no_pose"])
+    drive.command("pause")
+    assert (drive.mission.state, codes(drive)) == (State.PAUSED, ["no_pose"])
+    drive.tell(pose_at(0, 0))
+    assert codes(drive) == []
+
+
+def test_a_robot_at_rest_may_publish_its_pose_less_often():
+    drive = paused()
+    for _ in range(5):
+        live(drive, 20, without="pose")
+        live(drive, 1)
+        assert codes(drive) == []
+
+
+def test_poses_in_another_frame_are_missing_while_paused_too():
+    drive = paused()
+    for _ in range(A_MINUTE_S):
+        drive.tell(pose_at(*drive.cell, frame="odom"), patch(".", at=(0, 0)))
+    assert codes(drive) == ["no_pose"]
+    assert "poses arrive in frame 'odom', the map is in 'map'" in drive.mission.troubles[0].text
+
+
+@pytest.mark.parametrize("kind", ["nan", "to and fro"])
+def test_battery_messages_that_say_nothing_are_a_silence(kind):
+    drive = charging()
+    for second in range(A_MINUTE_S + 1):
+        level = None if kind == "nan" else 0.9 if second % 2 else 0.05
+        drive.level = None
+        message = BatteryReceived(level, "charging")
+        drive.tell(pose_at(*drive.cell), patch(".", at=(0, 0)), message)
+    assert (drive.mission.state, codes(drive)) == (State.CHARGING, ["no_battery"])
+    why = {"nan": "its messages give none", "to and fro": "it jumps to and fro"}[kind]
+    assert why in drive.mission.troubles[0].text
+
+
+@pytest.mark.parametrize("power", ["discharging", "not charging", "unknown"])
+def test_a_dock_without_current_is_said_within_a_minute(power):
+    drive = charging(power)
+    live(drive, A_MINUTE_S)
+    assert (drive.mission.state, codes(drive)) == (State.CHARGING, ["no_current"])
+    assert f"reports '{power}', and its level does not rise" in drive.mission.troubles[0].text
+
+
+@pytest.mark.parametrize("power", ["discharging", "not charging", "unknown", "charging", "full"])
+def test_a_level_that_falls_in_the_dock_is_believed_whatever_the_battery_reports(power):
+    drive = charging(power)
+    live(drive, A_MINUTE_S, fall=0.0005)
+    assert (drive.mission.state, codes(drive)) == (State.CHARGING, ["no_current"])
+    while drive.level > 0.0:
+        live(drive, 1, fall=0.0005)
+        assert codes(drive) == ["no_current"]
+    drive.power = "charging"
+    live(drive, A_MINUTE_S, rise=0.0005)
+    assert codes(drive) == [], "the current is back"
+
+
+@pytest.mark.parametrize("power", ["charging", "unknown", "discharging"])
+def test_a_battery_that_rises_charges_whatever_it_reports(power):
+    drive = charging(power)
+    for _ in range(1200):
+        live(drive, 1, rise=0.0003)
+        assert codes(drive) == []
+
+
+def test_a_coarse_gauge_may_take_minutes_for_a_step_while_it_charges():
+    drive = charging()
+    live(drive, FLAT_S - 30)
+    assert codes(drive) == []
+    live(drive, 60)
+    assert codes(drive) == ["no_current"]
+    assert "has not risen for 10 minutes" in drive.mission.troubles[0].text
+
+
+def test_a_contact_that_comes_and_goes_hides_no_falling_level():
+    drive = charging()
+    for second in range(A_MINUTE_S):
+        drive.power = "charging" if second % 3 else "discharging"
+        live(drive, 1, fall=0.0005)
+    assert codes(drive) == ["no_current"]
+
+
+def test_a_current_that_ends_while_it_charges_is_missed():
+    drive = charging()
+    live(drive, 300, rise=0.0005)
+    drive.power = "discharging"
+    live(drive, A_MINUTE_S)
+    assert codes(drive) == ["no_current"]
+    assert drive.mission.troubles[0].since == pytest.approx(drive.now, abs=A_MINUTE_S)
+
+
+@pytest.mark.parametrize("state", OVER)
+def test_a_robot_without_work_stands_in_a_dead_dock(state):
+    drive = charging(level=0.15)
+    live(drive, 400, rise=0.001)
+    if state is State.IDLE:
+        drive.command("cancel")
+    else:
+        drive.power = "charging"
+        while drive.mission.state is State.CHARGING:
+            live(drive, 1, rise=0.002)
+        drive.finish()
+        drive.cell, drive.level = AT_DOCK, 0.6
+        live(drive, 6)
+    assert (drive.mission.state, drive.cell) == (state, AT_DOCK)
+    drive.power = "discharging"
+    live(drive, A_MINUTE_S)
+    assert codes(drive) == ["no_current"]
+
+
+def test_a_full_battery_in_its_dock_may_discharge():
+    drive = done()
+    drive.cell, drive.level, drive.power = AT_DOCK, 0.95, "discharging"
+    live(drive, 300)
+    assert (drive.mission.state, codes(drive)) == (State.DONE, [])
+
+
+def test_a_trouble_keeps_the_time_when_it_began():
+    drive = paused()
+    live(drive, 32, without="pose")
+    (first,) = drive.mission.troubles
+    live(drive, 100, without="pose")
+    (later,) = drive.mission.troubles
+    assert (later.since, later.do) == (first.since, first.do)
+    assert later.do
+
+
+def test_an_unused_battery_and_limits_of_0_are_no_trouble():
+    drive = Drive((0, 0), MapReceived(building("....")), pose_at(0, 0), config=CONFIG)
+    drive.command("pause")
+    drive.tell(after=1000.0)
+    assert (drive.mission.state, codes(drive)) == (State.PAUSED, [])
+
+
+def test_the_contract_names_each_trouble():
+    assert {rule.code for rule in RULES} | {"not_begun"} == set(TROUBLES)
