@@ -202,6 +202,9 @@ def _seen(context: CheckContext, bus: Bus, listen_s: float) -> Finding:
                 "ros2.namespace say where this one looks"
             )
         return warn(found, to_do, details)
+    if status.troubles:
+        texts, to_dos = zip(*((each.text, each.do) for each in status.troubles), strict=True)
+        return warn("; ".join((found, *texts)), "; ".join(to_dos), details)
     return ok(found, details)
 
 

@@ -153,8 +153,9 @@ class ReviewDocument(msgspec.Struct):
             core], threads.
         restored_cells: cells that were covered before a restart.
         states: seconds in each state.
-        troubles: each time the mission was degraded, blocked or silent, or the recorder could not
-            write (`recorder: disk full`, `recorder: stalled`): state, reason, at_s, seconds.
+        troubles: each time the mission was degraded, blocked or silent, something was wrong in
+            another state (its reason says what), or the recorder could not write (`recorder: disk
+            full`, `recorder: stalled`): state, reason, at_s, seconds.
         charges: each time the robot charged: at_s, seconds, level_from, level_to (0 to 1; null
             where not known).
         worst: moments that stand out: what, value, unit, at_s, note.

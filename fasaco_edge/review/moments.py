@@ -6,7 +6,7 @@ import math
 import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import groupby, pairwise
 
 import numpy as np
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from fasaco_edge.drawing.spread import percentile
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.read.run import RunRecord
-from fasaco_edge.review.run_data import PublishedPath, RunData
+from fasaco_edge.review.run_data import PublishedPath, RunData, StatusSample
 
 # Less than this is no motion.
 STILL_M = 0.05
@@ -85,6 +85,24 @@ def spans_of(entered: Sequence[tuple[float, str, str]], end_s: float) -> tuple[S
             spans[-1] = Span(spans[-1].name, spans[-1].begin_s, at_s, spans[-1].reason)
         spans.append(Span(state, at_s, end_s, reason))
     return tuple(spans)
+
+
+def troubles_at_rest(statuses: Sequence[StatusSample], end_s: float) -> list[Span]:
+    """Return the periods of troubles in other states than those of ``TROUBLES``.
+
+    Each has the name of the state in which it began, and the trouble as its reason.
+    """
+    found: list[Span] = []
+    lasting: dict[str, Span] = {}
+    for each in statuses:
+        status = each.status
+        is_reason = status.state in TROUBLES
+        present = {} if is_reason else {one.code: one.text for one in status.troubles}
+        for code in lasting.keys() - present.keys():
+            found.append(replace(lasting.pop(code), end_s=each.at_s))
+        for code, text in present.items():
+            lasting.setdefault(code, Span(status.state, each.at_s, end_s, text))
+    return [*found, *lasting.values()]
 
 
 def under_way(states: Sequence[Span]) -> tuple[Span, ...]:

@@ -41,6 +41,7 @@ from fasaco_edge.review.moments import (
     Span,
     faults_of,
     spans_of,
+    troubles_at_rest,
     worst_moments,
 )
 from fasaco_edge.review.orders import OrderChapter, chapters, is_complete, is_still_true
@@ -171,6 +172,8 @@ class Review:
     def troubles(self) -> list[Span]:
         """The periods with a fault of mission or recorder, in order."""
         mission = [span for span in self.states if span.name in TROUBLES]
+        end_s = _end_s(self.record, self.data)
+        mission += troubles_at_rest(self.data.statuses, end_s)
         recorder = [
             replace(span, name=f"recorder: {span.name}")
             for span in self.recorder_states

@@ -31,7 +31,7 @@ MOST_TO_GO_S = 1e8
 # Coordinates beyond this are invalid [m].
 MOST_M = 1e6
 # States with a path to drive.
-UNDERWAY = ("planning", "covering", "returning", "paused", "charging")
+UNDERWAY = ("planning", "covering", "returning", "degraded", "paused", "charging")
 
 
 def state(view: RobotState, way: Way, now: float) -> Digest:
@@ -54,6 +54,7 @@ def state(view: RobotState, way: Way, now: float) -> Digest:
             for area in mission.unreached.areas
         ],
         "battery": _battery(status),
+        "in_trouble": bool(status.troubles),
         "faults": list(_faults(status)),
         "fleet": _fleet(status.fleet) if status.fleet else None,
         "radius_m": view.settings.robot.radius_m,
@@ -138,7 +139,9 @@ def _battery(status: Status) -> Digest | None:
 
 
 def _faults(status: Status) -> Iterator[str]:
-    """Yield the faults in words."""
+    """Yield troubles and faults in words."""
+    for what, to_do in phrases.troubles(status):
+        yield f"{what}. {to_do[:1].upper()}{to_do[1:]}."
     if status.errors.total:
         count = status.errors.total
         yield f"refused or failed {count} times since the start, last: {status.errors.last}"

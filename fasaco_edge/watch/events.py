@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 from fasaco_edge.text import one_line
-from fasaco_edge.wire.documents.status import Status
+from fasaco_edge.wire.documents.status import TROUBLES, Status
 
 KEPT = 200
 # Tone of an entry.
@@ -49,6 +50,7 @@ def differences(before: Status | None, after: Status) -> list[tuple[str, str]]:
         found.append((f"{after.state}: {after.reason}", tone))
     elif after.state in TROUBLED and before.reason != after.reason:
         found.append((f"{after.state}: {after.reason}", BAD))
+    found += _troubles(before, after)
     known = before.errors.by_code if before is not None else {}
     for code, count in after.errors.by_code.items():
         if more := count - known.get(code, 0):
@@ -60,3 +62,16 @@ def differences(before: Status | None, after: Status) -> list[tuple[str, str]]:
         tone = PLAIN if after.recorder.state in ("recording", "starting") else BAD
         found.append((f"recorder {after.recorder.state}: {after.recorder.reason or ''}", tone))
     return found
+
+
+def _troubles(before: Status | None, after: Status) -> Iterator[tuple[str, str]]:
+    """Yield the troubles that began and ended; that of a degraded mission is its reason."""
+    known, present = (
+        {each.code: each.text for each in (status.troubles if status else ())[: len(TROUBLES)]}
+        for status in (before, after)
+    )
+    for code, text in present.items():
+        if code not in known and text != after.reason:
+            yield f"trouble: {text}", BAD
+    for code in sorted(known.keys() - present.keys()):
+        yield f"trouble is over: {code}", GOOD

@@ -10,6 +10,7 @@ from rich.text import Text
 from fasaco_edge.text import one_line
 from fasaco_edge.watch import picture
 from fasaco_edge.watch.blocks import FAINT, Blocks, on_a_line
+from fasaco_edge.watch.events import TROUBLED
 from fasaco_edge.watch.phrases import age, clock, percent
 from fasaco_edge.watch.picture import MissionPicture
 from fasaco_edge.watch.robot_view import RobotView
@@ -148,6 +149,8 @@ def headline(view: RobotView, now: float) -> Text:
         line.append(f"silent for {age(silent)}", "bold red")
     else:
         line.append(one_line(status.state).upper(), f"bold {state_colour(status.state)}")
+        if status.troubles and status.state not in TROUBLED:
+            line.append("  IN TROUBLE", "bold red")
         if status.coverage is not None:
             line.append(f"  {percent(status.coverage.fraction)} of cells")
         if status.path is not None:

@@ -11,7 +11,7 @@ from fasaco_edge.wire.documents.replies import (
     MissionReport,
     ZoneReport,
 )
-from fasaco_edge.wire.documents.status import DriveReport, Status
+from fasaco_edge.wire.documents.status import TROUBLES, DriveReport, Status
 
 # Of the wall clock to the monotonic one, when this module was imported [s].
 _OFFSET_S = time.time() - time.monotonic()
@@ -74,6 +74,14 @@ def drive(report: DriveReport) -> str:
     )
     words = [f"{name}{value:.2f}{unit}" for name, value, unit in measured if value is not None]
     return ", ".join(words) or "not measured yet"
+
+
+def troubles(status: Status) -> list[tuple[str, str]]:
+    """Return what is wrong and for how long, each with what to do."""
+    return [
+        (f"{one_line(each.text)} (for {age(each.since_s)})", one_line(each.do))
+        for each in status.troubles[: len(TROUBLES)]
+    ]
 
 
 def steady_now() -> float:

@@ -47,6 +47,9 @@ def _rows(status: Status, width: int, glyphs: GlyphSet) -> list[Row]:
     if status.path is None or status.reason != f"path {status.path.revision}":
         state.append(f": {one_line(status.reason)}", "not bold")
     rows: list[Row] = [("state", state)]
+    rows += [
+        ("trouble", _text(f"{what}: {to_do}", "red")) for what, to_do in phrases.troubles(status)
+    ]
     if status.coverage is not None:
         rows += _coverage(
             status.coverage, glyphs.bar(status.coverage.fraction, min(width, LONGEST_BAR))

@@ -41,6 +41,7 @@ PATHS = (
     ("fasaco", 8.0, "path blocked at cell (1, 2)"),
     (None, 0.0, "stopped"),
 )
+DEAD_DOCK = {"code": "no_current", "text": "the dock gives no current"}
 
 
 def run_told(folder, *, faults, silent=0, killed=False):
@@ -74,6 +75,7 @@ def run_told(folder, *, faults, silent=0, killed=False):
             # A part ends with a flush, and these are seconds apart.
             recorder.wait_until(lambda report: "-part1." not in report["file"])
             put("status", _status("degraded", "no pose for 3 s", {}))
+            put("status", _status("charging", "battery at 15%", {}, troubles=[DEAD_DOCK]))
             put("status", _status("covering", "path 1", faults))
             for _ in range(silent):
                 put("status", _status("covering", "path 1", faults | {"late": 1}))
@@ -101,11 +103,11 @@ def kill_within_a_part(recorder, folder, faults):
     recorder.process.kill()
 
 
-def _status(state, reason, faults):
+def _status(state, reason, faults, troubles=()):
     errors = {"total": sum(faults.values()), "last": "one", "by_code": faults}
     return encode_json(
         {"robot": "robot", "version": "9", "state": state, "reason": reason, "config": CONFIG}
-        | {"errors": errors, "recorder": {"lost": 2}, "map": {"rows": 1}}
+        | {"errors": errors, "recorder": {"lost": 2}, "map": {"rows": 1}, "troubles": troubles}
     )
 
 
@@ -164,8 +166,16 @@ def test_troubles_and_faults_are_told(parts):
     review = read_review(parts)
     told = document(review)
     # On a slow computer the planner is heard late, too.
-    (trouble,) = [one for one in told["troubles"] if one["state"] != "silent"]
-    assert (trouble["state"], trouble["reason"]) == ("degraded", "no pose for 3 s")
+    troubles = [one for one in told["troubles"] if one["state"] != "silent"]
+    assert [(one["state"], one["reason"]) for one in troubles] == [
+        ("degraded", "no pose for 3 s"),
+        ("charging", "the dock gives no current"),
+    ]
+    (log,) = [lines for entity, lines in review.record.log.items() if entity == "log/mission"]
+    texts = [line for _, line in log]
+    assert texts.index("trouble: the dock gives no current") < texts.index(
+        "trouble is over: no_current"
+    )
     assert told["recorder_lost"] == 2
     assert told["faults_by_code"] == {"wrong_frame": 2, "late": 1}
     assert told["faults"] == 3

@@ -181,3 +181,22 @@ def test_a_recorder_that_gives_no_reason_yet_is_shown_without_one():
     view = mid_mission()
     tell(view, "status", status(recorder={"state": "starting", "restarts": 0}))
     assert texts(view)[-1] == "recorder starting: "
+
+
+def test_a_trouble_of_a_robot_at_rest_begins_and_ends():
+    view = RobotView("robot")
+    dead = {"code": "no_current", "text": "the dock gives no current", "since_s": 3.0}
+    resting = {"state": "charging", "reason": "battery at 15%"}
+    for troubles in ([], [dead], [dead | {"since_s": 4.0}], []):
+        tell(view, "status", status(**resting, troubles=troubles))
+    texts = [event.text for event in view.events.entries]
+    assert texts.count("trouble: the dock gives no current") == 1
+    assert texts[-1] == "trouble is over: no_current"
+
+
+def test_a_degraded_mission_has_its_trouble_as_its_reason():
+    view = RobotView("robot")
+    lost = {"code": "no_pose", "text": "no pose for 3 s"}
+    tell(view, "status", status(state="degraded", reason=lost["text"], troubles=[lost]))
+    texts = [event.text for event in view.events.entries]
+    assert [text for text in texts if "no pose" in text] == ["degraded: no pose for 3 s"]

@@ -37,7 +37,7 @@ from fasaco_edge.recording.write.writer import RecordingWriter
 from fasaco_edge.text import one_line
 from fasaco_edge.wire.documents.path_documents import PathAttachment, TrailAttachment
 from fasaco_edge.wire.documents.settings import known_settings
-from fasaco_edge.wire.documents.status import ErrorCounts, Recorder, Status
+from fasaco_edge.wire.documents.status import TROUBLES, ErrorCounts, Recorder, Status
 from fasaco_edge.wire.messages.maps import directions_of
 from fasaco_edge.wire.messages.paths import PathMessage
 from fasaco_edge.wire.messages.pheromone import PheromoneMessage
@@ -67,6 +67,7 @@ class Scene:
         # The order, by the last command, and the operator's keep-outs, by the last status.
         self._order = EVERYTHING_ONCE
         self._kept_out: list[tuple[str, Polygon]] = []
+        self._troubles: set[str] = set()
         self._layers = Layers()
         self._curves = Curves(writer)
         self._driven = DrivenPathDrawing(writer)
@@ -245,6 +246,7 @@ class Scene:
             self._draw_areas()
         self.enter(entities.MISSION_STATE, status.state, status.reason)
         self.enter(entities.PLANNER_STATE, "planning" if status.plan.planning else "idle")
+        self._add_troubles(status)
         self._add_errors(status.errors)
 
     def add_report(self, report: Recorder) -> None:
@@ -332,6 +334,16 @@ class Scene:
         if restored != self._restored:
             self._restored = restored
             self.add_line(entities.MISSION_LOG, f"{restored} cells were covered before a restart")
+
+    def _add_troubles(self, status: Status) -> None:
+        """Log the troubles that began and ended; that of a degraded mission is its reason."""
+        present = {each.code: each.text for each in status.troubles[: len(TROUBLES)]}
+        for code, text in present.items():
+            if code not in self._troubles and text != status.reason:
+                self.add_line(entities.MISSION_LOG, f"trouble: {text}", "WARN")
+        for code in sorted(self._troubles - present.keys()):
+            self.add_line(entities.MISSION_LOG, f"trouble is over: {code}")
+        self._troubles = set(present)
 
     def _add_errors(self, errors: ErrorCounts) -> None:
         # Fewer than before: the planner was restarted.

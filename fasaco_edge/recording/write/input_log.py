@@ -102,6 +102,7 @@ class InputLog:
         news = (
             *(status.state, has_map, status.version, status.config),
             sorted(status.errors.by_code),
+            [trouble.code for trouble in status.troubles],
             status.ledger.fault,
             status.recorder and status.recorder.state,
         )

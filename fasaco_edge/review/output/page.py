@@ -266,7 +266,7 @@ def _remarkable(review: Review, figures: ReviewDocument, of: int) -> Html:
     moments = rows.moment_rows(review)
     parts = [_table(("worst moments", "how much", "at", "context"), moments, "notes")]
     troubles, faults = rows.trouble_rows(review.troubles), rows.fault_rows(figures)
-    none = "The mission was never degraded, blocked or silent, and the recorder could always write."
+    none = "The mission was never in trouble, blocked or silent; the recorder could always write."
     titles = ("trouble", "at", "for", "why")
     parts.append(_table(titles, troubles, "notes") if troubles else element("p", none))
     if charges := rows.charge_rows(figures):

@@ -35,7 +35,7 @@ function showState() {
   find("absent").textContent = state.absent && state.absent + (state.absent.includes("of the name") ? others : "");
   if (!state.state) return;
   find("state").textContent = WORDS[state.state] || state.state;
-  find("state").className = `chip ${LOOKS[state.state] || ""}`;
+  find("state").className = `chip ${state.in_trouble ? "bad" : LOOKS[state.state] || ""}`;
   find("reason").textContent = state.reason;
   showProgress(state);
   showBattery(state.battery);

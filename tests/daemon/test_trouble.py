@@ -1,0 +1,122 @@
+"""A trouble of a robot at rest, wherever it is looked for."""
+
+from __future__ import annotations
+
+import threading
+import urllib.request
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+
+from fasaco_edge.config.config import BusConfig, DaemonConfig
+from fasaco_edge.doctor import session
+from fasaco_edge.doctor.finding import CheckContext, Level
+from fasaco_edge.wire.messages.battery import BatteryState, encode_battery
+from fasaco_edge.wire.schemas import BATTERY_STATE
+from tests.serve.serving import looking, served
+from tests.support.outsider import TIMEOUT_S, Outsider
+from tests.support.processes import daemon_process, fasaco_edge, free_endpoint
+from tests.support.rooms import map_bytes, pose_bytes, room
+from tests.support.ros_robot import DIAGNOSTICS, Naming, ros_robot
+from tests.wire import oracle
+
+DOCK = {"x_m": 0.75, "y_m": 0.75, "yaw_deg": 0.0, "approach_m": 0.0}
+PERIOD_S = 0.2
+OPENER = urllib.request.build_opener(urllib.request.ProxyHandler({}))
+
+
+@dataclass
+class Battery:
+    """A battery that publishes its level, which changes by ``step`` with each message."""
+
+    outsider: Outsider
+    level: float = 0.18
+    step: float = 0.0
+    stop: threading.Event = field(default_factory=threading.Event)
+
+    def run(self) -> None:
+        while not self.stop.wait(PERIOD_S):
+            self.level = min(max(self.level + self.step, 0.05), 1.0)
+            payload = encode_battery(BatteryState(self.level, "charging"))
+            self.outsider.put("battery", payload, BATTERY_STATE)
+
+    @contextmanager
+    def on(self):
+        """Publish."""
+        self.stop.clear()
+        thread = threading.Thread(target=self.run)
+        thread.start()
+        try:
+            yield
+        finally:
+            self.stop.set()
+            thread.join()
+
+
+def codes(status):
+    return [trouble["code"] for trouble in status["troubles"]]
+
+
+def test_a_dead_dock_is_on_the_bus_in_metrics_on_the_page_and_in_the_terminal(tmp_path):
+    figures = free_endpoint().removeprefix("tcp/")
+    with (
+        daemon_process(
+            tmp_path,
+            mission={"dock": DOCK},
+            battery={"silent_s": 10.0},
+            metrics={"listen": figures},
+            ros2={"kind": "bridge"},
+        ) as daemon,
+        Outsider(daemon.endpoint) as outsider,
+        ros_robot(daemon.endpoint, Naming(None)) as robot,
+        served(tmp_path, daemon.endpoint) as page,
+        looking(page) as looker,
+    ):
+        diagnostics = robot.listen("diagnostics", DIAGNOSTICS)
+        outsider.put("map", map_bytes(room(3.0, 3.0)))
+        outsider.put("pose", pose_bytes(0.75, 0.75))
+        battery = Battery(outsider)
+        with battery.on():
+            status = outsider.wait_status(lambda status: status["state"] == "charging")
+            assert codes(status) == []
+            battery.step = -0.002
+            status = outsider.wait_status(lambda status: bool(status["troubles"]))
+            (trouble,) = status["troubles"]
+            assert (status["state"], trouble["code"]) == ("charging", "no_current")
+            assert trouble["text"].startswith("in the dock the battery, at 1")
+            assert "does not charge: its level falls, from 18% to 1" in trouble["text"]
+            assert trouble["do"].startswith("check the dock's power and contacts")
+            with OPENER.open(f"http://{figures}/metrics", timeout=TIMEOUT_S) as answer:
+                lines = answer.read().decode().splitlines()
+            assert 'fasaco_edge_trouble{code="no_current"} 1' in lines
+            assert 'fasaco_edge_trouble{code="no_pose"} 0' in lines
+            assert 'fasaco_edge_state{state="charging"} 1' in lines
+            shown = fasaco_edge("watch", "--once", "--connect", daemon.endpoint).out
+            assert "CHARGING  IN TROUBLE" in shown
+            assert "trouble" in shown
+            bus = BusConfig(listen=(daemon.endpoint,))
+            examined = session.peers(CheckContext(DaemonConfig(bus=bus)))
+            assert examined.level is Level.WARN
+            assert "does not charge" in examined.found
+            digest = looker.wait("state", lambda seen: seen["in_trouble"])
+            assert digest["state"] == "charging"
+            assert any("does not charge" in fault for fault in digest["faults"])
+            told = diagnostics.wait(lambda heard: b"does not charge" in heard.payload)
+            (one,) = oracle.from_bytes(DIAGNOSTICS, told.payload).status
+            assert (one.level, one.message.partition(":")[0]) == (1, "charging")
+        silent = outsider.wait_status(lambda status: codes(status) == ["no_battery"])
+        assert silent["state"] == "charging"
+        battery.step = 0.005
+        with battery.on():
+            outsider.wait_status(lambda status: not status["troubles"])
+            looker.wait("state", lambda seen: not seen["in_trouble"])
+    assert "does not charge: its level falls" in daemon.log_text()
+
+
+def test_a_mission_that_cannot_begin_is_a_trouble_until_it_does(tmp_path):
+    with daemon_process(tmp_path) as daemon, Outsider(daemon.endpoint) as outsider:
+        status = outsider.wait_status(lambda status: bool(status["troubles"]))
+        assert (status["state"], codes(status)) == ("waiting for map", ["not_begun"])
+        assert status["troubles"][0]["text"] == "the mission cannot begin: no map yet"
+        outsider.put("map", map_bytes(room(3.0, 3.0)))
+        outsider.put("pose", pose_bytes(0.75, 0.75))
+        outsider.wait_status(lambda status: status["state"] == "covering" and not codes(status))
