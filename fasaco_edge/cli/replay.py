@@ -20,6 +20,7 @@ from fasaco_edge.cli.console.streams import print_json
 from fasaco_edge.config.loading import load_config
 from fasaco_edge.replay.cycle_replay import CycleReplay, Difference, read_turns
 from fasaco_edge.replay.replay import Replay, read_run
+from fasaco_edge.text import shown
 from fasaco_edge.wire.documents.path_documents import PlanFigures, digest
 
 if TYPE_CHECKING:
@@ -40,7 +41,8 @@ EPILOG = """\
 The column `then` tells whether the path equals the recorded one cell by cell. Without a turn log
 a recording does not tell in full which samples the daemon took together, nor the work of plans
 that were not used: a different path is no error then. With --config or --work the replay is of
-another mission, and approximate, too.
+another mission, and approximate, too. So is that of a daemon of an earlier release which planned
+with a planner of the user's own: those plans cannot be repeated, and `planner.name` plans instead.
 """
 
 
@@ -74,7 +76,7 @@ def run(args: argparse.Namespace) -> int:
     samples = RecordedSamples(args.recordings)
     recorded = read_run(samples)
     config = load_config(args.config) if args.config else recorded.daemon_config()
-    is_as_it_was = args.config is None and args.work is None
+    is_as_it_was = args.config is None and args.work is None and not recorded.own_planner
     record = read_turns(samples) if is_as_it_was else None
     replay: Replay | CycleReplay
     if record is not None:
@@ -148,6 +150,7 @@ class Summary(msgspec.Struct):
     samples_missing: int
     restored_cells_missing: int
     restarts_ignored: int
+    own_planner_missing: str
 
 
 def _summary(
@@ -178,6 +181,7 @@ def _summary(
         samples_missing=samples.missing,
         restored_cells_missing=recorded.restored_cells if is_approximate else 0,
         restarts_ignored=recorded.starts if is_approximate else 0,
+        own_planner_missing=recorded.own_planner,
     )
 
 
@@ -215,6 +219,8 @@ def _rows(summary: Summary) -> list[tuple[str, str]]:
         ("as recorded", f"{summary.paths_as_recorded} of {summary.paths_recorded} paths"),
         ("refused", faults or "nothing"),
     ]
+    if own := summary.own_planner_missing:
+        rows.append(("own planner", f"{shown(own)}: its plans cannot be repeated"))
     if summary.samples_missing:
         rows.append(("not recorded", f"{summary.samples_missing} samples"))
     if summary.restored_cells_missing:

@@ -23,10 +23,8 @@ from fasaco_edge.grid.geometry import FARTHEST_M
 from fasaco_edge.mission.config import BatteryPolicy, MapPlace, MissionPolicy
 from fasaco_edge.mission.orders.mask import INLINE, mask_polygons
 from fasaco_edge.mission.orders.order import OrderDocument, ZoneDocument, order_of
-from fasaco_edge.planners.own.loading import is_place
 from fasaco_edge.planners.paper.colony import ColonyConfig, parse_velocities
 from fasaco_edge.planners.registry import PLANNER_NAMES
-from fasaco_edge.text import shown
 from fasaco_edge.wire import schemas
 from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.limits import MAX_GRID_CELLS, MAX_STRING_BYTES
@@ -103,9 +101,6 @@ class PlannerConfig(Section, frozen=True):
     While the robot drives, ``spare_share`` of a processor core goes into making the rest of its
     path better; fasaco with local search alone can do that.
 
-    ``own`` is the place of a planner of the user's own, ``MODULE:NAME``, which plans in a process
-    of its own; ``name`` plans where it fails.
-
     ``local_search`` is for planners that have it (``planners.registry``), which is fasaco alone;
     without it a plan may end before its budget.
 
@@ -118,7 +113,6 @@ class PlannerConfig(Section, frozen=True):
     """
 
     name: PlannerName = "fasaco"
-    own: str = ""
     local_search: bool = True
     ants: Annotated[int, Meta(ge=1, le=1_000_000)] = 200
     velocities: str = "8:1"
@@ -133,18 +127,6 @@ class PlannerConfig(Section, frozen=True):
     spare_share: Annotated[float, Meta(ge=0, le=1)] = 0.05
     line: Literal["cells", "quick", "thorough"] = "thorough"
     align: Literal["walls", "axes"] | Annotated[float, Meta(ge=-45, le=45)] = "walls"
-
-    def check_own(self) -> None:
-        """Check the place of the user's own planner.
-
-        Raises:
-            BadConfiguration: it is none.
-        """
-        own = self.own
-        if own and (own.partition(":")[0].endswith(".py") or not is_place(own)):
-            raise BadConfiguration(
-                f'planner.own must be MODULE:NAME of an installed module, or "", got {shown(own)}'
-            )
 
     def colony(self) -> ColonyConfig:
         """Return these as a colony.

@@ -159,7 +159,6 @@ def _misfits(config: DaemonConfig) -> Iterator[BadConfiguration]:
                 f"{footprint.radius():.3g} m, got {radius_m:g}"
             )
     yield from _refused("planner.", config.planner.colony)
-    yield from _refused("", config.planner.check_own)
     yield from _refused("", config.mission.check_zones)
     mask = config.mission.keep_out_mask
     if config.mission.keep_out_topic and mask and not mask.startswith(INLINE):

@@ -19,6 +19,13 @@ from fasaco_edge.host.plain_yaml import PlainYamlError, compose, read_bounded
 from fasaco_edge.text import shown
 
 FOLDER = "CREDENTIALS_DIRECTORY"
+# Keys of earlier releases: why each was removed, and what to do without it.
+REMOVED = {
+    "planner.own": (
+        "was removed in this version, the daemon plans with its own planners only",
+        "delete the key; `fasaco-edge plan --planner MODULE:NAME` runs a planner of your own",
+    ),
+}
 
 
 class Section(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -62,7 +69,10 @@ def section_faults(
         if not isinstance(name, str):
             continue
         path = f"{key}.{name}" if key else name
-        if name not in fields:
+        if path in REMOVED:
+            why, hint = REMOVED[path]
+            yield Fault(path, BadConfiguration(f"{path} {why}", hint=hint))
+        elif name not in fields:
             yield _fault(path, f"unknown key {path}{_meant(name, key, list(fields), root)}")
         elif section := section_of(fields[name].type):
             yield from section_faults(section, value, path, root)
@@ -71,6 +81,16 @@ def section_faults(
     for name, field in fields.items():
         if field.required and name not in document:
             yield _fault(key, f"{key}: object missing required field {name}")
+
+
+def without_removed(document: Mapping[str, object], key: str = "") -> dict[str, object]:
+    """Return a section ``key`` of an earlier release without the keys removed since."""
+    kept: dict[str, object] = {}
+    for name, value in document.items():
+        path = f"{key}.{name}" if key else name
+        if path not in REMOVED:
+            kept[name] = without_removed(value, path) if isinstance(value, Mapping) else value
+    return kept
 
 
 def section_of(kind: object) -> type[Section] | None:

@@ -15,11 +15,10 @@ from fasaco_edge.daemon.loop.fleet import FleetEar
 from fasaco_edge.daemon.loop.inbox import Batch, Inbox, make_mailbox
 from fasaco_edge.daemon.loop.loader import Loader
 from fasaco_edge.daemon.loop.mission_runner import MissionRunner
-from fasaco_edge.errors import BadConfiguration, FasacoError
+from fasaco_edge.errors import FasacoError
 from fasaco_edge.mission.core.events import CommandReceived, Decision, PlanReady
 from fasaco_edge.mission.coverage.ledger import LedgerSnapshot
 from fasaco_edge.planners.registry import planner_of
-from fasaco_edge.text import shown
 
 LOAD_S = 1.0
 
@@ -71,11 +70,6 @@ class MissionDrive:
 
     def __init__(self, config: DaemonConfig, ledger: LedgerSnapshot | None = None) -> None:
         max_pixels, planner = config.map.max_pixels, config.planner
-        if planner.own:
-            raise BadConfiguration(
-                f"planner.own: {shown(planner.own)} is not ours, its plans cannot be repeated",
-                hint="a --config without it replays with planner.name; decisions will differ",
-            )
         self.mailbox = make_mailbox(max_pixels, map_spacing_s=0.0, most_poses=math.inf)
         ear = FleetEar(config) if config.fleet else None
         self._inbox = Inbox(

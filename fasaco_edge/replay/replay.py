@@ -19,6 +19,7 @@ import msgspec
 
 from fasaco_edge.bus.arrival import Arrival
 from fasaco_edge.config.config import DaemonConfig
+from fasaco_edge.config.reading import without_removed
 from fasaco_edge.daemon.loop.inbox import Received, take_batch
 from fasaco_edge.daemon.loop.loop import TICK_S
 from fasaco_edge.errors import BadConfiguration, FasacoError, MalformedMessage
@@ -92,15 +93,22 @@ class RecordedRun:
     starts: int = 0
     paths: Mapping[int, RecordedPath] = field(default_factory=dict)
 
+    @property
+    def own_planner(self) -> str:
+        """The user's planner of an earlier release's daemon, which made its plans; "" for none."""
+        planner = self.config.get("planner")
+        own = planner.get("own") if isinstance(planner, Mapping) else None
+        return own if isinstance(own, str) else ""
+
     def daemon_config(self) -> DaemonConfig:
-        """Return the configuration.
+        """Return the configuration, without keys that were removed since.
 
         Raises:
             BadConfiguration: it is of a release whose settings this one does not know.
         """
         # Before there were lines, cells were driven, and before they turned, along the axes.
-        planner = self.config.get("planner", {})
-        config = dict(self.config)
+        config = without_removed(self.config)
+        planner = config.get("planner", {})
         if isinstance(planner, Mapping):
             config["planner"] = {"line": "cells", "align": "axes", **planner}
         try:

@@ -65,26 +65,6 @@ def test_a_full_disk_is_said_and_the_mission_goes_on(service: Service):
         lab.run("umount", "/var/lib/private/fasaco-edge")
 
 
-def test_a_planner_of_the_user_s_own_plans_and_may_die(service: Service):
-    """In a process of its own, within all that the unit forbids."""
-    lab = service.lab
-    service.configure(planner={"own": "tests.deploy.own_walks:depth_first", "spare_share": 0.0})
-    service.start()
-    with robot(lab):
-        wait_for(lambda: swept_m2(service) >= 2, 40.0, "2 m2 swept")
-        assert service.ask()["errors"]["total"] == 0
-        daemon = service.pid
-        (child,) = lab.run("pgrep", "-f", "planners.own.child").stdout.split()
-        lab.run("kill", "-KILL", child)
-        wait_for(lambda: service.ask()["errors"]["total"], 60.0, "the end of the process told")
-        assert "its process has ended" in service.ask()["errors"]["last"]
-        before = swept_m2(service)
-        wait_for(lambda: swept_m2(service) > before + 1, 40.0, "more swept than before")
-    assert service.pid == daemon
-    service.stop()
-    assert lab.run("pgrep", "-f", "planners.own.child", check=False).stdout == ""
-
-
 def test_a_recorder_may_die(service: Service):
     pytest.importorskip("rerun")
     lab, recorder = service.lab, Service(service.lab, "fasaco-edge-recorder")

@@ -11,10 +11,8 @@ import pytest
 
 import fasaco_edge as fe
 from fasaco_edge.cli import main
-from fasaco_edge.config.config import DaemonConfig, PlannerConfig
 from fasaco_edge.errors import BadConfiguration, IllegalWalk, PlannerFailed
 from fasaco_edge.planners.registry import PLANNER_NAMES
-from fasaco_edge.replay.mission_drive import MissionDrive
 from tests.offline.test_plan import OWN_PLAN, OWN_PLANNER
 from tests.support.processes import ENVIRONMENT
 
@@ -218,29 +216,6 @@ def test_a_file_that_cannot_be_loaded_is_told(mine, text, name, error, said, cap
         78 if error is BadConfiguration else 1
     )
     assert said in capsys.readouterr().err
-
-
-def test_a_configuration_s_planner_plans_as_the_daemon_s_would(mine, monkeypatch, capsys):
-    (mine.parent / "plans_of_ours.py").write_text(OWN_PLANNER)
-    monkeypatch.syspath_prepend(str(mine.parent))
-    config = mine.parent / "robot.yaml"
-    config.write_text("planner:\n  own: plans_of_ours:depth_first\n")
-    words = ["plan", "office", "--config", str(config), "--json"]
-    assert main(words) == 0
-    assert json.loads(capsys.readouterr().out)["planner"] == "plans_of_ours:depth_first"
-    # What the command line names comes first.
-    assert main([*words, "--planner", "zigzag"]) == 0
-    assert json.loads(capsys.readouterr().out)["planner"] == "zigzag"
-    mine.parent.chmod(0o777)
-    monkeypatch.delitem(sys.modules, "plans_of_ours")
-    assert main(words) == 78
-    assert "may be written by everybody" in capsys.readouterr().err
-
-
-def test_a_replay_runs_no_planner_that_a_recording_names():
-    config = DaemonConfig(planner=PlannerConfig(own="json:loads"))
-    with pytest.raises(BadConfiguration, match="its plans cannot be repeated"):
-        MissionDrive(config)
 
 
 def test_no_configuration_names_a_file(mine, tmp_path, capsys):

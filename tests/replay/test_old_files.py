@@ -6,6 +6,8 @@ import hashlib
 import json
 import lzma
 import shutil
+import signal
+import time
 from pathlib import Path
 
 import msgspec
@@ -20,8 +22,11 @@ from fasaco_edge.wire.documents.path_documents import digest
 
 pytest.importorskip("rerun")
 
+from fasaco_edge.daemon.loop.answers import config_document
 from fasaco_edge.recording.read.run import RecordedSamples
-from fasaco_edge.replay.replay import Replay, read_run
+from fasaco_edge.replay.replay import RecordedRun, Replay, read_run
+from tests.support.recordings import bus_on_free_port, recorder_process
+from tests.support.scripted_mission import CONFIG, Mission
 
 DATA = Path(__file__).parents[1] / "data"
 
@@ -73,6 +78,44 @@ def test_a_recording_is_reviewed(recording, capsys):
     assert [review[name] for name in figures] == [63, 51, 1, 15, 30, 27]
     assert review["driven_m"] == pytest.approx(15.23)
     assert (review["state"], review["complete"]) == ("done", True)
+
+
+@pytest.fixture(scope="module")
+def of_own_planner(tmp_path_factory):
+    """Return a recording of a daemon that planned with a planner of its user's."""
+    config = config_document(CONFIG)
+    config["planner"] = {**config["planner"], "own": "lab.mine:Deep"}
+    out = tmp_path_factory.mktemp("own")
+    with bus_on_free_port() as (bus, endpoint), recorder_process(bus, endpoint, out) as recorder:
+        mission = Mission(bus)
+        mission.publish_status("waiting for map", 0.0, planning=False, config=config)
+        for _ in mission.frames(20):
+            time.sleep(0.04)
+        mission.publish_status("covering", 1.0, planning=False, config=config)
+        report = recorder.written(mission.sent)
+        recorder.process.send_signal(signal.SIGTERM)
+        assert recorder.process.wait(60) == 0
+    return report["file"]
+
+
+def test_a_recording_of_a_planner_of_the_user_s_own_is_replayed_with_another(
+    of_own_planner, capsys
+):
+    told = printed(capsys, "replay", of_own_planner)
+    assert told["summary"]["own_planner_missing"] == "lab.mine:Deep"
+    assert told["summary"]["equal"] is None
+    assert told["summary"]["paths"] >= 1
+    assert main(["replay", of_own_planner]) == 0
+    assert "'lab.mine:Deep': its plans cannot be repeated" in capsys.readouterr().out
+    assert printed(capsys, "review", of_own_planner)["config"]["planner.own"] == "lab.mine:Deep"
+
+
+def test_a_recording_without_such_a_planner_is_none_of_one(recording, capsys):
+    """Every recording of the releases that had the key has it, mostly empty."""
+    empty = RecordedRun({"planner": {"name": "zigzag", "own": ""}})
+    assert empty.daemon_config().planner.name == "zigzag"
+    assert empty.own_planner == ""
+    assert printed(capsys, "replay", recording, code=1)["summary"]["own_planner_missing"] == ""
 
 
 def test_a_ledger_is_restored(tmp_path):

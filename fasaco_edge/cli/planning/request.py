@@ -65,8 +65,6 @@ def read_request(args: argparse.Namespace) -> PlanRequest:
     given, own = _given(args, SEARCH_OPTIONS), None
     if ":" in given.get("planner", ""):
         own = load(given.pop("planner"))
-    elif config is not None and config.planner.own and "planner" not in given:
-        own = load(config.planner.own, "planner.own:", is_trusted=True)
     search = replace(_search(config), **given)
     if args.no_local_search or own:
         search = replace(search, local_search=False)

@@ -74,13 +74,6 @@ class PlanSnapshot:
     snapshot: ColonySnapshot
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class PlannerFault:
-    """Why the user's own planner failed; another one has planned."""
-
-    error: FasacoError
-
-
 @dataclass(slots=True)
 class Batch:
     """The input of one cycle.
@@ -91,7 +84,6 @@ class Batch:
         questions: commands that wait for a reply.
         plans: results of the planning thread, good or not.
         snapshots: snapshots of the search from the planning thread.
-        planner_faults: failures of the user's own planner.
         updates_lost: map updates dropped by the full queue.
     """
 
@@ -100,7 +92,6 @@ class Batch:
     questions: list[Question] = field(default_factory=list)
     plans: list[PlanReady | PlanBroken] = field(default_factory=list)
     snapshots: list[PlanSnapshot] = field(default_factory=list)
-    planner_faults: list[FasacoError] = field(default_factory=list)
     updates_lost: int = 0
 
 
@@ -121,8 +112,6 @@ def take_batch(mailbox: Mailbox[object], timeout_s: float) -> Batch:
                 batch.plans.append(item)
             case PlanSnapshot():
                 batch.snapshots.append(item)
-            case PlannerFault():
-                batch.planner_faults.append(item.error)
             case Oversized():
                 batch.oversized.append(item)
             case BaseException():

@@ -12,9 +12,7 @@ from typing import TYPE_CHECKING
 
 from fasaco_edge.bus.mailbox import Mailbox
 from fasaco_edge.config.config import DaemonConfig
-from fasaco_edge.daemon.loop.inbox import PlannerFault
 from fasaco_edge.daemon.memory import floor_pixels
-from fasaco_edge.errors import FasacoError
 from fasaco_edge.host.processes import release_unused
 from fasaco_edge.mission.config import MissionConfig, Sweeping
 from fasaco_edge.mission.orders.order_state import NO_ORDER, OrderState
@@ -73,18 +71,11 @@ class Loader:
         release_unused()
         planner = self._config.planner
         chosen = planner_of(planner.name, planner.colony(), planner.threads, planner.local_search)
-        if planner.own:
-            from fasaco_edge.planners.own.process import OwnProcess  # noqa: PLC0415
-
-            chosen = OwnProcess(planner.own, planner.seed, chosen, self._tell)
         worker = PlanningWorker(chosen, planner.budget_s, self._mailbox.post)
         first = (
             OrderState.autostart() if self._config.mission.autostart else OrderState.idle(NO_ORDER)
         )
         return Mission(mission_config(self._config, chosen), first), worker
-
-    def _tell(self, error: FasacoError) -> None:
-        self._mailbox.post("planner_fault", PlannerFault(error))
 
     def _report(self, stage: str) -> None:
         self.stage = f"kernels: {stage}"

@@ -121,7 +121,7 @@ class Loop:
         now = time.monotonic()
         has_mission = self._runner.mission is not None
         events, faults = self._bus.inbox.decode(batch, has_mission=has_mission)
-        self._count_faults([*faults, *batch.planner_faults])
+        self._count_faults(faults)
         self._note(batch)
         commands = self._bus.commands.take(batch.questions, now)
         decision = self._step(events, commands, batch, now)

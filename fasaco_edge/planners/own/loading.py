@@ -17,7 +17,7 @@ from types import ModuleType
 from typing import Any
 
 from fasaco_edge.errors import BadConfiguration, PlannerFailed
-from fasaco_edge.host.files import UntrustedFileError, check_plain, read_trusted, why_not_trusted
+from fasaco_edge.host.files import check_plain
 from fasaco_edge.text import shown
 
 # Exceptions of the user's code: ``sys.exit()`` there must not look as if a plan had been made.
@@ -47,28 +47,24 @@ def is_place(text: str) -> bool:
     return name.isidentifier() and (source.endswith(".py") or is_module)
 
 
-def load(place: str, option: str = "--planner", *, is_trusted: bool = False) -> UserCode:
+def load(place: str) -> UserCode:
     """Return the planner at a place; its file is executed.
 
     Args:
         place: where it is.
-        option: what names the place, for messages.
-        is_trusted: whether it must be a module in a place where only root or this process's user
-            may write.
 
     Raises:
-        BadConfiguration: there is none, or it is no planner, or not to be trusted.
+        BadConfiguration: there is none, or it is no planner.
         PlannerFailed: the file raised.
     """
     source, _, member = place.rpartition(":")
-    said = f"{option} {place}"
-    if not is_place(place) or (is_trusted and source.endswith(".py")):
-        shape = "MODULE:NAME, of an installed module" if is_trusted else SHAPE
-        raise BadConfiguration(f"{option} must be {shape}, got {shown(place)}")
+    said = f"--planner {place}"
+    if not is_place(place):
+        raise BadConfiguration(f"--planner must be {SHAPE}, got {shown(place)}")
     if source.endswith(".py"):
         module = _executed(Path(source).expanduser(), said, place)
     else:
-        module = _imported(source, said, place, is_trusted=is_trusted)
+        module = _imported(source, said, place)
     made_there = {
         name: value
         for name, value in vars(module).items()
@@ -132,35 +128,23 @@ def _executed(file: Path, said: str, place: str) -> ModuleType:
     return module
 
 
-def _imported(name: str, said: str, place: str, *, is_trusted: bool) -> ModuleType:
+def _imported(name: str, said: str, place: str) -> ModuleType:
     parts = name.split(".")
     file = ""
     try:
         for count in range(1, len(parts) + 1):
-            # Looking for a part imports those before it, which are checked by then.
+            # Looking for a part imports those before it, which may fail.
             spec = importlib.util.find_spec(".".join(parts[:count]))
             if spec is None:
                 raise _not_found(said, ".".join(parts[:count]))
             file = spec.origin or ""
-            if is_trusted and spec.has_location:
-                _check_trusted(Path(file).absolute())
         return importlib.import_module(name)
     except BadConfiguration:
         raise
-    except UntrustedFileError as error:
-        raise BadConfiguration(
-            f"{said}: {error}", hint="install it where only root may write"
-        ) from error
     except RAISED as error:
         if isinstance(error, ModuleNotFoundError) and error.name in (name, parts[0]):
             raise _not_found(said, str(error.name)) from error
         raise failure(error, place, file) from error
-
-
-def _check_trusted(file: Path) -> None:
-    if why := why_not_trusted(file.parent):
-        raise UntrustedFileError(why)
-    read_trusted(file)
 
 
 def _not_found(said: str, name: str) -> BadConfiguration:

@@ -6,7 +6,6 @@ import time
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fasaco_edge.planners.own.loading import UserCode
 from fasaco_edge.planners.own.problem import posed, walked
@@ -38,21 +37,8 @@ class OwnPlanner:
         """
         given, began = posed(problem, self.seed), time.perf_counter()
         cells = walked(self.code, given)
-        return path_of(problem, cells, self.code.name, self.seed, time.perf_counter() - began)
-
-
-def path_of(
-    problem: CoverageProblem, cells: NDArray[np.int32], name: str, seed: int, taken_s: float
-) -> CoveragePath:
-    """Return a walk as a path of a problem.
-
-    Args:
-        problem: which the walk solves.
-        cells: int32 (n, 2): the walk, in array indices.
-        name, seed: of the planner.
-        taken_s: how long it took [s].
-    """
-    window = problem.lattice.window
-    cells = cells + np.array((window.row0, window.col0), np.int32)
-    cost_s = problem.cost.of_walk(cells)
-    return CoveragePath(cells, name, seed, cost_s=cost_s, first_walk_s=taken_s)
+        taken_s = time.perf_counter() - began
+        window = problem.lattice.window
+        cells = cells + np.array((window.row0, window.col0), np.int32)
+        cost_s = problem.cost.of_walk(cells)
+        return CoveragePath(cells, self.code.name, self.seed, cost_s=cost_s, first_walk_s=taken_s)

@@ -1,7 +1,4 @@
-"""Problem as a planner of the user's own gets it, and checks of the walk it returns.
-
-Imports no numba: it is used in a process of its own, too.
-"""
+"""Problem as a planner of the user's own gets it, and checks of the walk it returns."""
 
 from __future__ import annotations
 
