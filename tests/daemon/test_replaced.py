@@ -1,0 +1,105 @@
+"""Missions that are replaced again and again: what the last one used is released."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from itertools import chain
+from pathlib import Path
+
+import pytest
+
+from tests.daemon.test_mask_topic import MISSION, put_mask
+from tests.daemon.test_service import rewritten, service
+from tests.support.outsider import TIMEOUT_S, Outsider
+from tests.support.processes import resident_mb
+from tests.support.rooms import FREE, WALL, fill, map_bytes, pose_bytes, room
+
+# Replacements until all caches are full, and those after that which are measured.
+FIRST, MEASURED = 10, 50
+# What one may keep, on average [MB]. The allocator's own growth ends after some hundred.
+KEPT_MB = 0.1
+ROOM = room(16.0, 12.0)
+BLANK = fill(ROOM, 0.0, 0.0, 16.0, 12.0, FREE)
+
+
+@dataclass(frozen=True)
+class Held:
+    """What a process holds; memory is [MB]."""
+
+    children: int
+    threads: int
+    descriptors: int
+    resident: float
+
+
+def held_by(pid: int) -> Held:
+    """Count what a process holds, also children that it has not waited for."""
+    process = Path(f"/proc/{pid}")
+    threads = list((process / "task").iterdir())
+    children = (thread / "children" for thread in threads)
+    return Held(
+        len(list(chain.from_iterable(file.read_text().split() for file in children))),
+        len(threads),
+        len(list((process / "fd").iterdir())),
+        resident_mb(pid),
+    )
+
+
+def squares() -> Iterator[tuple[float, float, float, float]]:
+    """Yield squares in the room, each another one than the last (west, south, east, north) [m]."""
+    for number in range(FIRST + MEASURED):
+        x = 2.0 + 0.05 * (number % 60)
+        yield x, 2.0, x + 1.0, 3.0
+
+
+def wait_replaced(outsider: Outsider, config: Callable[[dict], bool]) -> None:
+    """Wait until a mission with this configuration has planned."""
+    deadline = time.monotonic() + TIMEOUT_S
+    while True:
+        status = outsider.ask_status()
+        if config(status["config"]["mission"]) and status["state"] == "covering":
+            return
+        assert time.monotonic() < deadline, status
+        time.sleep(0.02)
+
+
+def reload(running, outsider, square):
+    """Read another keep-out zone from the file."""
+    west, south, east, north = square
+    corners = [[west, south], [east, south], [east, north], [west, north]]
+    rewritten(running, mission={"keep_out": [corners]})
+    wait_replaced(outsider, lambda mission: mission["keep_out"] == [corners])
+
+
+def send_mask(running, outsider, square):
+    """Publish another keep-out mask."""
+    before = outsider.ask_status()["config"]["mission"]["keep_out_mask"]
+    put_mask(outsider, fill(BLANK, *square, WALL))
+    wait_replaced(outsider, lambda mission: mission["keep_out_mask"] not in ("", before))
+
+
+@pytest.mark.parametrize("replace", [reload, send_mask])
+def test_what_a_mission_used_is_released_when_it_is_replaced(tmp_path, replace):
+    mission = {} if replace is reload else dict(MISSION)
+    with (
+        service(tmp_path, mission=mission) as (running, _),
+        Outsider(running.endpoint) as outsider,
+    ):
+        outsider.put("map", map_bytes(ROOM))
+        outsider.put("pose", pose_bytes(0.75, 0.75))
+        if replace is send_mask:
+            put_mask(outsider, BLANK)
+        outsider.wait_status(lambda status: status["state"] == "covering")
+        for number, square in enumerate(squares(), 1):
+            if number == FIRST + 1:
+                before = held_by(running.pid)
+            replace(running, outsider, square)
+        time.sleep(1.0)  # a thread that is interrupted ends within some tenths
+        after = held_by(running.pid)
+        print(f"{replace.__name__}: {before}, after {MEASURED} more {after}")
+    assert after.children == 0
+    assert after.descriptors <= before.descriptors
+    assert after.threads <= before.threads + 2  # Zenoh starts and ends some of its own
+    assert after.resident < before.resident + KEPT_MB * MEASURED
