@@ -240,6 +240,22 @@ def test_paused_it_stands_and_once_it_goes_on_it_charges_on():
     drive.finish()
 
 
+def test_another_order_waits_until_it_is_charged():
+    drive = Battery(0.21)
+    drive.run(State.COVERING)
+    drive.level = 0.2
+    drive.run(State.CHARGING)
+    drive.charge(to=0.5)
+    drive.command("start", {"passes": 2})
+    assert (drive.refused, drive.mission.state, drive.walk) == (None, State.CHARGING, [])
+    drive.go()
+    assert (drive.cell, drive.mission.state) == (AT_DOCK, State.CHARGING)
+    drive.charge(to=0.95)
+    drive.run(State.COVERING)
+    assert drive.mission.order_state.title.endswith("pass 1 of 2")
+    drive.finish()
+
+
 def test_started_again_while_it_charges_it_stays_in_its_dock():
     drive = Battery(0.15)
     drive.run(State.CHARGING)
