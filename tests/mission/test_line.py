@@ -31,6 +31,7 @@ from fasaco_edge.mission.line.out_of_reach import Cause
 from fasaco_edge.mission.line.polisher import AHEAD_M
 from fasaco_edge.mission.line.polyline import POLISHED
 from fasaco_edge.mission.line.tally import SweepTally
+from fasaco_edge.mission.orders.keep_outs import KeepOut
 from fasaco_edge.mission.orders.order import read_order
 from fasaco_edge.planners.cost import CoverageCost, SearchWork
 from fasaco_edge.planners.line import LINES
@@ -239,6 +240,23 @@ def test_the_status_says_what_floor_is_out_of_reach_and_why():
     # Each is told in whole thousandths.
     left_m2 = told.reachable_m2 - more["in a keep-out zone"]
     assert kept.reachable_m2 == pytest.approx(left_m2, abs=0.0015)
+
+
+def test_a_keep_out_in_mid_mission_is_driven_around_by_the_line_at_once():
+    robot = Robot(Mission(CONFIG))
+    robot.tell(MapReceived(room(4.8, 2.4)))
+    robot.drive(20)
+    covered, swept_m2 = robot.mission.coverage().covered, robot.mission.floor.swept_m2
+    assert covered > 3
+    corners = ((4.2, 2.0), (4.7, 2.0), (4.7, 2.5), (4.2, 2.5))
+    robot.tell(CommandReceived(1, "keep_out_add", keep_out=KeepOut("column", corners)))
+    began = len(robot.trail)
+    assert robot.mission.coverage().covered >= covered
+    assert robot.mission.floor.swept_m2 >= swept_m2
+    robot.finish()
+    for x, y in robot.trail[began:]:
+        assert not (4.2 < x < 4.7 and 2.0 < y < 2.5)
+    assert robot.mission.coverage().remaining == 0
 
 
 def test_what_is_out_of_reach_follows_a_map_that_grows_and_an_order_for_a_zone():
