@@ -331,7 +331,7 @@ class _SampleReader:
     def _path(self, arrival: Arrival) -> None:
         about = decode_tolerant(arrival.sample.attachment, PathAttachment)
         paths = self.data.paths
-        # A path that is published again is the same.
-        if paths and paths[-1].about.revision == about.revision:
+        # A path that is published again is the same; the first of a daemon, 0, is no mission's.
+        if not about.revision or (paths and paths[-1].about.revision == about.revision):
             return
         paths.append(PublishedPath(self._now, about))
