@@ -75,7 +75,7 @@ def run_told(folder, *, faults, silent=0, killed=False):
             # A part ends with a flush, and these are seconds apart.
             recorder.wait_until(lambda report: "-part1." not in report["file"])
             put("status", _status("degraded", "no pose for 3 s", {}))
-            put("status", _status("charging", "battery at 15%", {}, troubles=[DEAD_DOCK]))
+            put("status", _status("paused", "paused by command", {}, troubles=[DEAD_DOCK]))
             put("status", _status("covering", "path 1", faults))
             for _ in range(silent):
                 put("status", _status("covering", "path 1", faults | {"late": 1}))
@@ -169,7 +169,7 @@ def test_troubles_and_faults_are_told(parts):
     troubles = [one for one in told["troubles"] if one["state"] != "silent"]
     assert [(one["state"], one["reason"]) for one in troubles] == [
         ("degraded", "no pose for 3 s"),
-        ("charging", "the dock gives no current"),
+        ("paused", "the dock gives no current"),
     ]
     (log,) = [lines for entity, lines in review.record.log.items() if entity == "log/mission"]
     texts = [line for _, line in log]
