@@ -107,7 +107,7 @@ class BatteryPolicy(msgspec.Struct, frozen=True, kw_only=True):
     low: Annotated[float, Meta(ge=0.01, le=0.8)] = 0.2
     reserve: Annotated[float, Meta(ge=0, le=0.8)] = 0.1
     enough: Annotated[float, Meta(ge=0.1, le=1)] = 0.9
-    silent_s: Annotated[float, Meta(ge=10, le=86_400)] = 60.0
+    silent_s: Annotated[float, Meta(ge=10, le=86_400)] = 45.0
 
 
 NO_PATIENCE = MissionPolicy(retries=0, lost_pose_s=0.0)

@@ -131,7 +131,7 @@ def test_a_battery_that_is_silent_is_told_of_and_not_waited_for_on_the_way():
     drive.level = None
     drive.tell(pose_at(*drive.cell), after=61.0)
     assert drive.mission.state is State.DEGRADED
-    assert drive.mission.reason == "no charge of the battery for 60 s: when to charge is not known"
+    assert drive.mission.reason == "no charge of the battery for 45 s: when to charge is not known"
     drive.finish()
 
 
@@ -151,7 +151,7 @@ def test_a_charge_that_jumps_to_and_fro_is_told_of():
         drive.tell(pose_at(*drive.cell))
     assert drive.mission.charging.gauge.level is None
     assert drive.mission.state is State.DEGRADED
-    assert drive.mission.reason.startswith("no charge of the battery for 60 s, it jumps to and fro")
+    assert drive.mission.reason.startswith("no charge of the battery for 45 s, it jumps to and fro")
     # Once it holds it counts.
     drive.level = 0.1
     drive.run(State.CHARGING)
@@ -163,7 +163,7 @@ def test_silent_while_it_charges_it_stays_where_it_is():
     drive.level = None
     drive.tell(pose_at(*drive.cell), after=100.0)
     assert drive.mission.state is State.CHARGING
-    assert drive.mission.reason == "no charge of the battery for 60 s: waits for one"
+    assert drive.mission.reason == "no charge of the battery for 45 s: waits for one"
     drive.level = 0.95
     for _ in range(8):
         drive.go()

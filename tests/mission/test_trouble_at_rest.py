@@ -89,7 +89,7 @@ def test_what_is_silent_is_said_within_a_minute_in_each_state_at_rest(state, kin
     drive = AT_REST[state]()
     live(drive, 5, rise=0.001)
     assert (drive.mission.state, codes(drive)) == (state, [])
-    live(drive, A_MINUTE_S + 1, without=kind, rise=0.001)
+    live(drive, A_MINUTE_S, without=kind, rise=0.001)
     assert drive.mission.state is state, "what it does stays in sight"
     assert codes(drive) == [SILENT[kind]]
     assert not drive.walk
@@ -103,7 +103,7 @@ def test_what_is_silent_is_said_within_a_minute_in_each_state_at_rest(state, kin
 def test_a_robot_that_drives_is_degraded_and_the_trouble_is_listed(state, kind):
     drive = DRIVING[state]()
     # It moves to and fro, so that nobody takes it for one that is stuck.
-    for second in range(A_MINUTE_S + 1):
+    for second in range(A_MINUTE_S):
         row, col = drive.cell
         heard = [] if kind == "pose" else [pose_at(row, col + 0.45 * (second % 2))]
         heard += [] if kind == "map" else [patch(".", at=(0, 0))]
@@ -153,7 +153,7 @@ def test_poses_in_another_frame_are_missing_while_paused_too():
 @pytest.mark.parametrize("kind", ["nan", "to and fro"])
 def test_battery_messages_that_say_nothing_are_a_silence(kind):
     drive = charging()
-    for second in range(A_MINUTE_S + 1):
+    for second in range(A_MINUTE_S):
         level = None if kind == "nan" else 0.9 if second % 2 else 0.05
         drive.level = None
         message = BatteryReceived(level, "charging")
