@@ -22,9 +22,10 @@ DOCKED_M = 0.1
 RETRY_S, MOST_RETRY_S = 10.0, 300.0
 # Period of querying the result again, as a reply may be lost; after the second a goal is given up.
 RESULT_EVERY_S, GIVE_UP_S = 20.0, 1200.0
-# The daemon's states in which the robot drives, or has charged; in others it docks on.
-DRIVES = ("planning", "covering", "returning")
-LEAVES = (*DRIVES, "paused", "idle", "done")
+# The daemon's states in which the robot leaves its dock; and those in which it has charged, or is
+# to drive elsewhere: in others it docks on.
+DRIVES = ("planning", "covering", "returning", "degraded")
+LEAVES = ("planning", "covering", "returning", "paused", "idle", "done")
 
 
 class Move(enum.Enum):

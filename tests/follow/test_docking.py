@@ -87,6 +87,21 @@ def test_a_path_alone_does_not_lead_it_out(robot):
     assert robot.docking.holds == "in its dock"
 
 
+def test_a_robot_that_is_to_drive_though_something_is_wrong_leaves_its_dock(robot):
+    robot.arrive()
+    robot.here = DOCK
+    robot.ends(robot.started(), DONE)
+    robot.drives, robot.state = True, "degraded"
+    assert robot.started().move is Move.UNDOCK
+
+
+def test_docking_goes_on_though_something_is_wrong(robot):
+    robot.arrive()
+    robot.started()
+    robot.state = "degraded"
+    assert robot.step() == []
+
+
 def test_a_robot_that_is_switched_on_in_its_dock_undocks_first():
     robot = Robot(here=DOCK)
     (start,) = robot.step()
