@@ -37,6 +37,13 @@ MAX_POSE_BYTES: Final = 1_048_576
 """Longest pose or tf message."""
 
 MAX_JSON_BYTES: Final = 1_048_576
+MAX_JSON_DEPTH: Final = 32
+"""Levels of objects and arrays in a JSON document, the document itself one of them."""
+MAX_JSON_INTEGER: Final = 2**63 - 1
+"""Largest magnitude of an integer in a JSON document."""
+MAX_JSON_NUMBER: Final = 1e15
+"""Largest magnitude of any other number in it."""
+
 MAX_FLEET_TILES: Final = 24
 """Of progress in one message of a fleet's robot, of 64 x 64 cells each: 17 kB; and of ground."""
 MAX_FLEET_PARTS: Final = 33

@@ -39,6 +39,7 @@ from tests.support.processes import (
     resident_mb,
 )
 from tests.support.rooms import HALL, begin, drive, lanes, map_bytes, pose_bytes, update_bytes
+from tests.support.statuses import FULL, MALFORMED, malformed_status
 
 # What it may be resident with [MB]; half of it is Zenoh's and Python's code, shared with a daemon.
 SERVE_MB = 46.0
@@ -463,3 +464,32 @@ def test_it_outlives_the_daemon(tmp_path):
         looker.wait("state", lambda state: "has been gone" in state["absent"])
         with daemon_process(tmp_path, bus={"listen": [endpoint]}):
             looker.wait("state", lambda state: state["absent"] == "")
+
+
+def test_no_status_of_a_peer_ends_the_page_of_others(page, covering):
+    with looking(page) as looker, looking(page) as other, Outsider(covering.endpoint) as peer:
+        for viewer in (looker, other):
+            viewer.wait("state", lambda said: said["state"] == "covering")
+        for name in MALFORMED:
+            peer.put("status", malformed_status(name), "")
+        for viewer in (looker, other):
+            viewer.wait("events", lambda said: "status cannot be read (4 so far)" in str(said))
+            # The daemon's own go on to be shown.
+            assert viewer.seen.pop("state")["version"] != FULL["version"]
+            again = viewer.wait("state", lambda said: said["state"] == "covering")
+            assert again["version"] != FULL["version"]
+    assert page.get()[0] == 200
+    assert page.process.poll() is None
+
+
+def test_an_order_beyond_the_limits_is_refused_to_its_sender_alone(covering, tmp_path):
+    with (
+        served(tmp_path, covering.endpoint, "--allow-commands") as page,
+        looking(page) as looker,
+        looking(page) as other,
+    ):
+        answer = looker.command("start", {"passes": 10**400})
+        assert not answer["ok"]
+        assert "must be from" in answer["text"]
+        other.wait("state", lambda said: said["state"] == "covering")
+        assert page.process.poll() is None

@@ -6,6 +6,7 @@ import json
 from typing import Any
 
 import numpy as np
+import pytest
 
 from fasaco_edge.bus.arrival import Sample
 from fasaco_edge.serve import served_view
@@ -14,6 +15,7 @@ from fasaco_edge.wire.documents.fleet import FleetMember
 from fasaco_edge.wire.documents.json_text import encode_json
 from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.messages.paths import encode_path
+from tests.support.statuses import FULL, MALFORMED, extreme_statuses, malformed_status
 
 CORNERS = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]]
 
@@ -57,7 +59,7 @@ def test_an_order_is_drawn_until_it_is_cancelled():
 def test_an_order_is_drawn_with_all_its_corners_and_without_what_is_no_place():
     view = ServedView(Keys())
     many = [[float(index), float(index % 2)] for index in range(300)]
-    places = [CORNERS[0], [10**400, 0], [1.0, True], *CORNERS[1:]]
+    places = [CORNERS[0], [1e12, 0], [1.0, True], *CORNERS[1:]]
     zones = [{"name": "hall", "polygon": many}, {"name": "den", "polygon": places}]
     payload = json.dumps({"command": "start", "order": {"zones": zones}}).encode()
     view.take("command", Sample("", payload), 1.0)
@@ -150,3 +152,26 @@ def test_a_robot_that_was_told_to_stand_has_no_time_to_go():
     view.news(3.0)
     tell(view, "status", status | {"state": "paused", "path": {"steps": 0}}, 4.0)
     assert heard(view, "state", 4.0)["to_go_s"] is None
+
+
+def test_no_number_that_a_status_may_have_ends_the_page():
+    view, now = ServedView(Keys("robot")), 1.0
+    view.take("path", Sample("", encode_path(np.eye(3, 2), np.zeros(3), "map", 1)), now)
+    shown = 0
+    for payload in extreme_statuses():
+        now += 10.0
+        view.take("status", Sample("", payload), now)
+        shown += "state" in view.news(now)
+    assert shown > 100
+
+
+@pytest.mark.parametrize("name", MALFORMED)
+def test_a_malformed_status_leaves_the_last_good_one_and_is_an_event(name):
+    view = ServedView(Keys("robot"))
+    view.robots.add("robot")
+    tell(view, "status", FULL, 1.0)
+    assert heard(view, "state", 1.0)["state"] == "covering"
+    view.take("status", Sample("", malformed_status(name)), 2.0)
+    now = view.news(2.0)
+    assert '"state":"covering"' in now.get("state", '"state":"covering"')
+    assert "status cannot be read (1 so far)" in now["events"]

@@ -19,6 +19,7 @@ from fasaco_edge.watch.glyphs import GlyphSet
 from fasaco_edge.wire.limits import MAX_COORDINATE_M
 from tests.support.fleet_told import tiles
 from tests.support.rooms import map_bytes, room
+from tests.support.statuses import extreme_statuses
 from tests.watch.fleets import PARTS, say, stand, tell, two_in_a_hall
 from tests.watch.grids import NOW, console, plain, status
 from tests.watch.test_page import SIZES
@@ -220,3 +221,10 @@ def test_a_robot_anywhere_is_drawn_or_is_not(origin, at, ahead, cells, cell_m, l
         )  # fmt: skip
     view.tick(NOW + 1)
     assert len(page_of(view, 60, 20, NOW + 1).splitlines()) == 20
+
+
+def test_no_number_that_a_status_may_have_ends_the_page():
+    view = two_in_a_hall()
+    for payload in extreme_statuses():
+        tell(view, "a", "status", payload)
+        assert "a" in page_of(view)

@@ -18,6 +18,7 @@ from fasaco_edge.watch.picture import COVERED, HEADING, TO_COVER, WALL
 from fasaco_edge.watch.robot_state import Token
 from fasaco_edge.watch.robot_view import RobotView
 from fasaco_edge.wire.messages.pheromone import encode_pheromone
+from tests.support.statuses import extreme_statuses
 from tests.watch.grids import NOW, console, mid_mission, plain, status, tell
 
 SIZES = [(80, 24), (120, 40), (200, 60), (64, 14), (63, 13), (30, 10), (12, 4), (1, 1), (400, 5)]
@@ -232,3 +233,11 @@ def test_a_page_that_did_not_change_is_not_drawn_anew():
     first, second = (page.lines(view, NOW, 80, 24) for _ in range(2))
     assert first == second
     assert all(a is b for a, b in zip(first[18:22], second[18:22], strict=True))
+
+
+@pytest.mark.parametrize("size", [(80, 24), (120, 50)])
+def test_no_number_that_a_status_may_have_ends_the_page(size):
+    view = mid_mission()
+    for payload in extreme_statuses():
+        tell(view, "status", payload)
+        assert len(page_of(view, *size).split("\n")) == size[1]

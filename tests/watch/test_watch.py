@@ -26,6 +26,7 @@ from tests.support.processes import (
     resident_mb,
 )
 from tests.support.rooms import HALL, begin, lanes, map_bytes, pose_bytes
+from tests.support.statuses import MALFORMED, malformed_status
 from tests.watch.terminal import Terminal
 
 # What it may be resident with [MB].
@@ -291,3 +292,19 @@ def _piped(*words: str) -> subprocess.Popen[str]:
         text=True,
         env=ENVIRONMENT | {"PYTHONUNBUFFERED": "1"},
     )
+
+
+def test_no_status_of_a_peer_ends_it(covering):
+    with (
+        Terminal("--connect", covering.endpoint, columns=120, lines=40) as terminal,
+        Outsider(covering.endpoint) as peer,
+    ):
+        terminal.wait_text("COVERING")
+        for name in MALFORMED:
+            peer.put("status", malformed_status(name), "")
+        screen = terminal.wait_text("status cannot be read (4 so far)")
+        assert "COVERING" in screen
+        assert "of 234 cells" in screen
+        terminal.type("q")
+        assert terminal.end() == 0
+        assert terminal.is_clean()

@@ -134,8 +134,8 @@ def test_json_that_is_none_is_refused(payload: bytes) -> None:
 json_values = st.recursive(
     st.none()
     | st.booleans()
-    | st.integers(-(2**63), 2**63 - 1)
-    | st.floats(allow_nan=False, allow_infinity=False)
+    | st.integers(-limits.MAX_JSON_INTEGER, limits.MAX_JSON_INTEGER)
+    | st.floats(-limits.MAX_JSON_NUMBER, limits.MAX_JSON_NUMBER)
     | st.text(),
     lambda inner: st.lists(inner, max_size=4) | st.dictionaries(st.text(), inner, max_size=4),
     max_leaves=12,

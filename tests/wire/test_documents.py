@@ -14,9 +14,9 @@ from fasaco_edge.errors import MalformedMessage
 from fasaco_edge.mission.core.events import State
 from fasaco_edge.planners.path import CoveragePath, Saved
 from fasaco_edge.wire.documents.json_text import (
-    MAX_INTEGER,
     MAX_TEXT,
     decode_document,
+    decode_json,
     decode_tolerant,
     encode_json,
     tolerant,
@@ -25,7 +25,9 @@ from fasaco_edge.wire.documents.path_documents import PathAttachment, PlanFigure
 from fasaco_edge.wire.documents.replies import STATES, CoverageReport, ZoneReport
 from fasaco_edge.wire.documents.settings import known_settings
 from fasaco_edge.wire.documents.status import Status, SupervisedRecorder
+from fasaco_edge.wire.limits import MAX_JSON_DEPTH, MAX_JSON_INTEGER
 
+TWO = CoverageReport(coverable=2)
 JSON = st.recursive(
     st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False) | st.text(max_size=8),
     lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=8), inner),
@@ -66,7 +68,9 @@ def test_a_strict_reader_refuses_what_a_tolerant_one_leaves_out():
         ({"state": 5, "reason": None}, Status()),
         ({"reason": "x" * 900}, Status(reason="x" * MAX_TEXT)),
         ({"threads": True}, Status()),
-        ({"threads": MAX_INTEGER + 1, "rss_mb": 10**400}, Status()),
+        ({"threads": MAX_JSON_INTEGER + 1, "rss_mb": 10**400}, Status()),
+        ({"threads": 0, "cpu_s": -1.0, "rss_mb": 1e16}, Status()),
+        ({"coverage": {"fraction": 1.1, "covered": -1, "coverable": 2}}, Status(coverage=TWO)),
         ({"rss_mb": 5, "plan": []}, Status(rss_mb=5.0)),
         ({"errors": {"total": 1, "by_code": {"a": 1, "b": "2"}}}, {"a": 1}),
         ({"mission": {"zones": [{"name": "k", "pass": 2}, 7]}}, (ZoneReport("k", pass_number=2),)),
@@ -75,6 +79,55 @@ def test_a_strict_reader_refuses_what_a_tolerant_one_leaves_out():
 def test_what_does_not_fit_keeps_its_default(document, expected):
     status = tolerant(document, Status)
     assert expected in (status, status.errors.by_code, status.mission.zones)
+
+
+# What a publisher on the bus may write in place of a number.
+NO_NUMBERS = {
+    "400 digits": "9" * 400,
+    "beyond 64 bits": str(MAX_JSON_INTEGER + 1),
+    "negative": "-1",
+    "text": '"7"',
+    "NaN": "NaN",
+    "infinity": "1e999",
+    "1e308": "1e308",
+    "object": "{}",
+}
+
+
+@pytest.mark.parametrize("written", NO_NUMBERS.values(), ids=NO_NUMBERS)
+@pytest.mark.parametrize("member", ["covered", "covered_m2"])
+def test_a_strict_reader_refuses_numbers_out_of_range(written, member):
+    payload = f'{{"state": "done", "coverage": {{"{member}": {written}}}}}'.encode()
+    with pytest.raises(MalformedMessage):
+        decode_document(payload, Status)
+
+
+@pytest.mark.parametrize("name", ["400 digits", "beyond 64 bits", "1e308", "infinity", "NaN"])
+def test_no_reader_takes_a_number_beyond_the_limits_in_any_member(name):
+    """Members of settings, of an order and of later versions have no type that would refuse it."""
+    payload = f'{{"state": "done", "config": {{"later": [{NO_NUMBERS[name]}]}}}}'.encode()
+    for decode in (decode_tolerant, decode_document):
+        with pytest.raises(MalformedMessage):
+            decode(payload, Status)
+
+
+def test_a_fault_names_the_member_and_the_limit():
+    with pytest.raises(MalformedMessage, match=r"object\.plan\.plans must be from -9223"):
+        decode_json(b'{"plan": {"plans": %s}}' % (b"9" * 400))
+    with pytest.raises(MalformedMessage, match=r"object\.x\[1\] must be .* 1e\+15, got 1e\+300"):
+        decode_json(b'{"x": [0.0, 1e300]}')
+    with pytest.raises(MalformedMessage, match=r"message\.order must be .* to 9223372036854775807"):
+        encode_json({"order": 10**400})
+
+
+def test_a_document_is_nested_no_deeper_than_its_limit():
+    def nested(levels: int) -> bytes:
+        return b'{"a":' * levels + b"1" + b"}" * levels
+
+    assert decode_json(nested(MAX_JSON_DEPTH))
+    for levels in (MAX_JSON_DEPTH + 1, 900, 100_000):
+        with pytest.raises(MalformedMessage, match="nested too deeply"):
+            decode_json(nested(levels))
 
 
 def test_a_rectangle_is_whole_or_missing():

@@ -1,7 +1,9 @@
 """JSON documents on the bus (RFC 8259: no NaN, no infinities).
 
-Strict readers refuse a document with a member of the wrong type; tolerant readers, for documents
-of other versions, drop that member. Both ignore unknown members.
+Strict readers refuse a document with a member of the wrong type or out of its range; tolerant
+readers, for documents of other versions, drop that member. Both ignore unknown members, and refuse
+a document with a number or a depth beyond the limits, whichever member has it: what was decoded
+can be calculated with.
 """
 
 from __future__ import annotations
@@ -16,24 +18,31 @@ import msgspec
 from msgspec import UNSET, Meta
 
 from fasaco_edge.errors import MalformedMessage
-from fasaco_edge.wire.limits import MAX_JSON_BYTES
+from fasaco_edge.text import one_line
+from fasaco_edge.wire.limits import (
+    MAX_JSON_BYTES,
+    MAX_JSON_DEPTH,
+    MAX_JSON_INTEGER,
+    MAX_JSON_NUMBER,
+)
 
-# Bounds of a tolerant reader.
-MAX_INTEGER = 2**63 - 1
-MAX_NUMBER = 1e300
+# A tolerant reader cuts texts at this length.
 MAX_TEXT = 500
 
 Struct = TypeVar("Struct", bound=msgspec.Struct)
 
 
 def allowed(**schema: object) -> Meta:
-    """Return a limit that a schema states and writers keep; readers do not check it."""
+    """Return a limit that a schema states and writers keep; readers do not check it.
+
+    Those of numbers are checked: ``Meta(ge=...)``.
+    """
     return Meta(extra_json_schema=schema)
 
 
-Count = Annotated[int, allowed(minimum=0)]
-Ordinal = Annotated[int, allowed(minimum=1)]
-Amount = Annotated[float, allowed(minimum=0)]
+Count = Annotated[int, Meta(ge=0, extra_json_schema={"minimum": 0})]
+Ordinal = Annotated[int, Meta(ge=1, extra_json_schema={"minimum": 1})]
+Amount = Annotated[float, Meta(ge=0, extra_json_schema={"minimum": 0})]
 Name = Annotated[str, allowed(minLength=1)]
 
 
@@ -45,12 +54,12 @@ def encode_json(message: object) -> bytes:
     """Return ``message`` (dicts, lists, dataclasses, structs, plain values) as JSON.
 
     Raises:
-        MalformedMessage: a number in it is not finite.
+        MalformedMessage: a number in it is not finite, or it is beyond the limits of readers.
         TypeError: a value in it has no JSON.
     """
     plain = msgspec.to_builtins(message, str_keys=True)
-    # msgspec would write null.
-    _check_finite(plain, "message")
+    # msgspec would write null for what is not finite.
+    _check_limits(plain, "message")
     return msgspec.json.encode(plain)
 
 
@@ -58,16 +67,19 @@ def decode_json(payload: bytes) -> dict[str, object]:
     """Return the JSON object in ``payload``.
 
     Raises:
-        MalformedMessage: it is no JSON, no object, or longer than ``MAX_JSON_BYTES``.
+        MalformedMessage: it is no JSON, no object, or beyond a limit: ``MAX_JSON_BYTES``,
+            ``MAX_JSON_DEPTH``, of integers ``MAX_JSON_INTEGER``, of others ``MAX_JSON_NUMBER``.
     """
     if len(payload) > MAX_JSON_BYTES:
         raise MalformedMessage(f"JSON must have at most {MAX_JSON_BYTES} bytes, got {len(payload)}")
     try:
-        return msgspec.json.decode(payload, type=dict[str, object])
+        document = msgspec.json.decode(payload, type=dict[str, object])
     except (msgspec.DecodeError, UnicodeDecodeError) as error:
         raise MalformedMessage(f"JSON object: {error}") from error
     except RecursionError as error:
         raise MalformedMessage("JSON object: nested too deeply") from error
+    _check_limits(document, "JSON object")
+    return document
 
 
 def decode_document(payload: bytes, kind: type[Struct]) -> Struct:
@@ -94,7 +106,7 @@ def decode_tolerant(payload: bytes, kind: type[Struct]) -> Struct:
 def tolerant(document: Mapping[str, object], kind: type[Struct]) -> Struct:
     """Return the members of a JSON object that fit ``kind``; others keep their defaults.
 
-    Numbers beyond ``MAX_INTEGER`` and ``MAX_NUMBER`` do not fit, texts are cut at ``MAX_TEXT``.
+    What is beyond a limit of numbers or depth does not fit, texts are cut at ``MAX_TEXT``.
 
     Raises:
         TypeError: a member without a default is missing, or does not fit.
@@ -116,18 +128,23 @@ def _is_within_bounds(value: object) -> bool:
         return all(map(_is_within_bounds, value.values()))
     if isinstance(value, list):
         return all(map(_is_within_bounds, value))
-    if isinstance(value, str):
-        return len(value) <= MAX_TEXT
-    if isinstance(value, int | float):
-        return abs(value) <= (MAX_INTEGER if isinstance(value, int) else MAX_NUMBER)
-    return True
+    return len(value) <= MAX_TEXT if isinstance(value, str) else _is_in_range(value)
+
+
+def _is_in_range(value: object) -> bool:
+    """Tell whether a value is none of the numbers beyond the limits; NaN is beyond them."""
+    if not isinstance(value, int | float):
+        return True
+    return abs(value) <= (MAX_JSON_INTEGER if isinstance(value, int) else MAX_JSON_NUMBER)
 
 
 def _fitting(value: object, kind: Any) -> object:  # noqa: ANN401 - a type as annotations have it
     """Return a JSON value as one of ``kind``; UNSET where it does not fit."""
     origin, arguments = get_origin(kind), get_args(kind)
     if origin is Annotated:
-        return _fitting(value, arguments[0])
+        # A type of numbers has a range.
+        is_plain = arguments[0] in (int, float)
+        return _fitting_plain(value, kind) if is_plain else _fitting(value, arguments[0])
     if origin in (Union, UnionType):
         fitting = (_fitting(value, option) for option in arguments)
         return next((found for found in fitting if found is not UNSET), UNSET)
@@ -141,7 +158,7 @@ def _fitting(value: object, kind: Any) -> object:  # noqa: ANN401 - a type as an
 
 
 def _fitting_plain(value: object, kind: Any) -> object:  # noqa: ANN401 - a class, or None
-    if isinstance(value, int | float) and abs(value) > (MAX_INTEGER if kind is int else MAX_NUMBER):
+    if not _is_in_range(value):
         return UNSET
     if isinstance(value, str) and kind is str:
         return value[:MAX_TEXT]
@@ -155,12 +172,32 @@ def _fitting_plain(value: object, kind: Any) -> object:  # noqa: ANN401 - a clas
         return UNSET
 
 
-def _check_finite(value: object, where: str) -> None:
-    if isinstance(value, float) and not math.isfinite(value):
-        raise MalformedMessage(f"{where} must be finite in JSON, got {value}")
-    if isinstance(value, dict):
-        for key, item in value.items():
-            _check_finite(item, f"{where}.{key}")
-    elif isinstance(value, list | tuple):
-        for index, item in enumerate(value):
-            _check_finite(item, f"{where}[{index}]")
+def _check_limits(value: object, where: str, depth: int = 0) -> None:
+    """Check the numbers and the depth of a tree of plain values.
+
+    Raises:
+        MalformedMessage: a number is not finite or beyond its limit, or it is nested too deeply.
+    """
+    if not _is_in_range(value):
+        if isinstance(value, float) and not math.isfinite(value):
+            raise MalformedMessage(f"{_short(where)} must be finite in JSON, got {value}")
+        if isinstance(value, int):
+            limit, shown = f"{MAX_JSON_INTEGER}", "an integer beyond that"
+        else:
+            limit, shown = f"{MAX_JSON_NUMBER:g}", f"{value:g}"
+        raise MalformedMessage(f"{_short(where)} must be from -{limit} to {limit}, got {shown}")
+    if isinstance(value, dict | list | tuple):
+        if depth == MAX_JSON_DEPTH:
+            raise MalformedMessage(
+                f"{_short(where)}: nested too deeply, {MAX_JSON_DEPTH} levels are the limit"
+            )
+        if isinstance(value, dict):
+            for key, item in value.items():
+                _check_limits(item, f"{where}.{key}", depth + 1)
+        else:
+            for index, item in enumerate(value):
+                _check_limits(item, f"{where}[{index}]", depth + 1)
+
+
+def _short(where: str) -> str:
+    return one_line(where, 120)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Annotated, Final
 
 import msgspec
+from msgspec import Meta
 
 from fasaco_edge.errors import FasacoError
 from fasaco_edge.wire.documents.json_text import (
@@ -56,7 +57,7 @@ class CoverageReport(Document, frozen=True):
     covered_m2: Amount = 0.0
     to_cover_m2: Amount = 0.0
     free_out_of_reach_m2: Amount = 0.0
-    fraction: Annotated[float, allowed(minimum=0, maximum=1)] = 0.0
+    fraction: Annotated[float, Meta(ge=0, le=1)] = 0.0
 
 
 class FloorLeft(Document, frozen=True):

@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import Annotated, Final
 
 import msgspec
-from msgspec import UNSET, UnsetType
+from msgspec import UNSET, Meta, UnsetType
 
 from fasaco_edge.wire.documents.json_text import Amount, Count, Document, Name, Ordinal, allowed
 from fasaco_edge.wire.documents.path_documents import PathReport
@@ -56,7 +56,7 @@ class MapReport(Document, frozen=True):
 
     rows: Ordinal = 1
     cols: Ordinal = 1
-    resolution_m: Annotated[float, allowed(exclusiveMinimum=0)] = 1.0
+    resolution_m: Annotated[float, Meta(gt=0)] = 1.0
     revision: Ordinal = 1
     stamp_ns: int = 0
     frame: str = ""
@@ -218,7 +218,7 @@ class Recorder(Document, frozen=True):
     malformed: Count = 0
     rss_mb: Amount = 0.0
     cpu_s: Amount = 0.0
-    pid: Ordinal = 0
+    pid: Count = 0
 
 
 class SupervisedRecorder(Document, frozen=True):
@@ -331,7 +331,7 @@ class Status(Document, frozen=True):
     recorder: SupervisedRecorder | None = None
     rss_mb: Amount = 0.0
     cpu_s: Amount = 0.0
-    threads: Ordinal = 0
+    threads: Count = 0
     config: Annotated[Settings, allowed(**{"$ref": "config.json"})] = msgspec.field(
         default_factory=dict
     )
