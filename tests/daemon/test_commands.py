@@ -63,7 +63,7 @@ def told(daemon: Daemon, *words: str) -> Any:
         (b'{"command":"start","order":{"zone":1}}', "bad_order", "order: unknown member zone"),
         (b'{"command":"start","order":{"keep_out":[[[0,0],[1,1],[1,0],[0,1]]]}}', "bad_order",
          "keep_out[0] crosses or touches itself"),
-        (b'{"command":"start","order":{"passes":1e99}}', "bad_order", "order.passes"),
+        (b'{"command":"start","order":{"passes":1e9}}', "bad_order", "order.passes"),
     ],
 )  # fmt: skip
 def test_what_is_no_command_is_answered_with_an_error(outsider, payload, code, said):

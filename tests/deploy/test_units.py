@@ -75,7 +75,9 @@ def test_the_follower_runs_ahead_of_all_else_and_starts_anew_with_the_planner(se
     try:
         service.start()
         follower.start()
-        wait_for(lambda: "standing, no p" in follower.text(), 10.0, "what it stands for")
+        # The daemon begins with an empty path.
+        stands = "standing, stopped by an empty path"
+        wait_for(lambda: stands in follower.text(), 10.0, "what it stands for")
         before, stat = follower.pid, service.lab.run("cat", f"/proc/{follower.pid}/stat").stdout
         assert stat.rpartition(")")[2].split()[16] == "-10"
         service.lab.run("systemctl", "restart", "fasaco-edge")
