@@ -29,7 +29,7 @@ PAUSE_S = 0.75 * LEASE_S
 # Longest wait for one that could plan and does not [s]: its lease and a margin.
 PATIENCE_S = 15.0
 
-_ID = re.compile(r"[0-9a-f]{1,32}")
+ID = re.compile(r"[0-9a-f]{1,32}")
 
 
 class ClaimState(StrEnum):
@@ -196,7 +196,7 @@ def claims_in(keys: Iterable[str], active: str = "plans") -> dict[str, ClaimStat
     for key in keys:
         _, own, state = key.rsplit("/", 2)
         state = ClaimState.PLANS if state == active else state
-        if _ID.fullmatch(own) and state in _SHOWN:
+        if ID.fullmatch(own) and state in _SHOWN:
             # One that changes its state has two tokens for a moment: PLANS comes first.
             before = claims.get(own, ClaimState.WAITS)
             claims[own] = max(ClaimState(state), before, key=_SHOWN.index)

@@ -13,10 +13,14 @@ from dataclasses import dataclass
 from typing import Any
 
 from fasaco_edge.bus.arrival import Sample
+from fasaco_edge.bus.claim import ID
 from fasaco_edge.wire.limits import MAX_JSON_BYTES
 
 # Most daemons whose samples are kept; beyond that those of the one that came first are dropped.
 MOST_DAEMONS = 16
+# Most claims that are kept; one that comes beyond that does not count. A claim dropped in its place
+# would not come again.
+MOST_CLAIMS = 1_000
 
 PLANS = "plans"
 
@@ -63,16 +67,14 @@ class Daemons:
         """Take in that the token of a claim appeared or is gone."""
         _, _, claim = key.rpartition("/claim/")
         own, _, stand = claim.partition("/")
-        if stand != PLANS:
+        # The daemons ignore other tokens, too.
+        if stand != PLANS or not ID.fullmatch(own):
             return
         with self._lock:
             if not is_there:
                 self._planners.discard(own)
-                return
-            self._planners.add(own)
-            if len(self._planners) > MOST_DAEMONS:
-                # The smallest one plans.
-                self._planners.remove(max(self._planners))
+            elif len(self._planners) < MOST_CLAIMS:
+                self._planners.add(own)
 
     def take_status(self, payload: bytes, now: float) -> None:
         """Take in a status; one that is malformed, or whose daemon does not plan, is ignored."""
@@ -115,8 +117,9 @@ class Daemons:
     def _daemon(self, own: str) -> _Daemon:
         """Return what is kept of a daemon; the caller holds the lock."""
         if own not in self._daemons:
-            others = [one for one in self._daemons if one not in self._planners]
-            if len(self._daemons) >= MOST_DAEMONS and others:
+            planner = min(self._planners, default="")
+            others = [one for one in self._daemons if one != planner]
+            if len(self._daemons) >= MOST_DAEMONS:
                 del self._daemons[others[0]]
             self._daemons[own] = _Daemon()
         return self._daemons[own]

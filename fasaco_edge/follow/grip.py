@@ -28,6 +28,8 @@ class Grip:
         self._from = Pose2D(0.0, 0.0)
         # Commanded distance and duration since then.
         self._way, self._seconds = 0.0, 0.0
+        # Commanded distance since the first failed try [m].
+        self._pushed = 0.0
 
     @property
     def tries(self) -> int:
@@ -43,7 +45,8 @@ class Grip:
             now: the time [s].
         """
         self._toward = toward
-        self._tries.moved_to((pose.x, pose.y))
+        # Odometry that runs on while wheels slip is no progress.
+        self._tries.moved_to((pose.x, pose.y), LEAST_SHARE * self._pushed)
         if not self._tries.may_try(toward, now):
             if self._seconds > 0.0:
                 self._look_from(pose)
@@ -66,6 +69,7 @@ class Grip:
         if way := seconds * (command.speed + WAY_M_RAD * abs(command.turn_rate)):
             self._way += way
             self._seconds += seconds
+            self._pushed = self._pushed + way if self._tries.have_failed else 0.0
 
     def _came(self, pose: Pose2D) -> float:
         """Return how far the robot has come since the last look [m]."""

@@ -3,7 +3,7 @@
 import pytest
 
 from fasaco_edge.bus.arrival import Sample
-from fasaco_edge.follow.daemons import MOST_DAEMONS, Daemons
+from fasaco_edge.follow.daemons import MOST_CLAIMS, MOST_DAEMONS, Daemons
 from fasaco_edge.wire.keys import Keys
 from tests.support.driven_base import named, status_of
 
@@ -90,4 +90,21 @@ def test_a_flood_of_daemons_takes_no_memory_and_not_the_place_of_the_one_that_pl
         daemons.take_status(status_of(own), 1.0)
     assert daemons.news().path == path(A)
     assert len(daemons._daemons) <= 2 * MOST_DAEMONS
-    assert len(daemons._planners) <= MOST_DAEMONS
+    assert len(daemons._planners) <= MOST_CLAIMS
+
+
+@pytest.mark.parametrize("own", ["!x", "", "0A", "0a" * 17])
+def test_a_token_that_is_no_id_takes_nobodys_place(daemons, own):
+    """The daemons ignore it, too: the one that plans goes on."""
+    daemons.take_claim(f"fasaco/@v1/robot/claim/{own}/plans", True)
+    daemons.take_status(status_of(A), 1.0)
+    assert (daemons.news().planner, daemons.state) == (A, "covering")
+
+
+def test_the_daemon_that_plans_is_still_there_after_a_crowd_has_gone(daemons):
+    for is_there in (True, False):
+        for number in range(3 * MOST_DAEMONS):
+            claim(daemons, f"00{number:04x}", is_there=is_there)
+    daemons.take_status(status_of(A), 1.0)
+    news = daemons.news()
+    assert (news.planner, news.status_at) == (A, 1.0)

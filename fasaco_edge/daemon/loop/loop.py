@@ -162,10 +162,11 @@ class Loop:
             else:
                 self._void_path("this daemon plans from now on")
             claim.announce()
-        elif claim.rival_yielded and mission is not None:
+        elif claim.rival_yielded:
             # The robot may have received the other's path after ours.
             self._void_path("another daemon planned, too")
-            self._restart("another daemon planned, too")
+            if mission is not None:
+                self._restart("another daemon planned, too")
         elif self._status.yield_reason:
             self._status.yield_reason = claim.reason
         return not claim.is_uncertain(now)
