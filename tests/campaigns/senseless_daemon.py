@@ -508,6 +508,8 @@ class Campaign:
         self._daemon.process.send_signal(signal.SIGSTOP)
         time.sleep(seconds)
         self._daemon.process.send_signal(signal.SIGCONT)
+        # The turn that was stopped is late, but not by the daemon.
+        self.loop["late"] -= 1
 
     def _rival(self, event: Event) -> None:
         """Let another daemon of this name come, take over from a frozen one if so, and go."""
