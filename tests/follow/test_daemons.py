@@ -94,7 +94,7 @@ def test_a_flood_of_daemons_takes_no_memory_and_not_the_place_of_the_one_that_pl
 
 
 @pytest.mark.parametrize("own", ["!x", "", "0A", "0a" * 17])
-def test_a_token_that_is_no_id_takes_nobodys_place(daemons, own):
+def test_a_token_that_is_no_id_does_not_take_the_place_of_the_planner(daemons, own):
     """The daemons ignore it, too: the one that plans goes on."""
     daemons.take_claim(f"fasaco/@v1/robot/claim/{own}/plans", True)
     daemons.take_status(status_of(A), 1.0)

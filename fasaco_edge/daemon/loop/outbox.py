@@ -66,7 +66,7 @@ class Outbox:
         self._command = bus.advertise(keys, topics.COMMAND)
 
     def path(self, path: PublishedPath) -> bool:
-        """Publish a path, facing along the way; tell whether that succeeded."""
+        """Publish a path, facing along the way; return whether that succeeded."""
         return self.guard.attempt("path", lambda: self._put_path(path))
 
     def _put_path(self, path: PublishedPath) -> None:

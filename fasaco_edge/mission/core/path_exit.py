@@ -142,7 +142,7 @@ class PathExit:
         path. It is tried again with each call until it is sent.
 
         Args:
-            publish: sends a path, and tells whether it did.
+            publish: sends a path; returns whether it did.
         """
         if self._due is None:
             return None

@@ -265,7 +265,7 @@ class MissionLedger:
         return None if verdict is Verdict.SAME else self._leave_building(before.cells, since, frame)
 
     def contradicts(self, lattice: CoverageLattice) -> bool:
-        """Tell whether so many covered cells are blocked on a map that it is of another building.
+        """Return whether a map blocks too many covered cells to be of the same building.
 
         For a map whose walls are not those before: new furniture alone would block fewer.
         """

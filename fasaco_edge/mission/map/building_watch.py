@@ -143,7 +143,7 @@ class BuildingWatch:
         # How a map that still shows the building before agrees with the reference, and the pose by
         # then, until the next pose; None for a map that is all but equal.
         self._shifted: tuple[Agreement, Pose2D] | None = None
-        # Whether a loop closure was found that nobody has asked for yet.
+        # Whether a loop closure was found since ``take_closure``.
         self._has_closed = False
         # The last jump of the pose, and when.
         self._jump: tuple[Motion, float] | None = None
