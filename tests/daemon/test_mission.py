@@ -74,9 +74,14 @@ def path(daemon, pixels):
         return heard
 
 
-def test_before_there_is_a_path_the_answer_is_an_error(tmp_path):
+def test_before_there_is_a_map_the_path_is_empty_and_coverage_an_error(tmp_path):
     with daemon_process(tmp_path) as running, Outsider(running.endpoint) as outsider:
-        for name in ("@rpc/path", "@rpc/coverage", "path", "coverage"):
+        begins = outsider.listen("path", begins=True).wait(lambda heard: True)
+        assert about(begins)["revision"] == 0
+        assert len(planned(begins)[0]) == 0
+        for name in ("@rpc/path", "path"):
+            assert outsider.ask(name) == begins
+        for name in ("@rpc/coverage", "coverage"):
             (reply,) = outsider.get(name)
             assert reply.ok is None
             error = json.loads(reply.err.payload.to_bytes())

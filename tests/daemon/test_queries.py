@@ -47,7 +47,7 @@ def covering(tmp_path_factory):
         daemon_process(folder, planner=ANTS) as running,
         Outsider(running.endpoint) as outsider,
     ):
-        for name in ("path", "coverage", "pheromone"):
+        for name in ("coverage", "pheromone"):
             assert error(outsider, f"@rpc/{name}")["code"] == "not_yet"
         assert error(outsider, "@rpc/replan")["code"] == "not_now"
         path = outsider.listen("path")

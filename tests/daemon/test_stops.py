@@ -106,7 +106,7 @@ def test_a_daemon_that_was_killed_and_started_again(tmp_path):
     ):
         drive(outsider, outsider.listen("path"))
         running.kill()
-        begun = outsider.listen_to_all("path")
+        begun = outsider.listen("path", late=False, begins=True)
         with daemon_process(tmp_path, bus=bus):
             # No map and no pose has come since.
             assert stops(begun.wait(lambda heard: True))
@@ -125,7 +125,7 @@ def test_a_daemon_that_takes_over_from_a_frozen_one(tmp_path):
         Outsider(endpoint) as outsider,
         daemon_process(folders[1], bus=bus),
     ):
-        paths = outsider.listen_to_all("path")
+        paths = outsider.listen("path", late=False, begins=True)
         drive(outsider, paths)
         first.process.send_signal(signal.SIGSTOP)
         since = len(paths.heard)

@@ -95,21 +95,21 @@ class Outsider:
     def __exit__(self, *_: object) -> None:
         self.session.close()  # type: ignore[no-untyped-call]
 
-    def listen(self, name: str, *, late: bool = True) -> Ear:
-        """Subscribe; ``late``: and get what was said last."""
-        ear = Ear()
+    def listen(self, name: str, *, late: bool = True, begins: bool = False) -> Ear:
+        """Subscribe.
+
+        Args:
+            name: the last chunk of the key.
+            late: get what was published last, too.
+            begins: take the empty path with which a daemon begins, too.
+        """
+        ear = Ear(begins=begins)
         key = f"{self.prefix}/{name}"
         if late:
             history = zenoh.ext.HistoryConfig(max_samples=1, detect_late_publishers=True)
             zenoh.ext.declare_advanced_subscriber(self.session, key, ear, history=history)
         else:
             self.session.declare_subscriber(key, ear)
-        return ear
-
-    def listen_to_all(self, name: str) -> Ear:
-        """Subscribe to what comes from now on, also to the empty path of a daemon that begins."""
-        ear = Ear(begins=True)
-        self.session.declare_subscriber(f"{self.prefix}/{name}", ear)
         return ear
 
     def put(self, name: str, payload: bytes, schema: str | None = None) -> None:
