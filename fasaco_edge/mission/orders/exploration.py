@@ -61,6 +61,7 @@ class Exploration:
 
     Attributes:
         viewpoints: cells (row, col) to look from, not yet reached.
+        reached: number of those that were.
         looked: cells already visited in search of the zone, or of ground that others see.
         seeks_zone: whether the viewpoints are for a zone.
         is_shut: whether other robots stand in the way to all cells from which it may be seen.
@@ -68,6 +69,7 @@ class Exploration:
 
     viewpoints: set[Cell] = field(default_factory=set)
     looked: set[Cell] = field(default_factory=set)
+    reached: int = 0
     seeks_zone: bool = False
     is_shut: bool = False
     # The last viewpoint of ground that others see, and since when the robot is there.
@@ -81,6 +83,12 @@ class Exploration:
         """Begin with another zone."""
         self.looked.clear()
         self.is_shut, self._shut_since = False, None
+
+    def note_cell(self, cell: Cell) -> None:
+        """Note that the robot is in ``cell``."""
+        if cell in self.viewpoints:
+            self.viewpoints.discard(cell)
+            self.reached += 1
 
     def seek(
         self, zone: Zone | None, area: ReachableArea | None, free: ReachableArea | None, cell: Cell

@@ -23,9 +23,9 @@ from fasaco_edge.mission.orders.order_state import NO_ORDER, OrderState, Stage
 from fasaco_edge.mission.orders.zones import in_zones
 from fasaco_edge.planners.problem import CoverageProblem
 
-# After this many paths in a row that leave the same number of cells, those wait for the retry: the
+# After this many paths in a row that cover no further cell, those left wait for the retry: the
 # robot may stop short of its path's end, with the last cell out of the tool's reach.
-MAX_SAME_LEFTOVERS = 3
+MAX_IN_VAIN = 3
 
 
 @dataclass(slots=True)
@@ -34,15 +34,16 @@ class _Run:
 
     Attributes:
         exploration: the viewpoints.
-        left_over: number of cells the last path left over; -1 before the first.
-        same_again: number of paths in a row that left over that many.
+        done: number of cells covered, and looked from, by the end of the last path; -1 before the
+            first.
+        in_vain: number of paths in a row that ended with that many.
         retry_at: time of the next retry [s]; None if nothing waits.
         ending: how the order ended.
     """
 
     exploration: Exploration = field(default_factory=Exploration)
-    left_over: int = -1
-    same_again: int = 0
+    done: int = -1
+    in_vain: int = 0
     retry_at: float | None = None
     ending: str = "the order was carried out"
 
@@ -130,7 +131,7 @@ class Sequencer:
 
     def note_cell(self, cell: Cell) -> None:
         """Note that the robot is in ``cell``."""
-        self._run.exploration.viewpoints.discard(cell)
+        self._run.exploration.note_cell(cell)
 
     def begin(self, cell: Cell, now: float) -> str:
         """Begin what is due, from ``cell``; return why a plan is wanted, or ""."""
@@ -146,7 +147,7 @@ class Sequencer:
         if zone is not None and not (state.order.keep_covered and state.pass_number == 1):
             self._ledger.forget(partial(in_zones, (zone,)))
         self.order_state = replace(state, begun=True, home=state.home or cell)
-        run.left_over, run.same_again = -1, 0
+        run.done, run.in_vain = -1, 0
         self._fleet.try_again()
         if state.pass_number == 1:
             run.exploration.begin()
@@ -191,11 +192,8 @@ class Sequencer:
 
     def explore(self, cell: Cell) -> str:
         """Look for a path to an unreachable zone or part; return why a plan is wanted, or ""."""
-        exploration, zone, area = (
-            self._run.exploration,
-            self.order_state.current_zone,
-            self._map.area,
-        )
+        exploration, zone = self._run.exploration, self.order_state.current_zone
+        area = self._map.area
         free = None if area is None else self.passable(area, cell)
         if reason := exploration.seek(zone, area, free, cell):
             return reason
@@ -222,24 +220,29 @@ class Sequencer:
 
     def _why_shut(self) -> str:
         zone = self.order_state.current_zone
-        return (
-            f"others stand in the way to zone {zone.name!r}" if zone else "others stand in the way"
-        )
+        return "others stand in the way" + (f" to zone {zone.name!r}" if zone else "")
 
     def note_path_end(self) -> bool:
         """Note the end of a path; return whether the cells it left over must wait for a retry."""
         run, cells = self._run, self.cells.left_to_me()
         if cells > 0:
             self._unreached.note_failure()
-        run.same_again = run.same_again + 1 if cells == run.left_over else 1
-        run.left_over = cells
-        is_given_up = cells > 0 and run.same_again > MAX_SAME_LEFTOVERS
+        # Not by the cells left: the map may show some now and then.
+        done = self._done
+        run.in_vain = run.in_vain + 1 if cells and done <= run.done else 1
+        run.done = done
+        is_given_up = cells > 0 and run.in_vain > MAX_IN_VAIN
         if is_given_up and run.exploration.skip_viewpoint():
             return False
         if is_given_up and self._fleet.has_company:
             # Other robots may leave before they have swept their parts: those come first.
-            is_given_up, run.same_again = self._leave_to_others(), 0
+            is_given_up, run.in_vain = self._leave_to_others(), 0
         return is_given_up
+
+    @property
+    def _done(self) -> int:
+        """Number of cells that this robot has covered, and has come to only to look from there."""
+        return self._ledger.current.snapshot().cells + self._run.exploration.reached
 
     def _leave_to_others(self) -> bool:
         """Give up what this robot has tried in vain; tell whether nothing untried is left."""
@@ -309,7 +312,7 @@ class Sequencer:
         run.exploration.aim_at(self._viewpoints() - {cell})
         self._fleet.try_again()
         # In a retry, one path without progress is enough to give up.
-        run.left_over, run.same_again = self.cells.left_to_me(), MAX_SAME_LEFTOVERS
+        run.done, run.in_vain = self._done, MAX_IN_VAIN
         return f"tried again, {self.order_state.tries + 1} of {self._config.policy.retries}"
 
     def _end(self) -> None:
