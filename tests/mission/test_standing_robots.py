@@ -142,6 +142,26 @@ def test_one_that_stands_in_the_way_is_planned_around_though_its_poses_scatter(s
     assert len(drive.visited) >= 24 * 5 - 10
 
 
+@pytest.mark.parametrize("names", [("r2",), ("r2", "r3")], ids=["one", "two in turn"])
+def test_those_that_stand_in_the_way_now_and_then_are_planned_around(names):
+    # Where they were told to be scattered about what has to be kept clear: each moment without them
+    # began the wait anew, and so did the other one of two.
+    drive = planned()
+    (row, col), (to_row, to_col) = drive.cell, drive.walk[0]
+    ahead, aside = np.array([to_col - col, to_row - row]), np.array([to_row - row, to_col - col])
+    here = (np.array([col, row]) + 0.5) * CELL_M
+    for tick in range(int(PATIENCE_S) + 3):
+        heard = []
+        for place, name in enumerate(names):
+            off_m = 0.31 if tick % 2 == place else 0.34
+            x, y = here + CELL_M * ahead + (1 - 2 * place) * off_m * aside
+            heard.append(replace(member(x, y), robot=name))
+        drive.tell(pose_at(row, col), *heard, after=1.0)
+        if drive.request is not None:
+            drive.plan()
+    assert any(map(drive.mission.fleet.others.is_avoided, names))
+
+
 def test_whether_another_is_near_is_told_at_rest_too():
     drive = planned()
     drive.command("pause")

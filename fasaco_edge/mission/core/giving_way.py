@@ -253,7 +253,8 @@ class GivingWay:
     ) -> PathUpdate | None:
         route = self._route
         if found.robot != self.waits_for:
-            self._since = now
+            # Not now: let go for a moment, or for another one in turn, it has not got on.
+            self._since = self._stays_since
         was_waiting = bool(self.waits_for)
         self.waits_for, self.reason = found.robot, found.reason
         has_path = len(route.path.cells) > 0
