@@ -13,7 +13,7 @@ from fasaco_edge.mission.fleet.remainder import STUCK_S, WAITING_S, Remainder
 from fasaco_edge.mission.orders.order import MissionOrder, Zone
 from tests.mission.fleets import FleetDrive, FleetRobot
 from tests.mission.test_fleet import tiles_of
-from tests.mission.world import building
+from tests.mission.world import building, patch
 
 HALL = ["." * 24] * 12
 CELLS = [(row, col) for row in range(12) for col in range(24)]
@@ -65,6 +65,28 @@ def test_what_another_leaves_is_swept_by_a_robot_without_a_part():
     assert not shared.ours.walk
     shared.run(int(STUCK_S) + 2, sweeps=0)
     assert shared.ours.walk
+
+
+def test_what_a_robot_has_tried_in_vain_stays_the_others_whatever_maps_come():
+    # With each map it was tried anew, while the others were at work.
+    niche = ["#####.##################", *HALL]
+    fleet = FleetDrive(niche, {"r1": (0, 0), "r2": (0, 1)})
+    ours, other = fleet.robots.values()
+    ours.cannot = other.cannot = {(12, 5)}
+
+    def untried():
+        area = ours.mission.area
+        return ours.mission.fleet.untried(area.reachable, area)[area.lattice.local((12, 5))]
+
+    while untried():
+        fleet.tick()
+        assert fleet.seconds < 300
+    ours.tell(patch("#", at=(0, 23)))
+    assert not untried()
+    assert ours.mission.fleet.has_company
+    fleet.run(2)
+    ours.tell(patch(".", at=(0, 23)))
+    assert not untried()
 
 
 def test_robots_do_not_stand_for_one_another():

@@ -246,7 +246,7 @@ class Executive:
                     continue
                 if why := orders.why_looking(cell, self._now):
                     return self._stand_by(why, update)
-                if orders.give_up_unreachable():
+                if orders.pass_over_unreachable():
                     self._share(cell, at_once=True)
                     continue
                 orders.advance(self._now)

@@ -13,6 +13,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 from numpy.typing import NDArray
 
+from fasaco_edge.grid.changes import carried
 from fasaco_edge.grid.geometry import Window
 from fasaco_edge.grid.lattice import Cell
 from fasaco_edge.mission.core.events import Part
@@ -70,9 +71,11 @@ class FleetLayer:
         self._owners = None, np.zeros((0, 0), np.int8)
         # The joint area of an area at the last look: others tell of theirs many times a second.
         self._seen: tuple[ReachableArea, ReachableArea] | None = None
-        # Cells of an area that this robot tried in vain, while others are at work.
-        self._tried: tuple[ReachableArea | None, NDArray[np.bool_]]
-        self._tried = None, np.zeros((0, 0), np.bool_)
+        # Cells that this robot tried in vain, while others are at work; and those of an area that
+        # it cannot come to: another map may show a way.
+        self._tried = Window(0, 0, 0, 0), np.zeros((0, 0), np.bool_)
+        self._shut: tuple[ReachableArea | None, NDArray[np.bool_]]
+        self._shut = None, np.zeros((0, 0), np.bool_)
         # Number of own cells that others had swept at the last plan; version of the shared progress
         # at the last check.
         self._taken, self._counted = 0, 0
@@ -162,13 +165,17 @@ class FleetLayer:
         return cells & own if has_work else cells
 
     def give_up(self, cells: NDArray[np.bool_], area: ReachableArea) -> None:
-        """Leave cells that this robot tried in vain to the others."""
-        before = self._tried[1] if self._tried[0] is area else np.False_
-        self._tried = area, cells | before
+        """Leave cells that this robot tried in vain to the others, whatever maps come."""
+        self._tried = area.lattice.window, cells | self._tried_on(area)
+
+    def pass_over(self, cells: NDArray[np.bool_], area: ReachableArea) -> None:
+        """Leave cells that this robot cannot come to to the others, until the next map."""
+        self._shut = area, cells | (self._shut[1] if self._shut[0] is area else np.False_)
 
     def try_again(self) -> None:
         """Clear the list of cells given up."""
-        self._tried = None, self._tried[1]
+        self._tried = Window(0, 0, 0, 0), np.zeros((0, 0), np.bool_)
+        self._shut = None, self._shut[1]
 
     def share(self, open_cells: OpenCells, cell: Cell, now: float, *, at_once: bool = False) -> str:
         """Divide the remaining area again if worthwhile; return why a plan is wanted, or "".
@@ -288,7 +295,11 @@ class FleetLayer:
 
     def untried(self, cells: NDArray[np.bool_], area: ReachableArea) -> NDArray[np.bool_]:
         """Return the cells that this robot has not given up."""
-        return cells & ~self._tried[1] if self._tried[0] is area else cells
+        cells = cells & ~self._tried_on(area)
+        return cells & ~self._shut[1] if self._shut[0] is area else cells
+
+    def _tried_on(self, area: ReachableArea) -> NDArray[np.bool_]:
+        return carried(self._tried[1], self._tried[0], area.lattice.window)
 
     def _is_own(self, division: Division, area: ReachableArea) -> NDArray[np.bool_]:
         """Return which cells of this robot's area are in its part."""

@@ -246,14 +246,14 @@ class Sequencer:
 
     def _leave_to_others(self) -> bool:
         """Give up what this robot has tried in vain; tell whether nothing untried is left."""
-        self.give_up_unreachable()
         area = self._map.area
         assert area is not None
         unswept = self.cells.unswept(area.lattice.window) & area.reachable
+        self._fleet.give_up(self._fleet.mine(unswept, area), area)
         return not self._fleet.untried(unswept, area).any()
 
-    def give_up_unreachable(self) -> bool:
-        """Give up what this robot cannot come to now, in a fleet; tell whether there was any.
+    def pass_over_unreachable(self) -> bool:
+        """Pass over what this robot cannot come to now, in a fleet; tell whether there was any.
 
         What it can come to of the others' parts comes before a retry.
         """
@@ -262,7 +262,7 @@ class Sequencer:
             return False
         unswept = self.cells.unswept(area.lattice.window) & area.reachable
         mine = self._fleet.mine(unswept, area)
-        self._fleet.give_up(mine, area)
+        self._fleet.pass_over(mine, area)
         return bool(mine.any())
 
     def advance(self, now: float) -> None:
