@@ -163,7 +163,7 @@ class EventHandler:
         assert self.map.grid is not None
         self.monitor.note_map(self._now)
         self.line.note_map()
-        self.route.forget_failure()
+        self.route.note_map()
         before = self._compare_buildings()
         if before is not None and (self.map.has_moved or self.map.building.is_foreign):
             self.ledger.note_map_motion(before)
@@ -346,6 +346,7 @@ class EventHandler:
             self._path = self.route.stop("robot is in a keep-out zone", self._now) or self._path
 
     def _resume(self, order: OrderState) -> PathUpdate | None:
+        self.route.forget_failure()
         if order.begun and order.stage is not Stage.RETURNING:
             return self.route.resume(self._now)
         self.route.want("resumed")

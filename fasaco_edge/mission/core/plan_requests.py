@@ -35,8 +35,11 @@ class PlanRequests:
         # What changed since the last request; and whether that change is the reason for the plan.
         self._changed: Window | None = None
         self._is_by_map = False
-        # How the last plan failed, and when; "" where it did not.
+        # How the last plan failed, and when; "" where it did not. How many have failed in a row,
+        # and whether another map has come since the last.
         self._failure = "", 0.0
+        self._failures = 0
+        self._has_map = False
 
     @property
     def is_planning(self) -> bool:
@@ -77,7 +80,6 @@ class PlanRequests:
 
     def pause(self) -> None:
         """Discard the pending plan; its reason is planned for again once the robot continues."""
-        self.forget_failure()
         if self.pending is not None and self.is_planning and not self._is_abandoned:
             if self.pending.problem.is_full:
                 self._full = self.pending.reason
@@ -121,16 +123,25 @@ class PlanRequests:
         if self._close_request() or is_improving:
             return False
         self.want(self.wanted or request.reason, request.changed)
-        self._failure = str(event.why), now
+        self._failure, self._has_map = (str(event.why), now), False
+        self._failures += 1
         return True
 
     def why_not_yet(self, now: float) -> str:
         """Return why no plan may be requested yet; "" if one may be."""
         why, since = self._failure
-        if why and now - since < BROKEN_S:
-            return f"{why}; tried again with the next map, or after {BROKEN_S:g} s"
-        return ""
+        # Each map is another problem; a planner that breaks over all of them is asked less often.
+        pause_s = min(2.0 ** (self._failures - 1) - 1.0, BROKEN_S)
+        if not why or now - since >= (pause_s if self._has_map else BROKEN_S):
+            return ""
+        with_map = f"with a map after {pause_s:g} s" if pause_s else "with the next map"
+        sooner = f"{with_map}, or " if pause_s < BROKEN_S else ""
+        return f"{why}; tried again {sooner}after {BROKEN_S:g} s"
+
+    def note_map(self) -> None:
+        """Note another map: what failed may not fail again."""
+        self._has_map = True
 
     def forget_failure(self) -> None:
-        """Allow a request after a failed plan: the problem has changed."""
-        self._failure = "", 0.0
+        """Allow a request after a failed plan: one was asked for, or has succeeded since."""
+        self._failure, self._failures = ("", 0.0), 0

@@ -205,6 +205,8 @@ class Route(PlanRequests):
         if request is None or request.number != event.number:
             return None
         is_abandoned = self._close_request()
+        if attempt is None:
+            self.forget_failure()
         cell = self._map.robot_cell()
         if is_abandoned or cell is None or area is None:
             self.outdated += attempt is None
