@@ -44,7 +44,7 @@ class RecorderSupervisor:
         self._command = [*program, *parent, "--config", "-", "--out", str(folder)]
         self._reports = LatestSlot[Sample]()
         self._report: Recorder | None = None
-        self._reported_at = time.monotonic()
+        self._began_at = self._reported_at = time.monotonic()
         self._restarts = 0
         self._pause_s = FIRST_PAUSE_S
         self._start_at: float | None = None
@@ -68,7 +68,7 @@ class RecorderSupervisor:
         elif now >= self._start_at:
             self._start_at = None
             self._restarts += 1
-            self._report, self._reported_at = None, now
+            self._report, self._began_at, self._reported_at = None, now, now
             self._launch()
         return SupervisedRecorder("restarting", self._restarts, self._death)
 
@@ -117,7 +117,9 @@ class RecorderSupervisor:
             return
         if self._process is not None and report.pid == self._process.pid:
             self._report, self._reported_at = report, now
-            self._pause_s = FIRST_PAUSE_S
+            # One that dies of what it records has reported before.
+            if now - self._began_at >= LONGEST_PAUSE_S:
+                self._pause_s = FIRST_PAUSE_S
 
     def _running(self, now: float) -> SupervisedRecorder:
         patience_s = SILENT_AFTER_S if self._report else START_WITHIN_S

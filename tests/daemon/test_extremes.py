@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+import os
+import signal
 import sys
+import time
 
 from fasaco_edge.bus.session import open_bus
 from fasaco_edge.bus.settings import BusSettings
 from fasaco_edge.config.config import DaemonConfig
-from fasaco_edge.daemon.supervisor import FIRST_PAUSE_S, RecorderSupervisor
+from fasaco_edge.daemon.supervisor import FIRST_PAUSE_S, LONGEST_PAUSE_S, RecorderSupervisor
+from fasaco_edge.wire import topics
+from fasaco_edge.wire.documents.json_text import encode_json
+from fasaco_edge.wire.documents.status import Recorder
 from tests.support.processes import free_endpoint
 
 
@@ -21,3 +27,36 @@ def test_a_recorder_that_cannot_be_started_is_tried_again(tmp_path, monkeypatch)
         assert "could not be started" in state.reason
         assert recorder.poll(100.0 + 2 * FIRST_PAUSE_S).restarts == 1
         recorder.close(1.0, 1.0)
+
+
+def test_a_recorder_that_reports_and_dies_is_started_less_and_less_often(tmp_path, monkeypatch):
+    config, program, born = DaemonConfig(), tmp_path / "program", tmp_path / "born"
+    program.write_text(f"#!/bin/sh\necho $$ > {born}\nexec sleep 60\n")
+    program.chmod(0o755)
+    monkeypatch.setattr(sys, "executable", str(program))
+    with open_bus(BusSettings("peer", (), (free_endpoint(),))) as bus:
+        reports = bus.advertise(config.keys(), topics.RECORDER)
+        recorder, now, pauses = RecorderSupervisor(config, bus, tmp_path), time.monotonic(), []
+
+        def lives_for(seconds):
+            """Let it report once, die, and start again; note how long that took."""
+            nonlocal now
+            while not (born.exists() and (pid := born.read_text().strip())):
+                time.sleep(0.01)
+            born.unlink()
+            now += seconds
+            while recorder.poll(now).state != "recording":
+                reports.put(encode_json(Recorder(state="recording", pid=int(pid))))
+                time.sleep(0.01)
+            os.kill(int(pid), signal.SIGKILL)
+            while (state := recorder.poll(now)).state != "restarting":
+                time.sleep(0.01)
+            died_at = now
+            while recorder.poll(now).restarts == state.restarts:
+                now += 0.5
+            pauses.append(now - died_at)
+
+        for seconds in (2.0, 2.0, 2.0, LONGEST_PAUSE_S, 2.0):
+            lives_for(seconds)
+        recorder.close(1.0, 1.0)
+    assert pauses == [1.0, 2.0, 4.0, 1.0, 2.0]
