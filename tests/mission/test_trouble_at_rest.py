@@ -237,6 +237,16 @@ def test_a_robot_without_work_stands_in_a_dead_dock(state):
     assert codes(drive) == ["no_current"]
 
 
+def test_a_contact_that_comes_and_goes_does_not_take_a_robot_at_rest_out_of_its_dock():
+    # Its base has moved it into the dock, some way from the dock's place.
+    drive = paused()
+    drive.cell = (AT_DOCK[0], AT_DOCK[1] + 1)
+    for second in range(round(FLAT_S) + 30):
+        drive.power = "charging" if second % 2 else "discharging"
+        live(drive, 1)
+    assert (drive.mission.state, codes(drive)) == (State.PAUSED, ["no_current"])
+
+
 def test_a_full_battery_in_its_dock_may_discharge():
     drive = done()
     drive.cell, drive.level, drive.power = AT_DOCK, 0.95, "discharging"

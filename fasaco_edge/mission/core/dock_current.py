@@ -30,6 +30,11 @@ class DockCurrent:
         self._from = 0.0
         self._rose_at: float | None = None
 
+    @property
+    def is_docked(self) -> bool:
+        """Whether the robot was docked at the last look."""
+        return self._docked_at is not None
+
     def look(self, now: float, *, is_docked: bool) -> None:
         """Note level and power supply at ``now``; to be called in each step."""
         if not is_docked:

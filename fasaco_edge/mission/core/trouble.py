@@ -89,7 +89,7 @@ class Troubles:
         """Find the troubles at ``now`` [s] of a mission that is in a state; once in each step."""
         self.monitor.begin(now)
         is_docked = state is State.CHARGING or (
-            state.is_at_rest and self.dock.holds(is_charging=False)
+            state.is_at_rest and self.dock.holds(is_charging=self._current.is_docked)
         )
         self._current.look(now, is_docked=is_docked)
         before = {trouble.code: trouble.since for trouble in self.found}
