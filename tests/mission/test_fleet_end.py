@@ -13,7 +13,7 @@ from fasaco_edge.mission.fleet.remainder import STUCK_S, WAITING_S, Remainder
 from fasaco_edge.mission.orders.order import MissionOrder, Zone
 from tests.mission.fleets import FleetDrive, FleetRobot
 from tests.mission.test_fleet import tiles_of
-from tests.mission.world import building, patch
+from tests.mission.world import CONFIG, building, patch, with_policy
 
 HALL = ["." * 24] * 12
 CELLS = [(row, col) for row in range(12) for col in range(24)]
@@ -23,8 +23,8 @@ ALL_TO_R2 = (Part("r1", (0, 0), 1e6, 1.0), Part("r2", (6, 12), 0.0, 1.0))
 class Shared:
     """A robot, r1, in a hall whose cells another one, r2, gives itself and sweeps one by one."""
 
-    def __init__(self):
-        fleet = FleetDrive(HALL, {"r1": (0, 0), "r2": (6, 12)})
+    def __init__(self, config=CONFIG):
+        fleet = FleetDrive(HALL, {"r1": (0, 0), "r2": (6, 12)}, config)
         self.ours, other = fleet.robots.values()
         self._report, self.swept, self._number = other.report(), 0, 0
 
@@ -130,6 +130,15 @@ def test_a_robot_that_is_paused_tells_of_nobody_that_it_waits_for():
     assert shared.ours.mission.waits_for == "r2"
     shared.ours.tell(CommandReceived(1, "pause"), after=1.0)
     assert (shared.ours.mission.state, shared.ours.mission.waits_for) == ("paused", "")
+
+
+def test_a_robot_that_stands_tells_whom_it_waits_for_in_trouble_too():
+    # Else the others took it for one that hangs, and left it out of the next division.
+    shared = Shared(with_policy(CONFIG, stale_map_s=20.0))
+    shared.run(40)
+    mission = shared.ours.mission
+    assert [trouble.code for trouble in mission.troubles] == ["no_map"]
+    assert (mission.state, mission.waits_for) == ("degraded", "r2")
 
 
 def test_a_robot_whose_part_others_alone_can_see_sweeps_what_it_sees():

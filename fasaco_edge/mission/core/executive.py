@@ -73,12 +73,12 @@ class Executive:
     def status(self) -> tuple[State, str]:
         """Return the reported state and its reason, by the last decision."""
         found = self.troubles.found
-        if found and self._doing in DRIVING:
+        if found and self.doing in DRIVING:
             return State.DEGRADED, found[0].text
-        return self._doing, self._reason
+        return self.doing, self._reason
 
     @property
-    def _doing(self) -> State:
+    def doing(self) -> State:
         """What the mission does, with or without troubles."""
         makes_way = bool(self.giving_way.waits_for) and len(self.route.path.cells) > 0
         return State.RETURNING if self._state is State.DONE and makes_way else self._state
@@ -86,7 +86,7 @@ class Executive:
     def decide(self, now: float) -> Decision:
         """Return what is to be done at ``now`` [s]."""
         decision = self._decide(now)
-        self.troubles.look(self._doing, now)
+        self.troubles.look(self.doing, now)
         return decision
 
     def _decide(self, now: float) -> Decision:

@@ -303,7 +303,8 @@ class Mission:
     @property
     def waits_for(self) -> str:
         """Name of the robot that this one waits or makes way for, or that sweeps what is left."""
-        stands = self.state is State.COVERING and len(self.route.path.ahead) < 2
+        is_covering = self._executive.doing is State.COVERING
+        stands = is_covering and len(self.route.path.ahead) < 2
         if self.giving_way.waits_for or not (stands and self._orders.waits_for_others):
             return self.giving_way.waits_for
         return self.fleet.busiest(self._orders.cells.open_cells)
