@@ -5,6 +5,7 @@ Read in this order:
     core/mission         step(events, now) -> Decision: the whole interface
     core/events          events and decisions
     core/event_handler   applies each event
+    core/order_changes   begins orders, and carries out commands
     core/executive       then decides the state, and what the robot does next
     core/route           owns the path and the pending plan; better paths in spare time
 

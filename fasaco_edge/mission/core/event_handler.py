@@ -6,10 +6,8 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
 from functools import partial
 
-from fasaco_edge.errors import CommandError, FasacoError, LedgerMismatchError
-from fasaco_edge.grid.geometry import Polygon, Pose2D, StampedPose
-from fasaco_edge.grid.rotation import rotated_polygon
-from fasaco_edge.mission.config import MissionPolicy
+from fasaco_edge.errors import FasacoError, LedgerMismatchError
+from fasaco_edge.grid.geometry import Pose2D, StampedPose
 from fasaco_edge.mission.core.charging import BatteryGauge
 from fasaco_edge.mission.core.events import (
     Answer,
@@ -27,18 +25,15 @@ from fasaco_edge.mission.core.events import (
     PoseReceived,
     in_runs,
 )
+from fasaco_edge.mission.core.order_changes import OrderChanges
 from fasaco_edge.mission.core.route import Route
 from fasaco_edge.mission.core.trail_layer import TrailLayer
 from fasaco_edge.mission.coverage.drive_meter import DriveMeter
-from fasaco_edge.mission.coverage.loss import loss_in
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
 from fasaco_edge.mission.fleet.layer import FleetLayer
 from fasaco_edge.mission.line.layer import LineLayer
 from fasaco_edge.mission.map.inputs import InputMonitor
 from fasaco_edge.mission.map.map_state import MapState
-from fasaco_edge.mission.orders.mask import mask_polygons
-from fasaco_edge.mission.orders.order import rotated_order
-from fasaco_edge.mission.orders.order_state import OrderState, Stage
 from fasaco_edge.mission.orders.sequencer import Sequencer
 
 
@@ -56,20 +51,13 @@ class EventHandler:
     drive: DriveMeter
     fleet: FleetLayer
     battery: BatteryGauge
-    policy: MissionPolicy
-    # Angle of the cells' rows to the x axis of the map frame [deg].
-    lattice_deg: float = 0.0
+    changes: OrderChanges
     _now: float = field(default=0.0, init=False)
     # Results of the events of one step.
     _path: PathUpdate | None = field(default=None, init=False)
     _faults: list[FasacoError] = field(default_factory=list, init=False)
     _answers: list[Answer] = field(default_factory=list, init=False)
     _is_forgotten: bool = field(default=False, init=False)
-    # Polygons to keep out of under every order.
-    _standing: tuple[Polygon, ...] = field(default=(), init=False)
-
-    def __post_init__(self) -> None:
-        self._standing = self.policy.keep_out + mask_polygons(self.policy.keep_out_mask)
 
     def handle(self, events: Iterable[Event], now: float) -> Decision:
         """Apply events at ``now`` [s]; return their immediate results.
@@ -98,35 +86,6 @@ class EventHandler:
         except FasacoError as error:
             # Its traceback would hold the map until garbage is collected.
             self._faults.append(error.with_traceback(None))
-
-    def begin_order(self, order: OrderState) -> None:
-        """Begin another order, or none; ``update_area`` must be called next."""
-        self.route.abandon()
-        self._keep_out(order)
-        self.orders.start(order)
-
-    def _keep_out(self, order: OrderState) -> None:
-        """Keep out of all areas under an order; ``update_area`` must be called next."""
-        ordered = order.order.keep_out if order.order else ()
-        drawn = tuple(keep_out.polygon for keep_out in order.keep_out)
-        if self.lattice_deg:
-            drawn = tuple(rotated_polygon(polygon, -self.lattice_deg) for polygon in drawn)
-        self.map.keep_out(self._standing + ordered + drawn)
-        self.line.note_map()
-
-    def update_area(self) -> None:
-        """Update the reachable area; want a new plan if it changed."""
-        before, route = self.map.area, self.route
-        self.map.update_area()
-        area = self.map.area
-        if area is None:
-            return
-        self.orders.note_area()
-        if before is None:
-            again = "robot is on coverable ground again"
-            route.want(again if route.revision else self.ledger.first_plan_reason)
-        elif change := area.change_since(before):
-            route.want(str(change), change.window)
 
     def _apply(self, event: Event | PatchRun) -> None:
         match event:
@@ -194,8 +153,8 @@ class EventHandler:
         elif order.frame != grid.frame:
             why = f"it was given in frame {order.frame!r}, the map is in {grid.frame!r}"
             after = order.in_other_frame(why)
-            self.begin_order(replace(after, frame=grid.frame))
-            self.update_area()
+            self.changes.begin(replace(after, frame=grid.frame))
+            self.changes.update_area()
 
     def _look_for_another_building(self) -> None:
         """Raise LedgerMismatchError once the map has shown another building for long enough."""
@@ -218,8 +177,8 @@ class EventHandler:
         if misfit is not None:
             self._path = self.route.stop(str(misfit), self._now) or self._path
             self.trail.begin_anew()
-            self.begin_order(self.orders.order_state.in_other_building(str(misfit)))
-        self.update_area()
+            self.changes.begin(self.orders.order_state.in_other_building(str(misfit)))
+        self.changes.update_area()
         if misfit is not None:
             self.route.want(self.ledger.first_plan_reason)
             raise misfit
@@ -234,7 +193,7 @@ class EventHandler:
             self.fleet.others.ground.clear()
         if misfit is None and before not in ("", frame):
             why = f"map and poses are in frame {frame!r} now, no longer in {before!r}"
-            self.begin_order(self.orders.order_state.in_other_frame(why))
+            self.changes.begin(self.orders.order_state.in_other_frame(why))
         if not is_other_map and misfit is None:
             return
         self._leave_map(f"map and poses are in frame {frame!r} now")
@@ -279,7 +238,7 @@ class EventHandler:
         if cell is None:
             return
         if has_jumped or self.map.area is None or not self.map.area.contains(cell):
-            self.update_area()
+            self.changes.update_area()
         if is_known:
             self._path = self.route.note_motion(motion, self._now) or self._path
         if uncertain:
@@ -307,50 +266,13 @@ class EventHandler:
 
     def _obey(self, event: CommandReceived) -> None:
         """Carry out a command; an error becomes its answer."""
-        before = self.orders.order_state
-        try:
-            order = rotated_order(self.map.places.located(event.order), -self.lattice_deg)
-            if event.command == "start":
-                self.map.check_zones(order)
-            asked = event.asked._replace(order=order)
-            has_home = self.map.places.place("home") is not None
-            after = before.commanded(asked, has_home=has_home)
-            if not asked.discard:
-                loss_in(before.forgets(asked, after), self.ledger, self.map).check(asked.name)
-            plan = self._replan() if event.command == "replan" else None
-        except FasacoError as error:
-            self._answers.append(Answer(event.number, error))
+        answer, after = self.changes.answer(event)
+        self._answers.append(answer)
+        if after is None:
             return
-        self._answers.append(Answer(event.number, plan=plan))
         if event.command == "reset":
             self._reset()
-        if after.order is not before.order:
-            self.begin_order(after)
-            self.update_area()
-        elif after.keep_out != before.keep_out:
-            self._change_keep_outs(after)
-        elif after.paused and not before.paused:
-            self.route.pause()
-        elif before.paused and not (after.paused or after.errand):
-            self._path = self._resume(after) or self._path
-        self.orders.set_state(after)
-
-    def _change_keep_outs(self, order: OrderState) -> None:
-        """Follow other keep-outs under the same order; stop a robot that is in one of them."""
-        self._keep_out(order)
-        self.route.forget_failure()
-        self.update_area()
-        if self.map.is_kept_out:
-            # Its border may be near enough to go on from there, but not by this path.
-            self.map.follow_path(None)
-            self._path = self.route.stop("robot is in a keep-out zone", self._now) or self._path
-
-    def _resume(self, order: OrderState) -> PathUpdate | None:
-        self.route.forget_failure()
-        if order.begun and order.stage is not Stage.RETURNING:
-            return self.route.resume(self._now)
-        self.route.want("resumed")
-        return None
+        self._path = self.changes.change_to(after, self._now) or self._path
 
     def _reset(self) -> None:
         """Forget all coverage except under the tool, and deselect the active frame."""
@@ -367,15 +289,3 @@ class EventHandler:
         self._compare_buildings()
         self.route.forget_failure()
         self._record()
-
-    def _replan(self) -> int:
-        """Want a full new plan; return its number, or raise CommandError if none can be made."""
-        if self.map.lattice is None:
-            raise CommandError("nothing to plan: there is no map yet")
-        if self.map.pose is None:
-            raise CommandError("nothing to plan: there is no pose yet")
-        if self.map.area is None or self.map.robot_cell() is None:
-            raise CommandError(f"nothing to plan: {self.map.why_misplaced()}")
-        if not self.orders.can_plan:
-            raise CommandError("nothing to plan: no reachable cell is left to cover")
-        return self.route.want_full("asked for")

@@ -132,7 +132,10 @@ class Executive:
             orders.is_waiting and route.path.finished and route.pending is None
         ):
             return self._settle(update)
-        self._report_driving()
+        if route.pending is not None and not len(route.path.cells):
+            self._state, self._reason = State.PLANNING, route.pending.reason
+        elif orders.order_state.stage is not Stage.RETURNING:
+            self._state, self._reason = State.COVERING, f"path {route.revision}"
         if self._standing.is_on_path and update is None:
             update = route.publish(route.path.ahead, "robot stands", now)
             self._standing.note_again()
@@ -179,8 +182,7 @@ class Executive:
         if order.errand == "charge" and (docked := self._why_in_dock()):
             return docked
         if not order.errand and not order.is_open:
-            is_idle = order.order is None
-            return (State.IDLE, order.why) if is_idle else (State.DONE, self.orders.ending)
+            return (State.DONE, self.orders.ending) if order.order else (State.IDLE, order.why)
         if self.map.lattice is None:
             return State.WAITING_FOR_MAP, self.map.why_no_map()
         if self.map.pose is None:
@@ -219,14 +221,6 @@ class Executive:
         if orders.is_waiting:
             return self._rest(State.BLOCKED, orders.waiting_reason(), update)
         return self._rest(State.DONE, orders.ending, update)
-
-    def _report_driving(self) -> None:
-        """Set the state of a robot that has work to do."""
-        route = self.route
-        if route.pending is not None and not len(route.path.cells):
-            self._state, self._reason = State.PLANNING, route.pending.reason
-        elif self.orders.order_state.stage is not Stage.RETURNING:
-            self._state, self._reason = State.COVERING, f"path {route.revision}"
 
     def _request(self, cell: Cell, update: PathUpdate | None) -> Decision:
         """Request the wanted plan; if nothing is left to cover, continue with the order."""
@@ -348,8 +342,7 @@ class Executive:
 
     def _arrive(self) -> Decision:
         """End an errand on arrival."""
-        orders = self.orders
-        orders.set_state(orders.order_state.arrived())
+        self.orders.set_state(self.orders.order_state.arrived())
         resting = self._why_resting()
         assert resting is not None
         return self._rest(*resting)

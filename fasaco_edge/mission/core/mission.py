@@ -29,6 +29,7 @@ from fasaco_edge.mission.core.giving_way import GivingWay
 from fasaco_edge.mission.core.in_dock import InDock
 from fasaco_edge.mission.core.lattice_angle import LatticeAngle
 from fasaco_edge.mission.core.lattice_rotation import LatticeRotation
+from fasaco_edge.mission.core.order_changes import OrderChanges
 from fasaco_edge.mission.core.route import Route
 from fasaco_edge.mission.core.trail_layer import TrailLayer
 from fasaco_edge.mission.core.trouble import Trouble
@@ -99,10 +100,10 @@ class Mission:
         self._line = LineLayer(sweeping, self._map, self._ledger, self._orders, self.route)
         self._trail = TrailLayer(config, self._map, self.route)
         self.charging = Charging(config, self._map, self._orders, self.route, self._gauge)
+        ordered = self._map, self._ledger, self._orders, self.route, self._line
+        self._changes = OrderChanges(*ordered, config.policy, self._rotation.deg)
         measured = self._drive, self.fleet, self._gauge
-        self._handler = EventHandler(
-            *owners, self._line, self._trail, *measured, config.policy, self._rotation.deg
-        )
+        self._handler = EventHandler(*owners, self._line, self._trail, *measured, self._changes)
         self.giving_way = GivingWay(config, self._map, self.route, self.fleet)
         decided_by = self._line, self._trail, self.fleet, self.charging, self.giving_way
         in_dock = InDock(self._map, self._gauge)
@@ -130,7 +131,7 @@ class Mission:
     def restore_order(self, order: OrderState) -> None:
         """Continue an order from before a restart; to be called before the first step."""
         self._map.places.resume(order.places)
-        self._handler.begin_order(self._rotation.order(order, self._rotated_by_deg))
+        self._changes.begin(self._rotation.order(order, self._rotated_by_deg))
         self.state, self.reason = self._executive.status()
 
     def succeed(self, before: Mission) -> None:

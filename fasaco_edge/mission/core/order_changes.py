@@ -1,0 +1,130 @@
+"""Order changes: begins another order, and carries out commands, on map, orders and route."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from fasaco_edge.errors import CommandError, FasacoError
+from fasaco_edge.grid.geometry import Polygon
+from fasaco_edge.grid.rotation import rotated_polygon
+from fasaco_edge.mission.config import MissionPolicy
+from fasaco_edge.mission.core.events import Answer, CommandReceived, PathUpdate
+from fasaco_edge.mission.core.route import Route
+from fasaco_edge.mission.coverage.loss import loss_in
+from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
+from fasaco_edge.mission.line.layer import LineLayer
+from fasaco_edge.mission.map.map_state import MapState
+from fasaco_edge.mission.orders.mask import mask_polygons
+from fasaco_edge.mission.orders.order import rotated_order
+from fasaco_edge.mission.orders.order_state import OrderState, Stage
+from fasaco_edge.mission.orders.sequencer import Sequencer
+
+
+@dataclass(slots=True, eq=False)
+class OrderChanges:
+    """Changes the order, and what follows from it: keep-outs, reachable area, path."""
+
+    map: MapState
+    ledger: MissionLedger
+    orders: Sequencer
+    route: Route
+    line: LineLayer
+    policy: MissionPolicy
+    # Angle of the cells' rows to the x axis of the map frame [deg].
+    lattice_deg: float = 0.0
+    # Polygons to keep out of under every order.
+    _standing: tuple[Polygon, ...] = field(default=(), init=False)
+
+    def __post_init__(self) -> None:
+        self._standing = self.policy.keep_out + mask_polygons(self.policy.keep_out_mask)
+
+    def begin(self, order: OrderState) -> None:
+        """Begin another order, or none; ``update_area`` must be called next."""
+        self.route.abandon()
+        self._keep_out(order)
+        self.orders.start(order)
+
+    def _keep_out(self, order: OrderState) -> None:
+        """Keep out of all areas under an order; ``update_area`` must be called next."""
+        ordered = order.order.keep_out if order.order else ()
+        drawn = tuple(keep_out.polygon for keep_out in order.keep_out)
+        if self.lattice_deg:
+            drawn = tuple(rotated_polygon(polygon, -self.lattice_deg) for polygon in drawn)
+        self.map.keep_out(self._standing + ordered + drawn)
+        self.line.note_map()
+
+    def update_area(self) -> None:
+        """Update the reachable area; want a new plan if it changed."""
+        before, route = self.map.area, self.route
+        self.map.update_area()
+        area = self.map.area
+        if area is None:
+            return
+        self.orders.note_area()
+        if before is None:
+            again = "robot is on coverable ground again"
+            route.want(again if route.revision else self.ledger.first_plan_reason)
+        elif change := area.change_since(before):
+            route.want(str(change), change.window)
+
+    def answer(self, event: CommandReceived) -> tuple[Answer, OrderState | None]:
+        """Return the answer to a command, and the state that follows; None if it is refused."""
+        before = self.orders.order_state
+        try:
+            order = rotated_order(self.map.places.located(event.order), -self.lattice_deg)
+            if event.command == "start":
+                self.map.check_zones(order)
+            asked = event.asked._replace(order=order)
+            has_home = self.map.places.place("home") is not None
+            after = before.commanded(asked, has_home=has_home)
+            if not asked.discard:
+                loss_in(before.forgets(asked, after), self.ledger, self.map).check(asked.name)
+            plan = self._replan() if event.command == "replan" else None
+        except FasacoError as error:
+            return Answer(event.number, error), None
+        return Answer(event.number, plan=plan), after
+
+    def change_to(self, after: OrderState, now: float) -> PathUpdate | None:
+        """Change to the state that follows a command at ``now`` [s]; return the path, if any."""
+        before, update = self.orders.order_state, None
+        if after.order is not before.order:
+            self.begin(after)
+            self.update_area()
+        elif after.keep_out != before.keep_out:
+            update = self._change_keep_outs(after, now)
+        elif after.paused and not before.paused:
+            self.route.pause()
+        elif before.paused and not (after.paused or after.errand):
+            update = self._resume(after, now)
+        self.orders.set_state(after)
+        return update
+
+    def _change_keep_outs(self, order: OrderState, now: float) -> PathUpdate | None:
+        """Follow other keep-outs under the same order; stop a robot that is in one of them."""
+        self._keep_out(order)
+        self.route.forget_failure()
+        self.update_area()
+        if not self.map.is_kept_out:
+            return None
+        # Its border may be near enough to go on from there, but not by this path.
+        self.map.follow_path(None)
+        return self.route.stop("robot is in a keep-out zone", now)
+
+    def _resume(self, order: OrderState, now: float) -> PathUpdate | None:
+        self.route.forget_failure()
+        if order.begun and order.stage is not Stage.RETURNING:
+            return self.route.resume(now)
+        self.route.want("resumed")
+        return None
+
+    def _replan(self) -> int:
+        """Want a full new plan; return its number, or raise CommandError if none can be made."""
+        if self.map.lattice is None:
+            raise CommandError("nothing to plan: there is no map yet")
+        if self.map.pose is None:
+            raise CommandError("nothing to plan: there is no pose yet")
+        if self.map.area is None or self.map.robot_cell() is None:
+            raise CommandError(f"nothing to plan: {self.map.why_misplaced()}")
+        if not self.orders.can_plan:
+            raise CommandError("nothing to plan: no reachable cell is left to cover")
+        return self.route.want_full("asked for")
