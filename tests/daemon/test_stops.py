@@ -49,6 +49,14 @@ def manager(tmp_path):
     running.close()
 
 
+@pytest.fixture
+def bus():
+    """The ``bus`` section of daemons at a router that outlives them."""
+    endpoint = free_endpoint()
+    with router_process(endpoint):
+        yield {"listen": [], "connect": [endpoint], "mode": "client"}
+
+
 def test_a_mask_over_a_driving_robot(tmp_path):
     with (
         daemon_process(tmp_path, mission=dict(MISSION)) as running,
@@ -81,13 +89,10 @@ def test_a_keep_out_zone_over_a_driving_robot_by_reload(tmp_path, manager):
         assert stops(paths.heard[-1])
 
 
-def test_the_end_of_the_daemon(tmp_path):
-    endpoint = free_endpoint()
-    bus = {"listen": [], "connect": [endpoint], "mode": "client"}
+def test_the_end_of_the_daemon(tmp_path, bus):
     with (
-        router_process(endpoint),
         daemon_process(tmp_path, bus=bus) as running,
-        Outsider(endpoint) as outsider,
+        Outsider(running.endpoint) as outsider,
     ):
         paths = outsider.listen("path")
         since = drive(outsider, paths)
@@ -95,14 +100,11 @@ def test_the_end_of_the_daemon(tmp_path):
         assert b"the daemon ends" in paths.wait(stops, since).attachment
 
 
-def test_a_daemon_that_was_killed_and_started_again(tmp_path):
+def test_a_daemon_that_was_killed_and_started_again(tmp_path, bus):
     """Its follower may still have the path of before."""
-    endpoint = free_endpoint()
-    bus = {"listen": [], "connect": [endpoint], "mode": "client"}
     with (
-        router_process(endpoint),
         daemon_process(tmp_path, bus=bus) as running,
-        Outsider(endpoint) as outsider,
+        Outsider(running.endpoint) as outsider,
     ):
         drive(outsider, outsider.listen("path"))
         running.kill()
@@ -113,16 +115,13 @@ def test_a_daemon_that_was_killed_and_started_again(tmp_path):
             assert outsider.ask_status()["state"] in ("waiting for map", "loading")
 
 
-def test_a_daemon_that_takes_over_from_a_frozen_one(tmp_path):
-    endpoint = free_endpoint()
-    bus = {"listen": [], "connect": [endpoint], "mode": "client"}
+def test_a_daemon_that_takes_over_from_a_frozen_one(tmp_path, bus):
     folders = [tmp_path / name for name in ("first", "second")]
     for folder in folders:
         folder.mkdir()
     with (
-        router_process(endpoint),
         daemon_process(folders[0], bus=bus) as first,
-        Outsider(endpoint) as outsider,
+        Outsider(first.endpoint) as outsider,
         daemon_process(folders[1], bus=bus),
     ):
         paths = outsider.listen("path", late=False, begins=True)
