@@ -128,7 +128,8 @@ class SampleOrder:
             self._hold(name, mark, sample)
         elif _is_newer(mark, last):
             self._deliver(name, mark, sample)
-            if self._gap_until is not None:
+            # More of those before may be under way; what another publishes says nothing of that.
+            if self._gap_until is not None and any(one[0] == name for one in self._held):
                 self._gap_until = time.monotonic() + UNDER_WAY_S
 
     def _sort_answer(self, sample: zenoh.Sample, *, again: bool) -> None:

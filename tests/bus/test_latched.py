@@ -289,6 +289,33 @@ def test_where_several_count_an_answer_waits_for_what_is_before_it(
         assert samples.empty()
 
 
+def test_what_is_lost_of_one_publisher_is_not_waited_for_longer_as_another_publishes(
+    bus, endpoint, monkeypatch
+):
+    monkeypatch.setattr(sample_order, "UNDER_WAY_S", 0.5)
+    samples = Queue()
+    hear, under_way, answers = held_under_way(monkeypatch)
+    with publishing(endpoint, cache=3) as publisher, publishing(endpoint, cache=3) as other:
+        publisher.put(b"0")
+        other.put(b"other")
+        subscription = bus.subscribe(KEY, samples.put, latched=True, history=100)
+        assert sorted(taken(samples, 2)) == [b"0", b"other"]
+        for number in range(1, 10):
+            publisher.put(b"%d" % number)
+        while answers.get(timeout=TIMEOUT_S).to_bytes() != b"9":
+            pass
+        heard, deadline = [], time.monotonic() + TIMEOUT_S
+        while b"9" not in heard:
+            assert time.monotonic() < deadline
+            other.put(b"other")
+            sample = under_way.get(timeout=TIMEOUT_S)
+            if sample.payload.to_bytes() == b"other":
+                hear(subscription, sample)
+                time.sleep(0.05)
+            while not samples.empty():
+                heard.append(samples.get().payload)
+
+
 @pytest.mark.parametrize("numbered", [True, False])
 def test_what_is_published_while_somebody_subscribes_comes_once(bus, endpoint, numbered):
     with publishing(endpoint, numbered) as publisher:
