@@ -103,6 +103,25 @@ def test_before_there_is_a_map_all_that_was_covered_counts():
     assert refused_without_map(again) == "start forgets 11 covered cells (0.7 m2)"
 
 
+@pytest.mark.parametrize("at", [(0, 0), (40, 40)])
+def test_what_is_covered_beyond_a_map_that_has_shrunk_counts_too(at):
+    """A mapper that begins again shows little at first."""
+    drive = covering(12)
+    drive.tell(MapReceived(building("..", "..", at=at)))
+    assert "reset forgets 11 covered cells (0.7 m2)" in refused(drive, "reset")
+    assert "start forgets 11 covered cells (0.7 m2)" in refused(drive, "start", OTHER)
+
+
+def test_of_a_zone_too_what_is_covered_beyond_the_map_counts():
+    drive = covering(12)
+    drive.tell(MapReceived(building("..", "..")))
+    west = {"zones": [{"name": "west", "polygon": rectangle(0, 0, 6, 3)}]}
+    inside = [cell for cell in drive.visited | set(drive.driven) if cell[1] < 3]
+    assert 2 < len(inside) < 11
+    assert drive.cell not in inside
+    assert f"start forgets {len(inside)} covered cells" in refused(drive, "start", west)
+
+
 def refused_without_map(drive):
     drive.command("start", OTHER, discard=False)
     return str(drive.refused)

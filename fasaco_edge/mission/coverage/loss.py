@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from fasaco_edge.errors import WouldForget
+from fasaco_edge.grid.geometry import Window
+from fasaco_edge.mission.coverage.ledger import TILE, LedgerSnapshot
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
 from fasaco_edge.mission.map.map_state import MapState
 from fasaco_edge.mission.orders.order import Zone
@@ -60,10 +62,27 @@ def loss_in(zones: tuple[Zone, ...], ledger: MissionLedger, on: MapState) -> Los
     for cell in own.under_tool:
         if lattice.contains(cell):
             covered[lattice.local(cell)] = False
-    cells = int(np.count_nonzero(covered))
+    cells = int(np.count_nonzero(covered)) + _beyond(window, zones, own)
     if on.area is None:
         return Loss(cells, cells * lattice.cell_m**2)
     reachable = on.area.reachable
     all_cells = int(np.count_nonzero(reachable))
     share = int(np.count_nonzero(covered & reachable)) / all_cells if all_cells else 0.0
     return Loss(cells, cells * lattice.cell_m**2, share)
+
+
+def _beyond(window: Window, zones: tuple[Zone, ...], own: LedgerSnapshot) -> int:
+    """Return how many cells in zones are covered outside of a window.
+
+    A map may have shrunk, as that of a mapper that begins again.
+    """
+    cells = 0
+    for i, j in own.tiles:
+        tile = Window(TILE * i, TILE * j, TILE * (i + 1), TILE * (j + 1))
+        for part in tile.without(window):
+            covered = (own.visits(part) > 0) & in_zones(zones, part, own.cell_m)
+            for row, col in own.under_tool:
+                if part.contains(Window(row, col, row + 1, col + 1)):
+                    covered[row - part.row0, col - part.col0] = False
+            cells += int(np.count_nonzero(covered))
+    return cells
