@@ -250,6 +250,36 @@ def test_zones_of_the_configuration(tmp_path):
         assert "no zone 'hall' in mission.zones" in refused.err
 
 
+@pytest.mark.parametrize("frame", ["floor_1", "floor_2"])
+def test_a_zone_named_before_there_is_a_map_lies_on_its_own_map_alone(tmp_path, frame):
+    mission = {"autostart": False, "map_frame": "floor_1"}
+    mission["zones"] = [{"name": "kitchen", "polygon": KITCHEN["polygon"]}]
+    with (
+        daemon_process(tmp_path, mission=mission) as running,
+        Outsider(running.endpoint) as outsider,
+    ):
+        paths = outsider.listen("path")
+        command(outsider, "start", {"zones": [{"name": "kitchen"}]})
+        outsider.put("map", map_bytes(room(3.0, 3.0), frame=frame))
+        outsider.put("pose", pose_bytes(0.75, 0.75, frame=frame))
+        if frame == "floor_1":
+            outsider.wait_status(lambda status: status["state"] == "covering")
+            return
+        status = outsider.wait_status(lambda status: status["state"] == "idle")
+        assert status["reason"] == (
+            "it was given in frame 'floor_1', the map is in 'floor_2': the order was dropped"
+        )
+        assert not paths.heard
+    # Progress on another map says before any map comes that it is not theirs.
+    with (
+        daemon_process(tmp_path, mission=mission) as running,
+        Outsider(running.endpoint) as outsider,
+    ):
+        refused = command(outsider, "start", {"zones": [{"name": "kitchen"}]})
+        assert refused["code"] == "bad_order"
+        assert "given for the map in frame 'floor_1'" in refused["message"]
+
+
 def test_poses_that_stop_are_a_state(tmp_path):
     patience = {"lost_pose_s": 0.5, "stale_map_s": 60.0}
     with (

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from fasaco_edge.bus.claim import ClaimState
@@ -26,7 +27,8 @@ from fasaco_edge.mission.core.events import (
     PoseReceived,
 )
 from fasaco_edge.mission.core.path_exit import PathExit
-from fasaco_edge.mission.orders.order import located
+from fasaco_edge.mission.map.standing_places import StandingPlaces
+from fasaco_edge.mission.orders.order import is_named
 from fasaco_edge.mission.orders.order_state import OrderState
 
 if TYPE_CHECKING:
@@ -122,10 +124,15 @@ class MissionRunner:
         try:
             if rival:
                 raise CommandError(rival, hint="command the one that plans")
-            order = located(asked.order, self.config.mission.zones)
-            has_home = self.config.mission.place("home") is not None
-            before, command = self.order_state, asked.asked._replace(order=order)
-            after = before.commanded(command, has_home=has_home)
+            before = self.order_state
+            places = StandingPlaces(self.config.mission, self.config.mission)
+            places.resume(before.places)
+            if before.frame:
+                places.enter(before.frame)
+            command = asked.asked._replace(order=places.located(asked.order))
+            after = before.commanded(command, has_home=places.place("home") is not None)
+            if is_named(asked.order) and not after.frame:
+                after = replace(after, frame=places.frame)
             if not asked.discard and before.forgets(command, after):
                 self._keeper.check_loss(asked.command)
             if asked.command == "replan":

@@ -119,6 +119,11 @@ class StandingPlaces:
         """Return the destination of an errand; None without one on this map."""
         return None if self.why else self._policy.place(errand)
 
+    @property
+    def frame(self) -> str:
+        """The frame of the map they belong to; "" while that is not known."""
+        return self.note.frame if self.note.of == self._of else self._given.map_frame
+
     def located(self, order: MissionOrder) -> MissionOrder:
         """Return an order with its named zones replaced by those of the configuration.
 

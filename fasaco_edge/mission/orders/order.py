@@ -222,6 +222,11 @@ def order_document(order: MissionOrder) -> dict[str, object]:
     return {"zones": zones, **rest}
 
 
+def is_named(order: MissionOrder) -> bool:
+    """Tell whether an order has zones that are given by name alone."""
+    return any(zone.polygon == () for zone in order.zones)
+
+
 def located(order: MissionOrder, standing: tuple[StandingZone, ...]) -> MissionOrder:
     """Return an order with its named zones replaced by standing zones.
 
