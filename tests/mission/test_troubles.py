@@ -192,6 +192,25 @@ def test_a_robot_that_stands_is_reported_though_each_map_leads_to_another_path()
     assert drive.mission.state is State.COVERING
 
 
+def test_a_robot_that_stands_is_reported_though_the_map_flickers_just_ahead():
+    """Each time the path ends in its own cell, and another one begins there."""
+    drive = driving(*ROOM, config=CONFIG)
+    empty = 0
+    for tick in range(100):
+        events = [pose_at(*drive.cell)]
+        if tick % 8 == 4:
+            ahead = drive.walk[0]
+        if tick % 8 in (4, 6):
+            events.insert(0, patch("#."[tick % 8 == 6], at=ahead))
+        drive.tell(*events, after=1.0)
+        empty += len(drive.mission.route.path.ahead) < 2
+        if drive.request is not None:
+            drive.plan()
+    assert empty > 10
+    assert drive.mission.state is State.DEGRADED
+    assert drive.mission.reason.startswith("the robot stands")
+
+
 def test_a_robot_that_stood_is_not_told_of_with_another_order():
     drive = driving(*ROOM, config=CONFIG)
     for _ in range(65):

@@ -31,6 +31,8 @@ from fasaco_edge.mission.orders.sequencer import Sequencer
 # An errand ends once the robot was in the last cell for this long [s]: its path leads to the centre
 # and ends with a turn.
 ARRIVAL_S = 2.0
+# States of a robot that is not to drive, as somebody said so, or as its order is over.
+STOPPED = frozenset((State.PAUSED, State.IDLE, State.DONE, State.CHARGING))
 PLACES: dict[Errand, str] = {"home": "home", "charge": "to the dock"}
 
 
@@ -95,6 +97,8 @@ class Executive:
         if held := self._give_way():
             return held
         if resting := self._why_resting():
+            if resting[0] in STOPPED:
+                self._standing.begin_anew()
             return self._rest(*resting)
         route = self.route
         cell = self.map.robot_cell()

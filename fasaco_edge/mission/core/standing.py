@@ -1,7 +1,8 @@
 """Standing: how long the robot has been in its cell, and in one place with a path to drive.
 
-Another path does not make a robot that stands drive: only a move, or a time without any path,
-begins the count anew. Times are [s].
+Another path does not make a robot that stands drive: only a move, or a rest by command or at the
+end of an order, begins the count anew. Time without a path, as where a map flickers ahead of the
+robot, does not count. Times are [s].
 """
 
 from __future__ import annotations
@@ -36,11 +37,17 @@ class Standing:
         self._cell: Cell | None = None
         self._entered_at = 0.0
         # The robot's position, to STANDING_M, and since when it has had a path there, or was last
-        # given it again: by our clock, and by the robot's [ns].
+        # given it again: by our clock, and by the robot's [ns]; later by the time without one.
         self._place = math.inf, math.inf
         self._since = 0.0, 0
+        # When it was last seen there with a path to drive, by both clocks.
+        self._had_path = 0.0, 0
         # How often it was given its path again in that place.
         self._tries = 0
+
+    def begin_anew(self) -> None:
+        """Forget the place: the robot rests, and is not to drive."""
+        self._place = math.inf, math.inf
 
     def look(self, cell: Cell, now: float) -> None:
         """Note the robot's cell, and its place."""
@@ -106,11 +113,16 @@ class Standing:
         """Note the robot's place, and whether it has a path to drive."""
         assert self._map.pose is not None
         stamped = self._map.pose
-        here = stamped.pose.x, stamped.pose.y
+        here, at = (stamped.pose.x, stamped.pose.y), (self._now, stamped.stamp_ns)
         if math.dist(here, self._place) > STANDING_M:
-            self._place, self._since, self._tries = here, (self._now, stamped.stamp_ns), 0
-        elif (begun_at := self._route.begun_at) > self._since[0]:
-            self._since, self._tries = (begun_at, stamped.stamp_ns), 0
+            self._place, self._since, self._had_path, self._tries = here, at, at, 0
+        elif not self._has_path:
+            return
+        elif (begun_at := self._route.begun_at) > self._had_path[0]:
+            since, since_ns = self._since
+            had_at, had_ns = self._had_path
+            self._since = since + begun_at - had_at, since_ns + at[1] - had_ns
+        self._had_path = at
 
     def _in_place_s(self) -> float:
         """Return how long the robot has stood in one place with a path to drive.
