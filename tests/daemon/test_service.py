@@ -84,6 +84,23 @@ def test_a_reload_is_told_and_in_force(tmp_path):
         assert status["errors"]["total"] == 0
 
 
+def test_a_trouble_is_the_same_one_after_a_reload(tmp_path):
+    mission = {"lost_pose_s": 0.5}
+    with service(tmp_path, mission=mission) as (running, _), Outsider(running.endpoint) as outsider:
+
+        def since_s(status):
+            return sum(one["since_s"] for one in status["troubles"] if one["code"] == "no_pose")
+
+        outsider.put("map", map_bytes(pillared_room()))
+        outsider.put("pose", pose_bytes(1.0, 1.0))
+        before = outsider.wait_status(lambda status: since_s(status) > 1.0)
+        rewritten(running, planner={"seed": 7})
+        after = outsider.wait_status(
+            lambda status: status["config"]["planner"]["seed"] == 7 and since_s(status)
+        )
+        assert since_s(after) > since_s(before)
+
+
 def test_a_large_mask_is_read_beside_the_loop(tmp_path):
     """Commands are carried out meanwhile, and maps wait: they are decoded in the same memory."""
     mask = Image.new("L", (6000, 6000), 254)

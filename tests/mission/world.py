@@ -78,6 +78,7 @@ class Drive:
     """A mission and a robot; each tick is a step of the mission.
 
     Attributes:
+        config: of the mission.
         cell: where the robot is.
         walk: the cells it still has to drive, by the last path published.
         driven: all it has driven.
@@ -91,6 +92,7 @@ class Drive:
     refused = None
 
     def __init__(self, cell, *first_events, config=CONFIG, order_state=None):
+        self.config = config
         self.mission = Mission(config, order_state)
         self.cell = cell
         self.now = 0.0

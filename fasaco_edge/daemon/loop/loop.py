@@ -158,7 +158,7 @@ class Loop:
                 if mission is not None:
                     self._restart(claim.reason)
                     self._bus.outbox.forget()
-                self._runner.paths.forget()
+                self._runner.stand_by()
             else:
                 self._void_path("this daemon plans from now on")
             claim.announce()

@@ -24,7 +24,6 @@ from fasaco_edge.mission.core.events import (
     Decision,
     Event,
     MapReceived,
-    PoseReceived,
 )
 from fasaco_edge.mission.core.path_exit import PathExit
 from fasaco_edge.mission.map.standing_places import StandingPlaces
@@ -63,7 +62,7 @@ class MissionRunner:
         self._load = load or Loader
         self._loader: Loader | None = None
         self._held = HeldEvents()
-        # The mission that the next one replaces, if that doubts which building it is in.
+        # The mission that the next one replaces.
         self._before: Mission | None = None
 
     @property
@@ -146,13 +145,7 @@ class MissionRunner:
 
     def held(self) -> list[Event]:
         """Return newest map and pose as events, for a new mission."""
-        if self.mission is None:
-            return self._held.events
-        grid, pose = self.mission.grid, self.mission.pose
-        return [
-            *([MapReceived(grid)] if grid is not None else []),
-            *([PoseReceived(pose)] if pose is not None else []),
-        ]
+        return self._held.events if self.mission is None else self.mission.held()
 
     def step(self, mission: Mission, events: Sequence[Event], now: float) -> Decision:
         """Step the mission; its path is due afterwards."""
@@ -169,12 +162,18 @@ class MissionRunner:
         if self.mission is not None and self.worker is not None:
             self.worker.disown()
             self._keeper.take_back(self.mission)
-            self._before = self.mission if self.mission.is_in_doubt else None
+            self._before = self.mission
         elif self._loader is not None:
             self._loader.drop()
         self.config = config
         self.mission = self.worker = self._loader = None
         self._held = HeldEvents(held)
+
+    def stand_by(self) -> None:
+        """Send nothing more, as another daemon plans; keep only the doubt about the building."""
+        self.paths.forget()
+        if self._before is not None and not self._before.is_in_doubt:
+            self._before = None
 
     def submit(self, request: PlanRequest) -> None:
         """Submit a plan request."""

@@ -68,6 +68,10 @@ class BatteryGauge:
         self._since: tuple[float, float] | None = None
         self._drains: deque[float] = deque(maxlen=NEWEST)
 
+    def succeed(self, before: BatteryGauge) -> None:
+        """Go on with what another gauge has heard."""
+        vars(self).update(vars(before))
+
     @property
     def drain_per_s(self) -> float | None:
         """Charge used per second of driving; None before enough was measured."""
@@ -139,6 +143,11 @@ class Charging:
     _is_best_here: bool = field(default=False, init=False)
     # The highest level since the robot is in its dock, and since when; None elsewhere.
     _best: tuple[float, float] | None = field(default=None, init=False)
+
+    def succeed(self, before: Charging) -> None:
+        """Go on with the gauge of another one, and with its wait for the last percents."""
+        self.gauge.succeed(before.gauge)
+        self._best = before._best
 
     @property
     def policy(self) -> BatteryPolicy | None:

@@ -35,6 +35,10 @@ class DockCurrent:
         """Whether the robot was docked at the last look."""
         return self._docked_at is not None
 
+    def succeed(self, before: DockCurrent) -> None:
+        """Go on with what another one has followed."""
+        vars(self).update(vars(before) | {"_gauge": self._gauge})
+
     def look(self, now: float, *, is_docked: bool) -> None:
         """Note level and power supply at ``now``; to be called in each step."""
         if not is_docked:

@@ -89,10 +89,10 @@ class EventHandler:
 
     def _apply(self, event: Event | PatchRun) -> None:
         match event:
-            case MapReceived(grid):
+            case MapReceived(grid, at):
                 if self.map.take_map(grid):
                     self._enter_frame(grid.frame)
-                self._map_changed()
+                self._map_changed(at)
             case PatchRun(patches):
                 has_changed, faults = self.map.take_patches(patches)
                 self._faults += faults
@@ -100,8 +100,8 @@ class EventHandler:
                     self._map_changed()
             case PatchesLost(count):
                 self.map.lose_patches(count)
-            case PoseReceived(pose):
-                self._take_pose(pose)
+            case PoseReceived(pose, at):
+                self._take_pose(pose, at)
             case BatteryReceived():
                 drives = len(self.route.path.ahead) > 1
                 self.battery.note(event, self._now, drives=drives)
@@ -116,11 +116,11 @@ class EventHandler:
                 if reason := self.fleet.others.hear(event, self._now):
                     self.route.want(reason)
 
-    def _map_changed(self) -> None:
+    def _map_changed(self, at: float | None = None) -> None:
         """Follow a new map; raise LedgerMismatchError if it shows another building."""
         assert self.map.free is not None
         assert self.map.grid is not None
-        self.monitor.note_map(self._now)
+        self.monitor.note_map(self._now if at is None else at)
         self.line.note_map()
         self.route.note_map()
         before = self._compare_buildings()
@@ -208,15 +208,15 @@ class EventHandler:
         """Stop the robot: its path belongs to another map."""
         self._path = self.route.stop(why, self._now) or self._path
         self.route.abandon()
-        self.monitor.forget_pose()
+        self.monitor.forget_pose(self._now)
         self.trail.begin_anew()
 
-    def _take_pose(self, stamped: StampedPose) -> None:
+    def _take_pose(self, stamped: StampedPose, at: float | None = None) -> None:
         if self.map.frames.note_pose(stamped, self._now):
             self._enter_frame(stamped.frame)
         before = self.map.pose
         self.map.take_pose(stamped)
-        has_jumped = self.monitor.note_pose(stamped.pose, self._now)
+        has_jumped = self.monitor.note_pose(stamped.pose, self._now if at is None else at)
         if has_jumped:
             self.ledger.break_track()
             self.drive.break_track()

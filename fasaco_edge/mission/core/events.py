@@ -30,9 +30,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class MapReceived:
-    """A full map."""
+    """A full map; ``at``: when it came [s], where a mission before has had it, else None."""
 
     grid: OccupancyGrid
+    at: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,9 +52,10 @@ class PatchesLost:
 
 @dataclass(frozen=True, slots=True)
 class PoseReceived:
-    """A pose of the robot."""
+    """A pose of the robot; ``at``: as that of a map."""
 
     pose: StampedPose
+    at: float | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -72,6 +72,12 @@ class Executive:
         drives = self.charging, self.giving_way, self._standing
         self.troubles = Troubles(self.map, self.monitor, *drives, self.dock)
 
+    def succeed(self, before: Executive) -> None:
+        """Go on where another mission ended; a docked robot stays docked."""
+        self.troubles.succeed(before.troubles)
+        if before._state is State.CHARGING:
+            self._state, self._reason = before._state, before._reason
+
     def status(self) -> tuple[State, str]:
         """Return the reported state and its reason, by the last decision."""
         found = self.troubles.found

@@ -85,6 +85,11 @@ class GivingWay:
         # Why it waited last, and when.
         self._waited, self._waited_at = "", -math.inf
 
+    def succeed(self, before: GivingWay) -> None:
+        """Go on with the count of another one: where the robot stays, and why it waited."""
+        self._waited, self._waited_at = before._waited, before._waited_at
+        self._stays_at, self._stays_since = before._stays_at, before._stays_since
+
     def line(self) -> Points:
         """Return the next metres, from the robot's place on, points (x, y) [m], float64 (n, 2)."""
         pose = self._map.pose

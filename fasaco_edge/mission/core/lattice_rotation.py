@@ -67,10 +67,10 @@ class LatticeRotation:
         if not self.deg:
             return event
         match event:
-            case MapReceived(grid):
-                return MapReceived(_rotated_grid(grid, -self.deg))
-            case PoseReceived(pose):
-                return PoseReceived(_rotated_stamped(pose, -self.deg))
+            case MapReceived(grid, at):
+                return MapReceived(_rotated_grid(grid, -self.deg), at)
+            case PoseReceived(pose, at):
+                return PoseReceived(_rotated_stamped(pose, -self.deg), at)
             case MemberHeard(x=x, y=y):
                 x, y = rotated_point(x, y, -self.deg)
                 ahead = tuple(rotated_point(*point, -self.deg) for point in event.ahead)

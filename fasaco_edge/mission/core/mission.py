@@ -135,9 +135,19 @@ class Mission:
         self.state, self.reason = self._executive.status()
 
     def succeed(self, before: Mission) -> None:
-        """Go on with the doubt of another mission about the building; before the first step."""
+        """Go on with what another mission knew of robot and inputs, and with its doubt about the
+        building; before the first step, to which the events of its ``held`` belong."""
+        self._executive.succeed(before._executive)
         if before.is_in_doubt and before.rotation == self.rotation:
             self._map.watch_on(before._map.building)
+
+    def held(self) -> list[Event]:
+        """Return newest map and pose as events for a mission that goes on with them."""
+        monitor = self._executive.monitor
+        return [
+            *([MapReceived(self.grid, monitor.map_at)] if self.grid is not None else []),
+            *([PoseReceived(self.pose, monitor.pose_at)] if self.pose is not None else []),
+        ]
 
     @property
     def is_in_doubt(self) -> bool:
@@ -194,14 +204,14 @@ class Mission:
         """Continue on a lattice at the new angle; return the path that stops the robot, if any."""
         before, order, route = self.snapshot(), self.order_state, self.route
         is_confirmed = self._ledger.is_confirmed and not self._map.building.is_foreign
-        held: list[Event] = [MapReceived(self.grid)] if self.grid is not None else []
-        held += [PoseReceived(self.pose)] if self.pose is not None else []
+        executive, held = self._executive, self.held()
         # No path may be driven that is no longer checked.
         stop = route.stop(why, now)
         self._lay_cells()
         self._resume(before, is_confirmed=is_confirmed)
         self.restore_order(order)
         self.route.succeed(route)
+        self._executive.succeed(executive)
         self._drive.break_track()
         self._handle(held, now)
         self.route.want(why)

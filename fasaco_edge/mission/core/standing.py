@@ -45,6 +45,11 @@ class Standing:
         # How often it was given its path again in that place.
         self._tries = 0
 
+    def succeed(self, before: Standing) -> None:
+        """Go on with the count of another one, whose path was the last that the robot had."""
+        self._place, self._since, self._tries = before._place, before._since, before._tries
+        self._had_path = before._had_path
+
     def begin_anew(self) -> None:
         """Forget the place: the robot rests, and is not to drive."""
         self._place = math.inf, math.inf

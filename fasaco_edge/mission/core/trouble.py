@@ -85,6 +85,15 @@ class Troubles:
         """Its limits."""
         return self.charging.config.policy
 
+    def succeed(self, before: Troubles) -> None:
+        """Go on with what another mission has found and counted: no limit begins anew."""
+        self.found = before.found
+        self.monitor.succeed(before.monitor)
+        self.charging.succeed(before.charging)
+        self.giving_way.succeed(before.giving_way)
+        self.standing.succeed(before.standing)
+        self._current.succeed(before._current)
+
     def look(self, state: State, now: float) -> None:
         """Find the troubles at ``now`` [s] of a mission that is in a state; once in each step."""
         self.monitor.begin(now)

@@ -174,6 +174,8 @@ class InputMonitor:
         self.doubt_since = 0.0
         self._config = config
         self._pose: Pose2D | None = None
+        # Whether a pose has come, in whatever frame.
+        self._has_pose = False
         # When the last ones came; before that, when they began to be due.
         self._pose_at: float | None = None
         self._map_at: float | None = None
@@ -185,6 +187,21 @@ class InputMonitor:
         self._pose_at = now if self._pose_at is None else self._pose_at
         self._map_at = now if self._map_at is None else self._map_at
 
+    def succeed(self, before: InputMonitor) -> None:
+        """Go on with the times of another monitor."""
+        self._has_pose, self._pose_at = before._has_pose, before._pose_at
+        self._map_at = before._map_at
+
+    @property
+    def pose_at(self) -> float | None:
+        """When the last pose came; before that, when it began to be due; None before that."""
+        return self._pose_at
+
+    @property
+    def map_at(self) -> float | None:
+        """The same of maps and updates."""
+        return self._map_at
+
     def note_map(self, now: float) -> None:
         """Note a map or an update."""
         self._map_at = now
@@ -192,7 +209,7 @@ class InputMonitor:
     def note_pose(self, pose: Pose2D, now: float) -> bool:
         """Note a pose; return whether the track from the last one is unknown."""
         last, lost = self._pose, self.is_pose_lost(now)
-        self._pose, self._pose_at = pose, now
+        self._pose, self._pose_at, self._has_pose = pose, now, True
         if last is None:
             return False
         distance = math.hypot(pose.x - last.x, pose.y - last.y)
@@ -205,9 +222,9 @@ class InputMonitor:
             self.doubt = f"the pose {how if lost else f'jumped {distance:.2f} m'}"
         return jumped or lost
 
-    def forget_pose(self) -> None:
-        """Forget the last pose: the next one is in another frame."""
-        self._pose, self.doubt = None, ""
+    def forget_pose(self, now: float) -> None:
+        """Forget the last pose: the next one is in another frame, and due from now on."""
+        self._pose, self._pose_at, self.doubt = None, now, ""
 
     def clear_doubt(self) -> None:
         """Trust the robot's pose."""
@@ -233,7 +250,7 @@ class InputMonitor:
     def is_pose_lost(self, now: float) -> bool:
         """Tell whether poses have timed out."""
         limit = self._config.policy.lost_pose_s
-        return self._pose is not None and 0 < limit < self.pose_silent_s(now)
+        return self._has_pose and 0 < limit < self.pose_silent_s(now)
 
     def is_map_stale(self, now: float) -> bool:
         """Tell whether maps and updates have timed out."""
