@@ -288,3 +288,26 @@ def test_the_errand_survives_a_restart():
 def test_an_order_without_an_errand_is_kept_as_older_daemons_read_it():
     drive = covering()
     assert "errand" not in drive.mission.snapshot().note
+
+
+@pytest.mark.parametrize("how", ["home", "return_home"])
+def test_a_path_that_a_map_cuts_off_behind_it_is_replaced_at_once(how):
+    """Its own cell is blocked, the one beside it is not, and no way leads home from there."""
+    drive = Drive((0, 0), MapReceived(building("............")), pose_at(0, 0))
+    drive.finish()
+    if how == "home":
+        drive.command("home")
+    else:
+        drive.command("start", {"return_home": True, "keep_covered": True})
+    while drive.cell != (0, 8):
+        assert drive.walk
+        drive.go()
+    assert drive.walk
+    edge = pose_at(0, 8.45)
+    drive.tell(edge)
+    blocked = MapReceived(building("........#..."))
+    decision = drive.tell(blocked, edge)
+    assert drive.mission.state is State.BLOCKED
+    assert drive.mission.reason == "no way home: waits for a map that shows one"
+    assert decision.path is not None
+    assert drive.walk == []

@@ -31,6 +31,7 @@ from fasaco_edge.mission.orders.sequencer import Sequencer
 # An errand ends once the robot was in the last cell for this long [s]: its path leads to the centre
 # and ends with a turn.
 ARRIVAL_S = 2.0
+NO_WAY = "no way {}: waits for a map that shows one"
 # States of a robot that is not to drive, as somebody said so, or as its order is over.
 STOPPED = frozenset((State.PAUSED, State.IDLE, State.DONE, State.CHARGING))
 PLACES: dict[Errand, str] = {"home": "home", "charge": "to the dock"}
@@ -105,12 +106,12 @@ class Executive:
         if resting := self._why_resting():
             if resting[0] in STOPPED:
                 self._standing.begin_anew()
-            return self._rest(*resting)
+            return self._rest(*resting, None)
         route = self.route
         cell = self.map.robot_cell()
         if cell is None or self.map.area is None:
             self.map.forget_area()
-            return self._rest(State.BLOCKED, self.map.why_misplaced())
+            return self._rest(State.BLOCKED, self.map.why_misplaced(), None)
         self._standing.look(cell, now)
         if not len(route.path.cells):
             self.monitor.clear_doubt()  # without a path the robot cannot be off it
@@ -132,7 +133,7 @@ class Executive:
             route.want(reason)
         if route.wanted and route.pending is None:
             if why := route.why_not_yet(now):
-                return self._rest(State.BLOCKED, why)
+                return self._rest(State.BLOCKED, why, update)
             # Wait a moment after the robot was stopped.
             is_too_soon = self._state is State.BLOCKED and not self._standing.has_waited
             return Decision(path=update) if is_too_soon else self._request(cell, update)
@@ -215,8 +216,12 @@ class Executive:
             "waits for one in the map's"
         )
 
-    def _rest(self, state: State, reason: str, update: PathUpdate | None = None) -> Decision:
-        """Rest in a state: the mission then withdraws the path; else ``update`` is published."""
+    def _rest(self, state: State, reason: str, update: PathUpdate | None) -> Decision:
+        """Rest in a state: the mission then withdraws the path; else ``update`` is published.
+
+        ``update`` is what this step has made of the path: a path that was cut to nothing is not
+        withdrawn again.
+        """
         self._state, self._reason = state, reason
         return Decision(path=update)
 
@@ -283,7 +288,7 @@ class Executive:
             return self._settle(update)
         path = self._way(area, cell, home)
         if not len(path):
-            return self._rest(State.BLOCKED, "no way home: waits for a map that shows one")
+            return self._rest(State.BLOCKED, NO_WAY.format("home"), update)
         self._state, self._reason = State.RETURNING, "on the way home"
         if np.array_equal(path, route.path.ahead):
             return Decision(path=update)
@@ -310,8 +315,8 @@ class Executive:
         goal = orders.goal(errand)
         if cell == goal and not is_new and self._standing.in_cell_s >= ARRIVAL_S:
             if errand == "charge":
-                return self._rest(State.CHARGING, self.charging.why(self._now))
-            return self._arrive()
+                return self._rest(State.CHARGING, self.charging.why(self._now), update)
+            return self._arrive(update)
         is_off = path.finished or path.is_far(cell) or bool(self.monitor.doubt)
         stands = cell != goal and self._standing.is_on_path
         if stands and not is_new:
@@ -321,7 +326,7 @@ class Executive:
         if is_new or is_lost or not len(path.cells) or tuple(path.cells[-1].tolist()) != goal:
             self.monitor.clear_doubt()
             if goal is None or area is None or not area.contains(goal):
-                return self._rest(State.BLOCKED, f"no way {to}: waits for a map that shows one")
+                return self._rest(State.BLOCKED, NO_WAY.format(to), update)
             here = self.map.cell_at_pose() or cell
             why = self.charging.why_due() if errand == "charge" else ""
             update = self._lead(self._way(area, here, goal), f"drives {to}{why}", errand)
@@ -350,9 +355,9 @@ class Executive:
             return State.BLOCKED, "near the dock: waits for the battery to say if it charges"
         return None
 
-    def _arrive(self) -> Decision:
+    def _arrive(self, update: PathUpdate | None) -> Decision:
         """End an errand on arrival."""
         self.orders.set_state(self.orders.order_state.arrived())
         resting = self._why_resting()
         assert resting is not None
-        return self._rest(*resting)
+        return self._rest(*resting, update)
