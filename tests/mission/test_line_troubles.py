@@ -17,9 +17,10 @@ from fasaco_edge.grid.lattice import CoverageLattice, Footprint
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.host.processes import peak_mb
 from fasaco_edge.mission.config import Sweeping
-from fasaco_edge.mission.core.events import MapReceived, State
+from fasaco_edge.mission.core.events import CommandReceived, MapReceived, State
 from fasaco_edge.mission.core.mission import Mission
 from fasaco_edge.mission.line.line_ahead import LineAhead
+from fasaco_edge.mission.orders.keep_outs import KeepOut
 from tests.grid.test_floor import room
 from tests.mission.test_line import CONFIG, RADIUS_M, ROBOT, Robot, assert_clear
 
@@ -148,3 +149,22 @@ def test_a_robot_beside_a_long_straight_line_gets_one_that_turns_off_it():
     ahead.lay(np.array(turns_off, np.int32), aside)
     assert ahead.xy()[0].tolist() == pytest.approx([aside.x, aside.y])
     assert ahead.xy()[-1].tolist() == pytest.approx([16.5 * 0.25, 8.5 * 0.25], abs=0.03)
+
+
+def test_without_its_last_keep_out_the_whole_floor_is_swept():
+    """All but the floor of the keep-out counted as swept: cells were covered in passing."""
+    grid = room(3.0, 2.4)
+    robot = Robot(Mission(CONFIG))
+    for _ in range(2):
+        robot.tell(MapReceived(grid))
+    asked_m2 = robot.mission.floor_to_sweep().asked_m2
+    polygon = ((3.6, 2.2), (3.9, 2.2), (3.9, 2.5), (3.6, 2.5))
+    for number, name in enumerate(("keep_out_add", "keep_out_remove")):
+        keep_out = KeepOut("vase", polygon if name == "keep_out_add" else ())
+        robot.tell(CommandReceived(number, name, keep_out=keep_out))
+        is_less = robot.mission.floor_to_sweep().asked_m2 < asked_m2
+        assert is_less == (name == "keep_out_add")
+    assert robot.mission.floor_to_sweep().asked_m2 == asked_m2
+    robot.finish()
+    figures = judge_floor(grid, np.array([*robot.trail, robot.at]), ROBOT).figures
+    assert figures.swept_share > 0.95

@@ -94,10 +94,13 @@ class LineLayer:
             self._ahead = LineAhead(floor)
             self._asked, self._touched = None, None
             return
+        before = self._ahead.tally
         if self._ahead.follow_floor(floor):
             self._is_dropped = True
-        if floor.shift is None:
-            self._touched, self._unexplained, self._asked = floor.touched, None, None
+        # A floor without its last keep-out is another one, whatever its newest map has changed.
+        if floor.shift is None or self._ahead.tally is not before:
+            whole = Window(0, 0, floor.geometry.rows, floor.geometry.cols)
+            self._touched, self._unexplained, self._asked = whole, None, None
             return
         touched, self._unexplained = (
             window and window.moved(*floor.shift) for window in (self._touched, self._unexplained)
