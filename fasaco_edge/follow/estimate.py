@@ -84,6 +84,8 @@ class PoseEstimate:
                 is accepted.
             pose_at: arrival of the newest accepted pose [s]; None before there is one.
             measured: the newest pose, unfiltered.
+            commanded: motion along x and y [m] and turn [rad] that the commands until then should
+                have caused, in the headings that were measured.
             delay: between a command and its effect on an arriving pose [s].
     """
 
@@ -95,6 +97,7 @@ class PoseEstimate:
         self._unlike = [0.0] * len(DELAYS_S)
         self._pose = Pose2D(0.0, 0.0)
         self.measured = self._pose
+        self.commanded = (0.0, 0.0, 0.0)
         self._doubted: Pose2D | None = None
         self._agreeing = 0
         self._sent = deque[tuple[float, Command]]()
@@ -171,8 +174,21 @@ class PoseEstimate:
             self._unlike[index] = FORGETTING * self._unlike[index] + unlike
         self.delay = DELAYS_S[self._unlike.index(min(self._unlike))]
 
+    def _add_commanded(self, now: float) -> None:
+        """Add what the commands meant since the last pose."""
+        if self.pose_at is None:
+            return
+        here, turned = self.measured, 0.0
+        for seconds, command in self._between(self.pose_at - self.delay, now - self.delay):
+            here = moved(here, command, seconds)
+            turned += command.turn_rate * seconds
+        x, y, turn = self.commanded
+        went = (here.x - self.measured.x, here.y - self.measured.y)
+        self.commanded = (x + went[0], y + went[1], turn + turned)
+
     def _believe(self, pose: Pose2D, now: float, measured: Pose2D) -> None:
         self._measure_delay(measured, now)
+        self._add_commanded(now)
         self.measured = measured
         self._pose, self.pose_at = pose, now
         self.jump, self._doubted, self._agreeing = None, None, 0

@@ -113,8 +113,8 @@ class Follower(Supervision):
             self._is_new, self._before = False, None
         leg = self._route.leg
         toward = self._route.toward(here, LEADS_M)
-        if leg is not None and self._grip.is_lost(self._estimate.measured, toward, now):
-            self.state, self.detail = State.NOT_MOVING, f"tried {self._grip.tries} times"
+        if leg is not None and self._grip.is_lost(self._estimate, toward, now):
+            self.state, self.detail = State.NOT_MOVING, self._grip.detail
             return None
         if leg is not None and (off := leg.distance(here)) > OFF_PATH_M:
             self.state, self.detail = State.OFF_PATH, f"by {off:.2f} m"

@@ -1,80 +1,131 @@
-"""Check that the base moves as commanded: one that pushes against an obstacle must stop."""
+"""Check that the base moves as commanded: one that pushes against an obstacle must stop.
+
+Poses scatter, so no two of them are compared: all poses of a look are fitted to the motion that was
+commanded. The share of it that they show is about 1 for a robot that moves and 0 for one that does
+not, whatever way it drives and turns. Scatter makes it larger as often as smaller: if it is so
+large that nothing can be told, one look in two ends in a pause.
+"""
 
 from __future__ import annotations
 
 import math
 
-from fasaco_edge.follow.estimate import Command
+from fasaco_edge.follow.estimate import Command, PoseEstimate
+from fasaco_edge.follow.rest import MOVED_M, Place, Rest
 from fasaco_edge.follow.tries import Tries
 from fasaco_edge.grid.geometry import Pose2D
 
-# The check follows this commanded distance [m], of which the robot must have moved this share; a
-# radian of turning counts as the third. For a fast robot it follows after this time [s]: poses lag.
+# A look takes this commanded distance [m], of which the robot must have moved this share; a radian
+# of turning counts as the third. For a fast robot it takes this time [s] and these poses.
 LEAST_WAY_M, LEAST_SHARE, WAY_M_RAD = 0.2, 0.15, 0.2
-LOOK_S = 2.0
+LOOK_S, LEAST_POSES = 2.0, 3
 # Pause after the first try [s], doubled after the next, and number of tries in a direction. After
-# the last one it waits until its pose has moved this far [m], or the path leads elsewhere.
+# the last one it waits until it is moved, or the path leads elsewhere.
 REST_S = 2.0
 TRIES = 3
-FREED_M = 0.1
 
 
 class Grip:
     """Compares the commands with the motion of the poses."""
 
     def __init__(self) -> None:
-        self._tries = Tries(FREED_M, REST_S, math.inf, TRIES)
+        self._tries = Tries(MOVED_M, REST_S, math.inf, TRIES)
+        self._rest = Rest()
+        self._look = _Look()
         self._toward = 0.0
-        self._from = Pose2D(0.0, 0.0)
-        # Commanded distance and duration since then.
-        self._way, self._seconds = 0.0, 0.0
-        # Commanded distance since the first failed try [m].
-        self._pushed = 0.0
+        self._rests = False
+        self._pose, self._turned = Pose2D(0.0, 0.0), 0.0
 
     @property
-    def tries(self) -> int:
-        """Number of tries in the present direction in which the robot did not move."""
-        return self._tries.tries(self._toward)
+    def detail(self) -> str:
+        """The tries in the present direction in which the robot did not move, for people."""
+        said = f"tried {self._tries.tries(self._toward)} times"
+        if (least := self._rest.least) >= 2.0 * MOVED_M:
+            said += f"; poses scatter: goes on once moved by {least:.1f} m"
+        return said
 
-    def is_lost(self, pose: Pose2D, toward: float, now: float) -> bool:
+    def is_lost(self, estimate: PoseEstimate, toward: float, now: float) -> bool:
         """Tell whether the robot must pause because it did not move.
 
         Args:
-            pose: the newest one measured.
+            estimate: with the newest pose, and the motion commanded until then.
             toward: the direction in which the path leads [rad].
             now: the time [s].
         """
         self._toward = toward
-        # Odometry that runs on while wheels slip is no progress.
-        self._tries.moved_to((pose.x, pose.y), LEAST_SHARE * self._pushed)
+        pose, is_new = estimate.measured, estimate.measured is not self._pose
+        self._turned += math.remainder(pose.yaw - self._pose.yaw, math.tau)
+        self._pose = pose
+        place = (pose.x, pose.y, WAY_M_RAD * self._turned)
         if not self._tries.may_try(toward, now):
-            if self._seconds > 0.0:
-                self._look_from(pose)
-            if self._came(pose) < FREED_M:
+            if not self._rests:
+                self._rests = True
+                self._rest.begin(now)
+            if not self._rest.is_moved(place, now):
                 return True
-            # It was moved, perhaps turned, while nothing was commanded.
             self._tries.forget()
-        if self._seconds == 0.0:
-            self._look_from(pose)
-        if self._seconds < LOOK_S or self._way < LEAST_WAY_M:
+        if self._rests:
+            self._rests, self._look = False, _Look()
+        look = self._look
+        if is_new or not look.count:
+            x, y, turn = estimate.commanded
+            look.take(place, (x, y, WAY_M_RAD * turn))
+        if look.seconds < LOOK_S or look.way < LEAST_WAY_M or look.count < LEAST_POSES:
             return False
-        is_lost = self._came(pose) < LEAST_SHARE * self._way
-        self._look_from(pose)
-        if is_lost:
-            self._tries.failed((pose.x, pose.y), toward, now)
-        return is_lost
+        self._look = _Look()
+        if look.share() >= LEAST_SHARE:
+            self._tries.moved_to(look.middle())
+            return False
+        self._tries.failed(look.middle(), toward, now)
+        return True
 
     def sent(self, command: Command, seconds: float) -> None:
         """Note a command and its duration."""
-        if way := seconds * (command.speed + WAY_M_RAD * abs(command.turn_rate)):
-            self._way += way
-            self._seconds += seconds
-            self._pushed = self._pushed + way if self._tries.have_failed else 0.0
+        if way := seconds * (abs(command.speed) + WAY_M_RAD * abs(command.turn_rate)):
+            self._look.way += way
+            self._look.seconds += seconds
 
-    def _came(self, pose: Pose2D) -> float:
-        """Return how far the robot has come since the last look [m]."""
-        turned = abs(math.remainder(pose.yaw - self._from.yaw, math.tau))
-        return math.hypot(pose.x - self._from.x, pose.y - self._from.y) + WAY_M_RAD * turned
 
-    def _look_from(self, pose: Pose2D) -> None:
-        self._from, self._way, self._seconds = pose, 0.0, 0.0
+class _Look:
+    """Poses over commanded motion, by least squares.
+
+    Attributes:
+        way, seconds: commanded distance [m], and its duration [s].
+        count: number of poses.
+    """
+
+    def __init__(self) -> None:
+        self.way = self.seconds = 0.0
+        self.count = 0
+        self._first: tuple[Place, Place] | None = None
+        # Sums of measured and commanded motion since the first pose, and of their products.
+        self._measured, self._commanded = [0.0] * 3, [0.0] * 3
+        self._products = self._squares = 0.0
+
+    def take(self, place: Place, commanded: Place) -> None:
+        """Take in a pose, and the motion commanded until then."""
+        self._first = self._first or (place, commanded)
+        self.count += 1
+        for axis in range(3):
+            went, meant = place[axis] - self._first[0][axis], commanded[axis] - self._first[1][axis]
+            self._measured[axis] += went
+            self._commanded[axis] += meant
+            self._products += went * meant
+            self._squares += meant * meant
+
+    def share(self) -> float:
+        """Return how much of the commanded motion the poses show; 0 if none had effect by then."""
+        went, meant = self._measured, self._commanded
+        products = self._products - _product(went, meant) / self.count
+        squares = self._squares - _product(meant, meant) / self.count
+        return products / squares if squares > 0.0 else 0.0
+
+    def middle(self) -> tuple[float, float]:
+        """Return the mean of the positions [m]."""
+        assert self._first is not None
+        (x, y, _), _ = self._first
+        return x + self._measured[0] / self.count, y + self._measured[1] / self.count
+
+
+def _product(one: list[float], other: list[float]) -> float:
+    return sum(a * b for a, b in zip(one, other, strict=True))

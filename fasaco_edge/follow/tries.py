@@ -46,16 +46,10 @@ class Tries:
         self._place: Point | None = None
         self._directions: list[_Direction] = []
 
-    def moved_to(self, here: Point, least: float = 0.0) -> None:
-        """Take in the robot's position; progress is at least ``least`` [m], too."""
-        far = max(self._far, least)
-        if self._place is not None and math.dist(here, self._place) >= far:
+    def moved_to(self, here: Point) -> None:
+        """Take in the robot's position."""
+        if self._place is not None and math.dist(here, self._place) >= self._far:
             self.forget()
-
-    @property
-    def have_failed(self) -> bool:
-        """Whether a try has failed in this place."""
-        return self._place is not None
 
     def forget(self) -> None:
         """Begin anew: there was progress."""

@@ -298,8 +298,8 @@ def test_a_path_that_leads_elsewhere_has_tries_of_its_own_and_no_more(told):
 
 def test_a_robot_that_somebody_turns_may_try_again(told):
     told.states_where_it_is(30.0)
-    for step in range(40):
-        told.pose(yaw=0.02 * step)
+    for step in range(80):
+        told.pose(yaw=min(0.02 * step, 0.8))
         told.step()
     assert told.follower.state is State.DRIVING
 

@@ -4,10 +4,7 @@ import math
 
 import pytest
 
-from fasaco_edge.follow.estimate import Command
-from fasaco_edge.follow.grip import Grip
 from fasaco_edge.follow.tries import Tries
-from fasaco_edge.grid.geometry import Pose2D
 
 HERE = (1.0, 2.0)
 
@@ -72,13 +69,3 @@ def test_directions_that_turn_on_and_on_are_bounded():
             tries.failed(HERE, toward, 0.0)
             count += 1
             assert count <= 8 * 3
-
-
-def test_odometry_that_runs_on_while_wheels_slip_is_no_progress():
-    grip, x, pushed_s, tick_s = Grip(), 0.0, 0.0, 0.05
-    for tick in range(2_400):
-        is_lost = grip.is_lost(Pose2D(x, 0.0), 0.0, tick * tick_s)
-        grip.sent(Command(0.0 if is_lost else 0.3, 0.0), tick_s)
-        if not is_lost:
-            pushed_s, x = pushed_s + tick_s, x + 0.04 * tick_s
-    assert pushed_s == pytest.approx(6.0, abs=0.1)
