@@ -232,6 +232,23 @@ def test_a_malformed_sample_costs_that_sample(recorded):
     assert sum(Keys().of(topics.COVERAGE) in line for (line,) in lines) == 1
 
 
+@pytest.mark.parametrize("polygon", [[], [[]], [[0], [1, 1]], [[0, 0], [1, 0, 5], [1, 1]]], ids=str)
+def test_an_area_that_is_none_does_not_end_it(tmp_path, polygon):
+    area = {"name": "a", "polygon": polygon}
+    with (
+        bus_on_free_port() as (bus, endpoint),
+        recorder_process(bus, endpoint, tmp_path) as recorder,
+    ):
+        status, command = Sender(bus, topics.STATUS), Sender(bus, topics.COMMAND)
+        order = {"zones": [area], "keep_out": [polygon]}
+        command.put(encode_json({"command": "start", "order": order}))
+        for number in range(3):
+            mission = {"keep_outs": [area, {"name": f"{number}", "polygon": [[0, 0], [1, 1]]}]}
+            status.put(encode_json({"state": "covering", "mission": mission}))
+        recorder.written(4)
+        assert recorder.process.poll() is None
+
+
 def test_the_report_tells_what_is_going_on(recorded):
     report = recorded.report
     assert report["state"] == "recording"

@@ -136,6 +136,17 @@ def test_a_rectangle_is_whole_or_missing():
     assert tolerant({"changed": edges | {"x_min": "0"}}, PathAttachment).changed is None
 
 
+@pytest.mark.parametrize("corner", [[], [1], [1, 0, 5], [1, "0"], [1, "9" * 400], "10", None])
+def test_a_corner_has_two_coordinates_or_is_left_out(corner):
+    """Who draws or lists a polygon takes a corner for two numbers."""
+    area = {"name": "a", "polygon": [[0, 0], corner, [1, 1]]}
+    document = {"mission": {"keep_outs": [area]}, "config": {"mission": {"zones": [area]}}}
+    status = tolerant(document, Status)
+    zones = known_settings(status.config).mission.zones
+    for known in (status.mission.keep_outs[0], zones[0]):
+        assert known.polygon == ((0.0, 0.0), (1.0, 1.0))
+
+
 def test_a_repair_that_costs_more_has_saved_nothing():
     path = CoveragePath(np.zeros((1, 2), np.int32), "near-optimal", 1, saved=Saved(0.5, -0.3))
     figures = PlanFigures.of(path)

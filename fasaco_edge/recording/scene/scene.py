@@ -127,7 +127,7 @@ class Scene:
     def _draw_areas(self) -> None:
         """Draw the zones of the order, its keep-outs and the operator's."""
         order = self._order
-        zones = [(zone.name, zone.polygon) for zone in order.zones if zone.polygon is not None]
+        zones = [(zone.name, zone.polygon) for zone in order.zones]
         keep_out = [("keep out", polygon) for polygon in order.keep_out] + self._kept_out
         for entity, style, polygons in (
             (entities.ZONES, draw.ZONE, zones),
@@ -136,6 +136,7 @@ class Scene:
             placed = [
                 (one_line(name), np.array(corners) - self._anchored(Pose2D(*corners[0])).xy)
                 for name, corners in polygons
+                if corners
             ]
             self._writer.log(entity, draw.polygons_archetype(placed, style), latched=True)
 
@@ -239,7 +240,7 @@ class Scene:
         kept_out = [
             (f"keep out: {keep_out.name}", keep_out.polygon)
             for keep_out in status.mission.keep_outs
-            if keep_out.by == "operator" and keep_out.polygon
+            if keep_out.by == "operator"
         ]
         if kept_out != self._kept_out:
             self._kept_out = kept_out

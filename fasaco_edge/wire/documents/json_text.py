@@ -149,6 +149,9 @@ def _fitting(value: object, kind: Any) -> object:  # noqa: ANN401 - a type as an
         fitting = (_fitting(value, option) for option in arguments)
         return next((found for found in fitting if found is not UNSET), UNSET)
     if origin is tuple and isinstance(value, list):
+        if Ellipsis not in arguments:
+            # Of a corner without its y nothing is left.
+            return _fitting_plain(value, kind)
         items = (_fitting(item, arguments[0]) for item in value)
         return tuple(item for item in items if item is not UNSET)
     if origin is dict and isinstance(value, dict):
