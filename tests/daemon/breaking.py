@@ -1,6 +1,6 @@
 """The daemon with faults built in: ``python -m tests.daemon.breaking run ...`` as ``fasaco-edge``.
 
-What breaks is chosen by the width of the map.
+What breaks is chosen by the width of the map; after the word ``unsent`` the first stops do.
 """
 
 from __future__ import annotations
@@ -11,12 +11,15 @@ from typing import Any
 
 import numpy as np
 
+from fasaco_edge.daemon.loop.outbox import Outbox
 from fasaco_edge.mission.map.map_state import MapState
 from fasaco_edge.planners import registry
 
 # Width of the map [m] that breaks each of them.
 PLANNER_M, PHEROMONE_M, MISSION_M = 4.6, 5.2, 5.8
 PIXEL_M = 0.05
+# Paths that stop the robot that cannot be sent, after the word of this name.
+UNSENT, MOST_UNSENT = "unsent", 3
 
 
 class BreakingPlanner:
@@ -42,8 +45,24 @@ def cells(width_m: float) -> int:
     return int(np.ceil(width_m / 0.3))
 
 
+def break_stops() -> None:
+    """Have the first empty paths break."""
+    put_path, unsent = Outbox._put_path, []
+
+    def breaking_put(self: Any, path: Any) -> None:
+        if path.stops and len(unsent) < MOST_UNSENT:
+            unsent.append(path)
+            raise MemoryError
+        put_path(self, path)
+
+    Outbox._put_path = breaking_put  # type: ignore[method-assign]
+
+
 def main() -> None:
     """Build the faults in and run."""
+    if UNSENT in sys.argv:
+        sys.argv.remove(UNSENT)
+        break_stops()
     planner_of, take_map = registry.planner_of, MapState._take_map
 
     def breaking_map(self: Any, grid: Any, within: Any = None) -> None:

@@ -8,7 +8,8 @@ import time
 import pytest
 
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D
-from tests.daemon.breaking import MISSION_M, PHEROMONE_M, PLANNER_M
+from fasaco_edge.wire.messages.paths import decode_path
+from tests.daemon.breaking import MISSION_M, MOST_UNSENT, PHEROMONE_M, PLANNER_M, UNSENT
 from tests.support import processes
 from tests.support.outsider import Outsider
 from tests.support.processes import daemon_process
@@ -112,3 +113,19 @@ def test_a_map_that_breaks_the_mission_is_given_up_for_the_next(breaking):
     client.put("map", map_bytes(room(3.0, 3.0)))
     stand(client, lambda status: status["state"] == "covering")
     assert running.process.poll() is None
+
+
+def test_a_stop_that_cannot_be_sent_before_there_is_a_mission_is_sent_later(tmp_path, monkeypatch):
+    """The robot may follow the path of an earlier daemon; without a map there is no mission."""
+    program = (sys.executable, "-m", "tests.daemon.breaking", UNSENT)
+    monkeypatch.setattr(processes, "PROGRAM", program)
+    with daemon_process(tmp_path) as running, Outsider(running.endpoint) as client:
+        unsent = {"not_published": MOST_UNSENT}
+        client.wait_status(lambda status: status["errors"]["by_code"] == unsent)
+        deadline = time.monotonic() + 60.0
+        while not (replies := client.get("@rpc/path"))[0].ok:
+            assert time.monotonic() < deadline
+            time.sleep(POSE_S)
+        assert not len(decode_path(bytes(replies[0].ok.payload)).xy)
+        # Told by its exit otherwise: a traceback is in the log here.
+        running.kill()
