@@ -27,7 +27,7 @@ from fasaco_edge.review.spot import left_patches
 
 if TYPE_CHECKING:
     from fasaco_edge.review.review import Review
-    from fasaco_edge.review.run_data import PublishedPath
+    from fasaco_edge.review.run_data import PathSample
     from fasaco_edge.wire.documents.replies import FloorLeft
 
 
@@ -192,7 +192,7 @@ def _pheromone(review: Review) -> PheromoneFigures:
     return PheromoneFigures(review.record.field_count, _rounded(share), _rounded(branching))
 
 
-def _replan(path: PublishedPath) -> Replan:
+def _replan(path: PathSample) -> Replan:
     about = path.about
     return Replan(
         at_s=_rounded(path.at_s),

@@ -26,7 +26,7 @@ from fasaco_edge.wire.documents.path_documents import Rectangle
 
 if TYPE_CHECKING:
     from fasaco_edge.review.review import Review
-    from fasaco_edge.review.run_data import PublishedPath
+    from fasaco_edge.review.run_data import PathSample
 
 # A turn is searched for this long before and after [s], and lasts at most this long.
 TURN_S = 2.0
@@ -185,7 +185,7 @@ class _Drawn(msgspec.Struct):
 
 
 def _path(
-    paths: Sequence[PublishedPath],
+    paths: Sequence[PathSample],
     number: int,
     drawn: _Drawn,
     place: tuple[float, float] | None,
@@ -251,7 +251,7 @@ def _turn(review: Review, drawn: _Drawn, at_s: float) -> TurnThen | None:
 
 
 def _why(
-    paths: Sequence[PublishedPath],
+    paths: Sequence[PathSample],
     drawn: _Drawn,
     place: tuple[float, float],
     begin_s: float,

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from fasaco_edge.drawing.spread import percentile
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.read.run import RunRecord
-from fasaco_edge.review.run_data import PublishedPath, RunData, StatusSample
+from fasaco_edge.review.run_data import PathSample, RunData, StatusSample
 
 # Less than this is no motion.
 STILL_M = 0.05
@@ -187,11 +187,11 @@ class Replans:
         later: all others, in order, without the first ones of a daemon that was started again.
     """
 
-    first: PublishedPath | None
-    later: tuple[PublishedPath, ...]
+    first: PathSample | None
+    later: tuple[PathSample, ...]
 
     @classmethod
-    def of(cls, paths: Sequence[PublishedPath]) -> Replans:
+    def of(cls, paths: Sequence[PathSample]) -> Replans:
         """Return the replans in ``paths``; paths without a plan are none."""
         planned = [path for path in paths if path.about.planner]
         later = [
@@ -215,12 +215,12 @@ class Replans:
                 took[kind_of(path.about.reason)].append(path.plan_ms)
         return {kind: (percentile(ms, 50), percentile(ms, 100)) for kind, ms in took.items()}
 
-    def slowest_first(self, most: int) -> list[PublishedPath]:
+    def slowest_first(self, most: int) -> list[PathSample]:
         """Return up to ``most`` of them, the slowest first."""
         return sorted(self.later, key=lambda path: -(path.plan_ms or 0.0))[:most]
 
     @property
-    def slowest(self) -> PublishedPath | None:
+    def slowest(self) -> PathSample | None:
         """The slowest one."""
         timed = [path for path in self.later if path.plan_ms is not None]
         return max(timed, key=lambda path: path.plan_ms or 0.0, default=None)

@@ -92,7 +92,7 @@ class PlanLog:
 
 
 @dataclass(frozen=True, slots=True)
-class PublishedPath:
+class PathSample:
     """A path's attachment, and when the path came, since the recording began [s]."""
 
     at_s: float
@@ -133,7 +133,7 @@ class RunData:
     pose_s: list[float] = field(default_factory=list)
     poses: list[tuple[float, float, float]] = field(default_factory=list)
     map_s: list[float] = field(default_factory=list)
-    paths: list[PublishedPath] = field(default_factory=list)
+    paths: list[PathSample] = field(default_factory=list)
     statuses: list[StatusSample] = field(default_factory=list)
     commands: list[tuple[float, str, MissionOrder]] = field(default_factory=list)
     plan_log: PlanLog = field(default_factory=PlanLog)
@@ -334,4 +334,4 @@ class _SampleReader:
         # A path that is published again is the same; the first of a daemon, 0, is no mission's.
         if not about.revision or (paths and paths[-1].about.revision == about.revision):
             return
-        paths.append(PublishedPath(self._now, about))
+        paths.append(PathSample(self._now, about))

@@ -18,7 +18,7 @@ from fasaco_edge.wire.documents.path_documents import Rectangle
 if TYPE_CHECKING:
     from fasaco_edge.review.moments import Span
     from fasaco_edge.review.review import Review
-    from fasaco_edge.review.run_data import PublishedPath
+    from fasaco_edge.review.run_data import PathSample
     from fasaco_edge.review.spot import Spot
 
 REASONS = ("reason", "replans", "median", "slowest")
@@ -215,7 +215,7 @@ def replan_rows(review: Review) -> list[tuple[str, ...]]:
     return [_replan_row(path) for path in review.replans.slowest_first(MOST_REPLANS)]
 
 
-def _replan_row(path: PublishedPath) -> tuple[str, ...]:
+def _replan_row(path: PathSample) -> tuple[str, ...]:
     about = path.about
     return (
         clock(path.at_s),
