@@ -10,7 +10,7 @@ from __future__ import annotations
 import json
 import threading
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeGuard
 
 from fasaco_edge.bus.arrival import Sample
 from fasaco_edge.bus.claim import ID
@@ -68,7 +68,7 @@ class Daemons:
         _, _, claim = key.rpartition("/claim/")
         own, _, stand = claim.partition("/")
         # The daemons ignore other tokens, too.
-        if stand != PLANS or not ID.fullmatch(own):
+        if stand != PLANS or not _is_id(own):
             return
         with self._lock:
             if not is_there:
@@ -81,7 +81,7 @@ class Daemons:
         document = _object(payload)
         claim = document.get("claim")
         own = claim.get("id") if isinstance(claim, dict) and claim.get("stand") == PLANS else None
-        if not own or not isinstance(own, str):
+        if not _is_id(own):
             return
         state = document.get("state")
         with self._lock:
@@ -92,7 +92,7 @@ class Daemons:
         """Take in a path."""
         own = _object(sample.attachment).get("daemon")
         with self._lock:
-            if own and isinstance(own, str):
+            if _is_id(own):
                 self._daemon(own).path = sample
             else:
                 self._unnamed = sample
@@ -123,6 +123,10 @@ class Daemons:
                 del self._daemons[others[0]]
             self._daemons[own] = _Daemon()
         return self._daemons[own]
+
+
+def _is_id(value: object) -> TypeGuard[str]:
+    return isinstance(value, str) and ID.fullmatch(value) is not None
 
 
 def _object(payload: bytes) -> dict[str, Any]:

@@ -108,3 +108,13 @@ def test_the_daemon_that_plans_is_still_there_after_a_crowd_has_gone(daemons):
     daemons.take_status(status_of(A), 1.0)
     news = daemons.news()
     assert (news.planner, news.status_at) == (A, 1.0)
+
+
+@pytest.mark.parametrize("own", ["!x", "0A", "0a" * 100_000])
+def test_nothing_is_kept_by_an_id_that_is_none(daemons, own):
+    for number in range(3):
+        daemons.take_status(status_of(f"{own}{number}"), 1.0)
+        daemons.take_path(path(f"{own}{number}"))
+    assert daemons._daemons == {}
+    # As one of a daemon that does not name itself: it may be the planner's, and stops the robot.
+    assert daemons.news().unnamed is not None
