@@ -49,6 +49,9 @@ PROGRESS_M, LEADS_M = 0.5, 0.5
 # goal is given up [s].
 MOVED_M, STANDS_S, ARRIVED_S, GIVE_UP_S = 0.05, 3.0, 1.0, 20.0
 
+# Time constant of the position by which it stands [s]: poses scatter.
+STEADY_S = 1.0
+
 # Of a goal that another client's takes the place of Nav2 says no more; Humble has no codes at all.
 NO_CODE = "without a code; does another program send goals, too?"
 
@@ -85,6 +88,8 @@ class Nav2Follower(Supervision):
         self._ahead = AHEAD_M + AHEAD_S * speed
         self._new_id = new_id
         self._here: Point | None = None
+        # The same, without the scatter of single poses.
+        self._steady: Point = (0.0, 0.0)
         self._came_at: float | None = None
         self._path: PathDriven | None = None
         # Its successor, once Nav2 has answered the pending request.
@@ -271,9 +276,8 @@ class Nav2Follower(Supervision):
 
     def _watch(self, path: PathDriven, goal: Goal, now: float) -> None:
         """Query again, or give up, if the robot stands."""
-        assert self._here is not None
-        if self._moved_last is None or math.dist(self._here, self._moved_last[0]) > MOVED_M:
-            self._moved_last = (self._here, now)
+        if self._moved_last is None or math.dist(self._steady, self._moved_last[0]) > MOVED_M:
+            self._moved_last = (self._steady, now)
         stands_s = now - self._moved_last[1]
         longest_s = ARRIVED_S if goal.end - path.way <= DONE_M else STANDS_S
         if stands_s <= longest_s:
@@ -318,7 +322,11 @@ class Nav2Follower(Supervision):
         self._requests_later.clear()
 
     def _moved_to(self, pose: Pose2D, now: float) -> None:
-        self._here, self._came_at = (pose.x, pose.y), now
+        before, here = self._came_at, (pose.x, pose.y)
+        share = 1.0 if before is None else 1.0 - math.exp((before - now) / STEADY_S)
+        x, y = self._steady
+        self._steady = (x + share * (here[0] - x), y + share * (here[1] - y))
+        self._here, self._came_at = here, now
 
     def _have(self, points: PathPoints) -> None:
         self._next = Line(points.take)

@@ -443,13 +443,15 @@ def test_an_old_pose_cancels_and_a_new_one_goes_on():
     assert again.points[0][0] == pytest.approx(0.3)
 
 
-def test_a_controller_that_stands_is_asked_and_then_given_up():
-    drive = Drive(*LONG)
+@pytest.mark.parametrize("noise_m", [0.0, 0.04])
+def test_a_controller_that_stands_is_asked_and_then_given_up(noise_m):
+    drive, rng = Drive(*LONG), np.random.default_rng(0)
     drive.begun()
     drive.step(0.5)
     requests, said = [], set()
-    while drive.now < GIVE_UP_S + 2.0:
-        requests += [type(request) for request in drive.step(0.5, after=0.25)]
+    while drive.now < GIVE_UP_S + 6.0:
+        x, y = rng.normal((0.5, 0.0), noise_m)
+        requests += [type(request) for request in drive.step(x, y, after=0.05)]
         if drive.now > STANDS_S + 1.0:
             said.add(drive.state)
     # The result may have been lost.
