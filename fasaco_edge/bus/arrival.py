@@ -19,9 +19,12 @@ class Sample:
         key: its key.
         schema: message type in its encoding; "" for none.
         size: of payload and attachment together [bytes].
+        sender: id of the session that published it, as far as the sample says; "" for unknown. It
+        may be the id of the first router on the way, or of this session, if the publisher's own
+        gives samples no timestamps.
     """
 
-    __slots__ = ("_attachment", "_payload", "key", "schema", "size")
+    __slots__ = ("_attachment", "_payload", "key", "schema", "sender", "size")
 
     def __init__(
         self,
@@ -29,8 +32,10 @@ class Sample:
         payload: bytes | zenoh.ZBytes,
         schema: str = "",
         attachment: bytes | zenoh.ZBytes = b"",
+        sender: str = "",
     ) -> None:
         self.key = key
+        self.sender = sender
         self.schema = schema
         self.size = len(payload) + len(attachment)
         self._payload = payload
@@ -40,7 +45,8 @@ class Sample:
     def of(cls, sample: zenoh.Sample) -> Sample:
         """Return a sample delivered by Zenoh."""
         attachment = b"" if sample.attachment is None else sample.attachment
-        return cls(str(sample.key_expr), sample.payload, schema_of(sample.encoding), attachment)
+        schema = schema_of(sample.encoding)
+        return cls(str(sample.key_expr), sample.payload, schema, attachment, _sender_of(sample))
 
     @property
     def payload(self) -> bytes:
@@ -58,7 +64,7 @@ class Sample:
 
     def as_type(self, schema: str) -> Sample:
         """Return it as a message of another type."""
-        return Sample(self.key, self._payload, schema, self._attachment)
+        return Sample(self.key, self._payload, schema, self._attachment, self.sender)
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Sample) and self._fields() == other._fields()
@@ -71,6 +77,13 @@ class Sample:
 
     def _fields(self) -> tuple[str, bytes, str, bytes]:
         return self.key, self.payload, self.schema, self.attachment
+
+
+def _sender_of(sample: zenoh.Sample) -> str:
+    """Return the id of the session that published a sample, or put the timestamp on it."""
+    if sample.source_info is not None:
+        return str(sample.source_info.source_id.zid)
+    return str(sample.timestamp).partition("/")[2] if sample.timestamp is not None else ""
 
 
 def schema_of(encoding: zenoh.Encoding) -> str:

@@ -242,6 +242,17 @@ class Bus:
         """Return the roll of the liveliness tokens that match ``key``."""
         return Roll(self._session, key)
 
+    def is_linked(self, session: str) -> bool:
+        """Tell whether another session, by its id, is connected to this one directly."""
+        return any(session == str(each.zid) for each in self._session.info.transports())
+
+    def only_passes_on(self, session: str) -> bool:
+        """Tell whether an id is this session's or that of a router it is connected to.
+
+        They put theirs on samples without a timestamp: who published those is unknown.
+        """
+        return session == self.id or session in map(str, self._session.info.routers_zid())
+
     def is_in_touch(self) -> bool:
         """Tell whether samples can arrive: a session is connected, or could be at any time."""
         info = self._session.info

@@ -11,11 +11,13 @@ holds if the map's frame becomes that one. Until one of the map's frame has come
 from __future__ import annotations
 
 import threading
+import time
 from collections.abc import Callable
 
 from msgspec import structs
 
 from fasaco_edge.bus.arrival import Sample
+from fasaco_edge.bus.one_publisher import OnePublisher
 from fasaco_edge.bus.session import Bus
 from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.daemon.memory import most_bytes
@@ -24,6 +26,9 @@ from fasaco_edge.errors import BadConfiguration, FasacoError
 from fasaco_edge.mission.orders.mask import inline_grid
 from fasaco_edge.wire import topics
 from fasaco_edge.wire.messages.maps import decode_occupancy_grid
+
+# Most masks that wait to be read, of as many publishers; one of them counts.
+MOST_WAITING = 2
 
 
 class MaskTopic:
@@ -47,13 +52,34 @@ class MaskTopic:
         self._came = came
         self.map_frame = ""
         self._lock = threading.Lock()
+        # By publisher, the newest mask and when it came [s, monotonic]; and the one to read.
+        self._waiting: dict[str, tuple[Sample, float]] = {}
         self._newest: Sample | None = None
+        self._publisher = OnePublisher("keep-out masks", topics.KEEP_OUT_MASK.one_publisher_s, bus)
         # The newest mask of each frame, inline, the newest last; and the one in force.
         self._masks: dict[str, str] = {}
         self._in_force = ""
-        bus.listen(config.keys(), topics.KEEP_OUT_MASK, self._take)
+        self._subscriptions = [bus.listen(config.keys(), topics.KEEP_OUT_MASK, self._take)]
         if ros is not None:
-            ros.subscribe_mask(self._take)
+            self._subscriptions.append(ros.subscribe_mask(self._take))
+
+    def choose(self, now: float) -> None:
+        """Take the newest mask of the publisher that counts; ``now``: monotonic [s]."""
+        with self._lock:
+            waiting, self._waiting = self._waiting, {}
+        # Whoever holds the lock must not call Zenoh: its threads wait for it.
+        takes = self._publisher.takes
+        if taken := [sample for sender, (sample, at) in waiting.items() if takes(sender, at)]:
+            with self._lock:
+                self._newest = taken[-1]
+        if self._publisher.takes_over(now):
+            for subscription in self._subscriptions:
+                subscription.ask()
+
+    def conflicts(self, now: float) -> list[str]:
+        """Return whether masks come from two publishers."""
+        text = self._publisher.conflict(now)
+        return [text] if text else []
 
     @property
     def has_come(self) -> bool:
@@ -106,5 +132,8 @@ class MaskTopic:
 
     def _take(self, sample: Sample) -> None:
         with self._lock:
-            self._newest = sample
+            self._waiting.pop(sample.sender, None)
+            self._waiting[sample.sender] = sample, time.monotonic()
+            if len(self._waiting) > MOST_WAITING:
+                del self._waiting[next(iter(self._waiting))]
         self._came()

@@ -72,14 +72,15 @@ class RosBridge:
         self._announce("MS", topic)
         return subscription
 
-    def subscribe_mask(self, take: Callable[[Sample], None]) -> None:
+    def subscribe_mask(self, take: Callable[[Sample], None]) -> Subscription:
         """Subscribe to the keep-out mask; ``take`` is called on a Zenoh thread."""
         topic = self._config.keep_out_mask
         key = self._config.input_key(topic)
-        self._bus.subscribe(
+        subscription = self._bus.subscribe(
             key, lambda sample: take(sample.as_type(topic.schema)), topic.latched, topic.depth
         )
         self._announce("MS", topic)
+        return subscription
 
     def diagnose(self, status: Status) -> None:
         """Publish a status as diagnostics."""

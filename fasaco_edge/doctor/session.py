@@ -10,7 +10,7 @@ import socket
 import threading
 import time
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -26,6 +26,7 @@ from fasaco_edge.wire import topics
 from fasaco_edge.wire.documents.json_text import decode_tolerant
 from fasaco_edge.wire.documents.status import Status
 from fasaco_edge.wire.keys import VERSION
+from fasaco_edge.wire.schemas import TF_MESSAGE
 
 ANSWER_S = 0.5
 LISTENING = "0A"  # proc(5), /proc/net/tcp
@@ -105,6 +106,8 @@ def _listening(port: int) -> set[str]:
 # Time to listen for maps and poses [s]; poses come ten times a second.
 LISTEN_S = 0.7
 ASK_S = 0.7
+# What to do about two publishers of one thing.
+ONE_ONLY = "stop all but one: the daemon takes the one it hears first, until that is silent"
 # Most maps elsewhere that are named.
 MOST_PLACES = 8
 # Positions of the entity's kind and of its topic's type in a token of rmw_zenoh
@@ -164,12 +167,15 @@ def peers(context: CheckContext, listen_s: float = LISTEN_S) -> Finding:
 def _seen(context: CheckContext, bus: Bus, listen_s: float) -> Finding:
     keys, ros = context.config.keys(), context.config.ros2
     wanted = {"map": [keys.of(topics.MAP)], "pose": [keys.of(topics.POSE)]}
+    chained = set[str]()
     if ros:
         poses = [topic for name, topic in ros.inputs.items() if name in ("pose", "tf_static")]
         wanted["map"].append(ros.input_key(ros.inputs["map"]))
         wanted["pose"] += map(ros.input_key, poses)
+        # Each link of a chain of transforms has a publisher of its own.
+        chained |= {ros.input_key(topic) for topic in poses if topic.schema == TF_MESSAGE}
     elsewhere = MapsElsewhere(bus, wanted["map"])
-    heard = _listen(bus, wanted, listen_s)
+    heard = _listen(bus, wanted, listen_s, chained)
     alive = bus.alive(f"{keys.base}/{VERSION}/*/alive", ASK_S)
     others = sorted(key.split("/")[-2] for key in alive if key != keys.of(topics.ALIVE))
     details = [f"other robots: {', '.join(others)}"] if others else []
@@ -177,11 +183,13 @@ def _seen(context: CheckContext, bus: Bus, listen_s: float) -> Finding:
     claims = claims_in(bus.alive(keys.of(topics.CLAIM), ASK_S))
     details += [f"daemon {own} {stand}" for own, stand in sorted(claims.items())]
     status = _status(bus, keys.rpc("status")) if keys.of(topics.ALIVE) in alive else None
-    for kind, count in heard.items():
+    for kind, senders in heard.items():
+        count = senders.total()
         details.append(f"{kind}: {f'{count} in {listen_s:g} s' if count else 'nothing received'}")
+    several = _several(bus, heard)
     if keys.of(topics.ALIVE) not in alive:
         found = f"no daemon of robot {keys.robot!r}; {_in_words(heard)}"
-        return ok(found, details)
+        return warn(f"{found}; {several}", ONE_ONLY, details) if several else ok(found, details)
     if status is None:
         found = "the daemon runs, but does not answer for its status"
         to_do = "connect under a name with the role viewer (bus.security.roles)"
@@ -205,7 +213,7 @@ def _seen(context: CheckContext, bus: Bus, listen_s: float) -> Finding:
     if status.troubles:
         texts, to_dos = zip(*((each.text, each.do) for each in status.troubles), strict=True)
         return warn("; ".join((found, *texts)), "; ".join(to_dos), details)
-    return ok(found, details)
+    return warn(f"{found}; {several}", ONE_ONLY, details) if several else ok(found, details)
 
 
 class MapsElsewhere:
@@ -240,27 +248,42 @@ class MapsElsewhere:
         return sorted(one_line(place) for place in found)[:MOST_PLACES]
 
 
-def _listen(bus: Bus, wanted: dict[str, list[str]], listen_s: float) -> dict[str, int]:
-    """Return how many samples of each kind came."""
-    heard, lock = Counter[str](), threading.Lock()
+def _listen(
+    bus: Bus, wanted: dict[str, list[str]], listen_s: float, chained: Collection[str] = ()
+) -> dict[str, Counter[str]]:
+    """Return how many samples of each kind came from each session.
 
-    def counting(kind: str) -> Callable[[Sample], None]:
-        def count(_: Sample) -> None:
+    "" stands for unknown sessions, and for those of the keys ``chained``.
+    """
+    heard, lock = {kind: Counter[str]() for kind in wanted}, threading.Lock()
+
+    def counting(kind: str, *, is_chained: bool) -> Callable[[Sample], None]:
+        def count(sample: Sample) -> None:
             with lock:
-                heard[kind] += 1
+                heard[kind]["" if is_chained else sample.sender] += 1
 
         return count
 
     for kind, kinds_keys in wanted.items():
         for key in kinds_keys:
-            bus.subscribe(key, counting(kind), latched=True)
+            take = counting(kind, is_chained=key in chained)
+            bus.subscribe(key, take, latched=True)
     time.sleep(listen_s)
     with lock:
-        return {kind: heard[kind] for kind in wanted}
+        return {kind: Counter(senders) for kind, senders in heard.items()}
 
 
-def _in_words(heard: dict[str, int]) -> str:
-    there = [f"{kind}s" for kind, count in heard.items() if count]
+def _several(bus: Bus, heard: dict[str, Counter[str]]) -> str:
+    """Return what comes from several publishers; "" for nothing."""
+    counts = {
+        kind: sum(1 for each in senders if each and not bus.only_passes_on(each))
+        for kind, senders in heard.items()
+    }
+    return "; ".join(f"{n} publishers of {kind}s" for kind, n in counts.items() if n > 1)
+
+
+def _in_words(heard: dict[str, Counter[str]]) -> str:
+    there = [f"{kind}s" for kind, senders in heard.items() if senders]
     return f"{' and '.join(there)} received" if there else "no maps and no poses received"
 
 

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import logging
 import time
 from collections import deque
 from collections.abc import Callable
 
 from fasaco_edge.bus.arrival import Sample
+from fasaco_edge.bus.one_publisher import OnePublisher
 from fasaco_edge.bus.session import Bus
 from fasaco_edge.errors import FasacoError
 from fasaco_edge.follow.clock import Clock, RealClock, SimulatedClock
@@ -16,7 +18,9 @@ from fasaco_edge.follow.supervision import LINK_S, Patience, Supervision
 from fasaco_edge.wire import topics
 from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.messages.poses import PoseDecoder
+from fasaco_edge.wire.schemas import TF_MESSAGE
 
+LOG = logging.getLogger(__name__)
 # Most poses that wait for the next cycle; beyond that the oldest are dropped.
 MOST_POSES = 256
 
@@ -38,6 +42,8 @@ class Inputs:
         self._clock: Clock = RealClock() if real else SimulatedClock(settings.pace)
         self._decoder = PoseDecoder(settings.pose_schema, settings.frames)
         self._poses = deque[tuple[Sample, PoseSource, float]](maxlen=MOST_POSES)
+        self._publisher = OnePublisher("poses", topics.POSE.one_publisher_s, bus)
+        self._conflict = ""
         self._daemons = Daemons()
         keys = Keys(settings.robot, settings.base)
         for source in settings.poses:
@@ -63,6 +69,10 @@ class Inputs:
             follower.heard_status(news.status_at)
         while self._poses:
             sample, source, came_at = self._poses.popleft()
+            # Each link of a chain of transforms has a publisher of its own.
+            is_chained = (source.schema or sample.schema) == TF_MESSAGE
+            if not is_chained and not self._publisher.takes(sample.sender, came_at):
+                continue
             at = self._clock.at(came_at)
             try:
                 pose = self._decoder.decode(
@@ -78,10 +88,16 @@ class Inputs:
                 follower.take_pose(pose, self._clock.hear(pose.stamp_ns, came_at))
             if (link := self._decoder.oldest_link) is not None:
                 follower.heard_link(link)
+        self._warn(self._publisher.conflict(time.monotonic()))
         if news.path is not None:
             follower.take_path(news.path.payload)
         if news.unnamed is not None:
             follower.take_unnamed_path(news.unnamed.payload)
+
+    def _warn(self, conflict: str) -> None:
+        if conflict and not self._conflict:
+            LOG.warning("%s", conflict, extra={"event": "two_publishers"})
+        self._conflict = conflict
 
     def _pose_taker(self, source: PoseSource) -> Callable[[Sample], None]:
         def take(sample: Sample) -> None:

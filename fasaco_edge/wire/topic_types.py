@@ -89,6 +89,8 @@ class Topic:
         is_input: whether a replay feeds it to the mission, so that recordings hold it byte for
             byte; topics for the recorder alone are no inputs.
         limits: names of its limits in ``protocol/limits.yaml``.
+        one_publisher_s: of several publishers one counts, the one heard first, until it is silent
+            for so long [s], see ``bus.one_publisher``; 0: all count.
     """
 
     name: str
@@ -105,6 +107,7 @@ class Topic:
     queues: Queues = NO_QUEUES
     is_input: bool = False
     limits: tuple[str, ...] = ()
+    one_publisher_s: float = 0.0
 
     @property
     def suffix(self) -> str:

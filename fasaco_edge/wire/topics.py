@@ -29,6 +29,7 @@ MAP = Topic(
     queues=Queues(daemon=4, recorder=NEWEST, watch=NEWEST),
     is_input=True,
     limits=("max_grid_cells", "min_resolution_m", "max_resolution_m", "max_grid_tilt", "queue_map"),
+    one_publisher_s=10.0,
 )
 MAP_UPDATE = Topic(
     name="map_update",
@@ -57,6 +58,7 @@ POSE = Topic(
     queues=Queues(daemon=1024, recorder=NEWEST, watch=NEWEST),
     is_input=True,
     limits=("max_coordinate_m", "quaternion_tolerance", "queue_pose"),
+    one_publisher_s=3.0,
 )
 BATTERY = Topic(
     name="battery",
@@ -69,6 +71,7 @@ BATTERY = Topic(
     queues=Queues(daemon=16, recorder=NEWEST),
     is_input=True,
     limits=("max_pose_bytes", "queue_battery"),
+    one_publisher_s=60.0,
 )
 KEEP_OUT_MASK = Topic(
     name="keep_out_mask",
@@ -80,6 +83,7 @@ KEEP_OUT_MASK = Topic(
     schemas=(schemas.OCCUPANCY_GRID,),
     qos=Qos("data_low", cache=1),
     limits=("max_grid_cells", "max_grid_tilt"),
+    one_publisher_s=10.0,
 )
 PATH = Topic(
     name="path",

@@ -176,6 +176,7 @@ def test_what_is_written_does_not_take_the_mask_out_of_force():
     payload = map_bytes(MASK)
     take(Sample("keep_out_mask", payload, GRID))
     mask.map_frame = "map"
+    mask.choose(0.0)
     assert mask.has_come
     in_force, faults = mask.added_to(config)
     assert faults == []

@@ -62,6 +62,7 @@ def key_entry(topic: Topic) -> dict[str, Any]:
         "latched": None if is_token else topic.is_latched,
         "qos": None if is_token else topic.name,
         "rate_hz": topic.rate_hz or None,
+        "one_publisher_s": topic.one_publisher_s or None,
         "when": topic.when,
         "limits": list(topic.limits),
     }

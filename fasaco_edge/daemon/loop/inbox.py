@@ -10,8 +10,10 @@ from typing import TYPE_CHECKING
 from fasaco_edge.bus.arrival import Sample
 from fasaco_edge.bus.latched import Subscription
 from fasaco_edge.bus.mailbox import Mailbox, Spacing
+from fasaco_edge.bus.one_publisher import OnePublisher
 from fasaco_edge.bus.queries import Question, Reply
 from fasaco_edge.bus.session import Bus
+from fasaco_edge.daemon.loop.returning_maps import ReturningMaps
 from fasaco_edge.daemon.memory import most_bytes, queues
 from fasaco_edge.errors import CommandError, FasacoError, MalformedMessage, MapTooLarge
 from fasaco_edge.grid.occupancy import OccupancyGrid
@@ -31,12 +33,15 @@ from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.messages.battery import decode_battery
 from fasaco_edge.wire.messages.maps import decode_map_update, decode_occupancy_grid
 from fasaco_edge.wire.messages.poses import PoseDecoder
+from fasaco_edge.wire.schemas import TF_MESSAGE
 
 if TYPE_CHECKING:
     from fasaco_edge.daemon.loop.fleet import FleetEar
     from fasaco_edge.planners.planner import ColonySnapshot
 
 MAPS = ("map", "map_update")
+# Inputs of which one publisher counts.
+PLURALS = {topics.MAP: "maps", topics.POSE: "poses", topics.BATTERY: "charges of the battery"}
 # Least period of queries for the map: updates without their map come in bursts [s].
 ASK_FOR_MAP_S = 2.0
 # Rate limit of maps [s]: a flood of maps must not take a core. No mapper is that fast.
@@ -194,6 +199,32 @@ class Inbox:
             bus.listen(keys, topic, poster(mailbox, topic.name, max_pixels))
         if fleet is not None:
             fleet.listen(bus, poster(mailbox, topics.FLEET.name, max_pixels))
+        self._returning = ReturningMaps()
+        self._publishers = {
+            topic.name: OnePublisher(many, topic.one_publisher_s, bus)
+            for topic, many in PLURALS.items()
+        }
+
+    def leave_out(self, batch: Batch, now: float) -> None:
+        """Leave out of a batch what a second publisher of an input sent, see ``one_publisher``."""
+        batch.samples = [one for one in batch.samples if self._counts(one)]
+        if self._publishers[topics.MAP.name].takes_over(now):
+            for subscription in self._maps:
+                subscription.ask()
+
+    def conflicts(self, now: float) -> list[str]:
+        """Return which inputs come from two publishers."""
+        found = [each.conflict(now) for each in self._publishers.values()]
+        return [text for text in (*found, self._returning.conflict(now)) if text]
+
+    def _counts(self, received: Received) -> bool:
+        kind, sample = received.kind, received.sample
+        if kind == topics.MAP_UPDATE.name:
+            return not self._publishers[topics.MAP.name].refuses(sample.sender)
+        # Each link of a chain of transforms has a publisher of its own.
+        if kind not in self._publishers or sample.schema == TF_MESSAGE:
+            return True
+        return self._publishers[kind].takes(sample.sender, received.at)
 
     def ask_for_map(self, now: float) -> None:
         """Query the publishers of the map for their newest one, with a rate limit."""
@@ -214,6 +245,8 @@ class Inbox:
         """
         maps, faults = self._newest_maps(batch.samples)
         events = list[Event](MapReceived(grid) for grid, _ in maps.values())
+        for grid, at in maps.values():
+            self._returning.note(grid, at)
         map_at = {frame: at for frame, (_, at) in maps.items()}
         faults.extend(map(_size_fault, batch.oversized))
         lost = batch.updates_lost

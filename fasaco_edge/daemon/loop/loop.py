@@ -120,6 +120,8 @@ class Loop:
             self._reload_config(batch)
         now = time.monotonic()
         has_mission = self._runner.mission is not None
+        self._bus.inbox.leave_out(batch, now)
+        self._status.conflicts = self._conflicts(now)
         events, faults = self._bus.inbox.decode(batch, has_mission=has_mission)
         self._count_faults(faults)
         self._note(batch)
@@ -179,6 +181,7 @@ class Loop:
         reload, mailbox = self._host.reload, self._bus.mailbox
         if reload.mask is not None:
             reload.mask.map_frame = self._runner.map_frame
+            reload.mask.choose(time.monotonic())
         if reload.is_wanted and not reload.is_reading and not self._runner.loading:
             mailbox.hold()
             reload.begin(self.config, partial(mailbox.post, "reloaded", None))
@@ -222,6 +225,11 @@ class Loop:
         self._status.faults.count(faults)
         if any(isinstance(fault, PatchWithoutBase) for fault in faults):
             self._bus.inbox.ask_for_map(time.monotonic())
+
+    def _conflicts(self, now: float) -> list[str]:
+        """Return which inputs come from two publishers."""
+        mask = self._host.reload.mask
+        return self._bus.inbox.conflicts(now) + (mask.conflicts(now) if mask else [])
 
     def _note(self, batch: Batch) -> None:
         """Take data that is not the mission's: snapshots of the search, and times."""

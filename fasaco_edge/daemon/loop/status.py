@@ -60,6 +60,7 @@ class StatusBoard:
     Attributes:
         claim: id of this daemon and whether it plans, as in the status.
         yield_reason: reason why another daemon plans instead; "" if this one plans.
+        conflicts: which inputs come from two publishers.
     """
 
     def __init__(self, config: DaemonConfig) -> None:
@@ -73,6 +74,7 @@ class StatusBoard:
         self.waits = "no map yet"
         self.claim = ClaimReport()
         self.yield_reason = ""
+        self.conflicts: list[str] = []
         self._config = config
         self.show(config)
         self._started = time.monotonic()
@@ -80,6 +82,7 @@ class StatusBoard:
         self._sent_key: tuple[object, ...] = ()
         # Since when there is no mission and nothing is loaded for one; None while there is.
         self._unbegun_at: float | None = None
+        self._conflicts_since = self._started
 
     def show(self, config: DaemonConfig) -> None:
         """Show this configuration as the one in force."""
@@ -161,6 +164,16 @@ class StatusBoard:
         return ("loading", loading) if loading else ("waiting for map", self.waits)
 
     def _troubles(self, runner: MissionRunner, now: float) -> tuple[TroubleReport, ...]:
+        return self._of_mission(runner, now) + self._of_publishers(now)
+
+    def _of_publishers(self, now: float) -> tuple[TroubleReport, ...]:
+        if not self.conflicts or self.yield_reason:
+            self._conflicts_since = now
+            return ()
+        text, since_s = "; ".join(self.conflicts), round(now - self._conflicts_since, 1)
+        return (TroubleReport("two_publishers", text, "stop one of the two", since_s),)
+
+    def _of_mission(self, runner: MissionRunner, now: float) -> tuple[TroubleReport, ...]:
         is_unbegun = runner.mission is None and not runner.loading and not self.yield_reason
         if not is_unbegun or runner.order_state.order is None:
             self._unbegun_at = None

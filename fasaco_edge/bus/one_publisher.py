@@ -1,0 +1,98 @@
+"""Rule of one publisher: of several that publish an input, the one heard first counts.
+
+Another counts once the first has been silent for a stated time (``Topic.one_publisher_s``), or its
+session has ended. So a map, pose or mask does not change to and fro with whoever spoke last, and a
+program that is restarted is heard again.
+
+A publisher is known by the Zenoh id of its session, see ``arrival.Sample.sender``. A sample of
+unknown origin always counts.
+"""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+# A second publisher is reported for at least this long after its last sample [s].
+SHOWN_S = 10.0
+
+
+class Sessions(Protocol):
+    """What the bus knows of other sessions, by their Zenoh ids."""
+
+    def is_linked(self, session: str) -> bool:
+        """Tell whether it is connected to this one directly."""
+        ...
+
+    def only_passes_on(self, session: str) -> bool:
+        """Tell whether it is this one or a router of it: they put their ids on samples of others
+        that have none."""
+        ...
+
+
+class OnePublisher:
+    """The publisher of one input that counts; used from one thread, or under the caller's lock.
+
+    Args:
+        name: what it publishes, in the plural: "maps".
+        silent_s: how long it may be silent before another one counts [s].
+        sessions: of the bus.
+    """
+
+    def __init__(self, name: str, silent_s: float, sessions: Sessions) -> None:
+        self._name, self._silent_s, self._sessions = name, silent_s, sessions
+        # The one that counts, when it was heard [s], and whether it was linked directly.
+        self._first, self._heard_at, self._was_linked = "", float("-inf"), False
+        # Another that was refused last, when, and whether its newest sample is still missing.
+        self._other, self._refused_at, self._misses = "", float("-inf"), False
+
+    def takes(self, sender: str, now: float) -> bool:
+        """Tell whether a sample counts.
+
+        Args:
+            sender: id of its session; "" for unknown.
+            now: by the monotonic clock [s].
+        """
+        if sender != self._first:
+            if not sender or self._sessions.only_passes_on(sender):
+                return True
+            if self._first and not self._is_over(now):
+                self._other, self._refused_at, self._misses = sender, now, True
+                return False
+            self._count(sender)
+        self._heard_at, self._misses = now, False
+        return True
+
+    def takes_over(self, now: float) -> bool:
+        """Tell once that a refused publisher counts from now on: its newest sample is missing.
+
+        A publisher that is silent and still linked is not over before another one publishes.
+        """
+        if not self._misses or not self._is_over(now):
+            return False
+        if self._was_linked and self._sessions.is_linked(self._first):
+            return False
+        self._count(self._other)
+        self._heard_at, self._misses = now, False
+        return True
+
+    def refuses(self, sender: str) -> bool:
+        """Tell whether a publisher is the one that was refused last."""
+        return bool(sender) and sender == self._other
+
+    def conflict(self, now: float) -> str:
+        """Return that there are two; "" if there are not."""
+        if not self._other or now - self._refused_at > max(self._silent_s, SHOWN_S):
+            return ""
+        return (
+            f"{self._name} come from two publishers: session {self._first} counts, "
+            f"session {self._other} does not"
+        )
+
+    def _count(self, sender: str) -> None:
+        if sender == self._other:
+            self._other = ""
+        self._first, self._was_linked = sender, self._sessions.is_linked(sender)
+
+    def _is_over(self, now: float) -> bool:
+        is_gone = self._was_linked and not self._sessions.is_linked(self._first)
+        return is_gone or now - self._heard_at > self._silent_s

@@ -1,0 +1,77 @@
+"""The rule of one publisher: who counts, until when, and what is said of the other."""
+
+from __future__ import annotations
+
+from fasaco_edge.bus.one_publisher import SHOWN_S, OnePublisher
+
+SILENT_S = 4.0
+
+
+class Sessions:
+    """Sessions that are linked directly, and those that only pass on."""
+
+    def __init__(self, linked=(), passing=()):
+        self.linked, self.passing = set(linked), set(passing)
+
+    def is_linked(self, session):
+        return session in self.linked
+
+    def only_passes_on(self, session):
+        return session in self.passing
+
+
+def maps(**sessions):
+    return OnePublisher("maps", SILENT_S, Sessions(**sessions))
+
+
+def test_the_first_counts_while_it_speaks():
+    one = maps()
+    assert [one.takes("ab"[turn % 2], turn) for turn in range(6)] == [True, False] * 3
+    assert one.conflict(6.0) == (
+        "maps come from two publishers: session a counts, session b does not"
+    )
+    assert one.refuses("b")
+    assert not one.refuses("a")
+    assert one.conflict(5.0 + SHOWN_S + 0.1) == ""
+
+
+def test_another_counts_once_the_first_is_silent():
+    one = maps(linked="a")
+    assert one.takes("a", 0.0)
+    assert not one.takes("b", SILENT_S)
+    assert one.takes("b", SILENT_S + 0.1)
+    assert not one.takes("a", SILENT_S + 0.2)
+
+
+def test_another_counts_at_once_if_the_session_of_the_first_has_ended():
+    sessions = Sessions(linked="a")
+    one = OnePublisher("maps", SILENT_S, sessions)
+    assert one.takes("a", 0.0)
+    assert not one.takes("b", 0.1)
+    assert not one.takes_over(0.2)
+    sessions.linked.clear()
+    assert one.takes_over(0.3)
+    assert not one.takes_over(0.4)
+    assert one.takes("b", 0.5)
+    assert one.conflict(0.6) == ""
+
+
+def test_one_that_spoke_once_takes_over_from_one_behind_a_router_that_is_silent():
+    one = maps()
+    assert one.takes("a", 0.0)
+    assert not one.takes("b", 1.0)
+    assert not one.takes_over(SILENT_S)
+    assert one.takes_over(SILENT_S + 0.1)
+    linked = maps(linked="a")
+    assert linked.takes("a", 0.0)
+    assert not linked.takes("b", 1.0)
+    assert not linked.takes_over(SILENT_S + 0.1)
+
+
+def test_a_sample_of_unknown_origin_counts():
+    one = maps(passing="r")
+    assert [one.takes(sender, 0.0) for sender in ("a", "", "r", "a", "b")] == [True] * 4 + [False]
+    assert "session a counts" in one.conflict(0.0)
+    alone = maps(passing="r")
+    assert [alone.takes(sender, 0.0) for sender in ("r", "", "r", "a")] == [True] * 4
+    assert alone.conflict(0.0) == ""
