@@ -3,11 +3,13 @@
 A map file is interpreted as by nav2_map_server (map_io.cpp). Its releases differ on transparent
 pixels in trinary mode: older ones average the alpha channel into the brightness, so that opaque
 black is 75 % occupied (navigation2 issue 4233); newer ones take a transparent pixel for unknown, as
-scale mode always did. Here alpha is never a brightness, and a transparent pixel is unknown.
+scale mode always did. Here alpha is never a brightness, and a transparent pixel is unknown. Keys
+that contradict the image, or leave never-seen ground free, are logged (``map_conventions``).
 """
 
 from __future__ import annotations
 
+import logging
 import math
 import os
 from collections.abc import Iterator
@@ -27,12 +29,15 @@ from fasaco_edge.grid.geometry import (
     GridGeometry,
     Pose2D,
 )
+from fasaco_edge.grid.map_conventions import settle, yaw_in_degrees
 from fasaco_edge.grid.map_images import MapImage, check_size, read_image
 from fasaco_edge.grid.occupancy import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
 from fasaco_edge.host.files import check_plain
 from fasaco_edge.host.plain_yaml import PlainYamlError, load, read_bounded
 from fasaco_edge.host.resources import folder
 from fasaco_edge.text import shown
+
+LOG = logging.getLogger(__name__)
 
 IMAGE_SUFFIXES = (".pgm", ".png", ".bmp", ".jpg", ".jpeg")
 # Thresholds of ROS 1's map_saver: its grey for unknown, 205, is not free by these.
@@ -56,13 +61,14 @@ def read_map(path: str | Path) -> OccupancyGrid:
 
 
 def read_map_rows(
-    path: str | Path, most_bytes: int | None = None
+    path: str | Path, most_bytes: int | None = None, *, is_mask: bool = False
 ) -> tuple[GridGeometry, Iterator[NDArray[np.int8]]]:
     """Return a map's geometry, and its rows from the smallest y up, as ``read_map`` reads them.
 
     Args:
         path: the YAML file.
         most_bytes: memory limit for reading the image [bytes]; None for no limit.
+        is_mask: whether only occupied pixels count: what is unknown is the same as free.
 
     Returns:
         The geometry, and stripes of the map, int8 (some, cols): each but the last has a multiple
@@ -87,7 +93,11 @@ def read_map_rows(
     file, mode, origin, negate = keys.image(), keys.mode(), keys.origin(), keys.negate()
     image = read_image(Path(file), most_bytes)
     geometry = GridGeometry(image.rows, image.cols, resolution, origin)
-    return geometry, _cells(image, mode, thresholds, negate)
+    values = _values(mode, thresholds, image.white, negate)
+    said = settle(image, values, mode, negate=negate, is_mask=is_mask)
+    for text in filter(None, (yaw_in_degrees(origin.yaw), said)):
+        LOG.warning("%s: %s", path, text, extra={"event": "map_file"})
+    return geometry, _cells(image, values, mode)
 
 
 def read_bare_image(path: str | Path, resolution_m: float) -> OccupancyGrid:
@@ -121,14 +131,16 @@ def read_bare_image(path: str | Path, resolution_m: float) -> OccupancyGrid:
         )
     image = read_image(path)
     geometry = GridGeometry(image.rows, image.cols, resolution_m, Pose2D(0, 0, 0))
-    return _grid(geometry, _cells(image, MODES[0], (FREE_THRESH, OCCUPIED_THRESH), negate=False))
+    mode, thresholds = MODES[0], (FREE_THRESH, OCCUPIED_THRESH)
+    values = _values(mode, thresholds, image.white, negate=False)
+    return _grid(geometry, _cells(image, values, mode))
 
 
-def _cells(
-    image: MapImage, mode: str, thresholds: tuple[float, float], negate: bool
-) -> Iterator[NDArray[np.int8]]:
-    """Yield the rows of a map, int8 (some, cols), from the smallest y up."""
-    values = _values(mode, thresholds, image.white, negate)
+def _cells(image: MapImage, values: NDArray[np.int8], mode: str) -> Iterator[NDArray[np.int8]]:
+    """Yield the rows of a map, int8 (some, cols), from the smallest y up.
+
+    ``values``, int8 (white + 1,), are the cell values of levels.
+    """
     for stripe in image.stripes():
         cells = values[stripe.levels]
         if stripe.transparent is not None and mode != "raw":

@@ -49,7 +49,7 @@ def inline_mask(file: Path, occupied_at_least: int, most_bytes: int | None = Non
         BadConfiguration: it cannot be read, exceeds the limit, or its outlines are too fine.
     """
     try:
-        place, stripes = read_map_rows(file, most_bytes)
+        place, stripes = read_map_rows(file, most_bytes, is_mask=True)
         _check_width(place.cols)
         # Stripes are packed separately, so each has a multiple of 8 rows.
         packed = [np.packbits(stripe >= occupied_at_least) for stripe in stripes]
