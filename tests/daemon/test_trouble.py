@@ -120,3 +120,18 @@ def test_a_mission_that_cannot_begin_is_a_trouble_until_it_does(tmp_path):
         outsider.put("map", map_bytes(room(3.0, 3.0)))
         outsider.put("pose", pose_bytes(0.75, 0.75))
         outsider.wait_status(lambda status: status["state"] == "covering" and not codes(status))
+
+
+def test_a_keep_out_beside_the_map_is_told_and_the_mission_goes_on(tmp_path):
+    far = [[500, 500], [501, 500], [501, 501]]
+    with (
+        daemon_process(tmp_path, mission={"keep_out": [far]}) as daemon,
+        Outsider(daemon.endpoint) as outsider,
+    ):
+        outsider.put("map", map_bytes(room(3.0, 3.0)))
+        outsider.put("pose", pose_bytes(0.75, 0.75))
+        status = outsider.wait_status(lambda status: status["state"] == "covering")
+        (trouble,) = status["troubles"]
+        text = "no free ground of the map so far lies in or beside mission.keep_out[0]"
+        assert (trouble["code"], trouble["text"]) == ("no_effect", text)
+    assert text in daemon.log_text()

@@ -272,4 +272,6 @@ def test_an_unused_battery_and_limits_of_0_are_no_trouble():
 
 
 def test_the_contract_names_each_trouble():
-    assert {rule.code for rule in RULES} | {"not_begun", "two_publishers"} == set(TROUBLES)
+    assert {rule.code for rule in RULES} | {"not_begun", "two_publishers", "no_effect"} == set(
+        TROUBLES
+    )

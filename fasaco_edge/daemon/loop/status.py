@@ -50,6 +50,11 @@ if TYPE_CHECKING:
 HEARTBEAT_S = 1.0
 # A mission that has not begun after this time is a trouble [s].
 BEGUN_S = 30.0
+# What to do about troubles that are not the mission's.
+TO_DO = {
+    "two_publishers": "stop one of the two",
+    "no_effect": "check their unit, sign and origin; a map that still grows may reach them",
+}
 # Changes closer together than this go out as one.
 LEAST_INTERVAL_S = 0.05
 
@@ -82,7 +87,7 @@ class StatusBoard:
         self._sent_key: tuple[object, ...] = ()
         # Since when there is no mission and nothing is loaded for one; None while there is.
         self._unbegun_at: float | None = None
-        self._conflicts_since = self._started
+        self._since: dict[str, float] = {}
 
     def show(self, config: DaemonConfig) -> None:
         """Show this configuration as the one in force."""
@@ -164,14 +169,18 @@ class StatusBoard:
         return ("loading", loading) if loading else ("waiting for map", self.waits)
 
     def _troubles(self, runner: MissionRunner, now: float) -> tuple[TroubleReport, ...]:
-        return self._of_mission(runner, now) + self._of_publishers(now)
-
-    def _of_publishers(self, now: float) -> tuple[TroubleReport, ...]:
-        if not self.conflicts or self.yield_reason:
-            self._conflicts_since = now
-            return ()
-        text, since_s = "; ".join(self.conflicts), round(now - self._conflicts_since, 1)
-        return (TroubleReport("two_publishers", text, "stop one of the two", since_s),)
+        """Return what is wrong; the mission's own troubles alone make it degraded."""
+        own = self._of_mission(runner, now)
+        if self.yield_reason:
+            return own
+        idle = runner.mission.idle_places(now) if runner.mission else ""
+        texts = {"two_publishers": "; ".join(self.conflicts), "no_effect": idle}
+        # Since when each has been reported [s].
+        self._since = {code: self._since.get(code, now) for code, text in texts.items() if text}
+        return own + tuple(
+            TroubleReport(code, texts[code], TO_DO[code], round(now - since, 1))
+            for code, since in self._since.items()
+        )
 
     def _of_mission(self, runner: MissionRunner, now: float) -> tuple[TroubleReport, ...]:
         is_unbegun = runner.mission is None and not runner.loading and not self.yield_reason

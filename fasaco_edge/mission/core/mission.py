@@ -44,6 +44,7 @@ from fasaco_edge.mission.fleet.layer import FleetLayer
 from fasaco_edge.mission.fleet.shared import SharedProgress
 from fasaco_edge.mission.fleet.traffic import Points
 from fasaco_edge.mission.line.layer import FloorToSweep, LineLayer
+from fasaco_edge.mission.map.idle_places import IdlePlaces
 from fasaco_edge.mission.map.inputs import InputMonitor
 from fasaco_edge.mission.map.map_state import MapState
 from fasaco_edge.mission.map.reachable_area import ReachableArea
@@ -70,6 +71,7 @@ class Mission:
         self._config = config
         self._drive, self._gauge = DriveMeter(), BatteryGauge()
         self._angle = LatticeAngle(config)
+        self._idle = IdlePlaces(config)
         self._lay_cells()
         self.restore_order(order or OrderState.autostart())
 
@@ -221,6 +223,17 @@ class Mission:
     def troubles(self) -> tuple[Trouble, ...]:
         """What is wrong in the present state, the weightiest first."""
         return self._executive.troubles.found
+
+    def idle_places(self, now: float) -> str:
+        """Return which keep-outs and places have no effect on the map at ``now`` [s]; "" if none.
+
+        It decides nothing: only reports of the mission ask for it.
+        """
+        if self.grid is None:
+            return ""
+        is_theirs = not self._map.places.why
+        order = self._orders.order_state
+        return self._idle.look(self.grid, self.map_revision, order, now, is_theirs=is_theirs)
 
     def coverage(self) -> Coverage | None:
         """Return the counts of coverage; None before there is a map."""

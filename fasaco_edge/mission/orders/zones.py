@@ -110,6 +110,15 @@ def cells_near(
     or contains it. With half a cell or more, a disc of that radius can drive between the centres of
     the other cells without touching a polygon.
     """
+    cells = near_polygons(polygons, window, cell_m, reach_m)
+    cells.flags.writeable = False
+    return cells
+
+
+def near_polygons(
+    polygons: tuple[Polygon, ...], window: Window, cell_m: float, reach_m: float
+) -> NDArray[np.bool_]:
+    """Return the same as ``cells_near``, which remembers it."""
     starts = np.zeros((window.rows, window.cols + 1), np.int32)
     inside = np.zeros((window.rows, window.cols), bool)
     for polygon in polygons:
@@ -118,7 +127,6 @@ def cells_near(
         _add_inside(polygon, window, cell_m, inside)
     cells: NDArray[np.bool_] = np.cumsum(starts, axis=1, out=starts)[:, :-1] > 0
     cells |= inside
-    cells.flags.writeable = False
     return cells
 
 
