@@ -4,9 +4,11 @@ Its inputs are a map and a line of points, no cells, walks or planners.
 
 Reachable floor
     All that the tool's disc touches at the places that the robot's disc can come to from the
-    beginning of the line. The robot fits where all that its disc touches is known free.
+    beginning of the line. The robot fits where all that its disc touches is known free. A tool that
+    sticks out of the robot's disc touches what is free, and connected with that disc by free
+    pixels about within the tool's: nothing behind a wall.
 Swept floor
-    What of it the tool's disc passed over along the line.
+    What of it the tool's disc passed over along the line, likewise.
 Illegal share
     The part of the line on which the robot's disc would touch what is not known free.
 Patch
@@ -19,6 +21,7 @@ its pixels do, and a robot fits a corridor that is a finer pixel or two wider th
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -30,13 +33,14 @@ from fasaco_edge.bench.driven_line import (
     Points,
     drive_seconds,
 )
-from fasaco_edge.bench.pixels import Mask, Patches, within
+from fasaco_edge.bench.pixels import Mask, Patches, through, within
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D, Window
 from fasaco_edge.grid.occupancy import FREE, OccupancyGrid, marked_window
 
 # Largest pixel [m], unless that makes more than this many of them.
 FINE_M = 0.025
 MOST_PIXELS = 24_000_000
+SQRT2 = math.sqrt(2.0)
 # A patch larger than this counts [m2]: 4 dm2.
 PATCH_M2 = 0.04
 # Pixels of the robot's disc that a line may lose to the raster before it counts as touching.
@@ -162,7 +166,7 @@ def judge_floor(
     floor = _Floor.of(grid, robot)
     line = DrivenLine.of(line_xy, floor.geometry, driven)
     reachable = floor.reachable_from(stands_at or tuple(line_xy[0].tolist()))
-    swept = line.swept(robot.tool_m / floor.geometry.resolution / 2, floor.free.shape)
+    swept = floor.under_tool(lambda radius_px: line.swept(radius_px, floor.free.shape))
     swept &= reachable
     return JudgedFloor(_figures(floor, line, reachable, swept), floor.geometry, reachable, swept)
 
@@ -205,8 +209,20 @@ class _Floor:
         # Half a pixel beyond the centre of a blocked one lies its edge.
         fits = ~within(~self.free, self.radius_px + 0.5 - TOUCH_TOLERANCE_PX)
         stands = Patches.of(fits).nearest_to(*self.geometry.to_pixels(*point))
-        tool_px = self.robot.tool_m / self.geometry.resolution
-        return within(stands, tool_px / 2 + TOUCH_TOLERANCE_PX)
+        return self.under_tool(lambda radius_px: within(stands, radius_px + TOUCH_TOLERANCE_PX))
+
+    def under_tool(self, near: Callable[[float], Mask]) -> Mask:
+        """Return what the tool touches, nothing through walls.
+
+        Args:
+            near: returns the pixels within a radius [pixels] of where the robot is.
+        """
+        tool_px = self.robot.tool_m / self.geometry.resolution / 2
+        under, beyond_px = near(tool_px), tool_px - self.radius_px
+        if beyond_px <= 0:
+            return under
+        # Steps over edges lead to what lies askew by as much longer ways.
+        return under & through(self.free, near(self.radius_px), math.ceil(SQRT2 * beyond_px))
 
     def illegal_share(self, line: DrivenLine) -> float:
         touched = within(~self.free, self.radius_px - TOUCH_SLACK_PX - TOUCH_TOLERANCE_PX)

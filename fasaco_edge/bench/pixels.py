@@ -45,6 +45,25 @@ def within(mask: Mask, distance: float) -> Mask:
     return near
 
 
+def through(free: Mask, mask: Mask, steps: int) -> Mask:
+    """Return which free pixels so many steps over edges lead to from marked ones, through free.
+
+    Args:
+        free, mask: bool (rows, cols).
+        steps: their number.
+    """
+    found = mask & free
+    for _ in range(steps):
+        more = found.copy()
+        more[1:] |= found[:-1]
+        more[:-1] |= found[1:]
+        more[:, 1:] |= found[:, :-1]
+        more[:, :-1] |= found[:, 1:]
+        more &= free
+        found = more
+    return found
+
+
 def _along_rows(mask: Mask) -> NDArray[np.int32]:
     """Return how far the next marked pixel of the same row is; ``FAR`` or more without any."""
     index = np.arange(mask.shape[1], dtype=np.int32)

@@ -24,6 +24,7 @@ from fasaco_edge.grid.fine_raster import (
 from fasaco_edge.grid.geometry import GridGeometry, Window
 from fasaco_edge.grid.lattice import BLOCKED, COVERABLE, UNKNOWN, CoverageLattice, lattice_window
 from fasaco_edge.grid.occupancy import OccupancyGrid
+from fasaco_edge.grid.tool_reach import tool_reach
 from fasaco_edge.kernels.floor.bits import Bits, packed, unpacked
 from fasaco_edge.kernels.floor.places import (
     choose_stands,
@@ -31,7 +32,6 @@ from fasaco_edge.kernels.floor.places import (
     disc_rows,
     link_stands,
     places_of,
-    within,
 )
 from fasaco_edge.kernels.lattice.footprint import Placement
 
@@ -75,7 +75,7 @@ class Floor:
         fits = unpacked(places_of(blocked, disc_rows(radius)), geometry.cols)
         at = _nearest_place(geometry, fits, start, radius)
         places = packed(connected(fits, *at), beyond=False)
-        reached = within(places, discs.tool_m / 2 / geometry.resolution)
+        reached = tool_reach(places, blocked, radius, discs.tool_m / 2 / geometry.resolution)
         reachable = unpacked(reached, geometry.cols)
         return cls(geometry, discs, blocked, places, reachable, at)
 

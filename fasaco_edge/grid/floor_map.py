@@ -35,12 +35,12 @@ from fasaco_edge.grid.lattice import (
 )
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.grid.reach import REACH_CELLS, REACH_PX, Reach
+from fasaco_edge.grid.tool_reach import tool_reach, tool_steps
 from fasaco_edge.kernels.floor.bits import WORD, Bits, unpacked
 from fasaco_edge.kernels.floor.places import (
     disc_rows,
     keep_in_cells,
     places_of,
-    within,
 )
 from fasaco_edge.kernels.lattice.footprint import Placement
 
@@ -185,6 +185,8 @@ class FloorMap:
     def reached(self, cells: NDArray[np.bool_], part: Window) -> NDArray[np.bool_]:
         """Return the pixels in a window of the raster that the tool reaches from places in cells.
 
+        It reaches none through walls, see ``tool_reach``.
+
         Args:
             cells: bool (rows, cols) of the lattice.
             part: window of the raster.
@@ -192,8 +194,9 @@ class FloorMap:
         Returns:
             bool, (rows, cols) of the part.
         """
-        radius = self.discs.tool_m / 2 / self.geometry.resolution
-        margin = int(radius) + 1
+        radius = self.discs.radius_m / self.geometry.resolution
+        tool = self.discs.tool_m / 2 / self.geometry.resolution
+        margin = int(max(tool, min(radius, tool) + tool_steps(radius, tool))) + 1
         whole = Window(0, 0, self.geometry.rows, self.geometry.cols)
         around = Window(
             part.row0 - margin, part.col0 - margin, part.row1 + margin, part.col1 + margin
@@ -208,7 +211,8 @@ class FloorMap:
             cell, corner = (window.row0, window.col0), (around.row0, first * WORD)
             keep_in_cells(found, self._placement(), cells, cell, corner)
         words = Window(around.row0, first * WORD, around.row1, end * WORD)
-        reached = unpacked(within(found, radius), words.cols)
+        blocked = self.blocked[around.row0 : around.row1, first:end]
+        reached = unpacked(tool_reach(found, blocked, radius, tool), words.cols)
         return reached[part.slices_in(words)]
 
     def pixels_of(self, cells: NDArray[np.bool_]) -> Window | None:
