@@ -10,6 +10,7 @@ import yaml
 from fasaco_edge.cli.console.arguments import Command, Exit, add_json
 from fasaco_edge.cli.console.streams import print_json
 from fasaco_edge.cli.console.terminal import out
+from fasaco_edge.config.cautions import cautions
 from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.config.loading import inspect_config, mask_fault
 from fasaco_edge.config.reading import Fault
@@ -64,8 +65,8 @@ def run(args: argparse.Namespace) -> int:
         print(yaml.safe_dump(_shown(config), sort_keys=False), end="")
     else:
         print(f"{args.file}: in order")
-        if assumed := config.robot.assumed:
-            print(f"  {assumed}")
+        for said in filter(None, (config.robot.assumed, *cautions(config))):
+            print(f"  {said}")
     return Exit.OK if config is not None else Exit.CONFIG
 
 
@@ -85,6 +86,7 @@ def _document(
             }
             for fault in faults
         ],
+        "cautions": cautions(config) if config is not None else [],
     }
     if args.show:
         document["config"] = _shown(config) if config is not None else None

@@ -119,7 +119,7 @@ def run(args: argparse.Namespace) -> int:
     if args.json:
         print_json({"file": str(file), "config": document, "heard": heard and asdict(heard)})
     else:
-        _print(file, text, config.robot.assumed, heard)
+        _print(file, text, config, heard)
     return Exit.OK
 
 
@@ -219,13 +219,17 @@ def _listen(config: DaemonConfig, listen_s: float) -> Finding:
     return peers(CheckContext(config), listen_s)
 
 
-def _print(file: Path, text: str, assumed: str, heard: Finding | None) -> None:
+def _print(file: Path, text: str, config: DaemonConfig, heard: Finding | None) -> None:
+    from fasaco_edge.config.cautions import cautions
+
     console = out()
     console.print(f"{file}:", soft_wrap=True)
     for line in text.splitlines():
         console.print(f"  {line}", markup=False, highlight=False, soft_wrap=True)
-    if assumed:
+    if assumed := config.robot.assumed:
         console.print(f"assumed:    {assumed}", soft_wrap=True)
+    for caution in cautions(config):
+        console.print(f"caution:    {caution}", soft_wrap=True)
     if heard is not None:
         console.print(f"on the bus: {heard.found}", soft_wrap=True)
         for line in heard.details:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import logging
 import signal
 from collections import deque
 from collections.abc import Sequence
@@ -19,13 +20,17 @@ from fasaco_edge.cli.planning.options import EPILOG, add_options
 from fasaco_edge.cli.planning.progress import watching
 from fasaco_edge.cli.planning.request import read_request, require_frame
 from fasaco_edge.cli.warmup import compile_kernels
+from fasaco_edge.config.cautions import tool_caution
 from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.grid.map_files import find_map, map_sources
 from fasaco_edge.host.processes import first_signal_calls
+from fasaco_edge.offline.settings import CELLS
 from fasaco_edge.planners.planner import ColonySnapshot, Interrupt, ignore
 
 if TYPE_CHECKING:
     from fasaco_edge.offline.result import Plan
+
+LOG = logging.getLogger(__name__)
 
 WITH_PHEROMONE = ("fasaco", "aco")
 
@@ -55,6 +60,8 @@ def run(args: argparse.Namespace) -> int:
 
     map = load_map(args.map, resolution_m=args.resolution, unknown_free=args.unknown_free)
     require_frame(map, args.xy_out)
+    if request.line != CELLS and (caution := tool_caution(robot)):
+        LOG.warning("%s", caution)
     asked = Interrupt()
     total = search.most_s if search.has_local_search else search.ants
     counted = not search.has_local_search

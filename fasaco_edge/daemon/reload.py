@@ -14,6 +14,7 @@ from pathlib import Path
 
 from msgspec import structs
 
+from fasaco_edge.config.cautions import log_cautions
 from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.config.loading import load_config, with_mask
 from fasaco_edge.daemon.mask_topic import MaskTopic
@@ -137,7 +138,10 @@ class Reload:
             LOG.warning("%s: needs a restart", keys, extra={"event": "reload_needs_restart"})
         taken = ", ".join(key for key in changed if is_changeable(key))
         LOG.info("configuration read again: %s", taken or "no change", extra={"event": "reload"})
-        return with_changeable(running, written), faults
+        config = with_changeable(running, written)
+        if taken:
+            log_cautions(config)
+        return config, faults
 
     def done(self) -> None:
         """Report that the new configuration is in force."""

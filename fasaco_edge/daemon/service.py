@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 from fasaco_edge.bus.session import Bus, open_bus
 from fasaco_edge.bus.settings import BusSettings
+from fasaco_edge.config.cautions import log_cautions
 from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.daemon.claim import NameClaim
 from fasaco_edge.daemon.compiling import KernelCompiler
@@ -109,6 +110,7 @@ def run_daemon(
         if compiler is not None:
             compiler.wait(stop)
         config.bus.security.warn_of_clock()
+        log_cautions(config)
         settings = config.bus.settings(config.keys().prefix, config.ros2 or None)
         bus = _joined(settings, stop, manager)
         if bus is None:

@@ -7,6 +7,7 @@ import time
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
+from fasaco_edge.config.cautions import cautions
 from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.daemon.reload import read_config
 from fasaco_edge.doctor import installation, machine, security, session
@@ -78,7 +79,12 @@ def findings(
     try:
         config, refused = read_config(path), None
         assumed = [said] if (said := config.robot.assumed) else []
-        yield "configuration", ok(str(path or "defaults, without a file"), details=assumed)
+        found = str(path or "defaults, without a file")
+        if together := cautions(config):
+            found = f"{found}: settings that do not go together"
+            yield "configuration", warn(found, "; ".join(together), assumed)
+        else:
+            yield "configuration", ok(found, details=assumed)
     except BadConfiguration as error:
         config, refused = DaemonConfig(), error
         yield "configuration", fail(str(error), error.hint)

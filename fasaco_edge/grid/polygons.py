@@ -36,6 +36,20 @@ def polygon_flaw(polygon: Polygon) -> str:
     return ""
 
 
+def is_near(polygon: Polygon, point: Point, reach_m: float) -> bool:
+    """Tell whether a point (x, y) [m] lies in a polygon, or nearer to it than ``reach_m`` [m]."""
+    x, y = point
+    is_inside = False
+    for (ax, ay), (bx, by) in _edges(polygon):
+        dx, dy = bx - ax, by - ay
+        along = min(max(((x - ax) * dx + (y - ay) * dy) / (dx * dx + dy * dy), 0.0), 1.0)
+        if math.hypot(ax + along * dx - x, ay + along * dy - y) < reach_m:
+            return True
+        if (ay > y) != (by > y) and x < ax + (y - ay) * dx / dy:
+            is_inside = not is_inside
+    return is_inside
+
+
 def _edges(polygon: Polygon) -> Iterator[tuple[Point, Point]]:
     return zip(polygon, (*polygon[1:], polygon[0]), strict=True)
 

@@ -1,0 +1,89 @@
+"""Cautions: settings that are in order each, but together have no effect, or one not expected.
+
+The daemon starts with them; what it cannot work with is a fault of ``loading``.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Iterator
+
+from fasaco_edge.config.config import DaemonConfig, PlannerConfig
+from fasaco_edge.config.robot import RobotConfig
+from fasaco_edge.grid.polygons import is_near
+
+LOG = logging.getLogger(__name__)
+
+# How often poses come at least, as localisers send them [Hz]; and how far apart two may be, in
+# tool's widths, for the floor between them to count (``mission.coverage.swept_floor.JUMP_TOOLS``).
+POSES_HZ, JUMP_TOOLS = 10.0, 2.0
+# Rounding of a tool as wide as the robot [m].
+ROUNDING_M = 1e-6
+
+
+def cautions(config: DaemonConfig) -> list[str]:
+    """Return them, each with the keys it is about."""
+    found = (_tool(config.robot), _turns(config.robot), _planner(config), _places(config))
+    return [text for texts in found for text in texts]
+
+
+def log_cautions(config: DaemonConfig) -> None:
+    """Log them."""
+    for text in cautions(config):
+        LOG.warning("%s", text, extra={"event": "caution"})
+
+
+def tool_caution(robot: RobotConfig) -> str:
+    """Return that the tool sticks out of the robot's disc; "" if it does not."""
+    tool_m = abs(robot.tool_ahead_m) + 0.5 * robot.tool_width_m
+    out_m = tool_m - robot.radius_m
+    if out_m <= ROUNDING_M:
+        return ""
+    ahead = f" and robot.tool_ahead_m {robot.tool_ahead_m:g}" if robot.tool_ahead_m else ""
+    return (
+        f"robot.tool_width_m {robot.tool_width_m:g}{ahead}: the tool sticks {out_m:.2g} m out of "
+        f"the robot's disc, robot.radius_m {robot.radius_m:.3g}. Nothing keeps that part off walls "
+        f"and furniture; if it must not touch them, set robot.radius_m: {tool_m:.3g}"
+    )
+
+
+def _tool(robot: RobotConfig) -> Iterator[str]:
+    if text := tool_caution(robot):
+        yield text
+    needed_hz = robot.speed_m_s / (JUMP_TOOLS * robot.tool_width_m)
+    if needed_hz > POSES_HZ:
+        yield (
+            f"robot.speed_m_s {robot.speed_m_s:g} beside robot.tool_width_m "
+            f"{robot.tool_width_m:g}: floor counts as swept only if a pose comes at least "
+            f"{needed_hz:.0f} times a second; between poses farther apart it does not"
+        )
+
+
+def _turns(robot: RobotConfig) -> Iterator[str]:
+    usual = RobotConfig()
+    if robot.turn_deg_s is not None and robot.quarter_turn_s != usual.quarter_turn_s:
+        yield "robot.quarter_turn_s has no effect beside robot.turn_deg_s"
+    if robot.turn_deg_s is None and robot.steered_deg != usual.steered_deg:
+        yield "robot.steered_deg has no effect without robot.turn_deg_s"
+
+
+def _planner(config: DaemonConfig) -> Iterator[str]:
+    planner, usual = config.planner, PlannerConfig()
+    if planner.line == "cells":
+        idle = ["planner.align"] if planner.align != usual.align else []
+        idle += ["robot.overlap"] if config.robot.overlap != RobotConfig().overlap else []
+        if idle:
+            yield f"no effect where planner.line is cells: {', '.join(idle)}"
+
+
+def _places(config: DaemonConfig) -> Iterator[str]:
+    mission, radius_m = config.mission, config.robot.radius_m
+    for name, place in (("home", mission.home), ("dock", mission.dock)):
+        for index, polygon in enumerate(mission.keep_out if place is not None else ()):
+            assert place is not None
+            if is_near(polygon, (place.stand.x, place.stand.y), radius_m):
+                where = "the place before its dock" if name == "dock" else "home"
+                yield (
+                    f"mission.keep_out[{index}] lies at mission.{name}: the robot may not stand at "
+                    f"{where}, so it never gets there"
+                )
