@@ -6,12 +6,13 @@ TARGET_PYTHON ?= 3.11
 VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
+LAB_STAMP := $(VENV)/.lab
 # Most tests wait for processes and their timers: three a core, but of many cores no more than eight.
 WORKERS ?= $(shell n=$$(nproc); echo $$((n < 3 ? 3 * n : 8)))
 # As images for containers set it, each of some hundred processes would compile all sources anew.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo test properties check format contract bench wheelhouse clean
+.PHONY: demo test properties check format contract bench lab lab-install wheelhouse clean
 
 demo: $(STAMP)  ## watch a robot cover a building nobody mapped before
 	$(BIN)/fasaco-edge demo $(ARGS)
@@ -46,6 +47,12 @@ bench: $(STAMP)  ## speed, footprint, latency
 	$(BIN)/fasaco-edge bench footprint
 	$(BIN)/fasaco-edge bench latency
 
+lab: $(LAB_STAMP)  ## missions in a simulator of others, judged by the true poses: some 5 min each
+	$(BIN)/python -m tests.campaigns.lab table $(ARGS)
+
+lab-install: $(STAMP)  ## what `make lab` needs, if that can be had here; without it `make test` skips the lab
+	@$(MAKE) --no-print-directory $(LAB_STAMP) || echo "the lab cannot be installed here: its test is skipped"
+
 wheelhouse: $(STAMP)  ## a folder in dist/ from which a robot is installed without a network
 	PYTHONPATH=deploy $(BIN)/python -m wheelhouse --arch $(ARCH) --python $(TARGET_PYTHON) $(ARGS)
 
@@ -58,3 +65,7 @@ $(STAMP): pyproject.toml
 	$(PYTHON) -I -m venv $(VENV)
 	$(BIN)/python -I -m pip install --quiet --disable-pip-version-check --editable ".[dev]"
 	touch $(STAMP)
+
+$(LAB_STAMP): $(STAMP)
+	$(BIN)/python -I -m pip install --quiet --disable-pip-version-check --editable ".[lab]"
+	touch $(LAB_STAMP)

@@ -1,0 +1,124 @@
+"""Missions in the lab: the product in ir-sim, with OpenKarto's mapper, judged by the true poses.
+
+python -m tests.campaigns.lab --building office --seed 1 --out DIR
+python -m tests.campaigns.lab table --maps DIR
+
+Base, mapper, mission and follower run in one process in simulated time: the same seed gives the
+same mission, bit for bit, however busy the machine is. ``table`` runs several and prints a table.
+It needs ``pip install -e ".[lab]"``. Exit code 1 after a false done or a deadlock.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import re
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import fields
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from tests.campaigns.lab.settings import LabSettings
+
+if TYPE_CHECKING:
+    from tests.campaigns.lab.report import Judged
+
+# Buildings of the table: the project's own, and those of a folder of others, where it has them.
+OWN, OTHERS = ("office", "flat"), ("tb3_world", "aws_small_house")
+OPTIONS = {
+    "seed": "of all noise",
+    "people": "how many walk about",
+    "noise_m": "scatter of the lidar [m]",
+    "radius_m": "radius that the product is told [m]",
+    "hull_m": "radius of the hull that collides [m]",
+    "clearance_m": "what the product plans with beside the radius [m]",
+    "seconds": "limit of simulated time [s]",
+    "pose_hz": "rate of poses [1/s]",
+    "scan_hz": "rate of scans that are offered to the mapper [1/s]",
+    "nudge_s": "a person helps a robot that stood for so long [s]; 0 for never",
+    "speed_m_s": "speed of the robot [m/s]",
+    "tool_m": "width of its tool [m]",
+}
+
+
+def main() -> int:
+    """Run one mission, or several for a table."""
+    args = _parser().parse_args()
+    try:
+        from tests.campaigns.lab import report
+    except ModuleNotFoundError as error:
+        print(f'{error}: the lab needs pip install -e ".[lab]"', file=sys.stderr)
+        return 2
+    if args.command is None:
+        found = _mission(args, args.building[0] if args.building else OWN[0], args.out)
+        print(json.dumps(found.document()) if args.json else report.in_words(found))
+        return int(found.figures.is_fault)
+    all_found = []
+    for name in args.building or _names(args.maps):
+        found = _mission(args, name, args.out and args.out / name)
+        print(report.in_words(found), file=sys.stderr, flush=True)
+        all_found.append(found)
+    if args.json:
+        print(json.dumps([found.document() for found in all_found]))
+    else:
+        print(report.table(all_found))
+    return int(any(found.figures.is_fault for found in all_found))
+
+
+def _names(folder: Path | None) -> list[str]:
+    """Return the buildings of the table."""
+    others = [name for name in OTHERS if folder and (folder / f"{name}.yaml").is_file()]
+    return [*OWN, *others]
+
+
+def _mission(args: argparse.Namespace, name: str, out: Path | None) -> Judged:
+    from tests.campaigns.lab.building import Building
+    from tests.campaigns.lab.mission import run_mission
+    from tests.campaigns.lab.report import judged
+
+    given = {field.name: getattr(args, field.name) for field in fields(LabSettings)}
+    began = time.perf_counter()
+    run = run_mission(Building.read(name, args.maps, args.start), LabSettings(**given))
+    return judged(run, time.perf_counter() - began, out)
+
+
+def _parser() -> argparse.ArgumentParser:
+    about, _, epilog = (__doc__ or "").partition("\n\n")
+    parser = argparse.ArgumentParser(
+        prog="python -m tests.campaigns.lab",
+        description=about,
+        epilog=epilog,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    add = parser.add_argument
+    add("command", nargs="?", choices=("table",), help="run several missions")
+    add("--building", action="append", help="a map's name or file; of a table several")
+    add("--maps", type=Path, metavar="DIR", help="a folder with further maps")
+    add("--start", type=_numbers(3), metavar="X,Y,YAW", help="where it starts [m, rad]")
+    add("--walk", type=_numbers(4), metavar="X1,Y1,X2,Y2", help="where people walk [m]")
+    add("--ideal", action="store_true", help="no slip, no drift")
+    defaults = LabSettings()
+    for name, what in OPTIONS.items():
+        default = getattr(defaults, name)
+        option = "--" + re.sub("_(m|s|m_s)$", "", name).replace("_", "-")
+        told = f"{what} (default: {default:g})"
+        add(option, dest=name, type=type(default), default=default, metavar="N", help=told)
+    add("--out", type=Path, metavar="DIR", help="write picture, trace, paths and figures there")
+    add("--json", action="store_true", help="print figures as JSON")
+    return parser
+
+
+def _numbers(count: int) -> Callable[[str], tuple[float, ...]]:
+    def numbers(text: str) -> tuple[float, ...]:
+        found = tuple(map(float, text.split(",")))
+        if len(found) != count:
+            raise argparse.ArgumentTypeError(f"must be {count} numbers, got {text!r}")
+        return found
+
+    return numbers
+
+
+if __name__ == "__main__":
+    sys.exit(main())

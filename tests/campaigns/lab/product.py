@@ -1,0 +1,182 @@
+"""The product in the lab: the daemon's mission and the follower, stepped in simulated time.
+
+Between the two go a path's bytes, as on the bus; maps and poses come as bytes, too.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import dataclass
+from typing import Any
+
+from fasaco_edge.config.config import DaemonConfig
+from fasaco_edge.daemon.ledger.writer import LedgerKeeper, LedgerWriter
+from fasaco_edge.daemon.loop.grid_publishers import MOST_SQUARES
+from fasaco_edge.daemon.loop.inbox import make_mailbox
+from fasaco_edge.daemon.loop.loader import mission_config
+from fasaco_edge.daemon.loop.mission_runner import MissionRunner
+from fasaco_edge.daemon.loop.outbox import headings
+from fasaco_edge.daemon.loop.status import HEARTBEAT_S, StatusBoard
+from fasaco_edge.follow.estimate import Command, Limits
+from fasaco_edge.follow.follower import Follower
+from fasaco_edge.grid.geometry import StampedPose
+from fasaco_edge.grid.occupancy import OccupancyGrid
+from fasaco_edge.mission.core.events import Event, MapReceived, PoseReceived
+from fasaco_edge.mission.core.mission import Mission
+from fasaco_edge.mission.core.path_exit import PublishedPath
+from fasaco_edge.mission.orders.order_state import OrderState
+from fasaco_edge.wire.documents.json_text import encode_json
+from fasaco_edge.wire.messages.maps import decode_occupancy_grid, encode_occupancy_grid
+from fasaco_edge.wire.messages.paths import encode_path
+from fasaco_edge.wire.messages.poses import encode_pose_stamped
+from fasaco_edge.wire.schemas import POSE_STAMPED
+from tests.campaigns.lab.planning import LockStepPlanning
+
+NAME = "lab"
+
+
+class Product:
+    """A daemon and a follower without bus, disk and threads.
+
+    Attributes:
+        paths: all paths published since they were last taken.
+        faults: what the mission refused, and how often.
+    """
+
+    def __init__(self, config: DaemonConfig) -> None:
+        self.paths: list[PublishedPath] = []
+        self.faults: dict[str, int] = {}
+        self._config = config
+        self._planning = LockStepPlanning(config.planner)
+        self._mission = Mission(
+            mission_config(config, self._planning.planner), OrderState.autostart()
+        )
+        mailbox = make_mailbox(config.map.max_pixels)
+        keeper = LedgerKeeper(_NoDisk(), config.cell_m, autostart=True)
+        self._runner = MissionRunner(config, keeper, mailbox)
+        self._runner.mission = self._mission
+        self._decoder = config.poses()
+        self._events: list[Event] = []
+        self._sent: bytes | None = None
+        self.follower = _follower(config)
+        self._heartbeat_at = -math.inf
+
+    @property
+    def state(self) -> str:
+        """State of the mission."""
+        return str(self._mission.state)
+
+    @property
+    def reason(self) -> str:
+        """The mission's reason for it."""
+        return self._mission.reason
+
+    @property
+    def plans(self) -> int:
+        """How many plans were made."""
+        return self._planning.plans
+
+    def hear_map(self, grid: OccupancyGrid) -> None:
+        """Take in a map."""
+        payload = encode_occupancy_grid(grid)
+        decoded = decode_occupancy_grid(payload, self._config.map.max_pixels)
+        self._events.append(MapReceived(decoded))
+
+    def hear_pose(self, stamped: StampedPose, now: float) -> None:
+        """Take in a pose: mission and follower both do, at ``now`` [s]."""
+        pose = self._decoder.decode(encode_pose_stamped(stamped), POSE_STAMPED)
+        assert pose is not None
+        self._events.append(PoseReceived(pose))
+        self.follower.take_pose(pose, now)
+
+    def step(self, now: float) -> Command | None:
+        """Run a cycle of both at ``now`` [s]; return the command to the base, None for none.
+
+        The follower has a path one cycle after the mission has published it.
+        """
+        if self._sent is not None:
+            self.follower.take_path(self._sent)
+            self._sent = None
+        if now - self._heartbeat_at >= HEARTBEAT_S:
+            self._heartbeat_at = now
+            self.follower.heard_status(now)
+        self._step_mission(now)
+        return self.follower.step(now)
+
+    def _step_mission(self, now: float) -> None:
+        """Step the mission, and perform what it decides, as the daemon's loop does."""
+        events, self._events = self._events, []
+        plans = self._planning.take(now)
+        if not events and not plans:
+            return
+        mission, runner = self._mission, self._runner
+        decision = runner.step(mission, [*events, *plans], now)
+        for fault in decision.faults:
+            self.faults[fault.code] = self.faults.get(fault.code, 0) + 1
+        if mission.route.wanted and mission.route.is_improving:
+            self._planning.interrupt(now)
+        if decision.plan is not None:
+            self._planning.submit(decision.plan, now)
+        if decision.path is not None and decision.plan is None and decision.path.plan is None:
+            self._planning.interrupt(now)
+        runner.paths.send(self._publish)
+
+    def _publish(self, path: PublishedPath) -> bool:
+        yaw = headings(path.xy)
+        if len(yaw) and path.end_yaw is not None:
+            yaw[-1] = path.end_yaw
+        self._sent = encode_path(path.xy, yaw, path.frame, path.map_stamp_ns)
+        self.paths.append(path)
+        return True
+
+    def report(self) -> ProductReport:
+        """Return what the product says of its mission."""
+        reply = StatusBoard(self._config).reply(self._runner)
+        shown, grid = None, self._mission.grid
+        if grid is not None:
+            shown = self._mission.floor.snapshot().shown(MOST_SQUARES, grid.frame, grid.stamp_ns)
+        if shown is not None:
+            turned = self._mission.rotation.geometry(shown.geometry)
+            shown = OccupancyGrid(turned, shown.cells, shown.frame, shown.stamp_ns)
+        return ProductReport(json.loads(encode_json(reply)), shown, self.plans, dict(self.faults))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ProductReport:
+    """What the product says of its mission.
+
+    Attributes:
+        reply: state, reason, coverage, floor and order, as of a reply to a command.
+        floor: the swept floor as it is published; None before there is one.
+        plans: how many were made.
+        faults: what the mission refused, and how often.
+    """
+
+    reply: dict[str, Any]
+    floor: OccupancyGrid | None
+    plans: int
+    faults: dict[str, int]
+
+
+def _follower(config: DaemonConfig) -> Follower:
+    """Return a follower as ``fasaco-edge follow`` makes it."""
+    robot = config.robot
+    follower = Follower(
+        Limits(
+            robot.speed_m_s,
+            robot.acceleration_m_s2,
+            math.radians(robot.turning_deg_s()),
+            math.radians(robot.turn_deg_s2),
+            math.radians(robot.steered_deg),
+        )
+    )
+    follower.take_planner(NAME)
+    return follower
+
+
+class _NoDisk(LedgerWriter):
+    """A ledger that nothing is written to."""
+
+    def __init__(self) -> None:
+        self.restored = None

@@ -1,0 +1,85 @@
+"""Settings of a lab's mission: robot, noise, people, rates."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from fasaco_edge.config.config import DaemonConfig
+from fasaco_edge.config.robot import RobotConfig
+
+TICK_S = 0.05
+"""A tick of the simulated time [s]: all rates are whole numbers of it."""
+
+
+@dataclass(frozen=True, slots=True)
+class LabSettings:
+    """How a mission is made.
+
+    Attributes:
+        seed: of all noise.
+        people: how many walk about.
+        walk: the rectangle they walk in: x1, y1, x2, y2 [m]; None for the middle of the building.
+        ideal: without slip of the wheels and drift of odometry.
+        noise_m: scatter of the lidar [m].
+        radius_m: of the robot's disc by the product's configuration, and to the judge [m].
+        hull_m: of the hull that collides [m].
+        clearance_m: by how much more than ``radius_m`` the product plans with [m].
+        seconds: limit of simulated time [s].
+        pose_hz, scan_hz: rates of poses, and of scans that are offered to the mapper [1/s].
+        nudge_s: a person helps a robot that stood so long with work left [s]; 0 for never.
+        speed_m_s, tool_m: speed of the robot, and width of its tool.
+    """
+
+    seed: int = 1
+    people: int = 0
+    walk: tuple[float, float, float, float] | None = None
+    ideal: bool = False
+    noise_m: float = 0.012
+    radius_m: float = 0.18
+    hull_m: float = 0.17
+    clearance_m: float = 0.0
+    seconds: float = 1500.0
+    pose_hz: float = 20.0
+    scan_hz: float = 2.5
+    nudge_s: float = 0.0
+    speed_m_s: float = 0.35
+    tool_m: float = 0.3
+
+    def __post_init__(self) -> None:
+        """Check rates and lengths.
+
+        Raises:
+            ValueError: one cannot be.
+        """
+        for name in ("pose_hz", "scan_hz"):
+            if not 0.0 < getattr(self, name) <= 1.0 / TICK_S:
+                raise ValueError(f"{name} must be above 0 and at most {1.0 / TICK_S:g}")
+        if not self.seconds > 0.0:
+            raise ValueError("seconds must be above 0")
+
+    def ticks(self, rate_hz: float) -> int:
+        """Return every how many ticks something of this rate is due."""
+        return max(round(1.0 / (rate_hz * TICK_S)), 1)
+
+    @property
+    def robot(self) -> RobotConfig:
+        """The product's configuration of the robot."""
+        return RobotConfig(
+            radius_m=self.radius_m + self.clearance_m,
+            tool_width_m=self.tool_m,
+            speed_m_s=self.speed_m_s,
+            acceleration_m_s2=0.5,
+            turn_deg_s=80.0,
+            turn_deg_s2=180.0,
+        )
+
+    @property
+    def config(self) -> DaemonConfig:
+        """The product's configuration."""
+        return DaemonConfig(robot=self.robot)
+
+
+def stamp_ns(now: float) -> int:
+    """Return the stamp of a simulated time; 0 would be an unknown one."""
+    return 1_000_000_000 + math.floor(now * 1e9)

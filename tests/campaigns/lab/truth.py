@@ -1,0 +1,150 @@
+"""Truth of a mission: the floor that can be swept, and that was, by the true poses alone."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from fasaco_edge.grid.geometry import GridGeometry
+from fasaco_edge.grid.occupancy import OccupancyGrid
+from tests.campaigns.lab.building import Building, Mask
+
+# Largest pixel [m].
+FINE_M = 0.0125
+# Patches below this are left out [m2].
+LEAST_M2 = 0.01
+# The floor is published as percent swept; from here on it is claimed.
+CLAIMED_AT = 50
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Truth:
+    """A building's floor on fine pixels.
+
+    Attributes:
+        geometry: placement of the pixels.
+        occupied: walls, bool (rows, cols).
+        free: known free.
+        reachable: the floor that the tool's disc touches where the robot's disc fits and comes to
+            from its start.
+        swept: the floor that the tool's disc passed over.
+        claimed: the floor that the product says was swept.
+    """
+
+    geometry: GridGeometry
+    occupied: Mask
+    free: Mask
+    reachable: Mask
+    swept: Mask
+    claimed: Mask
+
+    @classmethod
+    def of(
+        cls,
+        building: Building,
+        radius_m: float,
+        tool_m: float,
+        xy: NDArray[np.float64],
+        floor: OccupancyGrid | None,
+    ) -> Truth:
+        """Return the truth of a mission.
+
+        Args:
+            building: where it was.
+            radius_m, tool_m: radius of the robot's disc, and width of its tool [m].
+            xy: float64 (n, 2), the true positions.
+            floor: the floor swept as the product says, percent; None for none.
+        """
+        rough, split = building.geometry, building.split(FINE_M)
+        pixel_m = rough.resolution / split
+        shape = rough.rows * split, rough.cols * split
+        geometry = GridGeometry(*shape, pixel_m, rough.origin)
+        occupied = building.fine(building.occupied, FINE_M)
+        free = ~(occupied | building.fine(building.unknown, FINE_M))
+        fits = ndimage.distance_transform_edt(free) * pixel_m > radius_m
+        stands = _connected(fits, geometry, xy[0], radius_m)
+        reachable = _within(stands, 0.5 * tool_m / pixel_m) & free
+        driven = np.zeros(shape, bool)
+        between = 0.5 * (xy[1:] + xy[:-1])
+        cols, rows = geometry.to_pixels(*np.concatenate([xy, between]).T)
+        driven[rows.astype(int), cols.astype(int)] = True
+        swept = _within(driven, 0.5 * tool_m / pixel_m)
+        return cls(geometry, occupied, free, reachable, swept, _claimed(geometry, floor))
+
+    def m2(self, mask: Mask) -> float:
+        """Return the area of a mask [m2]."""
+        return float(np.count_nonzero(mask)) * self.geometry.resolution**2
+
+    @property
+    def share(self) -> float:
+        """The swept share of the reachable floor."""
+        reachable = self.m2(self.reachable)
+        return self.m2(self.swept & self.reachable) / reachable if reachable else 0.0
+
+    def missed(self, most: int) -> list[tuple[float, float, float]]:
+        """Return the largest patches that were not swept: area [m2], x, y [m]; no tiny ones."""
+        patches, count = ndimage.label(self.reachable & ~self.swept)
+        if not count:
+            return []
+        numbers = np.arange(1, count + 1)
+        pixels = ndimage.sum_labels(np.ones(patches.shape), patches, numbers)
+        largest = np.argsort(-pixels, kind="stable")[:most]
+        largest = largest[pixels[largest] * self.geometry.resolution**2 >= LEAST_M2]
+        centres = ndimage.center_of_mass(patches > 0, patches, numbers[largest])
+        found = []
+        for i, (row, col) in zip(largest, centres, strict=True):
+            x, y = self.geometry.to_map(col + 0.5, row + 0.5)
+            m2 = float(pixels[i]) * self.geometry.resolution**2
+            found.append((round(m2, 3), round(x, 2), round(y, 2)))
+        return found
+
+
+def _within(mask: Mask, pixels: float) -> Mask:
+    """Return what lies at most so far from a mask [pixels]."""
+    if not mask.any():
+        return mask
+    near: Mask = ndimage.distance_transform_edt(~mask) <= pixels
+    return near
+
+
+def _connected(
+    fits: Mask, geometry: GridGeometry, start: NDArray[np.float64], radius_m: float
+) -> Mask:
+    """Return the part of ``fits`` that is connected with the place nearest to ``start``."""
+    labels, _ = ndimage.label(fits)
+    rows, cols = np.nonzero(labels)
+    if not len(rows):
+        return fits
+    col, row = geometry.to_pixels(float(start[0]), float(start[1]))
+    apart = np.hypot(rows + 0.5 - row, cols + 0.5 - col)
+    nearest = int(np.argmin(apart))
+    if apart[nearest] * geometry.resolution > radius_m:
+        return np.zeros_like(fits)
+    part: Mask = labels == labels[rows[nearest], cols[nearest]]
+    return part
+
+
+def _claimed(geometry: GridGeometry, floor: OccupancyGrid | None) -> Mask:
+    """Return which pixels the product says were swept, in the map frame."""
+    claimed = np.zeros((geometry.rows, geometry.cols), bool)
+    if floor is None:
+        return claimed
+    rows, cols = np.mgrid[0 : geometry.rows, 0 : geometry.cols]
+    x = geometry.origin.x + (cols + 0.5) * geometry.resolution
+    y = geometry.origin.y + (rows + 0.5) * geometry.resolution
+    there_cols, there_rows = (np.floor(axis) for axis in floor.geometry.to_pixels(x, y))
+    inside = (there_cols >= 0) & (there_rows >= 0)
+    inside &= (there_cols < floor.geometry.cols) & (there_rows < floor.geometry.rows)
+    at = there_rows[inside].astype(int), there_cols[inside].astype(int)
+    claimed[inside] = floor.cells[at] >= CLAIMED_AT
+    return claimed
+
+
+def turns_between(yaw: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the turns from each heading to the next, float64 (n - 1,), in [-pi, pi) [rad]."""
+    turned: NDArray[np.float64] = (np.diff(yaw) + math.pi) % math.tau - math.pi
+    return turned
