@@ -141,13 +141,12 @@ class Mapper:
 
     def _drawn(self) -> tuple[GridGeometry, NDArray[np.int8]]:
         grid = karto.create_occupancy_grid(self._scans, RESOLUTION_M, USED_RANGE_M)
-        drawn = np.array(grid.image)
+        drawn: NDArray[np.uint8] = np.array(grid.image)
         cells = np.full(drawn.shape, UNKNOWN, np.int8)
         cells[drawn == DRAWN_FREE] = FREE
         cells[drawn == DRAWN_OCCUPIED] = OCCUPIED
-        rows, cols = cells.shape
         origin = Pose2D(grid.offset.x, grid.offset.y)
-        return GridGeometry(rows, cols, RESOLUTION_M, origin), cells
+        return GridGeometry(grid.height, grid.width, RESOLUTION_M, origin), cells
 
 
 def composed(frame: Pose2D, pose: Pose2D) -> Pose2D:

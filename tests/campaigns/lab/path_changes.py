@@ -64,19 +64,19 @@ def changes_ahead(
     begun = 0
     for tick, path in paths:
         if before is not None:
-            for at in range(begun, tick, LOOK_TICKS):
+            for at in (*range(begun, tick, LOOK_TICKS), tick):
                 before.look(x[at], y[at])
         now = PathAhead(path.xy)
         if before is not None:
-            now.look(x[min(tick, len(x) - 1)], y[min(tick, len(y) - 1)])
+            now.look(x[tick], y[tick])
             yield differs(before.ahead(), now.ahead())
         before, begun = now, tick
 
 
 def differs(before: Points, after: Points) -> bool:
     """Tell whether a stretch of path leads elsewhere than the one before it, or ends earlier."""
-    if len(after) < len(before) - SLACK:
-        return True
+    if not len(before) or len(after) < len(before) - SLACK:
+        return len(before) != len(after)
     common = min(len(before), len(after))
     padded = np.pad(after, ((SLACK, SLACK), (0, 0)), constant_values=np.inf)
     apart = np.min(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from PIL import Image
+from PIL import Image, ImageDraw
 
 from fasaco_edge.drawing import palette
 from fasaco_edge.drawing.palette import Colour
@@ -31,8 +31,8 @@ KEY = (
     (TRACK, "true track"),
     (CONTACT, "contact"),
 )
-# Of a contact, and most of a picture [pixels].
-CONTACT_PX, MOST_PX = 3, 1400
+# Of a contact, of start and end, and most of a picture [pixels].
+CONTACT_PX, MARK_PX, MOST_PX = 3, 8, 1400
 
 
 def draw(run: LabRun, truth: Truth, figures: Figures, file: Path) -> None:
@@ -41,6 +41,7 @@ def draw(run: LabRun, truth: Truth, figures: Figures, file: Path) -> None:
     scale = max(-(-max(plot.size) // MOST_PX), 1)
     plot = plot.reduce(scale) if scale > 1 else plot
     key = [KeyEntry("tile", colour, label) for colour, label in KEY]
+    key += [KeyEntry("disc", palette.START, "start"), KeyEntry("disc", palette.END, "end")]
     settings = run.settings
     title = f"{run.building.name}, seed {settings.seed}: {figures.ending}"
     lines = [
@@ -73,4 +74,9 @@ def _plot(run: LabRun, truth: Truth) -> Image.Image:
         pixels[max(row - near, 0) : row + near + 1, max(col - near, 0) : col + near + 1] = CONTACT
     shown = np.argwhere(reachable | truth.occupied)
     (row0, col0), (row1, col1) = shown.min(axis=0), shown.max(axis=0)
-    return Image.fromarray(np.flipud(pixels[row0 : row1 + 1, col0 : col1 + 1]))
+    plot = Image.fromarray(np.flipud(pixels[row0 : row1 + 1, col0 : col1 + 1]))
+    pen = ImageDraw.Draw(plot)
+    for tick, colour in ((0, palette.START), (-1, palette.END)):
+        x, y = int(cols[tick] - col0), int(row1 - rows[tick])
+        pen.ellipse((x - MARK_PX, y - MARK_PX, x + MARK_PX, y + MARK_PX), outline=colour, width=3)
+    return plot

@@ -139,7 +139,9 @@ class Product:
         if shown is not None:
             turned = self._mission.rotation.geometry(shown.geometry)
             shown = OccupancyGrid(turned, shown.cells, shown.frame, shown.stamp_ns)
-        return ProductReport(json.loads(encode_json(reply)), shown, self.plans, dict(self.faults))
+        return ProductReport(
+            json.loads(encode_json(reply)), shown, grid, self.plans, dict(self.faults)
+        )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -149,12 +151,14 @@ class ProductReport:
     Attributes:
         reply: state, reason, coverage, floor and order, as of a reply to a command.
         floor: the swept floor as it is published; None before there is one.
+        grid: the map that it had last; None for none.
         plans: how many were made.
         faults: what the mission refused, and how often.
     """
 
     reply: dict[str, Any]
     floor: OccupancyGrid | None
+    grid: OccupancyGrid | None
     plans: int
     faults: dict[str, int]
 

@@ -9,6 +9,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from maps.map_writer import write_map
 from tests.campaigns.lab.judge import Figures, judge, truth_of
 from tests.campaigns.lab.mission import COLUMNS, LabRun
 from tests.campaigns.lab.picture import draw
@@ -47,7 +48,7 @@ class Judged:
 
 
 def judged(run: LabRun, wall_s: float, out: Path | None = None) -> Judged:
-    """Judge a mission; with a folder write picture, trace, paths, states and figures there."""
+    """Judge a mission; with a folder write picture, map, trace, paths and figures there."""
     truth = truth_of(run)
     found = Judged(run, judge(run, truth), truth.missed(MISSED), wall_s)
     if out is not None:
@@ -103,7 +104,9 @@ def table(all_found: Sequence[Judged]) -> str:
 
 
 def _write(found: Judged, out: Path) -> None:
-    trace = found.run.trace
+    trace, grid = found.run.trace, found.run.report.grid
+    if grid is not None:
+        write_map(grid, out / "map.yaml")
     (out / "figures.json").write_text(json.dumps(found.document(), indent=1), encoding="utf-8")
     with (out / "trace.csv").open("w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file)

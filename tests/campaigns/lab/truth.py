@@ -15,6 +15,8 @@ from tests.campaigns.lab.building import Building, Mask
 
 # Largest pixel [m].
 FINE_M = 0.0125
+# Distances of whole pixels are reached [pixels].
+ROUNDING_PX = 1e-6
 # Patches below this are left out [m2].
 LEAST_M2 = 0.01
 # The floor is published as percent swept; from here on it is claimed.
@@ -65,14 +67,12 @@ class Truth:
         geometry = GridGeometry(*shape, pixel_m, rough.origin)
         occupied = building.fine(building.occupied, FINE_M)
         free = ~(occupied | building.fine(building.unknown, FINE_M))
-        fits = ndimage.distance_transform_edt(free) * pixel_m > radius_m
+        # A wall begins half a pixel before the centre of its first one.
+        fits = (ndimage.distance_transform_edt(free) - 0.5) * pixel_m > radius_m
         stands = _connected(fits, geometry, xy[0], radius_m)
-        reachable = _within(stands, 0.5 * tool_m / pixel_m) & free
-        driven = np.zeros(shape, bool)
-        between = 0.5 * (xy[1:] + xy[:-1])
-        cols, rows = geometry.to_pixels(*np.concatenate([xy, between]).T)
-        driven[rows.astype(int), cols.astype(int)] = True
-        swept = _within(driven, 0.5 * tool_m / pixel_m)
+        tool_px = 0.5 * tool_m / pixel_m
+        reachable = (ndimage.distance_transform_edt(~stands) <= tool_px + ROUNDING_PX) & free
+        swept = _within(geometry, xy, tool_px)
         return cls(geometry, occupied, free, reachable, swept, _claimed(geometry, floor))
 
     def m2(self, mask: Mask) -> float:
@@ -103,11 +103,22 @@ class Truth:
         return found
 
 
-def _within(mask: Mask, pixels: float) -> Mask:
-    """Return what lies at most so far from a mask [pixels]."""
-    if not mask.any():
-        return mask
-    near: Mask = ndimage.distance_transform_edt(~mask) <= pixels
+def _within(geometry: GridGeometry, xy: NDArray[np.float64], pixels: float) -> Mask:
+    """Return the pixels whose centres are at most so far from a track [pixels]."""
+    between = 0.5 * (xy[1:] + xy[:-1])
+    cols, rows = geometry.to_pixels(*np.concatenate([xy, between]).T)
+    at = rows.astype(int), cols.astype(int)
+    off = np.ones((geometry.rows, geometry.cols), bool)
+    off[at] = False
+    # Where in its pixel the track is.
+    there = np.zeros((2, geometry.rows, geometry.cols), np.float32)
+    there[:, *at] = rows - at[0] - 0.5, cols - at[1] - 0.5
+    nearest = ndimage.distance_transform_edt(off, return_distances=False, return_indices=True)
+    down, right = (
+        nearest[axis] + there[axis][tuple(nearest)] - place
+        for axis, place in enumerate(np.ogrid[0 : geometry.rows, 0 : geometry.cols])
+    )
+    near: Mask = np.hypot(down, right) <= pixels
     return near
 
 
