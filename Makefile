@@ -67,5 +67,5 @@ $(STAMP): pyproject.toml
 	touch $(STAMP)
 
 $(LAB_STAMP): $(STAMP)
-	$(BIN)/python -I -m pip install --quiet --disable-pip-version-check --editable ".[lab]"
+	$(BIN)/python -I -m pip install --quiet --disable-pip-version-check --retries 1 --editable ".[lab]"
 	touch $(LAB_STAMP)

@@ -57,6 +57,12 @@ class Building:
         x, y, yaw = (*start, 0.0)[:3]
         return cls(path.stem, grid.geometry, occupied, unknown, Pose2D(x, y, yaw))
 
+    @property
+    def free_m2(self) -> float:
+        """Return the area of its free floor [m2]."""
+        free = ~(self.occupied | self.unknown)
+        return float(np.count_nonzero(free)) * self.geometry.resolution**2
+
     def fine(self, mask: Mask, pixel_m: float) -> Mask:
         """Return one of its masks on pixels of at most ``pixel_m`` [m]."""
         split = self.split(pixel_m)

@@ -99,6 +99,7 @@ class _Running:
         self._product = Product(settings.config)
         self._person = Person(building, settings.nudge_s)
         self._trace = Trace()
+        self._limit_s = settings.limit_s(building.free_m2)
         self._pose_ticks = settings.ticks(settings.pose_hz)
         self._scan_ticks = settings.ticks(settings.scan_hz)
         # Since when the mission is done, and the robot has not moved [s].
@@ -109,9 +110,7 @@ class _Running:
         """Tell whether there is nothing more to be seen."""
         now = self._base.now
         return (
-            now >= self._settings.seconds
-            or now - self._done_at > SURE_S
-            or now - self._stood_at > GIVE_UP_S
+            now >= self._limit_s or now - self._done_at > SURE_S or now - self._stood_at > GIVE_UP_S
         )
 
     def tick(self) -> None:

@@ -15,6 +15,7 @@ from fasaco_edge.daemon.ledger.writer import LedgerKeeper, LedgerWriter
 from fasaco_edge.daemon.loop.grid_publishers import MOST_SQUARES
 from fasaco_edge.daemon.loop.inbox import make_mailbox
 from fasaco_edge.daemon.loop.loader import mission_config
+from fasaco_edge.daemon.loop.loop import TICK_S as LOOP_S
 from fasaco_edge.daemon.loop.mission_runner import MissionRunner
 from fasaco_edge.daemon.loop.outbox import headings
 from fasaco_edge.daemon.loop.status import HEARTBEAT_S, StatusBoard
@@ -60,7 +61,7 @@ class Product:
         self._events: list[Event] = []
         self._sent: bytes | None = None
         self.follower = _follower(config)
-        self._heartbeat_at = -math.inf
+        self._heartbeat_at = self._stepped_at = -math.inf
 
     @property
     def state(self) -> str:
@@ -78,10 +79,10 @@ class Product:
         return self._planning.plans
 
     def hear_map(self, grid: OccupancyGrid) -> None:
-        """Take in a map."""
+        """Take in a map; in a cycle maps come before poses, as in the daemon's inbox."""
         payload = encode_occupancy_grid(grid)
         decoded = decode_occupancy_grid(payload, self._config.map.max_pixels)
-        self._events.append(MapReceived(decoded))
+        self._events.insert(0, MapReceived(decoded))
 
     def hear_pose(self, stamped: StampedPose, now: float) -> None:
         """Take in a pose: mission and follower both do, at ``now`` [s]."""
@@ -108,8 +109,9 @@ class Product:
         """Step the mission, and perform what it decides, as the daemon's loop does."""
         events, self._events = self._events, []
         plans = self._planning.take(now)
-        if not events and not plans:
+        if not events and not plans and now - self._stepped_at < LOOP_S:
             return
+        self._stepped_at = now
         mission, runner = self._mission, self._runner
         decision = runner.step(mission, [*events, *plans], now)
         for fault in decision.faults:

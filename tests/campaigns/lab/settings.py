@@ -11,6 +11,10 @@ from fasaco_edge.config.robot import RobotConfig
 TICK_S = 0.05
 """A tick of the simulated time [s]: all rates are whole numbers of it."""
 
+# A mission over so much floor takes at most so many times as long as driving at full speed without
+# turns and overlap; half of that time is usual.
+LONGEST = 4.0
+
 
 @dataclass(frozen=True, slots=True)
 class LabSettings:
@@ -25,7 +29,7 @@ class LabSettings:
         radius_m: of the robot's disc by the product's configuration, and to the judge [m].
         hull_m: of the hull that collides [m].
         clearance_m: by how much more than ``radius_m`` the product plans with [m].
-        seconds: limit of simulated time [s].
+        seconds: limit of simulated time [s]; 0 for as many as the building's floor may take.
         pose_hz, scan_hz: rates of poses, and of scans that are offered to the mapper [1/s].
         nudge_s: a person helps a robot that stood so long with work left [s]; 0 for never.
         speed_m_s, tool_m: speed of the robot, and width of its tool.
@@ -39,7 +43,7 @@ class LabSettings:
     radius_m: float = 0.18
     hull_m: float = 0.17
     clearance_m: float = 0.0
-    seconds: float = 1500.0
+    seconds: float = 0.0
     pose_hz: float = 20.0
     scan_hz: float = 2.5
     nudge_s: float = 0.0
@@ -55,12 +59,16 @@ class LabSettings:
         for name in ("pose_hz", "scan_hz"):
             if not 0.0 < getattr(self, name) <= 1.0 / TICK_S:
                 raise ValueError(f"{name} must be above 0 and at most {1.0 / TICK_S:g}")
-        if not self.seconds > 0.0:
-            raise ValueError("seconds must be above 0")
+        if not self.seconds >= 0.0:
+            raise ValueError("seconds must be at least 0")
 
     def ticks(self, rate_hz: float) -> int:
         """Return every how many ticks something of this rate is due."""
         return max(round(1.0 / (rate_hz * TICK_S)), 1)
+
+    def limit_s(self, free_m2: float) -> float:
+        """Return the limit of simulated time over so much free floor [s]."""
+        return self.seconds or LONGEST * free_m2 / (self.tool_m * self.speed_m_s)
 
     @property
     def robot(self) -> RobotConfig:
