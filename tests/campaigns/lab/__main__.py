@@ -5,7 +5,8 @@ python -m tests.campaigns.lab table --maps DIR
 
 Base, mapper, mission and follower run in one process in simulated time: the same seed gives the
 same mission, bit for bit, however busy the machine is. ``table`` runs several and prints a table.
-It needs ``pip install -e ".[lab]"``. Exit code 1 after a false done or a deadlock.
+A small change of anything makes another mission: compare several seeds (``--seeds``). It needs
+``pip install -e ".[lab]"``. Exit code 1 after a false done or a deadlock.
 """
 
 from __future__ import annotations
@@ -16,7 +17,8 @@ import re
 import sys
 import time
 from collections.abc import Callable
-from dataclasses import fields
+from dataclasses import fields, replace
+from itertools import product
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -52,12 +54,13 @@ def main() -> int:
         print(f'{error}: the lab needs pip install -e ".[lab]"', file=sys.stderr)
         return 2
     if args.command is None:
-        found = _mission(args, args.building[0] if args.building else OWN[0], args.out)
+        found = _mission(args, args.building[0] if args.building else OWN[0], args.seed, args.out)
         print(json.dumps(found.document()) if args.json else report.in_words(found))
         return int(found.figures.is_fault)
     all_found = []
-    for name in args.building or _names(args.maps):
-        found = _mission(args, name, args.out and args.out / name)
+    seeds = range(args.seed, args.seed + args.seeds)
+    for name, seed in product(args.building or _names(args.maps), seeds):
+        found = _mission(args, name, seed, args.out and args.out / f"{Path(name).stem}_{seed}")
         print(report.in_words(found), file=sys.stderr, flush=True)
         all_found.append(found)
     if args.json:
@@ -73,14 +76,15 @@ def _names(folder: Path | None) -> list[str]:
     return [*OWN, *others]
 
 
-def _mission(args: argparse.Namespace, name: str, out: Path | None) -> Judged:
+def _mission(args: argparse.Namespace, name: str, seed: int, out: Path | None) -> Judged:
     from tests.campaigns.lab.building import Building
     from tests.campaigns.lab.mission import run_mission
     from tests.campaigns.lab.report import judged
 
     given = {field.name: getattr(args, field.name) for field in fields(LabSettings)}
     began = time.perf_counter()
-    run = run_mission(Building.read(name, args.maps, args.start), LabSettings(**given))
+    settings = replace(LabSettings(**given), seed=seed)
+    run = run_mission(Building.read(name, args.maps, args.start), settings)
     return judged(run, time.perf_counter() - began, out)
 
 
@@ -95,6 +99,7 @@ def _parser() -> argparse.ArgumentParser:
     add = parser.add_argument
     add("command", nargs="?", choices=("table",), help="run several missions")
     add("--building", action="append", help="a map's name or file; of a table several")
+    add("--seeds", type=int, default=1, metavar="N", help="of a table: seeds from --seed on")
     add("--maps", type=Path, metavar="DIR", help="a folder with further maps")
     add("--start", type=_numbers(3), metavar="X,Y,YAW", help="where it starts [m, rad]")
     add("--walk", type=_numbers(4), metavar="X1,Y1,X2,Y2", help="where people walk [m]")

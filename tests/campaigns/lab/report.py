@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import csv
 import json
+import statistics
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -100,7 +102,19 @@ def table(all_found: Sequence[Judged]) -> str:
             f"{of.stops_per_m:.2f}", f"{of.paths_per_min:.1f}", f"{of.changes_per_min:.1f}",
             f"{of.longest_stand_s:.0f}", f"{found.wall_s:.0f}",
         ))  # fmt: skip
-    return "\n".join("| " + " | ".join(row) + " |" for row in rows)
+    lines = ["| " + " | ".join(row) + " |" for row in rows]
+    return "\n".join([*lines, "", _summary([found.figures for found in all_found])])
+
+
+def _summary(figures: Sequence[Figures]) -> str:
+    """Return how many missions ended how, and their medians."""
+    endings = Counter(str(of.ending) for of in figures)
+    told = ", ".join(f"{count} {ending}" for ending, count in endings.most_common())
+    true, excess = (
+        statistics.median(getattr(of, name) for of in figures)
+        for name in ("true_share", "excess_points")
+    )
+    return f"{told}; median of the truly swept share {true:.1%}, of the excess {excess:+.1f} points"
 
 
 def _write(found: Judged, out: Path) -> None:
