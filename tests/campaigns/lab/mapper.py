@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D
 from fasaco_edge.grid.occupancy import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
 from tests.campaigns.lab.base import BEAMS, LEAST_RANGE_M, MOST_RANGE_M
-from tests.campaigns.lab.settings import stamp_ns
+from tests.campaigns.lab.settings import RESOLUTION_M, stamp_ns
 
 FRAME = "map"
-RESOLUTION_M, MAP_EVERY_S = 0.05, 3.0
+MAP_EVERY_S = 3.0
 # A scan is kept after so much way [m] or turn [rad].
 TRAVEL_M, TURN_RAD = 0.3, 0.35
 # Matched to the last scans: within so much [m], and believed from this response on.

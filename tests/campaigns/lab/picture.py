@@ -45,10 +45,11 @@ def draw(run: LabRun, truth: Truth, figures: Figures, file: Path) -> None:
     settings = run.settings
     title = f"{run.building.name}, seed {settings.seed}: {figures.ending}"
     lines = [
-        f"truly swept {figures.true_share:.1%}, claimed {figures.claimed_share:.1%} of what can be "
-        f"reached; {figures.contacts} contacts; pose error {100 * figures.pose_error_median_m:.1f} "
-        f"cm (95%: {100 * figures.pose_error_p95_m:.1f}); {figures.seconds:.0f} s, "
-        f"{figures.driven_m:.0f} m",
+        f"truly swept {figures.true_share:.1%} of what can be reached, {figures.clear_share:.1%} "
+        f"of what is not beside a wall; claimed {figures.claimed_share:.1%}; {figures.contacts} "
+        f"contacts",
+        f"pose error {100 * figures.pose_error_median_m:.1f} cm (95%: "
+        f"{100 * figures.pose_error_p95_m:.1f}); {figures.seconds:.0f} s, {figures.driven_m:.0f} m",
         f"{settings.people} people, noise {settings.noise_m:g} m, "
         f"{'ideal' if settings.ideal else 'slip and drift'}; {figures.state}: {figures.reason}",
     ]

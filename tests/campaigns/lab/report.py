@@ -66,7 +66,8 @@ def in_words(found: Judged) -> str:
     rows = [
         ("ending", f"{of.ending}; the mission is {of.state}: {of.reason}"),
         ("floor", f"{of.true_share:.1%} of {of.reachable_m2:.1f} m2 truly swept, "
-                  f"{of.claimed_share:.1%} claimed: {of.excess_points:+.1f} points"),
+                  f"{of.claimed_share:.1%} claimed: {of.excess_points:+.1f} points; of what is not "
+                  f"beside a wall {of.clear_share:.1%} swept"),
         ("", f"claimed but not swept {of.claimed_unswept_m2:.2f} m2, swept but not claimed "
              f"{of.swept_unclaimed_m2:.2f} m2; cells {of.coverage:.1%}"),
         ("contacts", f"{of.contacts} separate, {of.contact_s:.1f} s in all"),
@@ -88,15 +89,17 @@ def in_words(found: Judged) -> str:
 def table(all_found: Sequence[Judged]) -> str:
     """Return a table in Markdown, a row a mission."""
     heads = (
-        "building", "seed", "ending", "true %", "claimed %", "points", "contacts", "pose p95 cm",
-        "s", "speed %", "turning %", "stops/m", "paths/min", "changes/min", "stand s", "wall s",
+        "building", "seed", "ending", "true %", "clear %", "claimed %", "points", "contacts",
+        "pose p95 cm", "s", "speed %", "turning %", "stops/m", "paths/min", "changes/min",
+        "stand s", "wall s",
     )  # fmt: skip
     rows = [heads, tuple("---" for _ in heads)]
     for found in all_found:
         of, settings = found.figures, found.run.settings
         rows.append((
             found.run.building.name, str(settings.seed), str(of.ending),
-            f"{100 * of.true_share:.1f}", f"{100 * of.claimed_share:.1f}",
+            f"{100 * of.true_share:.1f}", f"{100 * of.clear_share:.1f}",
+            f"{100 * of.claimed_share:.1f}",
             f"{of.excess_points:+.1f}", str(of.contacts), f"{100 * of.pose_error_p95_m:.1f}",
             f"{of.seconds:.0f}", f"{100 * of.speed_share:.0f}", f"{100 * of.turning_share:.0f}",
             f"{of.stops_per_m:.2f}", f"{of.paths_per_min:.1f}", f"{of.changes_per_min:.1f}",

@@ -11,6 +11,9 @@ from fasaco_edge.config.robot import RobotConfig
 TICK_S = 0.05
 """A tick of the simulated time [s]: all rates are whole numbers of it."""
 
+RESOLUTION_M = 0.05
+"""Edge of a pixel of the robot's map [m]."""
+
 # A mission over so much floor takes at most so many times as long as driving at full speed without
 # turns and overlap; half of that time is usual.
 LONGEST = 4.0

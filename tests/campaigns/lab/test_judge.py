@@ -66,7 +66,8 @@ def test_reachable_and_swept_floor_are_those_of_the_discs():
     assert truth.m2(truth.reachable) == pytest.approx(3.94 * 0.94 - corners, rel=0.02)
     assert truth.m2(truth.swept) == pytest.approx(3.0 * 0.3 + math.pi * 0.15**2, rel=0.01)
     assert truth.m2(truth.claimed & truth.free) == pytest.approx(2.0, rel=0.01)
-    assert truth.share == pytest.approx(0.97 / 3.68, rel=0.03)
+    assert truth.m2(truth.clear) == pytest.approx(3.84 * 0.84 - corners, rel=0.02)
+    assert truth.share(truth.reachable) == pytest.approx(0.97 / 3.68, rel=0.03)
 
 
 def test_figures_of_driving_turning_and_contacts():

@@ -12,6 +12,7 @@ from scipy import ndimage
 from fasaco_edge.grid.geometry import GridGeometry
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from tests.campaigns.lab.building import Building, Mask
+from tests.campaigns.lab.settings import RESOLUTION_M
 
 # Largest pixel [m].
 FINE_M = 0.0125
@@ -33,6 +34,8 @@ class Truth:
         free: known free.
         reachable: the floor that the tool's disc touches where the robot's disc fits and comes to
             from its start.
+        clear: the same for a disc that is larger by a pixel of the robot's map: what lies nearer to
+            walls no map of such pixels tells for certain.
         swept: the floor that the tool's disc passed over.
         claimed: the floor that the product says was swept.
     """
@@ -41,6 +44,7 @@ class Truth:
     occupied: Mask
     free: Mask
     reachable: Mask
+    clear: Mask
     swept: Mask
     claimed: Mask
 
@@ -68,22 +72,22 @@ class Truth:
         occupied = building.fine(building.occupied, FINE_M)
         free = ~(occupied | building.fine(building.unknown, FINE_M))
         # A wall begins half a pixel before the centre of its first one.
-        fits = (ndimage.distance_transform_edt(free) - 0.5) * pixel_m > radius_m
-        stands = _connected(fits, geometry, xy[0], radius_m)
+        room_m = (ndimage.distance_transform_edt(free) - 0.5) * pixel_m
         tool_px = 0.5 * tool_m / pixel_m
-        reachable = (ndimage.distance_transform_edt(~stands) <= tool_px + ROUNDING_PX) & free
+        reachable, clear = (
+            _touched(_connected(room_m > disc_m, geometry, xy[0]), tool_px) & free
+            for disc_m in (radius_m, radius_m + RESOLUTION_M)
+        )
         swept = _within(geometry, xy, tool_px)
-        return cls(geometry, occupied, free, reachable, swept, _claimed(geometry, floor))
+        return cls(geometry, occupied, free, reachable, clear, swept, _claimed(geometry, floor))
 
     def m2(self, mask: Mask) -> float:
         """Return the area of a mask [m2]."""
         return float(np.count_nonzero(mask)) * self.geometry.resolution**2
 
-    @property
-    def share(self) -> float:
-        """The swept share of the reachable floor."""
-        reachable = self.m2(self.reachable)
-        return self.m2(self.swept & self.reachable) / reachable if reachable else 0.0
+    def share(self, floor: Mask) -> float:
+        """Return the swept share of some floor."""
+        return self.m2(self.swept & floor) / max(self.m2(floor), self.geometry.resolution**2)
 
     def missed(self, most: int) -> list[tuple[float, float, float]]:
         """Return the largest patches that were not swept: area [m2], x, y [m]; no tiny ones."""
@@ -122,19 +126,22 @@ def _within(geometry: GridGeometry, xy: NDArray[np.float64], pixels: float) -> M
     return near
 
 
-def _connected(
-    fits: Mask, geometry: GridGeometry, start: NDArray[np.float64], radius_m: float
-) -> Mask:
+def _touched(stands: Mask, pixels: float) -> Mask:
+    """Return what lies at most so far from where the robot can stand [pixels]."""
+    if not stands.any():
+        return stands
+    touched: Mask = ndimage.distance_transform_edt(~stands) <= pixels + ROUNDING_PX
+    return touched
+
+
+def _connected(fits: Mask, geometry: GridGeometry, start: NDArray[np.float64]) -> Mask:
     """Return the part of ``fits`` that is connected with the place nearest to ``start``."""
     labels, _ = ndimage.label(fits)
     rows, cols = np.nonzero(labels)
     if not len(rows):
         return fits
     col, row = geometry.to_pixels(float(start[0]), float(start[1]))
-    apart = np.hypot(rows + 0.5 - row, cols + 0.5 - col)
-    nearest = int(np.argmin(apart))
-    if apart[nearest] * geometry.resolution > radius_m:
-        return np.zeros_like(fits)
+    nearest = int(np.argmin(np.hypot(rows + 0.5 - row, cols + 0.5 - col)))
     part: Mask = labels == labels[rows[nearest], cols[nearest]]
     return part
 
