@@ -65,7 +65,12 @@ def test_a_room_whose_door_was_shut_is_looked_at_again_after_a_while():
     # It still is shut; in the end nobody waits any more.
     drive.tell(after=31.0)
     until(drive, State.DONE)
-    assert drive.mission.reason == "every reachable cell is covered"
+    assert drive.mission.reason == (
+        "48 % of 2.1 m2 covered; 1.1 m2 not reached: closed off by obstacles (1.0 m2), "
+        "blocked by an obstacle that was not there before (0.1 m2)"
+    )
+    coverage = drive.mission.coverage()
+    assert (coverage.covered, coverage.coverable) == (16, 33)
     assert sum(cells for cells, _ in reasons(drive)) == 17
     assert drive.tell(after=100.0).plan is None
 
@@ -148,7 +153,9 @@ def test_a_cell_left_over_after_several_tries_is_tried_again_later():
     assert drive.mission.state is State.BLOCKED
     assert stands_short(drive, 100) == 1
     assert drive.mission.state is State.DONE
-    assert drive.mission.reason == "1 reachable cell was left over"
+    assert drive.mission.reason == (
+        "66 % of 0.2 m2 covered; 0.1 m2 not reached: left over after 6 tries (0.1 m2)"
+    )
     assert reasons(drive) == [(1, "left over after 6 tries")]
 
 

@@ -28,6 +28,7 @@ from fasaco_edge.mission.core.events import (
 from fasaco_edge.mission.core.order_changes import OrderChanges
 from fasaco_edge.mission.core.route import Route
 from fasaco_edge.mission.core.trail_layer import TrailLayer
+from fasaco_edge.mission.core.way_out import WayOut
 from fasaco_edge.mission.coverage.drive_meter import DriveMeter
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
 from fasaco_edge.mission.fleet.layer import FleetLayer
@@ -51,6 +52,7 @@ class EventHandler:
     drive: DriveMeter
     fleet: FleetLayer
     battery: BatteryGauge
+    way_out: WayOut
     changes: OrderChanges
     _now: float = field(default=0.0, init=False)
     # Results of the events of one step.
@@ -128,6 +130,7 @@ class EventHandler:
             self.ledger.note_map_motion(before)
             self.trail.note_map_motion()
             self.route.note_map_motion()
+            self.way_out.begin_anew()
         else:
             self._record()  # the pose may have come before the map
         self._change_building(self.ledger.check(self.map.free, self.map.grid.frame))
@@ -210,6 +213,7 @@ class EventHandler:
         self.route.abandon()
         self.monitor.forget_pose(self._now)
         self.trail.begin_anew()
+        self.way_out.begin_anew()
 
     def _take_pose(self, stamped: StampedPose, at: float | None = None) -> None:
         if self.map.frames.note_pose(stamped, self._now):
@@ -220,9 +224,11 @@ class EventHandler:
         if has_jumped:
             self.ledger.break_track()
             self.drive.break_track()
+            self.way_out.begin_anew()
             if before is not None:
                 self.map.building.note_jump(before.pose, stamped.pose, self._now)
         self.drive.note(stamped)
+        self.way_out.note_pose(stamped.pose)
         motion, uncertain = None, 0
         # On the map of another building neither the pose nor the floor under it says anything.
         is_known = self.map.building.note_pose(stamped.pose, self._now)

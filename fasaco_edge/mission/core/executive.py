@@ -18,6 +18,7 @@ from fasaco_edge.mission.core.route import NO_CELLS, Route
 from fasaco_edge.mission.core.standing import Standing
 from fasaco_edge.mission.core.trail_layer import TrailLayer
 from fasaco_edge.mission.core.trouble import DRIVING, Troubles
+from fasaco_edge.mission.core.way_out import WayOut
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
 from fasaco_edge.mission.fleet.layer import FleetLayer
 from fasaco_edge.mission.line.layer import LineLayer
@@ -57,6 +58,7 @@ class Executive:
     charging: Charging
     giving_way: GivingWay
     dock: InDock
+    way_out: WayOut
     mask_frame: str
     troubles: Troubles = field(init=False)
     _state: State = field(default=State.WAITING_FOR_MAP, init=False)
@@ -64,6 +66,7 @@ class Executive:
     _now: float = field(default=0.0, init=False)
     _standing: Standing = field(init=False)
     _checks: PathChecks = field(init=False)
+    _is_shut_in: bool = field(default=False, init=False)
 
     def __post_init__(self) -> None:
         self._standing = Standing(self.map, self.route)
@@ -71,7 +74,7 @@ class Executive:
             self.ledger, self.monitor, self.orders, self.route, self.line, self._standing
         )
         drives = self.charging, self.giving_way, self._standing
-        self.troubles = Troubles(self.map, self.monitor, *drives, self.dock)
+        self.troubles = Troubles(self.map, self.monitor, *drives, self.dock, self.way_out)
 
     def succeed(self, before: Executive) -> None:
         """Go on where another mission ended; a docked robot stays docked."""
@@ -94,7 +97,10 @@ class Executive:
 
     def decide(self, now: float) -> Decision:
         """Return what is to be done at ``now`` [s]."""
+        self._is_shut_in = False
         decision = self._decide(now)
+        if not self._is_shut_in:
+            self.way_out.end()
         self.troubles.look(self.doing, now)
         return decision
 
@@ -111,7 +117,7 @@ class Executive:
         cell = self.map.robot_cell()
         if cell is None or self.map.area is None:
             self.map.forget_area()
-            return self._rest(State.BLOCKED, self.map.why_misplaced(), None)
+            return self._lead_out(self.map.why_misplaced(), None)
         self._standing.look(cell, now)
         if not len(route.path.cells):
             self.monitor.clear_doubt()  # without a path the robot cannot be off it
@@ -217,13 +223,34 @@ class Executive:
         )
 
     def _rest(self, state: State, reason: str, update: PathUpdate | None) -> Decision:
-        """Rest in a state: the mission then withdraws the path; else ``update`` is published.
+        """Be in a state: at rest the mission withdraws the path; else ``update`` is published.
 
         ``update`` is what this step has made of the path: a path that was cut to nothing is not
         withdrawn again.
         """
         self._state, self._reason = state, reason
         return Decision(path=update)
+
+    def _lead_out(self, why: str, update: PathUpdate | None, goal: Cell | None = None) -> Decision:
+        """Lead a robot that is shut in back along its track, to where it can go on, or to a goal.
+
+        Not one in a keep-out zone, which a person has drawn. ``update``: see ``_rest``.
+        """
+        if self.map.is_kept_out:
+            return self._rest(State.BLOCKED, why, update)
+
+        def leads_on(area: ReachableArea) -> bool:
+            return area.contains(goal) if goal else not self.orders.is_shut_in(area)
+
+        self._is_shut_in = True
+        way = self.way_out.lead(leads_on, why, self._now)
+        back = f"{why}: drives back along its track"
+        if way is not None:
+            reason = back if len(way) else why
+            update = self.route.publish_way_out(way, reason, self._now) or update
+        if self.route.is_way_out:
+            return self._rest(State.COVERING, back, update)
+        return self._rest(State.BLOCKED, why, update)
 
     def _stand_by(self, reason: str, update: PathUpdate | None) -> Decision:
         """Stand in the middle of an order, without a path."""
@@ -250,6 +277,8 @@ class Executive:
             try:
                 problem = orders.problem(cell, route.path_to_keep)
             except NothingToCover:
+                if self.map.area is not None and orders.is_shut_in(self.map.area):
+                    return self._lead_out(self._why_shut_in(self.map.area), update)
                 if reason := orders.explore(cell):
                     route.want(reason)
                     continue
@@ -272,6 +301,11 @@ class Executive:
             return Decision(plan=request, path=update)
         return self._return_home(cell, update)
 
+    def _why_shut_in(self, area: ReachableArea) -> str:
+        """Return what shuts the robot in: most of what it could reach is out of reach."""
+        reached, once = self.orders.reached_m2(area)
+        return f"shut in: {reached:.1f} of {once:.1f} m2 in reach"
+
     def _share(self, cell: Cell, *, at_once: bool = False) -> str:
         """Divide the rest among the fleet if due; return why a plan is wanted, or ""."""
         if self.orders.order_state.stage is Stage.RETURNING:
@@ -288,7 +322,7 @@ class Executive:
             return self._settle(update)
         path = self._way(area, cell, home)
         if not len(path):
-            return self._rest(State.BLOCKED, NO_WAY.format("home"), update)
+            return self._lead_out(NO_WAY.format("home"), update, home)
         self._state, self._reason = State.RETURNING, "on the way home"
         if np.array_equal(path, route.path.ahead):
             return Decision(path=update)
@@ -325,8 +359,10 @@ class Executive:
         to = PLACES[errand]
         if is_new or is_lost or not len(path.cells) or tuple(path.cells[-1].tolist()) != goal:
             self.monitor.clear_doubt()
-            if goal is None or area is None or not area.contains(goal):
+            if goal is None:
                 return self._rest(State.BLOCKED, NO_WAY.format(to), update)
+            if area is None or not area.contains(goal):
+                return self._lead_out(NO_WAY.format(to), update, goal)
             here = self.map.cell_at_pose() or cell
             why = self.charging.why_due() if errand == "charge" else ""
             update = self._lead(self._way(area, here, goal), f"drives {to}{why}", errand)

@@ -33,6 +33,7 @@ from fasaco_edge.mission.core.order_changes import OrderChanges
 from fasaco_edge.mission.core.route import Route
 from fasaco_edge.mission.core.trail_layer import TrailLayer
 from fasaco_edge.mission.core.trouble import Trouble
+from fasaco_edge.mission.core.way_out import WayOut
 from fasaco_edge.mission.coverage.drive_meter import DriveMeter, DriveTimes
 from fasaco_edge.mission.coverage.ledger import CoverageLedger, LedgerSnapshot
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
@@ -104,13 +105,14 @@ class Mission:
         self.charging = Charging(config, self._map, self._orders, self.route, self._gauge)
         ordered = self._map, self._ledger, self._orders, self.route, self._line
         self._changes = OrderChanges(*ordered, config.policy, self._rotation.deg)
-        measured = self._drive, self.fleet, self._gauge
+        way_out = WayOut(self._map, self.route)
+        measured = self._drive, self.fleet, self._gauge, way_out
         self._handler = EventHandler(*owners, self._line, self._trail, *measured, self._changes)
         self.giving_way = GivingWay(config, self._map, self.route, self.fleet)
         decided_by = self._line, self._trail, self.fleet, self.charging, self.giving_way
         in_dock = InDock(self._map, self._gauge)
         mask = mask_frame(self._config.policy.keep_out_mask)
-        self._executive = Executive(*owners, *decided_by, in_dock, mask)
+        self._executive = Executive(*owners, *decided_by, in_dock, way_out, mask)
 
     def restore_ledger(self, before: LedgerSnapshot) -> None:
         """Continue a ledger from before a restart, unless the map contradicts it.
@@ -140,7 +142,12 @@ class Mission:
         """Go on with what another mission knew of robot and inputs, and with its doubt about the
         building; before the first step, to which the events of its ``held`` belong."""
         self._executive.succeed(before._executive)
-        if before.is_in_doubt and before.rotation == self.rotation:
+        cell_m, was = self._config.footprint.cell_m, before._config.footprint.cell_m
+        if before.rotation != self.rotation or cell_m != was:
+            return
+        self._orders.succeed(before._orders)
+        self._executive.way_out.succeed(before._executive.way_out)
+        if before.is_in_doubt:
             self._map.watch_on(before._map.building)
 
     def held(self) -> list[Event]:
@@ -237,7 +244,12 @@ class Mission:
 
     def coverage(self) -> Coverage | None:
         """Return the counts of coverage; None before there is a map."""
-        return self._map.coverage(self._ledger)
+        lattice = self._map.lattice
+        return (
+            None
+            if lattice is None
+            else self._map.coverage(self._ledger, self._orders.known(lattice))
+        )
 
     def floor_to_sweep(self) -> FloorToSweep | None:
         """Return the areas of floor to sweep; None where cells are counted."""

@@ -38,6 +38,7 @@ class Route(PlanRequests):
         unchanged, outdated: count the plans that were not published because they equal the current
             path, or because they no longer hold.
         published_at: when a path was last published or confirmed by a plan.
+        is_way_out: whether the published path is a way out, along no cells.
         begun_at: when there was something to drive again, after a path without.
         beside: other robots that the path's line keeps clear of, float64 (k, 3): x, y, least
             distance [m]; where it begins nearer to one, it comes no nearer. None for any line.
@@ -62,6 +63,7 @@ class Route(PlanRequests):
         self._changed_at = 0.0
         self.unchanged = self.outdated = 0
         self.published_at = self.begun_at = 0.0
+        self.is_way_out = False
         self.beside: NDArray[np.float64] | None = None
         self._map = map_state
         self._orders = orders
@@ -276,6 +278,7 @@ class Route(PlanRequests):
     ) -> PathUpdate:
         """Publish a path that replaces the current one."""
         self.revision += 1
+        self.is_way_out = False
         self._numberings += 1
         self._walks += not np.array_equal(cells, self.path.ahead)
         self.published_at = now
@@ -285,6 +288,20 @@ class Route(PlanRequests):
         self._end_yaw, self.beside = end_yaw, beside
         plan, seconds = (ready.path, ready.seconds) if ready else (None, 0.0)
         return PathUpdate(self.revision, cells, reason, plan, seconds, changed, end_yaw=end_yaw)
+
+    def publish_way_out(
+        self, way: NDArray[np.float64], reason: str, now: float
+    ) -> PathUpdate | None:
+        """Publish a way along no cells, float64 (n, 2): x, y [m], and keep the current path.
+
+        None for an empty way where nothing is driven.
+        """
+        if not len(way):
+            return self.stop(reason, now)
+        kept = self.path_to_keep
+        update = self.publish(NO_CELLS, reason, now)
+        self._kept, self.is_way_out = PathProgress(kept), True
+        return replace(update, xy=way)
 
     def publish_anew(self, reason: str, now: float) -> PathUpdate:
         """Publish the rest of the path once more, with a line that is laid anew."""
@@ -315,7 +332,7 @@ class Route(PlanRequests):
 
     def stop(self, reason: str, now: float) -> PathUpdate | None:
         """Publish an empty path and keep the current one; None if there was none to drive."""
-        if not len(self.path.cells):
+        if not len(self.path.cells) and not self.is_way_out:
             return None
         kept = self.path_to_keep
         update = self.publish(NO_CELLS, reason, now)

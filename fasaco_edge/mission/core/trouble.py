@@ -16,6 +16,7 @@ from fasaco_edge.mission.core.events import State
 from fasaco_edge.mission.core.giving_way import GivingWay
 from fasaco_edge.mission.core.in_dock import InDock
 from fasaco_edge.mission.core.standing import Standing
+from fasaco_edge.mission.core.way_out import WayOut
 from fasaco_edge.mission.map.inputs import InputMonitor
 from fasaco_edge.mission.map.map_state import MapState
 
@@ -74,6 +75,7 @@ class Troubles:
     giving_way: GivingWay
     standing: Standing
     dock: InDock
+    way_out: WayOut
     found: tuple[Trouble, ...] = field(default=(), init=False)
     _current: DockCurrent = field(init=False)
 
@@ -143,6 +145,10 @@ class Troubles:
         why = self._current.why_none(now)
         return f"in the dock the battery, at {level:.0%}, does not charge: {why}" if why else ""
 
+    def shut_in(self, *_: object) -> str:
+        """Return what shuts the robot in; "" for one whose pose is no place for it."""
+        return self.way_out.why if self.map.area is not None else ""
+
     def stands(self, _: State, now: float) -> str:
         """Return why the robot is thought to be stuck; without poses that is not known."""
         if self.monitor.is_pose_lost(now):
@@ -186,6 +192,12 @@ RULES = (
         frozenset(State) - DRIVING,
         Troubles.no_current,
         "check the dock's power and contacts, and whether the robot stands in it",
+    ),
+    Rule(
+        "shut_in",
+        UNDER_WAY,
+        Troubles.shut_in,
+        "open the way, or drive the robot to free floor by hand",
     ),
     Rule(
         "stands",

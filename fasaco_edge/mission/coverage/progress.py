@@ -27,10 +27,10 @@ class Coverage:
     """Counts of cells.
 
     Attributes:
-        coverable: coverable and reachable cells.
+        coverable: cells that are reachable, or have been since the order began.
         covered: those of them that the tool has passed over.
         recovered: those it has passed over at least twice.
-        unreachable: coverable cells that the robot cannot reach.
+        unreachable: coverable cells that the robot never could reach.
         cell_m2: area of a cell [m2].
         free_out_of_reach_m2: area known to be free, but in no reachable cell [m2].
     """
@@ -46,14 +46,12 @@ class Coverage:
     def of(
         cls,
         lattice: CoverageLattice,
-        reachable: NDArray[np.bool_] | None,
+        reachable: NDArray[np.bool_],
         visits: NDArray[np.uint16],
         free_out_of_reach_m2: float = 0.0,
     ) -> Self:
         """Count over ``lattice``; all arrays are (rows, cols)."""
         coverable = lattice.coverable
-        if reachable is None:
-            reachable = np.zeros_like(coverable)
         return cls(
             coverable=int(np.count_nonzero(reachable)),
             covered=int(np.count_nonzero(reachable & (visits > 0))),
@@ -65,7 +63,7 @@ class Coverage:
 
     @property
     def remaining(self) -> int:
-        """Reachable cells still to be covered."""
+        """Cells still to be covered, of those that are reachable or have been."""
         return self.coverable - self.covered
 
     @property

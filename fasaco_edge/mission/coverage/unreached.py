@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.grid.changes import carried
-from fasaco_edge.grid.lattice import BLOCKED, UNKNOWN, Cell
+from fasaco_edge.grid.geometry import Window
+from fasaco_edge.grid.lattice import BLOCKED, UNKNOWN, Cell, CoverageLattice
 from fasaco_edge.kernels.lattice.areas import cells_beside, find_areas
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
 from fasaco_edge.mission.map.map_state import MapState
@@ -108,12 +109,31 @@ class UnreachedFinder:
         self._failures, self._newest, self._once_reachable = 0, None, None
         self.note_area()
 
+    def succeed(self, before: UnreachedFinder) -> None:
+        """Go on with what another one remembers of the same cells."""
+        self._failures, self._newest = before._failures, before._newest
+        self._once_reachable = before._once_reachable
+
     def note_area(self) -> None:
         """Remember the cells that are reachable now."""
         area = self._map.area
         if area is not None and area is not self._newest:
-            self._once_reachable = self._reached_on(area) | area.reachable
+            decided = self._map.is_decided(area.lattice.window)
+            reachable = area.reachable if decided is None else area.reachable & decided
+            self._once_reachable = self._once_on(area.lattice.window) | reachable
             self._newest = area
+
+    def known(self, lattice: CoverageLattice) -> NDArray[np.bool_]:
+        """Return which cells of a lattice are reachable or have been, bool (rows, cols).
+
+        Without cells that keep-out zones close now, and cells that were but assumed to be.
+        """
+        known, area = self._once_on(lattice.window), self._map.area
+        if area is not None and area.lattice is lattice:
+            known |= area.reachable
+        if self._map.free is not None:
+            known &= ~(self._map.free.coverable & ~lattice.coverable)
+        return known
 
     def note_failure(self) -> None:
         """Note that a path left cells over."""
@@ -129,12 +149,53 @@ class UnreachedFinder:
             self._found = key, self._list_areas(state.order, area, state.stage)
         return self._found[1]
 
+    def reached_m2(self, area: ReachableArea) -> tuple[float, float]:
+        """Return how large an area is, and all that was ever reachable [m2].
+
+        Covered cells are: after a restart they alone are remembered.
+        """
+        once = self.known(area.lattice) | (self._ledger.visits(area.lattice.window) > 0)
+        cell_m2 = area.lattice.cell_m**2
+        return np.count_nonzero(area.reachable) * cell_m2, np.count_nonzero(once) * cell_m2
+
+    def ending(self, state: OrderState) -> str:
+        """Return how much of an order is covered, and why the rest is not."""
+        order, area, lattice = state.order, self._map.area, self._map.lattice
+        if order is None or lattice is None:
+            return "the order was carried out"
+        zones = "" if order.zones[0].polygon is None else " of the zones"
+        asked = self.known(lattice) & in_zones(order.zones, lattice.window, lattice.cell_m)
+        left = asked & (self._ledger.visits(lattice.window) == 0)
+        asked_cells, left_cells = np.count_nonzero(asked), np.count_nonzero(left)
+        if not left_cells:
+            return f"every reachable cell{zones} is covered"
+        percent, cell_m2 = 100 * (asked_cells - left_cells) // asked_cells, lattice.cell_m**2
+        ending = (
+            f"{percent} % of {asked_cells * cell_m2:.1f} m2{zones} covered; "
+            f"{left_cells * cell_m2:.1f} m2 not reached"
+        )
+        if area is None:
+            return ending
+        causes = self._causes(order, area, state.stage)[left]
+        counts = np.bincount(causes, minlength=len(Cause) + 1)[1:]
+        order_of = np.argsort(-counts, kind="stable")
+        why = [
+            f"{self._reason(Cause(n + 1))} ({counts[n] * cell_m2:.1f} m2)"
+            for n in order_of.tolist()
+            if counts[n]
+        ]
+        return f"{ending}: {', '.join(why)}" if why else ending
+
+    def _reason(self, cause: Cause) -> str:
+        tries = "1 try" if self._failures == 1 else f"{self._failures} tries"
+        return REASONS.get(cause, f"left over after {tries}")
+
     def viewpoints(self, order: MissionOrder, area: ReachableArea) -> set[Cell]:
         """Return the cells (row, col) from which to look at areas that were closed."""
         assert self._map.free is not None
         window = area.lattice.window
         kept_out = self._map.free.coverable & ~area.lattice.coverable
-        closed = self._uncovered(order, area) & self._reached_on(area) & ~area.reachable & ~kept_out
+        closed = self._uncovered(order, area) & self._once_on(window) & ~area.reachable & ~kept_out
         found = viewpoints(closed, area.reachable)
         return {(row + window.row0, col + window.col0) for row, col in found}
 
@@ -146,9 +207,8 @@ class UnreachedFinder:
         for index in largest.tolist():
             row, col = areas.inner[index].tolist()
             cause = Cause(int(areas.kinds[index]))
-            reason = REASONS.get(cause, f"left over after {self._failures} tries")
             cell = row + window.row0, col + window.col0
-            listed.append(UnreachedArea(int(areas.cells[index]), cell, reason))
+            listed.append(UnreachedArea(int(areas.cells[index]), cell, self._reason(cause)))
         cells = int(areas.cells.sum(dtype=np.int64))
         return Unreached(tuple(listed), cells, len(areas.cells) - len(listed))
 
@@ -160,7 +220,7 @@ class UnreachedFinder:
         if order.zones[0].polygon is not None:
             # An order for everything does not ask for unknown cells.
             causes[lattice.states == UNKNOWN] = Cause.UNKNOWN
-        causes[self._reached_on(area) & ~lattice.coverable] = Cause.CLOSED
+        causes[self._once_on(lattice.window) & ~lattice.coverable] = Cause.CLOSED
         causes[lattice.coverable & ~reachable] = Cause.BEHIND_OBSTACLES
         if free is not lattice:
             causes[free.coverable & (lattice.states == BLOCKED)] = Cause.KEPT_OUT
@@ -183,8 +243,8 @@ class UnreachedFinder:
         )
         return uncovered
 
-    def _reached_on(self, area: ReachableArea) -> NDArray[np.bool_]:
-        """Return the cells that have ever been reachable."""
+    def _once_on(self, window: Window) -> NDArray[np.bool_]:
+        """Return which cells of a window have ever been reachable."""
         if self._newest is None or self._once_reachable is None:
-            return area.reachable
-        return carried(self._once_reachable, self._newest.lattice.window, area.lattice.window)
+            return np.zeros((window.rows, window.cols), bool)
+        return carried(self._once_reachable, self._newest.lattice.window, window).copy()

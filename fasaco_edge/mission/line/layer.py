@@ -161,6 +161,8 @@ class LineLayer:
             update = self._route.publish_line(reason, now)
         if update is None:
             return None
+        if update.xy is not None:
+            return update  # a way out, along no cells
         ahead.note_published()
         return replace(update, xy=ahead.xy())
 

@@ -17,6 +17,7 @@ from fasaco_edge.grid.floor_map import FloorMap
 from fasaco_edge.grid.geometry import Pose2D, Window
 from fasaco_edge.kernels.floor.line import LEAST_EDGE
 from fasaco_edge.mission.line.alignment import aligned, by_distance
+from fasaco_edge.mission.line.lead_out import fitting_radius, lead_out
 from fasaco_edge.mission.line.line_aside import LineAside
 from fasaco_edge.mission.line.pieces import Joiner, Piece, exchanged, kept_pieces
 from fasaco_edge.mission.line.place_on_line import PlaceOnLine
@@ -178,11 +179,13 @@ class LineAhead:
             beyond: the kept part beyond the cut, if the walk was cut off.
             skips: whether it may skip the stand of the robot's cell, where that is swept.
         """
-        begin = self._begin()[None]
-        here = Line(begin, np.array([self.cell]), np.array([POLISHED], np.uint8))
         if not len(self._walk):
             self._take([])
             return
+        robot = self._place.here
+        points = np.concatenate([robot[None], lead_out(self._floor, robot)])
+        state = np.full(len(points), POLISHED, np.uint8)
+        here = Line(points, np.full(len(points), self.cell), state)
         stands, tally = self._floor.stands, self.tally
         joiner = Joiner(
             here,
@@ -213,18 +216,6 @@ class LineAhead:
         joint = Window(int(row0), int(col0), int(row1), int(col1))
         self._unchecked = Window.around(self._unchecked, joint)
         return [beyond]
-
-    def _begin(self) -> Points:
-        """Return the first point of a new line: the robot's position.
-
-        If its disc does not fit there, as a real robot is a little off its line and poses are
-        noisy, it is the robot's place on the previous line: from the position itself no path would
-        be clear, and the line would begin at the first clear point, metres away.
-        """
-        here = self._place.here
-        if self.is_followed and not self._is_clear(here, here):
-            here = self._place.on(self.line.points)
-        return here
 
     @property
     def is_cut(self) -> bool:
@@ -288,11 +279,18 @@ class LineAhead:
         self._place.here = np.array(map_to_raster(self._floor.geometry, pose.x, pose.y))
 
     def xy(self) -> Points:
-        """Return the line from the robot on, float64 (n, 2): x, y in the map frame [m]."""
-        points = self._published()
+        """Return the line from the robot on, float64 (n, 2): x, y in the map frame [m].
+
+        A robot beside its line begins at its place on it, unless its disc does not fit where it is.
+        """
+        points, here = self._published(), self._place.here
         if len(points) > 1:
             points = points.copy()
-            points[0] = self._place.on(points)
+            points[0] = on = self._place.on(points)
+            radius = fitting_radius(self._floor, here)
+            is_off = radius < self._floor.discs.radius_m / self._floor.geometry.resolution
+            if is_off and is_clear_between(self._floor, here, on, radius):
+                points = np.concatenate([here[None], points])
         return raster_to_map(self._floor.geometry, points)
 
     def _published(self) -> Points:

@@ -31,11 +31,15 @@ MOST_SKIPPED = 40
 DETOUR_M, BESIDE_PX = 2.0, 2.0
 
 
-def is_clear_between(floor: FloorMap, a: Points, b: Points) -> bool:
-    """Tell whether the robot can drive straight between two points, (2,): y, x [pixels]."""
+def is_clear_between(floor: FloorMap, a: Points, b: Points, radius: float | None = None) -> bool:
+    """Tell whether the robot can drive straight between two points, (2,): y, x [pixels].
+
+    ``radius``: of a smaller disc than the robot's [pixels]; None for the robot's.
+    """
     if math.isnan(b[0]):
         return False
-    radius = floor.discs.radius_m / floor.geometry.resolution
+    if radius is None:
+        radius = floor.discs.radius_m / floor.geometry.resolution
     return bool(is_clear(floor.blocked, a[0], a[1], b[0], b[1], radius))
 
 

@@ -316,8 +316,11 @@ class MapState:
                     f"x {west:.2f}..{east:.2f} m, y {south:.2f}..{north:.2f} m"
                 )
 
-    def coverage(self, ledger: MissionLedger) -> Coverage | None:
-        """Return the counts of coverage; None before there is a map."""
+    def coverage(self, ledger: MissionLedger, known: NDArray[np.bool_]) -> Coverage | None:
+        """Return the counts of coverage; None before there is a map.
+
+        ``known``: bool (rows, cols), the cells that are reachable or have been.
+        """
         if self.lattice is None or self.grid is None:
             return None
         reachable = self.area.reachable if self.area else None
@@ -325,4 +328,4 @@ class MapState:
         free_m2 = self._free_area.out_of_reach_m2(
             self.grid, self.map_revision, self.lattice, reachable
         )
-        return Coverage.of(self.lattice, reachable, visits, free_m2)
+        return Coverage.of(self.lattice, known, visits, free_m2)

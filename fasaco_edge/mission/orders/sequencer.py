@@ -8,7 +8,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.grid.lattice import Cell
+from fasaco_edge.grid.lattice import Cell, CoverageLattice
 from fasaco_edge.mission.config import MissionConfig
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
 from fasaco_edge.mission.coverage.unreached import Unreached, UnreachedFinder
@@ -26,6 +26,9 @@ from fasaco_edge.planners.problem import CoverageProblem
 # After this many paths in a row that cover no further cell, those left wait for the retry: the
 # robot may stop short of its path's end, with the last cell out of the tool's reach.
 MAX_IN_VAIN = 3
+# A robot is shut in if the area in its reach is less than this share of what ever was: if home is
+# in it, or if not. A closed door before another room shuts nobody in who is at home.
+HOME_SHARE, MOST_SHARE = 0.1, 0.5
 
 
 @dataclass(slots=True)
@@ -118,6 +121,10 @@ class Sequencer:
         """Continue with the same order in another state, after a command."""
         self.order_state = state
 
+    def succeed(self, before: Sequencer) -> None:
+        """Go on with the same order on the same cells, as another mission left it."""
+        self._unreached.succeed(before._unreached)
+
     def move_home(self, motion: Motion) -> None:
         """Move home, where it is a cell, with the map."""
         if (home := self.order_state.home) is not None:
@@ -128,6 +135,20 @@ class Sequencer:
     def note_area(self) -> None:
         """Remember the cells that are reachable now."""
         self._unreached.note_area()
+
+    def known(self, lattice: CoverageLattice) -> NDArray[np.bool_]:
+        """Return which cells of a lattice are reachable or have been, bool (rows, cols)."""
+        return self._unreached.known(lattice)
+
+    def reached_m2(self, area: ReachableArea) -> tuple[float, float]:
+        """Return how large an area is, and all that was ever reachable [m2]."""
+        return self._unreached.reached_m2(area)
+
+    def is_shut_in(self, area: ReachableArea) -> bool:
+        """Tell whether most of the floor and home are out of reach from an area, or nearly all."""
+        (reached, once), home = self.reached_m2(area), self.goal()
+        share = HOME_SHARE if home is None or area.contains(home) else MOST_SHARE
+        return reached < share * once
 
     def note_cell(self, cell: Cell) -> None:
         """Note that the robot is in ``cell``."""
@@ -316,15 +337,11 @@ class Sequencer:
         return f"tried again, {self.order_state.tries + 1} of {self._config.policy.retries}"
 
     def _end(self) -> None:
-        run, left, order = self._run, self.cells.left(), self.order_state.order
+        run, order = self._run, self.order_state.order
         run.retry_at = None
         self.order_state = replace(self.order_state, stage=Stage.OVER)
         every = order is None or order.zones[0].polygon is None
-        zones = "" if every else " of the zones"
-        run.ending = f"every reachable cell{zones} is covered"
-        if left:
-            cells, were = ("cell", "was") if left == 1 else ("cells", "were")
-            run.ending = f"{left} reachable {cells}{zones} {were} left over"
+        run.ending = self._unreached.ending(self.order_state)
         area, named = self._map.area, () if every or order is None else order.zones
         if area is not None and (beyond := [z.name for z in named if not is_in_reach(z, area)]):
             run.ending += f"; not reached: {', '.join(map(repr, beyond))}"

@@ -40,7 +40,7 @@ class CoverageReport(Document, frozen=True):
     """The coverage in cells; areas are of cells. For swept floor see FloorReport.
 
     Attributes:
-        coverable: cells that are coverable and reachable.
+        coverable: cells that are reachable, or have been since the order began.
         covered: covered cells of these.
         recovered: cells of these that are covered more than once.
         remaining: cells of these that are still to cover.

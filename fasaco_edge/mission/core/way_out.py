@@ -1,0 +1,161 @@
+"""Way out: back along the driven track, for a robot that the map has shut in.
+
+Where the hull has stood, it fits. Walls get thicker by a pixel from map to map, and legs of chairs
+come and go: a gap that the robot has just driven through may be too narrow on the next map. Then it
+leaves as it came, with a smaller margin.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Callable
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fasaco_edge.grid.fine_raster import map_to_raster
+from fasaco_edge.grid.floor_map import FloorMap
+from fasaco_edge.grid.geometry import Point, Pose2D
+from fasaco_edge.mission.core.route import Route
+from fasaco_edge.mission.line.lead_out import LEAST_SHARE, fitting_radius
+from fasaco_edge.mission.line.way import is_clear_between
+from fasaco_edge.mission.map.map_state import MapState
+from fasaco_edge.mission.map.reachable_area import ReachableArea
+
+# The track is kept over this length, as points so far apart [m].
+TRACK_M, SPACING_M = 40.0, 0.05
+# On the way out the robot comes so much nearer to walls [pixels of the map]: a wall may be mapped
+# a pixel thicker than it is, and the pose be off by half of one.
+SQUEEZE_PX = 1.5
+# A robot that has not come this far [m] on its way out after this time [s] cannot drive it. It
+# tries again after as long, then after twice as long each time, until it has come that far.
+STANDING_M, STANDING_S = 0.1, 15.0
+# Loops of up to so many points are left out.
+LEAPS = (256, 128, 64, 32, 16, 8, 4, 2)
+NO_WAY: NDArray[np.float64] = np.empty((0, 2))
+
+
+class WayOut:
+    """Keeps the track, and the way out along it.
+
+    Attributes:
+        why: what shuts the robot in; "" for nothing.
+    """
+
+    def __init__(self, map_state: MapState, route: Route) -> None:
+        self.why = ""
+        self._map, self._route = map_state, route
+        self._track: deque[Point] = deque(maxlen=round(TRACK_M / SPACING_M))
+        # Where the way leads to, and the floor on which it was looked for.
+        self._to: Point | None = None
+        self._seen: tuple[FloorMap | None, int] = None, 0
+        # Where the robot stands, since when [s], and how often it could not drive a way from there.
+        self._place: Point = math.inf, math.inf
+        self._since = -math.inf
+        self._tries = 0
+
+    def note_pose(self, pose: Pose2D) -> None:
+        """Note where the robot is."""
+        here = pose.x, pose.y
+        if not self._track or math.dist(here, self._track[-1]) >= SPACING_M:
+            self._track.append(here)
+
+    def succeed(self, before: WayOut) -> None:
+        """Go on with the track that another mission has kept."""
+        self._track = before._track
+
+    def end(self) -> None:
+        """Note that nothing shuts the robot in."""
+        self.why = ""
+
+    def begin_anew(self) -> None:
+        """Forget the track: the robot was carried, or drove it on another map."""
+        self._track.clear()
+
+    def lead(
+        self, leads_on: Callable[[ReachableArea], bool], why: str, now: float
+    ) -> NDArray[np.float64] | None:
+        """Return the way to publish, float64 (n, 2): x, y [m]; None to go on as before.
+
+        To be called in each step while the robot is shut in.
+
+        Args:
+            leads_on: whether the robot can go on in an area.
+            why: what shuts it in.
+            now: the time [s].
+        """
+        self.why = why
+        floor, stamped, drives = self._map.floor, self._map.pose, self._route.is_way_out
+        assert stamped is not None
+        here = stamped.pose.x, stamped.pose.y
+        has_moved = math.dist(here, self._place) > STANDING_M
+        if has_moved:
+            self._place, self._since, self._tries = here, now, 0
+        waits_s = now - self._since
+        seen, self._seen = self._seen, (floor, floor.revision if floor else 0)
+        if drives and waits_s > STANDING_S:
+            self._since, self._tries = now, self._tries + 1
+            return NO_WAY
+        if self._tries and not drives and waits_s <= STANDING_S * 2 ** (self._tries - 1):
+            return None
+        is_same_floor = seen[0] is floor and seen[1] == self._seen[1]
+        knows_none = self._to is None and not (has_moved or self._tries)
+        if is_same_floor and (drives or knows_none):
+            return None
+        way = self.find(leads_on)
+        to, self._to = self._to, tuple(way[-1].tolist()) if len(way) else None
+        if drives:
+            return None if to == self._to else way
+        self._since = now
+        return way
+
+    def find(self, leads_on: Callable[[ReachableArea], bool]) -> NDArray[np.float64]:
+        """Return the way back to where the robot can go on from, float64 (n, 2): x, y [m].
+
+        It begins at the robot. (0, 2) if there is none, or cells are counted.
+
+        Args:
+            leads_on: whether the robot can go on in an area.
+        """
+        floor, lattice, stamped = self._map.floor, self._map.lattice, self._map.pose
+        if floor is None or lattice is None or stamped is None or self._map.grid is None:
+            return NO_WAY
+        here = stamped.pose.x, stamped.pose.y
+        way = [here, *reversed(self._track)]
+        raster = [np.array(map_to_raster(floor.geometry, x, y)) for x, y in way]
+        full_px = floor.discs.radius_m / floor.geometry.resolution
+        squeeze_px = SQUEEZE_PX * self._map.grid.geometry.resolution / floor.geometry.resolution
+        radius = max(full_px - squeeze_px, LEAST_SHARE * full_px)
+        radius = min(radius, fitting_radius(floor, raster[0]))
+        if radius < LEAST_SHARE * full_px:
+            return NO_WAY
+        # Areas that the robot cannot go on in, its own among them.
+        seen = np.zeros(lattice.states.shape, bool)
+        for index, (a, b) in enumerate(pairwise(raster), start=1):
+            if not is_clear_between(floor, a, b, radius):
+                break
+            cell = lattice.cell_at(*way[index])
+            is_coverable = lattice.contains(cell) and lattice.coverable[lattice.local(cell)]
+            if not is_coverable or seen[lattice.local(cell)] or not is_clear_between(floor, b, b):
+                continue
+            area = ReachableArea.around(lattice, cell)
+            if leads_on(area):
+                return np.array(way)[_without_loops(floor, raster[: index + 1])]
+            seen |= area.reachable
+        return NO_WAY
+
+
+def _without_loops(floor: FloorMap, track: list[NDArray[np.float64]]) -> list[int]:
+    """Return the numbers of the points of a track that remain where it leaves out loops.
+
+    Only where the robot's whole disc fits; elsewhere it keeps to the track.
+    """
+    kept, last = [0], len(track) - 1
+    while kept[-1] < last:
+        at = kept[-1]
+        ahead = [at + leap for leap in LEAPS if at + leap <= last]
+        clear = (n for n in ahead if is_clear_between(floor, track[at], track[n]))
+        kept.append(next(clear, at + 1))
+    return kept

@@ -1,0 +1,63 @@
+"""The contract of a path: it begins at the robot, and leads out of where the disc does not fit."""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from tests.mission.line_robot import RADIUS_M, TOOL_M, LineRobot
+
+
+def room_with_box():
+    """A room of 4 m x 3 m with a box in it, and a wall beside the robot's way."""
+    pixels = np.full((60, 82), 100, np.int8)
+    pixels[1:59, 1:81] = 0
+    pixels[24:36, 30:44] = 100
+    return pixels
+
+
+def distance_to_walls(pixels, points):
+    """Return the distance of points (n, 2) to the nearest wall, from pixel squares [m]."""
+    rows, cols = np.nonzero(pixels > 50)
+    points = np.asarray(points)
+    dx = np.abs(points[:, None, 0] / 0.05 - (cols + 0.5)) - 0.5
+    dy = np.abs(points[:, None, 1] / 0.05 - (rows + 0.5)) - 0.5
+    return 0.05 * np.hypot(dx.clip(0), dy.clip(0)).min(axis=1)
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_wherever_the_robot_is_pushed_to_the_path_begins_there(seed):
+    rng = np.random.default_rng(seed)
+    pixels = room_with_box()
+    robot = LineRobot(pixels, (0.75, 0.75))
+    robot.wait(5.0 + 20.0 * rng.random(), lambda _: False)
+    # Walls get a pixel thicker, and the robot is a little beside its line.
+    if seed % 2:
+        thick = pixels.copy()
+        thick[1:2] = thick[58:59] = thick[:, 1:2] = thick[:, 80:81] = 100
+        thick[23:37, 29:45] = 100
+        pixels = thick
+    while True:
+        x, y = rng.uniform(0.1, 4.0), rng.uniform(0.1, 2.9)
+        gap = distance_to_walls(pixels, [(x, y)])[0]
+        if 0.6 * RADIUS_M < gap < 1.2 * RADIUS_M:
+            break
+    robot.x, robot.y, robot.is_stuck = x, y, True
+    robot.show(pixels)
+    robot.wait(40.0, lambda _: False)
+    # The first ones may still be of where it was.
+    since = [(points, why) for at, points, why in robot.paths if at > robot.now - 38.0]
+    assert since
+    for points, why in since:
+        # A robot that fits where it is may begin at its place on the line, within half the tool.
+        apart = math.dist(points[0], (x, y))
+        assert apart < (TOOL_M / 2 if gap > RADIUS_M else 0.01), f"{why}: {x:.3f} {y:.3f} {gap:.3f}"
+    # Nowhere is it nearer to a wall than where the robot is.
+    steps = [np.linspace(a, b, 20) for a, b in pairwise(points)]
+    nearest = distance_to_walls(pixels, np.concatenate(steps))
+    assert nearest.min() > min(gap, RADIUS_M) - 0.008
+    robot.is_stuck = False
+    assert robot.wait(900.0, lambda robot: robot.mission.state == "done")
