@@ -29,6 +29,8 @@ from fasaco_edge.wire.documents.status import (
 if TYPE_CHECKING:
     from fasaco_edge.mission.core.mission import Mission
 
+NARROW = "strips too narrow to tell, which no path is laid for"
+
 
 def map_report(mission: Mission | None) -> MapReport | None:
     """Return the map's part; None before there is a map."""
@@ -101,7 +103,11 @@ def floor_report(mission: Mission | None) -> FloorReport | None:
     is_aside = bool(order.errand) or (order.paused and not to_sweep.ahead_m2)
     beside = "to come" if is_aside and order.is_open else "beside the path, and not worth the way"
     beside = beside if is_planned else "not planned yet"
-    left = _largest_first((to_sweep.ahead_m2, "on the path"), (to_sweep.left_m2, beside))
+    left = _largest_first(
+        (to_sweep.ahead_m2, "on the path"),
+        (to_sweep.left_m2, beside),
+        (to_sweep.narrow_m2, NARROW),
+    )
     beyond = _largest_first(*((m2, reason) for reason, m2 in to_sweep.beyond_m2.items()))
     return FloorReport(swept_m2, round(to_sweep.asked_m2, 3), left, beyond)
 

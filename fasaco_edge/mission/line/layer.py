@@ -43,12 +43,14 @@ class FloorToSweep(NamedTuple):
         asked_m2: reachable floor that is asked for, swept or not [m2].
         ahead_m2: the unswept part of it that the line ahead sweeps [m2].
         left_m2: the unswept part of it that the line ahead does not sweep [m2].
+        narrow_m2: the rest of it: strips as narrow as a pixel, which may be swept [m2].
         beyond_m2: free floor out of the tool's reach, asked for or not, by cause [m2].
     """
 
     asked_m2: float
     ahead_m2: float
     left_m2: float
+    narrow_m2: float
     beyond_m2: dict[str, float]
 
 
@@ -77,10 +79,8 @@ class LineLayer:
         self._asked: tuple[Window, NDArray[np.bool_], NDArray[np.bool_]] | None = None
         # Whether the map is complete; None before the first check.
         self._is_settled: bool | None = None
-        # The swept floor at the last update, its number of changes, and how often it had forgotten
-        # pixels.
+        # The swept floor at the last update, and its number of changes.
         self._swept: tuple[SweptFloor | None, int] = None, 0
-        self._forgotten = 0
         # The floor at the last update, and its revision.
         self._seen: tuple[FloorMap | None, int] = None, 0
 
@@ -112,9 +112,6 @@ class LineLayer:
         ahead = self._ahead
         if ahead is None:
             return
-        # Forgotten floor is opened before the next sweep is recorded.
-        if self._ledger.floor.forgotten != self._forgotten:
-            self._take_floor()
         before = self._route.held.index
         ahead.drive(pose)
         self._route.follow_line(ahead.cell)
@@ -202,7 +199,8 @@ class LineLayer:
         tally = self._ahead.tally
         open_m2, left_m2 = tally.open_m2, tally.left_m2
         beyond_m2 = {REASONS[cause]: m2 for cause, m2 in tally.beyond_m2.items()}
-        return FloorToSweep(tally.wanted_m2, open_m2 - left_m2, left_m2, beyond_m2)
+        ahead_m2 = open_m2 - left_m2
+        return FloorToSweep(tally.wanted_m2, ahead_m2, left_m2, tally.narrow_m2, beyond_m2)
 
     @property
     def is_worth_driving(self) -> bool:
@@ -268,10 +266,6 @@ class LineLayer:
         # forgetting.
         known, since = self._swept
         news = swept.changed_since(since) if known is swept else ANYWHERE
-        if known is not swept or swept.forgotten != self._forgotten:
-            ahead.tally.forget_driven()
-            news = ANYWHERE
-        self._forgotten = swept.forgotten
         part = Window.around(self._asked_part(floor), touched)
         if self._asked is not None and self._asked[0] != floor.stands.lattice.window:
             self._asked = None

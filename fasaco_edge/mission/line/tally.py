@@ -12,13 +12,12 @@ from numpy.typing import NDArray
 from fasaco_edge.grid.changes import carried
 from fasaco_edge.grid.floor_map import FloorMap
 from fasaco_edge.grid.geometry import Window
-from fasaco_edge.kernels.floor.driven import (
+from fasaco_edge.kernels.floor.open_floor import (
     CAUSE,
     CAUSE_SHIFT,
-    DRIVEN,
     OPEN,
+    SWEPT,
     WANTED,
-    note_driven,
     set_causes,
     set_open,
 )
@@ -40,11 +39,11 @@ class SweepTally:
     def __init__(self, floor: FloorMap) -> None:
         shape = floor.geometry.rows, floor.geometry.cols
         self.unit_m = floor.geometry.resolution
-        # Flags of each pixel, WANTED, OPEN and DRIVEN, and its cause of being out of reach.
+        # Flags of each pixel, WANTED, OPEN and SWEPT, and its cause of being out of reach.
         self._state = np.zeros(shape, np.uint8)
         self.sweeps = Sweeps(np.full(shape, NEVER, np.int16), np.zeros(blocks_of(shape), np.int32))
-        # Number of wanted pixels, and of open ones.
-        self._wanted_pixels = self._open_pixels = 0
+        # Number of wanted pixels, of those that are swept, and of open ones.
+        self._wanted_pixels = self._swept_pixels = self._open_pixels = 0
         # Number of pixels out of reach by cause; the first element is unused.
         self._beyond_pixels = np.zeros(len(Cause) + 1, np.int64)
         self._tool = floor.discs.tool_m / 2 / self.unit_m
@@ -63,6 +62,7 @@ class SweepTally:
         for part in old.without(new):
             lost = self._state[part.slices_in(old)]
             self._wanted_pixels -= int(np.count_nonzero(lost & WANTED))
+            self._swept_pixels -= int(np.count_nonzero(lost & (WANTED | SWEPT) == WANTED | SWEPT))
             self._open_pixels -= int(np.count_nonzero(lost & OPEN))
             self._beyond_pixels -= _count_causes(lost)
         self._state = carried(self._state, old, new)
@@ -84,7 +84,7 @@ class SweepTally:
             wanted: bool (rows, cols) of it, the floor asked for; None for no change.
             swept: bool (rows, cols) of it, the floor that the robot has swept.
         """
-        more_wanted, more_open = set_open(
+        more_wanted, more_swept, more_open = set_open(
             self.sweeps,
             self._state,
             (part.row0, part.col0),
@@ -92,26 +92,12 @@ class SweepTally:
             swept,
         )
         self._wanted_pixels += more_wanted
+        self._swept_pixels += more_swept
         self._open_pixels += more_open
 
     def set_causes(self, part: Window, causes: NDArray[np.uint8]) -> None:
         """Set the causes of being out of reach in a window, uint8 (rows, cols), see ``Cause``."""
         set_causes(self._state, (part.row0, part.col0), causes, self._beyond_pixels)
-
-    def drive(self, points: NDArray[np.float64]) -> None:
-        """Mark a driven line, float64 (n, 2), y, x [pixels], as swept.
-
-        The ledger records the same from poses: later, on other pixels, and more strictly. Without
-        the mark, strips that only the two rasters differ in, or that are not recorded yet, would
-        seem unswept.
-        """
-        self._open_pixels -= note_driven(
-            self.sweeps, self._state, points, self._tool, self._scratch
-        )
-
-    def forget_driven(self) -> None:
-        """Remove these marks at the next ``set_open``: the ledger alone counts."""
-        self._state &= ~np.uint8(DRIVEN)
 
     def missed_m2(self, part: Window) -> float:
         """Return the area in a window that should be swept and is not on the line [m2]."""
@@ -130,8 +116,14 @@ class SweepTally:
 
     @property
     def open_m2(self) -> float:
-        """Area asked for and not swept yet [m2]."""
+        """Area asked for and not swept yet [m2], without strips too narrow to tell."""
         return self._open_pixels * self.unit_m**2
+
+    @property
+    def narrow_m2(self) -> float:
+        """Area of these strips, for which no line is laid [m2]."""
+        pixels = self._wanted_pixels - self._swept_pixels - self._open_pixels
+        return pixels * self.unit_m**2
 
     @property
     def left_m2(self) -> float:
