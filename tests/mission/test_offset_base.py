@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import pytest
 
+from fasaco_edge.daemon.loop.mission_reports import floor_report
 from fasaco_edge.mission.core.events import State
 from tests.mission.offset_base import bare_room, driven
+from tests.mission.test_swept_truth import flat
 
 # The most that a claim may be above the truth.
 CLAIM = 0.02
@@ -17,6 +19,19 @@ def test_floor_beside_a_base_that_drives_beside_its_line_is_not_called_swept(lef
     assert outcome.mission.state is State.DONE
     assert outcome.claimed <= outcome.swept + CLAIM
     assert outcome.claimed <= outcome.known + CLAIM
+
+
+def test_floor_that_the_base_has_left_is_swept_afterwards_and_else_told():
+    outcome = driven(flat(), left_m=0.12)
+    assert outcome.mission.state is State.DONE
+    assert outcome.swept > 0.98
+    left_m2 = sum(left.m2 for left in floor_report(outcome.mission).left)
+    assert 0.0 < left_m2 < 0.2
+    # Along walls to its right it cannot come nearer.
+    outcome = driven(bare_room(), left_m=0.08)
+    left_m2 = sum(left.m2 for left in floor_report(outcome.mission).left)
+    assert left_m2 > 0.5
+    assert f"{left_m2:.1f} of" in outcome.mission.reason
 
 
 @pytest.mark.parametrize("at", [(0.0, 0.0), (0.013, 0.0088)])

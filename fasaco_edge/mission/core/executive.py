@@ -284,6 +284,8 @@ class Executive:
                     continue
                 if why := orders.why_looking(cell, self._now):
                     return self._stand_by(why, update)
+                if self.line.open_missed():
+                    continue
                 if orders.pass_over_unreachable():
                     self._share(cell, at_once=True)
                     continue

@@ -50,6 +50,7 @@ class PathChecks:
         if (
             path.finished and (waited or (last and self._ledger.current.has_visited(last)))
         ) or self._standing.is_at(last):
+            self._line.open_missed()
             if self._orders.note_path_end():
                 self._orders.advance(now)
             else:

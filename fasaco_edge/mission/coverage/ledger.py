@@ -193,6 +193,12 @@ class CoverageLedger:
         """Count a visit to a cell whose floor is swept, though the robot missed its point."""
         self._visit(cell)
 
+    def open_again(self, cell: Cell) -> None:
+        """Forget the visits to a cell: the tool missed floor in it."""
+        row, col = cell
+        if self.has_visited(cell):
+            self._tiles.writable((row // TILE, col // TILE))[row % TILE, col % TILE] = 0
+
     def _visit(self, cell: Cell) -> None:
         row, col = cell
         self.total += 1

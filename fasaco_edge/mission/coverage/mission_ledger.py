@@ -8,7 +8,7 @@ each map is compared with the building before (``map.building_watch``).
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -28,6 +28,7 @@ from fasaco_edge.mission.coverage.ledger import (
     CoverageLedger,
     LedgerSnapshot,
 )
+from fasaco_edge.mission.coverage.missed_cells import MissedCells
 from fasaco_edge.mission.coverage.passed_cells import PassedCells
 from fasaco_edge.mission.coverage.swept_floor import (
     DROPPED_FLOOR_TILES,
@@ -82,8 +83,10 @@ class MissionLedger:
 
     Attributes:
         first_plan_reason: reason of the first plan.
+        reopened: how often covered cells were opened again.
         shared: cells swept by other robots.
         passed: cells that this robot has passed while floor in them is unswept.
+        missed: how often it came back for such floor.
     """
 
     def __init__(
@@ -104,8 +107,9 @@ class MissionLedger:
         self._cell_m, self._tool_m, self._ahead_m = cell_m, tool_m, ahead_m
         self._covered = self._nothing("")
         self.first_plan_reason = "first plan"
+        self.reopened = 0
         self.shared = SharedProgress(map_place)
-        self.passed = PassedCells()
+        self.passed, self.missed = PassedCells(), MissedCells()
         # The ledger from before a restart while no map has confirmed it, and what was covered
         # since, which is true in any building.
         self._resumed: tuple[LedgerSnapshot, _Covered] | None = None
@@ -118,9 +122,9 @@ class MissionLedger:
         return self._covered.cells
 
     @property
-    def version(self) -> tuple[int, int]:
-        """Changes whenever more cells are covered."""
-        return self.current.total, self.shared.version
+    def version(self) -> tuple[int, int, int]:
+        """Changes whenever more cells are covered, or some are no longer."""
+        return self.current.total, self.shared.version, self.reopened
 
     def visits(self, window: Window) -> NDArray[np.uint16]:
         """Return the visits to cells, uint16 (rows, cols); 1 where only another robot swept."""
@@ -174,6 +178,14 @@ class MissionLedger:
         for covered in self._all:
             covered.cells.credit(cell)
 
+    def open_again(self, cells: Iterable[Cell]) -> None:
+        """Count cells as not covered: floor in them is left."""
+        for covered in self._all:
+            for cell in cells:
+                covered.cells.open_again(cell)
+        self.reopened += 1
+        self.shared.note_forgotten()
+
     def break_track(self) -> None:
         """Note that the robot's track to its next pose is unknown."""
         for covered in self._all:
@@ -197,7 +209,7 @@ class MissionLedger:
         motion, self._pose_before_motion = self.map_motion(pose), None
         if motion is None or motion.is_still:
             return 0
-        self.passed.clear()
+        self._forget_passed()
         before = self.snapshot()
         cells, floor = uncertain_cells(before, motion), certain_floor(before.floor, motion)
         for covered in self._all:
@@ -221,7 +233,7 @@ class MissionLedger:
             around = Window(row0, col0, int(rows.max()) + 1, int(cols.max()) + 1)
             return inside(around, self._cell_m)[rows - row0, cols - col0]
 
-        self.passed.clear()
+        self._forget_passed()
         for covered in self._all:
             covered.cells.forget(cells_inside)
             covered.floor.forget(lambda window: inside(window, PIXEL_M))
@@ -276,7 +288,7 @@ class MissionLedger:
         """Start over in another building, whose map is in ``frame``; return what to report."""
         cells = self.current.snapshot().cells
         self._resumed = self._pose_before_motion = None
-        self.passed.clear()
+        self._forget_passed()
         self.shared.leave_building(frame)
         return self._leave_building(cells, self._nothing(""), frame)
 
@@ -289,9 +301,14 @@ class MissionLedger:
             f"the ledger of {cells} covered cells is of another building than the map"
         )
 
+    def _forget_passed(self) -> None:
+        """Forget what the robot has passed: the floor there has to be swept again."""
+        self.passed.clear()
+        self.missed.clear()
+
     def _replace(self, covered: _Covered) -> None:
         self._covered, self._resumed, self._pose_before_motion = covered, None, None
-        self.passed.clear()
+        self._forget_passed()
         self.shared.note_forgotten()
 
     def _begun_anew(self, why: str) -> LedgerMismatchError:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.grid.changes import carried
-from fasaco_edge.grid.fine_raster import strips
+from fasaco_edge.grid.fine_raster import raster_to_map, strips
 from fasaco_edge.grid.floor_map import FloorMap
 from fasaco_edge.grid.geometry import Pose2D, Window
 from fasaco_edge.mission.config import Sweeping
@@ -34,6 +34,8 @@ LEAST_LEFT_M2 = 0.04
 # [s], [m]; cells looked at each time that the robot passes one. It is not gone back to: at the end
 # of a mission that took four robots a tenth more time, for 0.1 % of the floor.
 WORTH_S, RIM_M, LOOKED_AT = 4.0, 0.1, 24
+# Less unswept floor is not told at the end: to a tenth it is none [m2].
+LEAST_TOLD_M2 = 0.05
 
 
 class FloorToSweep(NamedTuple):
@@ -66,6 +68,7 @@ class LineLayer:
         route: Route,
     ) -> None:
         self._map, self._ledger, self._orders, self._route = map_state, ledger, orders, route
+        orders.floor_left = self.floor_left
         self._polisher = Polisher(sweeping.line) if sweeping else None
         price_s_m2 = sweeping.line.price_s_m2 if sweeping else 0.0
         self._worth_m2 = WORTH_S / price_s_m2 if price_s_m2 else math.inf
@@ -202,6 +205,14 @@ class LineLayer:
         ahead_m2 = open_m2 - left_m2
         return FloorToSweep(tally.wanted_m2, ahead_m2, left_m2, tally.narrow_m2, beyond_m2)
 
+    def floor_left(self) -> str:
+        """Return how much floor is not swept, as text that follows another; "" for hardly any."""
+        floor = self.to_sweep
+        left_m2 = floor.ahead_m2 + floor.left_m2 + floor.narrow_m2 if floor else 0.0
+        if floor is None or left_m2 < LEAST_TOLD_M2:
+            return ""
+        return f"; {left_m2:.1f} of {floor.asked_m2:.1f} m2 of its floor are not known to be swept"
+
     @property
     def is_worth_driving(self) -> bool:
         """Whether the line ahead sweeps floor to speak of; where cells are counted none is."""
@@ -230,6 +241,29 @@ class LineLayer:
         for cell, counts in zip(unseen, is_asked, strict=True):
             if counts and ahead.tally.missed_m2(floor.box_of(cell)) < LEAST_LEFT_M2:
                 self._ledger.credit(cell)
+
+    def open_missed(self) -> bool:
+        """Open cells again in which floor is left that is worth the way; tell whether any is.
+
+        To be called at the end of a path: the robot may have driven beside its line.
+        """
+        ahead, floor, lattice = self._ahead, self._map.floor, self._map.lattice
+        if ahead is None or floor is None or lattice is None:
+            return False
+        self._take_floor()
+        if self._asked is None:
+            return False
+        window, asked, _ = self._asked
+        points = raster_to_map(floor.geometry, ahead.tally.missed().astype(np.float64))
+        cells = np.floor(points[:, ::-1] / lattice.cell_m).astype(np.int32)
+        found, pixels = np.unique(cells, axis=0, return_counts=True)
+        found = found[pixels * floor.geometry.resolution**2 >= self._worth_m2]
+        found = found[window.values_at(asked & (self._ledger.current.visits(window) > 0), found, 0)]
+        missed = [(row, col) for row, col in found.tolist()]
+        again = [cell for cell in missed if self._ledger.missed.may_come_back(cell)]
+        if again:
+            self._ledger.open_again(again)
+        return bool(again)
 
     def _note_passed(self, passed: NDArray[np.int32]) -> None:
         """Note the passed cells, and drop those whose floor is swept."""

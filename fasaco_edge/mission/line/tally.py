@@ -21,7 +21,7 @@ from fasaco_edge.kernels.floor.open_floor import (
     set_causes,
     set_open,
 )
-from fasaco_edge.kernels.floor.sweeps import NEVER, Scratch, Sweeps, sweep_edges
+from fasaco_edge.kernels.floor.sweeps import BLOCK, NEVER, Scratch, Sweeps, sweep_edges
 from fasaco_edge.mission.line.out_of_reach import Cause
 from fasaco_edge.planners.line import blocks_of, left_in_blocks, memory_for_moves
 
@@ -103,6 +103,15 @@ class SweepTally:
         """Return the area in a window that should be swept and is not on the line [m2]."""
         counts = self.sweeps.counts[part.row0 : part.row1, part.col0 : part.col1]
         return int(np.count_nonzero(counts == 0)) * self.unit_m**2
+
+    def missed(self) -> NDArray[np.int64]:
+        """Return the pixels that should be swept and are not on the line, row, col (n, 2)."""
+        found = [np.empty((0, 2), np.int64)]
+        for corner in np.argwhere(self.sweeps.left) << BLOCK:
+            row, col = corner.tolist()
+            block = self.sweeps.counts[row : row + (1 << BLOCK), col : col + (1 << BLOCK)]
+            found.append(np.argwhere(block == 0) + corner)
+        return np.concatenate(found)
 
     def open_in_m2(self, part: Window) -> float:
         """Return the area in a window that should be swept, on the line or not [m2]."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import partial
 
@@ -57,6 +58,7 @@ class Sequencer:
     Attributes:
         order_state: the order and its progress.
         cells: the cells left of it.
+        floor_left: returns what floor is left where the order ends, as text; "" for none.
     """
 
     def __init__(
@@ -68,6 +70,7 @@ class Sequencer:
         self._ledger = ledger
         self._fleet = fleet
         self._run = _Run()
+        self.floor_left: Callable[[], str] = str
         self.cells = CellsLeft(
             config, map_state, ledger, fleet, self._zones, lambda: self._run.exploration
         )
@@ -341,7 +344,7 @@ class Sequencer:
         run.retry_at = None
         self.order_state = replace(self.order_state, stage=Stage.OVER)
         every = order is None or order.zones[0].polygon is None
-        run.ending = self._unreached.ending(self.order_state)
+        run.ending = self._unreached.ending(self.order_state) + self.floor_left()
         area, named = self._map.area, () if every or order is None else order.zones
         if area is not None and (beyond := [z.name for z in named if not is_in_reach(z, area)]):
             run.ending += f"; not reached: {', '.join(map(repr, beyond))}"

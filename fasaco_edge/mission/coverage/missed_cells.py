@@ -1,0 +1,30 @@
+"""Missed cells: cells that the robot drove through and left floor in, which it comes back for.
+
+A base that drives beside its line leaves some each time, so it comes back to a cell a few times
+only.
+"""
+
+from __future__ import annotations
+
+from fasaco_edge.grid.lattice import Cell
+
+# So often the robot comes back to a cell: floor that it left twice more it would leave again.
+MOST_AGAIN = 2
+
+
+class MissedCells:
+    """Counts how often the robot comes back to each cell."""
+
+    def __init__(self) -> None:
+        self._again: dict[Cell, int] = {}
+
+    def clear(self) -> None:
+        """Forget all counts."""
+        self._again.clear()
+
+    def may_come_back(self, cell: Cell) -> bool:
+        """Tell whether the robot may come back to a cell once more, and count it."""
+        again = self._again.get(cell, 0)
+        if again < MOST_AGAIN:
+            self._again[cell] = again + 1
+        return again < MOST_AGAIN

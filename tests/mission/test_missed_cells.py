@@ -1,0 +1,31 @@
+"""Cells that the robot comes back to for floor that it has left."""
+
+from __future__ import annotations
+
+from fasaco_edge.mission.coverage.missed_cells import MOST_AGAIN, MissedCells
+from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
+from tests.mission.world import CELL, pose_at
+
+
+def test_the_robot_comes_back_to_a_cell_a_few_times_only():
+    cells = MissedCells()
+    assert [cells.may_come_back((0, 1)) for _ in range(MOST_AGAIN + 1)] == [
+        *[True] * MOST_AGAIN,
+        False,
+    ]
+    assert cells.may_come_back((1, 0))
+    cells.clear()
+    assert cells.may_come_back((0, 1))
+
+
+def test_a_cell_opened_again_is_not_covered_until_it_is_visited_again():
+    ledger = MissionLedger(CELL, CELL)
+    for col in (0, 1, 2):
+        ledger.record(pose_at(0, col).pose.pose)
+    before = ledger.version
+    ledger.open_again([(0, 1), (5, 5)])
+    assert ledger.version != before
+    assert [ledger.current.has_visited((0, col)) for col in (0, 1, 2)] == [True, False, True]
+    assert not ledger.current.has_visited((5, 5))
+    ledger.record(pose_at(0, 1).pose.pose)
+    assert ledger.current.has_visited((0, 1))
