@@ -160,6 +160,7 @@ class MissionConfig:
         plans_on_trail: whether the planner's ants start from the living trail.
         robot: its name in a fleet that shares the work; "" without one.
         battery: when to charge; None for never.
+        speed_m_s: speed of the robot; 0 where it is not known [m/s].
         lattice_deg: angle of the cells' rows to the x axis of the map frame [deg]; None to align
             them with the walls, once their direction is certain.
         map_place: where its map lies in the frame of its fleet; None without such a frame.
@@ -179,3 +180,4 @@ class MissionConfig:
     lattice_deg: float | None = 0.0
     map_place: MapPlace | None = None
     given: MissionPolicy | None = None
+    speed_m_s: float = 0.0

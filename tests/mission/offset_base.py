@@ -46,6 +46,7 @@ def configured(speed_m_s):
         cost=CoverageCost.for_robot(CELL_M, speed_m_s, 1.5),
         policy=MissionPolicy(retries=1, retry_s=2.0),
         sweeping=Sweeping(TOOL_M, 1_000_000, line),
+        speed_m_s=speed_m_s,
     )
 
 

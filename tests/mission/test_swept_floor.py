@@ -212,14 +212,14 @@ def wobbling(sigma_m, poses=400):
 
 @pytest.mark.parametrize("sigma_m", [0.0, 0.01, 0.03])
 def test_the_scatter_of_poses_is_what_they_err(sigma_m):
-    scatter = PoseScatter()
+    scatter = PoseScatter(0.15)
     for x, y in wobbling(sigma_m):
         scatter.note(Pose2D(x, y))
     assert scatter.sigma_m == pytest.approx(sigma_m, rel=0.4)
 
 
 def test_few_poses_tell_no_scatter_and_corners_are_none():
-    scatter = PoseScatter()
+    scatter = PoseScatter(0.15)
     for number, (x, y) in enumerate([(0.25 * min(n, 6), 0.25 * max(n - 6, 0)) for n in range(13)]):
         scatter.note(Pose2D(x, y))
         assert scatter.sigma_m == 0.0, number

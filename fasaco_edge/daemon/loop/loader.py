@@ -102,6 +102,7 @@ def mission_config(config: DaemonConfig, chosen: CoveragePlanner) -> MissionConf
         config.battery or None,
         config.lattice_deg,
         config.fleet.map_place if config.fleet else None,
+        speed_m_s=robot.speed_m_s,
     )
 
 

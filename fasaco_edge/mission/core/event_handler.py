@@ -220,7 +220,7 @@ class EventHandler:
             self._enter_frame(stamped.frame)
         before = self.map.pose
         self.map.take_pose(stamped)
-        has_jumped = self.monitor.note_pose(stamped.pose, self._now if at is None else at)
+        has_jumped = self.monitor.note_pose(stamped, self._now if at is None else at)
         if has_jumped:
             self.ledger.break_track()
             self.drive.break_track()
@@ -239,7 +239,7 @@ class EventHandler:
             if motion is not None and self.map.building.take_closure():
                 self.orders.move_home(motion)
             self._record()
-        self.line.note_pose(stamped.pose)
+        self.line.note_pose(stamped.pose, self.monitor.farthest_m)
         cell = self.map.robot_cell()
         if cell is None:
             return
@@ -260,7 +260,7 @@ class EventHandler:
             return
         pose = stamped.pose
         if lattice.contains(lattice.cell_at(pose.x, pose.y)):
-            full = self.ledger.record(pose, self.map.place_of)
+            full = self.ledger.record(pose, self.map.place_of, self.monitor.farthest_m)
             if full is not None:
                 self._faults.append(full)
 

@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     # For types only: a daemon reads its ledger before the kernels are loaded.
     from fasaco_edge.grid.lattice import Cell
 
-# Two poses farther apart than this many cells are a jump: what was under the tool in between is
-# unknown.
+# Two poses farther apart than this many cells are a jump, unless the robot can have driven it: what
+# was under the tool in between is unknown.
 JUMP_CELLS = 2.0
 
 TILE = 64
@@ -123,7 +123,10 @@ class CoverageLedger:
         self.frame = frame
 
     def record(
-        self, pose: Pose2D, place_of: Callable[[Cell], Point | None] | None = None
+        self,
+        pose: Pose2D,
+        place_of: Callable[[Cell], Point | None] | None = None,
+        farthest_m: float = 0.0,
     ) -> frozenset[Cell]:
         """Record driving to ``pose``; return the newly visited cells.
 
@@ -131,9 +134,12 @@ class CoverageLedger:
             pose: the robot's pose.
             place_of: returns the point of a cell, x, y [m], that the tool has to pass over; None
                 for none. By default the cell's centre.
+            farthest_m: how far it can have driven since the pose before; 0 if not known [m].
         """
         last = self._last or pose
-        if math.hypot(pose.x - last.x, pose.y - last.y) > JUMP_CELLS * self._cell_m:
+        if math.hypot(pose.x - last.x, pose.y - last.y) > max(
+            JUMP_CELLS * self._cell_m, farthest_m
+        ):
             last = pose
         near = self._near(last, pose, place_of or self._centre)
         entered = self._swept(last, pose, near) - self._under_tool

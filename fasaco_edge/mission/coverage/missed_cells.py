@@ -23,8 +23,9 @@ class MissedCells:
         self._again.clear()
 
     def may_come_back(self, cell: Cell) -> bool:
-        """Tell whether the robot may come back to a cell once more, and count it."""
-        again = self._again.get(cell, 0)
-        if again < MOST_AGAIN:
-            self._again[cell] = again + 1
-        return again < MOST_AGAIN
+        """Tell whether the robot may come back to a cell once more."""
+        return self._again.get(cell, 0) < MOST_AGAIN
+
+    def come_back(self, cell: Cell) -> None:
+        """Note that the robot comes back to a cell."""
+        self._again[cell] = self._again.get(cell, 0) + 1

@@ -52,14 +52,14 @@ class _Covered:
     floor: SweptFloor
 
     def record(
-        self, pose: Pose2D, tool: Pose2D, place_of: PlaceOf | None
+        self, pose: Pose2D, tool: Pose2D, place_of: PlaceOf | None, farthest_m: float
     ) -> LedgerFullError | None:
         """Record driving to ``pose`` with the tool's centre at ``tool``; return a fault if tiles
-        were dropped."""
+        were dropped. ``farthest_m``: see ``MissionLedger.record``."""
         cells, floor = self.cells, self.floor
         before = cells.dropped, floor.dropped
-        cells.record(pose, place_of)
-        floor.record(tool)
+        cells.record(pose, place_of, farthest_m)
+        floor.record(tool, farthest_m)
         if cells.dropped != before[0]:
             return _full(MOST_TILES, f"{TILE} x {TILE} cells", DROPPED_TILES)
         if floor.dropped != before[1]:
@@ -161,16 +161,21 @@ class MissionLedger:
         if cells := before.cells:
             self.first_plan_reason = f"first plan, {cells} cells were covered before"
 
-    def record(self, pose: Pose2D, place_of: PlaceOf | None = None) -> LedgerFullError | None:
+    def record(
+        self, pose: Pose2D, place_of: PlaceOf | None = None, farthest_m: float = 0.0
+    ) -> LedgerFullError | None:
         """Record driving to ``pose``; return a fault if tiles were dropped.
 
-        ``place_of``: see ``CoverageLedger.record``.
+        Args:
+            pose: the robot's pose.
+            place_of: see ``CoverageLedger.record``.
+            farthest_m: how far it can have driven since the pose before; 0 if not known [m].
         """
         tool = pose
         if ahead_m := self._ahead_m:
             x = pose.x + ahead_m * math.cos(pose.yaw)
             tool = Pose2D(x, pose.y + ahead_m * math.sin(pose.yaw), pose.yaw)
-        faults = [covered.record(pose, tool, place_of) for covered in self._all]
+        faults = [covered.record(pose, tool, place_of, farthest_m) for covered in self._all]
         return faults[0]
 
     def credit(self, cell: Cell) -> None:

@@ -9,7 +9,8 @@ second it leaves the straight line between the pose before and the pose after by
 millimetres. The lateral deviation from that line is localisation noise; a longitudinal one would be
 timestamp error. Three lateral errors of standard deviation s give a deviation of sqrt(1 + 1/4 +
 1/4) s, whose median size is 0.674 times that. Corners are rare, so the median over the last ones
-ignores them. A drift, constant from pose to pose, is not seen.
+ignores them; of poses that are far apart they are not, and are left out. A drift, constant from
+pose to pose, is not seen.
 """
 
 from __future__ import annotations
@@ -35,14 +36,17 @@ class PoseScatter:
         sigma_m: standard deviation of an error along one axis [m]; 0 before enough poses have come.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, corner_m: float) -> None:
+        """Start without a pose; ``corner_m``: of steps longer than that a sharp bend is a corner
+        [m]."""
         self.sigma_m = 0.0
+        self._corner_m = corner_m
         self._before: tuple[Pose2D, ...] = ()
         self._off_m: deque[float] = deque(maxlen=POSES)
 
     def note(self, pose: Pose2D) -> None:
         """Take in the next pose."""
-        if len(self._before) == 2:
+        if len(self._before) == 2 and not self._is_corner(*self._before, pose):
             first, middle = self._before
             dx, dy = pose.x - first.x, pose.y - first.y
             length = math.hypot(dx, dy)
@@ -51,6 +55,17 @@ class PoseScatter:
             if len(self._off_m) >= FEWEST:
                 self.sigma_m = median(self._off_m) / _MEDIAN_OFF
         self._before = (*self._before[-1:], pose)
+
+    def _is_corner(self, first: Pose2D, middle: Pose2D, last: Pose2D) -> bool:
+        """Tell whether the robot turned, as noise would not."""
+        ax, ay, bx, by = (
+            middle.x - first.x,
+            middle.y - first.y,
+            last.x - middle.x,
+            last.y - middle.y,
+        )
+        is_long = min(math.hypot(ax, ay), math.hypot(bx, by)) > self._corner_m
+        return is_long and abs(ax * by - ay * bx) > ax * bx + ay * by
 
     def break_track(self) -> None:
         """Note that the robot's track to its next pose is unknown."""
@@ -66,11 +81,23 @@ MOST_BESIDE = 15
 
 
 class Place(NamedTuple):
-    """A filtered position: x, y [m], and its error bound to each side [m]."""
+    """A filtered position.
+
+    Attributes:
+        x, y: the position [m].
+        error_m: error bound to each side [m].
+        farthest_m: how far the robot can have driven to it from the one before; 0 if not known [m].
+    """
 
     x: float
     y: float
     error_m: float
+    farthest_m: float = 0.0
+
+    @property
+    def point(self) -> tuple[float, float]:
+        """The position, x, y [m]."""
+        return self.x, self.y
 
 
 class SteadyTrack:
@@ -79,18 +106,24 @@ class SteadyTrack:
     def __init__(self, tool_m: float) -> None:
         """Start without a pose; ``tool_m``: width of the tool [m]."""
         self._reach_m = 0.5 * tool_m
-        self._scatter = PoseScatter()
-        # The poses in the window, and how many of them have become places.
+        self._scatter = PoseScatter(self._reach_m)
+        # The poses in the window, how far the robot can have driven to each from the one before
+        # [m], and how many of them have become places.
         self._poses: list[Pose2D] = []
+        self._farthest_m: list[float] = []
         self._done = 0
 
-    def add(self, pose: Pose2D) -> list[Place]:
-        """Take in the next pose; return the places that are final now."""
+    def add(self, pose: Pose2D, farthest_m: float = 0.0) -> list[Place]:
+        """Take in the next pose; return the places that are final now.
+
+        ``farthest_m``: how far the robot can have driven since the pose before; 0 if not known [m].
+        """
         self._scatter.note(pose)
         self._poses.append(pose)
+        self._farthest_m.append(farthest_m)
         places = self._places(len(self._poses) - self._beside)
         past = max(self._done - MOST_BESIDE, 0)
-        del self._poses[:past]
+        del self._poses[:past], self._farthest_m[:past]
         self._done -= past
         return places
 
@@ -115,7 +148,7 @@ class SteadyTrack:
     def end(self) -> list[Place]:
         """Return the last places: the robot's track to its next pose is unknown."""
         places = self._places(len(self._poses))
-        self._poses, self._done = [], 0
+        self._poses, self._farthest_m, self._done = [], [], 0
         self._scatter.break_track()
         return places
 
@@ -145,4 +178,4 @@ class SteadyTrack:
         around = poses[index - beside : index + beside + 1]
         count = len(around)
         x, y = sum([pose.x for pose in around]) / count, sum([pose.y for pose in around]) / count
-        return Place(x, y, SURE * sigma_m / math.sqrt(count))
+        return Place(x, y, SURE * sigma_m / math.sqrt(count), self._farthest_m[index])

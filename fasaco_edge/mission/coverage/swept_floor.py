@@ -5,8 +5,9 @@ consecutive poses.
 
 With noisy poses, the union of tool discs is wider than the strip really swept. So the disc moves
 along the steady track and shrinks by the track's error bound: not at all with exact poses, and
-never to less than half of the tool. Sweeps along the newest poses are visible at once; they are
-stored, and counted, as soon as the track there is final.
+never to less than half of the tool. Between poses that are far apart it shrinks by how far the
+robot may have driven beside the segment, down to nothing, see ``bends``. Sweeps along the newest
+poses are visible at once; they are stored, and counted, as soon as the track there is final.
 """
 
 from __future__ import annotations
@@ -14,12 +15,12 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Callable, Iterable, Sequence
-from itertools import pairwise
-from typing import Self
+from typing import NamedTuple, Self
 
 import numpy as np
 
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D, Window
+from fasaco_edge.mission.coverage.bends import SHORT_M, beside_m
 from fasaco_edge.mission.coverage.floor_tiles import (
     FLOOR_TILE,
     PIXEL_M,
@@ -39,7 +40,7 @@ from fasaco_edge.mission.coverage.floor_tiles import Place as TilePlace
 from fasaco_edge.mission.coverage.shared_tiles import SharedTiles
 from fasaco_edge.mission.coverage.steady_track import Place, SteadyTrack
 
-# Two poses farther apart than this many tool widths are a jump.
+# Two poses farther apart than this many tool widths are a jump, unless a drive takes no longer.
 JUMP_TOOLS = 2.0
 # Limit on the tiles of a floor, 100 million pixels, the same as for planning: each takes 2 kB, and
 # as much again if it has changed since the copy that is being written. ``protocol/limits.yaml`` has
@@ -60,8 +61,16 @@ TOUCH_M = 1e-9
 # Grids are looked up in blocks of BLOCK x BLOCK of these pixels; coarser grids in smaller blocks.
 BLOCK = 256
 
-# A segment from one place to the next.
-Segment = tuple[Place, Place]
+
+class Segment(NamedTuple):
+    """A segment from one place to the next, and the radius swept along it with certainty [m].
+
+    The radius is 0 where none is.
+    """
+
+    start: Place
+    end: Place
+    reach_m: float
 
 
 class SweptFloor:
@@ -82,9 +91,12 @@ class SweptFloor:
         self.dropped = 0
         self._tool_m = tool_m
         self._track = SteadyTrack(tool_m)
-        # The newest pose, and the place up to which sweeps are stored.
+        # The newest pose. The places before the one up to which sweeps are stored, that one, and
+        # after a long segment the one that waits for the next, which shows if the robot turned.
         self._last: Pose2D | None = None
+        self._before: Place | None = None
         self._kept_to: Place | None = None
+        self._waiting: Place | None = None
         # Preliminary sweeps beyond that, None until computed; and a window that contains them.
         self._ahead: tuple[Window, Mask] | None = None
         self._around_ahead: Window | None = None
@@ -135,16 +147,21 @@ class SweptFloor:
                 found[block.slices_in(whole)] = swept_on(self.swept_in, place, block)
         return found
 
-    def record(self, pose: Pose2D) -> None:
-        """Record driving to ``pose``."""
+    def record(self, pose: Pose2D, farthest_m: float = 0.0) -> None:
+        """Record driving to ``pose``.
+
+        ``farthest_m``: how far the robot can have driven since the pose before; 0 if that is not
+        known [m].
+        """
         last, self._last = self._last, pose
-        if last is not None and (apart := _apart(last, pose)) <= JUMP_TOOLS * self._tool_m:
+        most_m = max(JUMP_TOOLS * self._tool_m, farthest_m)
+        if last is not None and (apart := _apart(last, pose)) <= most_m:
             if not apart:
                 return  # a pose repeated with each map says nothing about noise
         else:
             self._end_track()
         before = self._around_ahead
-        self._keep(self._track.add(pose))
+        self._keep(self._track.add(pose, farthest_m))
         self._begin_ahead()
         # The preliminary part has changed, too.
         self._note(Window.around(before, self._around_ahead))
@@ -206,7 +223,9 @@ class SweptFloor:
         """Store the sweeps up to the newest pose."""
         before = self._around_ahead
         self._keep(self._track.end())
-        self._kept_to = None
+        if self._waiting is not None:
+            self._store(self._waiting, None)
+        self._before = self._kept_to = self._waiting = None
         self._begin_ahead()
         self._note(before)
 
@@ -218,34 +237,63 @@ class SweptFloor:
 
     def _keep(self, places: list[Place]) -> None:
         for place in places:
-            segment = self._kept_to or place, place
+            if self._waiting is not None:
+                self._store(self._waiting, place)
+                self._waiting = None
+            start = self._kept_to
+            is_long = start is not None and math.dist(start.point, place.point) > SHORT_M
+            if is_long and place.farthest_m:
+                self._waiting = place
+            else:
+                self._store(place, None)
+
+    def _store(self, place: Place, after: Place | None) -> None:
+        """Store the sweep to a place, after which the robot came to another."""
+        start = self._kept_to
+        for segment in self._segments(self._before, start or place, place, after):
             window = self._around(segment)
             self._mark(window, np.packbits(self._under([segment], window), axis=1))
-            self._kept_to = place
+        self._before, self._kept_to = start, place
+
+    def _segments(
+        self, before: Place | None, start: Place, end: Place, after: Place | None
+    ) -> list[Segment]:
+        """Return what is swept between two places: the way, or the places alone."""
+        away_m = beside_m(
+            start.point,
+            end.point,
+            before and before.point,
+            after and after.point,
+            end.farthest_m,
+        )
+        reach_m = 0.5 * self._tool_m - away_m
+        at_end = max(0.5 * self._tool_m - end.error_m, 0.25 * self._tool_m)
+        if reach_m >= at_end:
+            return [Segment(start, end, at_end)]
+        way = [Segment(start, end, reach_m)] if reach_m > 0.0 else []
+        return [*way, Segment(end, end, at_end)]
 
     def _begin_ahead(self) -> None:
         """Set the window of the preliminary sweeps; they are computed on demand."""
         self._ahead, self._around_ahead = None, None
         box = self._track.box_ahead()
-        if box is not None:
-            x0, y0, x1, y1 = box
-            start = self._kept_to
-            if start is not None:
-                x0, y0, x1, y1 = (
-                    min(x0, start.x),
-                    min(y0, start.y),
-                    max(x1, start.x),
-                    max(y1, start.y),
-                )
-            rows = _span(y0, y1, 0.5 * self._tool_m + TOUCH_M, 1)
-            cols = _span(x0, x1, 0.5 * self._tool_m + TOUCH_M, 8)
-            self._around_ahead = Window(rows[0], cols[0], rows[1], cols[1])
+        corners = [(box[0], box[1]), (box[2], box[3])] if box is not None else []
+        if self._waiting is not None:
+            corners.append(self._waiting.point)
+        if not corners:
+            return
+        if self._kept_to is not None:
+            corners.append(self._kept_to.point)
+        xs, ys = zip(*corners, strict=True)
+        rows = _span(min(ys), max(ys), 0.5 * self._tool_m + TOUCH_M, 1)
+        cols = _span(min(xs), max(xs), 0.5 * self._tool_m + TOUCH_M, 8)
+        self._around_ahead = Window(rows[0], cols[0], rows[1], cols[1])
 
     def _swept_ahead(self) -> tuple[Window, Mask]:
         """Return the preliminary sweeps and their window."""
         if self._ahead is None:
             places = self._track.ahead()
-            segments = list(pairwise([self._kept_to or places[0], *places])) if places else []
+            segments = self._segments_ahead([*filter(None, [self._waiting]), *places])
             windows = [self._around(segment) for segment in segments]
             whole = Window.around(*windows) or NOWHERE
             if whole.rows * whole.cols > MOST_AHEAD:
@@ -260,26 +308,35 @@ class SweptFloor:
             self._ahead = whole, ahead
         return self._ahead
 
+    def _segments_ahead(self, places: list[Place]) -> list[Segment]:
+        """Return what is swept beyond what is stored, to places in their order."""
+        if not places:
+            return []
+        chain = [self._before, self._kept_to or places[0], *places, None]
+        return [
+            segment
+            for before, start, end, after in zip(
+                chain, chain[1:], chain[2:], chain[3:], strict=False
+            )
+            if start is not None and end is not None
+            for segment in self._segments(before, start, end, after)
+        ]
+
     def _around(self, segment: Segment) -> Window:
         """Return a window around a segment's sweep whose columns are whole bytes."""
-        start, end = segment
-        reach = self._reach(end)
+        start, end, reach = segment
         row0, row1 = _span(start.y, end.y, reach, 1)
         col0, col1 = _span(start.x, end.x, reach, 8)
         return Window(row0, col0, row1, col1)
 
-    def _reach(self, end: Place) -> float:
-        """Return the radius around a place that the tool swept with certainty [m]."""
-        return max(0.5 * self._tool_m - end.error_m, 0.25 * self._tool_m)
-
     def _under(self, segments: Sequence[Segment], window: Window) -> Mask:
         """Return which pixel centres of a window the tool passed with certainty."""
         values = []
-        for start, end in segments:
+        for start, end, reach_m in segments:
             # Relative to each start: far from the origin rounding would swamp differences.
             far_y, far_x = end.y - start.y, end.x - start.x
             length2 = far_x * far_x + far_y * far_y or 1.0
-            reach2 = (self._reach(end) + TOUCH_M) ** 2
+            reach2 = (reach_m + TOUCH_M) ** 2
             values.append((start.y, start.x, far_y, far_x, length2, reach2))
         y, x, dy, dx, lengths2, reaches2 = np.array(values).reshape(-1, 6, 1, 1).swapaxes(0, 1)
         up = ((np.arange(window.row0, window.row1) + 0.5) * PIXEL_M)[:, np.newaxis] - y

@@ -23,6 +23,7 @@ from fasaco_edge.mission.coverage.floor_tiles import pixels_under
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
 from fasaco_edge.mission.coverage.swept_floor import ANYWHERE, NOWHERE, SweptFloor
 from fasaco_edge.mission.line.line_ahead import LineAhead
+from fasaco_edge.mission.line.missed_floor import MissedFloor
 from fasaco_edge.mission.line.out_of_reach import REASONS, causes_of
 from fasaco_edge.mission.line.polisher import Polisher
 from fasaco_edge.mission.map.map_state import MapState
@@ -70,6 +71,7 @@ class LineLayer:
         self._map, self._ledger, self._orders, self._route = map_state, ledger, orders, route
         orders.floor_left = self.floor_left
         self._polisher = Polisher(sweeping.line) if sweeping else None
+        self._missed = MissedFloor.at(sweeping.line, WORTH_S) if sweeping else None
         price_s_m2 = sweeping.line.price_s_m2 if sweeping else 0.0
         self._worth_m2 = WORTH_S / price_s_m2 if price_s_m2 else math.inf
         self._ahead: LineAhead | None = None
@@ -110,13 +112,16 @@ class LineLayer:
         )
         self._touched = Window.around(touched, floor.touched)
 
-    def note_pose(self, pose: Pose2D) -> None:
-        """Note the robot's pose, which may be on its line."""
+    def note_pose(self, pose: Pose2D, farthest_m: float = 0.0) -> None:
+        """Note the robot's pose, which may be on its line.
+
+        ``farthest_m``: how far it can have driven since the pose before; 0 if not known [m].
+        """
         ahead = self._ahead
         if ahead is None:
             return
         before = self._route.held.index
-        ahead.drive(pose)
+        ahead.drive(pose, farthest_m)
         self._route.follow_line(ahead.cell)
         path = self._route.held
         passed = path.cells[before : path.index]
@@ -248,19 +253,28 @@ class LineLayer:
         To be called at the end of a path: the robot may have driven beside its line.
         """
         ahead, floor, lattice = self._ahead, self._map.floor, self._map.lattice
-        if ahead is None or floor is None or lattice is None:
+        stamped = self._map.pose
+        if ahead is None or floor is None or lattice is None or stamped is None:
             return False
+        assert self._missed is not None
         self._take_floor()
         if self._asked is None:
             return False
         window, asked, _ = self._asked
         points = raster_to_map(floor.geometry, ahead.tally.missed().astype(np.float64))
-        cells = np.floor(points[:, ::-1] / lattice.cell_m).astype(np.int32)
-        found, pixels = np.unique(cells, axis=0, return_counts=True)
-        found = found[pixels * floor.geometry.resolution**2 >= self._worth_m2]
-        found = found[window.values_at(asked & (self._ledger.current.visits(window) > 0), found, 0)]
-        missed = [(row, col) for row, col in found.tolist()]
-        again = [cell for cell in missed if self._ledger.missed.may_come_back(cell)]
+        found, pixels = np.unique(
+            np.floor(points[:, ::-1] / lattice.cell_m).astype(np.int32), axis=0, return_counts=True
+        )
+        is_covered = asked & (self._ledger.current.visits(window) > 0)
+        kept = window.values_at(is_covered, found, 0).astype(np.bool_)
+        areas_m2 = pixels[kept] * floor.geometry.resolution**2
+        cells = ((row, col) for row, col in found[kept].tolist())
+        left_m2 = dict(zip(cells, areas_m2.tolist(), strict=True))
+        pose, missed = stamped.pose, self._ledger.missed
+        here = lattice.cell_at(pose.x, pose.y)
+        again = self._missed.worth_the_way(left_m2, here, lattice.cell_m, missed.may_come_back)
+        for cell in again:
+            missed.come_back(cell)
         if again:
             self._ledger.open_again(again)
         return bool(again)

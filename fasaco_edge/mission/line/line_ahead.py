@@ -20,7 +20,7 @@ from fasaco_edge.mission.line.alignment import aligned, by_distance
 from fasaco_edge.mission.line.lead_out import fitting_radius, lead_out
 from fasaco_edge.mission.line.line_aside import LineAside
 from fasaco_edge.mission.line.pieces import Joiner, Piece, exchanged, kept_pieces
-from fasaco_edge.mission.line.place_on_line import PlaceOnLine
+from fasaco_edge.mission.line.place_on_line import LOOK_AHEAD_M, PlaceOnLine
 from fasaco_edge.mission.line.polyline import (
     NO_EDGES,
     POLISHED,
@@ -247,10 +247,14 @@ class LineAhead:
         self._join([*head, Piece(line.part(last), last)], beyond)
         return True
 
-    def drive(self, pose: Pose2D) -> None:
-        """Note the robot's pose; the driven part is dropped."""
+    def drive(self, pose: Pose2D, farthest_m: float = 0.0) -> None:
+        """Note the robot's pose; the driven part is dropped.
+
+        ``farthest_m``: how far it can have driven since the pose before; 0 if not known [m].
+        """
         self._see(pose)
-        number = self._place.find(self.line.points, self._tool, self.tally.unit_m)
+        look_m = max(LOOK_AHEAD_M, farthest_m)
+        number = self._place.find(self.line.points, self._tool, look_m / self.tally.unit_m)
         if number is None:
             return
         if number > 0:

@@ -11,8 +11,8 @@ import numpy as np
 
 from fasaco_edge.mission.line.polyline import Points
 
-# The robot is searched for this far ahead on its line [m]: farther on, the next lane may be as
-# near.
+# The robot is searched for this far ahead on its line, or as far as it can have driven [m]: farther
+# on, the next lane may be as near.
 LOOK_AHEAD_M = 0.8
 # Distance to the end of its line at which a robot has arrived [m]; it has also arrived if the tool
 # covers the end, and so many poses come no nearer: it may drive beside its line.
@@ -43,19 +43,18 @@ class PlaceOnLine:
         """Tell whether the robot is on the line, within half the tool."""
         return len(points) > 1 and math.hypot(*(self.on(points) - self.here)) <= tool
 
-    def find(self, points: Points, tool: float, unit_m: float) -> int | None:
+    def find(self, points: Points, tool: float, look: float) -> int | None:
         """Search for the robot along the line, and update ``along``.
 
         Args:
             points: points of the line.
             tool: half of the tool's width, the greatest distance from the line.
-            unit_m: edge of a pixel [m].
+            look: how far ahead it is searched for.
 
         Returns:
             The index of the nearest edge; None if none is within that distance.
         """
         nearest, at = tool, None
-        look = LOOK_AHEAD_M / unit_m
         for number in range(len(points) - 1):
             edge = points[number + 1] - points[number]
             length = max(math.hypot(*edge), 1e-9)
@@ -78,8 +77,9 @@ class PlaceOnLine:
         """Tell whether the robot is at the end of its line; to be called once for each pose.
 
         Args:
-            points, tool, unit_m: as for ``find``.
+            points, tool: as for ``find``.
             left_m: length of the rest of the line [m].
+            unit_m: edge of a pixel [m].
         """
         apart = math.hypot(*(points[-1] - self.here))
         if len(points) == 2 and apart * unit_m <= ARRIVED_M:

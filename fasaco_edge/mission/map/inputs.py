@@ -13,7 +13,7 @@ import math
 from collections.abc import Sequence
 
 from fasaco_edge.errors import FasacoError, WrongFrame
-from fasaco_edge.grid.geometry import Pose2D, StampedPose
+from fasaco_edge.grid.geometry import StampedPose
 from fasaco_edge.grid.occupancy import MapPatch, OccupancyGrid
 from fasaco_edge.mission.config import MissionConfig
 from fasaco_edge.mission.coverage.ledger import JUMP_CELLS
@@ -22,6 +22,9 @@ from fasaco_edge.mission.coverage.ledger import JUMP_CELLS
 PATIENCE_S = 10.0
 # Longer gaps between poses restart that time [s].
 GAP_S = 3.0
+# A base may drive by this factor faster than configured. Between two poses farther apart in time
+# nothing is known of its track, whatever the timeout of the pose [s].
+SPEED_MARGIN, LONGEST_S = 1.2, 3.0
 
 
 class FrameSelector:
@@ -167,13 +170,15 @@ class InputMonitor:
         doubt: why the robot may not be where its path says; "" for none. It is cleared when a plan
             from the new position arrives, or the robot is on its path after all.
         doubt_since: when that began.
+        farthest_m: how far the robot can have driven between the last two poses, by their stamps
+            and its speed; 0 where that is not known [m].
     """
 
     def __init__(self, config: MissionConfig) -> None:
         self.doubt = ""
-        self.doubt_since = 0.0
+        self.doubt_since = self.farthest_m = 0.0
         self._config = config
-        self._pose: Pose2D | None = None
+        self._pose: StampedPose | None = None
         # Whether a pose has come, in whatever frame.
         self._has_pose = False
         # When the last ones came; before that, when they began to be due.
@@ -206,15 +211,21 @@ class InputMonitor:
         """Note a map or an update."""
         self._map_at = now
 
-    def note_pose(self, pose: Pose2D, now: float) -> bool:
+    def note_pose(self, stamped: StampedPose, now: float) -> bool:
         """Note a pose; return whether the track from the last one is unknown."""
-        last, lost = self._pose, self.is_pose_lost(now)
-        self._pose, self._pose_at, self._has_pose = pose, now, True
+        last, lost, pose = self._pose, self.is_pose_lost(now), stamped.pose
+        self._pose, self._pose_at, self._has_pose = stamped, now, True
+        self.farthest_m = 0.0
         if last is None:
             return False
-        distance = math.hypot(pose.x - last.x, pose.y - last.y)
-        # Consecutive poses may be some cells apart; after a timeout half a cell is a gap.
-        jumped = distance > (0.5 if lost else JUMP_CELLS) * self._config.footprint.cell_m
+        took_s = (stamped.stamp_ns - last.stamp_ns) * 1e-9
+        if not lost and 0.0 < took_s <= LONGEST_S:
+            self.farthest_m = SPEED_MARGIN * self._config.speed_m_s * took_s
+        distance = math.hypot(pose.x - last.pose.x, pose.y - last.pose.y)
+        # Consecutive poses may be some cells apart, or as far as the robot can have driven; after a
+        # timeout half a cell is a gap.
+        most_m = (0.5 if lost else JUMP_CELLS) * self._config.footprint.cell_m
+        jumped = distance > max(most_m, self.farthest_m)
         if jumped:
             how = f"came back {distance:.2f} m from where it was lost"
             self._answered_by = -1
