@@ -20,7 +20,7 @@ from fasaco_edge.kernels.code_files import note_all_compiled
 from fasaco_edge.kernels.fleet.nearest import walk_parts
 from fasaco_edge.kernels.floor.capsule import is_clear
 from fasaco_edge.kernels.floor.certain import TILE, FloorTiles, Whereabouts, certain_floor
-from fasaco_edge.kernels.floor.open_floor import set_causes, set_open
+from fasaco_edge.kernels.floor.open_floor import pass_line, set_causes, set_open
 from fasaco_edge.kernels.floor.runs import common_runs
 from fasaco_edge.kernels.floor.sweeps import Sweeps
 from fasaco_edge.kernels.lattice.areas import cells_beside, find_areas
@@ -32,7 +32,7 @@ from fasaco_edge.planners.cost import CoverageCost
 from fasaco_edge.planners.fleet.annealing import PIECES
 from fasaco_edge.planners.fleet.division import divide
 from fasaco_edge.planners.fleet.first_tours import Fleet
-from fasaco_edge.planners.line import LineConfig, line_over
+from fasaco_edge.planners.line import LineConfig, line_over, memory_for_moves
 from fasaco_edge.planners.paper.colony import ColonyConfig
 from fasaco_edge.planners.path import CoveragePath, walk_figures
 from fasaco_edge.planners.planner import SearchProgress, ignore, never
@@ -171,6 +171,8 @@ def _take_line(room: _TinyRoom) -> None:
     is_clear(under_maps.blocked, 1.0, 1.0, 2.0, 2.0, 0.5)
     sweeps = Sweeps(np.zeros(shape, np.int16), np.zeros(shape, np.int32))
     state = np.zeros(shape, np.uint8)
+    points = np.array([(2.0, 2.0), (3.0, 2.0)])
+    pass_line(sweeps, state, points, 1.0, memory_for_moves().capsules)
     set_open(sweeps, state, (0, 0), np.zeros(shape, np.bool_), np.zeros(shape, np.bool_))
     set_causes(state, (0, 0), np.zeros(shape, np.uint8), np.zeros(4, np.int64))
     common_runs(walk, walk, 1)

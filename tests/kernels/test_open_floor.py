@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
@@ -10,14 +12,44 @@ from fasaco_edge.kernels.floor.open_floor import (
     CAUSE,
     CAUSE_SHIFT,
     OPEN,
+    PASSED,
     SWEPT,
     WANTED,
+    pass_line,
     set_causes,
     set_open,
 )
 from fasaco_edge.kernels.floor.sweeps import NEVER, Sweeps
-from tests.kernels.test_floor import SIDE
+from tests.kernels.test_floor import SIDE, distances, scratch
 from tests.support.examples import examples
+
+# The way may begin and end outside of the raster.
+POINTS = st.lists(st.tuples(*[st.floats(-6.0, SIDE + 6.0)] * 2), min_size=2, max_size=4)
+
+
+@given(POINTS, st.floats(0.6, 7.0), st.integers(0, 2**32 - 1))
+@examples(60)
+def test_what_the_line_has_passed_is_no_longer_open_and_not_swept(points, radius, seed):
+    rng = np.random.default_rng(seed)
+    before = rng.random((SIDE, SIDE)) < 0.7
+    counts = np.where(before, rng.integers(0, 3, before.shape), NEVER).astype(np.int16)
+    expected_counts, blocks = counts.copy(), left_of(counts)
+    state = np.where(before, WANTED | OPEN, WANTED).astype(np.uint8)
+    sweeps = Sweeps(counts, blocks)
+    closed = pass_line(sweeps, state, np.array(points), radius, scratch())
+    still_open, passed = (state & OPEN) > 0, (state & PASSED) > 0
+    assert (state & (WANTED | SWEPT) == WANTED).all()
+    over, near = np.zeros_like(passed), np.zeros_like(passed)
+    for a, b in pairwise(points):
+        away = distances(a, b)
+        over |= away <= radius
+        near |= abs(away - radius) < 1e-6
+    assert (passed == over)[~near].all()
+    assert (still_open == (before & ~passed)).all()
+    assert closed == np.count_nonzero(before & passed)
+    expected_counts[before & passed] += NEVER
+    assert (counts == expected_counts).all()
+    assert (blocks == left_of(counts)).all()
 
 
 def left_of(counts):
@@ -34,10 +66,11 @@ def left_of(counts):
 def test_what_is_open_is_asked_for_not_swept_and_two_pixels_wide(seed, corner, is_asked, share):
     rng = np.random.default_rng(seed)
     flags = WANTED * (rng.random((SIDE, SIDE)) < 0.8) | SWEPT * (rng.random((SIDE, SIDE)) < share)
-    was_open = wide(flags & (WANTED | SWEPT) == WANTED)
-    state = (flags | OPEN * was_open | rng.integers(0, 4, flags.shape) << CAUSE_SHIFT).astype(
-        np.uint8
-    )
+    passed = rng.random(flags.shape) < 0.1
+    was_open = wide(flags & (WANTED | SWEPT) == WANTED) & ~passed
+    state = (
+        flags | OPEN * was_open | PASSED * passed | rng.integers(0, 4, flags.shape) << CAUSE_SHIFT
+    ).astype(np.uint8)
     swept_times = rng.integers(0, 3, state.shape)
     counts = np.where(was_open, swept_times, swept_times + NEVER).astype(np.int16)
     sweeps, before = Sweeps(counts, left_of(counts)), state.copy()
@@ -50,11 +83,11 @@ def test_what_is_open_is_asked_for_not_swept_and_two_pixels_wide(seed, corner, i
     if is_asked:
         expected_wanted[part] = wanted
     expected_swept[part] = swept
-    expected_open = wide(expected_wanted & ~expected_swept)
+    expected_open = wide(expected_wanted & ~expected_swept) & ~passed
     assert (((state & WANTED) > 0) == expected_wanted).all()
     assert (((state & SWEPT) > 0) == expected_swept).all()
     assert (((state & OPEN) > 0) == expected_open).all()
-    assert ((state & CAUSE) == (before & CAUSE)).all()
+    assert ((state & (CAUSE | PASSED)) == (before & (CAUSE | PASSED))).all()
     assert (counts == np.where(expected_open, swept_times, swept_times + NEVER)).all()
     assert (sweeps.left == left_of(counts)).all()
     both = WANTED | SWEPT

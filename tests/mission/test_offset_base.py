@@ -44,15 +44,24 @@ def test_strips_in_which_only_the_rasters_differ_are_not_driven_to(at):
 
 
 @pytest.mark.parametrize(
-    ("poses_hz", "speed_m_s", "known"), [(1.0, 0.3, 0.97), (1.0, 0.7, 0.9), (0.5, 0.3, 0.9)]
+    ("poses_hz", "speed_m_s", "known"),
+    [(1.0, 0.3, 0.97), (1.0, 0.7, 0.9), (0.5, 0.3, 0.9), (0.5, 0.7, 0.3)],
 )
 def test_poses_that_come_seldom_are_joined_where_the_robot_can_have_driven(
     poses_hz, speed_m_s, known
 ):
-    outcome = driven(bare_room(), poses_hz=poses_hz, speed_m_s=speed_m_s)
+    outcome = driven(bare_room(), poses_hz=poses_hz, speed_m_s=speed_m_s, most_s=400.0)
     assert outcome.mission.state is State.DONE
     assert not outcome.troubles
     assert outcome.swept > 0.99
     assert outcome.known > known
     assert outcome.false < 0.005
     assert outcome.claimed <= outcome.known + CLAIM
+
+
+@pytest.mark.parametrize("noise_m", [0.01, 0.02])
+def test_noise_makes_no_more_be_claimed_and_takes_no_more_time(noise_m):
+    outcome = driven(bare_room(), noise_m=noise_m)
+    assert outcome.mission.state is State.DONE
+    assert outcome.claimed <= outcome.swept + CLAIM
+    assert outcome.seconds < 160.0

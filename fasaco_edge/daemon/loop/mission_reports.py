@@ -29,7 +29,7 @@ from fasaco_edge.wire.documents.status import (
 if TYPE_CHECKING:
     from fasaco_edge.mission.core.mission import Mission
 
-NARROW = "strips too narrow to tell, which no path is laid for"
+PASSED = "passed, or in narrow strips, and not known to be swept"
 
 
 def map_report(mission: Mission | None) -> MapReport | None:
@@ -106,7 +106,7 @@ def floor_report(mission: Mission | None) -> FloorReport | None:
     left = _largest_first(
         (to_sweep.ahead_m2, "on the path"),
         (to_sweep.left_m2, beside),
-        (to_sweep.narrow_m2, NARROW),
+        (to_sweep.passed_m2, PASSED),
     )
     beyond = _largest_first(*((m2, reason) for reason, m2 in to_sweep.beyond_m2.items()))
     return FloorReport(swept_m2, round(to_sweep.asked_m2, 3), left, beyond)

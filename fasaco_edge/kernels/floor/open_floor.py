@@ -3,11 +3,21 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.kernels.floor.sweeps import BLOCK, NEVER, Sweeps
+from fasaco_edge.kernels.floor.sweeps import (
+    BLOCK,
+    NEVER,
+    Scratch,
+    Sweeps,
+    prepare,
+    rows_of,
+    stretches_of,
+)
 from fasaco_edge.kernels.jit import inlined, lean_kernel
 
-# A pixel is wanted; it is still to sweep; it is swept.
+# A pixel is wanted; the line is to sweep it; it is swept.
 WANTED, OPEN, SWEPT = 1, 2, 4
+# The line has been there, whether or not the robot was and swept it: this line does not go back.
+PASSED = 32
 # Position in a pixel's state of the cause why it is out of reach.
 CAUSE_SHIFT, CAUSE = 3, 24
 
@@ -28,6 +38,43 @@ def _is_bare(state: NDArray[np.uint8], row: int, col: int) -> bool:
 
 
 @lean_kernel
+def pass_line(
+    sweeps: Sweeps,
+    state: NDArray[np.uint8],
+    points: NDArray[np.float64],
+    radius: float,
+    scratch: Scratch,
+) -> int:
+    """Note that the robot has passed a part of its line; return the number of pixels closed by it.
+
+    Args:
+        sweeps: whose counts go up by ``NEVER`` where a pixel is no longer open.
+        state: uint8 (rows, cols) of ``WANTED``, ``OPEN``, ``SWEPT`` and ``PASSED``, changed.
+        points: float64 (n, 2): y, x [pixels].
+        radius: of the tool [pixels].
+        scratch: memory for a capsule.
+    """
+    rows, cols = state.shape
+    counts, left, stretches = sweeps.counts, sweeps.left, scratch.before
+    closed = 0
+    for number in range(len(points) - 1):
+        a, b = points[number], points[number + 1]
+        prepare(scratch.capsules, 0, a[0], a[1], b[0], b[1], radius)
+        first, last = rows_of(scratch, 1, radius, rows)
+        for i in range(first, last + 1):
+            if not stretches_of(scratch, i, cols, 1, 0, radius)[0]:
+                continue
+            for j in range(stretches[0, 0], stretches[0, 1] + 1):
+                before = state[i, j]
+                state[i, j] = (before | PASSED) & (255 - OPEN)
+                if before & OPEN:
+                    closed += 1
+                    left[i >> BLOCK, j >> BLOCK] -= counts[i, j] == 0
+                    counts[i, j] += NEVER
+    return closed
+
+
+@lean_kernel
 def set_open(
     sweeps: Sweeps,
     state: NDArray[np.uint8],
@@ -38,11 +85,12 @@ def set_open(
     """Set the wanted and swept pixels of a part of the raster, and what of it is open.
 
     Pixels of another raster that are swept by the same tool differ along its rim by less than a
-    pixel, so a wanted pixel that is not swept is open only as one of two by two such pixels.
+    pixel, so a wanted pixel that is not swept is open only as one of two by two such pixels, and if
+    the line has not passed it.
 
     Args:
         sweeps: their counts are higher by ``NEVER`` where a pixel is not open.
-        state: uint8 (rows, cols) of ``WANTED``, ``OPEN`` and ``SWEPT``, changed.
+        state: uint8 (rows, cols) of ``WANTED``, ``OPEN``, ``SWEPT`` and ``PASSED``, changed.
         corner: first pixel (row, col) of the part.
         wanted: bool (rows, cols) of the part, wanted pixels; empty for no change.
         swept: bool (rows, cols) of the part.
@@ -71,7 +119,7 @@ def set_open(
     for row in range(first_row, last_row + 1):
         for col in range(first_col, last_col + 1):
             before = state[row, col]
-            is_open = before & both == WANTED and (
+            is_open = before & (both | PASSED) == WANTED and (
                 _is_bare(state, row, col)
                 or _is_bare(state, row, col - 1)
                 or _is_bare(state, row - 1, col)

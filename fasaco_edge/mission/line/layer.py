@@ -46,14 +46,14 @@ class FloorToSweep(NamedTuple):
         asked_m2: reachable floor that is asked for, swept or not [m2].
         ahead_m2: the unswept part of it that the line ahead sweeps [m2].
         left_m2: the unswept part of it that the line ahead does not sweep [m2].
-        narrow_m2: the rest of it: strips as narrow as a pixel, which may be swept [m2].
+        passed_m2: the rest of it: what the line has passed, and strips as narrow as a pixel [m2].
         beyond_m2: free floor out of the tool's reach, asked for or not, by cause [m2].
     """
 
     asked_m2: float
     ahead_m2: float
     left_m2: float
-    narrow_m2: float
+    passed_m2: float
     beyond_m2: dict[str, float]
 
 
@@ -69,7 +69,7 @@ class LineLayer:
         route: Route,
     ) -> None:
         self._map, self._ledger, self._orders, self._route = map_state, ledger, orders, route
-        orders.floor_left = self.floor_left
+        orders.ask_for_floor(self.floor_left)
         self._polisher = Polisher(sweeping.line) if sweeping else None
         self._missed = MissedFloor.at(sweeping.line, WORTH_S) if sweeping else None
         price_s_m2 = sweeping.line.price_s_m2 if sweeping else 0.0
@@ -84,8 +84,10 @@ class LineLayer:
         self._asked: tuple[Window, NDArray[np.bool_], NDArray[np.bool_]] | None = None
         # Whether the map is complete; None before the first check.
         self._is_settled: bool | None = None
-        # The swept floor at the last update, and its number of changes.
+        # The swept floor at the last update, its number of changes, and how often it had forgotten
+        # pixels.
         self._swept: tuple[SweptFloor | None, int] = None, 0
+        self._forgotten = 0
         # The floor at the last update, and its revision.
         self._seen: tuple[FloorMap | None, int] = None, 0
 
@@ -120,6 +122,9 @@ class LineLayer:
         ahead = self._ahead
         if ahead is None:
             return
+        # Forgotten floor is opened before more is passed.
+        if self._ledger.floor.forgotten != self._forgotten:
+            self._take_floor()
         before = self._route.held.index
         ahead.drive(pose, farthest_m)
         self._route.follow_line(ahead.cell)
@@ -208,12 +213,12 @@ class LineLayer:
         open_m2, left_m2 = tally.open_m2, tally.left_m2
         beyond_m2 = {REASONS[cause]: m2 for cause, m2 in tally.beyond_m2.items()}
         ahead_m2 = open_m2 - left_m2
-        return FloorToSweep(tally.wanted_m2, ahead_m2, left_m2, tally.narrow_m2, beyond_m2)
+        return FloorToSweep(tally.wanted_m2, ahead_m2, left_m2, tally.passed_m2, beyond_m2)
 
     def floor_left(self) -> str:
         """Return how much floor is not swept, as text that follows another; "" for hardly any."""
         floor = self.to_sweep
-        left_m2 = floor.ahead_m2 + floor.left_m2 + floor.narrow_m2 if floor else 0.0
+        left_m2 = floor.ahead_m2 + floor.left_m2 + floor.passed_m2 if floor else 0.0
         if floor is None or left_m2 < LEAST_TOLD_M2:
             return ""
         return f"; {left_m2:.1f} of {floor.asked_m2:.1f} m2 of its floor are not known to be swept"
@@ -257,7 +262,7 @@ class LineLayer:
         if ahead is None or floor is None or lattice is None or stamped is None:
             return False
         assert self._missed is not None
-        self._take_floor()
+        self._take_floor(ahead.tally.forget_passed())
         if self._asked is None:
             return False
         window, asked, _ = self._asked
@@ -314,6 +319,10 @@ class LineLayer:
         # forgetting.
         known, since = self._swept
         news = swept.changed_since(since) if known is swept else ANYWHERE
+        if known is not swept or swept.forgotten != self._forgotten:
+            ahead.tally.forget_passed()
+            news = ANYWHERE
+        self._forgotten = swept.forgotten
         part = Window.around(self._asked_part(floor), touched)
         if self._asked is not None and self._asked[0] != floor.stands.lattice.window:
             self._asked = None

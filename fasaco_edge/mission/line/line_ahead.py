@@ -258,6 +258,7 @@ class LineAhead:
         if number is None:
             return
         if number > 0:
+            self.tally.pass_line(self.line.points[: number + 1])
             self.tally.exchange(edges_between(self.line.points[: number + 1]), NO_EDGES)
             self.line = self.line.part(number)
             self.unpublished_from = max(self.unpublished_from - number, 0)
@@ -361,6 +362,7 @@ class LineAhead:
         old = self.line
         new, goes, comes = exchanged(old, pieces)
         if len(old) > 1 and not np.array_equal(old.points[:2], new.points[:2]):
+            self.tally.pass_line(np.stack([old.points[0], self._place.on(old.points)]))
             self._place.along = 0.0
         self.tally.exchange(goes, comes)
         self.line = new

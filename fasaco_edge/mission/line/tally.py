@@ -6,6 +6,8 @@ the count, so sweeping it never improves a line.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -16,8 +18,10 @@ from fasaco_edge.kernels.floor.open_floor import (
     CAUSE,
     CAUSE_SHIFT,
     OPEN,
+    PASSED,
     SWEPT,
     WANTED,
+    pass_line,
     set_causes,
     set_open,
 )
@@ -39,13 +43,15 @@ class SweepTally:
     def __init__(self, floor: FloorMap) -> None:
         shape = floor.geometry.rows, floor.geometry.cols
         self.unit_m = floor.geometry.resolution
-        # Flags of each pixel, WANTED, OPEN and SWEPT, and its cause of being out of reach.
+        # Flags of each pixel, WANTED, OPEN, SWEPT and PASSED, and its cause of being out of reach.
         self._state = np.zeros(shape, np.uint8)
         self.sweeps = Sweeps(np.full(shape, NEVER, np.int16), np.zeros(blocks_of(shape), np.int32))
         # Number of wanted pixels, of those that are swept, and of open ones.
         self._wanted_pixels = self._swept_pixels = self._open_pixels = 0
         # Number of pixels out of reach by cause; the first element is unused.
         self._beyond_pixels = np.zeros(len(Cause) + 1, np.int64)
+        # Window of the pixels that the line has passed.
+        self._passed: Window | None = None
         self._tool = floor.discs.tool_m / 2 / self.unit_m
         self._scratch: Scratch = memory_for_moves().capsules
 
@@ -66,6 +72,7 @@ class SweepTally:
             self._open_pixels -= int(np.count_nonzero(lost & OPEN))
             self._beyond_pixels -= _count_causes(lost)
         self._state = carried(self._state, old, new)
+        self._passed = self._passed and self._passed.moved(*by).intersection(Window(0, 0, *shape))
         counts = carried(self.sweeps.counts, old, new, NEVER)
         self.sweeps = Sweeps(counts, left_in_blocks(counts))
 
@@ -99,6 +106,31 @@ class SweepTally:
         """Set the causes of being out of reach in a window, uint8 (rows, cols), see ``Cause``."""
         set_causes(self._state, (part.row0, part.col0), causes, self._beyond_pixels)
 
+    def pass_line(self, points: NDArray[np.float64]) -> None:
+        """Note that the robot has passed a part of its line, float64 (n, 2), y, x [pixels].
+
+        Whether it swept the floor there, poses alone tell, later and more strictly. Until the end
+        of its path nothing is gone back to: what poses do not tell for certain the first time,
+        they seldom tell on a detour.
+        """
+        self._open_pixels -= pass_line(self.sweeps, self._state, points, self._tool, self._scratch)
+        (row0, col0), (row1, col1) = points.min(axis=0), points.max(axis=0)
+        reach = self._tool + 1.0
+        part = Window(
+            math.floor(row0 - reach),
+            math.floor(col0 - reach),
+            math.ceil(row1 + reach) + 1,
+            math.ceil(col1 + reach) + 1,
+        ).intersection(Window(0, 0, *self.shape))
+        self._passed = Window.around(self._passed, part)
+
+    def forget_passed(self) -> Window | None:
+        """Have what was passed and is not swept open at the next ``set_open``; return where."""
+        part, self._passed = self._passed, None
+        if part is not None:
+            self._state[part.slices_in(Window(0, 0, *self.shape))] &= ~np.uint8(PASSED)
+        return part
+
     def missed_m2(self, part: Window) -> float:
         """Return the area in a window that should be swept and is not on the line [m2]."""
         counts = self.sweeps.counts[part.row0 : part.row1, part.col0 : part.col1]
@@ -125,12 +157,12 @@ class SweepTally:
 
     @property
     def open_m2(self) -> float:
-        """Area asked for and not swept yet [m2], without strips too narrow to tell."""
+        """Area asked for and neither swept yet nor passed [m2], without narrow strips."""
         return self._open_pixels * self.unit_m**2
 
     @property
-    def narrow_m2(self) -> float:
-        """Area of these strips, for which no line is laid [m2]."""
+    def passed_m2(self) -> float:
+        """Area that was passed, or is in narrow strips, and is not known to be swept [m2]."""
         pixels = self._wanted_pixels - self._swept_pixels - self._open_pixels
         return pixels * self.unit_m**2
 

@@ -58,7 +58,6 @@ class Sequencer:
     Attributes:
         order_state: the order and its progress.
         cells: the cells left of it.
-        floor_left: returns what floor is left where the order ends, as text; "" for none.
     """
 
     def __init__(
@@ -70,13 +69,18 @@ class Sequencer:
         self._ledger = ledger
         self._fleet = fleet
         self._run = _Run()
-        self.floor_left: Callable[[], str] = str
+        # Returns what floor is left, as text; "" for none.
+        self._floor_left: Callable[[], str] = str
         self.cells = CellsLeft(
             config, map_state, ledger, fleet, self._zones, lambda: self._run.exploration
         )
         self._unreached = UnreachedFinder(map_state, ledger)
         # Cached result: whether a retry is worthwhile, for a given map and ledger.
         self._retry_check: tuple[object, bool] = (None, False)
+
+    def ask_for_floor(self, floor_left: Callable[[], str]) -> None:
+        """Have the end of an order tell what floor is left, as text that follows another."""
+        self._floor_left = floor_left
 
     @property
     def is_waiting(self) -> bool:
@@ -344,7 +348,7 @@ class Sequencer:
         run.retry_at = None
         self.order_state = replace(self.order_state, stage=Stage.OVER)
         every = order is None or order.zones[0].polygon is None
-        run.ending = self._unreached.ending(self.order_state) + self.floor_left()
+        run.ending = self._unreached.ending(self.order_state) + self._floor_left()
         area, named = self._map.area, () if every or order is None else order.zones
         if area is not None and (beyond := [z.name for z in named if not is_in_reach(z, area)]):
             run.ending += f"; not reached: {', '.join(map(repr, beyond))}"
