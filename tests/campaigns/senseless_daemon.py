@@ -16,7 +16,6 @@ import time
 from collections import Counter, OrderedDict, deque
 from contextlib import ExitStack, suppress
 from functools import partial
-from itertools import pairwise
 from pathlib import Path
 from typing import Any, Self
 
@@ -34,16 +33,15 @@ from fasaco_edge.grid.fine_raster import (
 )
 from fasaco_edge.grid.lattice import CoverageLattice, Footprint
 from fasaco_edge.host.processes import peak_mb, resident_mb
-from fasaco_edge.kernels.floor.capsule import is_clear
 from fasaco_edge.mission.map.reachable_area import ReachableArea
 from fasaco_edge.wire import schemas
 from fasaco_edge.wire.messages.maps import decode_occupancy_grid
 from fasaco_edge.wire.messages.paths import decode_path
 from fasaco_edge.wire.messages.pheromone import decode_pheromone
 from tests.campaigns import raw_messages
+from tests.campaigns.line_judge import why_touching
 from tests.campaigns.path_in_force import PathInForce
 from tests.campaigns.senseless import SILENT, Event, pixels_of
-from tests.campaigns.senseless_mission import NEAR_PX
 from tests.support.processes import Daemon, daemon_process, free_endpoint
 from tests.support.router import router_process
 from tests.support.service_manager import Manager
@@ -179,8 +177,10 @@ class Judge:
         shown = self._maps.get(about["map_stamp_ns"])
         if shown is None or shown["rows"] * shown["cols"] > MOST_JUDGED_PIXELS or not is_sure:
             return
-        holds = any(_is_clear(shown, config, xy[1:]) for config in list(self.configs)[-2:])
-        promise(holds, f"path {about['revision']} touches what is not free: {about}, {shown}")
+        reason = about["reason"]
+        walls = [_wall_on(shown, config, xy, reason) for config in list(self.configs)[-2:]]
+        holds = not all(walls)
+        promise(holds, f"path {about['revision']}: {walls[-1]}: {about}, {shown}")
         self.counts["lines judged on their map"] += 1
 
     def _lattice(self, shown: Event, config: Event) -> CoverageLattice | None:
@@ -203,15 +203,16 @@ def _holds(lattice: CoverageLattice, cells: np.ndarray[Any, Any]) -> bool:
     return ReachableArea(lattice, nothing).drivable_prefix(cells.astype(np.int32)) == len(cells)
 
 
-def _is_clear(shown: Event, config: Event, xy: np.ndarray[Any, Any]) -> bool:
+def _wall_on(shown: Event, config: Event, xy: np.ndarray[Any, Any], reason: str) -> str:
+    """Return where a line, float64 (n, 2) [m], touches what the map does not show free; or ""."""
     robot, free = config["robot"], config["map"]["free_at_most"]
     grid = decode_occupancy_grid(raw_messages.occupancy_grid(shown, pixels_of(shown)))
     discs = RobotDiscs(robot["radius_m"], robot["tool_width_m"], free)
     geometry, parts = fine_geometry(grid.geometry, discs, floor_pixels(grid.cells.size))
     blocked = blocked_pixels(grid, geometry, parts, free, (0, geometry.rows))
-    radius = robot["radius_m"] / geometry.resolution - NEAR_PX
     points = [map_to_raster(geometry, x, y) for x, y in xy.tolist()]
-    return all(is_clear(blocked, *start, *end, radius) for start, end in pairwise(points))
+    radius = robot["radius_m"] / geometry.resolution
+    return why_touching(blocked, points, radius, reason, parts)
 
 
 class Campaign:

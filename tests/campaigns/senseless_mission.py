@@ -14,7 +14,6 @@ import random
 import time
 from collections import Counter
 from collections.abc import Callable
-from itertools import pairwise
 from typing import Any
 
 import msgspec
@@ -32,7 +31,6 @@ from fasaco_edge.grid.fine_raster import map_to_raster
 from fasaco_edge.grid.geometry import GridGeometry
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.grid.rotation import rotated_points
-from fasaco_edge.kernels.floor.capsule import is_clear
 from fasaco_edge.mission.core.events import (
     CommandReceived,
     Decision,
@@ -62,6 +60,7 @@ from fasaco_edge.wire.messages.pheromone import encode_pheromone
 from fasaco_edge.wire.messages.poses import PoseDecoder
 from fasaco_edge.wire.schemas import TF_MESSAGE
 from tests.campaigns import raw_messages
+from tests.campaigns.line_judge import why_touching
 from tests.campaigns.senseless import Event, pixels_of
 from tests.mission.test_line import check_tally
 
@@ -69,8 +68,6 @@ MOST_CELLS = 20_000
 # A mission that is kept is read again once in so many turns; a lattice made afresh more often.
 KEPT_EVERY, FRESH_EVERY = 40, 5
 HONEST_TURNS = 6
-# What may be lost where a line goes from the raster to the map and back [pixels].
-NEAR_PX = 1e-3
 
 
 class BrokenInvariantError(AssertionError):
@@ -257,7 +254,7 @@ class MissionTrial:
             assert lattice is not None
             self._check_walk(update.cells)
             if update.xy is not None:
-                self._check_line(update.xy)
+                self._check_line(update.xy, update.reason)
             xy = lattice.centres(update.cells) if update.xy is None else update.xy
             payload = self._say(
                 "path", lambda: encode_path(xy, headings(xy), grid.frame, grid.stamp_ns)
@@ -358,17 +355,18 @@ class MissionTrial:
         apart = np.abs(np.diff(cells, axis=0)).sum(axis=1)
         _hold(bool((apart == 1).all()), "path not connected")
 
-    def _check_line(self, xy: np.ndarray[Any, Any]) -> None:
+    def _check_line(self, xy: np.ndarray[Any, Any], reason: str) -> None:
         """Check that a line leads over places where the robot may be."""
-        floor = self._mission._map.floor
+        floor, grid = self._mission._map.floor, self._mission._map.grid
         assert floor is not None
+        assert grid is not None
         _hold(bool(np.isfinite(xy).all()), "a line that leads nowhere")
-        radius = floor.discs.radius_m / floor.geometry.resolution - NEAR_PX
+        unit_m = floor.geometry.resolution
         laid = rotated_points(xy, -self._mission.rotation.deg)
         points = [map_to_raster(floor.geometry, x, y) for x, y in laid.tolist()]
-        # On its way to the line it may stand anywhere: too near to a wall, say.
-        for start, end in pairwise(points[1:]):
-            _hold(bool(is_clear(floor.blocked, *start, *end, radius)), f"a wall at {start}, {end}")
+        map_px = grid.geometry.resolution / unit_m
+        wall = why_touching(floor.blocked, points, floor.discs.radius_m / unit_m, reason, map_px)
+        _hold(not wall, wall)
         self.counts["lines"] += 1
 
     def _check_recovery(self, event: Event) -> None:

@@ -152,9 +152,11 @@ class UnreachedFinder:
     def reached_m2(self, area: ReachableArea) -> tuple[float, float]:
         """Return how large an area is, and all that was ever reachable [m2].
 
-        Covered cells are: after a restart they alone are remembered.
+        Covered cells are: after a restart they alone are remembered. Without what the map no longer
+        knows, as that of a mapper that has begun anew.
         """
         once = self.known(area.lattice) | (self._ledger.visits(area.lattice.window) > 0)
+        once &= area.lattice.states != UNKNOWN
         cell_m2 = area.lattice.cell_m**2
         return np.count_nonzero(area.reachable) * cell_m2, np.count_nonzero(once) * cell_m2
 

@@ -293,6 +293,7 @@ class LineAhead:
             points[0] = on = self._place.on(points)
             radius = fitting_radius(self._floor, here)
             is_off = radius < self._floor.discs.radius_m / self._floor.geometry.resolution
+            is_off = is_off and np.abs(on - here).sum() >= LEAST_EDGE
             if is_off and is_clear_between(self._floor, here, on, radius):
                 points = np.concatenate([here[None], points])
         return raster_to_map(self._floor.geometry, points)
