@@ -24,9 +24,10 @@ def test_floor_beside_a_base_that_drives_beside_its_line_is_not_called_swept(lef
 def test_floor_that_the_base_has_left_is_swept_afterwards_and_else_told():
     outcome = driven(flat(), left_m=0.12)
     assert outcome.mission.state is State.DONE
-    assert outcome.swept > 0.97
+    # 85 % without; of a twentieth it is only told.
+    assert outcome.swept > 0.95
     left_m2 = sum(left.m2 for left in floor_report(outcome.mission).left)
-    assert 0.0 < left_m2 < 0.4
+    assert 0.0 < left_m2 < 0.6
     # Along walls to its right it cannot come nearer.
     outcome = driven(bare_room(), left_m=0.08)
     left_m2 = sum(left.m2 for left in floor_report(outcome.mission).left)
