@@ -3,7 +3,7 @@
 ROS 2's map_saver writes three greys in trinary mode: black, 254, and 205 for never seen. Until
 2025 it wrote ``free_thresh: 0.25`` beside them, by which map_server takes 205, 19.6 % occupied, for
 free; since then it writes 0.196, as in ROS 1 (navigation2 PR 5278). Here that grey is unknown
-where it is map_saver's: a robot must not drive over ground that nobody has seen.
+where it is map_saver's: a robot must not drive over ground that was never seen.
 """
 
 from __future__ import annotations

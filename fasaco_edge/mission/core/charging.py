@@ -69,7 +69,7 @@ class BatteryGauge:
         self._drains: deque[float] = deque(maxlen=NEWEST)
 
     def succeed(self, before: BatteryGauge) -> None:
-        """Go on with what another gauge has heard."""
+        """Go on with what another gauge has received."""
         vars(self).update(vars(before))
 
     @property

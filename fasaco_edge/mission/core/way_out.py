@@ -32,7 +32,7 @@ SQUEEZE_PX = 1.5
 # A robot that has not come this far [m] on its way out after this time [s] cannot drive it. It
 # tries again after as long, then after twice as long each time, until it has come that far.
 STANDING_M, STANDING_S = 0.1, 15.0
-# Loops of up to so many points are left out.
+# Longest loops that are left out first, in points of the track.
 LEAPS = (256, 128, 64, 32, 16, 8, 4, 2)
 NO_WAY: NDArray[np.float64] = np.empty((0, 2))
 

@@ -39,7 +39,7 @@ WORTH_S, RIM_M, LOOKED_AT = 4.0, 0.1, 24
 # matcher that took an eighth more time, for 0.3 % of the floor. A base that drives beside its line
 # misses more, and poses that come seldom leave more unknown.
 LEAST_MISSED = 0.05
-# Less unswept floor is not told at the end: to a tenth it is none [m2].
+# Less unswept floor is not reported at the end: rounded to a tenth it is none [m2].
 LEAST_TOLD_M2 = 0.05
 
 

@@ -46,7 +46,7 @@ class MissedFloor:
             areas_m2: floor left in each cell [m2].
             here: the robot's cell.
             cell_m: edge of a cell [m].
-            may_take: tells of a cell worth driving through whether it may be taken.
+            may_take: whether a cell worth driving through may be taken.
         """
         step_s = cell_m / self.speed_m_s
         gains_s = {cell: self.price_s_m2 * m2 - step_s for cell, m2 in areas_m2.items()}

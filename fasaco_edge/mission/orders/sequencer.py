@@ -28,7 +28,7 @@ from fasaco_edge.planners.problem import CoverageProblem
 # robot may stop short of its path's end, with the last cell out of the tool's reach.
 MAX_IN_VAIN = 3
 # A robot is shut in if the area in its reach is less than this share of what ever was: if home is
-# in it, or if not. A closed door before another room shuts nobody in who is at home.
+# in it, or if not. A robot at home is not shut in by a closed door to another room.
 HOME_SHARE, MOST_SHARE = 0.1, 0.5
 
 
