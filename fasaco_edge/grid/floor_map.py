@@ -209,7 +209,7 @@ class FloorMap:
         window = lattice.window
         if (lattice.coverable & ~cells).any():
             cell, corner = (window.row0, window.col0), (around.row0, first * WORD)
-            keep_in_cells(found, self._placement(), cells, cell, corner)
+            keep_in_cells(found, self.placement, cells, cell, corner)
         words = Window(around.row0, first * WORD, around.row1, end * WORD)
         blocked = self.blocked[around.row0 : around.row1, first:end]
         reached = unpacked(tool_reach(found, blocked, radius, tool), words.cols)
@@ -272,7 +272,9 @@ class FloorMap:
         self.stands = replace(self.stands, lattice=change.after)
         return change
 
-    def _placement(self) -> Placement:
+    @property
+    def placement(self) -> Placement:
+        """Placement of the lattice's cells on the raster."""
         return stand_placement(self.geometry, self._footprint.cell_m, self.discs.radius_m)
 
     def _settle(self, plain: CoverageLattice, stale: NDArray[np.bool_]) -> None:
@@ -280,7 +282,7 @@ class FloorMap:
         self.stands = StandLattice.where(
             self.blocked,
             self.places,
-            self._placement(),
+            self.placement,
             plain.window,
             plain.cell_m,
             plain.states == UNKNOWN,

@@ -27,7 +27,11 @@ def swept(floor: FloorReport) -> str:
     reached_m2, reachable_m2 = floor.reached_m2, floor.reachable_m2
     if reached_m2 is None or not reachable_m2:
         return f"{floor.swept_m2:.1f} m2"
-    return f"{percent(reached_m2 / reachable_m2)}: {reached_m2:.1f} of {reachable_m2:.1f} m2"
+    share = f"{percent(reached_m2 / reachable_m2)}: {reached_m2:.1f} of {reachable_m2:.1f} m2"
+    if (possible_m2 := floor.possible_m2) is None:
+        return share
+    at_least = f"{percent(reached_m2 / possible_m2)} of {possible_m2:.1f} m2"
+    return f"{share}; {at_least} if walls are a pixel thinner than on the map"
 
 
 def percent(fraction: float) -> str:

@@ -109,7 +109,10 @@ def floor_report(mission: Mission | None) -> FloorReport | None:
         (to_sweep.passed_m2, PASSED),
     )
     beyond = _largest_first(*((m2, reason) for reason, m2 in to_sweep.beyond_m2.items()))
-    return FloorReport(swept_m2, round(to_sweep.asked_m2, 3), left, beyond)
+    possible_m2 = to_sweep.possible_m2
+    if possible_m2 is not None:
+        possible_m2 = round(max(possible_m2, to_sweep.asked_m2), 3)
+    return FloorReport(swept_m2, round(to_sweep.asked_m2, 3), left, beyond, possible_m2)
 
 
 def _largest_first(*parts: tuple[float, str]) -> tuple[FloorLeft, ...]:

@@ -16,6 +16,7 @@ from fasaco_edge.grid.changes import carried
 from fasaco_edge.grid.fine_raster import raster_to_map, strips
 from fasaco_edge.grid.floor_map import FloorMap
 from fasaco_edge.grid.geometry import Pose2D, Window
+from fasaco_edge.grid.possible_floor import possible_m2
 from fasaco_edge.mission.config import Sweeping
 from fasaco_edge.mission.core.events import PathUpdate
 from fasaco_edge.mission.core.route import Route
@@ -52,6 +53,8 @@ class FloorToSweep(NamedTuple):
         left_m2: the unswept part of it that the line ahead does not sweep [m2].
         passed_m2: the rest of it: what the line has passed, and strips as narrow as a pixel [m2].
         beyond_m2: free floor out of the tool's reach, asked for or not, by cause [m2].
+        possible_m2: what would be reachable were walls a pixel thinner than on the map [m2]; None
+            before the end of the order, or if not known.
     """
 
     asked_m2: float
@@ -59,6 +62,7 @@ class FloorToSweep(NamedTuple):
     left_m2: float
     passed_m2: float
     beyond_m2: dict[str, float]
+    possible_m2: float | None
 
 
 class LineLayer:
@@ -73,7 +77,7 @@ class LineLayer:
         route: Route,
     ) -> None:
         self._map, self._ledger, self._orders, self._route = map_state, ledger, orders, route
-        orders.ask_for_floor(self.floor_left)
+        orders.ask_for_floor(self.sum_up)
         self._polisher = Polisher(sweeping.line) if sweeping else None
         self._missed = MissedFloor.at(sweeping.line, WORTH_S) if sweeping else None
         price_s_m2 = sweeping.line.price_s_m2 if sweeping else 0.0
@@ -94,6 +98,8 @@ class LineLayer:
         self._forgotten = 0
         # The floor at the last update, and its revision.
         self._seen: tuple[FloorMap | None, int] = None, 0
+        # What of the floor of an order that is over may be reachable [m2].
+        self._possible_m2: float | None = None
 
     def note_map(self) -> None:
         """Follow the newest map; to be called with each."""
@@ -217,15 +223,34 @@ class LineLayer:
         open_m2, left_m2 = tally.open_m2, tally.left_m2
         beyond_m2 = {REASONS[cause]: m2 for cause, m2 in tally.beyond_m2.items()}
         ahead_m2 = open_m2 - left_m2
-        return FloorToSweep(tally.wanted_m2, ahead_m2, left_m2, tally.passed_m2, beyond_m2)
+        possible_m2 = self._possible_m2 if self._orders.is_over else None
+        return FloorToSweep(
+            tally.wanted_m2, ahead_m2, left_m2, tally.passed_m2, beyond_m2, possible_m2
+        )
 
-    def floor_left(self) -> str:
-        """Return how much floor is not swept, as text that follows another; "" for hardly any."""
-        floor = self.to_sweep
-        left_m2 = floor.ahead_m2 + floor.left_m2 + floor.passed_m2 if floor else 0.0
-        if floor is None or left_m2 < LEAST_TOLD_M2:
+    def sum_up(self) -> str:
+        """Return at the end of an order how much floor was swept, as text that follows another.
+
+        "" where hardly any is left, or where cells are counted.
+        """
+        floor, grid, stamped = self._map.floor, self._map.grid, self._map.pose
+        self._possible_m2 = None
+        if floor is None or grid is None or stamped is None or self._map.area is None:
             return ""
-        return f"; {left_m2:.1f} of {floor.asked_m2:.1f} m2 of its floor are not known to be swept"
+        asked, pose = self._orders.cells.asked_of_me(self._map.area), stamped.pose
+        thinner_m = grid.geometry.resolution
+        self._possible_m2 = possible_m2(floor, thinner_m, (pose.x, pose.y), asked)
+        found = self.to_sweep
+        if found is None:
+            return ""
+        possible = max(self._possible_m2 or 0.0, found.asked_m2)
+        left_m2 = found.ahead_m2 + found.left_m2 + found.passed_m2
+        if left_m2 + possible - found.asked_m2 < LEAST_TOLD_M2:
+            return ""
+        swept = f"; {found.asked_m2 - left_m2:.1f} of {found.asked_m2:.1f} m2 of floor swept"
+        if possible - found.asked_m2 < LEAST_TOLD_M2:
+            return swept
+        return f"{swept}, or of {possible:.1f} m2 if walls are a pixel thinner than on the map"
 
     @property
     def is_worth_driving(self) -> bool:

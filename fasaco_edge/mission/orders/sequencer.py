@@ -69,8 +69,8 @@ class Sequencer:
         self._ledger = ledger
         self._fleet = fleet
         self._run = _Run()
-        # Returns what floor is left, as text; "" for none.
-        self._floor_left: Callable[[], str] = str
+        # Returns at the end of an order how much floor was swept, as text; "" for no text.
+        self._sum_up: Callable[[], str] = str
         self.cells = CellsLeft(
             config, map_state, ledger, fleet, self._zones, lambda: self._run.exploration
         )
@@ -78,14 +78,19 @@ class Sequencer:
         # Cached result: whether a retry is worthwhile, for a given map and ledger.
         self._retry_check: tuple[object, bool] = (None, False)
 
-    def ask_for_floor(self, floor_left: Callable[[], str]) -> None:
-        """Have the end of an order tell what floor is left, as text that follows another."""
-        self._floor_left = floor_left
+    def ask_for_floor(self, sum_up: Callable[[], str]) -> None:
+        """Have the end of an order say how much floor was swept, as text that follows another."""
+        self._sum_up = sum_up
 
     @property
     def is_waiting(self) -> bool:
         """Whether the robot waits for a retry."""
         return self._run.retry_at is not None
+
+    @property
+    def is_over(self) -> bool:
+        """Whether the order is over."""
+        return self.order_state.stage is Stage.OVER
 
     @property
     def can_plan(self) -> bool:
@@ -348,7 +353,7 @@ class Sequencer:
         run.retry_at = None
         self.order_state = replace(self.order_state, stage=Stage.OVER)
         every = order is None or order.zones[0].polygon is None
-        run.ending = self._unreached.ending(self.order_state) + self._floor_left()
+        run.ending = self._unreached.ending(self.order_state) + self._sum_up()
         area, named = self._map.area, () if every or order is None else order.zones
         if area is not None and (beyond := [z.name for z in named if not is_in_reach(z, area)]):
             run.ending += f"; not reached: {', '.join(map(repr, beyond))}"

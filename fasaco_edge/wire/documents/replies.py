@@ -77,12 +77,15 @@ class FloorReport(Document, frozen=True):
         left: unswept part of that by reason, the largest first; null if unknown.
         out_of_reach: floor that the map shows free and the tool cannot reach, part of the order or
             not, by reason, the largest first; null if unknown.
+        possible_m2: floor that the tool would reach were walls and furniture a pixel of the map
+            thinner than the map shows them; null before the end of an order, or if unknown.
     """
 
     swept_m2: Amount = 0.0
     reachable_m2: Amount | None = None
     left: Annotated[tuple[FloorLeft, ...], allowed(maxItems=20)] | None = None
     out_of_reach: Annotated[tuple[FloorLeft, ...], allowed(maxItems=20)] | None = None
+    possible_m2: Amount | None = None
 
     @property
     def reached_m2(self) -> float | None:

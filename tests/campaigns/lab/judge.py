@@ -46,8 +46,8 @@ class Figures:
         ending: how it ended.
         true_share: swept share of the reachable floor, by the true poses.
         clear_share: the same of the floor that is a pixel of the map further from walls.
-        claimed_share: as ``true_share``, by the product's status, of the floor that it takes for
-            reachable.
+        claimed_share: as ``true_share``, by the product's status, of all floor that it takes for
+            reachable: the possible floor at the end of the order, else that of the map.
         excess_points: by how much the claim exceeds the truth [percentage points].
         claimed_unswept_m2: floor that the product takes for swept and that was not.
         swept_unclaimed_m2: floor that was swept and that it does not take for swept.
@@ -182,7 +182,8 @@ def _claim(reply: dict[str, Any]) -> tuple[float, float]:
     reachable_m2, left = floor.get("reachable_m2"), floor.get("left")
     if not reachable_m2 or left is None:
         return cells, cells
-    return max(1.0 - sum(part["m2"] for part in left) / reachable_m2, 0.0), cells
+    reached_m2 = max(reachable_m2 - sum(part["m2"] for part in left), 0.0)
+    return reached_m2 / max(floor.get("possible_m2") or 0.0, reachable_m2), cells
 
 
 def _moves(of: dict[str, NDArray[np.float64]]) -> NDArray[np.bool_]:

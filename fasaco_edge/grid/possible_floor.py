@@ -1,0 +1,54 @@
+"""Possible floor: what the tool would reach if walls were thinner than the map shows them.
+
+A pixel of a map is occupied if a wall passes through it, or if the noise of scans and poses put one
+there. So walls and furniture are thicker on a map than in the building: by about a pixel on the
+maps of a scan matcher. How much more floor there is, no such map tells; this is the most.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fasaco_edge.grid.floor_map import FloorMap
+from fasaco_edge.grid.geometry import Point
+from fasaco_edge.grid.tool_reach import tool_reach
+from fasaco_edge.kernels.floor.bits import packed, unpacked
+from fasaco_edge.kernels.floor.places import connected, disc_rows, keep_in_cells, places_of
+
+# On a larger raster it is not computed: it would take more than a tenth of a second [pixels].
+MOST_PIXELS = 8_000_000
+
+
+def possible_m2(
+    floor: FloorMap, thinner_m: float, at: Point, asked: NDArray[np.bool_]
+) -> float | None:
+    """Return the area that the tool would reach if walls were thinner on each side [m2].
+
+    None on a raster of more than ``MOST_PIXELS``, or if the robot would fit nowhere.
+
+    Args:
+        floor: of the newest map.
+        thinner_m: by how much: the edge of a pixel of the map [m].
+        at: where the robot is, x, y [m].
+        asked: bool (rows, cols) of the lattice: the cells whose floor counts.
+    """
+    geometry = floor.geometry
+    if geometry.rows * geometry.cols > MOST_PIXELS:
+        return None
+    unit = geometry.resolution
+    # No disc is smaller than the pixel that its centre is in.
+    radius = max((floor.discs.radius_m - thinner_m) / unit, 1.0)
+    fits = unpacked(places_of(floor.blocked, disc_rows(radius)), geometry.cols)
+    found = np.argwhere(fits)
+    if not len(found):
+        return None
+    col, row = geometry.to_pixels(*at)
+    nearest = found[np.argmin(((found + 0.5 - np.array((row, col))) ** 2).sum(axis=1))]
+    row, col = nearest.tolist()
+    places = packed(connected(fits, row, col), beyond=False)
+    if not asked.all():
+        window = floor.stands.lattice.window
+        keep_in_cells(places, floor.placement, asked, (window.row0, window.col0), (0, 0))
+    reached = tool_reach(places, floor.blocked, radius, floor.discs.tool_m / 2 / unit)
+    return int(np.count_nonzero(unpacked(reached, geometry.cols))) * unit**2
