@@ -66,3 +66,18 @@ def test_noise_makes_no_more_be_claimed_and_takes_no_more_time(noise_m):
     assert outcome.mission.state is State.DONE
     assert outcome.claimed <= outcome.swept + CLAIM
     assert outcome.seconds < 160.0
+
+
+@pytest.mark.parametrize(
+    ("left_m", "said"),
+    [
+        (0.08, "drives 8 cm left of its line"),
+        (-0.05, "drives 5 cm right of its line"),
+        (0.02, None),
+        (0.0, None),
+    ],
+)
+@pytest.mark.parametrize("noise_m", [0.0, 0.02])
+def test_a_base_that_drives_beside_its_line_is_reported(left_m, noise_m, said):
+    outcome = driven(bare_room(), left_m=left_m, noise_m=noise_m, most_s=120.0)
+    assert outcome.troubles.get("beside_line") == said

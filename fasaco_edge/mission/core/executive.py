@@ -74,7 +74,8 @@ class Executive:
             self.ledger, self.monitor, self.orders, self.route, self.line, self._standing
         )
         drives = self.charging, self.giving_way, self._standing
-        self.troubles = Troubles(self.map, self.monitor, *drives, self.dock, self.way_out)
+        at = self.dock, self.way_out, self.line.offset
+        self.troubles = Troubles(self.map, self.monitor, *drives, *at)
 
     def succeed(self, before: Executive) -> None:
         """Go on where another mission ended; a docked robot stays docked."""

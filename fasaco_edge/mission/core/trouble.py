@@ -17,6 +17,7 @@ from fasaco_edge.mission.core.giving_way import GivingWay
 from fasaco_edge.mission.core.in_dock import InDock
 from fasaco_edge.mission.core.standing import Standing
 from fasaco_edge.mission.core.way_out import WayOut
+from fasaco_edge.mission.line.offset import Offset
 from fasaco_edge.mission.map.inputs import InputMonitor
 from fasaco_edge.mission.map.map_state import MapState
 
@@ -76,6 +77,7 @@ class Troubles:
     standing: Standing
     dock: InDock
     way_out: WayOut
+    offset: Offset
     found: tuple[Trouble, ...] = field(default=(), init=False)
     _current: DockCurrent = field(init=False)
 
@@ -95,6 +97,7 @@ class Troubles:
         self.giving_way.succeed(before.giving_way)
         self.standing.succeed(before.standing)
         self._current.succeed(before._current)
+        self.offset.succeed(before.offset)
 
     def look(self, state: State, now: float) -> None:
         """Find the troubles at ``now`` [s] of a mission that is in a state; once in each step."""
@@ -204,6 +207,12 @@ RULES = (
         DRIVING,
         Troubles.stands,
         "look at what holds the robot; check that its base drives",
+    ),
+    Rule(
+        "beside_line",
+        DRIVING,
+        lambda troubles, state, now: troubles.offset.why,
+        "check that the pose is that of the tool's centre, and how the base follows its path",
     ),
 )
 """In order of their weight: the first is the reason of a degraded mission."""

@@ -25,6 +25,7 @@ from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
 from fasaco_edge.mission.coverage.swept_floor import ANYWHERE, NOWHERE, SweptFloor
 from fasaco_edge.mission.line.line_ahead import LineAhead
 from fasaco_edge.mission.line.missed_floor import MissedFloor
+from fasaco_edge.mission.line.offset import Offset
 from fasaco_edge.mission.line.out_of_reach import REASONS, causes_of
 from fasaco_edge.mission.line.polisher import Polisher
 from fasaco_edge.mission.map.map_state import MapState
@@ -66,7 +67,11 @@ class FloorToSweep(NamedTuple):
 
 
 class LineLayer:
-    """Owns the line; inactive where cells are counted."""
+    """Owns the line; inactive where cells are counted.
+
+    Attributes:
+        offset: whether the robot drives beside the line all the time.
+    """
 
     def __init__(
         self,
@@ -78,6 +83,7 @@ class LineLayer:
     ) -> None:
         self._map, self._ledger, self._orders, self._route = map_state, ledger, orders, route
         orders.ask_for_floor(self.sum_up)
+        self.offset = Offset(sweeping.tool_m if sweeping else 0.0)
         self._polisher = Polisher(sweeping.line) if sweeping else None
         self._missed = MissedFloor.at(sweeping.line, WORTH_S) if sweeping else None
         price_s_m2 = sweeping.line.price_s_m2 if sweeping else 0.0
@@ -137,6 +143,7 @@ class LineLayer:
             self._take_floor()
         before = self._route.held.index
         ahead.drive(pose, farthest_m)
+        self.offset.note((pose.x, pose.y), ahead.beside)
         self._route.follow_line(ahead.cell)
         path = self._route.held
         passed = path.cells[before : path.index]

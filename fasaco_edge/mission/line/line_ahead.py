@@ -19,6 +19,7 @@ from fasaco_edge.kernels.floor.line import LEAST_EDGE
 from fasaco_edge.mission.line.alignment import aligned, by_distance
 from fasaco_edge.mission.line.lead_out import fitting_radius, lead_out
 from fasaco_edge.mission.line.line_aside import LineAside
+from fasaco_edge.mission.line.offset import Beside
 from fasaco_edge.mission.line.pieces import Joiner, Piece, exchanged, kept_pieces
 from fasaco_edge.mission.line.place_on_line import LOOK_AHEAD_M, PlaceOnLine
 from fasaco_edge.mission.line.polyline import (
@@ -274,6 +275,11 @@ class LineAhead:
     def is_followed(self) -> bool:
         """Whether the robot is on the line, within half the tool."""
         return self._place.is_on(self.line.points, self._tool)
+
+    @property
+    def beside(self) -> Beside | None:
+        """Where the robot is beside the line; None where it does not follow one."""
+        return self._place.beside(self.line.points, self.tally.unit_m) if self.is_followed else None
 
     @property
     def _tool(self) -> float:

@@ -9,6 +9,7 @@ import math
 
 import numpy as np
 
+from fasaco_edge.mission.line.offset import CORNER_M, Beside
 from fasaco_edge.mission.line.polyline import Points
 
 # The robot is searched for this far ahead on its line, or as far as it can have driven [m]: farther
@@ -42,6 +43,30 @@ class PlaceOnLine:
     def is_on(self, points: Points, tool: float) -> bool:
         """Tell whether the robot is on the line, within half the tool."""
         return len(points) > 1 and math.hypot(*(self.on(points) - self.here)) <= tool
+
+    def beside(self, points: Points, unit_m: float) -> Beside | None:
+        """Return where the robot is beside its line; None at its end.
+
+        ``points`` is as for ``find``; ``unit_m``: edge of a pixel [m].
+        """
+        if len(points) < 2:
+            return None
+        far, left = self.on(points), CORNER_M / unit_m
+        for number in range(1, len(points)):
+            way = points[number] - far
+            length = math.hypot(*way)
+            far = points[number] if length <= left else far + way * (left / length)
+            left -= length
+            if left <= 0.0:
+                break
+        (dy, dx), (ahead_y, ahead_x) = points[1] - points[0], far - self.on(points)
+        length = math.hypot(dy, dx)
+        if not length or not math.hypot(ahead_y, ahead_x):
+            return None
+        off_y, off_x = self.here - points[0]
+        heading = math.atan2(dy, dx)
+        bend = math.remainder(math.atan2(ahead_y, ahead_x) - heading, math.tau)
+        return Beside((dx * off_y - dy * off_x) / length * unit_m, heading, bend)
 
     def find(self, points: Points, tool: float, look: float) -> int | None:
         """Search for the robot along the line, and update ``along``.
