@@ -40,6 +40,7 @@ from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
 from fasaco_edge.mission.coverage.progress import Coverage, ZoneProgress, zone_progress
 from fasaco_edge.mission.coverage.rotated_ledger import rotated_ledger
 from fasaco_edge.mission.coverage.swept_floor import SweptFloor
+from fasaco_edge.mission.coverage.tool_sight import ToolSight
 from fasaco_edge.mission.coverage.unreached import Unreached
 from fasaco_edge.mission.fleet.layer import FleetLayer
 from fasaco_edge.mission.fleet.shared import SharedProgress
@@ -88,7 +89,12 @@ class Mission:
         self._map = MapState(config)
         cell_m, sweeping = config.footprint.cell_m, config.sweeping
         tool_m, ahead_m = (sweeping.tool_m, sweeping.ahead_m) if sweeping else (cell_m, 0.0)
-        self._ledger = MissionLedger(cell_m, tool_m, ahead_m, config.map_place)
+        radius_m, sight = config.footprint.robot_radius_m, None
+        if sweeping and tool_m > 2.0 * radius_m:
+            sight = ToolSight(
+                tool_m, radius_m, config.footprint.free_at_most, lambda: self._map.grid
+            )
+        self._ledger = MissionLedger(cell_m, tool_m, ahead_m, config.map_place, sight)
         monitor = InputMonitor(config)
         self.fleet = FleetLayer(
             config.robot,

@@ -35,6 +35,7 @@ from fasaco_edge.mission.coverage.swept_floor import (
     MOST_FLOOR_TILES,
     SweptFloor,
 )
+from fasaco_edge.mission.coverage.tool_sight import ToolSight
 from fasaco_edge.mission.fleet.shared import SharedProgress
 from fasaco_edge.mission.map.loop_closure import Motion, certain_floor, uncertain_cells
 
@@ -95,6 +96,7 @@ class MissionLedger:
         tool_m: float,
         ahead_m: float = 0.0,
         map_place: MapPlace | None = None,
+        sight: ToolSight | None = None,
     ) -> None:
         """Start empty.
 
@@ -103,7 +105,9 @@ class MissionLedger:
             tool_m: width of the tool [m].
             ahead_m: from where the robot turns about to the tool's centre, ahead [m].
             map_place: where its map lies in the frame of its fleet; None without such a frame.
+            sight: of a tool that sticks out of the robot; None for one that does not.
         """
+        self._sight = sight
         self._cell_m, self._tool_m, self._ahead_m = cell_m, tool_m, ahead_m
         self._covered = self._nothing("")
         self.first_plan_reason = "first plan"
@@ -145,7 +149,7 @@ class MissionLedger:
         return (self._covered,) if self._resumed is None else (self._covered, self._resumed[1])
 
     def _nothing(self, frame: str) -> _Covered:
-        return _Covered(CoverageLedger(self._cell_m, frame), SweptFloor(self._tool_m))
+        return _Covered(CoverageLedger(self._cell_m, frame), SweptFloor(self._tool_m, self._sight))
 
     @property
     def is_confirmed(self) -> bool:
@@ -155,7 +159,7 @@ class MissionLedger:
     def resume(self, before: LedgerSnapshot, *, is_confirmed: bool = False) -> None:
         """Continue the ledger from before a restart; ``is_confirmed``: see the property."""
         self._resumed = None if is_confirmed else (before, self._nothing(""))
-        floor = SweptFloor.restored(before.floor, self._tool_m)
+        floor = SweptFloor.restored(before.floor, self._tool_m, self._sight)
         self._covered = _Covered(CoverageLedger.restored(before), floor)
         self.shared.resume(before.fleet)
         if cells := before.cells:

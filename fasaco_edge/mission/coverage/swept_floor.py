@@ -1,7 +1,7 @@
 """Swept floor: the pixels of the map frame that the tool has passed over.
 
 A pixel is swept if its centre was under the tool, a disc, on the straight segment between two
-consecutive poses.
+consecutive poses, and not behind a wall from there (``tool_sight``).
 
 With noisy poses, the union of tool discs is wider than the strip really swept. So the disc moves
 along the steady track and shrinks by the track's error bound: not at all with exact poses, and
@@ -39,6 +39,7 @@ from fasaco_edge.mission.coverage.floor_tiles import (
 from fasaco_edge.mission.coverage.floor_tiles import Place as TilePlace
 from fasaco_edge.mission.coverage.shared_tiles import SharedTiles
 from fasaco_edge.mission.coverage.steady_track import Place, SteadyTrack
+from fasaco_edge.mission.coverage.tool_sight import ToolSight
 
 # Two poses farther apart than this many tool widths are a jump, unless a drive takes no longer.
 JUMP_TOOLS = 2.0
@@ -84,8 +85,14 @@ class SweptFloor:
             robot at that moment.
     """
 
-    def __init__(self, tool_m: float) -> None:
-        """Create an empty one; ``tool_m``: width of the tool [m]."""
+    def __init__(self, tool_m: float, sight: ToolSight | None = None) -> None:
+        """Create an empty one.
+
+        Args:
+            tool_m: width of the tool [m].
+            sight: of a tool that sticks out of the robot; None for one that does not.
+        """
+        self._sight = sight
         self.changes = 0
         self.pixels = self.forgotten = 0
         self.dropped = 0
@@ -106,9 +113,11 @@ class SweptFloor:
         self._news: deque[tuple[int, Window]] = deque(maxlen=REMEMBERED)
 
     @classmethod
-    def restored(cls, snapshot: FloorSnapshot, tool_m: float) -> Self:
+    def restored(
+        cls, snapshot: FloorSnapshot, tool_m: float, sight: ToolSight | None = None
+    ) -> Self:
         """Return a restored floor, without the last pose: the track since then is unknown."""
-        floor = cls(tool_m)
+        floor = cls(tool_m, sight)
         floor.changes, floor.pixels = snapshot.changes, snapshot.pixels
         floor._tiles.update(snapshot.tiles)
         return floor
@@ -331,12 +340,19 @@ class SweptFloor:
 
     def _under(self, segments: Sequence[Segment], window: Window) -> Mask:
         """Return which pixel centres of a window the tool passed with certainty."""
+        under = self._within(segments, window, math.inf)
+        if self._sight is None:
+            return under
+        return self._sight.of(under, self._within(segments, window, self._sight.radius_m), window)
+
+    def _within(self, segments: Sequence[Segment], window: Window, most_m: float) -> Mask:
+        """Return which pixel centres are within reach of segments, at most so far from them."""
         values = []
         for start, end, reach_m in segments:
             # Relative to each start: far from the origin rounding would swamp differences.
             far_y, far_x = end.y - start.y, end.x - start.x
             length2 = far_x * far_x + far_y * far_y or 1.0
-            reach2 = (reach_m + TOUCH_M) ** 2
+            reach2 = (min(reach_m, most_m) + TOUCH_M) ** 2
             values.append((start.y, start.x, far_y, far_x, length2, reach2))
         y, x, dy, dx, lengths2, reaches2 = np.array(values).reshape(-1, 6, 1, 1).swapaxes(0, 1)
         up = ((np.arange(window.row0, window.row1) + 0.5) * PIXEL_M)[:, np.newaxis] - y

@@ -1,0 +1,82 @@
+"""Tool sight: what a tool that sticks out of the robot touches, and none of it through walls.
+
+Side brushes, a wide deck or a lamp reach over the rim of the robot's disc. As in
+``grid.tool_reach`` those pixels count that free ones connect with the disc, about within the tool.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from fasaco_edge.grid.geometry import Window
+from fasaco_edge.grid.occupancy import OccupancyGrid
+from fasaco_edge.grid.tool_reach import tool_steps
+from fasaco_edge.mission.coverage.floor_tiles import PIXEL_M, Mask
+
+
+class ToolSight:
+    """Tells what of the tool's disc the tool touches, on the newest map.
+
+    Attributes:
+        radius_m: of the robot's disc [m].
+    """
+
+    def __init__(
+        self,
+        tool_m: float,
+        radius_m: float,
+        free_at_most: int,
+        grid: Callable[[], OccupancyGrid | None],
+    ) -> None:
+        """Create one.
+
+        Args:
+            tool_m: width of the tool [m].
+            radius_m: of the robot's disc [m].
+            free_at_most: occupancy values up to this are free [percent].
+            grid: returns the newest map.
+        """
+        self._steps = tool_steps(radius_m / PIXEL_M, 0.5 * tool_m / PIXEL_M)
+        self.radius_m = radius_m
+        self._free_at_most, self._grid = free_at_most, grid
+
+    def of(self, under: Mask, inner: Mask, window: Window) -> Mask:
+        """Return what of a window of floor the tool touches, bool (rows, cols).
+
+        Args:
+            under: bool (rows, cols), what lies within the tool's disc.
+            inner: bool (rows, cols), what of it lies within the robot's.
+            window: their window.
+        """
+        grid = self._grid()
+        if grid is None:
+            return inner
+        open_ = under & _free_on(grid, self._free_at_most, window)
+        found = inner & under
+        for _ in range(self._steps):
+            more = found.copy()
+            more[:, 1:] |= found[:, :-1]
+            more[:, :-1] |= found[:, 1:]
+            more[1:] |= found[:-1]
+            more[:-1] |= found[1:]
+            more = (more & open_) | found
+            if (more == found).all():
+                break
+            found = more
+        return found
+
+
+def _free_on(grid: OccupancyGrid, free_at_most: int, window: Window) -> Mask:
+    """Return which pixels of a window of floor have their centre on free ground of a map."""
+    geometry = grid.geometry
+    x = (np.arange(window.col0, window.col1) + 0.5) * PIXEL_M
+    y = ((np.arange(window.row0, window.row1) + 0.5) * PIXEL_M)[:, np.newaxis]
+    cols, rows = geometry.to_pixels(*np.broadcast_arrays(x, y))
+    cols, rows = np.floor(cols).astype(np.int64), np.floor(rows).astype(np.int64)
+    inside = (rows >= 0) & (rows < geometry.rows) & (cols >= 0) & (cols < geometry.cols)
+    free = np.zeros(inside.shape, np.bool_)
+    values = grid.cells[rows[inside], cols[inside]]
+    free[inside] = (values >= 0) & (values <= free_at_most)
+    return free
