@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from fasaco_edge.mission.coverage.bends import SHORT_M, beside_m
+from fasaco_edge.mission.coverage.bends import SHORT_M, beside_m, corner_between
 
 FAR_M = 100.0
 
@@ -48,3 +48,19 @@ def test_it_was_no_farther_away_than_it_can_have_driven():
 def test_where_its_speed_is_not_known_or_places_are_near_it_drove_straight():
     assert beside_m((0, 0), (1, 0), (0, 1), (1, 1), 0.0) == 0.0
     assert beside_m((0, 0), (SHORT_M, 0), (0, 1), (SHORT_M, 1), FAR_M) == 0.0
+
+
+def test_headings_tell_where_it_turned_and_that_it_did_not():
+    corner = (0.6, 0.0)
+    found = corner_between((0.0, 0.0), (0.6, 0.5), (0.0, 0.5 * math.pi), FAR_M)
+    assert found == pytest.approx(corner)
+    # It cannot have driven round that corner in the time.
+    assert corner_between((0.0, 0.0), (0.6, 0.5), (0.0, 0.5 * math.pi), 1.0) is None
+    # Headings to one side, or against each other, are no single turn of a base that drives ahead.
+    for yaws in ((1.0, 1.0), (0.0, math.pi), (math.pi, 0.0), (math.nan, 0.0)):
+        assert corner_between((0.0, 0.0), (0.6, 0.5), yaws, FAR_M) is None
+    # Straight on by its headings, though it came and went elsewhere.
+    there_and_back = (0, 0), (1, 0), (0, 1), (1, 1)
+    assert beside_m(*there_and_back, 1.25, (0.0, 0.0)) == 0.0
+    # Headings that contradict the motion say nothing more than the places.
+    assert beside_m(*there_and_back, 1.25, (2.0, 2.0)) == pytest.approx(0.375)

@@ -2,7 +2,8 @@
 
 Between two places the robot turns once at most: its track stays within the triangle of the
 direction in which it came to the first and that in which it left the second. These are known by the
-places before and after. It also drives no farther than its speed allows.
+places before and after, or by its headings: bases drive where they head. It also drives no farther
+than its speed allows.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ Point = tuple[float, float]
 
 # Up to this length [m] a right angle between two places lies less than a pixel beside the segment.
 SHORT_M = 2.0 * math.sqrt(2.0) * PIXEL_M
+NO_YAWS = math.nan, math.nan
 # Sides this near to parallel do not meet within any room.
 LEAST_RAD = 1e-3
 
@@ -25,6 +27,7 @@ def beside_m(
     before: Point | None,
     after: Point | None,
     farthest_m: float,
+    yaws: tuple[float, float] = NO_YAWS,
 ) -> float:
     """Return how far from the segment between two places the robot may have been [m].
 
@@ -33,14 +36,43 @@ def beside_m(
         before, after: the places before and after them; None where none is known.
         farthest_m: how far it can have driven from one to the other [m]; 0 if that is not known:
             then it is taken to have driven straight.
+        yaws: its headings at the two places [rad]; NaN if not known.
     """
     length = math.dist(start, end)
     if length <= SHORT_M or not farthest_m:
         return 0.0
     by_turn = length * _height(_bend(before, start, end), _bend(start, end, after))
+    if not any(map(math.isnan, yaws)):
+        by_turn = min(by_turn, length * _height(*_turns(start, end, yaws)))
     if length > farthest_m:
         return by_turn
     return min(by_turn, 0.5 * math.sqrt(farthest_m**2 - length**2))
+
+
+def corner_between(
+    start: Point, end: Point, yaws: tuple[float, float], farthest_m: float
+) -> Point | None:
+    """Return where the robot turned between two places, by its headings there; None if not known.
+
+    See ``beside_m`` for the arguments.
+    """
+    way = math.atan2(end[1] - start[1], end[0] - start[0])
+    one, other = (math.remainder(yaw - way, math.tau) for yaw in yaws)
+    if not one * other < 0.0 or abs(one) + abs(other) >= math.pi - LEAST_RAD:
+        return None  # it did not turn once, or did not drive where it heads
+    one, other = abs(one), abs(other)
+    length = math.dist(start, end)
+    first_m = length * math.sin(other) / math.sin(one + other)
+    if first_m + length * math.sin(one) / math.sin(one + other) > farthest_m:
+        return None
+    return start[0] + first_m * math.cos(yaws[0]), start[1] + first_m * math.sin(yaws[0])
+
+
+def _turns(start: Point, end: Point, yaws: tuple[float, float]) -> tuple[float, float]:
+    """Return the angles between the segment and the headings at its ends [rad]."""
+    way = math.atan2(end[1] - start[1], end[0] - start[0])
+    one, other = (abs(math.remainder(yaw - way, math.tau)) for yaw in yaws)
+    return one, other
 
 
 def _height(one: float | None, other: float | None) -> float:

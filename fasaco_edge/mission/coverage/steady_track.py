@@ -87,12 +87,14 @@ class Place(NamedTuple):
         x, y: the position [m].
         error_m: error bound to each side [m].
         farthest_m: how far the robot can have driven to it from the one before; 0 if not known [m].
+        yaw: heading of the robot there [rad]; NaN if not known.
     """
 
     x: float
     y: float
     error_m: float
     farthest_m: float = 0.0
+    yaw: float = math.nan
 
     @property
     def point(self) -> tuple[float, float]:
@@ -178,4 +180,5 @@ class SteadyTrack:
         around = poses[index - beside : index + beside + 1]
         count = len(around)
         x, y = sum([pose.x for pose in around]) / count, sum([pose.y for pose in around]) / count
-        return Place(x, y, SURE * sigma_m / math.sqrt(count), self._farthest_m[index])
+        error_m = SURE * sigma_m / math.sqrt(count)
+        return Place(x, y, error_m, self._farthest_m[index], here.yaw)

@@ -20,7 +20,7 @@ from typing import NamedTuple, Self
 import numpy as np
 
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D, Window
-from fasaco_edge.mission.coverage.bends import SHORT_M, beside_m
+from fasaco_edge.mission.coverage.bends import SHORT_M, beside_m, corner_between
 from fasaco_edge.mission.coverage.floor_tiles import (
     FLOOR_TILE,
     PIXEL_M,
@@ -57,6 +57,8 @@ MOST_TOGETHER = 1 << 16
 # Number of changes whose windows are remembered.
 REMEMBERED = 64
 ANYWHERE = Window(-(2**40), -(2**40), 2**40, 2**40)
+# Error of a heading [rad].
+YAW_RAD = math.radians(1.0)
 # Tolerance, so that rounding does not decide whether a pixel at the rim is swept [m].
 TOUCH_M = 1e-9
 # Grids are looked up in blocks of BLOCK x BLOCK of these pixels; coarser grids in smaller blocks.
@@ -274,11 +276,20 @@ class SweptFloor:
             before and before.point,
             after and after.point,
             end.farthest_m,
+            (start.yaw, end.yaw),
         )
         reach_m = 0.5 * self._tool_m - away_m
         at_end = max(0.5 * self._tool_m - end.error_m, 0.25 * self._tool_m)
         if reach_m >= at_end:
             return [Segment(start, end, at_end)]
+        turned = corner_between(start.point, end.point, (start.yaw, end.yaw), end.farthest_m)
+        if turned is not None:
+            corner = Place(*turned, end.error_m)
+            beside = max(math.dist(turned, start.point), math.dist(turned, end.point)) * YAW_RAD
+            if at_end > beside:
+                reach_m = at_end - beside
+                round_it = Segment(start, corner, reach_m), Segment(corner, end, reach_m)
+                return [*round_it, Segment(end, end, at_end)]
         way = [Segment(start, end, reach_m)] if reach_m > 0.0 else []
         return [*way, Segment(end, end, at_end)]
 
