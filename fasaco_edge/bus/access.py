@@ -73,17 +73,19 @@ def _role(name: str, description: str, includes: str = "") -> Role:
 EVERYTHING = tuple(entry.suffix for entry in ENTRIES)
 
 ROLES: Mapping[str, Role] = {
-    "mapper": _role("mapper", "publishes maps, map updates, poses and the battery"),
+    "mapper": _role("mapper", "publishes maps, map updates, poses, the battery and scans"),
     "viewer": _role("viewer", "sees path, status, coverage and pheromone"),
     "operator": _role("operator", "commands the mission, and views", includes="viewer"),
     "recorder": _role(
-        "recorder", "receives all but the keep-out mask, publishes its status", includes="viewer"
+        "recorder",
+        "receives all but keep-out mask and scans, publishes its status",
+        includes="viewer",
     ),
     "driver": _role("driver", "drives the robot: publishes cmd_vel, and views", includes="viewer"),
     # Topics that the configuration names: see ``ros_rights``.
     "ros": Role(
-        "publishes maps, updates, poses and battery on ROS 2 topics, sees path, coverage and "
-        "diagnostics, commands by services"
+        "publishes maps, updates, poses, battery and scans on ROS 2 topics, sees path, coverage "
+        "and diagnostics, commands by services"
     ),
     # A daemon connects to it; the router itself must restrict the other clients.
     "router": Role("forwards everything, both ways", speaks=EVERYTHING, listens=EVERYTHING),

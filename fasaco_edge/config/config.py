@@ -220,6 +220,21 @@ class BatteryConfig(Section, BatteryPolicy, frozen=True, kw_only=True):
     """When to charge; without the block ``battery`` the robot never does by itself."""
 
 
+class ScanConfig(Section, frozen=True):
+    """The robot's lidar, by whose scans ``fasaco-edge follow`` stops before what no map shows.
+
+    Where it is mounted: ``x_m`` ahead of the robot's middle, ``y_m`` to its left [m], and where its
+    angle 0 points, ``yaw_deg`` from ahead to the left [deg]; ``upside_down`` turns its angles. The
+    robot stands after ``lost_s`` [s] without a scan. Without the block no scan is used.
+    """
+
+    x_m: Annotated[float, Meta(ge=-10, le=10)] = 0.0
+    y_m: Annotated[float, Meta(ge=-10, le=10)] = 0.0
+    yaw_deg: Annotated[float, Meta(ge=-360, le=360)] = 0.0
+    upside_down: bool = False
+    lost_s: Annotated[float, Meta(ge=0.2, le=10)] = 1.0
+
+
 class RecordingConfig(Section, frozen=True):
     """How large and how old a file may become, and what all may take.
 
@@ -235,8 +250,8 @@ class RecordingConfig(Section, frozen=True):
 
 
 class DaemonConfig(Section, frozen=True):
-    """The whole configuration; without ``fleet`` the robot is alone, without ``ros2`` nothing is
-    published or subscribed under ROS."""
+    """The whole configuration; without ``fleet`` the robot is alone, without ``scan`` it sees the
+    map alone, without ``ros2`` nothing is published or subscribed under ROS."""
 
     robot: RobotConfig = RobotConfig()
     bus: BusConfig = BusConfig()
@@ -245,6 +260,7 @@ class DaemonConfig(Section, frozen=True):
     planner: PlannerConfig = PlannerConfig()
     mission: MissionSettings = MissionSettings()
     battery: BatteryConfig | msgspec.UnsetType = msgspec.UNSET
+    scan: ScanConfig | msgspec.UnsetType = msgspec.UNSET
     recording: RecordingConfig = RecordingConfig()
     metrics: MetricsConfig = MetricsConfig()
     fleet: FleetConfig | msgspec.UnsetType = msgspec.UNSET

@@ -39,6 +39,7 @@ class RosTopicNames(Section, frozen=True):
     map_updates: str = "/map_updates"
     battery: str = "/battery_state"
     keep_out_mask: str = "/keepout_filter_mask"
+    scan: str = "/scan"
     pose: str = "/pose"
     tf: str = "/tf"
     tf_static: str = "/tf_static"
@@ -120,6 +121,11 @@ class RosConfig(Section, frozen=True):
         return self._topic("keep_out_mask")
 
     @property
+    def scan(self) -> RosTopic:
+        """The topic of scans, to which the follower subscribes if it is to take them."""
+        return self._topic("scan")
+
+    @property
     def outputs(self) -> dict[str, RosTopic]:
         """What the daemon publishes, by the native topic that is like it."""
         names = ("coverage_path", "coverage_grid", "diagnostics")
@@ -171,13 +177,14 @@ class RosConfig(Section, frozen=True):
         """Return what those may do that have the role ``ros``."""
         said = [*map(self.output_key, self.outputs.values()), *self._driven_by]
         said += map(self.input_key, self.commands.values())
-        heard = [*self.inputs.values(), self.keep_out_mask]
+        heard = [*self.inputs.values(), self.keep_out_mask, self.scan]
         return ros_rights([*map(self.input_key, heard)], said, self._graph)
 
     def driver_rights(self) -> Role:
         """Return what those may do that have the role ``driver``."""
-        poses = [self.input_key(topic) for name, topic in self.inputs.items() if name in POSES]
-        return ros_rights(self._driven_by, poses, self._graph)
+        poses = [topic for name, topic in self.inputs.items() if name in POSES]
+        said = [*map(self.input_key, (*poses, self.scan))]
+        return ros_rights(self._driven_by, said, self._graph)
 
     @property
     def _driven_by(self) -> list[str]:

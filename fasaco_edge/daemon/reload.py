@@ -174,7 +174,7 @@ def with_changeable(running: DaemonConfig, written: DaemonConfig) -> DaemonConfi
 def _flat(config: DaemonConfig) -> dict[str, object]:
     """Return the values by ``section.key``; an optional section counts as one value."""
     sections = structs.asdict(config)
-    left_out = ("fleet", "battery", "ros2")
+    left_out = ("fleet", "battery", "scan", "ros2")
     flat: dict[str, object] = {name: sections.pop(name) for name in left_out}
     for name, section in sections.items():
         flat |= {f"{name}.{key}": value for key, value in structs.asdict(section).items()}

@@ -36,6 +36,11 @@ MAX_TRANSFORMS: Final = 4096
 MAX_POSE_BYTES: Final = 1_048_576
 """Longest pose or tf message."""
 
+MAX_SCAN_BEAMS: Final = 32_768
+"""Of a laser scan."""
+MAX_SCAN_SPAN_RAD: Final = 6.5
+"""From its first beam to its last: a turn, and rounding [rad]."""
+
 MAX_JSON_BYTES: Final = 1_048_576
 MAX_JSON_DEPTH: Final = 32
 """Levels of objects and arrays in a JSON document, the document itself one of them."""

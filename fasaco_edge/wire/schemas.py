@@ -14,6 +14,7 @@ PATH: Final = "nav_msgs/msg/Path"
 TWIST: Final = "geometry_msgs/msg/Twist"
 TWIST_STAMPED: Final = "geometry_msgs/msg/TwistStamped"
 BATTERY_STATE: Final = "sensor_msgs/msg/BatteryState"
+LASER_SCAN: Final = "sensor_msgs/msg/LaserScan"
 DIAGNOSTIC_ARRAY: Final = "diagnostic_msgs/msg/DiagnosticArray"
 PHEROMONE_GRID: Final = "fasaco_msgs/msg/PheromoneGrid"
 

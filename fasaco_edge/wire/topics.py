@@ -85,6 +85,18 @@ KEEP_OUT_MASK = Topic(
     limits=("max_grid_cells", "max_grid_tilt"),
     one_publisher_s=10.0,
 )
+SCAN = Topic(
+    name="scan",
+    direction="in",
+    when="the robot's lidar has turned once, five times a second at least; only where the "
+    "configuration has a block `scan`",
+    speaker="mapper",
+    listeners=("driver",),
+    schemas=(schemas.LASER_SCAN,),
+    qos=Qos("interactive_low", express=True, why="as a pose"),
+    limits=("max_scan_beams", "max_scan_span_rad"),
+    one_publisher_s=1.0,
+)
 PATH = Topic(
     name="path",
     direction="out",
@@ -265,7 +277,7 @@ RECORDER_ALIVE = Topic(
 # A recorder subscribes in this order, to the turn log last: once the daemon sees that subscriber,
 # the recorder receives everything else, too.
 TOPICS = (
-    *(MAP, MAP_UPDATE, POSE, BATTERY, KEEP_OUT_MASK),
+    *(MAP, MAP_UPDATE, POSE, BATTERY, KEEP_OUT_MASK, SCAN),
     *(PATH, COVERAGE, FLOOR, PHEROMONE, DIRECTIONS, STATUS, COMMAND, TURNS, FLEET, ALIVE, CLAIM),
     *(RECORDER, RECORDER_ALIVE),
     *(CMD_VEL, DRIVER),
@@ -317,6 +329,7 @@ _ROS_ROWS = (
     RosRow("map_updates", "map_update", "in", MAP_UPDATE.schemas, latched=False, depth=256),
     RosRow("battery", "battery", "in", BATTERY.schemas, latched=False, depth=16),
     RosRow("keep_out_mask", "keep_out_mask", "in", MAP.schemas, latched=True, depth=1),
+    RosRow("scan", "scan", "in", SCAN.schemas, latched=False, depth=5),
     RosRow("pose", "pose", "in", POSE.schemas, latched=False, depth=POSE_DEPTH),
     RosRow("tf", "pose", "in", TF, latched=False, depth=TF_DEPTH),
     RosRow("tf_static", TF_STATIC, "in", TF, latched=True, depth=TF_DEPTH),

@@ -11,6 +11,7 @@ from fasaco_edge.wire.messages.maps import decode_map_update, decode_occupancy_g
 from fasaco_edge.wire.messages.paths import decode_path
 from fasaco_edge.wire.messages.pheromone import decode_pheromone
 from fasaco_edge.wire.messages.poses import Transform, decode_pose, decode_transforms
+from fasaco_edge.wire.messages.scans import decode_scan
 from fasaco_edge.wire.messages.twists import decode_velocity
 from fasaco_edge.wire.schemas import POSE_SCHEMAS, TWIST_SCHEMAS
 
@@ -30,6 +31,7 @@ DECODERS: dict[str, Callable[[bytes], object]] = {
     schemas.PHEROMONE_GRID: decode_pheromone,
     schemas.TF_MESSAGE: decode_and_look,
     schemas.BATTERY_STATE: decode_battery,
+    schemas.LASER_SCAN: decode_scan,
     **{schema: partial(decode_pose, schema=schema) for schema in POSE_SCHEMAS},
     **{schema: partial(decode_velocity, schema=schema) for schema in TWIST_SCHEMAS},
 }

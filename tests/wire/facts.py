@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 from fasaco_edge.grid.geometry import GridGeometry, StampedPose
@@ -9,6 +10,7 @@ from fasaco_edge.grid.occupancy import MapPatch, OccupancyGrid
 from fasaco_edge.wire.messages.battery import BatteryState
 from fasaco_edge.wire.messages.paths import PathMessage
 from fasaco_edge.wire.messages.pheromone import PheromoneMessage
+from fasaco_edge.wire.messages.scans import LaserScan
 from fasaco_edge.wire.messages.twists import Velocity
 
 
@@ -46,6 +48,10 @@ def facts_of(message: Any) -> dict[str, Any]:
             facts["twist"] = [message.speed_m_s, message.turn_rad_s]
         case BatteryState():
             facts |= {"level": message.level, "power": message.power}
+        case LaserScan():
+            names = ("first_rad", "step_rad", "least_m", "most_m")
+            facts |= {name: getattr(message, name) for name in names}
+            facts["ranges"] = [m if math.isfinite(m) else None for m in message.ranges]
         case PathMessage():
             facts |= {"xy": message.xy.tolist(), "yaw": message.yaw.tolist()}
         case PheromoneMessage():

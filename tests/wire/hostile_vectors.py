@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import struct
+from typing import Any
 
 import numpy as np
 
@@ -34,6 +35,7 @@ def hostile_vectors() -> list[Vector]:
         *_hostile_poses(),
         *_hostile_twists(),
         *_hostile_batteries(),
+        *_hostile_scans(),
         *_hostile_tf(),
         *_hostile_others(),
     ]
@@ -241,6 +243,32 @@ def _hostile_batteries() -> list[Vector]:
         ),
         _hostile("battery_trailing", schema, state(0.5) + b"junk", "bytes after it", "payload"),
     ]
+
+
+def _hostile_scans() -> list[Vector]:
+    schema, angles, limits = schemas.LASER_SCAN, (-1.5, 0.5), (0.25, 8.0)
+
+    def scan(*, count: int = 4, angles: Any = angles, limits: Any = limits) -> bytes:
+        return oracle.to_bytes(schema, oracle.scan([1.0] * count, angles, limits))
+
+    good = scan()
+    # After the header come stamp 8, frame 5 and padding 3, and seven floats.
+    count_at = 4 + 16 + 28
+    cases = [
+        ("angle_nan", scan(angles=(np.nan, 0.5)), "no first angle", "angle_min"),
+        ("angle_far", scan(angles=(7.0, 0.5)), "more than a turn", "angle_min"),
+        ("step_infinite", scan(angles=(0.0, np.inf)), "no step", "angle_increment"),
+        ("step_zero", scan(angles=(0.0, 0.0)), "all beams in one direction", "angle_increment"),
+        ("step_wide", scan(angles=(0.0, 3.0)), "more than a turn", "angle_increment"),
+        ("range_min_negative", scan(limits=(-0.1, 8.0)), "below 0", "range_min"),
+        ("range_min_above_max", scan(limits=(8.0, 0.25)), "no range between", "range_min"),
+        ("range_max_nan", scan(limits=(0.25, np.nan)), "no longest range", "range_max"),
+        ("of_no_beam", scan(count=0), "nothing measured", "length of ranges"),
+        ("count", _at(good, count_at, _uint32(2**30)), "a billion beams", "length of ranges"),
+        ("intensities", _at(good, len(good) - 4, _uint32(9)), "not there", "intensities"),
+        ("trailing", good + b"junk", "bytes after it", "payload"),
+    ]
+    return [_hostile(f"scan_{name}", schema, *case) for name, *case in cases]
 
 
 def _hostile_tf() -> list[Vector]:

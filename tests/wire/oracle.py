@@ -159,6 +159,30 @@ def battery(
     )
 
 
+def scan(
+    ranges: Any,
+    angles: tuple[float, float] = (-1.5, 0.5),
+    limits: tuple[float, float] = (0.25, 8.0),
+    stamp_ns: int = 0,
+    frame: str = "",
+    intensities: int = 0,
+) -> Any:
+    """Return a sensor_msgs/LaserScan: its first angle and the step, its least and longest range."""
+    floats = dict.fromkeys(("time_increment", "scan_time"), 0.0)
+    return make(
+        schemas.LASER_SCAN,
+        header=header(frame, stamp_ns),
+        angle_min=angles[0],
+        angle_max=angles[0] + angles[1] * (len(ranges) - 1),
+        angle_increment=angles[1],
+        range_min=limits[0],
+        range_max=limits[1],
+        **floats,
+        ranges=np.array(ranges, np.float32),
+        intensities=np.ones(intensities, np.float32),
+    )
+
+
 def odometry(
     frame: str, stamp_ns: int, child: str, where: Any, covariance: Any, numbers: Any, spread: Any
 ) -> Any:

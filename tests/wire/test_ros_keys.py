@@ -59,7 +59,7 @@ def test_topics_are_those_of_the_table() -> None:
     by_pose = RosConfig(kind="rmw_zenoh", pose=schemas.ODOMETRY)
     maps_and_battery, poses = list(by_pose.inputs.values())[:3], list(by_pose.inputs.values())[3:]
     ours = [
-        *(*maps_and_battery, config.keep_out_mask, *poses),
+        *(*maps_and_battery, config.keep_out_mask, config.scan, *poses),
         *(config.inputs["pose"], config.inputs["tf_static"]),
         *config.outputs.values(),
         config.velocities(schemas.TWIST),

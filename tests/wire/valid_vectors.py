@@ -40,6 +40,7 @@ def valid_vectors() -> list[Vector]:
         *_valid_poses(),
         *_valid_twists(),
         *_valid_batteries(),
+        *_valid_scans(),
         *_valid_paths(),
         *_valid_tf(),
         *_valid_pheromone(),
@@ -139,6 +140,25 @@ def _valid_batteries() -> list[Vector]:
         )
         for name, told, facts in cases
     ]
+
+
+def _valid_scans() -> list[Vector]:
+    schema = schemas.LASER_SCAN
+    some, none = [1.0, 2.5, 0.25, 8.0, 3.5], [np.inf, 1.5, np.nan, -np.inf, 0.0]
+    cases = [
+        ("scan", some, {"stamp_ns": STAMP_NS, "frame": "laser"}),
+        ("scan_of_one_beam", some[:1], {}),
+        ("scan_without_returns", none, {}),
+        ("scan_with_intensities", some, {"intensities": 5}),
+    ]
+    vectors = []
+    for name, ranges, told in cases:
+        stamped = {"frame": told.get("frame", ""), "stamp_ns": told.get("stamp_ns", 0)}
+        angles = {"first_rad": -1.5, "step_rad": 0.5, "least_m": 0.25, "most_m": 8.0}
+        facts = {"ranges": [m if np.isfinite(m) else None for m in ranges]}
+        payload = oracle.to_bytes(schema, oracle.scan(ranges, **told))
+        vectors.append(Vector(name, schema, payload, {**stamped, **angles, **facts}))
+    return vectors
 
 
 def _valid_paths() -> list[Vector]:

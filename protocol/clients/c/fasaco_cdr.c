@@ -318,6 +318,48 @@ bool fasaco_read_twist_stamped(const uint8_t *payload, size_t size, fasaco_twist
     return read_twist(&r, "twist.", twist);
 }
 
+bool fasaco_read_scan(const uint8_t *payload, size_t size, fasaco_scan *scan,
+                      fasaco_error *error)
+{
+    static const char *const NAMES[] = {"angle_min", "angle_max", "angle_increment",
+                                        "time_increment", "scan_time", "range_min", "range_max"};
+    float floats[7];
+    reader r = begin(payload, size, error);
+    scan->header = read_header(&r, "header");
+    for (int i = 0; i < 7; i++)
+        floats[i] = read_float32(&r, NAMES[i]);
+    scan->first = floats[0], scan->step = floats[2];
+    scan->least = floats[5], scan->most = floats[6];
+    scan->count = read_uint32(&r, "length of ranges");
+    for (int i = 0; i < 7; i++)
+        if (r.ok && (i == 0 || i == 2 || i > 4) && !isfinite(floats[i]))
+            refuse(&r, "%s must be a finite number, got %g", NAMES[i], (double)floats[i]);
+    if (r.ok && (scan->count < 1 || scan->count > FASACO_MAX_SCAN_BEAMS))
+        refuse(&r, "length of ranges must be 1..%u, got %u", FASACO_MAX_SCAN_BEAMS, scan->count);
+    if (r.ok && fabs((double)scan->first) > FASACO_MAX_SCAN_SPAN_RAD)
+        refuse(&r, "angle_min must be within %g of 0, got %g", FASACO_MAX_SCAN_SPAN_RAD,
+               (double)scan->first);
+    double span = r.ok ? fabs((double)scan->step) * (scan->count - 1) : 0;
+    if (r.ok && (span > FASACO_MAX_SCAN_SPAN_RAD || (scan->count > 1 && scan->step == 0)))
+        refuse(&r, "angle_increment must be not 0, and at most %g over all beams, got %g",
+               FASACO_MAX_SCAN_SPAN_RAD, (double)scan->step);
+    if (r.ok && !(scan->least >= 0 && scan->least < scan->most))
+        refuse(&r, "range_min must be at least 0 and below range_max, %g, got %g",
+               (double)scan->most, (double)scan->least);
+    scan->ranges = take(&r, 4, 4 * (size_t)scan->count, "ranges");
+    uint32_t others = read_uint32(&r, "length of intensities");
+    (void)take(&r, 4, 4 * (size_t)others, "intensities");
+    return end(&r);
+}
+
+float fasaco_range(const fasaco_scan *scan, uint32_t i)
+{
+    uint32_t bits = word(scan->ranges + 4 * (size_t)i);
+    float value;
+    memcpy(&value, &bits, sizeof value);
+    return value;
+}
+
 bool fasaco_read_battery(const uint8_t *payload, size_t size, fasaco_battery *battery,
                          fasaco_error *error)
 {

@@ -24,6 +24,8 @@
 #define FASACO_MAX_TRANSFORMS 4096u
 #define FASACO_MAX_GRID_CELLS 64000000u
 #define FASACO_MAX_PATH_POSES 1000000u
+#define FASACO_MAX_SCAN_BEAMS 32768u
+#define FASACO_MAX_SCAN_SPAN_RAD 6.5
 
 /* Why a payload was refused. */
 typedef struct {
@@ -65,6 +67,15 @@ typedef struct {
     float level;   /* charge, from 0 to 1 */
     uint8_t power; /* power_supply_status */
 } fasaco_battery;
+
+/* sensor_msgs/LaserScan: angles in the sensor's frame [rad], ranges [m]. */
+typedef struct {
+    fasaco_header header;
+    float first, step; /* angles */
+    float least, most; /* what the sensor measures; other ranges are none */
+    uint32_t count;
+    const uint8_t *ranges; /* for fasaco_range alone */
+} fasaco_scan;
 
 /* Placement of a grid: origin is the outer corner of cell (0, 0), resolution [m]. */
 typedef struct {
@@ -134,6 +145,10 @@ bool fasaco_read_twist_stamped(const uint8_t *payload, size_t size, fasaco_twist
                                fasaco_error *error);
 bool fasaco_read_battery(const uint8_t *payload, size_t size, fasaco_battery *battery,
                          fasaco_error *error);
+bool fasaco_read_scan(const uint8_t *payload, size_t size, fasaco_scan *scan,
+                      fasaco_error *error);
+/* The range of beam i, below count; it may be infinite or NaN. */
+float fasaco_range(const fasaco_scan *scan, uint32_t i);
 bool fasaco_read_grid(const uint8_t *payload, size_t size, fasaco_grid *grid,
                       fasaco_error *error);
 bool fasaco_read_grid_update(const uint8_t *payload, size_t size, fasaco_grid_update *update,

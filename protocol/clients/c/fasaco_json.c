@@ -137,6 +137,26 @@ static bool show_battery(const uint8_t *payload, size_t size, fasaco_error *erro
     return true;
 }
 
+static bool show_scan(const uint8_t *payload, size_t size, fasaco_error *error)
+{
+    fasaco_scan scan;
+    if (!fasaco_read_scan(payload, size, &scan, error))
+        return false;
+    print_header(&scan.header);
+    printf(", \"first_rad\": %.17g, \"step_rad\": %.17g, \"least_m\": %.17g, \"most_m\": %.17g",
+           (double)scan.first, (double)scan.step, (double)scan.least, (double)scan.most);
+    printf(", \"ranges\": [");
+    for (uint32_t i = 0; i < scan.count; i++) {
+        double range = (double)fasaco_range(&scan, i);
+        if (isfinite(range))
+            printf(i ? ", %.17g" : "%.17g", range);
+        else
+            printf(i ? ", null" : "null");
+    }
+    putchar(']');
+    return true;
+}
+
 static bool show_grid(const uint8_t *payload, size_t size, fasaco_error *error)
 {
     fasaco_grid grid;
@@ -230,6 +250,7 @@ static const struct {
     {"geometry_msgs/msg/Twist", show_twist},
     {"geometry_msgs/msg/TwistStamped", show_twist_stamped},
     {"sensor_msgs/msg/BatteryState", show_battery},
+    {"sensor_msgs/msg/LaserScan", show_scan},
     {"nav_msgs/msg/OccupancyGrid", show_grid},
     {"map_msgs/msg/OccupancyGridUpdate", show_grid_update},
     {"nav_msgs/msg/Path", show_path},

@@ -1,0 +1,103 @@
+"""The robot's laser scan: ranges and angles of sensor_msgs/LaserScan, by a small reader.
+
+As REP 117 has it, a range may be infinite (nothing in reach), minus infinite (too near to measure)
+or NaN (the measurement failed): these are no faults of a message. Intensities are not used.
+"""
+
+from __future__ import annotations
+
+import math
+import struct
+from dataclasses import dataclass
+
+from fasaco_edge.wire.limits import MAX_SCAN_BEAMS, MAX_SCAN_SPAN_RAD
+from fasaco_edge.wire.messages.cdr import CdrReader, CdrWriter, refuse
+from fasaco_edge.wire.messages.fields import read_header, write_header
+from fasaco_edge.wire.schemas import LASER_SCAN
+
+_FLOATS = struct.Struct("<7f")
+_NAMES = (
+    *("angle_min", "angle_max", "angle_increment", "time_increment", "scan_time"),
+    *("range_min", "range_max"),
+)
+# Those that are used.
+_FIRST, _STEP, _LEAST, _MOST = 0, 2, 5, 6
+
+
+@dataclass(frozen=True, slots=True)
+class LaserScan:
+    """A scan.
+
+    Attributes:
+        first_rad: direction of the first beam in the sensor's frame, counter-clockwise [rad].
+        step_rad: from one beam to the next [rad]; negative for a scan that turns clockwise.
+        least_m, most_m: shortest and longest range that the sensor measures [m].
+        ranges: of the beams, in order [m]; one that is not in ``least_m`` to ``most_m`` is none.
+        frame: name of the sensor's frame.
+        stamp_ns: time of the first beam [ns].
+    """
+
+    first_rad: float
+    step_rad: float
+    least_m: float
+    most_m: float
+    ranges: tuple[float, ...]
+    frame: str = ""
+    stamp_ns: int = 0
+
+
+def encode_scan(scan: LaserScan) -> bytes:
+    """Return ``scan`` as a sensor_msgs/LaserScan, without times of beams and intensities.
+
+    Raises:
+        MalformedMessage: the message would be one that ``decode_scan`` refuses.
+    """
+    writer = CdrWriter(LASER_SCAN)
+    write_header(writer, scan.frame, scan.stamp_ns)
+    count = len(scan.ranges)
+    last_rad = scan.first_rad + scan.step_rad * max(count - 1, 0)
+    floats = (scan.first_rad, last_rad, scan.step_rad, 0.0, 0.0, scan.least_m, scan.most_m)
+    _check(floats, count)
+    writer.words(_FLOATS, _NAMES, *floats)
+    writer.uint32(count, "length of ranges")
+    writer.words(struct.Struct(f"<{count}f"), ("ranges",) * count, *scan.ranges)
+    writer.uint32(0, "length of intensities")
+    return writer.payload()
+
+
+def decode_scan(payload: bytes) -> LaserScan:
+    """Return the scan in a sensor_msgs/LaserScan.
+
+    Raises:
+        MalformedMessage: it is no such message, has no beams or more than ``MAX_SCAN_BEAMS``, or
+            its angles or its limits of ranges are none.
+    """
+    reader = CdrReader(payload, LASER_SCAN)
+    frame, stamp_ns = read_header(reader)
+    floats = reader.words(_FLOATS, _NAMES)
+    count = reader.length("ranges", 4)
+    _check(floats, count)
+    start = reader.take(4, 4 * count, "ranges")
+    ranges = struct.unpack_from(f"<{count}f", payload, start)
+    reader.take(4, 4 * reader.length("intensities", 4), "intensities")
+    reader.end()
+    return LaserScan(
+        floats[_FIRST], floats[_STEP], floats[_LEAST], floats[_MOST], ranges, frame, stamp_ns
+    )
+
+
+def _check(floats: tuple[float, ...], count: int) -> None:
+    for index in (_FIRST, _STEP, _LEAST, _MOST):
+        if not math.isfinite(floats[index]):
+            refuse(LASER_SCAN, _NAMES[index], "a finite number", floats[index])
+    if not 1 <= count <= MAX_SCAN_BEAMS:
+        refuse(LASER_SCAN, "length of ranges", f"1..{MAX_SCAN_BEAMS}", count)
+    if abs(floats[_FIRST]) > MAX_SCAN_SPAN_RAD:
+        refuse(LASER_SCAN, "angle_min", f"within {MAX_SCAN_SPAN_RAD:g} of 0", floats[_FIRST])
+    span = abs(floats[_STEP]) * (count - 1)
+    if span > MAX_SCAN_SPAN_RAD or (count > 1 and floats[_STEP] == 0.0):
+        expected = f"not 0, and at most {MAX_SCAN_SPAN_RAD:g} over all beams"
+        refuse(LASER_SCAN, "angle_increment", expected, floats[_STEP])
+    if not 0.0 <= floats[_LEAST] < floats[_MOST]:
+        expected = f"at least 0 and below range_max, {floats[_MOST]:g}"
+        refuse(LASER_SCAN, "range_min", expected, floats[_LEAST])
