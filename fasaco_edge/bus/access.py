@@ -81,7 +81,11 @@ ROLES: Mapping[str, Role] = {
         "receives all but keep-out mask and scans, publishes its status",
         includes="viewer",
     ),
-    "driver": _role("driver", "drives the robot: publishes cmd_vel, and views", includes="viewer"),
+    "driver": _role(
+        "driver",
+        "drives the robot: publishes cmd_vel, says what blocks it, and views",
+        includes="viewer",
+    ),
     # Topics that the configuration names: see ``ros_rights``.
     "ros": Role(
         "publishes maps, updates, poses, battery and scans on ROS 2 topics, sees path, coverage "

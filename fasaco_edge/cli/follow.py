@@ -37,6 +37,9 @@ its topics and velocities go to ros2.topics.cmd_vel; else by the keys `pose` and
 The robot is told to stand, within 0.2 s, while
   the newest pose is older than --pose-age, or is none, or has jumped; of poses from tf, odometry
     is older than --pose-age, or the localiser's transform older than 2 s (or --pose-age, if longer)
+  the configuration has a block scan, and no scan has come for scan.lost_s, or none that can be used
+  something that the map does not show is ahead, by the scan: it slows down before it, and goes on
+    once that is gone
   the path is empty (mission pause, cancel; done), is driven, or is none
   it is further than 0.3 m off the path, or does not move as it is told (three tries in a place and
     a direction, 2 and 4 s apart)
@@ -179,6 +182,8 @@ def settings_of(args: argparse.Namespace) -> FollowSettings:
         ros=_ros_node(ros, schema) if ros else {},
         nav2=_nav2(config) if ros and ros.follow == "nav2" else {},
         dock=_dock(config) if ros and ros.dock == "nav2" else {},
+        scan=_scan(config) if config.scan and not (ros and ros.follow == "nav2") else {},
+        radius_m=robot.radius_m,
         pace=args.speed,
         dry_run=args.dry_run,
     )
@@ -195,6 +200,29 @@ def _ros_poses(ros: RosConfig) -> tuple[PoseSource, ...]:
         for name, topic in ros.inputs.items()
         if name in ("pose", TF_STATIC)
     )
+
+
+def _scan(config: DaemonConfig) -> dict[str, object]:
+    scan, ros = config.scan, config.ros2
+    assert scan
+    heard = {"scan": ros.scan, **ros.inputs} if ros else {}
+    return {
+        "mount": {
+            "x": scan.x_m,
+            "y": scan.y_m,
+            "yaw": math.radians(scan.yaw_deg),
+            "upside_down": scan.upside_down,
+        },
+        "radius_m": config.robot.radius_m,
+        "lost_s": scan.lost_s,
+        "free_at_most": config.map.free_at_most,
+        "most_pixels": config.map.max_pixels,
+        "topics": [
+            (name, ros.input_key(topic), topic.latched, topic.depth)
+            for name, topic in heard.items()
+            if ros and name in ("scan", "map", "map_update")
+        ],
+    }
 
 
 def _ros_node(ros: RosConfig, schema: str) -> dict[str, object]:

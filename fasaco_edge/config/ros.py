@@ -28,8 +28,8 @@ _MAX_PREFIX_LENGTH = _MAX_TOPIC_LENGTH - len("/resume")
 DEFAULT_NODE = "fasaco_edge"
 # As rclcpp's services have it.
 SERVICE_DEPTH = 10
-# What a follower hears of them.
-POSES = ("pose", TF_STATIC)
+# What a follower needs of them: poses, and maps to compare scans with.
+OF_DRIVER = ("map", "map_update", "pose", TF_STATIC)
 
 
 class RosTopicNames(Section, frozen=True):
@@ -182,8 +182,8 @@ class RosConfig(Section, frozen=True):
 
     def driver_rights(self) -> Role:
         """Return what those may do that have the role ``driver``."""
-        poses = [topic for name, topic in self.inputs.items() if name in POSES]
-        said = [*map(self.input_key, (*poses, self.scan))]
+        heard = [topic for name, topic in self.inputs.items() if name in OF_DRIVER]
+        said = [*map(self.input_key, (*heard, self.scan))]
         return ros_rights(self._driven_by, said, self._graph)
 
     @property

@@ -14,7 +14,7 @@ from typing import Any, TypeGuard
 
 from fasaco_edge.bus.arrival import Sample
 from fasaco_edge.bus.claim import ID
-from fasaco_edge.wire.limits import MAX_JSON_BYTES
+from fasaco_edge.wire.limits import MAX_JSON_BYTES, MAX_JSON_INTEGER
 
 # Most daemons whose samples are kept; beyond that those of the one that came first are dropped.
 MOST_DAEMONS = 16
@@ -33,12 +33,14 @@ class News:
         planner: its id; "" if none plans.
         status_at: arrival of its newest status [s]; None without a new one.
         path: its newest path; None without a new one.
+        revision: of the newest path that came; 0 where that is not known.
         unnamed: newest path that names no daemon; None without a new one.
     """
 
     planner: str
     status_at: float | None = None
     path: Sample | None = None
+    revision: int = 0
     unnamed: Sample | None = None
 
 
@@ -49,6 +51,7 @@ class _Daemon:
     status_at: float | None = None
     state: str = ""
     path: Sample | None = None
+    revision: int = 0
 
 
 class Daemons:
@@ -90,10 +93,12 @@ class Daemons:
 
     def take_path(self, sample: Sample) -> None:
         """Take in a path."""
-        own = _object(sample.attachment).get("daemon")
+        attachment = _object(sample.attachment)
+        own, revision = attachment.get("daemon"), attachment.get("revision")
         with self._lock:
             if _is_id(own):
-                self._daemon(own).path = sample
+                daemon = self._daemon(own)
+                daemon.path, daemon.revision = sample, revision if _is_count(revision) else 0
             else:
                 self._unnamed = sample
 
@@ -105,6 +110,7 @@ class Daemons:
             if (daemon := self._daemons.get(news.planner)) is not None:
                 news.status_at, daemon.status_at = daemon.status_at, None
                 news.path, daemon.path = daemon.path, None
+                news.revision = daemon.revision
             return news
 
     @property
@@ -127,6 +133,10 @@ class Daemons:
 
 def _is_id(value: object) -> TypeGuard[str]:
     return isinstance(value, str) and ID.fullmatch(value) is not None
+
+
+def _is_count(value: object) -> TypeGuard[int]:
+    return type(value) is int and 0 <= value <= MAX_JSON_INTEGER
 
 
 def _object(payload: bytes) -> dict[str, Any]:

@@ -12,6 +12,8 @@ from fasaco_edge.follow.estimate import STAND, Command, Limits, PoseEstimate
 from fasaco_edge.follow.grip import Grip
 from fasaco_edge.follow.pursuit import Pursuit
 from fasaco_edge.follow.route import Joining, Route
+from fasaco_edge.follow.sight import AHEAD_M, Limit, Sight
+from fasaco_edge.follow.standstill import floor_ahead
 from fasaco_edge.follow.supervision import USUAL, Patience, State, Supervision
 from fasaco_edge.grid.geometry import Pose2D
 from fasaco_edge.wire.messages.path_points import PathPoints
@@ -33,12 +35,23 @@ class Follower(Supervision):
         limits: of the base.
         patience: timeouts of pose and status.
         moves: whether the base executes the commands; in a dry run it does not.
+        sight: by which it keeps clear of what the map does not show; None for the map alone.
+        radius: of the robot's disc [m]; 0 where that is not known.
     """
 
-    def __init__(self, limits: Limits, patience: Patience = USUAL, *, moves: bool = True) -> None:
+    def __init__(
+        self,
+        limits: Limits,
+        patience: Patience = USUAL,
+        *,
+        moves: bool = True,
+        sight: Sight | None = None,
+        radius: float = 0.0,
+    ) -> None:
         super().__init__(patience)
         self._limits = limits
         self._moves = moves
+        self._sight, self._radius = sight, radius
         self._estimate = PoseEstimate(limits)
         self._pursuit = Pursuit(limits, 1.0 / RATE_HZ)
         self._grip = Grip()
@@ -53,9 +66,14 @@ class Follower(Supervision):
         """Return the command to send now; None for none."""
         if self._stepped_at is not None:
             self._pursuit.passed(now - self._stepped_at)
-        self._stepped_at = now
+        self._stepped_at, self.ahead = now, ()
         try:
             self.state, self.detail = self._trouble(now)
+            if self.state is State.DRIVING and self._sight is not None:
+                self.state, self.detail = self._sight.trouble(self._path_frame, now) or (
+                    State.DRIVING,
+                    "",
+                )
             command = self._steer(now) if self.state is State.DRIVING else None
         except MalformedMessage as error:
             # The rest of the path is malformed.
@@ -71,6 +89,11 @@ class Follower(Supervision):
         if command is None and now - self._driven_at <= ZEROS_S:
             return STAND
         return command
+
+    def take_scan(self, payload: bytes, now: float) -> None:
+        """Take in a scan on arrival; before the first pose it cannot be placed."""
+        if self._sight is not None and self._estimate.pose_at is not None:
+            self._sight.take_scan(payload, self._estimate.at(now - self._estimate.delay), now)
 
     def _moved_to(self, pose: Pose2D, now: float) -> None:
         self._estimate.take(pose, now)
@@ -115,12 +138,24 @@ class Follower(Supervision):
         toward = self._route.toward(here, LEADS_M)
         if leg is not None and self._grip.is_lost(self._estimate, toward, now):
             self.state, self.detail = State.NOT_MOVING, self._grip.detail
+            self.ahead = floor_ahead(here, toward, self._radius)
             return None
         if leg is not None and (off := leg.distance(here)) > OFF_PATH_M:
             self.state, self.detail = State.OFF_PATH, f"by {off:.2f} m"
             return None
-        command = self._pursuit.steer(pose, self._route)
+        limit = self._limit(pose, self._route)
+        command = self._pursuit.steer(pose, self._route, limit.speed)
         if self._route.leg is None:
             self.state = State.DRIVEN
             return None
+        if limit.speed == 0.0 and command == STAND and not self._pursuit.is_turning:
+            self.state, self.detail = State.OBSTACLE, limit.why
+            self.ahead = self._sight.around(limit.thing) if self._sight is not None else ()
         return command
+
+    def _limit(self, pose: Pose2D, route: Route) -> Limit:
+        """Return what the scan allows."""
+        if self._sight is None or not self._sight.things:
+            return Limit(math.inf)
+        line = route.line_ahead((pose.x, pose.y), AHEAD_M)
+        return self._sight.limit(pose, line, self._limits.acceleration, 1.0 / RATE_HZ)

@@ -35,7 +35,11 @@ def patience_of(settings: FollowSettings) -> Patience:
 
 
 class Inputs:
-    """Subscribes, and passes the inputs since the last cycle to a follower."""
+    """Subscribes, and passes the inputs since the last cycle to a follower.
+
+    Attributes:
+        planner, revision: the daemon that plans, "" for none, and the revision of its newest path.
+    """
 
     def __init__(self, settings: FollowSettings, bus: Bus) -> None:
         real = settings.pace == 1.0
@@ -45,6 +49,8 @@ class Inputs:
         self._publisher = OnePublisher("poses", topics.POSE.one_publisher_s, bus)
         self._conflict = ""
         self._daemons = Daemons()
+        # The daemon that plans, and the revision of its newest path.
+        self.planner, self.revision = "", 0
         keys = Keys(settings.robot, settings.base)
         for source in settings.poses:
             bus.subscribe(source.key, self._pose_taker(source), source.latched, source.depth)
@@ -56,6 +62,10 @@ class Inputs:
         """Return the time by the clock of the robot's seconds [s]."""
         return self._clock.at(time.monotonic())
 
+    def time_of(self, came_at: float) -> float:
+        """Return the same for an arrival, by the computer's monotonic clock [s]."""
+        return self._clock.at(came_at)
+
     @property
     def daemon_state(self) -> str:
         """The state of the daemon that plans, by its newest status; "" for none."""
@@ -64,6 +74,7 @@ class Inputs:
     def feed(self, follower: Supervision) -> None:
         """Pass the inputs to a follower."""
         news = self._daemons.news()
+        self.planner, self.revision = news.planner, news.revision
         follower.take_planner(news.planner)
         if news.status_at is not None:
             follower.heard_status(news.status_at)

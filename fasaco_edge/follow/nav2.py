@@ -17,6 +17,7 @@ from fasaco_edge.errors import MalformedMessage
 from fasaco_edge.follow.goals import COAST_M, TIP_M, Goal, PathDriven
 from fasaco_edge.follow.nav2_requests import AskResult, Cancellations, Request, SendGoal
 from fasaco_edge.follow.pieces import STEP_M, Line, end_of_piece
+from fasaco_edge.follow.standstill import floor_ahead
 from fasaco_edge.follow.supervision import Patience, State, Supervision
 from fasaco_edge.follow.tries import Tries
 from fasaco_edge.grid.geometry import Point, Pose2D
@@ -77,12 +78,19 @@ class Nav2Follower(Supervision):
         speed: of the robot [m/s].
         new_id: makes the id of a goal.
         patience: timeouts of pose and status.
+        radius: of the robot's disc [m]; 0 where that is not known.
     """
 
     def __init__(
-        self, near: float, speed: float, new_id: Callable[[], bytes], patience: Patience
+        self,
+        near: float,
+        speed: float,
+        new_id: Callable[[], bytes],
+        patience: Patience,
+        radius: float = 0.0,
     ) -> None:
         super().__init__(patience)
+        self._radius = radius
         self.tally = Tally()
         self._near = near
         self._ahead = AHEAD_M + AHEAD_S * speed
@@ -109,7 +117,7 @@ class Nav2Follower(Supervision):
 
     def step(self, now: float) -> list[Request]:
         """Return the requests to Nav2 now."""
-        self._requests = []
+        self._requests, self.ahead = [], ()
         try:
             self.state, self.detail = self._trouble(now)
             if self.state is State.DRIVING:
@@ -121,6 +129,8 @@ class Nav2Follower(Supervision):
             self._have_none(State.BAD_PATH, str(error))
             self.state, self.detail = State.BAD_PATH, str(error)
             self._stop()
+        if self.state in (State.STANDS, State.GIVEN_UP) and self._path and self._here:
+            self.ahead = floor_ahead(self._here, self._toward(self._path), self._radius)
         return self._requests + self._cancellations.due(now)
 
     def end(self) -> list[Request]:

@@ -53,7 +53,9 @@ class Nav2Node:
         self._release: Release = nav2["release"]
         new_id = partial(os.urandom, GOAL_ID_BYTES)
         speed = settings.speed_m_s
-        self._follower = Nav2Follower(nav2["near_m"], speed, new_id, patience_of(settings))
+        self._follower = Nav2Follower(
+            nav2["near_m"], speed, new_id, patience_of(settings), settings.radius_m
+        )
         self._inputs = Inputs(settings, bus)
         self._states = StateLog()
         # Replies of Nav2, from Zenoh's threads.
@@ -69,8 +71,10 @@ class Nav2Node:
         self._take_answers()
         self._inputs.feed(self._follower)
         self._role.turn(self._inputs, self._follower)
-        for request in self._follower.step(self._inputs.now()):
+        now = self._inputs.now()
+        for request in self._follower.step(now):
             self._ask(request)
+        self._role.report(self._inputs, self._follower, now)
         self._states.note(self._follower.state, self._follower.detail)
 
     def end(self) -> None:

@@ -16,10 +16,13 @@ from fasaco_edge.follow.base_claim import BaseClaim
 from fasaco_edge.follow.estimate import STAND, Command, Limits
 from fasaco_edge.follow.follower import RATE_HZ, Follower
 from fasaco_edge.follow.inputs import Inputs, patience_of
+from fasaco_edge.follow.scan_inputs import ScanInputs
 from fasaco_edge.follow.settings import FollowSettings
+from fasaco_edge.follow.standstill import Standstill, report_of
 from fasaco_edge.follow.supervision import State, Supervision
 from fasaco_edge.host.processes import release_unused
 from fasaco_edge.wire import topics
+from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.messages.twists import Velocity, encode_velocity
 from fasaco_edge.wire.schemas import TWIST_STAMPED
 from fasaco_edge.wire.topic_types import VOLATILE
@@ -106,12 +109,21 @@ def _take_turns(node: Node, period_s: float, stop: threading.Event) -> None:
 
 
 class Role:
-    """The follower's right to the base, and what has Nav2 dock the robot."""
+    """The right to the base, the report to the daemon, and what has Nav2 dock the robot."""
 
     def __init__(self, bus: Bus, settings: FollowSettings) -> None:
         self._claim = None if settings.dry_run else BaseClaim(bus, settings)
         self._docking = docking_of(bus, settings)
+        keys = Keys(settings.robot, settings.base)
+        self._blocked = None if settings.dry_run else bus.advertise(keys, topics.BLOCKED)
+        self._standstill = Standstill()
         self.is_on_standby = self._claim is not None
+
+    def report(self, inputs: Inputs, follower: Supervision, now: float) -> None:
+        """Tell the daemon what keeps the robot from driving its path, if anything does."""
+        held_s = self._standstill.look(follower, now)
+        if held_s is not None and self._blocked is not None and not self.is_on_standby:
+            self._blocked.put(report_of(follower, held_s, inputs.planner, inputs.revision))
 
     def turn(self, inputs: Inputs, follower: Supervision) -> None:
         """Run a cycle: have the follower stand by while another one drives; dock."""
@@ -139,6 +151,7 @@ class FollowerNode:
         self._settings = settings
         self._out = out
         self._report = report
+        self._scans = ScanInputs(settings, bus) if settings.scan else None
         self._follower = Follower(
             Limits(
                 settings.speed_m_s,
@@ -149,6 +162,8 @@ class FollowerNode:
             ),
             patience_of(settings),
             moves=not settings.dry_run,
+            radius=settings.radius_m,
+            sight=self._scans.sight if self._scans is not None else None,
         )
         self._inputs = Inputs(settings, bus)
         self._role = Role(bus, settings)
@@ -160,11 +175,14 @@ class FollowerNode:
         """Take the inputs, and send the resulting command."""
         follower = self._follower
         self._inputs.feed(follower)
+        if self._scans is not None:
+            self._scans.feed(follower, self._inputs.time_of)
         now = self._inputs.now()
         if self._settings.pace != 1.0 and not self._is_due(now):
             return
         self._role.turn(self._inputs, follower)
         command = follower.step(now)
+        self._role.report(self._inputs, follower, now)
         if command is not None:
             self._send(command)
         if self._states.note(follower.state, follower.detail):

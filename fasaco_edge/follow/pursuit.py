@@ -60,13 +60,18 @@ class Pursuit:
         """Note that the robot was commanded to stop at once."""
         self._is_turning, self.last = True, STAND
 
+    @property
+    def is_turning(self) -> bool:
+        """Whether the robot turns on the spot, or comes to rest to turn."""
+        return self._is_turning
+
     def brake(self) -> Command:
         """Return the next command of braking."""
         self._is_turning, self.last = True, Command(self._braked(), self._toward(0.0))
         return self.last
 
-    def steer(self, pose: Pose2D, route: Route) -> Command:
-        """Return the next command; ``STAND`` once the route is driven."""
+    def steer(self, pose: Pose2D, route: Route, most: float = math.inf) -> Command:
+        """Return the next command, at most so fast [m/s]; ``STAND`` once the route is driven."""
         limits = self._limits
         here = (pose.x, pose.y)
         route.pass_bends(here)
@@ -92,7 +97,7 @@ class Pursuit:
         if self._is_turning:
             self.last = self._turned(error)
         else:
-            self.last = self._driven(error, math.dist(here, (x, y)), to_stop)
+            self.last = self._driven(error, math.dist(here, (x, y)), to_stop, most)
         return self.last
 
     def _turned(self, error: float) -> Command:
@@ -107,10 +112,10 @@ class Pursuit:
             goal = math.copysign(rate, side)
         return Command(speed, self._toward(goal))
 
-    def _driven(self, error: float, ahead: float, to_stop: float) -> Command:
+    def _driven(self, error: float, ahead: float, to_stop: float, most: float) -> Command:
         limits, period = self._limits, self._period
         curvature = 2.0 * math.sin(error) / max(ahead, LOOKAHEAD_M)
-        most = min(limits.speed, limits.turn_rate / max(abs(curvature), 1e-9))
+        most = min(limits.speed, most, limits.turn_rate / max(abs(curvature), 1e-9))
         left = max(to_stop - self.last.speed * self._late, 0.0)
         goal = min(most, stopping_rate(left, limits.acceleration, period))
         speed = min(max(goal, self._braked()), self.last.speed + limits.acceleration * period)

@@ -138,6 +138,18 @@ class Route:
             leg, index = after, index + 1
         return leg.at(to)
 
+    def line_ahead(self, here: Point, ahead: float) -> list[Point]:
+        """Return the corners of the route from ``here`` on, at most ``ahead`` further [m]."""
+        line, index = [here], 0
+        while ahead > 0.0 and (leg := self._leg(index)):
+            length = math.dist(line[-1], leg.end)
+            share = min(ahead / length, 1.0) if length > 0.0 else 1.0
+            (x0, y0), (x1, y1) = line[-1], leg.end
+            line.append((x0 + share * (x1 - x0), y0 + share * (y1 - y0)))
+            ahead -= length
+            index += 1
+        return line
+
     def toward(self, here: Point, ahead: float) -> float:
         """Return the direction from ``here`` to the point ``ahead`` along the route [rad].
 

@@ -50,6 +50,10 @@ class FollowSettings:
             distance of goals to themselves [m].
         dock: if Nav2's docking server docks: names of its actions, dock, its type, frame, pose x,
             y [m], yaw [rad], and how far in front of it paths end [m].
+        scan: if scans are used: where the lidar is (``mount``), ``radius_m`` of the robot,
+            ``lost_s``, ``free_at_most``, ``most_pixels`` of a map, and further topics of scans,
+            maps and updates: name, key, whether it is latched, depth.
+        radius_m: of the robot's disc; 0 where that is not known.
         pace: simulated seconds in a second.
         dry_run: report commands instead of sending them.
     """
@@ -72,7 +76,9 @@ class FollowSettings:
     ros: Mapping[str, Any] = field(default_factory=dict)
     nav2: Mapping[str, Any] = field(default_factory=dict)
     dock: Mapping[str, Any] = field(default_factory=dict)
+    scan: Mapping[str, Any] = field(default_factory=dict)
     secured: Mapping[str, Any] = field(default_factory=dict, repr=False)
+    radius_m: float = 0.0
     pace: float = 1.0
     dry_run: bool = False
 

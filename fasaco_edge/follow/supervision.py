@@ -11,7 +11,7 @@ from abc import abstractmethod
 from dataclasses import dataclass
 
 from fasaco_edge.errors import FasacoError, MalformedMessage
-from fasaco_edge.grid.geometry import Pose2D, StampedPose
+from fasaco_edge.grid.geometry import Point, Pose2D, StampedPose
 from fasaco_edge.wire.messages.path_points import PathPoints
 from fasaco_edge.wire.messages.poses import Link
 
@@ -29,6 +29,9 @@ class State(enum.Enum):
     BAD_PATH = "path refused"
     PATH_ELSEWHERE = "path elsewhere"
     OFF_PATH = "off the path"
+    OBSTACLE = "obstacle ahead"
+    NO_SCAN = "no scan"
+    BAD_SCAN = "scan refused"
     DOCK = "left to the docking server"
     NOT_MOVING = "does not move as told"
     NO_POSE = "no pose"
@@ -76,9 +79,11 @@ class Supervision:
     Attributes:
         state: of the robot.
         detail: the same in figures, for people.
+        ahead: places of what the robot stands before [m], the nearest first; () for none.
     """
 
     def __init__(self, patience: Patience) -> None:
+        self.ahead: tuple[Point, ...] = ()
         self.state, self.detail = State.NO_DAEMON, ""
         self._patience = patience
         self._held = ""
@@ -156,6 +161,11 @@ class Supervision:
     def newest_pose(self) -> Pose2D | None:
         """The newest pose; None before there is one."""
         return self._newest
+
+    @property
+    def path_frame(self) -> str:
+        """Name of the frame of the path."""
+        return self._path_frame
 
     @property
     def has_path(self) -> bool:

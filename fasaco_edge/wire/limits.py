@@ -57,3 +57,7 @@ MAX_FLEET_INDEX: Final = geometry.MOST_INDEX
 """Magnitude of a cell's row and column: as far as any lattice reaches."""
 MAX_FLEET_POINTS: Final = 64
 """Of a robot's next metres."""
+MAX_BLOCKED_BYTES: Final = 16_384
+"""Longest report of a robot that is blocked."""
+MAX_BLOCKED_POINTS: Final = 64
+"""Of what is ahead of a robot that is blocked."""

@@ -23,7 +23,7 @@ MAP = Topic(
     direction="in",
     when="the map is new, or has grown or moved",
     speaker="mapper",
-    listeners=("robot", "recorder"),
+    listeners=("robot", "recorder", "driver"),
     schemas=(schemas.OCCUPANCY_GRID,),
     qos=Qos("data_high", cache=1),
     queues=Queues(daemon=4, recorder=NEWEST, watch=NEWEST),
@@ -36,7 +36,7 @@ MAP_UPDATE = Topic(
     direction="in",
     when="a window of the last map has changed",
     speaker="mapper",
-    listeners=("robot", "recorder"),
+    listeners=("robot", "recorder", "driver"),
     schemas=(schemas.OCCUPANCY_GRID_UPDATE,),
     qos=Qos(
         "data_high",
@@ -120,6 +120,22 @@ CMD_VEL = Topic(
     schemas=schemas.TWIST_SCHEMAS,
     qos=Qos(
         "interactive_high", express=True, why="the next velocity is better than one sent again"
+    ),
+)
+BLOCKED = Topic(
+    name="blocked",
+    direction="out, by the follower",
+    when="once a second while the follower has stood for some seconds for what keeps it from "
+    "driving its path",
+    speaker="driver",
+    listeners=("robot", "viewer"),
+    json="blocked.json",
+    qos=Qos("interactive_low"),
+    queues=Queues(daemon=16, recorder=EVERY),
+    is_input=True,
+    limits=(
+        *("max_blocked_bytes", "max_string_bytes", "max_coordinate_m"),
+        *("max_blocked_points", "queue_blocked"),
     ),
 )
 DRIVER = Topic(
@@ -280,7 +296,7 @@ TOPICS = (
     *(MAP, MAP_UPDATE, POSE, BATTERY, KEEP_OUT_MASK, SCAN),
     *(PATH, COVERAGE, FLOOR, PHEROMONE, DIRECTIONS, STATUS, COMMAND, TURNS, FLEET, ALIVE, CLAIM),
     *(RECORDER, RECORDER_ALIVE),
-    *(CMD_VEL, DRIVER),
+    *(CMD_VEL, BLOCKED, DRIVER),
 )
 # These keep the order of their one publisher: an update changes the map before it.
 IN_ORDER = frozenset({MAP.name, MAP_UPDATE.name})

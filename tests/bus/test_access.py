@@ -58,7 +58,7 @@ def test_what_a_robot_says_and_hears_is_what_the_contract_says():
     assert set(access.ROLES["mapper"].speaks) == incoming
     # A follower's alone.
     assert set(access.ROLES["robot"].listens) == incoming - {"scan"} | {
-        *("recorder", "recorder/alive", "claim/*/*"),
+        *("recorder", "recorder/alive", "claim/*/*", "blocked"),
     }
 
 

@@ -3,6 +3,7 @@
 import os
 import subprocess
 import sys
+import threading
 import time
 from pathlib import Path
 
@@ -13,10 +14,11 @@ from fasaco_edge.bus.session import open_bus
 from fasaco_edge.bus.settings import BusSettings
 from fasaco_edge.follow.estimate import Command
 from fasaco_edge.host.processes import own_mb
-from fasaco_edge.wire import schemas
+from fasaco_edge.wire import schemas, topics
 from fasaco_edge.wire.messages.twists import decode_velocity
 from tests.campaigns import stop_tries
 from tests.campaigns.raw_messages import transform
+from tests.follow.seeing import Disc, plain_map, scan_at
 from tests.support.driven_base import DrivenBase, follower_process
 from tests.support.processes import ENVIRONMENT, PROGRAM, free_endpoint, resident_mb
 
@@ -273,3 +275,36 @@ def test_the_environment_says_which_robot_and_where(base):
             base.wait_until_it_moves()
         finally:
             process.terminate()
+
+
+def test_it_takes_scans_and_compares_them_with_the_map(base, tmp_path):
+    """Somebody stands in the way, and goes; the process stays small, and stops without scans."""
+    config = tmp_path / "config.yaml"
+    config.write_text("scan: {lost_s: 1.0}\n")
+    maps, scans = (base.bus.advertise(base.keys, topic) for topic in (topics.MAP, topics.SCAN))
+    person, ends = [Disc(1.0, 0.0)], threading.Event()
+
+    def send_scans():
+        while not ends.wait(0.1):
+            scans.put(scan_at(base.pose, person))
+
+    base.plans()
+    base.send_path(*AHEAD)
+    log = tmp_path / "log"
+    with follower_process(base.endpoint, log, "--config", str(config)) as process:
+        until(lambda: "no scan: no map to compare scans with" in log.read_text())
+        maps.put(plain_map())
+        sender = threading.Thread(target=send_scans)
+        sender.start()
+        try:
+            until(lambda: "obstacle ahead" in log.read_text())
+            assert 0.3 < base.pose.x < 0.7
+            mapped = Path(f"/proc/{process.pid}/maps").read_text()
+            assert not any(name in mapped for name in ("numpy", "numba", "msgspec"))
+            person.clear()
+            until(lambda: base.pose.x > 1.0)
+        finally:
+            ends.set()
+            sender.join()
+        until(lambda: "no scan: for 1." in log.read_text())
+        until(lambda: base.newest() in (None, Command()))

@@ -17,6 +17,7 @@ import msgspec
 
 from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.mission.orders.order import CommandDocument
+from fasaco_edge.wire.documents.blocked import Blocked
 from fasaco_edge.wire.documents.fleet import FleetMember
 from fasaco_edge.wire.documents.path_documents import PathAttachment, TrailAttachment
 from fasaco_edge.wire.documents.replies import Error, Replan, Reply, Version
@@ -28,6 +29,7 @@ HEAD = {
     "$comment": "Written by `make contract` from the typed documents of fasaco_edge.",
 }
 DOCUMENTS = {
+    "blocked": Blocked,
     "error": Error,
     "fleet": FleetMember,
     "mission": CommandDocument,

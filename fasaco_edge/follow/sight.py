@@ -1,0 +1,197 @@
+"""Sight: what the lidar sees and the map does not show, and how fast the robot may go by it.
+
+Walls of the map are not looked at: the path keeps clear of them, by a centimetre where floor is to
+be swept beside them, which is less than ranges scatter. What the map does not show is kept clear of
+by a margin. What has stood in its place for a while is taken for a thing; anything else may move.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from fasaco_edge.errors import MalformedMessage
+from fasaco_edge.follow.free_way import Thing, first_met, speed_before, speed_beside
+from fasaco_edge.follow.known_map import KnownMap
+from fasaco_edge.follow.scanner import Mount, points_of
+from fasaco_edge.follow.supervision import State
+from fasaco_edge.grid.geometry import Point, Pose2D
+from fasaco_edge.wire.messages.scans import decode_scan
+
+# The path is looked at so far ahead [m].
+AHEAD_M = 1.5
+# What was seen in its place, a square of this edge [m] or beside it, for so long [s] stands; it is
+# forgotten where it has not been seen for so long [s].
+PLACE_M, STANDS_S, FORGET_S = 0.1, 1.5, 1.0
+# What is nearer to the robot's middle is the robot itself, as a share of its radius.
+OWN_SHARE = 0.7
+# What is reported of a thing: what was seen within this distance of it [m].
+AROUND_M = 0.5
+# A speed below this is none [m/s].
+LEAST_M_S = 0.02
+
+Trouble = tuple[State, str]
+
+
+@dataclass(frozen=True, slots=True)
+class SightSettings:
+    """What the follower knows of lidar and robot.
+
+    Attributes:
+        mount: where the lidar is.
+        radius: of the robot's disc [m].
+        lost_s: after so long without a scan the robot stands [s].
+        free_at_most: occupancy up to which a pixel of the map is free [percent].
+    """
+
+    mount: Mount
+    radius: float
+    lost_s: float = 1.0
+    free_at_most: int = 25
+
+    @classmethod
+    def of(cls, settings: Mapping[str, Any]) -> SightSettings:
+        """Return those in the member ``scan`` of the follower's settings."""
+        mount = Mount(**settings["mount"])
+        return cls(mount, settings["radius_m"], settings["lost_s"], settings["free_at_most"])
+
+
+@dataclass(frozen=True, slots=True)
+class Limit:
+    """What the sight allows.
+
+    Attributes:
+        speed: the highest [m/s]; infinite without a limit.
+        why: what limits it, for people.
+        thing: the same; None for none.
+    """
+
+    speed: float
+    why: str = ""
+    thing: Thing | None = None
+
+
+class Sight:
+    """Keeps the newest scan, without what the map shows.
+
+    Attributes:
+        things: what it shows, in the map frame.
+    """
+
+    def __init__(self, settings: SightSettings) -> None:
+        self.things: list[Thing] = []
+        self._settings = settings
+        self._map = KnownMap(settings.free_at_most)
+        self._scan_at: float | None = None
+        self._stamp_ns = 0
+        self._fault: Trouble | None = None
+        # Squares with something that the map does not show: since when, and when last [s].
+        self._seen: dict[tuple[int, int], tuple[float, float]] = {}
+
+    def take_map(self, payload: bytes, *, is_update: bool = False) -> None:
+        """Take in a map, or an update of it; one that is malformed is ignored, as by the daemon."""
+        try:
+            if is_update:
+                self._map.take_update(payload)
+            else:
+                self._map.take_map(payload)
+        except MalformedMessage:
+            return
+
+    def take_scan(self, payload: bytes, pose: Pose2D, now: float) -> None:
+        """Take in a scan that was made at ``pose``; one with the previous stamp is not new."""
+        try:
+            scan = decode_scan(payload)
+        except MalformedMessage as error:
+            self._fault = State.BAD_SCAN, str(error)
+            return
+        if scan.stamp_ns and scan.stamp_ns == self._stamp_ns:
+            return
+        self._stamp_ns = scan.stamp_ns
+        points = points_of(scan, self._settings.mount)
+        if points is None:
+            self._fault = State.BAD_SCAN, "it sees nothing: is the lidar covered?"
+            return
+        self._fault, self._scan_at = None, now
+        self._look(points, pose, now)
+
+    def trouble(self, frame: str, now: float) -> Trouble | None:
+        """Return why the robot must stand, with figures; None if it can see.
+
+        Args:
+            frame: of the path.
+            now: the time [s].
+        """
+        if self._fault is not None:
+            return self._fault
+        if self._map.frame is None:
+            return State.NO_SCAN, "no map to compare scans with"
+        if self._map.frame != frame:
+            return State.NO_SCAN, f"map in {self._map.frame!r}, path in {frame!r}"
+        if self._scan_at is None:
+            return State.NO_SCAN, "none has come"
+        if (age_s := now - self._scan_at) > self._settings.lost_s:
+            return State.NO_SCAN, f"for {age_s:.1f} s"
+        return None
+
+    def limit(
+        self, pose: Pose2D, line: Sequence[Point], acceleration: float, period: float
+    ) -> Limit:
+        """Return what the scan allows along a line.
+
+        Args:
+            pose: the robot's.
+            line: the path from there, ``AHEAD_M`` long, or shorter where it ends.
+            acceleration: of the base [m/s^2].
+            period: from one command to the next [s].
+        """
+        if not self.things:
+            return Limit(math.inf)
+        radius = self._settings.radius
+        speed, thing = speed_beside(self.things, pose, radius, acceleration)
+        why = "something moves"
+        met = first_met(self.things, line, radius) if len(line) > 1 else None
+        if met is not None and (ahead := speed_before(met.way, acceleration, period)) < speed:
+            speed, thing, why = ahead, met.thing, "something stands"
+        if thing is None:
+            return Limit(math.inf)
+        far = max(math.dist((pose.x, pose.y), thing[:2]) - radius, 0.0)
+        return Limit(speed if speed >= LEAST_M_S else 0.0, f"{why} {far:.2f} m away", thing)
+
+    def around(self, thing: Thing | None) -> tuple[Point, ...]:
+        """Return what was seen within ``AROUND_M`` of a thing, places [m], the nearest first."""
+        if thing is None:
+            return ()
+        apart = sorted((math.dist(thing[:2], other[:2]), other[:2]) for other in self.things)
+        return tuple(place for far, place in apart if far <= AROUND_M)
+
+    def _look(self, points: list[Point], pose: Pose2D, now: float) -> None:
+        """Keep what no map shows, and tell what stands from what may move."""
+        cos, sin = math.cos(pose.yaw), math.sin(pose.yaw)
+        own = OWN_SHARE * self._settings.radius
+        places: dict[tuple[int, int], list[Point]] = {}
+        for x, y in points:
+            if math.hypot(x, y) < own:
+                continue
+            there = pose.x + cos * x - sin * y, pose.y + sin * x + cos * y
+            if not self._map.shows(*there):
+                square = math.floor(there[0] / PLACE_M), math.floor(there[1] / PLACE_M)
+                places.setdefault(square, []).append(there)
+        known = {at: times for at, times in self._seen.items() if now - times[1] <= FORGET_S}
+        self.things = [
+            Thing(x, y, now - self._since(known, square, now) < STANDS_S)
+            for square, found in places.items()
+            for x, y in found
+        ]
+        self._seen = known | {at: (known[at][0] if at in known else now, now) for at in places}
+
+    @staticmethod
+    def _since(
+        known: Mapping[tuple[int, int], tuple[float, float]], square: tuple[int, int], now: float
+    ) -> float:
+        """Return since when something was seen in a square, or in one beside it [s]."""
+        col, row = square
+        around = ((col + right, row + up) for right in (-1, 0, 1) for up in (-1, 0, 1))
+        return min((known[at][0] for at in around if at in known), default=now)

@@ -1,0 +1,101 @@
+"""Standstill: how long something has kept the robot from driving, and the report of that.
+
+A robot that gets by, or another path that leads it away, ends it. What the daemon can do is
+to plan around what is ahead, or anew from where the robot is.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from typing import Final, Literal
+
+from fasaco_edge.follow.supervision import State, Supervision
+from fasaco_edge.grid.geometry import Point
+from fasaco_edge.text import one_line
+from fasaco_edge.wire.limits import MAX_BLOCKED_POINTS, MAX_STRING_BYTES
+
+Reason = Literal["obstacle", "stuck", "elsewhere"]
+
+# What is reported, and after how long [s]. A base that does not move is let rest for 2, then 4 s.
+REASONS: Final[dict[State, tuple[Reason, float]]] = {
+    State.OBSTACLE: ("obstacle", 5.0),
+    State.NOT_MOVING: ("stuck", 3.0),
+    State.STANDS: ("stuck", 5.0),
+    State.GIVEN_UP: ("stuck", 1.0),
+    State.PATH_ELSEWHERE: ("elsewhere", 2.0),
+    State.OFF_PATH: ("elsewhere", 2.0),
+}
+# A robot that has moved so far [m], or had no reason for so long [s], is kept by nothing.
+MOVED_M, GONE_S = 0.1, 2.0
+# From one report to the next [s].
+EVERY_S = 1.0
+# Of a base that does not move the floor ahead is blocked: at these angles from where it is to go.
+ANGLES_RAD = tuple(math.radians(angle) for angle in (0, -20, 20, -40, 40))
+
+
+class Standstill:
+    """Watches a follower; to be told its state in each cycle."""
+
+    def __init__(self) -> None:
+        self._place: Point = math.inf, math.inf
+        self._state: State | None = None
+        self._since = self._last = -math.inf
+        self._reported_at = -math.inf
+
+    def look(self, follower: Supervision, now: float) -> float | None:
+        """Note the follower's state; return how long it has been kept [s] if that is to be said."""
+        pose, state = follower.newest_pose, follower.state
+        if state not in REASONS or pose is None:
+            return None
+        here = pose.x, pose.y
+        has_moved = math.dist(here, self._place) > MOVED_M
+        if has_moved or state is not self._state or now - self._last > GONE_S:
+            self._place, self._state, self._since = here, state, now
+        self._last = now
+        held_s = now - self._since
+        if held_s < REASONS[state][1] or now - self._reported_at < EVERY_S:
+            return None
+        self._reported_at = now
+        return held_s
+
+
+def report_of(follower: Supervision, held_s: float, planner: str, revision: int) -> bytes:
+    """Return the report as JSON, see ``wire.documents.blocked``.
+
+    Args:
+        follower: with its state, and what is ahead.
+        held_s: for how long it is kept [s].
+        planner, revision: whose path it is, and which.
+    """
+    pose = follower.newest_pose
+    assert pose is not None
+    state, detail = follower.state, follower.detail
+    words = one_line(f"{state.value}: {detail}" if detail else state.value)
+    document = {
+        "daemon": planner,
+        "revision": revision,
+        "reason": REASONS[state][0],
+        "detail": words.encode()[:MAX_STRING_BYTES].decode(errors="ignore"),
+        "held_s": round(held_s, 1),
+        "frame": follower.path_frame,
+        "x": pose.x,
+        "y": pose.y,
+        "points": [(round(x, 3), round(y, 3)) for x, y in follower.ahead[:MAX_BLOCKED_POINTS]],
+    }
+    return json.dumps(document).encode()
+
+
+def floor_ahead(here: Point, toward: float, radius: float) -> tuple[Point, ...]:
+    """Return the floor that a robot pushes against, places [m]; none for an unknown radius.
+
+    Args:
+        here: where the robot is.
+        toward: where it is to go [rad].
+        radius: of its disc [m].
+    """
+    if not radius:
+        return ()
+    x, y = here
+    angles = (toward + angle for angle in ANGLES_RAD)
+    return tuple((x + radius * math.cos(a), y + radius * math.sin(a)) for a in angles)

@@ -1,0 +1,61 @@
+"""Report of a follower to the daemon: what keeps the robot from driving its path, and where.
+
+The follower, a small program without msgspec, writes the same members by itself.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Final
+
+import msgspec
+from msgspec import Meta
+
+from fasaco_edge.errors import MalformedMessage
+from fasaco_edge.wire.documents.json_text import Amount, Count, allowed, decode_document
+from fasaco_edge.wire.limits import MAX_BLOCKED_POINTS, MAX_COORDINATE_M, MAX_STRING_BYTES
+
+REASONS: Final = ("obstacle", "stuck", "elsewhere")
+
+Coordinate = Annotated[float, Meta(ge=-MAX_COORDINATE_M, le=MAX_COORDINATE_M)]
+Text = Annotated[str, Meta(max_length=MAX_STRING_BYTES)]
+
+
+class Blocked(msgspec.Struct, frozen=True, kw_only=True):
+    """What keeps the robot from driving its path.
+
+    Attributes:
+        daemon: Zenoh id of the daemon whose path it is.
+        revision: of the path; 0 where that is not known.
+        reason: obstacle: something is ahead that the map does not show; stuck: the robot does not
+            move as it is told, or its controller has given up; elsewhere: it cannot join the path.
+        detail: the same in words.
+        held_s: for how long [s].
+        frame: of the places.
+        x, y: where the robot is [m].
+        points: what is ahead: places x, y [m], the nearest first; none for elsewhere.
+    """
+
+    daemon: Annotated[str, allowed(pattern="^[0-9a-f]{1,32}$")]
+    revision: Count
+    reason: Annotated[str, allowed(enum=REASONS)]
+    detail: Text
+    held_s: Amount
+    frame: Text
+    x: Coordinate
+    y: Coordinate
+    points: Annotated[
+        tuple[tuple[Coordinate, Coordinate], ...], Meta(max_length=MAX_BLOCKED_POINTS)
+    ]
+
+
+def decode_blocked(payload: bytes) -> Blocked:
+    """Return the report in ``payload``.
+
+    Raises:
+        MalformedMessage: it is none, or its reason is none that is known.
+    """
+    report = decode_document(payload, Blocked)
+    if report.reason not in REASONS:
+        expected = ", ".join(REASONS)
+        raise MalformedMessage(f"blocked: reason must be one of {expected}, got {report.reason!r}")
+    return report

@@ -1,0 +1,148 @@
+"""What the lidar sees and no map shows: the robot stands before it, and only there."""
+
+import math
+
+import pytest
+
+from fasaco_edge.follow.free_way import MARGIN_M, STOP_M, Thing, first_met
+from fasaco_edge.follow.scanner import Mount, points_of
+from fasaco_edge.follow.sight import STANDS_S
+from fasaco_edge.follow.supervision import State
+from fasaco_edge.grid.geometry import Pose2D
+from fasaco_edge.wire.messages.scans import LaserScan
+from tests.follow.closed_loop import LIMITS
+from tests.follow.seeing import RADIUS_M, Disc, Seeing, scan_at
+
+
+def test_it_stops_before_what_stands_on_its_path_and_goes_on_once_that_is_gone():
+    seeing = Seeing([Disc(2.0, 0.05)])
+    seeing.send((0.0, 0.0), (4.0, 0.0))
+    assert State.OBSTACLE in seeing.run(12.0)
+    assert seeing.follower.state is State.OBSTACLE
+    assert "something stands" in seeing.follower.detail
+    assert MARGIN_M / 2 < seeing.gap < MARGIN_M + STOP_M + 0.02
+    seeing.discs.clear()
+    seeing.run(20.0)
+    assert seeing.follower.state is State.DRIVEN
+    assert seeing.pose.x == pytest.approx(4.0, abs=0.01)
+
+
+def test_what_stands_beside_the_path_does_not_stop_it():
+    seeing = Seeing([Disc(2.0, 0.2 + RADIUS_M + MARGIN_M + 0.02)])
+    seeing.send((0.0, 0.0), (4.0, 0.0))
+    seeing.run(25.0)
+    assert seeing.follower.state is State.DRIVEN
+
+
+def test_it_drives_on_beside_what_is_nearer_than_the_margin_already():
+    """Something came to stand 1 cm beside it: it may drive along, but not towards it."""
+    seeing = Seeing([Disc(0.0, 0.2 + RADIUS_M + 0.01)])
+    seeing.send((0.0, 0.0), (1.0, 0.0))
+    seeing.run(STANDS_S + 8.0)
+    assert seeing.follower.state is State.DRIVEN
+    seeing = Seeing([Disc(0.0, 0.2 + RADIUS_M + 0.01)])
+    seeing.send((0.0, 0.0), (0.0, 1.0))
+    seeing.run(STANDS_S + 8.0)
+    assert seeing.follower.state is State.OBSTACLE
+    assert seeing.touched_at == []
+
+
+def test_walls_of_the_map_do_not_slow_it_down():
+    """The line runs a centimetre beside a wall, and ends as near to it; ranges scatter by 2 cm."""
+
+    def seconds(**wall):
+        seeing = Seeing(noise=0.02, **wall)
+        seeing.send((0.0, 0.0), (2.0, 0.0), (2.0, -0.5))
+        begun = seeing.now
+        while seeing.step() is not State.DRIVEN:
+            assert seeing.now < begun + 60.0
+        return seeing.now - begun
+
+    assert seconds(wall_y=RADIUS_M + 0.01) == pytest.approx(seconds(), abs=0.2)
+
+
+@pytest.mark.parametrize("toward", [0.0, 0.6, 1.2, 2.0])
+def test_it_stands_by_the_time_somebody_walks_into_it(toward):
+    """From ahead at a walk, and from aside: whoever touches it then has walked into it."""
+    seconds = 7.5
+    vx, vy = -0.4 * math.cos(toward), -0.4 * math.sin(toward)
+    seeing = Seeing([Disc(1.0 - vx * seconds, -vy * seconds, 0.2, vx, vy)])
+    seeing.send((0.0, 0.0), (5.0, 0.0))
+    seeing.run(seconds + 2.0)
+    # Here they walk on through it: only how that begins says anything.
+    assert seeing.touched_at[:1] in ([], [0.0])
+
+
+@pytest.mark.parametrize("how", ["none", "lost", "malformed", "blind", "repeated"])
+def test_it_stands_without_scans_and_says_why(how):
+    seeing = Seeing(scans=how != "none")
+    seeing.send((0.0, 0.0), (5.0, 0.0))
+    seeing.run(1.0)
+    if how == "none":
+        assert (seeing.follower.state, seeing.follower.detail) == (State.NO_SCAN, "none has come")
+        assert seeing.pose.x == 0.0
+        return
+    assert seeing.follower.state is State.DRIVING
+    seeing.scans = False
+    nothing = LaserScan(0.0, 0.1, 0.1, 8.0, (math.nan,) * 40)
+    if how == "malformed":
+        seeing.follower.take_scan(b"\0\1\0\0junk", seeing.now)
+    elif how == "blind":
+        from fasaco_edge.wire.messages.scans import encode_scan
+
+        seeing.follower.take_scan(encode_scan(nothing), seeing.now)
+    elif how == "repeated":
+        for _ in range(30):
+            seeing.follower.take_scan(scan_at(seeing.pose, [], stamp_ns=7), seeing.now)
+            seeing.run(0.1)
+    if how in ("lost", "repeated"):
+        seeing.run(0.5)
+        assert how == "repeated" or seeing.follower.state is State.DRIVING
+        seeing.run(1.0)
+        assert seeing.follower.state is State.NO_SCAN
+    else:
+        seeing.step()
+        assert seeing.follower.state is State.BAD_SCAN
+    assert seeing.last.speed == 0.0 or seeing.run(1.0)
+    seeing.scans = True
+    seeing.run(1.0)
+    assert seeing.follower.state is State.DRIVING
+
+
+def test_the_lidar_may_be_mounted_anywhere_and_upside_down():
+    mount = Mount(0.1, -0.05, 2.0, upside_down=True)
+    seeing = Seeing([Disc(2.0, 0.0)], mount=mount)
+    seeing.send((0.0, 0.0), (4.0, 0.0))
+    seeing.run(12.0)
+    assert seeing.follower.state is State.OBSTACLE
+    assert 0.0 < seeing.gap < 0.1
+
+
+def test_a_scan_says_what_it_does():
+    ranges = (1.0, math.nan, math.inf, -math.inf, 0.01, 9.0, 2.0)
+    points = points_of(LaserScan(0.0, 0.5, 0.1, 8.0, ranges), Mount(0.2))
+    assert points is not None
+    assert sorted((round(x, 3), round(y, 3)) for x, y in points) == sorted(
+        (round(0.2 + far * math.cos(angle), 3), round(far * math.sin(angle), 3))
+        for far, angle in ((1.0, 0.0), (0.1, 1.5), (2.0, 3.0))
+    )
+
+
+def test_the_first_thing_on_a_line_with_corners_is_met():
+    line = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0)]
+    met = first_met([Thing(1.1, 0.8, False), Thing(3.0, 0.0, False)], line, 0.2)
+    assert met is not None
+    near = 0.2 + MARGIN_M
+    assert met.way == pytest.approx(1.0 + 0.8 - math.sqrt(near * near - 0.01))
+    assert first_met([Thing(-0.3, 0.0, False)], line, 0.2) is None
+
+
+def test_what_moves_behind_the_robot_does_not_hold_it():
+    seeing = Seeing([Disc(-0.5, 0.0)])
+    seeing.send((0.0, 0.0), (1.0, 0.0))
+    seeing.run(0.5)
+    assert seeing.follower.state is State.DRIVING
+    assert seeing.last.speed == pytest.approx(
+        min(LIMITS.acceleration * 0.45, LIMITS.speed), abs=0.1
+    )
+    assert Pose2D(0.0, 0.0).x < seeing.pose.x
