@@ -20,6 +20,7 @@ from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.mission.core.events import (
     BatteryReceived,
     Event,
+    FollowerBlocked,
     MapReceived,
     PatchesLost,
     PatchReceived,
@@ -28,6 +29,7 @@ from fasaco_edge.mission.core.events import (
     PoseReceived,
 )
 from fasaco_edge.wire import topics
+from fasaco_edge.wire.documents.blocked import decode_blocked
 from fasaco_edge.wire.documents.replies import encode_error
 from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.messages.battery import decode_battery
@@ -195,7 +197,7 @@ class Inbox:
             bus.listen(keys, topics.MAP, poster(mailbox, "map", max_pixels)),
             *maps,
         ]
-        for topic in (topics.MAP_UPDATE, topics.POSE, topics.BATTERY):
+        for topic in (topics.MAP_UPDATE, topics.POSE, topics.BATTERY, topics.BLOCKED):
             bus.listen(keys, topic, poster(mailbox, topic.name, max_pixels))
         if fleet is not None:
             fleet.listen(bus, poster(mailbox, topics.FLEET.name, max_pixels))
@@ -301,12 +303,21 @@ class Inbox:
             return self._fleet.event(sample) if self._fleet else None
         if kind == "map_update":
             return PatchReceived(decode_map_update(sample.payload, self._max_pixels))
+        if kind == topics.BLOCKED.name:
+            return _blocked(sample.payload)
         if kind == "battery":
             state = decode_battery(sample.payload)
             return BatteryReceived(state.level, state.power, state.stamp_ns)
         is_static = kind == "tf_static"
         pose = self._poses.decode(sample.payload, sample.schema, is_static=is_static)
         return None if pose is None else PoseReceived(pose)
+
+
+def _blocked(payload: bytes) -> FollowerBlocked:
+    said = decode_blocked(payload)
+    return FollowerBlocked(
+        said.revision, said.detail, said.held_s, said.frame, said.x, said.y, said.points
+    )
 
 
 def _bare(error: FasacoError) -> FasacoError:

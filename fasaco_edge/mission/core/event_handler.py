@@ -6,8 +6,9 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
 from functools import partial
 
-from fasaco_edge.errors import FasacoError, LedgerMismatchError
+from fasaco_edge.errors import FasacoError, LedgerMismatchError, WrongFrame
 from fasaco_edge.grid.geometry import Pose2D, StampedPose
+from fasaco_edge.mission.core.blocked_follower import BlockedFollower
 from fasaco_edge.mission.core.charging import BatteryGauge
 from fasaco_edge.mission.core.events import (
     Answer,
@@ -15,6 +16,7 @@ from fasaco_edge.mission.core.events import (
     CommandReceived,
     Decision,
     Event,
+    FollowerBlocked,
     MapReceived,
     MemberHeard,
     PatchesLost,
@@ -53,6 +55,7 @@ class EventHandler:
     fleet: FleetLayer
     battery: BatteryGauge
     way_out: WayOut
+    blocked: BlockedFollower
     changes: OrderChanges
     _now: float = field(default=0.0, init=False)
     # Results of the events of one step.
@@ -71,6 +74,7 @@ class EventHandler:
         stood = bool(self.map.building.why)
         for event in in_runs(events):
             self._attempt(partial(self._apply, event))
+        self._attempt(self._open_floor)
         self._attempt(self._look_for_another_building)
         self._note_frame()
         if stood and not self.map.building.why:
@@ -114,9 +118,39 @@ class EventHandler:
                 raise event.why
             case CommandReceived():
                 self._obey(event)
+            case FollowerBlocked():
+                self._close_floor(event)
             case MemberHeard():
-                if reason := self.fleet.others.hear(event, self._now):
-                    self.route.want(reason)
+                self._hear_member(event)
+
+    def _hear_member(self, event: MemberHeard) -> None:
+        if reason := self.fleet.others.hear(event, self._now):
+            self.route.want(reason)
+
+    def _close_floor(self, event: FollowerBlocked) -> None:
+        """Close the floor that a follower has met something on, for a while.
+
+        Raises:
+            WrongFrame: it says where in another frame than the map's.
+        """
+        grid = self.map.grid
+        # One that has another path by now will say it again, if need be.
+        if grid is None or event.revision not in (0, self.route.revision):
+            return
+        if event.frame != grid.frame:
+            raise WrongFrame(f"blocked in frame {event.frame!r}, map in {grid.frame!r}")
+        self.blocked.note(event, self._now)
+        if self.map.obstacles.close(event.points, (event.x, event.y), self._now):
+            self.map.draw_obstacles()
+            self._map_changed(self.monitor.map_at)
+
+    def _open_floor(self) -> None:
+        """Open floor again that was closed for long enough, as long as there is work."""
+        order = self.orders.order_state
+        is_at_work = order.is_open or bool(order.errand)
+        if is_at_work and self.map.grid is not None and self.map.obstacles.open_due(self._now):
+            self.map.draw_obstacles()
+            self._map_changed(self.monitor.map_at)
 
     def _map_changed(self, at: float | None = None) -> None:
         """Follow a new map; raise LedgerMismatchError if it shows another building."""

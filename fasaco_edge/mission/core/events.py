@@ -180,6 +180,28 @@ class MemberHeard:
     lattice: Pose2D = SAME_LATTICE
 
 
+@dataclass(frozen=True, slots=True)
+class FollowerBlocked:
+    """A report of the follower: what keeps the robot from driving its path.
+
+    Attributes:
+        revision: of the path; 0 where that is not known.
+        detail: what it is, in words.
+        held_s: for how long [s].
+        frame: of the places.
+        x, y: where the robot is [m].
+        points: what is ahead: places x, y [m], the nearest first; () where nothing is.
+    """
+
+    revision: int
+    detail: str
+    held_s: float
+    frame: str
+    x: float
+    y: float
+    points: tuple[tuple[float, float], ...] = ()
+
+
 Event = (
     MapReceived
     | PatchReceived
@@ -190,6 +212,7 @@ Event = (
     | PlanBroken
     | CommandReceived
     | MemberHeard
+    | FollowerBlocked
 )
 
 

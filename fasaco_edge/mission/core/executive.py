@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from fasaco_edge.errors import NothingToCover
 from fasaco_edge.grid.lattice import Cell
+from fasaco_edge.mission.core.blocked_follower import BlockedFollower
 from fasaco_edge.mission.core.charging import Charging
 from fasaco_edge.mission.core.events import Decision, PathUpdate, State
 from fasaco_edge.mission.core.giving_way import GivingWay
@@ -59,6 +60,7 @@ class Executive:
     giving_way: GivingWay
     dock: InDock
     way_out: WayOut
+    blocked: BlockedFollower
     mask_frame: str
     troubles: Troubles = field(init=False)
     _state: State = field(default=State.WAITING_FOR_MAP, init=False)
@@ -74,7 +76,7 @@ class Executive:
             self.ledger, self.monitor, self.orders, self.route, self.line, self._standing
         )
         drives = self.charging, self.giving_way, self._standing
-        at = self.dock, self.way_out, self.line.offset
+        at = self.dock, self.way_out, self.line.offset, self.blocked
         self.troubles = Troubles(self.map, self.monitor, *drives, *at)
 
     def succeed(self, before: Executive) -> None:
@@ -154,6 +156,9 @@ class Executive:
             self._state, self._reason = State.PLANNING, route.pending.reason
         elif orders.order_state.stage is not Stage.RETURNING:
             self._state, self._reason = State.COVERING, f"path {route.revision}"
+        drives = len(route.path.ahead) > 1 and update is None
+        if drives and route.pending is None and (why := self.blocked.asks_again(now)):
+            update = route.publish_anew(why, now)
         if self._standing.is_on_path and update is None:
             update = route.publish(route.path.ahead, "robot stands", now)
             self._standing.note_again()

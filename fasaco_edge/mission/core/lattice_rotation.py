@@ -26,6 +26,7 @@ from fasaco_edge.grid.rotation import (
 from fasaco_edge.mission.config import MissionConfig, Place
 from fasaco_edge.mission.core.events import (
     Event,
+    FollowerBlocked,
     MapReceived,
     MemberHeard,
     PathUpdate,
@@ -75,6 +76,10 @@ class LatticeRotation:
                 x, y = rotated_point(x, y, -self.deg)
                 ahead = tuple(rotated_point(*point, -self.deg) for point in event.ahead)
                 return replace(event, x=x, y=y, ahead=ahead)
+            case FollowerBlocked(x=x, y=y):
+                x, y = rotated_point(x, y, -self.deg)
+                points = tuple(rotated_point(*point, -self.deg) for point in event.points)
+                return replace(event, x=x, y=y, points=points)
         return event
 
     def order(self, state: OrderState, rotated_by_deg: float) -> OrderState:

@@ -14,6 +14,7 @@ from fasaco_edge.grid.lattice import Cell, CoverageLattice
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.grid.rotation import rotated_points
 from fasaco_edge.mission.config import MissionConfig
+from fasaco_edge.mission.core.blocked_follower import BlockedFollower
 from fasaco_edge.mission.core.charging import BatteryGauge, Charging
 from fasaco_edge.mission.core.event_handler import EventHandler
 from fasaco_edge.mission.core.events import (
@@ -112,13 +113,14 @@ class Mission:
         ordered = self._map, self._ledger, self._orders, self.route, self._line
         self._changes = OrderChanges(*ordered, config.policy, self._rotation.deg)
         way_out = WayOut(self._map, self.route)
-        measured = self._drive, self.fleet, self._gauge, way_out
+        blocked = BlockedFollower()
+        measured = self._drive, self.fleet, self._gauge, way_out, blocked
         self._handler = EventHandler(*owners, self._line, self._trail, *measured, self._changes)
         self.giving_way = GivingWay(config, self._map, self.route, self.fleet)
         decided_by = self._line, self._trail, self.fleet, self.charging, self.giving_way
         in_dock = InDock(self._map, self._gauge)
         mask = mask_frame(self._config.policy.keep_out_mask)
-        self._executive = Executive(*owners, *decided_by, in_dock, way_out, mask)
+        self._executive = Executive(*owners, *decided_by, in_dock, way_out, blocked, mask)
 
     def restore_ledger(self, before: LedgerSnapshot) -> None:
         """Continue a ledger from before a restart, unless the map contradicts it.
@@ -298,8 +300,9 @@ class Mission:
     @property
     def grid(self) -> OccupancyGrid | None:
         """The newest map; None before there is one."""
-        if self._map.grid is not self._laid_grid:
-            self._laid_grid, self._given_grid = self._map.grid, self._rotation.grid(self._map.grid)
+        if self._map.given is not self._laid_grid:
+            given = self._map.given
+            self._laid_grid, self._given_grid = given, self._rotation.grid(given)
         return self._given_grid
 
     @property

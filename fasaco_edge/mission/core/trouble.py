@@ -10,6 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from fasaco_edge.mission.config import MissionPolicy
+from fasaco_edge.mission.core.blocked_follower import BlockedFollower
 from fasaco_edge.mission.core.charging import Charging
 from fasaco_edge.mission.core.dock_current import DockCurrent
 from fasaco_edge.mission.core.events import State
@@ -78,6 +79,7 @@ class Troubles:
     dock: InDock
     way_out: WayOut
     offset: Offset
+    blocked: BlockedFollower
     found: tuple[Trouble, ...] = field(default=(), init=False)
     _current: DockCurrent = field(init=False)
 
@@ -201,6 +203,12 @@ RULES = (
         UNDER_WAY,
         Troubles.shut_in,
         "open the way, or drive the robot to free floor by hand",
+    ),
+    Rule(
+        "blocked",
+        DRIVING,
+        lambda troubles, state, now: troubles.blocked.why(now),
+        "nothing if it ends by itself: the robot goes on elsewhere; else look at what holds it",
     ),
     Rule(
         "stands",

@@ -29,6 +29,7 @@ from fasaco_edge.mission.map.building_watch import BuildingWatch
 from fasaco_edge.mission.map.ground import Ground
 from fasaco_edge.mission.map.inputs import FrameSelector
 from fasaco_edge.mission.map.loop_closure import has_moved
+from fasaco_edge.mission.map.obstacles import Obstacles
 from fasaco_edge.mission.map.reachable_area import ReachableArea, anchor_cell
 from fasaco_edge.mission.map.standing_places import StandingPlaces
 from fasaco_edge.mission.orders.order import MissionOrder
@@ -41,7 +42,9 @@ class MapState:
     """Takes in maps and poses.
 
     Attributes:
-        grid: the newest map, with all updates; None before there is one.
+        grid: the newest map, with all updates and obstacles; None before there is one.
+        given: the same without obstacles, as it came.
+        obstacles: what the map does not show.
         map_revision: counter of map states: full maps, batches of updates, changes of frame; 0
             before the first.
         pose: the newest pose in the map's frame; before the first map, in any frame.
@@ -56,6 +59,8 @@ class MapState:
 
     def __init__(self, config: MissionConfig) -> None:
         self.grid: OccupancyGrid | None = None
+        self.given: OccupancyGrid | None = None
+        self.obstacles = Obstacles(config.footprint.robot_radius_m)
         self.map_revision = 0
         self.pose: StampedPose | None = None
         self.area: ReachableArea | None = None
@@ -114,12 +119,12 @@ class MapState:
             Whether the map has changed; and the faults of updates that could not be applied.
         """
         own, faults = self.frames.note_patches(patches)
-        if self.grid is None or self._patches_lost:
+        if self.given is None or self._patches_lost:
             return False, faults + without_base(own, updates_lost=self._patches_lost)
-        updated = self.grid.with_updates(own)
+        updated = self.given.with_updates(own)
         if updated.windows:
             self._take_map(updated.grid, Window.around(*updated.windows))
-            self.frames.note_map(self.grid)
+            self.frames.note_map(self.given)
         return bool(updated.windows), faults + updated.faults
 
     def lose_patches(self, count: int) -> None:
@@ -127,7 +132,13 @@ class MapState:
         self._patches_lost = True
         raise PatchWithoutBase(f"{count} map updates were lost")
 
-    def _take_map(self, grid: OccupancyGrid, within: Window | None = None) -> None:
+    def draw_obstacles(self) -> None:
+        """Draw the newest map anew: what is closed on it has changed."""
+        if self.given is not None:
+            self._take_map(self.given)
+
+    def _take_map(self, given: OccupancyGrid, within: Window | None = None) -> None:
+        grid = self.obstacles.on(given)
         if self.grid is None or self.grid.frame != grid.frame:
             change = self._ground.begin(grid)
             if self.grid is not None:
@@ -136,7 +147,7 @@ class MapState:
         else:
             change = self._ground.follow((self.grid, grid), within)
         self.has_moved = has_moved(change)
-        self.grid = grid
+        self.grid, self.given = grid, given
         self.map_revision += 1
         if self.pose is not None and self.pose.frame != grid.frame:
             self.pose = self.frames.pose_in(grid.frame)

@@ -359,10 +359,14 @@ class Sequencer:
             run.ending += f"; not reached: {', '.join(map(repr, beyond))}"
 
     def _is_worth_trying(self) -> bool:
-        """Tell whether a retry is worthwhile; recomputed if anything changed."""
-        key = (self._map.area, self._ledger.version)
+        """Tell whether a retry is worthwhile; recomputed if anything changed.
+
+        It is while floor is closed for a while, by something that may be gone then.
+        """
+        closed = self._map.obstacles.closed
+        key = (self._map.area, self._ledger.version, closed)
         if key != self._retry_check[0]:
-            self._retry_check = key, bool(self.cells.left() or self._viewpoints())
+            self._retry_check = key, bool(self.cells.left() or closed or self._viewpoints())
         return self._retry_check[1]
 
     def _zones(self) -> tuple[Zone, ...] | None:

@@ -27,7 +27,7 @@ SUPERVISED_STATES: Final = ("starting", *RECORDER_STATES, "silent", "restarting"
 CLAIMS: Final = ("looks", "waits", "yields", "plans")
 TROUBLES: Final = (
     *("not_begun", "no_pose", "pose_jumped", "no_map", "no_battery", "no_dock", "no_current"),
-    *("shut_in", "stands", "beside_line", "two_publishers", "no_effect"),
+    *("shut_in", "blocked", "stands", "beside_line", "two_publishers", "no_effect"),
 )
 
 

@@ -1,0 +1,137 @@
+"""Obstacles that the map does not show: a follower met them, their floor is closed for a while.
+
+People go on and doors open, so such floor is tried again: after 20 s, and after twice as long each
+time something is met there again. Until then it is occupied on the mission's map, so all that a
+plan keeps clear of walls by keeps it clear of this, too. Where the robot stands it fits.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fasaco_edge.grid.geometry import Point
+from fasaco_edge.grid.occupancy import OCCUPIED, OccupancyGrid
+
+# Floor is closed for so long [s], twice as long each time it is closed again, up to a limit.
+CLOSED_S, MOST_CLOSED_S = 20.0, 320.0
+# It is the same floor within this distance [m]; it is forgotten after so long [s].
+SAME_M, FORGET_S = 0.5, 600.0
+# A follower that still stands there after so long [s] cannot drive the new path either: the floor
+# is closed wider, by this much each time [m], so often at most.
+AGAIN_S, WIDER_M, MOST_WIDER = 3.0, 0.05, 4
+# Something is as deep as this, away from the robot, as points so far apart [m]; the follower keeps
+# so far from it [m]; and pixels so near to the robot's disc [m] stay free.
+DEEP_M, SPACING_M, MARGIN_M, FREE_M = 0.3, 0.05, 0.06, 0.01
+# Most obstacles that are kept, beyond that the oldest is let go; and points of each.
+MOST, MOST_POINTS = 32, 192
+
+
+@dataclass(frozen=True, slots=True)
+class _Obstacle:
+    """An obstacle.
+
+    Attributes:
+        points: what was seen of it, the nearest first [m].
+        here: where the robot was [m].
+        at, until: from when until when its floor is closed [s].
+        times: how often it was closed, opened in between.
+        wider: how often it was closed wider.
+    """
+
+    points: tuple[Point, ...]
+    here: Point
+    at: float
+    until: float
+    times: int
+    wider: int
+
+
+class Obstacles:
+    """Keeps obstacles, and draws them on maps.
+
+    Args:
+        radius_m: of the robot's disc [m].
+    """
+
+    def __init__(self, radius_m: float) -> None:
+        self._radius_m = radius_m
+        self._closed: list[_Obstacle] = []
+        self._past: list[_Obstacle] = []
+
+    @property
+    def closed(self) -> int:
+        """How many there are for now."""
+        return len(self._closed)
+
+    def close(self, points: Sequence[Point], here: Point, now: float) -> bool:
+        """Close the floor at some points; return whether that changes anything.
+
+        Args:
+            points: what was seen, the nearest first [m].
+            here: where the robot is [m].
+            now: the time [s].
+        """
+        if not points:
+            return False
+        same = [one for one in self._closed if _is_same(one, points[0])]
+        if any(now - one.at < AGAIN_S for one in same):
+            return False
+        past = [one for one in self._past if _is_same(one, points[0])]
+        times = max([1, *(one.times for one in same), *(one.times + 1 for one in past)])
+        wider = min(max((one.wider + 1 for one in same), default=0), MOST_WIDER)
+        until = now + min(CLOSED_S * 2.0 ** (times - 1), MOST_CLOSED_S)
+        self._past = [one for one in self._past if one not in past]
+        kept = [one for one in self._closed if one not in same]
+        seen = tuple(points) + tuple(point for one in same for point in one.points)
+        self._closed = [*kept, _Obstacle(seen[:MOST_POINTS], here, now, until, times, wider)]
+        self._closed = self._closed[-MOST:]
+        return True
+
+    def open_due(self, now: float) -> bool:
+        """Open the floor that was closed for long enough; return whether there was any."""
+        self._past = [one for one in self._past if now - one.until < FORGET_S][-MOST:]
+        due = [one for one in self._closed if now >= one.until]
+        if due:
+            self._closed = [one for one in self._closed if one not in due]
+            self._past += due
+        return bool(due)
+
+    def on(self, grid: OccupancyGrid) -> OccupancyGrid:
+        """Return a map with the obstacles on it; the same one without any."""
+        if not self._closed:
+            return grid
+        cells = grid.cells.copy()
+        for obstacle in self._closed:
+            self._draw(obstacle, grid, cells)
+        return replace(grid, cells=cells)
+
+    def _draw(self, obstacle: _Obstacle, grid: OccupancyGrid, cells: NDArray[np.int8]) -> None:
+        geometry, (x, y) = grid.geometry, obstacle.here
+        deep = np.arange(0.0, DEEP_M + 1e-9, SPACING_M)[:, None]
+        points = np.array(obstacle.points)
+        away = points - (x, y)
+        lengths = np.maximum(np.hypot(*away.T), 1e-9)[:, None]
+        spots = (points + deep[:, :, None] * (away / lengths)).reshape(-1, 2)
+        col, row = geometry.to_pixels(spots[:, 0], spots[:, 1])
+        far = (MARGIN_M + obstacle.wider * WIDER_M) / geometry.resolution
+        row0, row1 = max(math.floor(row.min() - far), 0), math.ceil(row.max() + far) + 1
+        col0, col1 = max(math.floor(col.min() - far), 0), math.ceil(col.max() + far) + 1
+        part = cells[row0:row1, col0:col1]
+        if not part.size:
+            return
+        rows, cols = np.mgrid[row0 : row0 + part.shape[0], col0 : col0 + part.shape[1]] + 0.5
+        near = np.zeros(part.shape, bool)
+        for at_row, at_col in zip(row, col, strict=True):
+            near |= np.hypot(rows - at_row, cols - at_col) <= far + 0.5
+        my_col, my_row = geometry.to_pixels(x, y)
+        clear = (self._radius_m + FREE_M) / geometry.resolution + math.sqrt(0.5)
+        part[near & (np.hypot(rows - my_row, cols - my_col) >= clear)] = OCCUPIED
+
+
+def _is_same(obstacle: _Obstacle, point: Point) -> bool:
+    return math.dist(obstacle.points[0], point) <= SAME_M

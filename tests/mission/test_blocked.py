@@ -1,0 +1,174 @@
+"""A robot whose follower meets what the map does not show: it sweeps elsewhere, and comes back."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from fasaco_edge.mission.config import MissionPolicy
+from fasaco_edge.mission.core.events import FollowerBlocked
+from fasaco_edge.mission.map.obstacles import AGAIN_S, CLOSED_S, Obstacles
+from tests.mission.line_robot import CONFIG, RADIUS_M, TICK_S, LineRobot, map_of
+
+# The follower keeps this far from things [m], and says after so long that it stands [s].
+MARGIN_M, HELD_S = 0.06, 5.0
+START = (0.6, 0.6)
+TRIES_AGAIN = replace(CONFIG, policy=MissionPolicy(lost_pose_s=0.0))
+
+
+def room(cols=80):
+    """A room of 3 m x 4 m."""
+    pixels = np.full((60, cols), 100, np.int8)
+    pixels[1:59, 1 : cols - 1] = 0
+    return pixels
+
+
+def two_rooms():
+    """Two rooms with a door of 0.8 m between them."""
+    pixels = room(120)
+    pixels[:, 60:62] = 100
+    pixels[22:38, 60:62] = 0
+    return pixels
+
+
+class SeeingRobot(LineRobot):
+    """It does not come near to hidden points, and says so as a follower does.
+
+    Attributes:
+        hidden: points that no map shows [m].
+        stood: how long it has stood before them in all [s].
+    """
+
+    def __init__(self, pixels, start, hidden):
+        self.hidden = hidden
+        self.held_s = self.stood = 0.0
+        self.longest_s = 0.0
+        super().__init__(pixels, start, TRIES_AGAIN)
+
+    def _drive(self, metres):
+        before = self.x, self.y, list(self.path)
+        super()._drive(metres)
+        near = [p for p in self.hidden if math.dist(p, (self.x, self.y)) < RADIUS_M + MARGIN_M]
+        if any(math.dist(p, before[:2]) > math.dist(p, (self.x, self.y)) for p in near):
+            self.x, self.y, self.path = before
+            self.held_s += TICK_S
+        elif (self.x, self.y) != before[:2]:
+            self.longest_s = max(self.longest_s, self.held_s)
+            self.held_s = 0.0
+
+    def step(self, *events):
+        seconds = round(self.held_s / TICK_S)
+        if self.held_s >= HELD_S and seconds % 10 == 0 and self.path:
+            here = self.x, self.y
+            points = sorted((math.dist(p, here), p) for p in self.hidden)
+            near = tuple(p for far, p in points if far < RADIUS_M + MARGIN_M + 0.5)
+            said = FollowerBlocked(
+                self.mission.route.revision, "obstacle ahead", self.held_s, "map", *here, near
+            )
+            events = (*events, said)
+        super().step(*events)
+
+
+def disc(x, y, radius=0.2):
+    return [
+        (x + radius * math.cos(a), y + radius * math.sin(a))
+        for a in np.linspace(0.0, math.tau, 40, endpoint=False)
+    ]
+
+
+def closed_door():
+    return [(3.05, y) for y in np.arange(1.1, 1.9, 0.02)]
+
+
+def codes(robot):
+    return {trouble.code for trouble in robot.mission.troubles}
+
+
+def test_it_sweeps_elsewhere_and_then_where_somebody_stood():
+    robot = SeeingRobot(room(), START, disc(2.0, 1.5))
+    assert robot.wait(400.0, lambda robot: robot.held_s >= HELD_S)
+    assert robot.wait(3.0, lambda robot: "blocked" in codes(robot))
+    assert robot.mission.state == "degraded"
+    assert "obstacle ahead" in robot.mission.reason
+    assert robot.wait(15.0, lambda robot: robot.held_s == 0.0)
+    robot.hidden = []
+    assert robot.wait(900.0, lambda robot: robot.mission.state == "done")
+    covered = robot.mission.coverage()
+    assert covered.covered == covered.coverable
+    assert "blocked" not in codes(robot)
+
+
+def test_what_never_goes_away_is_left_out_and_said():
+    robot = SeeingRobot(two_rooms(), START, closed_door())
+    assert robot.wait(1500.0, lambda robot: robot.mission.state == "done")
+    assert "not reached" in robot.mission.reason
+    assert "%" in robot.mission.reason
+    # Half of the floor lies behind the door.
+    assert robot.mission.coverage().fraction == pytest.approx(0.5, abs=0.05)
+    # No longer in one place than it takes to be sure, and to plan.
+    assert robot.longest_s < 20.0
+
+
+def test_a_door_that_opens_is_driven_through():
+    robot = SeeingRobot(two_rooms(), START, closed_door())
+    assert robot.wait(400.0, lambda robot: robot.held_s >= HELD_S)
+    robot.wait(30.0, lambda robot: False)
+    robot.hidden = []
+    assert robot.wait(1500.0, lambda robot: robot.mission.state == "done")
+    covered = robot.mission.coverage()
+    assert covered.covered == covered.coverable
+    assert "not reached" not in robot.mission.reason
+
+
+def test_a_path_that_cannot_be_joined_is_laid_anew_from_the_robot():
+    robot = LineRobot(room(), START)
+    assert robot.wait(60.0, lambda robot: robot.x > 1.0 or robot.y > 1.0)
+    robot.is_stuck = True
+    robot.wait(3.0, lambda robot: False)
+    before = len(robot.paths)
+    for _ in range(20):
+        robot.wait(1.0, lambda robot: False)
+        revision = robot.mission.route.revision
+        robot.step(FollowerBlocked(revision, "path elsewhere", 3.0, "map", robot.x, robot.y))
+    anew = [path for path in robot.paths[before:] if "cannot follow it" in path[2]]
+    assert 3 <= len(anew) <= 6
+    for _, xy, reason in anew:
+        assert "path elsewhere" in reason
+        assert math.dist(xy[0], (robot.x, robot.y)) < 0.01
+
+
+def test_a_report_of_another_path_or_frame_closes_nothing():
+    robot = LineRobot(room(), START)
+    ahead = ((1.0, 1.0),)
+    maps = robot.mission.map_revision
+    robot.step(FollowerBlocked(999, "obstacle ahead", 5.0, "map", robot.x, robot.y, ahead))
+    revision = robot.mission.route.revision
+    robot.step(FollowerBlocked(revision, "obstacle ahead", 5.0, "odom", robot.x, robot.y, ahead))
+    assert robot.mission.map_revision == maps
+    assert not robot.mission.troubles
+
+
+def test_floor_is_closed_longer_each_time_and_never_under_the_robot():
+    obstacles = Obstacles(RADIUS_M)
+    grid = map_of(np.zeros((60, 80), np.int8))
+    here, point = (1.0, 1.0), (1.0 + RADIUS_M + 0.03, 1.0)
+    now, closed = 10.0, []
+    for _ in range(3):
+        assert obstacles.close([point], here, now)
+        assert not obstacles.close([point], here, now + AGAIN_S / 2)
+        drawn = obstacles.on(grid)
+        rows, cols = np.nonzero(drawn.cells)
+        assert len(rows) > 10
+        # By the nearest corner of each pixel.
+        near = np.maximum(np.abs((cols + 0.5) * 0.05 - 1.0) - 0.025, 0.0)
+        aside = np.maximum(np.abs((rows + 0.5) * 0.05 - 1.0) - 0.025, 0.0)
+        assert np.hypot(near, aside).min() >= RADIUS_M
+        begun = now
+        while not obstacles.open_due(now):
+            now += 1.0
+        closed.append(now - begun)
+        assert obstacles.on(grid) is grid
+    assert closed == [CLOSED_S, 2 * CLOSED_S, 4 * CLOSED_S]
