@@ -6,6 +6,7 @@ The daemon starts with them; what it cannot work with is a fault of ``loading``.
 from __future__ import annotations
 
 import logging
+import math
 from collections.abc import Iterator
 
 from fasaco_edge.config.config import DaemonConfig, PlannerConfig
@@ -23,7 +24,10 @@ ROUNDING_M = 1e-6
 
 def cautions(config: DaemonConfig) -> list[str]:
     """Return them, each with the keys it is about."""
-    found = (_tool(config.robot), _turns(config.robot), _planner(config), _places(config))
+    found = (
+        *(_tool(config.robot), _turns(config.robot), _planner(config), _places(config)),
+        _scan(config),
+    )
     return [text for texts in found for text in texts]
 
 
@@ -87,3 +91,17 @@ def _places(config: DaemonConfig) -> Iterator[str]:
                     f"mission.keep_out[{index}] lies at mission.{name}: the robot may not stand at "
                     f"{where}, so it never gets there"
                 )
+
+
+def _scan(config: DaemonConfig) -> Iterator[str]:
+    if not config.scan:
+        return
+    if config.ros2 and config.ros2.follow == "nav2":
+        yield "scan has no effect where ros2.follow is nav2: scans are Nav2's business there"
+    away_m = math.hypot(config.scan.x_m, config.scan.y_m)
+    if away_m > config.robot.radius_m:
+        yield (
+            f"scan.x_m {config.scan.x_m:g} and scan.y_m {config.scan.y_m:g}: the lidar is "
+            f"{away_m:.2g} m from the robot's middle, beyond its disc, robot.radius_m "
+            f"{config.robot.radius_m:.3g}: are they in metres?"
+        )

@@ -34,6 +34,12 @@ def said(**sections):
             "robot.quarter_turn_s has no effect beside robot.turn_deg_s",
         ),
         ({"robot": {"steered_deg": 5.0}}, "robot.steered_deg has no effect"),
+        ({"scan": {"x_m": 0.1}}, ""),
+        ({"scan": {"x_m": 3.0, "y_m": 4.0}}, "the lidar is 5 m from the robot's middle"),
+        (
+            {"scan": {}, "ros2": {"kind": "bridge", "follow": "nav2"}},
+            "scan has no effect where ros2.follow is nav2",
+        ),
         (
             {"planner": {"line": "cells", "align": "axes"}, "robot": {"overlap": 0.2}},
             "no effect where planner.line is cells: planner.align, robot.overlap",

@@ -304,7 +304,7 @@ class Inbox:
         if kind == "map_update":
             return PatchReceived(decode_map_update(sample.payload, self._max_pixels))
         if kind == topics.BLOCKED.name:
-            return _blocked(sample.payload)
+            return blocked_of(sample.payload)
         if kind == "battery":
             state = decode_battery(sample.payload)
             return BatteryReceived(state.level, state.power, state.stamp_ns)
@@ -313,7 +313,12 @@ class Inbox:
         return None if pose is None else PoseReceived(pose)
 
 
-def _blocked(payload: bytes) -> FollowerBlocked:
+def blocked_of(payload: bytes) -> FollowerBlocked:
+    """Return the event in a follower's report.
+
+    Raises:
+        MalformedMessage: it is none.
+    """
     said = decode_blocked(payload)
     return FollowerBlocked(
         said.revision, said.detail, said.held_s, said.frame, said.x, said.y, said.points
