@@ -103,6 +103,7 @@ def _parser() -> argparse.ArgumentParser:
     add("--maps", type=Path, metavar="DIR", help="a folder with further maps")
     add("--start", type=_numbers(3), metavar="X,Y,YAW", help="where it starts [m, rad]")
     add("--walk", type=_numbers(4), metavar="X1,Y1,X2,Y2", help="where people walk [m]")
+    add("--scan", action="store_true", help="give the follower the lidar's scans")
     add("--ideal", action="store_true", help="no slip, no drift")
     defaults = LabSettings()
     for name, what in OPTIONS.items():

@@ -55,6 +55,7 @@ class Base:
         wheels: velocities of its wheels.
         grip: share of these that moves it.
         touches: whether the hull touches something.
+        touches_person: whether that is somebody who walks about.
     """
 
     def __init__(self, building: Building, settings: LabSettings) -> None:
@@ -62,7 +63,7 @@ class Base:
         self.truth = self.odometry = building.start
         self.wheels = STAND
         self.grip = 1.0
-        self.touches = False
+        self.touches = self.touches_person = False
         self._ideal = settings.ideal
         self._rng = np.random.default_rng(settings.seed)
         self._command, self._commanded_at = STAND, -math.inf
@@ -89,7 +90,13 @@ class Base:
         speed, turn_rate = self.wheels.speed, self.wheels.turn_rate
         self._env.step([np.array([[speed * self.grip], [turn_rate * self.grip]])])
         self.truth = Pose2D(*map(float, self._body.state[:3, 0]))
-        self.touches = any(self._body in (c.a, c.b) for c in self._env.contacts)
+        touched = [
+            c.b if c.a is self._body else c.a
+            for c in self._env.contacts
+            if self._body in (c.a, c.b)
+        ]
+        self.touches = bool(touched)
+        self.touches_person = any(thing.shape == "circle" for thing in touched)
         self.odometry = moved(self.odometry, self._counted(), TICK_S)
         self._tick += 1
         self.now = self._tick * TICK_S

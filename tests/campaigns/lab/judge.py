@@ -52,6 +52,8 @@ class Figures:
         claimed_unswept_m2: floor that the product takes for swept and that was not.
         swept_unclaimed_m2: floor that was swept and that it does not take for swept.
         reachable_m2: the truly reachable floor.
+        people_touched, driven_into: separate contacts with people, and how many of these began
+            while the robot drove: into one that stands people walk by themselves.
         contacts, contact_s: separate contacts of the hull, and how long they lasted in all [s].
         pose_error_median_m, pose_error_p95_m, pose_error_most_m: of the pose that the product has.
         seconds: simulated time to the last motion [s].
@@ -75,6 +77,8 @@ class Figures:
     claimed_unswept_m2: float
     swept_unclaimed_m2: float
     reachable_m2: float
+    people_touched: int
+    driven_into: int
     contacts: int
     contact_s: float
     pose_error_median_m: float
@@ -134,6 +138,7 @@ def judge(run: LabRun, truth: Truth) -> Figures:
     errors = np.hypot(of["px"] - of["x"], of["py"] - of["y"])
     changes = sum(changes_ahead(trace.paths, of["px"], of["py"]))
     contacts, contact_s = _contacts(of["touches"] > 0.0)
+    touched = _begins(of["touches_person"] > 0.0)
     claimed, coverage = _claim(reply)
     true, clear = truth.share(truth.reachable), truth.share(truth.clear)
     at_end_s = stands_s[-1] if len(stands_s) and still[-1] and not of["done"][-1] else 0
@@ -146,6 +151,8 @@ def judge(run: LabRun, truth: Truth) -> Figures:
         claimed_unswept_m2=truth.m2(truth.claimed & ~truth.swept & truth.free),
         swept_unclaimed_m2=truth.m2(truth.swept & ~truth.claimed & truth.free),
         reachable_m2=truth.m2(truth.reachable),
+        people_touched=len(touched),
+        driven_into=int(np.count_nonzero(np.abs(of["speed"][touched]) >= STANDS_M_S)),
         contacts=contacts,
         contact_s=contact_s,
         pose_error_median_m=float(np.median(errors)),
@@ -213,6 +220,11 @@ def _runs(flags: NDArray[np.bool_]) -> list[int]:
 
 def _contacts(touches: NDArray[np.bool_]) -> tuple[int, float]:
     """Return the number of separate contacts, and how long they lasted in all [s]."""
+    return len(_begins(touches)), float(touches.sum()) * TICK_S
+
+
+def _begins(touches: NDArray[np.bool_]) -> NDArray[np.intp]:
+    """Return the ticks in which separate contacts begin, int (n,)."""
     begins = np.flatnonzero(np.diff(np.concatenate([[False], touches]).astype(int)) > 0)
     apart = np.diff(begins) * TICK_S > APART_S
-    return int(len(begins) > 0) + int(apart.sum()), float(touches.sum()) * TICK_S
+    return begins[np.concatenate([[True], apart])] if len(begins) else begins

@@ -29,8 +29,11 @@ SURE_S = 5.0
 # A robot that has not moved for so long will not move again [s].
 GIVE_UP_S = 300.0
 MOVED_M, MOVED_RAD = 0.01, 0.03
+# The follower gets a scan every so many ticks: ten a second.
+SIGHT_TICKS = 2
 COLUMNS = (
     "t", "x", "y", "yaw", "speed", "turn_rate", "grip", "touches", "px", "py", "pyaw", "done",
+    "touches_person",
 )  # fmt: skip
 
 
@@ -40,7 +43,7 @@ class Trace:
 
     Attributes:
         rows: of ``COLUMNS``: time [s], true pose, wheels [m/s, rad/s], grip, contact, the pose that
-            the product has, and whether its mission is done.
+            the product has, whether its mission is done, and whether a person is touched.
         paths: the paths published, each with the number of ticks before it.
         states: states of the mission with their reasons, and of the follower, and when each began
             [s].
@@ -120,8 +123,13 @@ class _Running:
         pose = mapper.corrected(base.odometry)
         if tick % self._pose_ticks == 0:
             product.hear_pose(StampedPose(pose, FRAME, stamp_ns(now)), now)
-        if tick % self._scan_ticks == 0 and mapper.wants(base.odometry):
-            mapper.take(base.scan(), base.odometry)
+        sees = self._settings.scan and tick % SIGHT_TICKS == 0
+        is_wanted = tick % self._scan_ticks == 0 and mapper.wants(base.odometry)
+        ranges = base.scan() if sees or is_wanted else None
+        if sees and ranges is not None:
+            product.hear_scan(ranges, now)
+        if is_wanted and ranges is not None:
+            mapper.take(ranges, base.odometry)
         if (grid := mapper.map_due(now)) is not None:
             product.hear_map(grid)
         command = product.step(now)
@@ -139,7 +147,7 @@ class _Running:
         self._person.note(base, now, has_work=not is_done)
         trace.rows.append(
             (now, truth.x, truth.y, truth.yaw, wheels.speed, wheels.turn_rate, base.grip,
-             base.touches, px, py, pyaw, is_done)
+             base.touches, px, py, pyaw, is_done, base.touches_person)
         )  # fmt: skip
         states = product.state, product.reason, product.follower.state.value
         if not trace.states or trace.states[-1][1:] != states:

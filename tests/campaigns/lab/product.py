@@ -10,10 +10,13 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.daemon.ledger.writer import LedgerKeeper, LedgerWriter
 from fasaco_edge.daemon.loop.grid_publishers import MOST_SQUARES
-from fasaco_edge.daemon.loop.inbox import make_mailbox
+from fasaco_edge.daemon.loop.inbox import blocked_of, make_mailbox
 from fasaco_edge.daemon.loop.loader import mission_config
 from fasaco_edge.daemon.loop.loop import TICK_S as LOOP_S
 from fasaco_edge.daemon.loop.mission_runner import MissionRunner
@@ -21,6 +24,9 @@ from fasaco_edge.daemon.loop.outbox import headings
 from fasaco_edge.daemon.loop.status import HEARTBEAT_S, StatusBoard
 from fasaco_edge.follow.estimate import Command, Limits
 from fasaco_edge.follow.follower import Follower
+from fasaco_edge.follow.scanner import Mount
+from fasaco_edge.follow.sight import Sight, SightSettings
+from fasaco_edge.follow.standstill import Standstill, report_of
 from fasaco_edge.grid.geometry import StampedPose
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.mission.core.events import Event, MapReceived, PoseReceived
@@ -31,8 +37,11 @@ from fasaco_edge.wire.documents.json_text import encode_json
 from fasaco_edge.wire.messages.maps import decode_occupancy_grid, encode_occupancy_grid
 from fasaco_edge.wire.messages.paths import encode_path
 from fasaco_edge.wire.messages.poses import encode_pose_stamped
+from fasaco_edge.wire.messages.scans import LaserScan, encode_scan
 from fasaco_edge.wire.schemas import POSE_STAMPED
+from tests.campaigns.lab.base import LEAST_RANGE_M, MOST_RANGE_M
 from tests.campaigns.lab.planning import LockStepPlanning
+from tests.campaigns.lab.settings import stamp_ns
 
 NAME = "lab"
 
@@ -59,8 +68,11 @@ class Product:
         self._runner.mission = self._mission
         self._decoder = config.poses()
         self._events: list[Event] = []
-        self._sent: bytes | None = None
-        self.follower = _follower(config)
+        # The newest path and its revision, on its way to the follower.
+        self._sent: tuple[bytes, int] | None = None
+        self._sight = _sight(config)
+        self.follower = _follower(config, self._sight)
+        self._standstill, self._revision = Standstill(), 0
         self._heartbeat_at = self._stepped_at = -math.inf
 
     @property
@@ -83,6 +95,8 @@ class Product:
         payload = encode_occupancy_grid(grid)
         decoded = decode_occupancy_grid(payload, self._config.map.max_pixels)
         self._events.insert(0, MapReceived(decoded))
+        if self._sight is not None:
+            self._sight.take_map(payload)
 
     def hear_pose(self, stamped: StampedPose, now: float) -> None:
         """Take in a pose: mission and follower both do, at ``now`` [s]."""
@@ -91,19 +105,31 @@ class Product:
         self._events.append(PoseReceived(pose))
         self.follower.take_pose(pose, now)
 
+    def hear_scan(self, ranges: NDArray[np.float64], now: float) -> None:
+        """Take in a scan, float64 (beams,) [m], 0 for no return: the follower does."""
+        told = tuple(np.where(ranges > 0.0, ranges, np.inf).tolist())
+        step = math.tau / (len(told) - 1)
+        scan = LaserScan(-math.pi, step, LEAST_RANGE_M, MOST_RANGE_M, told, "laser", stamp_ns(now))
+        self.follower.take_scan(encode_scan(scan), now)
+
     def step(self, now: float) -> Command | None:
         """Run a cycle of both at ``now`` [s]; return the command to the base, None for none.
 
         The follower has a path one cycle after the mission has published it.
         """
         if self._sent is not None:
-            self.follower.take_path(self._sent)
-            self._sent = None
+            (payload, self._revision), self._sent = self._sent, None
+            self.follower.take_path(payload)
         if now - self._heartbeat_at >= HEARTBEAT_S:
             self._heartbeat_at = now
             self.follower.heard_status(now)
         self._step_mission(now)
-        return self.follower.step(now)
+        command = self.follower.step(now)
+        held_s = self._standstill.look(self.follower, now)
+        if held_s is not None:
+            said = report_of(self.follower, held_s, NAME, self._revision)
+            self._events.append(blocked_of(said))
+        return command
 
     def _step_mission(self, now: float) -> None:
         """Step the mission, and perform what it decides, as the daemon's loop does."""
@@ -128,7 +154,8 @@ class Product:
         yaw = headings(path.xy)
         if len(yaw) and path.end_yaw is not None:
             yaw[-1] = path.end_yaw
-        self._sent = encode_path(path.xy, yaw, path.frame, path.map_stamp_ns)
+        payload = encode_path(path.xy, yaw, path.frame, path.map_stamp_ns)
+        self._sent = payload, path.revision
         self.paths.append(path)
         return True
 
@@ -165,7 +192,17 @@ class ProductReport:
     faults: dict[str, int]
 
 
-def _follower(config: DaemonConfig) -> Follower:
+def _sight(config: DaemonConfig) -> Sight | None:
+    """Return what the follower sees by; None without scans."""
+    if not config.scan:
+        return None
+    settings = SightSettings(
+        Mount(), config.robot.radius_m, config.scan.lost_s, config.map.free_at_most
+    )
+    return Sight(settings)
+
+
+def _follower(config: DaemonConfig, sight: Sight | None) -> Follower:
     """Return a follower as ``fasaco-edge follow`` makes it."""
     robot = config.robot
     follower = Follower(
@@ -175,7 +212,9 @@ def _follower(config: DaemonConfig) -> Follower:
             math.radians(robot.turning_deg_s()),
             math.radians(robot.turn_deg_s2),
             math.radians(robot.steered_deg),
-        )
+        ),
+        sight=sight,
+        radius=robot.radius_m,
     )
     follower.take_planner(NAME)
     return follower

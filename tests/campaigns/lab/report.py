@@ -70,7 +70,8 @@ def in_words(found: Judged) -> str:
                   f"beside a wall {of.clear_share:.1%} swept"),
         ("", f"claimed but not swept {of.claimed_unswept_m2:.2f} m2, swept but not claimed "
              f"{of.swept_unclaimed_m2:.2f} m2; cells {of.coverage:.1%}"),
-        ("contacts", f"{of.contacts} separate, {of.contact_s:.1f} s in all"),
+        ("contacts", f"{of.contacts} separate, {of.contact_s:.1f} s in all; "
+                     f"{of.people_touched} with people, {of.driven_into} of them driven into"),
         ("pose error", f"median {of.pose_error_median_m:.3f} m, 95% {of.pose_error_p95_m:.3f}, "
                        f"most {of.pose_error_most_m:.3f}; {of.loops} loops closed"),
         ("driving", f"{of.seconds:.0f} s, {of.driven_m:.0f} m at {of.speed_share:.0%} of the "

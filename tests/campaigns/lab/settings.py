@@ -5,7 +5,9 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from fasaco_edge.config.config import DaemonConfig
+import msgspec
+
+from fasaco_edge.config.config import DaemonConfig, ScanConfig
 from fasaco_edge.config.robot import RobotConfig
 
 TICK_S = 0.05
@@ -28,6 +30,7 @@ class LabSettings:
         people: how many walk about.
         walk: the rectangle they walk in: x1, y1, x2, y2 [m]; None for the middle of the building.
         ideal: without slip of the wheels and drift of odometry.
+        scan: whether the follower gets scans.
         noise_m: scatter of the lidar [m].
         radius_m: of the robot's disc by the product's configuration, and to the judge [m].
         hull_m: of the hull that collides [m].
@@ -42,6 +45,7 @@ class LabSettings:
     people: int = 0
     walk: tuple[float, float, float, float] | None = None
     ideal: bool = False
+    scan: bool = False
     noise_m: float = 0.012
     radius_m: float = 0.18
     hull_m: float = 0.17
@@ -88,7 +92,7 @@ class LabSettings:
     @property
     def config(self) -> DaemonConfig:
         """The product's configuration."""
-        return DaemonConfig(robot=self.robot)
+        return DaemonConfig(robot=self.robot, scan=ScanConfig() if self.scan else msgspec.UNSET)
 
 
 def stamp_ns(now: float) -> int:

@@ -24,14 +24,28 @@ def hall():
     return hall()
 
 
-def run_of(rows, paths=(), state="covering", left_m2=0.0, floor=None):
-    """A run with these ticks (x, yaw, speed, turn rate, touches, done)."""
+def run_of(rows, paths=(), state="covering", left_m2=0.0, floor=None, people=()):
+    """A run with these ticks (x, yaw, speed, turn rate, touches, done); people touch in some."""
     from tests.campaigns.lab.mission import LabRun, Trace
     from tests.campaigns.lab.product import ProductReport
     from tests.campaigns.lab.settings import TICK_S, LabSettings
 
     full = [
-        ((i + 1) * TICK_S, x, 0.5, yaw, speed, turn, 1.0, touches, x + 0.03, 0.54, yaw, done)
+        (
+            (i + 1) * TICK_S,
+            x,
+            0.5,
+            yaw,
+            speed,
+            turn,
+            1.0,
+            touches,
+            x + 0.03,
+            0.54,
+            yaw,
+            done,
+            i in people,
+        )
         for i, (x, yaw, speed, turn, touches, done) in enumerate(rows)
     ]
     reply = {"state": state, "reason": "", "coverage": {"fraction": 0.5}}
@@ -120,3 +134,10 @@ def test_a_path_changes_what_lies_ahead_of_the_robot(before, after, changes):
     x = np.linspace(0.0, 1.0, 101)
     paths = [(0, path(*before)), (100, path(*after))]
     assert list(changes_ahead(paths, x, np.zeros(101))) == [changes]
+
+
+def test_people_that_walk_into_a_robot_that_stands_are_not_driven_into():
+    rows = [*drive(100), *stand(100, 1.5), *drive(100, 1.5)]
+    people = {*range(20, 25), *range(120, 125), *range(150, 180), *range(260, 262)}
+    found = figures_of(run_of(rows, people=people))
+    assert (found.people_touched, found.driven_into) == (4, 2)
