@@ -16,7 +16,8 @@ A pixel is a byte, held in up to ten copies if updates are as large as the map:
 * 3 in Zenoh: a message being assembled, one being handed over, one on its way to a recorder;
 * 2 in the mailbox: the map queue and the update queue hold at most one largest message each;
 * 3 in the cycle: a map and an update being decoded, and Zenoh's buffer of the last one;
-* 2 in the mission: its map, and the one it is compared with or patched to.
+* 2 in the mission: its map, and the one it is compared with or patched to. One more with obstacles
+  drawn on it, of a map of up to 6 million pixels: for that the base has room.
 
 A keep-out mask is read while no map is decoded, and may take as much as two of the cycle's copies
 (``mask_bytes``).

@@ -8,8 +8,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from fasaco_edge.grid.geometry import Window
+from fasaco_edge.grid.occupancy import MapPatch
 from fasaco_edge.mission.config import MissionPolicy
-from fasaco_edge.mission.core.events import FollowerBlocked
+from fasaco_edge.mission.core.events import FollowerBlocked, PatchReceived
 from fasaco_edge.mission.map.obstacles import AGAIN_S, CLOSED_S, Obstacles
 from tests.mission.line_robot import CONFIG, RADIUS_M, TICK_S, LineRobot, map_of
 
@@ -172,3 +174,27 @@ def test_floor_is_closed_longer_each_time_and_never_under_the_robot():
         closed.append(now - begun)
         assert obstacles.on(grid) is grid
     assert closed == [CLOSED_S, 2 * CLOSED_S, 4 * CLOSED_S]
+
+
+def test_a_map_that_is_too_large_to_be_kept_twice_stays_as_it_is(monkeypatch):
+    obstacles, grid = Obstacles(RADIUS_M), map_of(np.zeros((60, 80), np.int8))
+    assert obstacles.close([(1.5, 1.0)], (1.0, 1.0), 0.0)
+    assert obstacles.on(grid) is not grid
+    monkeypatch.setattr("fasaco_edge.mission.map.obstacles.MOST_PIXELS", 4799)
+    assert obstacles.on(grid) is grid
+
+
+def test_updates_come_on_the_map_without_obstacles():
+    """What was drawn on it is gone once the floor is open again."""
+    robot = LineRobot(room(), START)
+    revision, here = robot.mission.route.revision, (robot.x, robot.y)
+    robot.step(FollowerBlocked(revision, "obstacle", 5.0, "map", *here, ((2.0, 2.0),)))
+    closed = robot.mission.coverage().coverable
+    patch = MapPatch(Window(50, 70, 52, 72), np.full((2, 2), 100, np.int8))
+    robot.step(PatchReceived(patch))
+    assert np.count_nonzero(robot.mission.grid.cells != room()) == 4
+    robot.wait(CLOSED_S, lambda robot: False)
+    assert np.count_nonzero(robot.mission.grid.cells != room()) == 4
+    assert robot.mission.lattice.coverable.sum() > closed - 4
+    rows, cols = np.nonzero(robot.mission._map.grid.cells != room())
+    assert (set(rows), set(cols)) == ({50, 51}, {70, 71})

@@ -27,6 +27,8 @@ AGAIN_S, WIDER_M, MOST_WIDER = 3.0, 0.05, 4
 # Something is as deep as this, away from the robot, as points so far apart [m]; the follower keeps
 # so far from it [m]; and pixels so near to the robot's disc [m] stay free.
 DEEP_M, SPACING_M, MARGIN_M, FREE_M = 0.3, 0.05, 0.06, 0.01
+# Largest map on which they are drawn [pixels]: it is kept twice then, see ``daemon.memory``.
+MOST_PIXELS = 6_000_000
 # Most obstacles that are kept, beyond that the oldest is let go; and points of each.
 MOST, MOST_POINTS = 32, 192
 
@@ -102,8 +104,8 @@ class Obstacles:
         return bool(due)
 
     def on(self, grid: OccupancyGrid) -> OccupancyGrid:
-        """Return a map with the obstacles on it; the same one without any."""
-        if not self._closed:
+        """Return a map with the obstacles on it; the same without any, or if it is too large."""
+        if not self._closed or grid.cells.size > MOST_PIXELS:
             return grid
         cells = grid.cells.copy()
         for obstacle in self._closed:
