@@ -75,9 +75,17 @@ class Executive:
         self._checks = PathChecks(
             self.ledger, self.monitor, self.orders, self.route, self.line, self._standing
         )
-        drives = self.charging, self.giving_way, self._standing
-        at = self.dock, self.way_out, self.line.offset, self.blocked
-        self.troubles = Troubles(self.map, self.monitor, *drives, *at)
+        self.troubles = Troubles(
+            self.map,
+            self.monitor,
+            self.charging,
+            self.giving_way,
+            self._standing,
+            self.dock,
+            self.way_out,
+            self.line.offset,
+            self.blocked,
+        )
 
     def succeed(self, before: Executive) -> None:
         """Go on where another mission ended; a docked robot stays docked."""
