@@ -128,6 +128,16 @@ def test_keep_outs_and_what_was_not_to_be_forgotten_are_repeated(tmp_path):
     assert replay.mission.coverage().covered == recording.status["coverage"]["covered"]
 
 
+def test_what_blocked_the_follower_blocks_it_again(tmp_path):
+    recording = record_mission(tmp_path, line="thorough", yaw_deg=25.0, blocked_s=(6.0, 12.0))
+    samples = list(RecordedSamples(recording.paths))
+    assert sum(sample.topic == "blocked" for sample in samples) == 2
+    replay, record, _ = played(samples)
+    assert (record.gap, replay.difference, replay.lacking) == ("", None, [])
+    said = [status["reason"] for _, status in recording.statuses]
+    assert any("the robot stands: obstacle ahead" in reason for reason in said)
+
+
 def test_what_is_said_on_the_bus_is_that_of_the_contract(samples):
     for place in places(samples, TURNS):
         check("turns.json", json.loads(samples[place].sample.payload))

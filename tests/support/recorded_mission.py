@@ -6,6 +6,7 @@ crate that is not there. Once the robot is told to pause, and to go on.
 
 from __future__ import annotations
 
+import math
 import time
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -83,10 +84,12 @@ def record_mission(
     line: str = "cells",
     yaw_deg: float = 0.0,
     commands=COMMANDS,
+    blocked_s: tuple[float, ...] = (),
 ) -> Recording:
     """Record a mission from its first map until a status ends it; some poses may be none.
 
-    ``line`` is the daemon's ``planner.line``; the room lies at ``yaw_deg`` in the map frame.
+    ``line`` is the daemon's ``planner.line``; the room lies at ``yaw_deg`` in the map frame. At
+    ``blocked_s`` [simulated s] a follower says that something is ahead.
     """
     runs = folder / name
     planner = {"budget_s": 0.05, "line": line}
@@ -97,7 +100,7 @@ def record_mission(
             assert time.monotonic() < deadline, daemon.log_text()
             time.sleep(0.05)
         with bus:
-            robot = MappingRobot(bus, broken_poses, yaw_deg, commands)
+            robot = MappingRobot(bus, broken_poses, yaw_deg, commands, blocked_s)
             robot.wait(lambda status: (status["recorder"] or {}).get("state") == "recording")
             robot.drive(ends)
         # With the recorder's last words it may take a while on a busy machine.
@@ -119,12 +122,17 @@ class MappingRobot:
     """A robot on the bus, and the newest status of the daemon."""
 
     def __init__(
-        self, bus: Bus, broken_poses: int = 0, yaw_deg: float = 0.0, commands=COMMANDS
+        self,
+        bus: Bus,
+        broken_poses: int = 0,
+        yaw_deg: float = 0.0,
+        commands=COMMANDS,
+        blocked_s: tuple[float, ...] = (),
     ) -> None:
         self._bus, self._keys = bus, Keys()
         self._broken_poses, self._broken_sent = broken_poses, 0
         keys = self._keys
-        self._commands = list(commands)
+        self._commands, self._blocked_s = list(commands), list(blocked_s)
         pixels = fill(room(*SIZE_M), 1.5, 0.0, 1.6, 1.2, WALL)
         geometry = GridGeometry(*pixels.shape, RESOLUTION_M, Pose2D(0.0, 0.0))
         geometry, start = rotated_geometry(geometry, yaw_deg), rotated_pose(START, yaw_deg)
@@ -132,6 +140,7 @@ class MappingRobot:
         self._maps = Sender(bus, topics.MAP)
         self._updates = Sender(bus, topics.MAP_UPDATE)
         self._poses = Sender(bus, topics.POSE)
+        self._blocked = Sender(bus, topics.BLOCKED)
         self._newest_path = LatestSlot[Sample]()
         self.status: dict = {}
         self.statuses: list[tuple[float, dict]] = []
@@ -157,6 +166,7 @@ class MappingRobot:
             if (sample := self._newest_path.take(0.0)) is not None:
                 self._world.follow(decode_path(sample.payload).xy)
             self._publish()
+            self._report()
             if self._is_time():
                 self._command(*self._commands.pop(0)[1:])
                 due = time.monotonic()
@@ -172,6 +182,17 @@ class MappingRobot:
         if not self.notes or time.monotonic() - self.notes[0][0] < DRIVES_S:
             return False
         return self._commands[0][1]["command"] == "resume" or self.status.get("state") == "covering"
+
+    def _report(self) -> None:
+        """Say that something is 0.4 m ahead, if that is due."""
+        if not self._blocked_s or 1e-9 * self._world.stamp_ns < self._blocked_s[0]:
+            return
+        del self._blocked_s[0]
+        pose = self._world.pose
+        ahead = pose.x + 0.4 * math.cos(pose.yaw), pose.y + 0.4 * math.sin(pose.yaw)
+        place = {"frame": "map", "x": pose.x, "y": pose.y, "points": (ahead,)}
+        why = {"reason": "obstacle", "detail": "obstacle ahead", "held_s": 5.0}
+        self._blocked.put(encode_json({"daemon": "a1", "revision": 0, **why, **place}))
 
     def _publish(self) -> None:
         emission = self._world.tick()
