@@ -34,11 +34,18 @@ class Mapper:
     Localisation is perfect: both maps share the frame and the pixel raster. The
     robot's own map is published as SLAM would: only as large as what is known, so
     its origin and its size change while the robot explores.
+
+    Attributes:
+        loops: how many loops were closed: none.
     """
+
+    loops = 0
 
     def __init__(self, truth: OccupancyGrid, config: SimulationConfig) -> None:
         resolution = truth.geometry.resolution
         self._truth = truth
+        # Raster of the own map.
+        self._geometry = truth.geometry
         self._known: NDArray[np.int8] = np.full(truth.cells.shape, UNKNOWN, np.int8)
         self._extent: Window | None = None
         self._hull_px = config.hull_radius_m / resolution
@@ -48,11 +55,19 @@ class Mapper:
         rays = rays_for(self._reach_px)
         self._angles = np.arange(rays) * (2.0 * math.pi / rays)
 
+    def believed(self, pose: Pose2D) -> Pose2D:
+        """Return the pose that it has of a robot at ``pose``: this one."""
+        return pose
+
+    def true_place(self, x: float, y: float) -> Point:
+        """Return where a place of its map is in truth [m]: there."""
+        return x, y
+
     def scan(self, pose: Pose2D) -> Window | None:
         """Take in a scan from ``pose``, and that the ground under the robot is as it is.
 
         Returns:
-            the window of the truth's pixels in which the own map changed, or None.
+            the window of the own map's pixels that changed, or None.
         """
         geometry = self._truth.geometry
         x, y = geometry.to_pixels(pose.x, pose.y)
@@ -74,16 +89,16 @@ class Mapper:
         between two discs is thinner than the padding, but enough to stop the robot. A margin [m]
         that the hull is to keep from everything makes sure of that.
         """
-        x0, y0 = self._truth.geometry.to_pixels(*start)
-        x1, y1 = self._truth.geometry.to_pixels(*end)
-        spacing = min(0.5, SPACING_M / self._truth.geometry.resolution)
+        x0, y0 = self._geometry.to_pixels(*start)
+        x1, y1 = self._geometry.to_pixels(*end)
+        spacing = min(0.5, SPACING_M / self._geometry.resolution)
         steps = max(1, math.ceil(math.hypot(x1 - x0, y1 - y0) / spacing))
         return all(
             disc_is_free(
                 self._known,
                 x0 + (x1 - x0) * step / steps,
                 y0 + (y1 - y0) * step / steps,
-                self._hull_px + margin_m / self._truth.geometry.resolution,
+                self._hull_px + margin_m / self._geometry.resolution,
                 self._free_at_most,
             )
             for step in range(steps + 1)
@@ -91,18 +106,18 @@ class Mapper:
 
     def is_clear_at(self, point: Point) -> bool:
         """Tell whether the hull has room at a point [m], by the own map; unknown is no room."""
-        x, y = self._truth.geometry.to_pixels(*point)
+        x, y = self._geometry.to_pixels(*point)
         return bool(disc_is_free(self._known, x, y, self._hull_px, self._free_at_most))
 
     def snapshot(self, stamp_ns: int) -> OccupancyGrid | None:
         """Return the own map, cropped to its known part; None before anything is known.
 
-        The crop is rounded outward to whole chunks, and ends where the truth ends.
+        The crop is rounded outward to whole chunks, and ends where its raster ends.
         """
         if self._extent is None:
             return None
         window = self._extent.in_chunks(self._chunk_px, *self._known.shape)
-        geometry = self._truth.geometry
+        geometry = self._geometry
         origin = Pose2D(*geometry.to_map(window.col0, window.row0), geometry.origin.yaw)
         cells = self._known[window.row0 : window.row1, window.col0 : window.col1].copy()
         placed = GridGeometry(window.rows, window.cols, geometry.resolution, origin)

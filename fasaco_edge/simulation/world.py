@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import enum
 import math
-from dataclasses import dataclass
+from collections import deque
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -20,6 +21,8 @@ from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.kernels.lattice.raycast import disc_is_free
 from fasaco_edge.simulation.battery import Battery
 from fasaco_edge.simulation.mapper import Mapper
+from fasaco_edge.simulation.noise import MapperNoise
+from fasaco_edge.simulation.noisy_mapper import NoisyMapper
 from fasaco_edge.simulation.robot import (
     ARRIVED_M,
     DriveState,
@@ -38,6 +41,8 @@ TRACK_SPACING_M = 0.02
 RECENT_TRACK_POINTS = 500
 # Timeout of the velocity, after which a base stops by itself [s].
 DEAF_S = 0.5
+# Directions to its heading in which a base slides along a wall that it is driven into [deg].
+SLIDES_DEG = (15, -15, 30, -30, 45, -45, 60, -60, 75, -75)
 # Clearance to other robots, all of one size, on stopping [m].
 MEETING_M = 0.05
 # Clearance of the robot's own line to its path, where possible [m].
@@ -81,13 +86,20 @@ class World:
         truth: the building. What is not free there (unknown too) is an obstacle.
         start: the robot's first pose, in the frame of ``truth``.
         config: the robot.
+        noise: of its mapper; None for none.
 
     Raises:
         StartOutsideMap: ``start`` is not on ``truth``.
         StartBlocked: the robot's hull does not fit at ``start``.
     """
 
-    def __init__(self, truth: OccupancyGrid, start: Pose2D, config: SimulationConfig) -> None:
+    def __init__(
+        self,
+        truth: OccupancyGrid,
+        start: Pose2D,
+        config: SimulationConfig,
+        noise: MapperNoise | None = None,
+    ) -> None:
         self._truth = truth
         self.config = config
         col, row = truth.geometry.to_pixels(start.x, start.y)
@@ -99,7 +111,12 @@ class World:
                 f"({start.x:g}, {start.y:g}) m"
             )
         self._drive = DriveState(start)
-        self._mapper = Mapper(truth, config)
+        noise = noise or MapperNoise.none()
+        is_ideal = not noise.is_in_map
+        self._mapper = Mapper(truth, config) if is_ideal else NoisyMapper(truth, config, noise)
+        # Poses that are not yet published, and for how many ticks each is not.
+        self._poses: deque[StampedPose] = deque()
+        self._late_ticks = round(noise.late_s / config.tick_s)
         self._path: NDArray[np.float64] | None = None
         self._corners: list[Point] = []
         # Where others drive it: speed [m/s], turn rate [rad/s], and the tick it was told.
@@ -124,8 +141,23 @@ class World:
 
     @property
     def pose(self) -> Pose2D:
-        """The robot's true pose, which is also what it believes."""
+        """The robot's true pose."""
         return self._drive.pose
+
+    @property
+    def believed(self) -> Pose2D:
+        """The pose that its mapper has; without noise the true one."""
+        return self._mapper.believed(self._drive.pose)
+
+    @property
+    def velocity(self) -> tuple[float, float]:
+        """Its speed [m/s] and rate of turning [rad/s]."""
+        return self._drive.speed, self._drive.turn_rate
+
+    @property
+    def loops(self) -> int:
+        """How many loops its mapper has closed."""
+        return self._mapper.loops
 
     @property
     def longest_stand_s(self) -> float:
@@ -154,7 +186,7 @@ class World:
         """Return map and pose as they are now; there is no map before the first tick."""
         return Emission(
             self._mapper.snapshot(self.stamp_ns) if with_map else None,
-            StampedPose(self.pose, self.frame, self.stamp_ns) if with_pose else None,
+            StampedPose(self.believed, self.frame, self.stamp_ns) if with_pose else None,
             self.battery if with_battery else None,
         )
 
@@ -193,9 +225,16 @@ class World:
         map_is_due = since_first % config.period_ticks(config.map_hz) == 0
         pose_is_due = since_first % config.period_ticks(config.pose_hz) == 0
         battery_is_due = since_first % config.period_ticks(BATTERY_HZ) == 0
-        return self.emission(
-            with_map=map_is_due, with_pose=pose_is_due, with_battery=battery_is_due
-        )
+        now = self.emission(with_map=map_is_due, with_pose=pose_is_due, with_battery=battery_is_due)
+        return replace(now, pose=self._ripe(now.pose)) if self._late_ticks else now
+
+    def _ripe(self, pose: StampedPose | None) -> StampedPose | None:
+        """Take in a pose; return one that is as old as those that are published."""
+        if pose is not None:
+            self._poses.append(pose)
+        oldest_ns = self.stamp_ns - self._late_ticks * self.config.tick_ns
+        is_ripe = bool(self._poses) and self._poses[0].stamp_ns <= oldest_ns
+        return self._poses.popleft() if is_ripe else None
 
     def _drain(self) -> None:
         battery, drive = self.battery, self._drive
@@ -229,28 +268,38 @@ class World:
         return self.activity is Activity.STOPPED and is_first and not self._drive.moving
 
     def _recent_track(self) -> NDArray[np.float64]:
-        """Return the track's last metres, to the point where the robot can come to rest."""
+        """Return the track's last metres, to where the robot can come to rest, on its map."""
         here = (self.pose.x, self.pose.y)
         rest = stopping_point(self._drive, self.config)
         points = 2 + int(math.dist(here, rest) / TRACK_SPACING_M)
-        behind = np.array(self._track[-RECENT_TRACK_POINTS:], np.float64)
-        return np.vstack((behind, np.linspace(here, rest, points)))
+        ahead = np.linspace(here, rest, points).tolist()
+        track = [*self._track[-RECENT_TRACK_POINTS:], *ahead]
+        return np.array([self._on_map((x, y)) for x, y in track], np.float64)
+
+    def _on_map(self, place: Point) -> Point:
+        """Return where a place is on the robot's map."""
+        pose = self._mapper.believed(Pose2D(*place))
+        return pose.x, pose.y
 
     def _move(self) -> None:
         if self._told is not None:
             self._move_as_told(*self._told)
             return
         here = (self.pose.x, self.pose.y)
-        while self._corners and math.dist(here, self._corners[-1]) < ARRIVED_M:
+        while self._corners and math.dist(here, self._goal()) < ARRIVED_M:
             self._corners.pop()
         if not self._corners:
             if self.activity in (Activity.DRIVING, Activity.STOPPED):
                 self.activity = Activity.IDLE
             if not self._drive.moving:
                 return
-        goal = self._corners[-1] if self._corners and self._looks_ahead() else None
+        goal = self._goal() if self._corners and self._looks_ahead() else None
         if goal is not None or self._drive.moving:
             self._go_on(driven(self._drive, goal, self.config))
+
+    def _goal(self) -> Point:
+        """Return where the next corner is in truth."""
+        return self._mapper.true_place(*self._corners[-1])
 
     def _looks_ahead(self) -> bool:
         """Tell whether the robot may drive on: it stops before obstacles on its own map.
@@ -259,12 +308,13 @@ class World:
         """
         if self.activity is Activity.STOPPED:
             return False
-        ahead = driven(self._drive, self._corners[-1], self.config)
+        ahead = driven(self._drive, self._goal(), self.config)
         was_held, self._is_held = self._is_held, self._meets(stopping_point(ahead, self.config))
         if self._is_held:
             self.meetings += not was_held
             return False
-        if ahead.speed == 0.0 or self._mapper.is_clear_at(stopping_point(ahead, self.config)):
+        stop = self._on_map(stopping_point(ahead, self.config))
+        if ahead.speed == 0.0 or self._mapper.is_clear_at(stop):
             return True
         self.activity = Activity.STOPPED
         self.stops += 1
@@ -274,9 +324,30 @@ class World:
         if (self._ticks - tick) * self.config.tick_s > DEAF_S:
             speed_m_s = turn_rad_s = 0.0
         ahead = moved_by(self._drive, speed_m_s, turn_rad_s, self.config)
+        was_touching = self.activity is Activity.COLLIDED
         self.activity = Activity.DRIVING if ahead.moving else Activity.IDLE
+        if ahead.moving and not _fits(self._truth, ahead.pose, self.config):
+            slid = self._slid(ahead)
+            if slid is not None:
+                self.collisions += not was_touching
+                self._go_on(slid)
+                self.activity = Activity.COLLIDED
+                return
         if ahead.moving or self._drive.moving:
             self._go_on(ahead)
+
+    def _slid(self, ahead: DriveState) -> DriveState | None:
+        """Return the state of a base that is pushed on along a wall; None where it cannot be."""
+        here, pose = self.pose, ahead.pose
+        way = math.dist((here.x, here.y), (pose.x, pose.y))
+        for deg in SLIDES_DEG:
+            along = pose.yaw + math.radians(deg)
+            share = math.cos(math.radians(deg))
+            x, y = here.x + share * way * math.cos(along), here.y + share * way * math.sin(along)
+            slid = Pose2D(x, y, pose.yaw)
+            if _fits(self._truth, slid, self.config):
+                return DriveState(slid, share * ahead.speed, ahead.turn_rate)
+        return None
 
     def _meets(self, place: Point, margin_m: float = MEETING_M) -> bool:
         """Tell whether a place is too near to another robot, and nearer than this robot is."""

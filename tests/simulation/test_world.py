@@ -95,6 +95,17 @@ def test_a_robot_that_is_pushed_into_a_wall_collides():
     assert world.activity is Activity.COLLIDED
 
 
+def test_a_robot_that_is_pushed_along_a_wall_slides():
+    world = started(building(6, 2), Pose2D(1.0, 0.3, -0.3))
+    for _ in range(400):
+        world.move(0.2, 0.0)
+        world.tick()
+    assert world.activity is Activity.COLLIDED
+    assert world.collisions == 1
+    assert world.pose.x > 1.8
+    assert world.pose.yaw == -0.3
+
+
 def test_a_new_path_under_way_is_joined_without_a_stop_where_it_goes_on_alike():
     world = started(building(8, 4), Pose2D(1.0, 1.0))
     lane = centres(*[(2, col) for col in range(2, 18)])

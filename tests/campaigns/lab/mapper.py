@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D
 from fasaco_edge.grid.occupancy import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
+from fasaco_edge.grid.rotation import composed, inverse
 from tests.campaigns.lab.base import BEAMS, LEAST_RANGE_M, MOST_RANGE_M
 from tests.campaigns.lab.settings import RESOLUTION_M, stamp_ns
 
@@ -147,22 +148,6 @@ class Mapper:
         cells[drawn == DRAWN_OCCUPIED] = OCCUPIED
         origin = Pose2D(grid.offset.x, grid.offset.y)
         return GridGeometry(grid.height, grid.width, RESOLUTION_M, origin), cells
-
-
-def composed(frame: Pose2D, pose: Pose2D) -> Pose2D:
-    """Return where ``pose``, given in a frame, lies where the frame does."""
-    cos, sin = math.cos(frame.yaw), math.sin(frame.yaw)
-    return Pose2D(
-        frame.x + pose.x * cos - pose.y * sin,
-        frame.y + pose.x * sin + pose.y * cos,
-        math.remainder(frame.yaw + pose.yaw, math.tau),
-    )
-
-
-def inverse(pose: Pose2D) -> Pose2D:
-    """Return the pose of the origin in the frame at ``pose``."""
-    cos, sin = math.cos(pose.yaw), math.sin(pose.yaw)
-    return Pose2D(-pose.x * cos - pose.y * sin, pose.x * sin - pose.y * cos, -pose.yaw)
 
 
 def _apart(a: Pose2D, b: Pose2D) -> float:

@@ -1,0 +1,135 @@
+"""Noise of the simulated mapper: settings, and the error of the pose that it has."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, fields, replace
+from typing import Self
+
+from numpy.random import Generator
+
+from fasaco_edge.errors import BadConfiguration
+from fasaco_edge.grid.geometry import Pose2D
+from fasaco_edge.grid.rotation import composed, inverse
+
+SHARES = ("specks", "leg_misses", "jumps")
+NOWHERE = Pose2D(0.0, 0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class MapperNoise:
+    """How far a mapper's maps and poses are from the truth.
+
+    The defaults are about those of a scan matcher with a lidar of 12 mm, on pixels of 5 cm.
+
+    Attributes:
+        seed: of all of it.
+        range_m: standard deviation of the scanner's ranges [m].
+        specks: share of its rays that end at nothing, before they are at a wall.
+        leg_misses: share of its rays that go by thin legs, of a few pixels.
+        shift_m: by how much at most the map's pixels lie beside the building's, along each axis.
+        match_m, match_rad: standard deviation of the pose that a scan is taken in with, along each
+            axis.
+        drift_m, drift_rad: standard deviation of the error that the pose and all of the map that is
+            new take on with a metre's way; after n metres it is sqrt(n) times as much.
+        closes_loops: whether that error is taken back, from the map too, where the robot comes to
+            what was mapped long ago.
+        jumps: share of scans that are taken in with a wrong pose, which is right again with the
+            next one.
+        jump_m: how far off it is [m].
+        late_s: age of a pose when it is published [s].
+    """
+
+    seed: int = 0
+    range_m: float = 0.012
+    specks: float = 0.0005
+    leg_misses: float = 0.5
+    shift_m: float = 0.05
+    match_m: float = 0.006
+    match_rad: float = 0.002
+    drift_m: float = 0.005
+    drift_rad: float = 0.0015
+    closes_loops: bool = True
+    jumps: float = 0.0
+    jump_m: float = 0.1
+    late_s: float = 0.05
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            value = getattr(self, field.name)
+            if not math.isfinite(value) or value < 0 or (field.name in SHARES and value > 1):
+                most = "in 0..1" if field.name in SHARES else "at least 0"
+                raise BadConfiguration(f"{field.name} must be {most}, got {value}")
+
+    @classmethod
+    def none(cls) -> Self:
+        """Return no noise: maps and poses are as the building and the robot are."""
+        return cls().times(0.0)
+
+    def times(self, level: float) -> Self:
+        """Return it so many times as large: all of it but what is no amount; shares up to 1."""
+        amounts = {
+            field.name: level * getattr(self, field.name)
+            for field in fields(self)
+            if field.name not in ("seed", "closes_loops")
+        }
+        return replace(self, **{n: min(a, 1.0) if n in SHARES else a for n, a in amounts.items()})
+
+    @property
+    def is_in_map(self) -> bool:
+        """Whether maps and poses differ from the truth at all; late ones do not."""
+        jumps_m = self.jumps * self.jump_m
+        return any((
+            self.range_m, self.specks, self.leg_misses, self.shift_m, self.match_m,
+            self.match_rad, self.drift_m, self.drift_rad, jumps_m,
+        ))  # fmt: skip
+
+
+class PoseError:
+    """The error of the pose that a mapper has.
+
+    One part is the map's, too: where its frame lies, which drifts with the way. The other is of the
+    newest scan alone.
+    """
+
+    def __init__(self, noise: MapperNoise, rng: Generator) -> None:
+        self._noise = noise
+        self._rng = rng
+        self._frame = self._match = NOWHERE
+
+    def believed(self, pose: Pose2D) -> Pose2D:
+        """Return the pose that the mapper has of a robot at ``pose``."""
+        drifted, match = composed(self._frame, pose), self._match
+        yaw = math.remainder(drifted.yaw + match.yaw, math.tau)
+        return Pose2D(drifted.x + match.x, drifted.y + match.y, yaw)
+
+    def true_place(self, x: float, y: float) -> tuple[float, float]:
+        """Return where a place of the map is in truth [m]."""
+        pose = composed(inverse(self._frame), Pose2D(x - self._match.x, y - self._match.y))
+        return pose.x, pose.y
+
+    def drift(self, pose: Pose2D, way_m: float) -> None:
+        """Let the frame drift while the robot drives on to ``pose``, about where it is."""
+        x, y, yaw = (math.sqrt(way_m) * self._rng.standard_normal(3)).tolist()
+        noise, at = self._noise, composed(self._frame, pose)
+        moved = Pose2D(
+            at.x + noise.drift_m * x, at.y + noise.drift_m * y, at.yaw + noise.drift_rad * yaw
+        )
+        self._frame = composed(moved, inverse(pose))
+
+    def match(self) -> None:
+        """Take in another scan: its pose has another error."""
+        noise, (x, y, yaw) = self._noise, self._rng.standard_normal(3).tolist()
+        chance, towards = self._rng.random(2).tolist()
+        self._match = Pose2D(noise.match_m * x, noise.match_m * y, noise.match_rad * yaw)
+        if chance < noise.jumps:
+            towards *= math.tau
+            self._match = Pose2D(
+                self._match.x + noise.jump_m * math.cos(towards),
+                self._match.y + noise.jump_m * math.sin(towards),
+                self._match.yaw,
+            )
+
+    def place(self, pose: Pose2D, there: Pose2D) -> None:
+        """Have the frame lie where a robot at ``pose`` is ``there``, but for the newest scan."""
+        self._frame = composed(there, inverse(pose))

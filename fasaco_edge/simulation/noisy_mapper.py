@@ -1,0 +1,180 @@
+"""A mapper that makes the map of a building out of noisy scans, as a scan matcher does.
+
+Each pixel is decided by the rays that end in it and those that pass it, as in OpenKarto's grid: so
+walls get thicker and thinner by a pixel, thin legs come and go, and specks appear and are passed.
+The poses of scans are not searched for: they are the true ones with an error.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.random import PCG64, Generator, SeedSequence
+from numpy.typing import NDArray
+
+from fasaco_edge.grid.geometry import GridGeometry, Pose2D, Window
+from fasaco_edge.grid.occupancy import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
+from fasaco_edge.grid.rotation import composed, inverse
+from fasaco_edge.kernels.lattice.areas import find_areas
+from fasaco_edge.kernels.lattice.raycast import Scanner, count_rays, ranges_of
+from fasaco_edge.simulation.mapper import Mapper
+from fasaco_edge.simulation.noise import MapperNoise, PoseError
+from fasaco_edge.simulation.robot import SimulationConfig
+
+# Rays of a scan, as of an LDS-01.
+RAYS = 360
+# A scan is taken in after so much way [m] or turn [rad].
+TRAVEL_M, TURN_RAD = 0.3, 0.35
+# Pixels are known after so many rays, and occupied if more than a share of them ended there.
+LEAST_PASSES, HITS = 2, 0.1
+# A leg has so many pixels at most.
+LEG_PX = 4
+# Room around the building for what is mapped beside it [m].
+MARGIN_M = 0.6
+# A wall begins so far behind its face [pixels]: where nothing else is noisy rays end in it.
+INTO_PX = 1e-3
+# Loops: every so many scans one is looked for, to a scan at least so old and so near; carried out
+# if it moves the robot by so much [m, rad].
+LOOP_EVERY, LOOP_AGE, LOOP_NEAR_M = 3, 40, 1.5
+LOOP_LEAST_M, LOOP_LEAST_RAD = 0.03, 0.01
+
+
+@dataclass(slots=True)
+class _Scan:
+    """A scan taken in: where it was made in truth and on the map, and its rays' ways [pixels]."""
+
+    pose: Pose2D
+    there: Pose2D
+    ways: NDArray[np.float64]
+
+
+class NoisyMapper(Mapper):
+    """A scanner in a ground-truth map, and the robot's own noisy map of it."""
+
+    def __init__(self, truth: OccupancyGrid, config: SimulationConfig, noise: MapperNoise) -> None:
+        super().__init__(truth, config)
+        self.loops = 0
+        of_rays, of_poses, of_raster = map(PCG64, SeedSequence(noise.seed).spawn(3))
+        self._noise, self._rng = noise, Generator(of_rays)
+        self._error = PoseError(noise, Generator(of_poses))
+        self._geometry = _beside(truth.geometry, noise.shift_m * Generator(of_raster).random(2))
+        shape = self._geometry.rows, self._geometry.cols
+        self._known = np.full(shape, UNKNOWN, np.int8)
+        self._hits, self._passes = np.zeros(shape, np.int32), np.zeros(shape, np.int32)
+        self._thin = _legs(truth.cells > config.free_at_most)
+        self._scans: list[_Scan] = []
+        self._at: Pose2D | None = None
+
+    def believed(self, pose: Pose2D) -> Pose2D:
+        """Return the pose that it has of a robot at ``pose``."""
+        return self._error.believed(pose)
+
+    def true_place(self, x: float, y: float) -> tuple[float, float]:
+        """Return where a place of its map is in truth [m]."""
+        return self._error.true_place(x, y)
+
+    def scan(self, pose: Pose2D) -> Window | None:
+        """Take in a scan from ``pose``, if that is away from where the one before it was made.
+
+        Returns:
+            the window of the own map's pixels that the scan may have changed, or None.
+        """
+        at, self._at = self._at or pose, pose
+        if way_m := math.hypot(pose.x - at.x, pose.y - at.y):
+            self._error.drift(pose, way_m)
+        if self._scans and not _is_away(pose, self._scans[-1].pose):
+            return None
+        self._error.match()
+        scan = _Scan(pose, self.believed(pose), self._ways(pose))
+        self._scans.append(scan)
+        changed = self._count(scan, 1)
+        if len(self._scans) % LOOP_EVERY == 0 and self._noise.closes_loops:
+            changed = Window.around(changed, self._close_loop())
+        if changed is not None:
+            self._draw(changed)
+            self._extent = Window.around(self._extent, changed)
+        return changed
+
+    def _ways(self, pose: Pose2D) -> NDArray[np.float64]:
+        """Return how far the rays of a scan come, float64 (RAYS,) [pixels]; below 0: no return."""
+        noise, geometry = self._noise, self._truth.geometry
+        goes_by, is_speck, speck = self._rng.random((3, RAYS))
+        scatter = self._rng.standard_normal(RAYS)
+        x, y = geometry.to_pixels(pose.x, pose.y)
+        ways = ranges_of(
+            self._truth.cells,
+            self._thin,
+            Scanner(x, y, self._reach_px, self._free_at_most),
+            _directions(pose.yaw - geometry.origin.yaw),
+            goes_by < noise.leg_misses,
+        )
+        noisy = ways + INTO_PX + noise.range_m / geometry.resolution * scatter
+        ways = np.where(ways > 0.0, np.maximum(noisy, INTO_PX), ways)
+        return np.where(is_speck < noise.specks, np.abs(ways) * speck, ways)
+
+    def _count(self, scan: _Scan, times: int) -> Window | None:
+        """Add a scan to the counts, or take it out again; return where."""
+        x, y = self._geometry.to_pixels(scan.there.x, scan.there.y)
+        directions = _directions(scan.there.yaw - self._geometry.origin.yaw)
+        ends = (x, y) + np.abs(scan.ways)[:, np.newaxis] * directions
+        counted = count_rays(self._hits, self._passes, (x, y), ends, scan.ways > 0.0, times)
+        return Window.around(Window(*map(int, counted)))
+
+    def _draw(self, part: Window) -> None:
+        """Decide the pixels of a part of the map by their counts."""
+        window = slice(part.row0, part.row1), slice(part.col0, part.col1)
+        hits, passes = self._hits[window], self._passes[window]
+        drawn = np.where(hits > HITS * passes, OCCUPIED, FREE)
+        self._known[window] = np.where(passes < LEAST_PASSES, UNKNOWN, drawn)
+
+    def _close_loop(self) -> Window | None:
+        """Place the newest scan by an old one nearby, and those between accordingly."""
+        *older, newest = self._scans
+        far = [math.dist((s.pose.x, s.pose.y), (newest.pose.x, newest.pose.y)) for s in older]
+        old = min(range(len(far) - LOOP_AGE), key=far.__getitem__, default=-1)
+        if old < 0 or far[old] > LOOP_NEAR_M:
+            return None
+        frame = composed(older[old].there, inverse(older[old].pose))
+        better = composed(frame, newest.pose)
+        dx, dy = better.x - newest.there.x, better.y - newest.there.y
+        turn = math.remainder(better.yaw - newest.there.yaw, math.tau)
+        if math.hypot(dx, dy) <= LOOP_LEAST_M and abs(turn) <= LOOP_LEAST_RAD:
+            return None
+        self.loops += 1
+        changed = None
+        for number, scan in enumerate(self._scans[old + 1 :], 1):
+            share, was = number / (len(older) - old), scan.there
+            taken_out = self._count(scan, -1)
+            scan.there = Pose2D(was.x + share * dx, was.y + share * dy, was.yaw + share * turn)
+            changed = Window.around(changed, taken_out, self._count(scan, 1))
+        self._error.place(newest.pose, better)
+        return changed
+
+
+def _beside(geometry: GridGeometry, shift_m: NDArray[np.float64]) -> GridGeometry:
+    """Return a raster around a building, whose pixels lie a little beside the building's."""
+    margin = math.ceil(MARGIN_M / geometry.resolution)
+    right, up = (shift_m / geometry.resolution).tolist()
+    origin = Pose2D(*geometry.to_map(right - margin, up - margin), geometry.origin.yaw)
+    shape = geometry.rows + 2 * margin, geometry.cols + 2 * margin
+    return GridGeometry(*shape, geometry.resolution, origin)
+
+
+def _legs(blocked: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Return the pixels of small obstacles, bool (rows, cols)."""
+    areas = find_areas(blocked.view(np.uint8))
+    is_small = np.append(False, areas.cells <= LEG_PX)
+    return is_small[areas.labels]
+
+
+def _directions(yaw: float) -> NDArray[np.float64]:
+    """Return the directions of a scan's rays, unit vectors, float64 (RAYS, 2)."""
+    angles = np.arange(RAYS) * (math.tau / RAYS) + yaw
+    return np.column_stack((np.cos(angles), np.sin(angles)))
+
+
+def _is_away(pose: Pose2D, other: Pose2D) -> bool:
+    turned = abs(math.remainder(pose.yaw - other.yaw, math.tau))
+    return math.hypot(pose.x - other.x, pose.y - other.y) > TRAVEL_M or turned > TURN_RAD
