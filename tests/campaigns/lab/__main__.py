@@ -6,7 +6,8 @@ python -m tests.campaigns.lab table --maps DIR
 Base, mapper, mission and follower run in one process in simulated time: the same seed gives the
 same mission, bit for bit, however busy the machine is. ``table`` runs several and prints a table.
 A small change of anything makes another mission: compare several seeds (``--seeds``). It needs
-``pip install -e ".[lab]"``. Exit code 1 after a false done or a deadlock.
+``pip install -e ".[lab]"``, or ``--own usual``: the project's own base and mapper. Exit code 1
+after a false done or a deadlock.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ from itertools import product
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from tests.campaigns.lab.own import NOISES
 from tests.campaigns.lab.settings import LabSettings
 
 if TYPE_CHECKING:
@@ -42,6 +44,7 @@ OPTIONS = {
     "nudge_s": "a person helps a robot that stood for so long [s]; 0 for never",
     "speed_m_s": "speed of the robot [m/s]",
     "tool_m": "width of its tool [m]",
+    "left_m": "how far the robot is to the left of where its follower takes it to be [m]",
 }
 
 
@@ -104,6 +107,7 @@ def _parser() -> argparse.ArgumentParser:
     add("--start", type=_numbers(3), metavar="X,Y,YAW", help="where it starts [m, rad]")
     add("--walk", type=_numbers(4), metavar="X1,Y1,X2,Y2", help="where people walk [m]")
     add("--scan", action="store_true", help="give the follower the lidar's scans")
+    add("--own", default="", choices=sorted(NOISES), help="the project's own base and mapper")
     add("--ideal", action="store_true", help="no slip, no drift")
     defaults = LabSettings()
     for name, what in OPTIONS.items():

@@ -25,12 +25,17 @@ from fasaco_edge.follow.estimate import STAND, Command, moved
 from fasaco_edge.grid.geometry import Pose2D
 from fasaco_edge.grid.motion import limited
 from tests.campaigns.lab.building import Building
-from tests.campaigns.lab.settings import TICK_S, LabSettings
+from tests.campaigns.lab.settings import (
+    BEAMS,
+    LEAST_RANGE_M,
+    MOST_RANGE_M,
+    TICK_S,
+    LabSettings,
+)
 
 with contextlib.redirect_stdout(io.StringIO()):
     import irsim  # says which of the window systems it does not find
 
-BEAMS, LEAST_RANGE_M, MOST_RANGE_M = 241, 0.12, 8.0
 # A base stands without a command for so long [s].
 PATIENCE_S = 0.5
 ACCELERATION_M_S2, TURN_ACCELERATION_RAD_S2 = 0.6, 4.0

@@ -16,8 +16,13 @@ from numpy.typing import NDArray
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D
 from fasaco_edge.grid.occupancy import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
 from fasaco_edge.grid.rotation import composed, inverse
-from tests.campaigns.lab.base import BEAMS, LEAST_RANGE_M, MOST_RANGE_M
-from tests.campaigns.lab.settings import RESOLUTION_M, stamp_ns
+from tests.campaigns.lab.settings import (
+    BEAMS,
+    LEAST_RANGE_M,
+    MOST_RANGE_M,
+    RESOLUTION_M,
+    stamp_ns,
+)
 
 FRAME = "map"
 MAP_EVERY_S = 3.0

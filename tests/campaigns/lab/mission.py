@@ -10,18 +10,23 @@ from __future__ import annotations
 import hashlib
 import math
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.grid.geometry import StampedPose
+from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.mission.core.path_exit import PublishedPath
-from tests.campaigns.lab.base import Base
 from tests.campaigns.lab.building import Building
-from tests.campaigns.lab.mapper import FRAME, Mapper
+from tests.campaigns.lab.own import FRAME, OwnBase, OwnMapper
 from tests.campaigns.lab.person import Person
 from tests.campaigns.lab.product import Product, ProductReport
 from tests.campaigns.lab.settings import LabSettings, stamp_ns
+
+if TYPE_CHECKING:
+    from tests.campaigns.lab.base import Base
+    from tests.campaigns.lab.mapper import Mapper
 
 DONE = "done"
 # A mission that is done for so long is over [s]: a map may yet bring it more to do.
@@ -47,6 +52,7 @@ class Trace:
         paths: the paths published, each with the number of ticks before it.
         states: states of the mission with their reasons, and of the follower, and when each began
             [s].
+        maps: the maps, each with the number of ticks before it.
         loops: loops that the mapper closed.
         nudges: when a person helped [s].
     """
@@ -54,6 +60,7 @@ class Trace:
     rows: list[tuple[float, ...]] = field(default_factory=list)
     paths: list[tuple[int, PublishedPath]] = field(default_factory=list)
     states: list[tuple[float, str, str, str]] = field(default_factory=list)
+    maps: list[tuple[int, OccupancyGrid]] = field(default_factory=list)
     loops: int = 0
     nudges: list[float] = field(default_factory=list)
 
@@ -97,8 +104,7 @@ def run_mission(building: Building, settings: LabSettings) -> LabRun:
 class _Running:
     def __init__(self, building: Building, settings: LabSettings) -> None:
         self._building, self._settings = building, settings
-        self._base = Base(building, settings)
-        self._mapper = Mapper()
+        self._base, self._mapper = _base_and_mapper(building, settings)
         self._product = Product(settings.config)
         self._person = Person(building, settings.nudge_s)
         self._trace = Trace()
@@ -122,7 +128,7 @@ class _Running:
         now, tick = base.now, len(trace.rows) + 1
         pose = mapper.corrected(base.odometry)
         if tick % self._pose_ticks == 0:
-            product.hear_pose(StampedPose(pose, FRAME, stamp_ns(now)), now)
+            product.hear_pose(StampedPose(pose, FRAME, stamp_ns(now)), now, self._settings.left_m)
         sees = self._settings.scan and tick % SIGHT_TICKS == 0
         is_wanted = tick % self._scan_ticks == 0 and mapper.wants(base.odometry)
         ranges = base.scan() if sees or is_wanted else None
@@ -132,6 +138,7 @@ class _Running:
             mapper.take(ranges, base.odometry)
         if (grid := mapper.map_due(now)) is not None:
             product.hear_map(grid)
+            trace.maps.append((len(trace.rows), grid))
         command = product.step(now)
         command = self._person.helps(base, now) or command
         if command is not None:
@@ -162,3 +169,16 @@ class _Running:
         self._trace.loops = self._mapper.loops
         self._trace.nudges = self._person.nudges
         return LabRun(self._building, self._settings, self._trace, self._product.report())
+
+
+def _base_and_mapper(
+    building: Building, settings: LabSettings
+) -> tuple[Base | OwnBase, Mapper | OwnMapper]:
+    if settings.own:
+        own = OwnBase(building, settings)
+        return own, OwnMapper(own)
+    # They are of others, and not everywhere.
+    from tests.campaigns.lab.base import Base
+    from tests.campaigns.lab.mapper import Mapper
+
+    return Base(building, settings), Mapper()

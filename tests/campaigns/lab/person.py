@@ -6,14 +6,18 @@ It is turned away from the nearest wall, and driven 0.4 m.
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy import ndimage
 
 from fasaco_edge.follow.estimate import STAND, Command
-from tests.campaigns.lab.base import Base
 from tests.campaigns.lab.building import Building
 from tests.campaigns.lab.settings import TICK_S
+
+if TYPE_CHECKING:
+    from tests.campaigns.lab.base import Base
+    from tests.campaigns.lab.own import OwnBase
 
 # A turn, then a drive, then a stop: when each ends [s].
 TURNED_S, DRIVEN_S, HELPED_S = 4.0, 7.0, 8.0
@@ -38,7 +42,7 @@ class Person:
             distance = ndimage.distance_transform_edt(~building.occupied)
             self._slope = np.gradient(ndimage.gaussian_filter(distance, 3))
 
-    def note(self, base: Base, now: float, *, has_work: bool) -> None:
+    def note(self, base: Base | OwnBase, now: float, *, has_work: bool) -> None:
         """Look at the robot; begin to help if it has stood for long."""
         wheels = base.wheels
         stands = abs(wheels.speed) < STANDS_M_S and abs(wheels.turn_rate) < STANDS_RAD_S
@@ -47,7 +51,7 @@ class Person:
             self.nudges.append(now)
             self._stood_s = 0.0
 
-    def helps(self, base: Base, now: float) -> Command | None:
+    def helps(self, base: Base | OwnBase, now: float) -> Command | None:
         """Return the joystick's command; None while nobody helps."""
         if not self.nudges or (since_s := now - self.nudges[-1]) >= HELPED_S:
             return None
@@ -56,7 +60,7 @@ class Person:
             return Command(0.0, max(-TURN_RAD_S, min(TURN_RAD_S, TURN_GAIN * bend)))
         return Command(SPEED_M_S) if since_s < DRIVEN_S else STAND
 
-    def _away(self, base: Base) -> float:
+    def _away(self, base: Base | OwnBase) -> float:
         """Return the direction away from the nearest wall [rad]."""
         col, row = self._geometry.to_pixels(base.truth.x, base.truth.y)
         up, right = (slope[int(row), int(col)] for slope in self._slope)

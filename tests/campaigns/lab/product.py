@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import json
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -27,7 +27,7 @@ from fasaco_edge.follow.follower import Follower
 from fasaco_edge.follow.scanner import Mount
 from fasaco_edge.follow.sight import Sight, SightSettings
 from fasaco_edge.follow.standstill import Standstill, report_of
-from fasaco_edge.grid.geometry import StampedPose
+from fasaco_edge.grid.geometry import Pose2D, StampedPose
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.mission.core.events import Event, MapReceived, PoseReceived
 from fasaco_edge.mission.core.mission import Mission
@@ -39,9 +39,8 @@ from fasaco_edge.wire.messages.paths import encode_path
 from fasaco_edge.wire.messages.poses import encode_pose_stamped
 from fasaco_edge.wire.messages.scans import LaserScan, encode_scan
 from fasaco_edge.wire.schemas import POSE_STAMPED
-from tests.campaigns.lab.base import LEAST_RANGE_M, MOST_RANGE_M
 from tests.campaigns.lab.planning import LockStepPlanning
-from tests.campaigns.lab.settings import stamp_ns
+from tests.campaigns.lab.settings import LEAST_RANGE_M, MOST_RANGE_M, stamp_ns
 
 NAME = "lab"
 
@@ -98,12 +97,17 @@ class Product:
         if self._sight is not None:
             self._sight.take_map(payload)
 
-    def hear_pose(self, stamped: StampedPose, now: float) -> None:
-        """Take in a pose: mission and follower both do, at ``now`` [s]."""
+    def hear_pose(self, stamped: StampedPose, now: float, left_m: float = 0.0) -> None:
+        """Take in a pose: mission and follower both do, at ``now`` [s].
+
+        The follower takes the robot to be ``left_m`` further to the right than it is.
+        """
         pose = self._decoder.decode(encode_pose_stamped(stamped), POSE_STAMPED)
         assert pose is not None
         self._events.append(PoseReceived(pose))
-        self.follower.take_pose(pose, now)
+        x, y, yaw = pose.pose.x, pose.pose.y, pose.pose.yaw
+        beside = Pose2D(x + left_m * math.sin(yaw), y - left_m * math.cos(yaw), yaw)
+        self.follower.take_pose(replace(pose, pose=beside) if left_m else pose, now)
 
     def hear_scan(self, ranges: NDArray[np.float64], now: float) -> None:
         """Take in a scan, float64 (beams,) [m], 0 for no return: the follower does."""

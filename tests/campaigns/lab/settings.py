@@ -16,6 +16,9 @@ TICK_S = 0.05
 RESOLUTION_M = 0.05
 """Edge of a pixel of the robot's map [m]."""
 
+BEAMS, LEAST_RANGE_M, MOST_RANGE_M = 241, 0.12, 8.0
+"""Beams of the lidar, and its ranges [m]."""
+
 # A mission over so much floor takes at most so many times as long as driving at full speed without
 # turns and overlap; half of that time is usual.
 LONGEST = 4.0
@@ -39,6 +42,9 @@ class LabSettings:
         pose_hz, scan_hz: rates of poses, and of scans that are offered to the mapper [1/s].
         nudge_s: a person helps a robot that stood so long with work left [s]; 0 for never.
         speed_m_s, tool_m: speed of the robot, and width of its tool.
+        own: noise of the project's own mapper, see ``own.NOISES``; "" for a simulator and a scan
+            matcher of others.
+        left_m: how far the robot is to the left of where its follower takes it to be [m].
     """
 
     seed: int = 1
@@ -56,6 +62,8 @@ class LabSettings:
     nudge_s: float = 0.0
     speed_m_s: float = 0.35
     tool_m: float = 0.3
+    own: str = ""
+    left_m: float = 0.0
 
     def __post_init__(self) -> None:
         """Check rates and lengths.

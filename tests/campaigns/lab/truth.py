@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from fasaco_edge.grid.geometry import GridGeometry
-from fasaco_edge.grid.occupancy import OccupancyGrid
+from fasaco_edge.grid.occupancy import UNKNOWN, OccupancyGrid
 from tests.campaigns.lab.building import Building, Mask
 from tests.campaigns.lab.settings import RESOLUTION_M
 
@@ -79,7 +79,7 @@ class Truth:
             for disc_m in (radius_m, radius_m + RESOLUTION_M)
         )
         swept = _within(geometry, xy, tool_px)
-        return cls(geometry, occupied, free, reachable, clear, swept, _claimed(geometry, floor))
+        return cls(geometry, occupied, free, reachable, clear, swept, claimed_on(geometry, floor))
 
     def m2(self, mask: Mask) -> float:
         """Return the area of a mask [m2]."""
@@ -146,19 +146,25 @@ def _connected(fits: Mask, geometry: GridGeometry, start: NDArray[np.float64]) -
     return part
 
 
-def _claimed(geometry: GridGeometry, floor: OccupancyGrid | None) -> Mask:
-    """Return which pixels the product says were swept, in the map frame."""
-    claimed = np.zeros((geometry.rows, geometry.cols), bool)
-    if floor is None:
-        return claimed
+def values_on(geometry: GridGeometry, grid: OccupancyGrid) -> NDArray[np.int8]:
+    """Return a grid's values at the centres of other pixels; UNKNOWN beyond it."""
+    values = np.full((geometry.rows, geometry.cols), UNKNOWN, np.int8)
     rows, cols = np.mgrid[0 : geometry.rows, 0 : geometry.cols]
     x = geometry.origin.x + (cols + 0.5) * geometry.resolution
     y = geometry.origin.y + (rows + 0.5) * geometry.resolution
-    there_cols, there_rows = (np.floor(axis) for axis in floor.geometry.to_pixels(x, y))
+    there_cols, there_rows = (np.floor(axis) for axis in grid.geometry.to_pixels(x, y))
     inside = (there_cols >= 0) & (there_rows >= 0)
-    inside &= (there_cols < floor.geometry.cols) & (there_rows < floor.geometry.rows)
+    inside &= (there_cols < grid.geometry.cols) & (there_rows < grid.geometry.rows)
     at = there_rows[inside].astype(int), there_cols[inside].astype(int)
-    claimed[inside] = floor.cells[at] >= CLAIMED_AT
+    values[inside] = grid.cells[at]
+    return values
+
+
+def claimed_on(geometry: GridGeometry, floor: OccupancyGrid | None) -> Mask:
+    """Return which pixels the product says were swept, in the map frame."""
+    if floor is None:
+        return np.zeros((geometry.rows, geometry.cols), bool)
+    claimed: Mask = values_on(geometry, floor) >= CLAIMED_AT
     return claimed
 
 
