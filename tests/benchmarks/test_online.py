@@ -22,7 +22,7 @@ from tests.benchmarks.online.mission import Conditions, CountedPlanning, OnlineM
 from tests.benchmarks.online.report import report
 from tests.benchmarks.online.robot import Pace, Robot
 from tests.benchmarks.online.runs import OnlinePlan, count, measure
-from tests.benchmarks.online.sight import Senses, Sight
+from tests.benchmarks.online.sight import Senses, Sight, sight_of
 
 CELL_M = 0.3
 TWO_ROOMS = (
@@ -394,6 +394,46 @@ def test_figures(capsys, monkeypatch, tmp_path):
     assert document["beside"]["maze-s0"]["covered_all"] is True
     assert [run["covered_all"] for run in document["runs"]] == [True] * 4
     assert document["goals"][0]["what"].startswith("all reachable")
+
+
+def test_noise_makes_each_mission_a_second_time(tmp_path):
+    file = tmp_path / "rooms.npy"
+    np.save(file, free_of(*TWO_ROOMS))
+    choice = BuildingChoice((str(file),), 0, 0, 0)
+    plan = plan_of(choice=choice, ranges_m=(4.0,), noise=1.0)
+    runs = list(measure(plan, lambda _: None))
+    assert len(runs) == count(plan) == 2
+    quiet, noisy = runs
+    assert (quiet.noise, noisy.noise) == (0.0, 1.0)
+    # Without noise it is as if there were none.
+    (alone,) = measure(plan_of(choice=choice, ranges_m=(4.0,)), lambda _: None)
+    assert (quiet.steps, quiet.time_s, quiet.reached) == (alone.steps, alone.time_s, alone.reached)
+    assert noisy.steps != quiet.steps
+    (again,) = (run for run in measure(plan, lambda _: None) if run.noise)
+    assert (again.time_s, again.ended) == (noisy.time_s, noisy.ended)
+    told = report(0.0, with_turns=False, about={}, runs=runs)
+    assert told.figures["missions"] == 1
+    assert told.figures["noisy"]["missions"] == 1
+    done = [noisy.time_s / quiet.time_s] if noisy.done else []
+    assert told.figures["noisy"]["time_ratio_median"] == (done[0] if done else None)
+    table = next(table for table in told.tables if table.title.startswith("under a mapper"))
+    assert [row[0] for row in table.rows] == [quiet.building]
+    assert next(iter(told.goals)).what.startswith("mission time with a noisy mapper")
+
+
+def test_what_a_noisy_mapper_shows_is_where_its_poses_are():
+    building = drawn(*TWO_ROOMS)
+    sight = sight_of(building, Senses(4.0, noise=1.0, seed=2))
+    x, y = centre_px(building, (1, 2))
+    assert sight.news() is None
+    for step in range(6):
+        at = x + step, y
+        sight.look(at)
+        there = sight.pose_of(at, 0.0)
+        assert sight.point_of(there.x, there.y) == pytest.approx(at)
+        assert sight.geometry.to_pixels(there.x, there.y) != at
+    assert (sight.news().grid.cells == 0).any()
+    assert sight.news() is None
 
 
 def test_tables(capsys, tmp_path):

@@ -27,7 +27,7 @@ FEWEST_CELLS, MOST_CELLS = 1_000, 1_000_000
 # Options that figures say of themselves.
 CONDITIONS = (
     "starts", "ranges", "seeds", "misread", "cost", "turn_s", "speed_m_s", "proposals",
-    "planning_takes_time", "planners",
+    "planning_takes_time", "planners", "noise",
 )  # fmt: skip
 
 
@@ -138,6 +138,14 @@ def _add_robot_options(parser: argparse.ArgumentParser) -> None:
         "%(default)g; there are goals for 0.05, too)",
     )
     parser.add_argument(
+        "--noise",
+        type=_within(0.0, 4.0),
+        default=0.0,
+        metavar="LEVEL",
+        help="each mission in a building once more, with a mapper of so much noise; 1: of a scan "
+        "matcher's (default: none)",
+    )
+    parser.add_argument(
         "--cost",
         choices=("steps", "turns"),
         default="steps",
@@ -173,6 +181,7 @@ def _plan(args: argparse.Namespace) -> OnlinePlan:
         proposals=args.proposals,
         planning_takes_time=args.planning_takes_time,
         planners=tuple(dict.fromkeys(args.planners)),
+        noise=args.noise,
     )
 
 
@@ -201,6 +210,7 @@ examples:
   python -m tests.benchmarks online --maps flat basement --ranges 3.5 --mazes 0 --cases
   python -m tests.benchmarks online --grids *.npy --starts 3 --seeds 10 --misread 0.05 --json
   python -m tests.benchmarks online --generated 3 --cells 10000 --cost turns
+  python -m tests.benchmarks online --maps office flat --mazes 0 --cases --noise 1 --cost turns
   python -m tests.benchmarks online --maps office --cases person --planning-takes-time
   python -m tests.benchmarks online --planners fasaco fasaco-anew aco aco-anew spiral-stc zigzag
 """,

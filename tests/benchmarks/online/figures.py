@@ -151,6 +151,48 @@ def time_ratio(run: MissionRun) -> float:
     return run.time_ratio
 
 
+@dataclass(frozen=True, slots=True)
+class NoisySummary:
+    """Missions under the noise of a mapper, each beside the same one without.
+
+    Attributes:
+        pairs: without noise, with it.
+    """
+
+    pairs: Sequence[tuple[MissionRun, MissionRun]]
+
+    @classmethod
+    def of(cls, runs: Sequence[MissionRun]) -> NoisySummary:
+        """Pair missions."""
+        quiet = {_what(run): run for run in runs if not run.noise}
+        return cls([(quiet[_what(run)], run) for run in runs if run.noise])
+
+    @property
+    def time_ratios(self) -> list[float]:
+        """Time with noise to that without, of missions that both were done."""
+        return [noisy.time_s / quiet.time_s for quiet, noisy in self.pairs if noisy.done]
+
+    @property
+    def time_ratio(self) -> float | None:
+        """Median of these."""
+        return _median(self.time_ratios)
+
+    def document(self) -> dict[str, Any]:
+        """Return this as JSON values."""
+        noisy = [run for _, run in self.pairs]
+        return {
+            "missions": len(noisy),
+            "done": sum(run.done for run in noisy),
+            "time_ratio_median": self.time_ratio,
+            "time_ratio_worst": max(self.time_ratios, default=None),
+            "missed_share_median": _median(run.missed / run.cells for run in noisy),
+        }
+
+
+def _what(run: MissionRun) -> tuple[object, ...]:
+    return run.planner, run.building, run.start, run.range_m, run.seed
+
+
 def _ms(elapsed: Elapsed, cpu: bool) -> float:
     return elapsed.cpu_ms if cpu else elapsed.wall_ms
 
@@ -167,10 +209,16 @@ TIME = 1.05
 REPLAN_MS, REPLAN_TO_FULL = 10.0, 1 / 20
 INGEST_MS = 10.0
 KEPT, WAITING = 0.88, 0.001
+NOISY_TIME = 1.10
 
 
-def goals(summary: Summary, misread: float, *, with_turns: bool) -> Iterator[Goal]:
+def goals(
+    summary: Summary, misread: float, *, with_turns: bool, noisy: NoisySummary | None = None
+) -> Iterator[Goal]:
     """Yield the goals that missions in buildings have something to say on."""
+    if noisy is not None and noisy.pairs:
+        what = "mission time with a noisy mapper to that with an ideal one, median"
+        yield _goal(what, noisy.time_ratio, NOISY_TIME)
     covered = summary.covered_all
     yield Goal(
         "all reachable cells covered (1 = always)",

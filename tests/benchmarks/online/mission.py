@@ -43,7 +43,7 @@ from tests.benchmarks.judge import MOVES
 from tests.benchmarks.online.buildings import Building
 from tests.benchmarks.online.contenders import CONTENDERS, DAEMON
 from tests.benchmarks.online.robot import Pace, Robot
-from tests.benchmarks.online.sight import Senses, Sight
+from tests.benchmarks.online.sight import Senses, sight_of
 
 # How far ahead of the robot a path is to hold still [m].
 NEXT_M = 5.0
@@ -228,7 +228,7 @@ class OnlineMission:
 
     def __init__(self, building: Building, conditions: Conditions) -> None:
         self.building = building
-        self.sight = Sight(building, conditions.senses)
+        self.sight = sight_of(building, conditions.senses)
         cell_m = building.footprint.cell_m
         centre = building.lattice.centres(np.array([building.start], np.int32))
         (x, y), *_ = centre.tolist()
@@ -247,6 +247,11 @@ class OnlineMission:
         # A plan that takes its time, and when it will be there.
         self._on_its_way: tuple[PlanReady, float] | None = None
         self._stale = False
+
+    @property
+    def is_noisy(self) -> bool:
+        """Whether the robot's mapper is."""
+        return self._conditions.senses.noise > 0.0
 
     @property
     def done(self) -> bool:

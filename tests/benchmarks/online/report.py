@@ -7,7 +7,7 @@ from functools import partial
 
 from fasaco_edge.bench.benchmark import Report, ResultTable, peak_mb
 from tests.benchmarks.online.buildings import BUILDING, CASE, KINDS, MAZE
-from tests.benchmarks.online.figures import Summary, goals, steps_ratio, time_ratio
+from tests.benchmarks.online.figures import NoisySummary, Summary, goals, steps_ratio, time_ratio
 from tests.benchmarks.online.judge import MILESTONES, MissionRun
 
 HEADER = (
@@ -19,6 +19,10 @@ LATENCY_HEADER = (
 )  # fmt: skip
 PLANNER_HEADER = (*HEADER[:-1], "replan\np50, p99\n[ms]")
 UNTIL_HEADER = ("", *(f"{percent} %:\nsteps,\n[s]" for percent in MILESTONES))
+NOISY_HEADER = (
+    "", "missions,\ndone", "time to\nideal", "steps\nto known", "missed\n[%]",
+    "waiting\n[%],\nheld up",
+)  # fmt: skip
 CASE_HEADER = (
     "", "missions,\ndone", "missed,\nof cells", "steps,\ntime [s]", "plans,\npaths",
     "replan\np50, p99,\nmax [ms]", "waiting\n[%],\nheld up",
@@ -47,7 +51,9 @@ def report(
 
     Figures and goals are of the planner that comes first; the last table has all of them.
     """
-    all_runs, of_planner = runs, _by_planner(runs)
+    noisy, all_runs = NoisySummary.of(runs), runs
+    runs = [run for run in runs if not run.noise]
+    of_planner = _by_planner(runs)
     runs = next(iter(of_planner.values()), [])
     of_kind = {kind: [run for run in runs if run.kind == kind] for kind in KINDS}
     buildings = Summary(of_kind[BUILDING])
@@ -69,6 +75,7 @@ def report(
             "beside: something happens", CASE_HEADER, tuple(_case_row(case) for case in cases)
         ),
     ]
+    further.append(ResultTable("under a mapper's noise", NOISY_HEADER, tuple(_noisy_rows(noisy))))
     if len(of_planner) > 1:
         rows = [_planner_row(name, group) for name, group in of_planner.items()]
         further.append(ResultTable("planners, in buildings", PLANNER_HEADER, tuple(rows)))
@@ -78,6 +85,7 @@ def report(
         rows=tuple(_row(*one) for one in groups),
         figures={
             **buildings.document(),
+            "noisy": noisy.document(),
             "conditions": about,
             "beside": {
                 group[0].building: {"kind": group[0].kind, **Summary(group).document()}
@@ -88,7 +96,7 @@ def report(
             },
             "runs": [run.document() for run in all_runs],
         },
-        goals=tuple(goals(buildings, misread, with_turns=with_turns)),
+        goals=tuple(goals(buildings, misread, with_turns=with_turns, noisy=noisy)),
         remarks=(*REMARKS, *_complaints(all_runs), f"peak memory of this process {peak_mb()} MB"),
         further=tuple(table for table in further if table.rows),
     )
@@ -170,9 +178,32 @@ def _case_row(runs: Sequence[MissionRun]) -> tuple[str, ...]:
     )
 
 
+def _noisy_rows(noisy: NoisySummary) -> Iterator[tuple[str, ...]]:
+    if len({quiet.building for quiet, _ in noisy.pairs}) > 1:
+        yield _noisy_row("all buildings", noisy)
+    for name in dict.fromkeys(quiet.building for quiet, _ in noisy.pairs):
+        pairs = [pair for pair in noisy.pairs if pair[0].building == name]
+        yield _noisy_row(name, NoisySummary(pairs))
+
+
+def _noisy_row(name: str, noisy: NoisySummary) -> tuple[str, ...]:
+    runs = [run for _, run in noisy.pairs]
+    of, summary = noisy.document(), Summary(runs)
+    return (
+        name,
+        f"{len(runs)}\n{of['done']}",
+        _lines(".3f", of["time_ratio_median"], of["time_ratio_worst"]),
+        _lines(".4f", summary.ratio_median(steps_ratio), summary.ratio_worst(steps_ratio)),
+        f"{100.0 * of['missed_share_median']:.1f}",
+        f"{_percent(summary.waiting)}\n{sum(run.held_up for run in runs)}",
+    )
+
+
 def _complaints(runs: Sequence[MissionRun]) -> Iterator[str]:
     """Yield what is wrong with missions, one by one."""
     for run in runs:
+        if run.noise and run.done:
+            continue
         about = f"{run.building}, start {run.start}, {run.range_m:g} m, seed {run.seed}"
         if not run.done:
             yield f"{about}: ended with {run.ended}; {run.missed} cells missed"

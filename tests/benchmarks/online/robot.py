@@ -81,10 +81,8 @@ class Robot:
 
     def pose(self, sight: Sight) -> Pose2D:
         """Return where the robot is in its map."""
-        x, y = sight.geometry.to_map(*self.at)
         along = self._heading or (1.0, 0.0)
-        yaw = math.atan2(along[1], along[0]) + sight.geometry.origin.yaw
-        return Pose2D(x, y, math.remainder(yaw, 2.0 * math.pi))
+        return sight.pose_of(self.at, math.atan2(along[1], along[0]))
 
     def next_leg(self, sight: Sight) -> Leg | None:
         """Return the way to the next waypoint; None at the path's end."""
@@ -108,7 +106,7 @@ class Robot:
         self.quarters += leg.quarters
 
     def _waypoint(self, sight: Sight, row: int, col: int) -> Point:
-        return sight.geometry.to_pixels((col + 0.5) * self._cell_m, (row + 0.5) * self._cell_m)
+        return sight.point_of((col + 0.5) * self._cell_m, (row + 0.5) * self._cell_m)
 
     def _quarters_to(self, end: Point) -> float:
         # How it stands in the beginning is nobody's merit.

@@ -43,6 +43,7 @@ class OnlinePlan:
         proposals: budget of a plan.
         planning_takes_time: as in ``Conditions``.
         planners: names of CONTENDERS.
+        noise: of a mapper, under which each mission in a building is made a second time; 0: none.
     """
 
     choice: BuildingChoice
@@ -56,13 +57,19 @@ class OnlinePlan:
     proposals: int
     planning_takes_time: bool
     planners: tuple[str, ...] = (DAEMON,)
+    noise: float = 0.0
+
+    @property
+    def noises(self) -> tuple[float, ...]:
+        """Noises of the mappers of each mission."""
+        return (0.0, self.noise) if self.noise else (0.0,)
 
 
 def count(plan: OnlinePlan) -> int:
     """Return how many missions ``measure`` will yield."""
     choice = plan.choice
     buildings = len(choice.grids) + choice.generated + choice.mazes
-    missions = buildings * plan.starts * len(plan.ranges_m) + len(plan.cases)
+    missions = buildings * plan.starts * len(plan.ranges_m) * len(plan.noises) + len(plan.cases)
     return plan.seeds * len(plan.planners) * missions
 
 
@@ -92,9 +99,10 @@ def measure(plan: OnlinePlan, say: Say) -> Generator[MissionRun, None, None]:
             if key not in references:
                 say(f"{started.name}: reference")
                 references[key] = _reference(plan, started)
-            for range_m in plan.ranges_m:
-                say(f"{planner}, seed {seed}: {started.name}, start {number}, {range_m:g} m")
-                yield _run(one, started, range_m, seed, references[key])
+            for range_m, noise in itertools.product(plan.ranges_m, plan.noises):
+                under = f", noise {noise:g}" if noise else ""
+                say(f"{planner}, seed {seed}: {started.name}, start {number}, {range_m:g} m{under}")
+                yield _run(one, started, range_m, seed, references[key], noise=noise)
         for name in plan.cases:
             say(f"{planner}, seed {seed}: {name}")
             case = CASES[name]
@@ -121,6 +129,8 @@ def _run(
     seed: int,
     reference: Reference | None,
     act: Act = lambda _: True,
+    *,
+    noise: float = 0.0,
 ) -> MissionRun:
     happened = False
 
@@ -131,7 +141,7 @@ def _run(
     (planner,) = plan.planners
     misread = plan.misread if reference is not None else 0.0
     conditions = Conditions(
-        senses=Senses(range_m, misread, seed),
+        senses=Senses(range_m, misread, seed, noise),
         pace=plan.pace,
         cost=plan.pace.cost(building.footprint.cell_m, with_turns=plan.with_turns),
         seat=CountedPlanning(seed, plan.proposals, planner),
@@ -169,4 +179,5 @@ def _run(
         kept=tuple(watch.kept),
         updates=tuple(watch.updates),
         planner=planner,
+        noise=noise,
     )

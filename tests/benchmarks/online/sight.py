@@ -25,6 +25,9 @@ from fasaco_edge.grid.lattice import UNKNOWN as UNKNOWN_CELL
 from fasaco_edge.grid.occupancy import FREE, OCCUPIED, UNKNOWN, MapPatch, OccupancyGrid
 from fasaco_edge.kernels.lattice.raycast import Scanner, cast_rays, disc_is_free, reveal_disc
 from fasaco_edge.mission.core.events import MapReceived, PatchReceived
+from fasaco_edge.simulation.noise import MapperNoise
+from fasaco_edge.simulation.noisy_mapper import NoisyMapper
+from fasaco_edge.simulation.robot import SimulationConfig
 from tests.benchmarks.online.buildings import Building
 
 # What is nearer than this is seen as it is [m].
@@ -91,12 +94,14 @@ class Senses:
     Attributes:
         range_m: reach of its scanner, which looks all around [m].
         misread: share of the cells that it misreads from afar, see ``online_misreading``.
-        seed: draws which cells these are.
+        seed: draws which cells these are, and the noise.
+        noise: of its mapper, so many times that of a scan matcher; 0 for none.
     """
 
     range_m: float
     misread: float = 0.0
     seed: int = 0
+    noise: float = 0.0
 
 
 class Sight:
@@ -123,6 +128,15 @@ class Sight:
         self._extent: Window | None = None
         self._changed: Window | None = None
         self._sent: Window | None = None
+
+    def pose_of(self, at: Point, yaw: float) -> Pose2D:
+        """Return the pose on the robot's map, of a robot that looks along ``yaw`` [rad]."""
+        yaw = math.remainder(yaw + self.geometry.origin.yaw, math.tau)
+        return Pose2D(*self.geometry.to_map(*at), yaw)
+
+    def point_of(self, x: float, y: float) -> Point:
+        """Return where a place on the robot's map is in truth [pixels]."""
+        return self.geometry.to_pixels(x, y)
 
     def look(self, at: Point) -> None:
         """Take in a scan from ``at``, and that the ground under the robot is as it is."""
@@ -191,6 +205,47 @@ class Sight:
         seen = cast_rays(self.truth, known, scanner, self._rays)
         stood_on = reveal_disc(self.truth, known, *at, self._hull_px)
         return Window.around(Window(*map(int, seen)), Window(*map(int, stood_on)))
+
+
+class NoisySight(Sight):
+    """A scanner in a building, and the robot's own map by the simulation's noisy mapper."""
+
+    def __init__(self, building: Building, senses: Senses) -> None:
+        super().__init__(building, senses)
+        footprint = building.footprint
+        config = SimulationConfig(
+            range_m=senses.range_m,
+            robot_radius_m=footprint.robot_radius_m,
+            free_at_most=footprint.free_at_most,
+        )
+        noise = replace(MapperNoise().times(senses.noise), seed=senses.seed)
+        self._mapper = NoisyMapper(building.truth, config, noise)
+        # Walls are nearer than on its map, by as much as a pixel: a robot touches them.
+        self._hull_px -= 1.0
+
+    def pose_of(self, at: Point, yaw: float) -> Pose2D:
+        """Return the pose that the mapper has."""
+        return self._mapper.believed(super().pose_of(at, yaw))
+
+    def point_of(self, x: float, y: float) -> Point:
+        """Return where a place on the robot's map is in truth [pixels]."""
+        return super().point_of(*self._mapper.true_place(x, y))
+
+    def look(self, at: Point) -> None:
+        """Take in a scan from ``at``, if the mapper does."""
+        pose = Pose2D(*self.geometry.to_map(*at))
+        self._changed = Window.around(self._changed, self._mapper.scan(pose))
+
+    def news(self) -> MapReceived | PatchReceived | None:
+        """Return what the mapper would publish now; None where there is nothing new."""
+        grid = self._mapper.snapshot(0) if self._changed is not None else None
+        self._changed = None
+        return None if grid is None else MapReceived(grid)
+
+
+def sight_of(building: Building, senses: Senses) -> Sight:
+    """Return the sight of a robot in a building."""
+    return NoisySight(building, senses) if senses.noise else Sight(building, senses)
 
 
 def _rays(reach_px: float) -> NDArray[np.float64]:
