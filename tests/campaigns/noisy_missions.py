@@ -4,9 +4,9 @@
     python -m tests.campaigns.noisy_missions --rooms legs --noises rough --seed 7
 
 Each seed is a mission for each room and noise, with an offset of the base and a rate of poses that
-it draws. What has to hold: claim and record of the swept floor agree, all floor that was ever
-reachable is told, a mission that is done is, and none stays where it is for more than 20 s with
-work left. Exit code 1 where one does not.
+it draws. What has to hold: a mission claims no floor that its record has not, all floor that was
+ever reachable is told, a mission that is done is, and none stays where it is for more than 20 s
+with work left. Exit code 1 where one does not.
 """
 
 from __future__ import annotations
@@ -170,7 +170,7 @@ def main() -> int:
         print(
             f"{mission}: {of.ending}, {of.seconds:.0f} s, swept {of.true_share:.1%}, off walls "
             f"{of.clear_share:.1%}, claimed {of.claimed_share:.1%}, in vain {in_vain:.2%}; "
-            f"claim and record {floor.overclaimed:.2%} apart, untold {floor.untold:.2%}, stayed "
+            f"claimed beyond the record {floor.overclaimed:.2%}, untold {floor.untold:.2%}, stayed "
             f"{found.stayed_s:.0f} s, {of.contacts} contacts",
             flush=True,
         )

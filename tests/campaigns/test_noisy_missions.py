@@ -2,11 +2,15 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
+from fasaco_edge.follow.estimate import Command
+from tests.campaigns.lab.halls import hall
 from tests.campaigns.lab.judge import Ending
 from tests.campaigns.lab.known_floor import FloorAccount
 from tests.campaigns.lab.mission import run_mission
+from tests.campaigns.lab.own import OwnBase
 from tests.campaigns.lab.settings import LabSettings
 from tests.campaigns.noisy_missions import NoisyMission, building_of, outcome_of
 
@@ -42,6 +46,19 @@ def test_a_mission_under_noise_is_had_again_bit_for_bit():
     digests = [run_mission(building_of("small"), settings).trace.digest() for _ in range(2)]
     other = run_mission(building_of("small"), replace(settings, seed=4))
     assert digests[0] == digests[1] != other.trace.digest()
+
+
+def test_the_scans_of_its_base_are_those_of_a_lidar():
+    base = OwnBase(hall(4.0, 1.0), LabSettings(own="usual", noise_m=0.01))
+    ranges = base.scan()
+    # Behind, to the right, ahead, to the left, of 0.5, 0.5; walls begin a pixel off.
+    assert ranges[[0, 60, 120, 180, 240]] == pytest.approx([0.5, 0.5, 3.5, 0.5, 0.5], abs=0.05)
+    assert np.abs(ranges[[0, 60, 120, 180]] - [0.5, 0.5, 3.5, 0.5]).max() > 0.0005
+    base.command(Command(0.2, 0.0))
+    for _ in range(40):
+        base.tick()
+    assert base.scan()[120] < ranges[120] - 0.05
+    assert base.pose != base.truth
 
 
 def test_an_account_is_of_shares():

@@ -1,7 +1,7 @@
 """Accounts of the floor that a mission ever knew to be reachable, by a judge of its maps.
 
 The judge (``bench.floor``) shares nothing with the mission's own count. Two things are to hold:
-what the mission claims to have swept of the reachable floor is what its record has of it; and all
+what the mission claims to have swept of the reachable floor, its record has of it; and all
 floor that was ever reachable, and is free by the newest map, is told: as reachable now, or as out
 of reach.
 """
@@ -39,8 +39,11 @@ class FloorAccount:
 
     @property
     def overclaimed(self) -> float:
-        """How far claim and record are apart, as a share."""
-        return abs(self.claimed - self.swept) / self.ever
+        """By how much the claim is more than the record has, as a share.
+
+        It may be less: by swept floor beside what stopped the robot and is on no map.
+        """
+        return max(self.claimed - self.swept, 0.0) / self.ever
 
     @property
     def untold(self) -> float:

@@ -98,7 +98,7 @@ class OwnBase:
         self.map = emission.map or self.map
 
     def scan(self) -> NDArray[np.float64]:
-        """Return the ranges of the lidar's beams; as of ``Base``. The world's mapper has its own."""
+        """Return the ranges of the beams of a lidar; as of ``Base``. The mapper has its own."""
         grid, truth = self._truth.geometry, self.truth
         angles = np.linspace(-math.pi, math.pi, BEAMS) + (truth.yaw - grid.origin.yaw)
         scanner = Scanner(*grid.to_pixels(truth.x, truth.y), MOST_RANGE_M / grid.resolution, FREE)
