@@ -101,7 +101,7 @@ class Follower(Supervision):
     def _have(self, points: PathPoints) -> None:
         if not self._is_new:
             self._before = self._route
-        self._route = Route(points.take, self._limits.steered)
+        self._route = Route(points.take, self._limits)
         self._is_new = True
 
     def _withdraw(self) -> None:

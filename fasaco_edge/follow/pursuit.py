@@ -1,11 +1,12 @@
-"""Velocities along a route: regulated pure pursuit on its legs, turns on the spot at its corners.
+"""Velocities along a route: regulated pure pursuit on its legs, turns at its corners.
 
 Source: R. C. Coulter, Implementation of the Pure Pursuit Path Tracking Algorithm, CMU-RI-TR-92-01:
 the robot steers the arc through a point of the path some way ahead, of curvature 2 y / L^2. The
 speed is regulated as by S. Macenski et al., Regulated Pure Pursuit for Robot Path Tracking (2023),
 but by the limits of the base: it brakes to come to rest at each stop, and respects the turn rate.
-Deviations: past a stop the point lies straight on, so that no corner is cut, and a robot with a
-large heading error comes to rest and turns on the spot.
+Deviations: past a corner the point lies straight on, so that it is not cut; corners are rounded at
+the speed at which they can be, see ``follow/rounding.py``; and a robot with a large heading error
+comes to rest and turns on the spot.
 """
 
 from __future__ import annotations
@@ -75,18 +76,27 @@ class Pursuit:
         limits = self._limits
         here = (pose.x, pose.y)
         route.pass_bends(here)
+        # So that it turns in the middle of a cycle, not after it.
+        route.round_corner(_ahead(pose, 0.5 * self._period * self.last.speed), self.last.speed)
         while (leg := route.leg) is not None:
             along, _ = leg.placed(here)
-            horizon = limits.speed**2 / limits.acceleration + limits.speed
-            to_stop = route.to_stop(along, horizon)
-            rests = self._braked() == 0.0
-            if to_stop > ARRIVED_M or not rests:
+            ends = route.ends(along, limits.speed**2 / limits.acceleration + limits.speed)
+            left, speed = ends[0]
+            if speed > 0.0 or left > ARRIVED_M or self._braked() > 0.0:
                 break
             route.next_leg(here)
-            self._is_turning = True
+            self._is_turning, route.rounds = True, 0.0
         if leg is None:
             self.stand()
             return STAND
+        most = min(most, self._most(ends))
+        if route.rounds > 0.0:
+            error = math.remainder(math.atan2(leg.uy, leg.ux) - pose.yaw, math.tau)
+            self._is_turning = False
+            self.last = self._rounded(error, min(most, route.rounds))
+            if abs(error) <= ALIGNED_RAD:
+                route.rounds = 0.0
+            return self.last
         ahead = max(LOOKAHEAD_S * self.last.speed, LOOKAHEAD_M)
         x, y = route.carrot(max(along, 0.0), ahead)
         error = math.remainder(math.atan2(y - pose.y, x - pose.x) - pose.yaw, math.tau)
@@ -97,29 +107,50 @@ class Pursuit:
         if self._is_turning:
             self.last = self._turned(error)
         else:
-            self.last = self._driven(error, math.dist(here, (x, y)), to_stop, most)
+            self.last = self._driven(error, math.dist(here, (x, y)), most)
         return self.last
+
+    def _most(self, ends: list[tuple[float, float]]) -> float:
+        """Return the greatest speed from which the corners ahead can be passed [m/s].
+
+        Args:
+            ends: distance [m] and greatest speed [m/s] of each.
+        """
+        limits, most = self._limits, self._limits.speed
+        for left, speed in ends:
+            # As if the robot came to rest further on.
+            further = min(speed, limits.speed) ** 2 / (2.0 * limits.acceleration)
+            way = max(left + further - self.last.speed * self._late, 0.0)
+            most = min(most, max(stopping_rate(way, limits.acceleration, self._period), speed))
+        return most
 
     def _turned(self, error: float) -> Command:
         """Turn on the spot, once at rest."""
-        limits, period = self._limits, self._period
         speed = self._braked()
-        goal = 0.0
-        if speed == 0.0:
-            left = max(abs(error) - abs(self.last.turn_rate) * self._late, 0.0)
-            rate = min(stopping_rate(left, limits.turn_acceleration, period), limits.turn_rate)
-            side = self.last.turn_rate if abs(error) > BACK_RAD and self.last.turn_rate else error
-            goal = math.copysign(rate, side)
-        return Command(speed, self._toward(goal))
+        return Command(speed, self._toward(self._turning(error) if speed == 0.0 else 0.0))
 
-    def _driven(self, error: float, ahead: float, to_stop: float, most: float) -> Command:
-        limits, period = self._limits, self._period
+    def _rounded(self, error: float, most: float) -> Command:
+        """Turn, and drive on at up to a speed."""
+        return Command(self._sped(most), self._toward(self._turning(error)))
+
+    def _driven(self, error: float, ahead: float, most: float) -> Command:
+        """Steer, at up to a speed."""
         curvature = 2.0 * math.sin(error) / max(ahead, LOOKAHEAD_M)
-        most = min(limits.speed, most, limits.turn_rate / max(abs(curvature), 1e-9))
-        left = max(to_stop - self.last.speed * self._late, 0.0)
-        goal = min(most, stopping_rate(left, limits.acceleration, period))
-        speed = min(max(goal, self._braked()), self.last.speed + limits.acceleration * period)
+        speed = self._sped(min(most, self._limits.turn_rate / max(abs(curvature), 1e-9)))
         return Command(speed, self._toward(speed * curvature))
+
+    def _turning(self, error: float) -> float:
+        """Return the rate at which to turn by an angle [rad/s]."""
+        limits = self._limits
+        left = max(abs(error) - abs(self.last.turn_rate) * self._late, 0.0)
+        rate = min(stopping_rate(left, limits.turn_acceleration, self._period), limits.turn_rate)
+        side = self.last.turn_rate if abs(error) > BACK_RAD and self.last.turn_rate else error
+        return math.copysign(rate, side)
+
+    def _sped(self, goal: float) -> float:
+        """Return the next speed toward another one [m/s]."""
+        most = self.last.speed + self._limits.acceleration * self._period
+        return min(max(goal, self._braked()), most)
 
     def _braked(self) -> float:
         """Return the lowest speed that the base can have come to [m/s]."""
@@ -129,3 +160,7 @@ class Pursuit:
         last = self.last.turn_rate
         seconds = self._seconds if abs(turn_rate) < abs(last) else self._period
         return limited(last, turn_rate, self._limits.turn_acceleration * seconds)
+
+
+def _ahead(pose: Pose2D, way: float) -> tuple[float, float]:
+    return pose.x + way * math.cos(pose.yaw), pose.y + way * math.sin(pose.yaw)

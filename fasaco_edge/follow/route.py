@@ -1,4 +1,4 @@
-"""The route along a path: legs, the corners to stop at, and the robot's progress.
+"""The route along a path: legs, the corners to round or to stop at, and the robot's progress.
 
 A coverage path crosses and touches itself, so the robot's position does not determine its progress.
 The robot is always on one leg; it reaches the next one by driving this one to its end, never by
@@ -10,8 +10,10 @@ from __future__ import annotations
 import enum
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
+from fasaco_edge.follow.estimate import Limits
+from fasaco_edge.follow.rounding import rounding
 from fasaco_edge.grid.geometry import Point
 
 # Points are read on demand, this many at a time.
@@ -28,10 +30,12 @@ BESIDE_M, ALONG_RAD = 0.02, 0.1
 NEAREST_M, BEGINNING_M = 0.15, 0.6
 # A path that begins on the last one at a distance ahead between these is a continuation [m].
 LEAST_LEAD_M, LEAD_M = 0.15, 2.0
-# A corner was overshot by more than this [m].
+# A corner, or the place where a turn begins, was overshot by more than this [m].
 MISSED_M = 0.03
 # A corner of the new path is that of the old one, if it is as near as this [m].
 SAME_M = 1e-3
+# Cosine of the angle up to which two legs lead in the same direction.
+SAME_DIRECTION = math.cos(ALONG_RAD)
 
 
 class Joining(enum.Enum):
@@ -50,7 +54,9 @@ class Leg:
         start, end: [m].
         ux, uy: its direction, of length 1.
         length: [m].
-        stops: whether the robot has to come to rest at its end.
+        most: greatest speed at its end [m/s]: 0 where the robot has to come to rest, infinity where
+            it just steers.
+        early_s: how long before its end the robot begins to turn there, if it rounds a corner [s].
     """
 
     start: Point
@@ -58,7 +64,18 @@ class Leg:
     ux: float
     uy: float
     length: float
-    stops: bool
+    most: float = 0.0
+    early_s: float = 0.0
+
+    @property
+    def stops(self) -> bool:
+        """Whether the robot has to come to rest at its end."""
+        return self.most == 0.0
+
+    @property
+    def bends(self) -> bool:
+        """Whether it just steers at its end."""
+        return self.most == math.inf
 
     def placed(self, point: Point) -> tuple[float, float]:
         """Return a point's distance along the leg's line, and to its left [m]."""
@@ -71,6 +88,10 @@ class Leg:
         beyond = max(-along, along - self.length, 0.0)
         return math.hypot(beyond, aside)
 
+    def leads_as(self, other: Leg | None) -> bool:
+        """Tell whether another leg leads in the same direction."""
+        return other is not None and self.ux * other.ux + self.uy * other.uy >= SAME_DIRECTION
+
     def at(self, along: float) -> Point:
         """Return the point at a distance along its line [m]."""
         return self.start[0] + along * self.ux, self.start[1] + along * self.uy
@@ -81,12 +102,16 @@ class Route:
 
     Args:
         take: returns the next points of the path [m], at most as many as asked for.
-        steered_rad: the largest bend that is steered while driving.
+        limits: of the base.
+
+    Attributes:
+        rounds: greatest speed in the corner that the robot rounds to its leg; 0 for none [m/s].
     """
 
-    def __init__(self, take: Callable[[int], list[Point]], steered_rad: float) -> None:
+    def __init__(self, take: Callable[[int], list[Point]], limits: Limits) -> None:
+        self.rounds = 0.0
         self._take = take
-        self._steered_rad = steered_rad
+        self._limits = limits
         # The first leg is the robot's; the end of the last one may be unknown yet.
         self._legs: list[Leg] = []
         self._ahead: list[Point] = []
@@ -110,30 +135,48 @@ class Route:
         if here is None or corner is None or not self._legs:
             return
         if self._legs[0].distance(here) > MISSED_M:
-            self._legs.insert(0, _leg(here, corner, True))
+            self._legs.insert(0, _leg(here, corner))
 
     def pass_bends(self, here: Point) -> None:
         """Go on to the leg that ``here`` is on, past bends that are steered."""
-        while (leg := self.leg) and not leg.stops and leg.placed(here)[0] >= leg.length:
+        while (leg := self.leg) and leg.bends and leg.placed(here)[0] >= leg.length:
             self.next_leg()
 
-    def to_stop(self, along: float, horizon: float) -> float:
-        """Return how far it is from ``along`` the leg to the next stop [m]; no more than
-        ``horizon`` is looked at."""
+    def round_corner(self, here: Point, speed: float) -> None:
+        """Go on to the next leg where a robot of this speed [m/s] begins to turn there.
+
+        One that has passed that place by more than ``MISSED_M`` comes to rest at the corner.
+        """
+        leg = self.leg
+        if leg is None or leg.stops or leg.bends:
+            return
+        late = leg.placed(here)[0] + leg.early_s * min(speed, leg.most) - leg.length
+        if late > MISSED_M:
+            self._legs[0] = replace(leg, most=0.0)
+        elif late >= 0.0:
+            self.next_leg()
+            self.rounds = leg.most
+
+    def ends(self, along: float, horizon: float) -> list[tuple[float, float]]:
+        """Return how far it is from ``along`` the leg to where it has to be slow [m], and how slow
+        [m/s]; at least one place, up to the next stop or beyond ``horizon`` [m]."""
+        found: list[tuple[float, float]] = []
         left, index = -along, 0
         while leg := self._leg(index):
             left += leg.length
+            if not leg.bends or left > horizon:
+                found.append((left - leg.early_s * leg.most if leg.early_s else left, leg.most))
             if leg.stops or left > horizon:
-                return left
+                break
             index += 1
-        return left
+        return found
 
     def carrot(self, along: float, ahead: float) -> Point:
-        """Return the point ``ahead`` of ``along`` the leg [m]; past a stop, straight on."""
+        """Return the point ``ahead`` of ``along`` the leg [m]; past a corner, straight on."""
         index, to = 0, along + ahead
         leg = self._leg(0)
         assert leg is not None
-        while to > leg.length and not leg.stops and (after := self._leg(index + 1)):
+        while to > leg.length and leg.bends and (after := self._leg(index + 1)):
             to -= leg.length
             leg, index = after, index + 1
         return leg.at(to)
@@ -186,11 +229,16 @@ class Route:
         leg = self._leg(index)
         if leg is None:
             return Joining.JOINED
+        # It may go on to round the same corner.
+        rounds = before.rounds if before is not None and kept is not None else 0.0
+        if rounds and before is not None and not leg.leads_as(before.leg):
+            rounds = 0.0
         aside = leg.distance(here)
         turn = math.atan2(leg.uy, leg.ux) - (heading or 0.0)
         is_along = heading is None or abs(math.remainder(turn, math.tau)) <= ALONG_RAD
-        if aside <= BESIDE_M and is_along:
+        if rounds or (aside <= BESIDE_M and is_along):
             del self._legs[:index]
+            self.rounds = rounds
             return Joining.JOINED
         begin = self._legs[0].start
         if lead := before._lead_to(begin, here) if before is not None else []:
@@ -201,12 +249,13 @@ class Route:
         if aside <= NEAREST_M:
             del self._legs[:index]
             begin = leg.at(min(max(leg.placed(here)[0], 0.0), leg.length))
-            rest = math.dist(begin, leg.end)
-            self._legs[:1] = [_leg(begin, leg.end, leg.stops)] if rest >= LEAST_LEG_M else []
+            rest_m = math.dist(begin, leg.end)
+            rest = [replace(leg, start=begin, length=rest_m)] if rest_m >= LEAST_LEG_M else []
+            self._legs[:1] = rest
         elif math.dist(here, begin) > BEGINNING_M:
             return Joining.ELSEWHERE
         if math.dist(here, begin) >= LEAST_LEG_M:
-            self._legs.insert(0, _leg(here, begin, True))
+            self._legs.insert(0, _leg(here, begin))
         return Joining.JOINED
 
     def _lead_to(self, point: Point, here: Point) -> list[Leg]:
@@ -219,7 +268,7 @@ class Route:
             on_leg = LEAST_LEG_M <= along <= leg.length + LEAST_LEG_M
             is_ahead = on_leg and LEAST_LEAD_M <= way + along <= LEAD_M
             if is_ahead and abs(aside) <= BESIDE_M:
-                return [*self._legs[:index], _leg(leg.start, leg.at(along), True)]
+                return [*self._legs[:index], _leg(leg.start, leg.at(along))]
             way += leg.length
             index += 1
         return []
@@ -253,8 +302,14 @@ class Route:
         """Read until there are ``count`` legs, if the path has them."""
         while len(self._legs) < count and self._read():
             start, end = self._ahead[:2]
-            stops = len(self._ahead) == 2 or self._bend(*self._ahead[:3]) > self._steered_rad
-            self._legs.append(_leg(start, end, stops))
+            leg = _leg(start, end)
+            if len(self._ahead) > 2:
+                after = _leg(end, self._ahead[2])
+                turn = math.atan2(after.uy, after.ux) - math.atan2(leg.uy, leg.ux)
+                room = 0.5 * min(leg.length, after.length)
+                most, early_s = rounding(abs(math.remainder(turn, math.tau)), room, self._limits)
+                leg = replace(leg, most=most, early_s=early_s)
+            self._legs.append(leg)
             del self._ahead[0]
 
     def _read(self) -> bool:
@@ -267,14 +322,7 @@ class Route:
                     self._ahead.append(point)
         return len(self._ahead) >= 2
 
-    @staticmethod
-    def _bend(a: Point, b: Point, c: Point) -> float:
-        turn = math.atan2(c[1] - b[1], c[0] - b[0]) - math.atan2(b[1] - a[1], b[0] - a[0])
-        return abs(math.remainder(turn, math.tau))
 
-
-def _leg(start: Point, end: Point, stops: bool) -> Leg:
+def _leg(start: Point, end: Point) -> Leg:
     length = math.dist(start, end)
-    return Leg(
-        start, end, (end[0] - start[0]) / length, (end[1] - start[1]) / length, length, stops
-    )
+    return Leg(start, end, (end[0] - start[0]) / length, (end[1] - start[1]) / length, length)

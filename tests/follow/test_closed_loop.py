@@ -1,5 +1,7 @@
 """The follower drives paths as they are meant, whatever delays, noise and slip there are."""
 
+import math
+
 import numpy as np
 import pytest
 
@@ -25,17 +27,17 @@ def driven(loop):
 @pytest.mark.parametrize(
     ("conditions", "off_m"),
     [
-        ({"delay_s": 0.0}, 0.01),
-        ({"delay_s": 0.05, "jitter_s": 0.02}, 0.01),
-        ({"delay_s": 0.1, "jitter_s": 0.05}, 0.02),
+        ({"delay_s": 0.0}, 0.02),
+        ({"delay_s": 0.05, "jitter_s": 0.02}, 0.02),
+        ({"delay_s": 0.1, "jitter_s": 0.05}, 0.025),
         ({"noise": 0.01}, 0.025),
         ({"turn_gain": 0.93}, 0.02),
-        ({"pose_hz": 50.0}, 0.01),
-        ({"pose_hz": 5.0}, 0.01),
+        ({"pose_hz": 50.0}, 0.02),
+        ({"pose_hz": 5.0}, 0.02),
     ],
     ids=str,
 )
-def test_it_stays_on_the_path_and_takes_no_longer_than_the_ideal_driver(conditions, off_m):
+def test_it_stays_on_the_path_and_is_faster_than_a_driver_that_stops_at_corners(conditions, off_m):
     loop = ClosedLoop(ROOM, START, **conditions)
     loop.send(LANES)
     seconds = driven(loop)
@@ -43,7 +45,7 @@ def test_it_stays_on_the_path_and_takes_no_longer_than_the_ideal_driver(conditio
     assert distances_to(LANES, trail(loop)).max() < off_m
     # And all of it was driven.
     assert distances_to(trail(loop)[::5], LANES).max() < off_m + 0.01
-    assert seconds < 1.05 * ideal_seconds(ROOM, START, LANES)
+    assert seconds < ideal_seconds(ROOM, START, LANES)
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -52,9 +54,48 @@ def test_cycles_that_come_late_do_not_carry_it_past_its_stops(seed):
     loop = ClosedLoop(ROOM, START, late_s=0.12, seed=seed)
     loop.send(LANES)
     seconds = driven(loop)
-    assert distances_to(LANES, trail(loop)).max() < 0.02
+    assert distances_to(LANES, trail(loop)).max() < 0.04
     assert loop.world.collisions == 0
     assert seconds < 1.15 * ideal_seconds(ROOM, START, LANES)
+
+
+@pytest.mark.parametrize("conditions", [{"delay_s": 0.05}, {"noise": 0.01}], ids=str)
+@pytest.mark.parametrize("turn_deg", [10, 30, 60, 90, 120])
+def test_a_corner_is_rounded_in_motion_and_hardly_cut(turn_deg, conditions):
+    """At each corner of more than a degree it came to rest: a third of a mission went with that."""
+    turn = math.radians(turn_deg)
+    corner = np.array([2.5, 2.0])
+    path = np.stack([(1.0, 2.0), corner, corner + 1.5 * np.array([math.cos(turn), math.sin(turn)])])
+    loop = ClosedLoop(ROOM, Pose2D(1.0, 2.0), **conditions)
+    loop.send(path)
+    slowest = math.inf
+
+    def near_end():
+        nonlocal slowest
+        if np.hypot(loop.world.pose.x - 1.0, loop.world.pose.y - 2.0) > 0.5:
+            slowest = min(slowest, loop.follower._estimate.speed)
+        return np.hypot(*(path[-1] - (loop.world.pose.x, loop.world.pose.y))) < 0.3
+
+    loop.run(near_end)
+    driven(loop)
+    assert slowest > 0.02
+    assert distances_to(path, trail(loop)).max() < 0.025
+    assert distances_to(trail(loop), corner[None]).max() < 0.03
+    stops_s = 0.25 / 0.5
+    assert loop.now < ideal_seconds(ROOM, Pose2D(1.0, 2.0), path) - 0.8 * stops_s
+
+
+def test_a_path_that_comes_in_a_corner_and_goes_on_alike_does_not_stop_it():
+    path = [(1, 1), (3, 1), (4, 2), (4, 3)]
+    loop = ClosedLoop(ROOM, Pose2D(1.0, 1.0), delay_s=0.05)
+    loop.send(path)
+    loop.run(lambda: loop.world.pose.x > 2.97)
+    pose = loop.world.pose
+    assert 0.2 < pose.yaw < 0.6
+    loop.send([(pose.x, 1), (3, 1), (4, 2), (4, 2.5)])
+    before = loop.world.distance_m, loop.now
+    loop.run(lambda: loop.now > before[1] + 2.0)
+    assert loop.world.distance_m - before[0] > 0.9 * 0.25 * 2.0
 
 
 def test_a_path_that_crosses_and_touches_itself_is_driven_in_its_order():
@@ -66,11 +107,13 @@ def test_a_path_that_crosses_and_touches_itself_is_driven_in_its_order():
     loop = ClosedLoop(ROOM, Pose2D(1.0, 1.0), delay_s=0.05, jitter_s=0.02)
     loop.send(path)
     driven(loop)
-    assert loop.world.distance_m == pytest.approx(
-        np.hypot(*np.diff(path, axis=0).T).sum(), abs=0.15
-    )
-    reached = [int(np.hypot(*(trail(loop) - corner).T).argmin()) for corner in path[[2, 4, 6]]]
-    assert reached == sorted(reached)
+    assert loop.world.distance_m == pytest.approx(np.hypot(*np.diff(path, axis=0).T).sum(), abs=0.3)
+    # Each corner is reached after the one before it, although others lie beside it.
+    way, at = trail(loop), 0
+    for corner in path:
+        near = np.flatnonzero(np.hypot(*(way[at:] - corner).T) < 0.03)
+        assert len(near), corner
+        at += int(near[0])
 
 
 def test_a_path_that_begins_like_the_one_before_is_joined_without_stopping():
@@ -92,7 +135,7 @@ def test_a_corner_that_was_missed_is_driven_back_to():
     """A computer that was busy for half a second: the base drives on meanwhile."""
     loop = ClosedLoop(ROOM, Pose2D(1.0, 1.0), delay_s=0.02)
     loop.send([(1, 1), (3, 1), (3, 3)])
-    loop.run(lambda: loop.world.pose.x > 2.9)
+    loop.run(lambda: loop.world.pose.x > 2.87)
     step, loop.follower.step = loop.follower.step, lambda now: None
     loop.run(lambda until=loop.now + 0.6: loop.now > until)
     loop.follower.step = step
@@ -128,7 +171,7 @@ def test_a_path_that_begins_further_on_along_the_one_before_is_joined_there():
     driven(loop)
     way = np.vstack(([(1, 1), (5, 1)], path))
     assert distances_to(way, trail(loop)).max() < 0.02
-    assert distances_to(trail(loop), way).max() < 0.02
+    assert distances_to(trail(loop), way).max() < 0.03
 
 
 def test_a_path_that_begins_far_away_is_not_driven_to():
