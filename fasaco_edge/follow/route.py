@@ -211,9 +211,9 @@ class Route:
     def join(self, here: Point, heading: float | None, before: Route | None) -> Joining:
         """Find the leg that passes the robot, near the beginning of a new path.
 
-        That is the leg to the corner that the robot was driving to, if the path has it. Otherwise
-        it is the leg where the distance to the robot stops decreasing. If the path begins further
-        along the last one, that one is driven until there.
+        That is the leg to the corner that the robot was driving to, if the path has it: on the same
+        leg it just goes on. Otherwise it is the leg where the distance to the robot stops
+        decreasing. If the path begins further along the last one, that one is driven until there.
 
         Args:
             here: the robot's position.
@@ -229,16 +229,14 @@ class Route:
         leg = self._leg(index)
         if leg is None:
             return Joining.JOINED
-        # It may go on to round the same corner.
-        rounds = before.rounds if before is not None and kept is not None else 0.0
-        if rounds and before is not None and not leg.leads_as(before.leg):
-            rounds = 0.0
         aside = leg.distance(here)
+        is_same = before is not None and kept is not None and leg.leads_as(before.leg)
         turn = math.atan2(leg.uy, leg.ux) - (heading or 0.0)
         is_along = heading is None or abs(math.remainder(turn, math.tau)) <= ALONG_RAD
-        if rounds or (aside <= BESIDE_M and is_along):
+        if (is_same and aside <= NEAREST_M) or (aside <= BESIDE_M and is_along):
             del self._legs[:index]
-            self.rounds = rounds
+            # It may be about to round the corner to it.
+            self.rounds = before.rounds if before is not None and is_same else 0.0
             return Joining.JOINED
         begin = self._legs[0].start
         if lead := before._lead_to(begin, here) if before is not None else []:
