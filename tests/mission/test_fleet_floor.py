@@ -63,7 +63,7 @@ def test_a_line_that_is_polished_outlives_the_wait_for_another_robot():
     robot.drive(60)
     while math.dist(robot.at, robot.mission.next_metres()[1]) > 2 * CELL_M:
         robot.drive()
-    before = {tuple(point) for point in robot.line}
+    before = {tuple(point) for point in robot.mission._line._ahead.xy().tolist()}
     x, y = robot.mission.next_metres()[1].tolist()
     in_the_way = replace(divided_by("r2", 0), state="done", parts=(), by="", x=x, y=y)
     robot.tell(in_the_way)

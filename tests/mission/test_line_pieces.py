@@ -59,6 +59,15 @@ def test_the_same_walk_keeps_the_line():
     assert (found.cells == np.arange(len(BEFORE))).all()
 
 
+def test_what_is_just_ahead_of_the_robot_stays_however_short():
+    """Where the walk changed within eight cells, the line began with stands all anew."""
+    line = polished(BEFORE)
+    after = cells(*lane(0, range(4)), *lane(1, range(3, -1, -1)))
+    found = whole(join(after, kept_pieces(line, BEFORE, after)))
+    assert (found.points[:3] == line.points[:3]).all()
+    assert (found.points[3:] == stand(after[3:])).all()
+
+
 def test_what_comes_between_goes_over_stands():
     detour = cells(*lane(0, range(10)), (1, 9), (2, 9), (2, 10), (1, 10), *lane(0, range(10, 20)))
     after = cells(*detour.tolist(), *lane(1, range(19, -1, -1)))

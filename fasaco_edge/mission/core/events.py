@@ -268,6 +268,7 @@ class PathUpdate:
         changed: window of the cells whose change is the reason; None where that is not the reason.
         xy: float64 (m, 2), x, y [m]: the line to drive; None for the centres of the cells.
         end_yaw: heading at the end [rad]; None for the heading of the last segment.
+        may_wait: whether the robot can drive on along the previous one as far as both are the same.
     """
 
     revision: int
@@ -278,6 +279,7 @@ class PathUpdate:
     changed: Window | None = None
     xy: NDArray[np.float64] | None = None
     end_yaw: float | None = None
+    may_wait: bool = False
 
 
 @dataclass(frozen=True, slots=True)

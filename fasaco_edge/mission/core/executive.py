@@ -98,6 +98,8 @@ class Executive:
         found = self.troubles.found
         if found and self.doing in DRIVING:
             return State.DEGRADED, found[0].text
+        if self.doing is State.COVERING and not self._reason:
+            return State.COVERING, f"path {self.route.revision}"
         return self.doing, self._reason
 
     @property
@@ -163,7 +165,7 @@ class Executive:
         if route.pending is not None and not len(route.path.cells):
             self._state, self._reason = State.PLANNING, route.pending.reason
         elif orders.order_state.stage is not Stage.RETURNING:
-            self._state, self._reason = State.COVERING, f"path {route.revision}"
+            self._state, self._reason = State.COVERING, ""
         drives = len(route.path.ahead) > 1 and update is None
         if drives and route.pending is None and (why := self.blocked.asks_again(now)):
             update = route.publish_anew(why, now)

@@ -188,6 +188,7 @@ class Mission:
         path = stop or decided.path or happened.path or begun
         self._trail.finish(path)
         path = self._line.finish(path, now)
+        self.state, self.reason = self._executive.status()
         if path is not None:
             path = self._rotation.path(path, self.lattice)
         return replace(happened, plan=decided.plan, path=path)

@@ -229,7 +229,8 @@ class Route(PlanRequests):
             self.published_at = now
             return None
         self._changed_at = now
-        return self.publish(cells, request.reason, now, event, request.changed)
+        update = self.publish(cells, request.reason, now, event, request.changed)
+        return replace(update, may_wait=True)
 
     def _accept_better(
         self, attempt: Attempt, event: PlanReady, area: ReachableArea, now: float
@@ -240,7 +241,7 @@ class Route(PlanRequests):
         cells = attempt.joined(self.path, event.path.cells, now - self._changed_at)
         if cells is None or area.drivable_prefix(cells) < len(cells):
             return None
-        return self.publish(cells, BETTER, now, event)
+        return replace(self.publish(cells, BETTER, now, event), may_wait=True)
 
     def _from_here(
         self, cells: NDArray[np.int32], here: Cell, area: ReachableArea
@@ -308,6 +309,10 @@ class Route(PlanRequests):
         ahead, end_yaw, beside = self.path.ahead, self._end_yaw, self.beside
         return self.publish(ahead, reason, now, end_yaw=end_yaw, beside=beside)
 
+    def keep_back(self) -> None:
+        """Note that the newest path is not published yet."""
+        self.revision -= 1
+
     def publish_line(self, reason: str, now: float) -> PathUpdate:
         """Publish a new line along the same cells; a pending attempt still holds."""
         self.revision += 1
@@ -358,4 +363,4 @@ class Route(PlanRequests):
         beyond = PathProgress(np.concatenate((ahead[drivable:], self._kept.ahead)))
         update = self.publish(ahead[:drivable], self.wanted, now, changed=self._changed)
         self._kept = beyond
-        return update
+        return replace(update, may_wait=True)

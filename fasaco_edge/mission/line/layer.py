@@ -28,6 +28,7 @@ from fasaco_edge.mission.line.missed_floor import MissedFloor
 from fasaco_edge.mission.line.offset import Offset
 from fasaco_edge.mission.line.out_of_reach import REASONS, causes_of
 from fasaco_edge.mission.line.polisher import Polisher
+from fasaco_edge.mission.line.publication import Publication
 from fasaco_edge.mission.map.map_state import MapState
 from fasaco_edge.mission.orders.sequencer import Sequencer
 
@@ -85,6 +86,7 @@ class LineLayer:
         orders.ask_for_floor(self.sum_up)
         self.offset = Offset(sweeping.tool_m if sweeping else 0.0)
         self._polisher = Polisher(sweeping.line) if sweeping else None
+        self._publication = Publication(route, sweeping.line.speed_m_s if sweeping else 0.0)
         self._missed = MissedFloor.at(sweeping.line, WORTH_S) if sweeping else None
         price_s_m2 = sweeping.line.price_s_m2 if sweeping else 0.0
         self._worth_m2 = WORTH_S / price_s_m2 if price_s_m2 else math.inf
@@ -158,6 +160,7 @@ class LineLayer:
         """Return the update to publish after a step, with or without a new path."""
         ahead, stamped = self._ahead, self._map.pose
         if ahead is None or stamped is None or self._polisher is None or self._map.floor is None:
+            self._publication.forget()
             return update
         touched, self._touched = self._touched, None
         self._take_floor(touched)
@@ -169,29 +172,23 @@ class LineLayer:
             self._lay(ahead, update.cells, stamped.pose, is_cut=self._route.is_cut)
         elif why := self._why_anew(ahead, is_further and touched is not None):
             self._lay(ahead, path.ahead, stamped.pose)
-            update = self._route.publish_anew(why, now) if len(path.ahead) else None
+            if len(path.ahead):
+                update = replace(self._route.publish_anew(why, now), may_wait=True)
         self._is_dropped = False
         if touched is not None and ahead.check(touched):
             reason = "line blocked"
         if touched is not None or self._is_settled is None:
             self._is_settled = not self._orders.cells.is_exploring
         # Urgent updates are published first; the rest comes with the next pose.
-        is_waited_for = update is not None or reason or is_further
-        if not is_waited_for:
+        held = self._publication.look(ahead)
+        if update is None and not reason and not is_further:
             self._explain()
-            # On such a way it sweeps nothing beside its path.
-            if not self._is_way and self._polisher.polish(
-                ahead, self._map.floor, is_settled=self._is_settled
-            ):
-                reason = "line polished"
-        if update is None and reason and len(path.ahead):
-            update = self._route.publish_line(reason, now)
-        if update is None:
-            return None
-        if update.xy is not None:
-            return update  # a way out, along no cells
-        ahead.note_published()
-        return replace(update, xy=ahead.xy())
+        may_change = (update is None or update.may_wait) and not reason and not is_further
+        # On such a way it sweeps nothing beside its path.
+        if may_change and not self._is_way:
+            self._polisher.polish(ahead, self._map.floor, held, is_settled=self._is_settled)
+            self._publication.look(ahead)
+        return self._publication.finish(ahead, update, reason, now, is_way=self._is_way)
 
     @property
     def _is_way(self) -> bool:

@@ -8,6 +8,7 @@ the line gives its place on the walk.
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,8 +38,6 @@ from fasaco_edge.mission.line.tally import SweepTally
 from fasaco_edge.mission.line.way import corners_between, is_clear_between, shortened
 from fasaco_edge.planners.path import common_beginning
 
-# Value of ``unpublished_from`` if all of the line is published.
-ALL_PUBLISHED = 1 << 60
 # So many of the nearest cells are tried for one that the robot can drive to straight.
 TRIED = 8
 
@@ -50,14 +49,12 @@ class LineAhead:
         line: the rest of the line.
         tally: counts of its sweeps.
         cell: index of the robot's cell in the walk.
-        unpublished_from: index of the first point that differs from the published line.
     """
 
     def __init__(self, floor: FloorMap) -> None:
         self.line = Line()
         self.tally = SweepTally(floor)
         self.cell = 0
-        self.unpublished_from = ALL_PUBLISHED
         self._floor = floor
         self._walk: Walk = np.empty((0, 2), np.int32)
         # Number of published cells of a walk that was cut off, 0 after a stop; the rest is kept
@@ -262,7 +259,6 @@ class LineAhead:
             self.tally.pass_line(self.line.points[: number + 1])
             self.tally.exchange(edges_between(self.line.points[: number + 1]), NO_EDGES)
             self.line = self.line.part(number)
-            self.unpublished_from = max(self.unpublished_from - number, 0)
         # At the last cell the robot has arrived, which is checked below.
         first, second = self.line.cells[:2].tolist()
         nearest = self._nearest(max(first, self.cell), second + 1)
@@ -293,10 +289,9 @@ class LineAhead:
 
         A robot beside its line begins at its place on it, unless its disc does not fit where it is.
         """
-        points, here = self._published(), self._place.here
+        points, here = self._from_place(), self._place.here
         if len(points) > 1:
-            points = points.copy()
-            points[0] = on = self._place.on(points)
+            on = points[0]
             radius = fitting_radius(self._floor, here)
             is_off = radius < self._floor.discs.radius_m / self._floor.geometry.resolution
             is_off = is_off and np.abs(on - here).sum() >= LEAST_EDGE
@@ -304,8 +299,36 @@ class LineAhead:
                 points = np.concatenate([here[None], points])
         return raster_to_map(self._floor.geometry, points)
 
-    def _published(self) -> Points:
-        """Return the points to publish; the line ends at a cut."""
+    def leads_on(self, xy: Points) -> bool:
+        """Tell whether the robot, on a line that is cut off, can drive along points for a while.
+
+        Args:
+            xy: float64 (n, 2): x, y [m]; the robot is between the first two.
+        """
+        if not self.is_cut or len(xy) < 2:
+            return False
+        points = np.array([map_to_raster(self._floor.geometry, x, y) for x, y in xy.tolist()])
+        edge, here = points[1] - points[0], self._place.here
+        share = float(np.dot(here - points[0], edge)) / max(float(np.dot(edge, edge)), 1e-9)
+        points[0] += min(max(share, 0.0), 1.0) * edge
+        if np.hypot(*(points[0] - here)) > self._tool:
+            return False
+        return all(self._is_clear(a, b) for a, b in pairwise(points))
+
+    def next_xy(self, count: int) -> Points:
+        """Return its first points from the robot's place on it, at most ``count``, as ``xy``."""
+        return raster_to_map(self._floor.geometry, self._from_place()[:count])
+
+    def _from_place(self) -> Points:
+        """Return the points to publish, from the robot's place on the line."""
+        points = self._up_to_cut()
+        if len(points) > 1:
+            points = points.copy()
+            points[0] = self._place.on(points)
+        return points
+
+    def _up_to_cut(self) -> Points:
+        """Return the points of the line, which ends at a cut."""
         points = self.line.points
         if not self._cut:
             return points if self._cut is None else points[:0]
@@ -328,7 +351,6 @@ class LineAhead:
         state = line.state[first:end].min(initial=POLISHED)
         part = Line(points, cells, np.full(len(points), state, np.uint8))
         self.line = line.part(0, first).joined(part, line.part(end))
-        self.unpublished_from = min(self.unpublished_from, first)
 
     def _nearest(self, begin: int, end: int) -> int:
         """Return which cell of the walk from ``begin`` to ``end`` is nearest to the robot.
@@ -347,10 +369,6 @@ class LineAhead:
     def note(self, first: int, end: int, state: int) -> None:
         """Mark points as MOVED or POLISHED."""
         self.line = self.line.marked(first, end, state)
-
-    def note_published(self) -> None:
-        """Note that all of the line is published."""
-        self.unpublished_from = ALL_PUBLISHED
 
     def lengths(self, within_m: float = math.inf) -> NDArray[np.float64]:
         """Return the distance along the line to each point, float64 (n,) [m]; the first is 0.

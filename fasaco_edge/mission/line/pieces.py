@@ -14,8 +14,10 @@ import numpy as np
 from fasaco_edge.kernels.floor.line import LEAST_EDGE
 from fasaco_edge.kernels.floor.runs import AFTER, BACKWARD, BEFORE, STEPS, common_runs
 from fasaco_edge.mission.line.polyline import RAW, Edges, Line, Numbers, Points, Walk, edges_between
+from fasaco_edge.planners.path import common_beginning
 
-# Least steps of a reused piece: shorter ones would consist mostly of joints.
+# Least steps of a reused piece: shorter ones would consist mostly of joints. That at the robot has
+# one joint only, and may be shorter: what is just ahead stays as it is.
 LEAST_STEPS = 8
 
 
@@ -46,8 +48,12 @@ def kept_pieces(line: Line, before: Walk, after: Walk) -> list[Piece]:
         before, after: int32 (n, 2) and (m, 2), cells (row, col).
     """
     pieces = []
-    for run in common_runs(before, after, LEAST_STEPS).tolist():
-        begin, origin, steps = run[AFTER], run[BEFORE], run[STEPS]
+    alike = max(common_beginning(before, after) - 1, 0)
+    own = alike if alike < LEAST_STEPS else 0
+    if own:
+        pieces.append(Piece(line.part(0, line.before(own)), 0))
+    for run in common_runs(before[own:], after[own:], LEAST_STEPS).tolist():
+        begin, origin, steps = run[AFTER] + own, run[BEFORE] + own, run[STEPS]
         if run[BACKWARD]:
             first, last = line.before(origin - steps + 1), line.before(origin)
             part = line.part(first, last)

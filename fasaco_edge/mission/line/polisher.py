@@ -1,6 +1,6 @@
 """Polisher: polishes the line ahead of the robot, a piece at a time.
 
-The line just ahead of the robot stays fixed; farther ahead it may still change.
+The line just ahead of the robot stays as it is published; farther ahead it may still change.
 """
 
 from __future__ import annotations
@@ -24,23 +24,22 @@ from fasaco_edge.planners.line import (
 )
 from fasaco_edge.planners.path import common_beginning
 
-# Length of the fixed line ahead of the robot [m].
-HELD_M = 1.0
+# Length of the line ahead of the robot that is fixed, published or not [m].
+HELD_M = 0.5
 # First pass: points are moved along the whole line, in pieces of this length [m].
 MOVED_M = 6.0
 # Second pass: detours to unswept floor, once all points are moved, or within NEAR_M of the robot;
 # at most AHEAD_M ahead, in pieces of PIECE_M [m]. Farther ahead the map of an exploring robot may
 # still grow.
 NEAR_M, AHEAD_M, PIECE_M = 5.0, 8.0, 4.0
-# Third pass: annealing, from this distance ahead, in so many pieces of this length, in turn [m].
+# Third pass: annealing, from this distance ahead, or from where the line is held, in so many pieces
+# of this length, in turn [m].
 ANNEALED_M, ANNEALED_PIECE_M, ANNEALED_PIECES = 2.0, 4.0, 2
 # Moves for each of them; and, on a complete map, the temperature of the farthest piece, as a share
 # of the full one.
 ANNEAL_MOVES, HOTTEST = 300, 0.3
 # The second and third pass look so far ahead [m].
 SEEN_M = 20.0
-# Changes farther ahead are published once the robot is this close to them [m].
-PUBLISHED_M = 1.5
 # Limit on the moves per call, which bounds a cycle of the loop.
 MOST_MOVES = 3000
 # As the greatest detour: excludes detours.
@@ -57,21 +56,26 @@ class Polisher:
         # Index of the piece to be annealed next.
         self._at = 0
 
-    def polish(self, ahead: LineAhead, floor: FloorMap, *, is_settled: bool) -> bool:
-        """Polish the next piece of the line; return whether to publish the line.
+    def polish(self, ahead: LineAhead, floor: FloorMap, held: int, *, is_settled: bool) -> None:
+        """Polish the next piece of the line.
 
-        It is published once all points are moved; later changes are published when the robot comes
-        near. On a map that still grows (``is_settled`` is False) random moves are included, but
-        only those at no loss: the floor that a detour or a lane was for may be swept by another
-        lane meanwhile.
+        On a map that still grows (``is_settled`` is False) random moves are included, but only
+        those at no loss: the floor that a detour or a lane was for may be swept by another lane
+        meanwhile.
+
+        Args:
+            ahead: the line.
+            floor: the floor under it.
+            held: how many of its first points stay as they are.
+            is_settled: whether the map is complete.
         """
         if self._config.price_s_m2 == 0.0 or len(ahead.line) < 3 or ahead.is_cut:
-            return False
+            return
         begin = ahead.line.first_below(MOVED)
         if begin < len(ahead.line):
             lengths = ahead.lengths()
             begins_m = lengths[begin]
-            first, last = _piece(lengths, begin, MOVED_M)
+            first, last = _piece(lengths, begin, MOVED_M, held)
             last = max(min(last, ahead.line.raw_until(begin) + 1, len(lengths) - 1), first)
             end = self._polish(ahead, floor, first, last, lengths, NO_DETOURS)
             # The last point of the line is fixed.
@@ -79,30 +83,30 @@ class Polisher:
             ahead.note(min(begin, first), max(end, begin + 1), MOVED)
             is_all = ahead.line.first_below(MOVED) == len(ahead.line)
             if is_all or begins_m > NEAR_M:
-                return is_all or self._is_due(ahead)
+                return
         lengths = ahead.lengths(SEEN_M)
         begin = ahead.line.first_below(POLISHED)
         if begin >= len(lengths) - 1 or lengths[begin] > AHEAD_M:
-            self._anneal(ahead, floor, lengths, HOTTEST if is_settled else 0.0)
-            return self._is_due(ahead)
-        first, last = _piece(lengths, begin, PIECE_M)
+            self._anneal(ahead, floor, lengths, held, HOTTEST if is_settled else 0.0)
+            return
+        first, last = _piece(lengths, begin, PIECE_M, held)
         farthest = FARTHEST_M / ahead.tally.unit_m
         end = self._polish(ahead, floor, first, last, lengths, farthest)
         ahead.note(min(begin, first), max(end, begin + 1), POLISHED)
-        return self._is_due(ahead)
-
-    def _is_due(self, ahead: LineAhead) -> bool:
-        """Tell whether the robot is near an unpublished change."""
-        lengths, unpublished = ahead.lengths(PUBLISHED_M), ahead.unpublished_from
-        return unpublished < len(lengths) and bool(lengths[unpublished] < PUBLISHED_M)
 
     def _anneal(
-        self, ahead: LineAhead, floor: FloorMap, lengths: NDArray[np.float64], hottest: float
+        self,
+        ahead: LineAhead,
+        floor: FloorMap,
+        lengths: NDArray[np.float64],
+        held: int,
+        hottest: float,
     ) -> None:
         """Anneal the next piece; the temperature rises with its distance from the robot."""
         # The beginning is random, too, so that joints do not stay in place.
         drawn = int(self._random[0] >> np.uint64(40)) / (1 << 24)
-        begins_m = ANNEALED_M + (self._at + drawn) * ANNEALED_PIECE_M
+        held_m = float(lengths[min(max(held, 1), len(lengths)) - 1])
+        begins_m = max(ANNEALED_M, held_m) + (self._at + drawn) * ANNEALED_PIECE_M
         self._at = (self._at + 1) % ANNEALED_PIECES
         first = max(int(np.searchsorted(lengths, begins_m)), 2)
         last = int(np.searchsorted(lengths, begins_m + ANNEALED_PIECE_M))
@@ -156,9 +160,9 @@ class Polisher:
         return self._put(ahead, first, last, piece, line)
 
 
-def _piece(lengths: NDArray[np.float64], begin: int, piece_m: float) -> tuple[int, int]:
-    """Return the range of points of the piece that begins at ``begin``."""
+def _piece(lengths: NDArray[np.float64], begin: int, piece_m: float, held: int) -> tuple[int, int]:
+    """Return the range of points of the piece that begins at ``begin``; its first one stays."""
     begin = min(begin, len(lengths) - 1)
-    first = max(int(np.searchsorted(lengths, HELD_M)), begin - 2)
+    first = max(int(np.searchsorted(lengths, HELD_M)), begin - 2, held - 1)
     last = int(np.searchsorted(lengths, lengths[begin] + piece_m))
     return first, min(max(last, first + 2), len(lengths) - 1)

@@ -1,0 +1,107 @@
+"""The published line holds still for the next metres, and changes far ahead wait."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from fasaco_edge.mission.line.published_line import HELD_M, PublishedLine
+from tests.campaigns.lab.path_changes import PathAhead, differs
+from tests.mission.line_robot import PIXEL_M, LineRobot
+
+ZIGZAG = np.array([(0.4 * number, 0.3 * (number % 2)) for number in range(60)])
+EDGE_M = 0.5
+
+
+def look(published, line, now=0.0, *, is_settled=True, leads_on=False):
+    published.look(line)
+    return published.is_due(now, is_settled, lambda points: leads_on)
+
+
+def test_a_change_waits_until_the_robot_is_near():
+    published = PublishedLine(0.25)
+    published.take(ZIGZAG, len(ZIGZAG))
+    assert not look(published, ZIGZAG)
+    changed = ZIGZAG.copy()
+    changed[12] += 0.1
+    due_at = [number for number in range(12) if look(published, changed[number:])]
+    # Of the points that stay, the last is the eleventh.
+    assert due_at == [number for number in range(12) if (11 - number) * EDGE_M <= 2.25]
+
+
+def test_a_near_change_waits_for_the_plan_that_is_under_way_but_not_for_long():
+    published = PublishedLine(0.25)
+    published.take(ZIGZAG, len(ZIGZAG))
+    cut = ZIGZAG[:5]
+    assert not look(published, cut, 1.0, is_settled=False)
+    assert not look(published, cut, 1.9, is_settled=False)
+    assert look(published, cut, 2.0, is_settled=False)
+    assert look(published, cut, 1.0, is_settled=True)
+
+
+@pytest.mark.parametrize("left", [1, 2, 3])
+def test_what_is_just_ahead_does_not_wait(left):
+    published = PublishedLine(0.25)
+    published.take(ZIGZAG, len(ZIGZAG))
+    assert look(published, ZIGZAG[:left], is_settled=False)
+
+
+def test_where_the_published_line_leads_on_the_plan_is_waited_for():
+    published = PublishedLine(0.25)
+    published.take(ZIGZAG, len(ZIGZAG))
+    assert not look(published, ZIGZAG[:2], 1.0, is_settled=False, leads_on=True)
+    assert look(published, ZIGZAG[:2], 1.1, is_settled=False, leads_on=False)
+    assert look(published, ZIGZAG[:2], 2.0, is_settled=False, leads_on=True)
+
+
+def test_a_robot_without_a_line_gets_one():
+    published = PublishedLine(0.25)
+    assert look(published, ZIGZAG, is_settled=False)
+    published.take(ZIGZAG, len(ZIGZAG))
+    published.forget()
+    assert look(published, ZIGZAG, is_settled=False)
+
+
+def test_the_published_line_is_held_as_far_as_it_is_polished():
+    published = PublishedLine(0.25)
+    published.take(ZIGZAG, len(ZIGZAG))
+    published.look(ZIGZAG)
+    assert (published.held - 1) * EDGE_M == pytest.approx(HELD_M, abs=EDGE_M)
+    published.look(ZIGZAG[4:])
+    assert (published.held - 1) * EDGE_M == pytest.approx(HELD_M - 4 * EDGE_M, abs=EDGE_M)
+    published.take(ZIGZAG, 3)
+    published.look(ZIGZAG)
+    assert published.held == 3
+
+
+def test_pixels_that_flicker_far_ahead_change_nothing_yet():
+    """Each of them brought a path, and the next map another one: 71 in these two minutes."""
+    pixels = np.full((80, 120), 100, np.int8)
+    pixels[1:-1, 1:-1] = 0
+    random = np.random.default_rng(1)
+    robot = LineRobot(pixels, (1.0, 1.0))
+    robot.wait(3.0, lambda robot: False)
+    seen, changes = len(robot.paths), 0
+    for number in range(1200):
+        before = PathAhead(np.array([(robot.x, robot.y), *robot.path]))
+        if number % 30:
+            robot.step()
+        else:
+            robot.show(with_specks(pixels, random, (robot.x, robot.y)))
+        if len(robot.paths) > seen:
+            seen = len(robot.paths)
+            after = PathAhead(np.array([(robot.x, robot.y), *robot.path]))
+            changes += differs(before.ahead(), after.ahead())
+    assert changes <= 4
+    assert len(robot.paths) <= 24
+
+
+def with_specks(pixels, random, away_from):
+    """Return a map with up to two pixels more that are occupied, far from the robot."""
+    shown = pixels.copy()
+    for row, col in random.integers(6, (74, 114), (2, 2)):
+        if math.dist((PIXEL_M * col, PIXEL_M * row), away_from) > 3.0:
+            shown[row, col] = 100
+    return shown
