@@ -18,14 +18,18 @@ LOG = logging.getLogger(__name__)
 # How often poses come at least, as localisers send them [Hz]; and how far apart two may be, in
 # tool's widths, for the floor between them to count (``mission.coverage.swept_floor.JUMP_TOOLS``).
 POSES_HZ, JUMP_TOOLS = 10.0, 2.0
+# Clearance above this share of the tool's width is given up along walls
+# (``planners.line.NEAR_SHARE``).
+NEAR_SHARE = 0.2
 # Rounding of a tool as wide as the robot [m].
 ROUNDING_M = 1e-6
 
 
 def cautions(config: DaemonConfig) -> list[str]:
     """Return them, each with the keys it is about."""
+    robot = config.robot
     found = (
-        *(_tool(config.robot), _turns(config.robot), _planner(config), _places(config)),
+        *(_tool(robot), _clearance(config), _turns(robot), _planner(config), _places(config)),
         _scan(config),
     )
     return [text for texts in found for text in texts]
@@ -63,6 +67,17 @@ def _tool(robot: RobotConfig) -> Iterator[str]:
         )
 
 
+def _clearance(config: DaemonConfig) -> Iterator[str]:
+    robot = config.robot
+    most_m = NEAR_SHARE * robot.tool_width_m
+    if config.planner.line != "cells" and robot.clearance_m > most_m:
+        yield (
+            f"robot.clearance_m {robot.clearance_m:g} is more than a fifth of robot.tool_width_m, "
+            f"{most_m:.2g}: so wide a strip of floor along a wall is worth giving it up, and lines "
+            "do; what the robot must never come nearer to belongs into robot.radius_m"
+        )
+
+
 def _turns(robot: RobotConfig) -> Iterator[str]:
     usual = RobotConfig()
     if robot.turn_deg_s is not None and robot.quarter_turn_s != usual.quarter_turn_s:
@@ -76,6 +91,7 @@ def _planner(config: DaemonConfig) -> Iterator[str]:
     if planner.line == "cells":
         idle = ["planner.align"] if planner.align != usual.align else []
         idle += ["robot.overlap"] if config.robot.overlap != RobotConfig().overlap else []
+        idle += ["robot.clearance_m"] if config.robot.clearance_m else []
         if idle:
             yield f"no effect where planner.line is cells: {', '.join(idle)}"
 

@@ -73,12 +73,15 @@ class RobotConfig(Section, frozen=True):
     of driving [m/s2], and the largest bend that is steered while driving [deg]. ``overlap`` is by
     what share of the tool's width lanes overlap where a line is driven (``planner.line``).
     ``footprint`` stands in place of ``radius_m``: the disc around it is planned with.
+    ``clearance_m`` is what driven lines keep beside the radius from walls and furniture, except
+    where only giving it up, half of it or all, reaches floor that is worth it.
     ``tool_ahead_m`` is from where the robot turns about to the centre of its tool, ahead; below 0
     behind.
     """
 
     name: str = "robot"
     radius_m: Metres = DEFAULT_RADIUS_M
+    clearance_m: Annotated[float, Meta(ge=0, le=1)] = 0.0
     footprint: FootprintConfig | msgspec.UnsetType = msgspec.UNSET
     tool_width_m: Metres = 0.3
     speed_m_s: Annotated[float, Meta(gt=0, le=10)] = 0.25

@@ -36,11 +36,19 @@ class RobotDiscs:
         radius_m: radius of the robot [m].
         tool_m: width of the tool [m].
         free_at_most: occupancy values up to this are free [percent].
+        clearance_m: what lines keep beside the radius from all that is not free, where they can
+            [m].
     """
 
     radius_m: float
     tool_m: float
     free_at_most: int = 25
+    clearance_m: float = 0.0
+
+    @property
+    def clear_m(self) -> float:
+        """Radius of the robot with its clearance [m]."""
+        return self.radius_m + self.clearance_m
 
 
 def fine_geometry(

@@ -114,7 +114,8 @@ class StandLattice:
         """
         window = lattice_window(floor.geometry, cell_m, max_cells)
         placement = stand_placement(floor.geometry, cell_m, floor.discs.radius_m)
-        return cls.where(floor.blocked, floor.places, placement, window, cell_m)
+        clear = floor.discs.clear_m / floor.geometry.resolution
+        return cls.where(floor.blocked, floor.places, placement, window, cell_m, clear)
 
     @classmethod
     def where(
@@ -124,6 +125,7 @@ class StandLattice:
         placement: Placement,
         window: Window,
         cell_m: float,
+        clear: float,
         unknown: NDArray[np.bool_] | None = None,
         before: tuple[StandLattice, tuple[int, int], NDArray[np.bool_]] | None = None,
     ) -> StandLattice:
@@ -134,6 +136,7 @@ class StandLattice:
             placement: position of the cells on the raster.
             window: window of the cells.
             cell_m: their width [m].
+            clear: radius of the robot with its clearance [pixels].
             unknown: bool (rows, cols): cells that are unknown, not blocked, if without stand.
             before: the previous lattice, the shift of pixels since then in rows and columns, and
                 the cells to recompute, bool (rows, cols); None to compute all.
@@ -153,7 +156,7 @@ class StandLattice:
                 if by:
                     stands[..., axis] += by
                     bends[..., axis] += np.float32(by)
-        choose_stands(blocked, places, placement, stale, window.row0, window.col0, stands)
+        choose_stands(blocked, places, placement, stale, window.row0, window.col0, clear, stands)
         blockers = np.zeros((2, 2), np.int64)
         link_stands(blocked, places, placement, stale, stands, steps, bends, blockers)
         states = states_of(stands, unknown)

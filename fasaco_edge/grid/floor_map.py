@@ -125,7 +125,8 @@ class FloorMap:
             return self._compared(before)
         wide = placement_of(grids[1].geometry, self._footprint)
         scale = self._footprint.cell_m / grids[1].geometry.resolution
-        wide = wide._replace(radius=wide.radius + REACH_CELLS * scale + REACH_PX)
+        clearance = self.discs.clearance_m / grids[1].geometry.resolution
+        wide = wide._replace(radius=wide.radius + clearance + REACH_CELLS * scale + REACH_PX)
         near = cells_near_changes(grids, plain.window, wide, self._footprint.thresholds, within)
         self.revision += 1
         self.shift = geometry.corner_of(self.geometry)
@@ -285,6 +286,7 @@ class FloorMap:
             self.placement,
             plain.window,
             plain.cell_m,
+            self.discs.clear_m / self.geometry.resolution,
             plain.states == UNKNOWN,
             None if self.shift is None else (self.stands, self.shift, stale),
         )

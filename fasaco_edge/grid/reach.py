@@ -85,7 +85,7 @@ class Reach:
             window: window of the lattice.
         """
         # As far as a changed pixel of the map has effects, at any yaw.
-        reach_m = self.discs.radius_m + (REACH_CELLS + 1.0) * self.cell_m
+        reach_m = self.discs.clear_m + (REACH_CELLS + 1.0) * self.cell_m
         reach_m = (reach_m + (REACH_PX + 1.0) * resolution) * math.sqrt(2.0)
         near, cell_m = np.zeros((window.rows, window.cols), np.bool_), self.cell_m
         for polygon in polygons:
@@ -127,7 +127,7 @@ class Reach:
 
     def _margin(self, geometry: GridGeometry) -> int:
         """Return how far robot and tool reach from a pixel, in pixels."""
-        return int(max(self.discs.radius_m, self.discs.tool_m / 2) / geometry.resolution) + 2
+        return int(max(self.discs.clear_m, self.discs.tool_m / 2) / geometry.resolution) + 2
 
 
 def _whole(geometry: GridGeometry) -> Window:

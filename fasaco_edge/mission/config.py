@@ -123,12 +123,14 @@ class Sweeping:
         line: prices for polishing the line.
         ahead_m: from where the robot turns about to the tool's centre, ahead [m]: where it has
             swept is known by that, lines are planned as if it were 0.
+        clearance_m: what lines keep beside the radius from walls and furniture [m].
     """
 
     tool_m: float
     most_pixels: int
     line: LineConfig
     ahead_m: float = 0.0
+    clearance_m: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)

@@ -65,7 +65,8 @@ class Ground:
             MapTooLarge, MapTooFar: see ``Floor.around``, ``StandLattice.over``.
         """
 
-        floor = Floor.around(grid, RobotDiscs(robot.radius_m, robot.tool_width_m), start_xy)
+        discs = RobotDiscs(robot.radius_m, robot.tool_width_m, clearance_m=robot.clearance_m)
+        floor = Floor.around(grid, discs, start_xy)
         cell_m = robot.tool_width_m * (1.0 - robot.overlap)
         lattice_deg = _lattice_deg(align, grid)
         try:

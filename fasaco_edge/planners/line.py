@@ -38,6 +38,9 @@ DESCENT_SHARE, PATCH_SHARE = 0.08, 0.12
 MOST_A_POINT = 2000
 # From the highest temperature to zero.
 COOLED = (1.0, 0.0)
+# Clearance is given up along a strip of floor that is wider than this share of the tool's width. A
+# niche or a passage gains the whole width; a wall gains the clearance alone.
+NEAR_SHARE = 0.2
 # Default turn durations.
 TURNING = proportional_turning(1.5)
 # Seed of the random moves.
@@ -66,12 +69,13 @@ class LineConfig:
     moves_m2: int = 5000
     patch_s: float = 20.0
 
-    def prices(self, unit_m: float) -> kernel.Price:
-        """Return the prices on a raster of pixels ``unit_m`` wide [m]."""
+    def prices(self, unit_m: float, tool_m: float) -> kernel.Price:
+        """Return the prices on a raster of pixels ``unit_m`` wide, for a tool ``tool_m`` wide."""
         return kernel.Price(
             drive_s=unit_m / self.speed_m_s,
             turning=self.turning,
             left_s=self.price_s_m2 * unit_m * unit_m,
+            near_s=NEAR_SHARE * self.price_s_m2 * tool_m * unit_m,
         )
 
 
@@ -125,8 +129,9 @@ def line_over(
     tried = 0
     if config.price_s_m2 > 0.0 and len(points) > 1:
         line = linked(points, sweeps.left.shape, is_end_fixed=is_end_fixed)
-        price = config.prices(unit)
-        on = kernel.Floor(floor.blocked, floor.places, sweeps, floor.discs.radius_m / unit, tool)
+        price = config.prices(unit, floor.discs.tool_m)
+        radius, clear = floor.discs.radius_m / unit, floor.discs.clear_m / unit
+        on = kernel.Floor(floor.blocked, floor.places, sweeps, radius, tool, clear)
         most = min(int(config.moves_m2 * floor.reachable_m2), MOST_A_POINT * len(points))
         farthest = FARTHEST_M / unit
         polish(line, on, price, memory, farthest, int(DESCENT_SHARE * most))

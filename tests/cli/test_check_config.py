@@ -125,6 +125,7 @@ def test_what_is_in_order_is_shown_as_it_is_in_force(check, capsys):
     assert told["config"]["robot"] == {
         "name": "mower",
         "radius_m": 0.18,
+        "clearance_m": 0.0,
         "tool_width_m": 0.3,
         "speed_m_s": 0.25,
         "quarter_turn_s": 1.5,

@@ -8,11 +8,12 @@ import msgspec
 import pytest
 import yaml
 
-from fasaco_edge.config.cautions import cautions
+from fasaco_edge.config.cautions import NEAR_SHARE, cautions
 from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.doctor.finding import Level
 from fasaco_edge.doctor.report import findings
 from fasaco_edge.grid.polygons import is_near
+from fasaco_edge.planners import line
 from tests.support.processes import fasaco_edge
 
 SQUARE = [[2.0, 2.0], [4.0, 2.0], [4.0, 4.0], [2.0, 4.0]]
@@ -45,6 +46,12 @@ def said(**sections):
             "no effect where planner.line is cells: planner.align, robot.overlap",
         ),
         (
+            {"planner": {"line": "cells"}, "robot": {"clearance_m": 0.1}},
+            "no effect where planner.line is cells: robot.clearance_m",
+        ),
+        ({"robot": {"clearance_m": 0.05}}, ""),
+        ({"robot": {"clearance_m": 0.07}}, "is more than a fifth of robot.tool_width_m, 0.06"),
+        (
             {"mission": {"keep_out": [SQUARE], "dock": {"x_m": 1.5, "y_m": 3.0}}},
             "",  # the place before it is half a metre west
         ),
@@ -66,6 +73,10 @@ def test_what_does_not_go_together_is_named(sections, text):
 def test_the_defaults_and_a_tool_as_wide_as_the_robot_are_in_order():
     assert said() == []
     assert said(robot={"radius_m": 0.3, "tool_width_m": 0.6}) == []
+
+
+def test_what_lines_do_with_a_wide_clearance_is_told_as_they_do_it():
+    assert NEAR_SHARE == line.NEAR_SHARE
 
 
 def test_near_a_polygon_is_inside_or_within_reach():

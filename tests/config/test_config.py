@@ -102,6 +102,7 @@ def test_a_removed_key_is_an_error_that_says_what_to_do(load, place):
         ("robot: {radius_m: true}", "robot.radius_m: expected float, got True"),
         ("robot: {radius_m: }", "robot.radius_m: expected float, got None"),
         ("robot: {tool_width_m: .inf}", "robot.tool_width_m: expected float <= 10.0, got inf"),
+        ("robot: {clearance_m: -0.01}", "robot.clearance_m: expected float >= 0.0, got -0.01"),
         ("robot: {overlap: 0.9}", "robot.overlap: expected float <= 0.5, got 0.9"),
         ("robot: 3", "robot: expected object, got 3"),
         ("robot: {name: 3}", "robot.name: expected str, in quotes, got 3"),

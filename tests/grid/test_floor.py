@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -89,6 +90,29 @@ def test_cells_at_walls_have_stands_beside_their_middles():
         assert np.hypot(*(stand - middle)) == pytest.approx(nearest, abs=0.0125)
     row, col = stands.start_cell(floor)
     assert np.hypot(*(lattice.centres(np.array([[row, col]]))[0] - (3.0, 2.0))) < 0.2
+
+
+def test_stands_keep_the_clearance_where_their_cells_have_a_place_that_does():
+    grid = room(3.0, 2.0)
+    plain, careful = (RobotDiscs(DISCS.radius_m, DISCS.tool_m, clearance_m=m) for m in (0.0, 0.04))
+    floor = Floor.around(grid, plain, (3.0, 2.0))
+    with_it = replace(floor, discs=careful)
+    stands, kept = (StandLattice.over(each, 0.275) for each in (floor, with_it))
+    assert (stands.lattice.coverable == kept.lattice.coverable).all()
+    assert (stands.lattice.steps == kept.lattice.steps).all()
+    roomy = Floor.around(grid, RobotDiscs(careful.clear_m, DISCS.tool_m), (3.0, 2.0))
+    places = roomy.to_map(np.argwhere(unpacked(roomy.places, roomy.geometry.cols)))
+    have_one = {tuple(cell) for cell in np.floor(places / 0.275).astype(int).tolist()}
+    moved = 0
+    for row, col in np.argwhere(kept.lattice.coverable).tolist():
+        x, y = floor.to_map(kept.stands[row, col][None])[0]
+        apart = min(x - 2.0, 5.0 - x, y - 1.0, 3.0 - y)
+        is_kept = apart > careful.clear_m - 1e-3
+        assert is_kept == ((int(x // 0.275), int(y // 0.275)) in have_one)
+        is_same = np.array_equal(kept.stands[row, col], stands.stands[row, col])
+        assert is_kept or is_same
+        moved += not is_same
+    assert 0 < moved < kept.lattice.coverable.sum() / 2
 
 
 def test_a_step_round_a_corner_has_a_bend():

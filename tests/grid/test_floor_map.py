@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -68,10 +69,13 @@ def assert_touched(floor, before):
     assert not different.any()
 
 
-@pytest.mark.parametrize("chunk", [64, 32, 1])
+@pytest.mark.parametrize(
+    ("chunk", "clearance_m"), [(64, 0.0), (32, 0.0), (1, 0.0), (64, 0.03), (64, 0.4)]
+)
 @pytest.mark.parametrize("yaw", [0.0, 0.3])
-def test_changes_lead_where_a_new_look_does(yaw, chunk, monkeypatch):
+def test_changes_lead_where_a_new_look_does(yaw, chunk, clearance_m, monkeypatch):
     monkeypatch.setattr(floor_map, "CHUNK", chunk)
+    monkeypatch.setattr(f"{__name__}.DISCS", replace(DISCS, clearance_m=clearance_m))
     rng = np.random.default_rng(7)
     whole = room(6.0, 5.0, yaw)
     known = part_of(whole, 3, 4, 90, 99)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from itertools import pairwise
 
 import numpy as np
@@ -9,8 +10,10 @@ import pytest
 
 from fasaco_edge.kernels.floor import line as kernel
 from fasaco_edge.kernels.floor.anneal import anneal
-from fasaco_edge.kernels.floor.bits import packed
+from fasaco_edge.kernels.floor.bits import packed, unpacked
+from fasaco_edge.kernels.floor.capsule import TOUCH
 from fasaco_edge.kernels.floor.detour import find_patches, sweep_patches
+from fasaco_edge.kernels.floor.nearness import PIECE
 from fasaco_edge.kernels.floor.polish import polish
 from fasaco_edge.kernels.floor.sweeps import NEVER, Sweeps, sweep
 from fasaco_edge.kernels.floor.turning import (
@@ -32,8 +35,10 @@ WAY = [(10, 10), (10, 85), (20, 85), (20, 10), (30, 10), (30, 85), (37, 10), (62
 class Room:
     """A room with a pillar, and lanes through it."""
 
-    def __init__(self, turning: Turning = TURNINGS[0], *, is_end_fixed: bool = False) -> None:
-        self.price = kernel.Price(drive_s=0.1, turning=turning, left_s=0.11)
+    def __init__(
+        self, turning: Turning = TURNINGS[0], *, is_end_fixed: bool = False, clear: float = ROBOT
+    ) -> None:
+        self.price = kernel.Price(drive_s=0.1, turning=turning, left_s=0.11, near_s=0.3)
         free = np.zeros((ROWS, COLS), np.bool_)
         free[2:-2, 2:-2] = True
         free[50:54, 60:64] = False
@@ -43,7 +48,7 @@ class Room:
         places = packed(inner, beyond=False)
         counts = np.where(free, 0, NEVER).astype(np.int16)
         left = (counts == 0).reshape(ROWS // 8, 8, COLS // 8, 8).sum(axis=(1, 3)).astype(np.int32)
-        self.floor = kernel.Floor(blocked, places, Sweeps(counts, left), ROBOT, TOOL)
+        self.floor = kernel.Floor(blocked, places, Sweeps(counts, left), ROBOT, TOOL, clear)
         self.memory = memory_for_moves()
         self.line = linked(np.array(WAY, float), left.shape, is_end_fixed=is_end_fixed)
         for a, b in pairwise(WAY):
@@ -61,7 +66,23 @@ class Room:
         left = int(np.count_nonzero(self.floor.sweeps.counts == 0))
         turns_s = sum(turn_seconds(self.price.turning, turn) for turn in turns.tolist())
         driven_s = self.price.drive_s * np.hypot(*way.T).sum() + turns_s
-        return float(driven_s + self.price.left_s * left)
+        return float(driven_s + self.price.left_s * left + self.price.near_s * self.near())
+
+    def near(self) -> float:
+        """Return the length without clearance, counted slowly [pixels]."""
+        pixels = np.argwhere(unpacked(self.floor.blocked, COLS))
+        length, (robot, clear) = 0.0, (self.floor.robot, self.floor.clear)
+        for a, b in pairwise(self.points):
+            edge = float(np.hypot(*(b - a)))
+            count = max(math.ceil(edge / PIECE), 1)
+            for part in range(count):
+                share = np.linspace(part / count, (part + 1) / count, 200)[:, None]
+                along = (a + share * (b - a))[:, None, :]
+                off = np.maximum(np.abs(along - pixels) - 0.5, 0.0)
+                apart = float(np.hypot(off[..., 0], off[..., 1]).min())
+                nearer = sum(apart < radius - TOUCH for radius in (clear, 0.5 * (robot + clear)))
+                length += 0.5 * nearer * edge / count if clear > robot else 0.0
+        return length
 
     def recounted(self) -> Sweeps:
         """Return what the line sweeps, counted anew."""
@@ -85,8 +106,9 @@ class Room:
 
 @pytest.mark.parametrize("turning", TURNINGS)
 @pytest.mark.parametrize("stage", ["polish", "anneal", "patches"])
-def test_what_is_gained_is_what_a_slow_count_shows(stage, turning):
-    room = Room(turning)
+@pytest.mark.parametrize("clear", [ROBOT, ROBOT + 1.5])
+def test_what_is_gained_is_what_a_slow_count_shows(stage, turning, clear):
+    room = Room(turning, clear=clear)
     before = room.cost_s()
     gained = room.run(stage)
     assert gained > 1.0
@@ -96,6 +118,16 @@ def test_what_is_gained_is_what_a_slow_count_shows(stage, turning):
     below = counted.counts < NEVER // 2
     assert (room.floor.sweeps.counts[below] == counted.counts[below]).all()
     assert (room.floor.sweeps.left == counted.left).all()
+
+
+def test_a_line_keeps_its_clearance_where_that_costs_little():
+    without, kept = Room(), Room(clear=ROBOT + 1.5)
+    for room in (without, kept):
+        room.run("polish")
+        room.run("anneal")
+    judged = Room(clear=kept.floor.clear)
+    judged.line = without.line
+    assert kept.near() < 0.5 * judged.near()
 
 
 def test_numbers_of_points_that_go_are_used_again():

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -111,6 +113,50 @@ def test_nothing_comes_nearer_to_a_wall_than_the_robot_is_wide(planned):
             dy = np.maximum(np.maximum(rows - row, row - rows - 1), 0.0)
             # As near as touching counts as free, and floats round [pixels].
             assert np.hypot(dx, dy).min() * geometry.resolution > ROBOT.radius_m - 1e-4
+
+
+def distances_m(grid, line: DrivenLine) -> np.ndarray:
+    """Return the distances to what is not free, at points 1 cm apart along a line [m]."""
+    rows, cols = np.nonzero((grid.cells < 0) | (grid.cells > 25))
+    found = []
+    for a, b in pairwise(line.xy):
+        for x, y in np.linspace(a, b, math.ceil(math.dist(a, b) / 0.01), endpoint=False):
+            col, row = grid.geometry.to_pixels(x, y)
+            off = np.abs(np.stack([cols + 0.5 - col, rows + 0.5 - row])) - 0.5
+            found.append(np.hypot(*np.maximum(off, 0.0)).min() * grid.geometry.resolution)
+    return np.array(found)
+
+
+def with_clearance(floor, clearance_m):
+    return replace(floor, discs=replace(floor.discs, clearance_m=clearance_m))
+
+
+def test_a_line_keeps_its_clearance_from_most_of_what_it_passes(planned):
+    grid, floor, stands, walk = planned
+    near, lines = [], []
+    for clearance_m in (0.0, 0.02):
+        on = with_clearance(floor, clearance_m)
+        lines.append(line_over(walk, stands, on, LineConfig(), is_end_fixed=False))
+        near.append((distances_m(grid, lines[-1]) < ROBOT.radius_m + 0.015).mean())
+    assert near[1] < 0.4 * near[0]
+    # What is left is a strip along walls, hardly wider than the clearance.
+    assert lines[1].swept_m2 > 0.93 * lines[0].swept_m2
+
+
+def test_clearance_is_given_up_for_the_floor_of_a_narrow_passage():
+    cells = np.full((42, 62), 100, np.int8)
+    cells[1:41, 1:41] = 0
+    cells[18:26, 41:61] = 0  # 40 cm wide, a metre deep
+    grid = OccupancyGrid(GridGeometry(42, 62, 0.05, Pose2D(0.0, 0.0)), cells)
+    floor = Floor.around(grid, RobotDiscs(ROBOT.radius_m, ROBOT.tool_m), (1.0, 1.0))
+    stands = StandLattice.over(floor, CELL_M)
+    problem = CoverageProblem.of(stands.lattice, stands.start_cell(floor))
+    walk = NearOptimal().plan(problem, lambda s: s.work.perturbations >= 20, ignore).cells
+    on = with_clearance(floor, 0.03)
+    line = line_over(walk, stands, on, LineConfig(), is_end_fixed=False)
+    assert line.xy[:, 0].max() > 2.7
+    near = distances_m(grid, line) < ROBOT.radius_m + 0.03 - 0.005
+    assert 0.0 < near.mean() < 0.3
 
 
 def test_a_walk_of_one_cell_sweeps_what_is_below_the_tool(planned):

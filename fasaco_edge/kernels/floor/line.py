@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.kernels.floor.capsule import is_clear
+from fasaco_edge.kernels.floor.nearness import near_px
 from fasaco_edge.kernels.floor.seconds import chain_s
 from fasaco_edge.kernels.floor.sweeps import (
     BLOCK,
@@ -71,6 +72,7 @@ class Floor(NamedTuple):
         places: the same: reachable places of the robot.
         sweeps: sweeps by the line.
         robot, tool: their radii [pixels].
+        clear: radius of the robot with its clearance [pixels].
     """
 
     blocked: NDArray[np.uint64]
@@ -78,14 +80,17 @@ class Floor(NamedTuple):
     sweeps: Sweeps
     robot: float
     tool: float
+    clear: float
 
 
 class Price(NamedTuple):
-    """The objective: seconds for a pixel driven, for turns, for an unswept pixel."""
+    """The objective: seconds for a pixel driven, for turns, for an unswept pixel, and how many more
+    for a pixel driven without clearance."""
 
     drive_s: float
     turning: Turning
     left_s: float
+    near_s: float
 
 
 class Memory(NamedTuple):
@@ -233,6 +238,10 @@ def gain_above(
     old, new, tool = memory.before, memory.after, floor.tool
     longer_s = chain_s(new, lead, last_new, news, price.drive_s, price.turning)
     longer_s -= chain_s(old, lead, last_old, olds, price.drive_s, price.turning)
+    if floor.clear > floor.robot:
+        nearer = near_px(floor.blocked, new, lead, last_new, floor.robot, floor.clear)
+        nearer -= near_px(floor.blocked, old, lead, last_old, floor.robot, floor.clear)
+        longer_s += price.near_s * nearer
     least_more = (longer_s + least_s) / price.left_s
     most_more = _left_around(floor.sweeps.left, new, lead, last_new, tool)
     if most_more < least_more or not _is_way(floor, new, lead, last_new):

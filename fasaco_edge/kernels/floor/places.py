@@ -151,6 +151,36 @@ def _pixels_of(placement: Placement, row: int, col: int, shape: tuple[int, int])
 
 
 @lean_kernel
+def _step_aside(
+    blocked: NDArray[np.uint64],
+    places: NDArray[np.uint64],
+    placement: Placement,
+    cell: tuple[int, int],
+    clear: float,
+    stand: NDArray[np.float64],
+) -> None:
+    """Move a stand without clearance to the nearest place of its cell that has it, if one is as
+    near as that may be."""
+    y, x = stand[0], stand[1]
+    if is_clear(blocked, y, x, y, x, clear):
+        return
+    rows, cols = places.shape[0], places.shape[1] << 6
+    margin = int(np.ceil(clear - placement.radius)) + 1
+    nearest = np.inf
+    for i in range(max(int(y) - margin, 0), min(int(y) + margin + 2, rows)):
+        for j in range(max(int(x) - margin, 0), min(int(x) + margin + 2, cols)):
+            square = (j - x) * (j - x) + (i - y) * (i - y)
+            if (
+                square < nearest - TIE
+                and is_marked(places, i, j)
+                and _cell_of(placement, i, j) == cell
+                and is_clear(blocked, i, j, i, j, clear)
+            ):
+                nearest = square
+                stand[0], stand[1] = i, j
+
+
+@lean_kernel
 def choose_stands(
     blocked: NDArray[np.uint64],
     places: NDArray[np.uint64],
@@ -158,9 +188,12 @@ def choose_stands(
     stale: NDArray[np.bool_],
     row0: int,
     col0: int,
+    clear: float,
     stands: NDArray[np.float64],
 ) -> None:
     """Find for stale cells the place nearest to its middle; the middle itself if that is clear.
+
+    A place beside it that keeps the robot's clearance is preferred.
 
     Args:
         blocked, places: uint64 (rows, words), see ``bits``, of the raster, whose pixel (0, 0) is
@@ -168,6 +201,7 @@ def choose_stands(
         placement: where the lattice's cells lie on it; its radius is the robot's.
         stale: bool (rows, cols): the cells to look at.
         row0, col0: the first cell (row, col) of the arrays.
+        clear: radius of the robot with its clearance [pixels].
         stands: float64 (rows, cols, 2): y, x [pixels], filled in; NaN where there is no place.
     """
     ux, uy = placement.ux, placement.uy
@@ -190,6 +224,9 @@ def choose_stands(
             and is_clear(blocked, y, x, y, x, placement.radius)
         ):
             stands[row, col, 0], stands[row, col, 1] = y, x
+            if clear > placement.radius:
+                cell = row + row0, col + col0
+                _step_aside(blocked, places, placement, cell, clear, stands[row, col])
             continue
         nearest = np.inf
         box = _pixels_of(placement, row + row0, col + col0, (rows, cols))
@@ -205,6 +242,9 @@ def choose_stands(
                     stands[row, col, 0], stands[row, col, 1] = i, j
         if nearest <= 0.5 + TIE and is_clear(blocked, y, x, y, x, placement.radius):
             stands[row, col, 0], stands[row, col, 1] = y, x
+        if clear > placement.radius and nearest < np.inf:
+            cell = row + row0, col + col0
+            _step_aside(blocked, places, placement, cell, clear, stands[row, col])
 
 
 @lean_kernel

@@ -126,8 +126,9 @@ class Polisher:
         """Return floor and prices for the kernels."""
         unit = ahead.tally.unit_m
         radius, tool = floor.discs.radius_m / unit, floor.discs.tool_m / 2 / unit
-        on = kernel.Floor(floor.blocked, floor.places, ahead.tally.sweeps, radius, tool)
-        return on, self._config.prices(unit)
+        clear = floor.discs.clear_m / unit
+        on = kernel.Floor(floor.blocked, floor.places, ahead.tally.sweeps, radius, tool, clear)
+        return on, self._config.prices(unit, floor.discs.tool_m)
 
     def _put(self, ahead: LineAhead, first: int, last: int, piece: Line, line: kernel.Line) -> int:
         """Replace a piece by its polished version; return the new index of its last point."""

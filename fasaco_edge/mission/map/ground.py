@@ -141,7 +141,12 @@ class Ground:
         sweeping, footprint = self._config.sweeping, self._config.footprint
         if sweeping is None:
             return None
-        discs = RobotDiscs(footprint.robot_radius_m, sweeping.tool_m, footprint.free_at_most)
+        discs = RobotDiscs(
+            footprint.robot_radius_m,
+            sweeping.tool_m,
+            footprint.free_at_most,
+            sweeping.clearance_m,
+        )
         return FloorMap(grid, plain, footprint, discs, sweeping.most_pixels)
 
     def _without_kept_out(self, free: CoverageLattice) -> CoverageLattice:

@@ -37,7 +37,7 @@ OPTIONS = {
     "noise_m": "scatter of the lidar [m]",
     "radius_m": "radius that the product is told [m]",
     "hull_m": "radius of the hull that collides [m]",
-    "clearance_m": "what the product plans with beside the radius [m]",
+    "clearance_m": "what its lines keep beside the radius [m]",
     "seconds": "limit of simulated time [s]; 0 for one by the size of the building",
     "pose_hz": "rate of poses [1/s]",
     "scan_hz": "rate of scans that are offered to the mapper [1/s]",

@@ -37,7 +37,7 @@ class LabSettings:
         noise_m: scatter of the lidar [m].
         radius_m: of the robot's disc by the product's configuration, and to the judge [m].
         hull_m: of the hull that collides [m].
-        clearance_m: by how much more than ``radius_m`` the product plans with [m].
+        clearance_m: what its lines keep beside that where they can [m].
         seconds: limit of simulated time [s]; 0 for as many as the building's floor may take.
         pose_hz, scan_hz: rates of poses, and of scans that are offered to the mapper [1/s].
         nudge_s: a person helps a robot that stood so long with work left [s]; 0 for never.
@@ -89,7 +89,8 @@ class LabSettings:
     def robot(self) -> RobotConfig:
         """The product's configuration of the robot."""
         return RobotConfig(
-            radius_m=self.radius_m + self.clearance_m,
+            radius_m=self.radius_m,
+            clearance_m=self.clearance_m,
             tool_width_m=self.tool_m,
             speed_m_s=self.speed_m_s,
             acceleration_m_s2=0.5,
