@@ -23,12 +23,13 @@ def init(file, *words):
 
 def test_it_has_nothing_in_it_but_what_differs_from_the_defaults(tmp_path, capsys):
     file = tmp_path / "robot.yaml"
-    assert init(file, *GIVEN) == 0
+    assert init(file, *GIVEN, "--clearance", "0") == 0
     assert file.read_text().splitlines()[1:] == ["robot:", "  radius_m: 0.2"]
     printed = capsys.readouterr().out
     assert "\n  robot:\n    radius_m: 0.2\n" in printed
     assert f"fasaco-edge run --config {file}" in printed
     default = ["--robot-radius", "0.18", "--tool-width", "0.3", "--map-by", "zenoh"]
+    default += ["--clearance", "0"]
     assert init(file, *default, "--force") == 0
     assert load_config(file) == DaemonConfig()
 
@@ -45,7 +46,7 @@ def test_ros_and_a_router(tmp_path, capsys):
     assert (config.bus.mode, config.bus.listen) == ("client", ())
     told = json.loads(capsys.readouterr().out)
     assert (told["file"], told["heard"]) == (str(file), None)
-    assert told["config"]["robot"] == {"tool_width_m": 0.4}
+    assert told["config"]["robot"] == {"clearance_m": 0.02, "tool_width_m": 0.4}
 
 
 @pytest.mark.parametrize(
@@ -55,6 +56,7 @@ def test_ros_and_a_router(tmp_path, capsys):
         ([], "--robot-radius, --tool-width, --map-by must be given"),
         ([*GIVEN, "--domain", "7"], "--domain and --namespace are for maps from ROS 2"),
         ([*GIVEN, "--robot-radius", "20"], "robot.radius_m: expected float <= 10.0, got 20"),
+        ([*GIVEN, "--clearance", "-1"], "robot.clearance_m: expected float >= 0.0, got -1.0"),
         ([*GIVEN, "--name", "a/b"], "robot.name: "),
     ],
 )

@@ -328,6 +328,17 @@ def test_a_plan_is_for_the_robot_of_a_configuration(plan, tmp_path):
     assert (cells["cell_m"], cells["turn_deg_s"]) == (0.36, 60.0)
 
 
+@pytest.mark.parametrize("clearance", ["1.1", "-0.1", "nan"])
+def test_a_clearance_is_a_length(capsys, clearance):
+    assert main(["plan", "office", "--line", "quick", f"--clearance={clearance}"]) == Exit.CONFIG
+    assert "--clearance must be in [0, 1] m" in capsys.readouterr().err
+
+
+def test_a_clearance_leaves_a_strip_along_walls(plan):
+    floors = [plan("office", "--clearance", metres)[0]["floor"] for metres in (0, 0.03)]
+    assert floors[1]["swept_share"] < floors[0]["swept_share"]
+
+
 @pytest.mark.parametrize("overlap", ["0.9", "-0.1", "nan"])
 def test_an_overlap_is_a_share_of_the_tool(capsys, overlap):
     assert main(["plan", "office", "--line", "quick", f"--overlap={overlap}"]) == Exit.CONFIG

@@ -153,6 +153,7 @@ def test_without_json_it_prints_a_line_for_each_robot(plan, grid):
         (["--robots", "0,0", "--target-gap", "0.1"], "--target-gap"),
         (["--robots", "0,0", "--align", "walls"], "--align"),
         (["--robots", "0,0", "--overlap", "0.1"], "--overlap"),
+        (["--robots", "0,0", "--clearance", "0.02"], "--clearance"),
         (
             ["--robots", *(f"0,{col}" for col in range(17)), *(f"1,{c}" for c in range(17))],
             "at most 33",

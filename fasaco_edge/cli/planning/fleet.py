@@ -99,7 +99,12 @@ def _check(args: argparse.Namespace, request: PlanRequest) -> None:
             "--pheromone-png: is of one robot's colony; several robots' walks are cut from one",
             hint="leave --pheromone-png out, or plan for one robot",
         )
-    for option, value in (("--align", args.align), ("--overlap", args.overlap)):
+    of_lines = {
+        "--align": args.align,
+        "--overlap": args.overlap,
+        "--clearance": args.clearance,
+    }
+    for option, value in of_lines.items():
         if value is not None:
             raise BadConfiguration(
                 f"{option}: is of a line over the floor, which is for one robot",

@@ -150,6 +150,13 @@ def _add_problem(group: argparse._ArgumentGroup) -> None:
         metavar="M",
         help=f"radius of the robot [m]; ignored with a .npy grid (default: {ROBOT.radius_m:g})",
     )
+    group.add_argument(
+        "--clearance",
+        type=float,
+        metavar="M",
+        help="what a line over the floor keeps from walls beside the radius, except where giving "
+        f"it up gains enough floor [m] (default: {ROBOT.clearance_m:g})",
+    )
     end = group.add_mutually_exclusive_group()
     end.add_argument(
         "--end",

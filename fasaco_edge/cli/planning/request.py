@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 ROBOT_OPTIONS = {
     "cell": "tool_width_m",
     "robot_radius": "radius_m",
+    "clearance": "clearance_m",
     "speed_m_s": "speed_m_s",
     "overlap": "overlap",
 }
@@ -79,6 +80,9 @@ def read_request(args: argparse.Namespace) -> PlanRequest:
         value, unit = getattr(args, option[2:].replace("-", "_")), option == "--speed-m-s"
         if value is not None:
             require(0.0 < value <= 10.0, option, f"be in (0, 10] m{'/s' * unit}", value)
+    if args.clearance is not None:
+        allowed = 0.0 <= args.clearance <= 1.0
+        require(allowed, "--clearance", "be in [0, 1] m", args.clearance)
     if args.overlap is not None:
         allowed = 0.0 <= args.overlap <= 0.5
         require(allowed, "--overlap", "be in [0, 0.5], of the tool's width", args.overlap)
