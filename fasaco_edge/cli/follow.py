@@ -33,6 +33,7 @@ EPILOG = """\
 Speeds and accelerations are those of the configuration: robot.speed_m_s, acceleration_m_s2,
 turn_deg_s, turn_deg_s2 and steered_deg. Where the configuration has a block ros2, poses come from
 its topics and velocities go to ros2.topics.cmd_vel; else by the keys `pose` and `cmd_vel`.
+Corners up to 135 degrees are rounded in motion, within 2 cm; at sharper ones it turns on the spot.
 
 The robot is told to stand, within 0.2 s, while
   the newest pose is older than --pose-age, or is none, or has jumped; of poses from tf, odometry
