@@ -60,7 +60,8 @@ class Base:
         wheels: velocities of its wheels.
         grip: share of these that moves it.
         touches: whether the hull touches something.
-        touches_person: whether that is somebody who walks about.
+        touches_person: whether that is somebody who walks about: 0 nobody, 1 beside or behind the
+            robot, 2 in front of it.
     """
 
     def __init__(self, building: Building, settings: LabSettings) -> None:
@@ -68,7 +69,7 @@ class Base:
         self.truth = self.odometry = building.start
         self.wheels = STAND
         self.grip = 1.0
-        self.touches = self.touches_person = False
+        self.touches, self.touches_person = False, 0
         self._ideal = settings.ideal
         self._rng = np.random.default_rng(settings.seed)
         self._command, self._commanded_at = STAND, -math.inf
@@ -101,10 +102,17 @@ class Base:
             if self._body in (c.a, c.b)
         ]
         self.touches = bool(touched)
-        self.touches_person = any(thing.shape == "circle" for thing in touched)
+        people = [self._is_ahead(thing) for thing in touched if thing.shape == "circle"]
+        self.touches_person = 1 + any(people) if people else 0
         self.odometry = moved(self.odometry, self._counted(), TICK_S)
         self._tick += 1
         self.now = self._tick * TICK_S
+
+    def _is_ahead(self, thing: Any) -> bool:
+        """Tell whether the middle of something is in front of the robot's."""
+        x, y = (float(value) for value in thing.state[:2, 0])
+        along = math.cos(self.truth.yaw) * (x - self.truth.x)
+        return along + math.sin(self.truth.yaw) * (y - self.truth.y) > 0.0
 
     def scan(self) -> NDArray[np.float64]:
         """Return the ranges of the lidar's beams, float64 (BEAMS,) [m]; 0 for no return.

@@ -53,7 +53,8 @@ class Figures:
         swept_unclaimed_m2: floor that was swept and that it does not take for swept.
         reachable_m2: the truly reachable floor.
         people_touched, driven_into: separate contacts with people, and how many of these began
-            while the robot drove: into one that stands people walk by themselves.
+            while the robot drove towards them: into one that stands, or from behind, people walk
+            by themselves.
         contacts, contact_s: separate contacts of the hull, and how long they lasted in all [s].
         pose_error_median_m, pose_error_p95_m, pose_error_most_m: of the pose that the product has.
         seconds: simulated time to the last motion [s].
@@ -152,7 +153,11 @@ def judge(run: LabRun, truth: Truth) -> Figures:
         swept_unclaimed_m2=truth.m2(truth.swept & ~truth.claimed & truth.free),
         reachable_m2=truth.m2(truth.reachable),
         people_touched=len(touched),
-        driven_into=int(np.count_nonzero(np.abs(of["speed"][touched]) >= STANDS_M_S)),
+        driven_into=int(
+            np.count_nonzero(
+                (of["speed"][touched] >= STANDS_M_S) & (of["touches_person"][touched] > 1.0)
+            )
+        ),
         contacts=contacts,
         contact_s=contact_s,
         pose_error_median_m=float(np.median(errors)),

@@ -48,7 +48,7 @@ class Trace:
 
     Attributes:
         rows: of ``COLUMNS``: time [s], true pose, wheels [m/s, rad/s], grip, contact, the pose that
-            the product has, whether its mission is done, and whether a person is touched.
+            the product has, whether its mission is done, and who is touched, as of the base.
         paths: the paths published, each with the number of ticks before it.
         states: states of the mission with their reasons, and of the follower, and when each began
             [s].
