@@ -1,7 +1,8 @@
 """Sight: what the lidar sees and the map does not show, and how fast the robot may go by it.
 
 Walls of the map are not looked at: the path keeps clear of them, by a centimetre where floor is to
-be swept beside them, which is less than ranges scatter. What the map does not show is kept clear of
+be swept beside them, which is less than ranges scatter. But people leave marks on a map where they
+walked: what moves counts there, too. What the map does not show is kept clear of
 by a margin. What has stood in its place for a while is taken for a thing; anything else may move.
 """
 
@@ -87,7 +88,8 @@ class Sight:
         self._scan_at: float | None = None
         self._stamp_ns = 0
         self._fault: Trouble | None = None
-        # Squares with something that the map does not show: since when, and when last [s].
+        self._is_first = True
+        # Squares with something in them: since when, and when last [s].
         self._seen: dict[tuple[int, int], tuple[float, float]] = {}
 
     def take_map(self, payload: bytes, *, is_update: bool = False) -> None:
@@ -176,16 +178,19 @@ class Sight:
             if math.hypot(x, y) < own:
                 continue
             there = pose.x + cos * x - sin * y, pose.y + sin * x + cos * y
-            if not self._map.shows(*there):
-                square = math.floor(there[0] / PLACE_M), math.floor(there[1] / PLACE_M)
-                places.setdefault(square, []).append(there)
+            square = math.floor(there[0] / PLACE_M), math.floor(there[1] / PLACE_M)
+            places.setdefault(square, []).append(there)
         known = {at: times for at, times in self._seen.items() if now - times[1] <= FORGET_S}
-        self.things = [
-            Thing(x, y, now - self._since(known, square, now) < STANDS_S)
-            for square, found in places.items()
-            for x, y in found
-        ]
-        self._seen = known | {at: (known[at][0] if at in known else now, now) for at in places}
+        # What was there from the beginning is taken to stand.
+        begun = -math.inf if self._is_first else now
+        self._is_first = False
+        self.things = []
+        for square, found in places.items():
+            moves = now - self._since(known, square, begun) < STANDS_S
+            self.things += [
+                Thing(x, y, moves) for x, y in found if moves or not self._map.shows(x, y)
+            ]
+        self._seen = known | {at: (known[at][0] if at in known else begun, now) for at in places}
 
     @staticmethod
     def _since(

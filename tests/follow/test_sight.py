@@ -11,7 +11,7 @@ from fasaco_edge.follow.supervision import State
 from fasaco_edge.grid.geometry import Pose2D
 from fasaco_edge.wire.messages.scans import LaserScan
 from tests.follow.closed_loop import LIMITS
-from tests.follow.seeing import RADIUS_M, Disc, Seeing, scan_at
+from tests.follow.seeing import RADIUS_M, Disc, Seeing, plain_map, scan_at
 
 
 def test_it_stops_before_what_stands_on_its_path_and_goes_on_once_that_is_gone():
@@ -146,3 +146,13 @@ def test_what_moves_behind_the_robot_does_not_hold_it():
         min(LIMITS.acceleration * 0.45, LIMITS.speed), abs=0.1
     )
     assert Pose2D(0.0, 0.0).x < seeing.pose.x
+
+
+def test_people_are_seen_where_the_map_shows_something_too():
+    """They leave marks on a map where they walked; what stands there is the map's business."""
+    for vy, stops in ((-0.4, True), (0.0, False)):
+        seeing = Seeing([Disc(1.5, 0.0 - vy * 6.0, 0.2, 0.0, vy)], wall_y=1.2)
+        seeing._sight.take_map(plain_map(wall_y=-0.3))
+        seeing.send((0.0, 0.0), (5.0, 0.0))
+        assert (State.OBSTACLE in seeing.run(7.5)) == stops
+        assert not stops or seeing.touched_at[:1] in ([], [0.0])
