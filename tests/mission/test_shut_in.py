@@ -66,6 +66,21 @@ def test_where_there_is_no_way_it_waits_and_is_never_done():
     assert robot.wait(900.0, lambda robot: robot.mission.state == "done")
 
 
+def test_one_that_gives_up_its_cells_while_it_is_shut_in_is_not_done():
+    """What it could not come to in the niche was given up, and with it all of the room."""
+    robot = shut_in(by=5)
+    for _ in range(5):
+        robot.mission._orders.advance(robot.now)
+    assert robot.mission.order_state.is_open
+    robot.wait(10.0, lambda robot: False)
+    assert robot.mission.state != "done"
+    assert "shut in" in robot.mission.reason
+    robot.show(room_with_niche())
+    assert robot.wait(900.0, lambda robot: robot.mission.state == "done")
+    covered = robot.mission.coverage()
+    assert covered.covered == covered.coverable > 140
+
+
 def test_in_the_gap_itself_it_drives_on_out():
     robot = shut_in(by=1, where=lambda robot: 4.02 < robot.x < 4.08)
     assert robot.wait(60.0, lambda robot: robot.x < 3.8)

@@ -275,7 +275,9 @@ class Executive:
 
     def _settle(self, update: PathUpdate | None) -> Decision:
         """Stop: all is covered, or the rest waits for a retry."""
-        orders = self.orders
+        orders, area = self.orders, self.map.area
+        if orders.is_waiting and area is not None and orders.is_shut_in(area):
+            return self._lead_out(self._why_shut_in(area), update)
         if orders.is_waiting:
             return self._rest(State.BLOCKED, orders.waiting_reason(), update)
         return self._rest(State.DONE, orders.ending, update)

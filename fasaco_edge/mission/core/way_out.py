@@ -32,6 +32,8 @@ SQUEEZE_PX = 1.5
 # A robot that has not come this far [m] on its way out after this time [s] cannot drive it. It
 # tries again after as long, then after twice as long each time, until it has come that far.
 STANDING_M, STANDING_S = 0.1, 15.0
+# It leads on by so many points of the track once the robot can go on.
+INTO_POINTS = 4
 # Longest loops that are left out first, in points of the track.
 LEAPS = (256, 128, 64, 32, 16, 8, 4, 2)
 NO_WAY: NDArray[np.float64] = np.empty((0, 2))
@@ -142,7 +144,13 @@ class WayOut:
                 continue
             area = ReachableArea.around(lattice, cell)
             if leads_on(area):
-                return np.array(way)[_without_loops(floor, raster[: index + 1])]
+                # Well into it: at the border of a cell the robot may count as in the one before.
+                end = index
+                while end < min(index + INTO_POINTS, len(way) - 1) and is_clear_between(
+                    floor, raster[end], raster[end + 1]
+                ):
+                    end += 1
+                return np.array(way)[_without_loops(floor, raster[: end + 1])]
             seen |= area.reachable
         return NO_WAY
 

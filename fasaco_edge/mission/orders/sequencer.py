@@ -299,9 +299,15 @@ class Sequencer:
         return bool(mine.any())
 
     def advance(self, now: float) -> None:
-        """Continue with the next part: nothing more can be done in this one now."""
-        state, run = self.order_state, self._run
+        """Continue with the next part: nothing more can be done in this one now.
+
+        A robot that is shut in has no next part: it waits, and tries this one again.
+        """
+        state, run, area = self.order_state, self._run, self._map.area
         run.exploration.viewpoints.clear()
+        if state.stage is not Stage.RETURNING and area is not None and self.is_shut_in(area):
+            run.retry_at = now + self._config.policy.retry_s
+            return
         following = state.next_pass()
         if following is not state:
             self.order_state = following
