@@ -142,7 +142,6 @@ def test_jitter(capsys):
             assert case["daemon_share"] > 0.0
         else:
             assert case["daemon_share"] < 0.01
-    assert sum(case["paths"] for case in cases.values() if case["covering"]) > 0
     assert document["goals"] == []
 
 

@@ -205,7 +205,7 @@ def test_the_status_says_all_there_is_to_know(path, pixels, outsider, daemon):
     }
     # The tool's disc, in pixels of 2.5 cm.
     swept_m2 = pytest.approx(math.pi / 4 * TOOL_M**2, rel=0.05)
-    unknown = dict.fromkeys(("reachable_m2", "left", "out_of_reach"))
+    unknown = dict.fromkeys(("reachable_m2", "left", "out_of_reach", "possible_m2"))
     assert status["floor"] == {"swept_m2": swept_m2} | unknown
     note = about(path)
     figures = ("planner", "seed", "ants", "kicks", "proposals", "planned_steps", "planned_cost_s")

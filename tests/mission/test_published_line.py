@@ -98,6 +98,21 @@ def test_pixels_that_flicker_far_ahead_change_nothing_yet():
     assert len(robot.paths) <= 24
 
 
+def test_a_robot_that_stands_gets_a_new_path_at_once():
+    """On a bench, say, where somebody publishes maps and waits for paths."""
+    pixels = np.full((80, 120), 100, np.int8)
+    pixels[1:-1, 1:-1] = 0
+    robot = LineRobot(pixels, (1.0, 1.0))
+    robot.wait(3.0, lambda robot: False)
+    robot.is_stuck = True
+    robot.wait(5.0, lambda robot: False)
+    before = len(robot.paths)
+    shown = pixels.copy()
+    shown[30:50, 90:110] = 100
+    robot.show(shown)
+    assert robot.wait(1.0, lambda robot: len(robot.paths) > before)
+
+
 def with_specks(pixels, random, away_from):
     """Return a map with up to two pixels more that are occupied, far from the robot."""
     shown = pixels.copy()

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,9 +36,11 @@ from fasaco_edge.mission.coverage.swept_floor import (
     MOST_FLOOR_TILES,
     SweptFloor,
 )
-from fasaco_edge.mission.coverage.tool_sight import ToolSight
 from fasaco_edge.mission.fleet.shared import SharedProgress
 from fasaco_edge.mission.map.loop_closure import Motion, certain_floor, uncertain_cells
+
+if TYPE_CHECKING:
+    from fasaco_edge.mission.coverage.tool_sight import ToolSight
 
 # Share of blocked among the known covered cells that no furniture blocks from one map to the next.
 MANY_AT_ONCE = 0.2

@@ -15,7 +15,7 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Callable, Iterable, Sequence
-from typing import NamedTuple, Self
+from typing import TYPE_CHECKING, NamedTuple, Self
 
 import numpy as np
 
@@ -39,7 +39,9 @@ from fasaco_edge.mission.coverage.floor_tiles import (
 from fasaco_edge.mission.coverage.floor_tiles import Place as TilePlace
 from fasaco_edge.mission.coverage.shared_tiles import SharedTiles
 from fasaco_edge.mission.coverage.steady_track import Place, SteadyTrack
-from fasaco_edge.mission.coverage.tool_sight import ToolSight
+
+if TYPE_CHECKING:
+    from fasaco_edge.mission.coverage.tool_sight import ToolSight
 
 # Two poses farther apart than this many tool widths are a jump, unless a drive takes no longer.
 JUMP_TOOLS = 2.0

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from fasaco_edge.grid.fine_raster import map_to_raster, raster_to_map
 from fasaco_edge.grid.floor_map import FloorMap
-from fasaco_edge.grid.geometry import Pose2D, Window
+from fasaco_edge.grid.geometry import Point, Pose2D, Window
 from fasaco_edge.kernels.floor.line import LEAST_EDGE
 from fasaco_edge.mission.line.alignment import aligned, by_distance
 from fasaco_edge.mission.line.lead_out import fitting_radius, lead_out
@@ -271,6 +271,12 @@ class LineAhead:
     def is_followed(self) -> bool:
         """Whether the robot is on the line, within half the tool."""
         return self._place.is_on(self.line.points, self._tool)
+
+    @property
+    def here(self) -> Point:
+        """The robot's position, x, y [m]."""
+        row, col = self._place.here.tolist()
+        return self._floor.geometry.to_map(col + 0.5, row + 0.5)
 
     @property
     def beside(self) -> Beside | None:

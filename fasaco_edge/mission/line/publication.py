@@ -1,7 +1,11 @@
-"""Publication of the line: at once, or together with later changes once the robot comes near."""
+"""Publication of the line: at once, or together with later changes once the robot comes near.
+
+A new path for a robot that stands never waits: it may come near nothing for long.
+"""
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 from fasaco_edge.mission.core.events import PathUpdate
@@ -9,6 +13,9 @@ from fasaco_edge.mission.core.route import Route
 from fasaco_edge.mission.line.line_ahead import LineAhead
 from fasaco_edge.mission.line.polyline import POLISHED
 from fasaco_edge.mission.line.published_line import HELD_M, SEEN_POINTS, PublishedLine
+
+# A robot stands that has not come this far for so long [m], [s]; turns on the spot take less.
+STANDING_M, STANDING_S = 0.05, 3.0
 
 
 class Publication:
@@ -25,6 +32,8 @@ class Publication:
         # The newest path that waits, and the newest reason for which the line alone changed.
         self._waiting: PathUpdate | None = None
         self._why = ""
+        # Where the robot was last seen to move, x, y [m], and until when [s].
+        self._at, self._moved_at = (math.inf, math.inf), -math.inf
 
     def look(self, ahead: LineAhead) -> int:
         """Compare the line with the published one; return how many of its points are held."""
@@ -48,6 +57,7 @@ class Publication:
             is_way: whether the path is only a way, on which nothing waits.
         """
         route, waiting = self._route, self._waiting
+        stands = self._stands(ahead, now)
         if update is None and not len(route.path.cells):
             self._waiting = None
             return None
@@ -57,6 +67,7 @@ class Publication:
                 plan = waiting.plan if waiting and update.plan is None else update.plan
                 waiting = self._waiting = replace(update, plan=plan)
             is_due = self._line.is_due(now, self._is_settled(ahead), ahead.leads_on)
+            is_due = is_due or (stands and waiting is not None)
             if not (waiting or reason if is_way else is_due):
                 self._why = reason or self._why
                 return None
@@ -70,6 +81,13 @@ class Publication:
         polished = ahead.line.first_below(POLISHED)
         self._line.take(ahead.next_xy(len(ahead.line) + 1), polished)
         return replace(update, xy=ahead.xy())
+
+    def _stands(self, ahead: LineAhead, now: float) -> bool:
+        """Note where the robot is; tell whether it stands."""
+        here = ahead.here
+        if math.dist(here, self._at) > STANDING_M:
+            self._at, self._moved_at = here, now
+        return now - self._moved_at > STANDING_S
 
     def _is_settled(self, ahead: LineAhead) -> bool:
         """Whether neither a plan nor polish is under way that changes the next metres."""

@@ -54,6 +54,8 @@ def test_rates_are_whole_ticks_and_impossible_ones_are_refused():
             LabSettings(**wrong)
 
 
-def test_the_product_plans_with_more_than_the_radius_only_if_it_is_told():
-    assert LabSettings(radius_m=0.2).config.robot.radius_m == pytest.approx(0.2)
-    assert LabSettings(radius_m=0.2, clearance_m=0.03).config.robot.radius_m == pytest.approx(0.23)
+def test_the_product_keeps_a_clearance_beside_the_radius_only_if_it_is_told():
+    robot = LabSettings(radius_m=0.2).config.robot
+    assert (robot.radius_m, robot.clearance_m) == (0.2, 0.0)
+    robot = LabSettings(radius_m=0.2, clearance_m=0.03).config.robot
+    assert (robot.radius_m, robot.clearance_m) == (0.2, 0.03)
