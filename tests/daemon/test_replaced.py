@@ -17,7 +17,7 @@ from tests.support.processes import resident_mb
 from tests.support.rooms import FREE, WALL, fill, map_bytes, pose_bytes, room
 
 # Replacements until all caches are full, and those after that which are measured.
-FIRST, MEASURED = 10, 50
+FIRST, MEASURED = 30, 50
 # What one may keep, on average [MB]. The allocator's own growth ends after some hundred.
 KEPT_MB = 0.1
 ROOM = room(16.0, 12.0)

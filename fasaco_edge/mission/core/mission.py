@@ -90,10 +90,10 @@ class Mission:
         self._map = MapState(config)
         cell_m, sweeping = config.footprint.cell_m, config.sweeping
         tool_m, ahead_m = (sweeping.tool_m, sweeping.ahead_m) if sweeping else (cell_m, 0.0)
-        radius_m, sight = config.footprint.robot_radius_m, None
+        radius_m, sight, map_state = config.footprint.robot_radius_m, None, self._map
         if sweeping and tool_m > 2.0 * radius_m:
             sight = ToolSight(
-                tool_m, radius_m, config.footprint.free_at_most, lambda: self._map.grid
+                tool_m, radius_m, config.footprint.free_at_most, lambda: map_state.grid
             )
         self._ledger = MissionLedger(cell_m, tool_m, ahead_m, config.map_place, sight)
         monitor = InputMonitor(config)
