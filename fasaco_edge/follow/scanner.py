@@ -38,21 +38,21 @@ def points_of(scan: LaserScan, mount: Mount) -> list[Point] | None:
     None for a sensor that sees nothing: less than ``LEAST_SHARE`` of its beams say anything.
     """
     shortest: dict[int, tuple[float, float]] = {}
-    told = 0
+    measured_beams = 0
     turn = -1.0 if mount.upside_down else 1.0
     for index, measured in enumerate(scan.ranges):
         # NaN, and what the sensor cannot measure, say nothing; minus infinity: too near to measure.
         length = scan.least_m if measured == -math.inf else measured
         if not length >= scan.least_m:
             continue
-        told += 1
+        measured_beams += 1
         if length > REACH_M or length > scan.most_m:
             continue
         angle = turn * (scan.first_rad + index * scan.step_rad) + mount.yaw
         sector = round(angle * SECTORS / math.tau) % SECTORS
         if sector not in shortest or length < shortest[sector][0]:
             shortest[sector] = length, angle
-    if told < LEAST_SHARE * len(scan.ranges):
+    if measured_beams < LEAST_SHARE * len(scan.ranges):
         return None
     return [
         (mount.x + length * math.cos(angle), mount.y + length * math.sin(angle))

@@ -35,7 +35,7 @@ ANGLES_RAD = tuple(math.radians(angle) for angle in (0, -20, 20, -40, 40))
 
 
 class Standstill:
-    """Watches a follower; to be told its state in each cycle."""
+    """Watches a follower; ``look`` is called once in each cycle."""
 
     def __init__(self) -> None:
         self._place: Point = math.inf, math.inf

@@ -2,7 +2,8 @@
 
 A pixel of a map is occupied if a wall passes through it, or if the noise of scans and poses put one
 there. So walls and furniture are thicker on a map than in the building: by about a pixel on the
-maps of a scan matcher. How much more floor there is, no such map tells; this is the most.
+maps of a scan matcher. How much more floor there is, no such map shows; this is an estimate
+of the most.
 """
 
 from __future__ import annotations

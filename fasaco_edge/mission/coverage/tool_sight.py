@@ -17,7 +17,7 @@ from fasaco_edge.mission.coverage.floor_tiles import PIXEL_M, Mask
 
 
 class ToolSight:
-    """Tells what of the tool's disc the tool touches, on the newest map.
+    """Finds what of the tool's disc the tool touches, on the newest map.
 
     Attributes:
         radius_m: of the robot's disc [m].

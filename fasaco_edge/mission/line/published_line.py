@@ -82,7 +82,7 @@ class PublishedLine:
         Args:
             now: [s].
             is_settled: whether nothing is under way that changes the next metres.
-            leads_on: tells whether the robot can drive along the next points of the published line,
+            leads_on: whether the robot can drive along the next points of the published line,
                 float64 (n, 2): x, y [m], of which the first is behind it, while a plan is made.
         """
         if self.differs_m > self._due_m:

@@ -29,7 +29,7 @@ AGAIN_S, WIDER_M, MOST_WIDER = 3.0, 0.05, 4
 DEEP_M, SPACING_M, MARGIN_M, FREE_M = 0.3, 0.05, 0.06, 0.01
 # Largest map on which they are drawn [pixels]: it is kept twice then, see ``daemon.memory``.
 MOST_PIXELS = 6_000_000
-# Most obstacles that are kept, beyond that the oldest is let go; and points of each.
+# Most obstacles that are kept, the newest; and points of each.
 MOST, MOST_POINTS = 32, 192
 
 

@@ -48,6 +48,7 @@ class Figures:
         clear_share: the same of the floor that is a pixel of the map further from walls.
         claimed_share: as ``true_share``, by the product's status, of all floor that it takes for
             reachable: the possible floor at the end of the order, else that of the map.
+        map_claimed_share: the same of the floor that its map shows in reach alone.
         excess_points: by how much the claim exceeds the truth [percentage points].
         claimed_unswept_m2: floor that the product takes for swept and that was not.
         swept_unclaimed_m2: floor that was swept and that it does not take for swept.
@@ -74,6 +75,7 @@ class Figures:
     true_share: float
     clear_share: float
     claimed_share: float
+    map_claimed_share: float
     excess_points: float
     claimed_unswept_m2: float
     swept_unclaimed_m2: float
@@ -140,7 +142,7 @@ def judge(run: LabRun, truth: Truth) -> Figures:
     changes = sum(changes_ahead(trace.paths, of["px"], of["py"]))
     contacts, contact_s = _contacts(of["touches"] > 0.0)
     touched = _begins(of["touches_person"] > 0.0)
-    claimed, coverage = _claim(reply)
+    claimed, map_claimed, coverage = _claim(reply)
     true, clear = truth.share(truth.reachable), truth.share(truth.clear)
     at_end_s = stands_s[-1] if len(stands_s) and still[-1] and not of["done"][-1] else 0
     return Figures(
@@ -148,6 +150,7 @@ def judge(run: LabRun, truth: Truth) -> Figures:
         true_share=true,
         clear_share=clear,
         claimed_share=claimed,
+        map_claimed_share=map_claimed,
         excess_points=100.0 * (claimed - true),
         claimed_unswept_m2=truth.m2(truth.claimed & ~truth.swept & truth.free),
         swept_unclaimed_m2=truth.m2(truth.swept & ~truth.claimed & truth.free),
@@ -187,15 +190,16 @@ def _ending(state: str, share: float, at_end_s: float) -> Ending:
     return Ending.DEADLOCK if at_end_s > DEADLOCK_S else Ending.LIMIT
 
 
-def _claim(reply: dict[str, Any]) -> tuple[float, float]:
-    """Return the claimed shares of floor and of cells."""
+def _claim(reply: dict[str, Any]) -> tuple[float, float, float]:
+    """Return the claimed shares of possible floor, of the map's floor, and of cells."""
     floor, coverage = reply["floor"] or {}, reply["coverage"] or {}
     cells = float(coverage.get("fraction") or 0.0)
     reachable_m2, left = floor.get("reachable_m2"), floor.get("left")
     if not reachable_m2 or left is None:
-        return cells, cells
+        return cells, cells, cells
     reached_m2 = max(reachable_m2 - sum(part["m2"] for part in left), 0.0)
-    return reached_m2 / max(floor.get("possible_m2") or 0.0, reachable_m2), cells
+    possible_m2 = max(floor.get("possible_m2") or 0.0, reachable_m2)
+    return reached_m2 / possible_m2, reached_m2 / reachable_m2, cells
 
 
 def _moves(of: dict[str, NDArray[np.float64]]) -> NDArray[np.bool_]:

@@ -66,7 +66,8 @@ def in_words(found: Judged) -> str:
     rows = [
         ("ending", f"{of.ending}; the mission is {of.state}: {of.reason}"),
         ("floor", f"{of.true_share:.1%} of {of.reachable_m2:.1f} m2 truly swept, "
-                  f"{of.claimed_share:.1%} claimed: {of.excess_points:+.1f} points; of what is not "
+                  f"{of.claimed_share:.1%} claimed: {of.excess_points:+.1f} points "
+                  f"({of.map_claimed_share:.1%} of what the map shows); of what is not "
                   f"beside a wall {of.clear_share:.1%} swept"),
         ("", f"claimed but not swept {of.claimed_unswept_m2:.2f} m2, swept but not claimed "
              f"{of.swept_unclaimed_m2:.2f} m2; cells {of.coverage:.1%}"),
