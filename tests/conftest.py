@@ -1,10 +1,12 @@
 """Settings for all tests."""
 
 import signal
+from collections.abc import Callable, Iterator
 
 import pytest
 from hypothesis import settings
 
+from fasaco_edge.cli.console import terminal
 from tests.support.examples import MOST, examples
 
 settings.register_profile("suite", examples(MOST))
@@ -30,6 +32,23 @@ BEGUN_FIRST = ("tests/replay/test_replay.py", "tests/test_taint.py", "tests/watc
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Begin with some files; the order of the rest stays as it is."""
     items.sort(key=lambda item: item.nodeid.partition("::")[0] not in BEGUN_FIRST)
+
+
+@pytest.fixture
+def terminal_width(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[int], None]]:
+    """Yield what sets the width of the terminal in columns, for one test.
+
+    A console keeps the width that the environment gave when it was made, also for later tests.
+    """
+
+    def set_width(columns: int) -> None:
+        monkeypatch.setenv("COLUMNS", str(columns))
+        for console in (terminal.out, terminal.err):
+            console.cache_clear()
+
+    yield set_width
+    for console in (terminal.out, terminal.err):
+        console.cache_clear()
 
 
 FAILED = pytest.StashKey[bool]()

@@ -248,8 +248,8 @@ def test_a_configuration_of_another_release_is_named(run):
         strange.daemon_config()
 
 
-def test_the_command_tells_the_same_twice(recording, capsys, monkeypatch):
-    monkeypatch.setenv("COLUMNS", "200")  # a narrow table breaks its words
+def test_the_command_tells_the_same_twice(recording, capsys, terminal_width):
+    terminal_width(200)  # a narrow table breaks its words
     words = ["replay", *map(str, recording.paths)]
     assert main([*words, "--json"]) == 0
     out = capsys.readouterr().out

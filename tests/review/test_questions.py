@@ -280,8 +280,8 @@ def test_a_time_that_is_none_is_named(parts, capsys, text, said):
     assert said in capsys.readouterr().err
 
 
-def test_a_review_fits_on_one_screen(parts, capsys, monkeypatch):
-    monkeypatch.setenv("COLUMNS", "80")
+def test_a_review_fits_on_one_screen(parts, capsys, terminal_width):
+    terminal_width(80)
     assert main(["review", *map(str, parts)]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert len(lines) <= 24
