@@ -13,6 +13,7 @@ from fasaco_edge.bench.floor import SweepingRobot, judge_floor
 from fasaco_edge.daemon.loop.mission_reports import PASSED as PASSED_BY
 from fasaco_edge.daemon.loop.mission_reports import floor_report
 from fasaco_edge.grid import floor_map
+from fasaco_edge.grid.fine_raster import raster_to_map
 from fasaco_edge.grid.geometry import Pose2D, StampedPose, Window
 from fasaco_edge.grid.lattice import Footprint
 from fasaco_edge.grid.occupancy import UNKNOWN, OccupancyGrid
@@ -634,6 +635,21 @@ def test_a_map_that_comes_while_the_robot_is_nowhere_is_swept_afterwards(other):
     check_tally(robot.mission)
     robot.finish()
     assert judge_floor(grid, np.array(robot.trail), ROBOT).figures.swept_share > 0.95
+
+
+def test_a_map_that_moved_by_part_of_a_pixel_leaves_most_of_the_line():
+    grid = room(3.6, 3.0)
+    robot = Robot(Mission(CONFIG))
+    robot.tell(MapReceived(grid))
+    robot.drive(10)
+    ahead = robot.mission._line._ahead
+    before = raster_to_map(ahead._geometry, ahead.line.points)
+    robot.tell(MapReceived(shifted(grid, 0.012)))
+    check_tally(robot.mission)
+    after = raster_to_map(ahead._geometry, ahead.line.points)
+    apart = np.abs(before[:, None] - after[None]).max(axis=2).min(axis=1)
+    assert np.mean(apart < 1e-6) > 0.5
+    robot.finish()
 
 
 def test_a_robot_that_jumped_ahead_on_its_path_is_not_led_back_through_a_new_wall():

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from fasaco_edge.grid.fine_raster import map_to_raster, raster_to_map
 from fasaco_edge.grid.floor_map import FloorMap
-from fasaco_edge.grid.geometry import Point, Pose2D, Window
+from fasaco_edge.grid.geometry import GridGeometry, Point, Pose2D, Window
 from fasaco_edge.kernels.floor.line import LEAST_EDGE
 from fasaco_edge.mission.line.alignment import aligned, by_distance
 from fasaco_edge.mission.line.lead_out import fitting_radius, lead_out
@@ -55,7 +55,7 @@ class LineAhead:
         self.line = Line()
         self.tally = SweepTally(floor)
         self.cell = 0
-        self._floor = floor
+        self._floor, self._geometry = floor, floor.geometry
         self._walk: Walk = np.empty((0, 2), np.int32)
         # Number of published cells of a walk that was cut off, 0 after a stop; the rest is kept
         # until the next walk. None for a complete walk.
@@ -67,19 +67,45 @@ class LineAhead:
         self._place = PlaceOnLine()
 
     def follow_floor(self, floor: FloorMap) -> bool:
-        """Follow the floor to another raster; return whether the line had to be dropped."""
-        is_same = floor is self._floor
-        self._floor = floor
+        """Follow the floor to another raster; return whether the line had to be dropped.
+
+        It stays where it is on the map, to be checked there, unless the raster is turned.
+        """
+        is_same, before = floor is self._floor, self._geometry
+        self._floor, self._geometry = floor, floor.geometry
         if is_same and floor.shift is not None:
             shape = floor.geometry.rows, floor.geometry.cols
             if floor.shift != (0, 0) or shape != self.tally.shape:
                 self._move(shape, floor.shift)
             return False
         self.tally = SweepTally(floor)
+        if floor.geometry.origin.yaw == before.origin.yaw:
+            self._carry(before)
+            return False
         dropped, self.line = bool(len(self.line)), Line()
         self._cut = self._unchecked = None
         self._aside = self._aside and LineAside()
         return dropped
+
+    def _carry(self, before: GridGeometry) -> None:
+        """Carry what lies on a raster over to the floor's, of another size or by part of a pixel.
+
+        A mapper whose map begins at the farthest point seen moves all its pixels with that point.
+        """
+        geometry = self._geometry
+
+        def carried(points: Points) -> Points:
+            cols, rows = geometry.to_pixels(*raster_to_map(before, points).T)
+            return np.stack([rows, cols], axis=1) - 0.5
+
+        whole = Window(0, 0, geometry.rows, geometry.cols)
+        self.line = self.line.at(carried(self.line.points))
+        self.tally.exchange(NO_EDGES, edges_between(self.line.points))
+        self._place.here = carried(self._place.here[None])[0]
+        self._unchecked = whole if self.is_cut else None
+        if self._aside is not None:
+            line = self._aside.line
+            self._aside = LineAside(self._aside.walk, line.at(carried(line.points)), whole)
 
     def _move(self, shape: tuple[int, int], by: tuple[int, int]) -> None:
         """Move to a raster of another shape, (rows, cols), and shift."""

@@ -66,7 +66,11 @@ class Line:
 
     def moved(self, by: tuple[int, int]) -> Line:
         """Return this line shifted by rows and columns of the raster."""
-        return Line(self.points + np.array(by), self.cells, self.state)
+        return self.at(self.points + np.array(by))
+
+    def at(self, points: Points) -> Line:
+        """Return this line with its points at other places, float64 (n, 2)."""
+        return Line(points, self.cells, self.state)
 
     def marked(self, first: int, end: int, state: int) -> Line:
         """Return this line with points marked as MOVED or POLISHED."""
