@@ -38,6 +38,10 @@ def everywhere(floor):
     return np.ones(floor.stands.lattice.states.shape, bool)
 
 
+def nowhere(floor):
+    return ~everywhere(floor)
+
+
 def test_a_map_with_walls_a_pixel_too_thick_holds_the_true_floor_as_possible():
     """The gap of 0.4 m is 0.3 m on the map, so that the other room is closed off there."""
     start = 1.0, 1.0
@@ -46,29 +50,43 @@ def test_a_map_with_walls_a_pixel_too_thick_holds_the_true_floor_as_possible():
     floor = floor_of(seen)
     shown_m2 = Floor.around(seen, DISCS, start).reachable_m2
     assert shown_m2 < 0.5 * true_m2
-    found_m2 = possible_m2(floor, PIXEL_M, start, everywhere(floor))
+    found_m2 = possible_m2(floor, PIXEL_M, start, everywhere(floor), nowhere(floor))
     assert found_m2 == pytest.approx(true_m2, rel=0.06)
-    assert possible_m2(floor, 0.0, start, everywhere(floor)) == pytest.approx(shown_m2, rel=0.001)
+    assert possible_m2(floor, 0.0, start, everywhere(floor), nowhere(floor)) == pytest.approx(
+        shown_m2, rel=0.001
+    )
 
 
 def test_a_room_behind_a_wall_is_not_possible():
     floor = floor_of(building(0, 0))
-    one_m2 = possible_m2(floor, PIXEL_M, (1.0, 1.0), everywhere(floor))
+    one_m2 = possible_m2(floor, PIXEL_M, (1.0, 1.0), everywhere(floor), nowhere(floor))
     assert one_m2 < 2.0 * 2.0
+
+
+def test_a_room_that_was_reachable_before_a_wall_came_is_possible():
+    floor = floor_of(building(0, 0))
+    once = nowhere(floor)
+    row, col = floor.stands.lattice.local(floor.stands.lattice.cell_at(3.4, 1.2))
+    once[row, col] = True
+    one_m2 = possible_m2(floor, PIXEL_M, (1.0, 1.0), everywhere(floor), nowhere(floor))
+    both_m2 = possible_m2(floor, PIXEL_M, (1.0, 1.0), everywhere(floor), once)
+    assert both_m2 == pytest.approx(2 * one_m2, rel=0.01)
 
 
 def test_only_floor_that_is_asked_for_counts():
     floor = floor_of(building(8, 1))
     asked = everywhere(floor)
     asked[:, asked.shape[1] // 2 :] = False
-    whole_m2 = possible_m2(floor, PIXEL_M, (1.0, 1.0), everywhere(floor))
-    assert possible_m2(floor, PIXEL_M, (1.0, 1.0), asked) == pytest.approx(whole_m2 / 2, rel=0.1)
+    whole_m2 = possible_m2(floor, PIXEL_M, (1.0, 1.0), everywhere(floor), nowhere(floor))
+    assert possible_m2(floor, PIXEL_M, (1.0, 1.0), asked, nowhere(floor)) == pytest.approx(
+        whole_m2 / 2, rel=0.1
+    )
 
 
 def test_a_large_raster_and_a_full_one_have_no_answer(monkeypatch):
     floor = floor_of(building(8, 0))
     grid = building(8, 0)
     full = floor_of(OccupancyGrid(grid.geometry, np.full_like(grid.cells, 100)))
-    assert possible_m2(full, PIXEL_M, (1.0, 1.0), everywhere(full)) is None
+    assert possible_m2(full, PIXEL_M, (1.0, 1.0), everywhere(full), nowhere(full)) is None
     monkeypatch.setattr(possible_floor, "MOST_PIXELS", 1000)
-    assert possible_m2(floor, PIXEL_M, (1.0, 1.0), everywhere(floor)) is None
+    assert possible_m2(floor, PIXEL_M, (1.0, 1.0), everywhere(floor), nowhere(floor)) is None
