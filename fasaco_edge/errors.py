@@ -157,7 +157,7 @@ class BadQuery(FasacoError):
     """A query has a parameter or a payload that it does not accept."""
 
     code = "bad_query"
-    hint = "remove what the query does not accept; see protocol/README.md, Queries"
+    hint = "remove what the query does not accept; see protocol/commands.md"
 
 
 class UnknownQuery(FasacoError):
@@ -179,7 +179,7 @@ class OpenToEveryone(BadConfiguration):
 
     code = "open_to_everyone"
     hint = (
-        "choose bus.security.kind tls or user (protocol/README.md, Security), listen on 127.0.0.1, "
+        "choose bus.security.kind tls or user (protocol/security.md), listen on 127.0.0.1, "
         "or set bus.open_to_everyone: true"
     )
 

@@ -2,7 +2,7 @@
 
 They are configuration of the session that listens (or of a router): Zenoh refuses forbidden
 messages before they reach this program. A role is named after what the *other* side does, as
-listed in ``protocol/README.md``.
+listed in ``protocol/security.md``.
 
 * Whatever is not named is denied. ``**`` does not match a chunk that begins with ``@``, so
   every key is named, and also the key that Zenoh's advanced publishers and subscribers use to serve

@@ -47,7 +47,7 @@ examples:
   fasaco-edge ask replan                    a full new plan, now
   fasaco-edge ask config --json
 
-Commands are given with `fasaco-edge mission`; protocol/README.md describes the queries and their
+Commands are given with `fasaco-edge mission`; protocol/commands.md describes the queries and their
 answers.
 
 exit codes: 0 answered; 1 refused, or no answer; 2 usage error; 78 invalid robot name

@@ -101,7 +101,7 @@ SECRETS = {
     "tls": ("private_key",),
     "user": ("password_file", "dictionary_file"),
 }
-HOW_TO = "protocol/README.md, Security, shows how to make them"
+HOW_TO = "protocol/security.md, shows how to make them"
 
 
 def identity(context: CheckContext) -> Finding:

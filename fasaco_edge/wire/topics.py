@@ -1,7 +1,7 @@
 """Table of topics: one row for each key, query and ROS 2 topic of the contract.
 
 Publishers, subscribers, queues, the recorder's inputs and access rules are made from these rows;
-``protocol/keys.yaml``, ``protocol/qos.yaml``, the tables of ``protocol/README.md`` and the session
+``protocol/keys.yaml``, ``protocol/qos.yaml``, the tables of ``protocol/*.md`` and the session
 templates are written from them (``make contract``).
 """
 

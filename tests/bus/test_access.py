@@ -10,8 +10,8 @@ import zenoh
 
 from fasaco_edge.bus import access
 from fasaco_edge.host.resources import folder
+from tests.wire.contract_files import CONTRACT
 
-README = (folder("protocol") / "README.md").read_text()
 PREFIX = "fasaco/@v1/robot"
 TABLE = yaml.safe_load((folder("protocol") / "keys.yaml").read_text())
 KEYS, QUERIES = TABLE["keys"], TABLE["queries"]
@@ -43,7 +43,7 @@ def test_every_topic_of_the_contract_is_some_bodys():
 
 
 def test_the_readme_has_the_roles():
-    shown = dict(re.findall(r"^\| `(\w+)` \| (.*) \|$", README, re.MULTILINE))
+    shown = dict(re.findall(r"^\| `(\w+)` \| (.*) \|$", CONTRACT, re.MULTILINE))
     for role in ("mapper", "viewer", "operator", "recorder", "router"):
         speaks, _, listens = shown[role].partition(" | ")
         own = set(re.findall("`([^`]+)`", speaks))

@@ -1,4 +1,4 @@
-"""Which key expressions match which keys, by Zenoh's own word; as the contract's README has it."""
+"""Which key expressions match which keys, by Zenoh's own word; as the contract's pages have it."""
 
 from __future__ import annotations
 

@@ -132,7 +132,7 @@ def test_certificates_that_others_would_refuse(doctor, ca, tmp_path, spoil, said
     assert code == 1
     assert told["identity"]["level"] == "fail"
     assert said in told["identity"]["found"]
-    assert "protocol/README.md" in told["identity"]["to_do"]
+    assert "protocol/security.md" in told["identity"]["to_do"]
 
 
 @needs_openssl

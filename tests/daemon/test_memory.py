@@ -37,6 +37,7 @@ from fasaco_edge.grid.lattice import MOST_REACH_PX
 from fasaco_edge.wire.limits import MAX_GRID_CELLS, MAX_POSE_BYTES
 from fasaco_edge.wire.topics import QUEUE_LENGTHS
 from tests.support.service_manager import unit_limit
+from tests.wire.contract_files import CONTRACT
 
 ROOT = Path(__file__).parents[2]
 DEFAULT = DaemonConfig()
@@ -63,7 +64,7 @@ def test_under_the_units_limit_maps_are_as_large_as_the_guide_says():
     assert f"up to {pixels} million pixels" in guide
     assert f"up to {cells},000 cells" in guide
     assert f"MemoryMax={unit_limit() // MIB}M" in guide
-    contract = " ".join((ROOT / "protocol" / "README.md").read_text().split())
+    contract = " ".join(CONTRACT.split())
     assert f"{pixels} million pixels and {cells},000 cells" in contract
 
 
@@ -76,7 +77,7 @@ def test_the_guides_say_the_formula():
     assert f"MemoryMax={limits_mib(DEFAULT)[1]}M" in guide
     reads = f"{MASK_COPIES} x map.max_pixels - {PILLOW_BYTES:,}"
     assert f"{reads} bytes ({mask_bytes(DEFAULT, None) // MB} MB)" in guide
-    contract = " ".join((ROOT / "protocol" / "README.md").read_text().split())
+    contract = " ".join(CONTRACT.split())
     maps = DEFAULT.map
     assert f"`map.max_pixels` pixels ({maps.max_pixels:,}" in contract
     assert f"`map.max_lattice_cells` cells ({maps.max_lattice_cells:,})" in contract

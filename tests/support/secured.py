@@ -1,4 +1,4 @@
-"""A CA by openssl as protocol/README.md shows, and a daemon that requires its certificates."""
+"""A CA by openssl as protocol/security.md shows, and a daemon that requires its certificates."""
 
 from __future__ import annotations
 

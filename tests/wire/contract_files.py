@@ -1,7 +1,7 @@
 """Files of ``protocol/`` that are made from the package; ``make contract`` writes them all.
 
 From ``fasaco_edge.wire.topics``: keys and queries of ``keys.yaml``, ``qos.yaml``, the key
-expressions of the session templates, the tables of ``README.md``. From the typed documents: the
+expressions of the session templates, the tables of the pages. From the typed documents: the
 schemas, see ``tests.wire.make_schemas``.
 """
 
@@ -21,6 +21,9 @@ from fasaco_edge.wire.topics import QOS, QUERIES, TOPICS
 from tests.wire import make_schemas
 
 PROTOCOL = folder("protocol")
+# What people read of it.
+PAGES = sorted(set(PROTOCOL.glob("*.md")) - {PROTOCOL / "CHANGELOG.md"})
+CONTRACT = "\n".join(page.read_text() for page in PAGES)
 PREFIX = "{base}/@v1/{robot}/"
 
 # Which subscription or query matches which keys of a robot `robot` under the base `fasaco`.
@@ -247,15 +250,17 @@ def write() -> None:
     for name, grants in template_grants().items():
         template = PROTOCOL / "config" / f"{name}.json5"
         template.write_text(with_keys(template.read_text(), grants))
-    readme = PROTOCOL / "README.md"
-    text = readme.read_text()
     for head, rows in TABLES.items():
+        (page,) = (page for page in PAGES if f"\n| {head} |" in page.read_text())
         pattern = rf"(^\| {re.escape(head)} \|.*\n\|[-|: ]+\n)(?:\|.*\n)*"
         text, count = re.subn(
-            pattern, lambda m, rows=rows: m[1] + "\n".join(rows()) + "\n", text, flags=re.MULTILINE
+            pattern,
+            lambda m, rows=rows: m[1] + "\n".join(rows()) + "\n",
+            page.read_text(),
+            flags=re.MULTILINE,
         )
         assert count == 1, head
-    readme.write_text(text)
+        page.write_text(text)
 
 
 TABLES: Mapping[str, Callable[[], list[str]]] = {

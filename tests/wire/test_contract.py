@@ -22,11 +22,11 @@ from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.messages.maps import CoverageValue
 from fasaco_edge.wire.schemas import POSE_SCHEMAS
 from tests.support.examples import examples
+from tests.wire.contract_files import CONTRACT
 
 PROTOCOL = folder("protocol")
 TABLE = yaml.safe_load((PROTOCOL / "keys.yaml").read_text())
 ENTRIES = {entry["name"]: entry for entry in TABLE["keys"]}
-README = (PROTOCOL / "README.md").read_text()
 
 
 def constants(module: object) -> dict[str, object]:
@@ -51,7 +51,7 @@ def test_payloads_are_those_of_the_table() -> None:
 
 
 def test_the_readme_has_the_values_of_coverage() -> None:
-    shown = re.findall(r"^\| (-?\d+) \|", README, re.MULTILINE)
+    shown = re.findall(r"^\| (-?\d+) \|", CONTRACT, re.MULTILINE)
     assert [int(value) for value in shown] == sorted(CoverageValue)
 
 

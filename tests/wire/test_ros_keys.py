@@ -23,8 +23,8 @@ from fasaco_edge.wire.ros_keys import (
     gid_of,
 )
 from tests.wire import oracle
+from tests.wire.contract_files import CONTRACT
 
-README = (folder("protocol") / "README.md").read_text()
 TABLE = yaml.safe_load((folder("protocol") / "keys.yaml").read_text())["ros2"]
 PATH = RosTopic("/robot1/coverage_path", schemas.PATH, latched=True)
 NODE = RosNode(2, "aac3178e146ba6f1fc6e6a4085e77f21", "/robot1", "fasaco_edge")
@@ -54,7 +54,7 @@ def test_services_are_those_of_the_table() -> None:
 
 
 def test_topics_are_those_of_the_table() -> None:
-    """What the daemon has by default, what keys.yaml says, and what the README shows."""
+    """What the daemon has by default, what keys.yaml says, and what the contract shows."""
     config = RosConfig(kind="rmw_zenoh")
     by_pose = RosConfig(kind="rmw_zenoh", pose=schemas.ODOMETRY)
     maps_and_battery, poses = list(by_pose.inputs.values())[:3], list(by_pose.inputs.values())[3:]
@@ -64,7 +64,7 @@ def test_topics_are_those_of_the_table() -> None:
         *config.outputs.values(),
         config.velocities(schemas.TWIST),
     ]
-    shown = re.findall(r"^\| `(/\w+)` \| (in|out).* \| (.*) \| (.*) \|$", README, re.MULTILINE)
+    shown = re.findall(r"^\| `(/\w+)` \| (in|out).* \| (.*) \| (.*) \|$", CONTRACT, re.MULTILINE)
     for topic, entry, row in zip(ours, TABLE["topics"], shown, strict=True):
         facts = topic.name, topic.latched, topic.depth
         assert facts == (entry["topic"], entry["latched"], entry["depth"])

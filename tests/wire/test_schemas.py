@@ -1,4 +1,4 @@
-"""The JSON Schemas are schemas, and the README's tables of members are theirs."""
+"""The JSON Schemas are schemas, and the contract's tables of members are theirs."""
 
 from __future__ import annotations
 
@@ -12,11 +12,9 @@ from jsonschema import Draft202012Validator, ValidationError
 from fasaco_edge.errors import NotYet
 from fasaco_edge.wire.documents.replies import STATES, encode_error
 from fasaco_edge.wire.documents.status import TROUBLES
-from tests.wire.contract_files import PROTOCOL, load
+from tests.wire.contract_files import CONTRACT, PROTOCOL, load
 from tests.wire.make_schemas import files
 from tests.wire.schemas import NAMES, check, schema
-
-README = (PROTOCOL / "README.md").read_text()
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -44,8 +42,8 @@ def struct(file: str, name: str) -> dict[str, Any]:
 
 
 def members(heading: str) -> list[str]:
-    """Return the names in the first column of the README's table with this heading."""
-    table = README.partition(f"\n| {heading} |")[2].partition("\n\n")[0]
+    """Return the names in the first column of the contract's table with this heading."""
+    table = CONTRACT.partition(f"\n| {heading} |")[2].partition("\n\n")[0]
     cells = [line.split(" | ")[0] for line in table.splitlines()[2:]]
     return [name for cell in cells for name in re.findall(r"`(\w+)`", cell)]
 
@@ -57,30 +55,30 @@ def members(heading: str) -> list[str]:
         ("member of `mission`", struct("status.json", "MissionReport")),
         ("member of `ledger`", struct("status.json", "LedgerReport")),
         ("member of `status`", struct("status.json", "Status")),
-        ("member", struct("path_attachment.json", "PathAttachment")),
+        ("member of a path", struct("path_attachment.json", "PathAttachment")),
         ("member of `order`", struct("mission.json", "OrderDocument")),
     ],
 )  # fmt: skip
-def test_the_readme_has_the_members_of_a_schema(heading, documented):
+def test_the_contract_has_the_members_of_a_schema(heading, documented):
     names = members(heading)
     # Beside its own the table of zones names what a zone has.
     assert set(documented["properties"]) <= set(names)
     assert set(documented["required"]) <= set(names)
 
 
-def test_the_readme_has_the_states():
-    table = README.partition("\n| state |")[2].partition("\n\n")[0]
+def test_the_contract_has_the_states():
+    table = CONTRACT.partition("\n| state |")[2].partition("\n\n")[0]
     cells = "".join(line.split(" | ")[0] for line in table.splitlines()[2:])
     assert re.findall(r"`([^`]+)`", cells) == list(STATES)
 
 
-def test_the_readme_has_the_troubles():
-    table = README.partition("\n| trouble |")[2].partition("\n\n")[0]
+def test_the_contract_has_the_troubles():
+    table = CONTRACT.partition("\n| trouble |")[2].partition("\n\n")[0]
     assert re.findall(r"^\| `(\w+)`", table, re.MULTILINE) == list(TROUBLES)
 
 
-def test_the_readme_has_the_commands():
-    table = README.partition("\n| command |")[2].partition("\n\n")[0]
+def test_the_contract_has_the_commands():
+    table = CONTRACT.partition("\n| command |")[2].partition("\n\n")[0]
     cells = "".join(line.split(" | ")[0] for line in table.splitlines()[2:])
     enum = struct("mission.json", "CommandDocument")["properties"]["command"]["enum"]
     assert sorted(re.findall(r"`(\w+)`", cells)) == enum

@@ -1,4 +1,4 @@
-"""The contract's README, its data and the code say the same."""
+"""The contract's pages, its data and the code say the same."""
 
 from __future__ import annotations
 
@@ -19,9 +19,8 @@ from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.topic_types import VOLATILE
 from fasaco_edge.wire.topics import QOS, QUERIES, QUEUE_LENGTHS, TOPICS
 from tests.wire import contract_files
-from tests.wire.contract_files import PROTOCOL, load
+from tests.wire.contract_files import CONTRACT, PAGES, PROTOCOL, load
 
-README = (PROTOCOL / "README.md").read_text()
 PRIORITIES = (
     "real_time", "interactive_high", "interactive_low", "data_high", "data", "data_low",
     "background",
@@ -29,28 +28,34 @@ PRIORITIES = (
 
 
 @pytest.mark.parametrize("table", ["key", "qos", "query", "wildcard", "error"])
-def test_a_table_of_the_readme_is_that_of_the_data(table):
+def test_a_table_of_the_contract_is_that_of_the_data(table):
     """To write it: make contract."""
     rows = getattr(contract_files, f"{table}_rows")()
-    assert "\n|---" in README
-    assert "\n".join(rows) in README
+    assert "\n".join(rows) in CONTRACT
 
 
-def test_the_contents_lead_to_headings():
-    contents = README.partition("\n\n| file |")[0]
-    links = re.findall(r"\[([^]]+)\]\(#([^)]+)\)", contents)
-    assert len(links) > 8
-    for title, anchor in links:
-        assert f"\n## {title}\n" in README
-        assert anchor == title.lower().replace(" ", "-")
+def test_links_lead_to_pages_and_headings():
+    links = [
+        (page, *link)
+        for page in PAGES
+        for link in re.findall(r"\]\(([\w./-]*)(?:#([\w-]+))?\)", page.read_text())
+    ]
+    assert len(links) > 30
+    for page, target, anchor in links:
+        other = page.parent / target if target else page
+        assert other.exists(), (page.name, target)
+        if anchor:
+            titles = re.findall(r"^##+ (.+)$", other.read_text(), re.MULTILINE)
+            assert anchor in [title.lower().replace(" ", "-") for title in titles], page.name
 
 
 def test_what_the_readme_names_is_there():
-    names = re.findall(r"^\| `([\w/.]+)` \|", README.partition("## Keys")[0], re.MULTILINE)
-    linked = re.findall(r"\]\((schema/\w+\.json)\)", README)
+    readme = (PROTOCOL / "README.md").read_text()
+    names = re.findall(r"^\| `([\w/.]+)` \|", readme, re.MULTILINE)
     assert {"keys.yaml", "errors.yaml", "examples/client.py"} <= set(names)
-    for name in (*names, *linked):
+    for name in names:
         assert (PROTOCOL / name).exists(), name
+    assert all(page.name in readme for page in PAGES if page.name != "README.md")
 
 
 def test_keys_queries_and_quality_of_service_are_those_of_the_table_of_topics():
