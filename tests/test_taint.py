@@ -28,6 +28,7 @@ import zenoh.ext
 pytest.importorskip("rerun")
 
 from fasaco_edge.bus.arrival import Arrival, Sample
+from fasaco_edge.client.robot_state import Token
 from fasaco_edge.grid.geometry import Window
 from fasaco_edge.planners.planner import ColonySnapshot
 from fasaco_edge.recording import entities
@@ -36,7 +37,6 @@ from fasaco_edge.recording.write.part import Part
 from fasaco_edge.samples import SampleEncoder
 from fasaco_edge.serve.served_view import ServedView
 from fasaco_edge.text import json_line
-from fasaco_edge.watch.robot_state import Token
 from fasaco_edge.wire import schemas
 from fasaco_edge.wire.documents.path_documents import PATH_DIGEST
 from fasaco_edge.wire.keys import Keys

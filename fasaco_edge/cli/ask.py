@@ -24,9 +24,9 @@ from fasaco_edge.cli.console.arguments import (
 )
 from fasaco_edge.cli.console.streams import print_json
 from fasaco_edge.cli.console.terminal import figures, out
+from fasaco_edge.client import phrases
 from fasaco_edge.errors import FasacoError, NobodyAnswersError
 from fasaco_edge.text import one_line
-from fasaco_edge.watch import phrases
 from fasaco_edge.wire import schemas
 from fasaco_edge.wire.documents import replies
 from fasaco_edge.wire.documents.json_text import decode_json, decode_tolerant

@@ -89,8 +89,8 @@ def run(args: argparse.Namespace) -> int:
             f"the live page needs websockets, which is not installed: {error}",
             hint="pip install 'fasaco-edge[serve]'",
         ) from error
+    from fasaco_edge.client.feed import Feed
     from fasaco_edge.serve.served_view import ServedView
-    from fasaco_edge.watch.feed import Feed
 
     address = read_address("--listen", args.listen, example=PORT)
     guard = guard_for(address, args.tokens, args.name, allow_commands=args.allow_commands)

@@ -18,11 +18,11 @@ from fasaco_edge.cli.console.arguments import (
 )
 from fasaco_edge.cli.console.logs import say_why
 from fasaco_edge.cli.console.terminal import out
+from fasaco_edge.client.phrases import steady_now
 from fasaco_edge.errors import BusUnavailable, FasacoError, NobodyAnswersError
 from fasaco_edge.text import one_line
 from fasaco_edge.watch import live
 from fasaco_edge.watch.live import Watched
-from fasaco_edge.watch.phrases import steady_now
 from fasaco_edge.wire.keys import VERSION, Keys
 
 if TYPE_CHECKING:
@@ -98,7 +98,7 @@ def _leave(code: int) -> NoReturn:
 
 
 def _watch_robot(args: argparse.Namespace, keys: Keys, bus: BusSettings) -> None:
-    from fasaco_edge.watch.feed import Feed
+    from fasaco_edge.client.feed import Feed
     from fasaco_edge.watch.robot_view import RobotView
     from fasaco_edge.watch.robot_watch import RobotWatch
 

@@ -10,20 +10,20 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from fasaco_edge.bench.driven_line import DriveLimits
-from fasaco_edge.bench.floor import (
-    FloorFigures,
-    JudgedFloor,
-    SweepingRobot,
-    judge_floor,
-    swept_words,
-)
 from fasaco_edge.config.robot import RobotConfig
 from fasaco_edge.drawing.pictures import draw_walk
 from fasaco_edge.drawing.plot import MapLayer
 from fasaco_edge.drawing.trail import draw_trail
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.host.outputs import whole
+from fasaco_edge.judge.driven_line import DriveLimits
+from fasaco_edge.judge.floor import (
+    FloorFigures,
+    JudgedFloor,
+    SweepingRobot,
+    judge_floor,
+    swept_words,
+)
 from fasaco_edge.offline.ground import Ground, Line
 from fasaco_edge.offline.maps import Map
 from fasaco_edge.offline.settings import CELLS, Search

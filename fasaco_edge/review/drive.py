@@ -15,9 +15,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.bench.floor import JudgedFloor, SweepingRobot, judge_floor
 from fasaco_edge.grid.geometry import Polygon, Pose2D
 from fasaco_edge.grid.lattice import Cell, CoverageLattice
+from fasaco_edge.judge.floor import JudgedFloor, SweepingRobot, judge_floor
 from fasaco_edge.mission.coverage.ledger import JUMP_CELLS, CoverageLedger
 from fasaco_edge.mission.coverage.progress import Coverage
 from fasaco_edge.mission.map.reachable_area import ReachableArea, anchor_cell

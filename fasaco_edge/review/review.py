@@ -11,9 +11,9 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.bench.floor import JudgedFloor
 from fasaco_edge.errors import MapTooFar, MapTooLarge
 from fasaco_edge.grid.lattice import CoverageLattice
+from fasaco_edge.judge.floor import JudgedFloor
 from fasaco_edge.mission.orders.zones import kept_out, without
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.read.run import (

@@ -21,11 +21,11 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.bench.floor import JudgedFloor
-from fasaco_edge.bench.pixels import Mask, Patches, within
 from fasaco_edge.grid.geometry import GridGeometry, Polygon, Window
 from fasaco_edge.grid.lattice import Footprint
 from fasaco_edge.grid.occupancy import FREE, OccupancyGrid
+from fasaco_edge.judge.floor import JudgedFloor
+from fasaco_edge.judge.pixels import Mask, Patches, within
 from fasaco_edge.mission.core.events import BETTER
 from fasaco_edge.mission.orders.zones import cells_inside
 from fasaco_edge.recording import entities

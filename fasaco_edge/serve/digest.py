@@ -6,10 +6,10 @@ import time
 from collections.abc import Iterator, Sequence
 from typing import Any
 
+from fasaco_edge.client import phrases
+from fasaco_edge.client.events import EventLog
+from fasaco_edge.client.robot_state import RobotState
 from fasaco_edge.serve.pace import Way
-from fasaco_edge.watch import phrases
-from fasaco_edge.watch.events import EventLog
-from fasaco_edge.watch.robot_state import RobotState
 from fasaco_edge.wire.documents.replies import (
     FloorLeft,
     FloorReport,

@@ -8,6 +8,7 @@ from array import array
 from collections.abc import Callable, Iterator
 
 from fasaco_edge.bus.arrival import Sample
+from fasaco_edge.client.robot_state import PathProgress, RobotState
 from fasaco_edge.errors import FasacoError
 from fasaco_edge.serve.digest import areas, lately, state
 from fasaco_edge.serve.marks import (
@@ -19,7 +20,6 @@ from fasaco_edge.serve.marks import (
 )
 from fasaco_edge.serve.messages import framed, message_text
 from fasaco_edge.serve.pace import Way
-from fasaco_edge.watch.robot_state import PathProgress, RobotState
 from fasaco_edge.wire.documents.fleet import decode_member
 from fasaco_edge.wire.documents.json_text import decode_document
 from fasaco_edge.wire.documents.path_documents import PathAttachment

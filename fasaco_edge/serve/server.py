@@ -16,6 +16,8 @@ from websockets.frames import CloseCode
 from websockets.http11 import Request, Response
 
 from fasaco_edge.bus.queries import Reply
+from fasaco_edge.client.feed import Feed
+from fasaco_edge.client.phrases import steady_now
 from fasaco_edge.host.addresses import Address
 from fasaco_edge.host.processes import release_unused
 from fasaco_edge.serve.guard import Guard, is_same_origin
@@ -23,8 +25,6 @@ from fasaco_edge.serve.messages import Role
 from fasaco_edge.serve.page import load_page
 from fasaco_edge.serve.served_view import ServedView
 from fasaco_edge.serve.viewer import Viewer, ending_oddities
-from fasaco_edge.watch.feed import Feed
-from fasaco_edge.watch.phrases import steady_now
 from fasaco_edge.wire.topics import FLOOR, PHEROMONE
 
 LOG = logging.getLogger(__name__)

@@ -7,9 +7,9 @@ from collections.abc import Callable, Iterable
 from rich.console import Console, RenderableType
 from rich.text import Text
 
-from fasaco_edge.watch.events import BAD, GOOD, ORDER, PLAIN, Event, EventLog
+from fasaco_edge.client.events import BAD, GOOD, ORDER, PLAIN, Event, EventLog
+from fasaco_edge.client.phrases import clock
 from fasaco_edge.watch.glyphs import GlyphSet
-from fasaco_edge.watch.phrases import clock
 
 FAINT = "bright_black"
 TONES = {PLAIN: "", GOOD: "green", BAD: "red", ORDER: "yellow"}

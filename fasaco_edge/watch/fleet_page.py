@@ -8,6 +8,7 @@ from dataclasses import replace
 from rich.console import Console, Group
 from rich.text import Text
 
+from fasaco_edge.client.phrases import clock, percent
 from fasaco_edge.text import one_line
 from fasaco_edge.watch import picture
 from fasaco_edge.watch.blocks import FAINT, Blocks, on_a_line
@@ -16,7 +17,6 @@ from fasaco_edge.watch.fleet_robot import FleetRobot, short
 from fasaco_edge.watch.fleet_table import robot_table, total_rows
 from fasaco_edge.watch.fleet_view import FleetView
 from fasaco_edge.watch.page import Layout
-from fasaco_edge.watch.phrases import clock, percent
 
 # In the colour of the first robot.
 LEGEND = (

@@ -7,7 +7,8 @@ from collections.abc import Sequence
 from rich.table import Table
 from rich.text import Text
 
-from fasaco_edge.watch import phrases, picture
+from fasaco_edge.client import phrases
+from fasaco_edge.watch import picture
 from fasaco_edge.watch.blocks import FAINT
 from fasaco_edge.watch.fleet_floor import FleetFloor
 from fasaco_edge.watch.fleet_robot import FleetRobot, short

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from fasaco_edge.bus.arrival import Sample
+from fasaco_edge.client.events import BAD, GOOD, PLAIN, TROUBLED, EventLog
 from fasaco_edge.errors import FasacoError
 from fasaco_edge.fleet.cells import Seat
 from fasaco_edge.fleet.inbox import LEAST_SHARING, Heard
@@ -18,7 +19,6 @@ from fasaco_edge.grid.geometry import Pose2D
 from fasaco_edge.grid.occupancy import OccupancyGrid, coarser
 from fasaco_edge.mission.fleet.frames import placed_point
 from fasaco_edge.text import is_reported
-from fasaco_edge.watch.events import BAD, GOOD, PLAIN, TROUBLED, EventLog
 from fasaco_edge.watch.fleet_floor import MOST_PIXELS, FleetFloor, FloorSurvey
 from fasaco_edge.watch.fleet_robot import FleetRobot, document_of, heading_to, short
 from fasaco_edge.wire.documents.fleet import decode_member, fleet_of

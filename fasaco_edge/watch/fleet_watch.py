@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from rich.console import Console
 
+from fasaco_edge.client import phrases
+from fasaco_edge.client.events import EventLog
 from fasaco_edge.text import one_line
-from fasaco_edge.watch import phrases
-from fasaco_edge.watch.events import EventLog
 from fasaco_edge.watch.fleet_feed import FleetFeed
 from fasaco_edge.watch.fleet_page import FleetPage
 from fasaco_edge.watch.fleet_view import FleetView

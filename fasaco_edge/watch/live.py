@@ -13,10 +13,10 @@ import tty
 from types import FrameType
 from typing import Any, Protocol, Self, TextIO
 
+from fasaco_edge.client import phrases
+from fasaco_edge.client.events import EventLog
 from fasaco_edge.host.processes import stop_event
 from fasaco_edge.text import json_line
-from fasaco_edge.watch import phrases
-from fasaco_edge.watch.events import EventLog
 
 END_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 # At most ten pages a second, and only if the content or the clock changed [s].

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from rich.console import Console
 from rich.text import Text
 
+from fasaco_edge.client.events import TROUBLED
+from fasaco_edge.client.phrases import age, clock, percent
 from fasaco_edge.text import one_line
 from fasaco_edge.watch import picture
 from fasaco_edge.watch.blocks import FAINT, Blocks, on_a_line
-from fasaco_edge.watch.events import TROUBLED
-from fasaco_edge.watch.phrases import age, clock, percent
 from fasaco_edge.watch.picture import MissionPicture
 from fasaco_edge.watch.robot_view import RobotView
 from fasaco_edge.watch.status_table import figures, state_colour

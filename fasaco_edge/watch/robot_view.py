@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.bus.arrival import Sample
+from fasaco_edge.client.robot_state import PathProgress, RobotState
 from fasaco_edge.grid.occupancy import OccupancyGrid
-from fasaco_edge.watch.robot_state import PathProgress, RobotState
 from fasaco_edge.wire.documents.json_text import decode_document
 from fasaco_edge.wire.documents.path_documents import PathAttachment
 from fasaco_edge.wire.messages.maps import decode_map_update, decode_occupancy_grid

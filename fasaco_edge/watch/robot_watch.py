@@ -7,11 +7,11 @@ from contextlib import suppress
 from rich.console import Console
 
 from fasaco_edge.bus.arrival import Sample
+from fasaco_edge.client import phrases
+from fasaco_edge.client.events import EventLog
+from fasaco_edge.client.feed import Feed
 from fasaco_edge.errors import MalformedMessage
 from fasaco_edge.text import one_line
-from fasaco_edge.watch import phrases
-from fasaco_edge.watch.events import EventLog
-from fasaco_edge.watch.feed import Feed
 from fasaco_edge.watch.page import Page
 from fasaco_edge.watch.robot_view import RobotView
 from fasaco_edge.wire.documents.json_text import decode_json

@@ -5,8 +5,8 @@ from __future__ import annotations
 from rich.table import Table
 from rich.text import Text
 
+from fasaco_edge.client import phrases
 from fasaco_edge.text import one_line
-from fasaco_edge.watch import phrases
 from fasaco_edge.watch.glyphs import GlyphSet
 from fasaco_edge.wire.documents.path_documents import PathReport
 from fasaco_edge.wire.documents.replies import CoverageReport, FloorReport, MissionReport

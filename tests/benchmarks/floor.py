@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from fasaco_edge.bench.floor import FloorFigures
     from fasaco_edge.grid.occupancy import OccupancyGrid
+    from fasaco_edge.judge.floor import FloorFigures
 
 DEFAULT_MAPS = ("flat", "office", "basement")
 # The robot that the floor figures of all releases are of.
@@ -175,7 +175,7 @@ def _judged(
     line_xy: NDArray[np.float64],
     start: tuple[float, float],
 ) -> FloorRun:
-    from fasaco_edge.bench.floor import SweepingRobot, judge_floor
+    from fasaco_edge.judge.floor import SweepingRobot, judge_floor
 
     robot = SweepingRobot(TOOL_M, RADIUS_M, SPEED_M_S, TURN_S)
     figures: FloorFigures = judge_floor(truth, line_xy, robot, stands_at=start).figures

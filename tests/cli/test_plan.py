@@ -12,13 +12,13 @@ import pytest
 from msgspec import ValidationError, convert
 from PIL import Image
 
-from fasaco_edge.bench.driven_line import DriveLimits, drive_seconds
 from fasaco_edge.cli import main
 from fasaco_edge.cli.console.arguments import Exit
 from fasaco_edge.cli.planning.turning import LIMITS
 from fasaco_edge.config.robot import RobotConfig
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D
 from fasaco_edge.grid.occupancy import OccupancyGrid
+from fasaco_edge.judge.driven_line import DriveLimits, drive_seconds
 from fasaco_edge.planners.registry import PLANNER_NAMES
 from fasaco_edge.simulation.robot import SimulationConfig
 from maps.map_writer import write_map

@@ -7,10 +7,10 @@ import math
 import numpy as np
 import pytest
 
-from fasaco_edge.bench.floor import SweepingRobot, judge_floor
 from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D
 from fasaco_edge.grid.occupancy import OccupancyGrid
+from fasaco_edge.judge.floor import SweepingRobot, judge_floor
 from fasaco_edge.wire.messages.maps import CoverageValue, decode_occupancy_grid
 from tests.daemon.test_mission import START, planned
 from tests.support.outsider import Outsider

@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fasaco_edge.bench.floor import SweepingRobot, judge_floor
 from fasaco_edge.grid.fine_raster import RobotDiscs
 from fasaco_edge.grid.floor import Floor
 from fasaco_edge.grid.floor_map import FloorMap
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D, Window
 from fasaco_edge.grid.lattice import CoverageLattice, Footprint
 from fasaco_edge.grid.occupancy import OccupancyGrid
+from fasaco_edge.judge.floor import SweepingRobot, judge_floor
 from fasaco_edge.kernels.floor.bits import unpacked
 
 PIXEL_M, RADIUS_M = 0.05, 0.2

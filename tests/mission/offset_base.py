@@ -11,11 +11,11 @@ from itertools import pairwise
 
 import numpy as np
 
-from fasaco_edge.bench.floor import SweepingRobot, judge_floor
 from fasaco_edge.daemon.loop.mission_reports import floor_report
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D, StampedPose
 from fasaco_edge.grid.lattice import Footprint
 from fasaco_edge.grid.occupancy import OccupancyGrid
+from fasaco_edge.judge.floor import SweepingRobot, judge_floor
 from fasaco_edge.mission.config import MissionConfig, MissionPolicy, Sweeping
 from fasaco_edge.mission.core.events import MapReceived, PlanReady, PoseReceived, State
 from fasaco_edge.mission.core.mission import Mission

@@ -6,10 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from fasaco_edge.bench.floor import judge_floor
 from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.config.robot import RobotConfig
 from fasaco_edge.daemon.loop.loader import mission_config
+from fasaco_edge.judge.floor import judge_floor
 from fasaco_edge.mission.core.events import MapReceived
 from fasaco_edge.mission.core.mission import Mission
 from fasaco_edge.planners.search.near_optimal import NearOptimal

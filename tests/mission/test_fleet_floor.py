@@ -9,7 +9,7 @@ from itertools import pairwise, product
 import numpy as np
 import pytest
 
-from fasaco_edge.bench.floor import judge_floor
+from fasaco_edge.judge.floor import judge_floor
 from fasaco_edge.mission.core.events import MapReceived, MemberHeard, Part, State
 from fasaco_edge.mission.core.mission import Mission
 from fasaco_edge.mission.fleet.layer import MANY_TAKEN

@@ -8,11 +8,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fasaco_edge.bench.floor import judge_floor
 from fasaco_edge.daemon.ledger.codec import decode_ledger, encode_ledger
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D, StampedPose, Window
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.grid.rotation import rotated_geometry, rotated_point, rotated_points, rotated_pose
+from fasaco_edge.judge.floor import judge_floor
 from fasaco_edge.mission.config import Dock, Place
 from fasaco_edge.mission.core.events import (
     CommandReceived,

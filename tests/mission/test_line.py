@@ -9,7 +9,6 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from fasaco_edge.bench.floor import SweepingRobot, judge_floor
 from fasaco_edge.daemon.loop.mission_reports import PASSED as PASSED_BY
 from fasaco_edge.daemon.loop.mission_reports import floor_report
 from fasaco_edge.grid import floor_map
@@ -17,6 +16,7 @@ from fasaco_edge.grid.fine_raster import raster_to_map
 from fasaco_edge.grid.geometry import Pose2D, StampedPose, Window
 from fasaco_edge.grid.lattice import Footprint
 from fasaco_edge.grid.occupancy import UNKNOWN, OccupancyGrid
+from fasaco_edge.judge.floor import SweepingRobot, judge_floor
 from fasaco_edge.kernels.floor.open_floor import CAUSE, CAUSE_SHIFT, OPEN, PASSED, SWEPT, WANTED
 from fasaco_edge.kernels.floor.sweeps import NEVER
 from fasaco_edge.mission.config import MissionConfig, Sweeping

@@ -9,13 +9,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fasaco_edge.bench.floor import SweepingRobot, judge_floor
 from fasaco_edge.grid.fine_raster import RobotDiscs
 from fasaco_edge.grid.floor_map import FloorMap
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D
 from fasaco_edge.grid.lattice import CoverageLattice, Footprint
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.host.processes import peak_mb
+from fasaco_edge.judge.floor import SweepingRobot, judge_floor
 from fasaco_edge.mission.config import Sweeping
 from fasaco_edge.mission.core.events import CommandReceived, MapReceived, State
 from fasaco_edge.mission.core.mission import Mission

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fasaco_edge.bench.floor import SweepingRobot, judge_floor
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D, StampedPose
 from fasaco_edge.grid.lattice import Footprint
 from fasaco_edge.grid.occupancy import OccupancyGrid
+from fasaco_edge.judge.floor import SweepingRobot, judge_floor
 from fasaco_edge.mission.config import MissionConfig, Sweeping
 from fasaco_edge.mission.core.events import MapReceived, PoseReceived
 from fasaco_edge.mission.core.mission import Mission

@@ -9,12 +9,12 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from fasaco_edge.bench.floor import SweepingRobot, judge_floor
 from fasaco_edge.grid.fine_raster import RobotDiscs
 from fasaco_edge.grid.floor import Floor, StandLattice
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D
 from fasaco_edge.grid.map_files import find_map, read_map, suggested_start
 from fasaco_edge.grid.occupancy import OccupancyGrid
+from fasaco_edge.judge.floor import SweepingRobot, judge_floor
 from fasaco_edge.planners.cost import CoverageCost
 from fasaco_edge.planners.line import LINES, DrivenLine, LineConfig, line_over
 from fasaco_edge.planners.planner import ignore

@@ -22,11 +22,11 @@ pytest.importorskip("websockets")
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
 from fasaco_edge.bus.settings import BusSettings
+from fasaco_edge.client.feed import Feed
 from fasaco_edge.host.addresses import Address
 from fasaco_edge.serve.guard import Guard
 from fasaco_edge.serve.served_view import ServedView
 from fasaco_edge.serve.server import MOST_STRANGERS, MOST_VIEWERS, Server
-from fasaco_edge.watch.feed import Feed
 from fasaco_edge.wire.keys import Keys
 from tests.serve.serving import Served, listens, looking, served, until
 from tests.support.outsider import TIMEOUT_S, Outsider

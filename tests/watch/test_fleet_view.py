@@ -11,9 +11,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from fasaco_edge.client.events import KEPT
 from fasaco_edge.fleet.members import GONE_NS, MOST_MEMBERS, REPLACED_NS
 from fasaco_edge.watch import fleet_floor
-from fasaco_edge.watch.events import KEPT
 from fasaco_edge.watch.fleet_robot import LONGEST
 from fasaco_edge.watch.fleet_view import MOST_FAULTS, MOST_FLEETS, FleetView
 from fasaco_edge.wire.documents.fleet import CellTile, FleetPart

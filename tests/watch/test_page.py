@@ -10,12 +10,12 @@ import pytest
 from rich.cells import cell_len
 from rich.color import ColorSystem
 
+from fasaco_edge.client.robot_state import Token
 from fasaco_edge.grid.geometry import Window
 from fasaco_edge.planners.planner import ColonySnapshot
 from fasaco_edge.watch.glyphs import GlyphSet
 from fasaco_edge.watch.page import Page
 from fasaco_edge.watch.picture import COVERED, HEADING, TO_COVER, WALL
-from fasaco_edge.watch.robot_state import Token
 from fasaco_edge.watch.robot_view import RobotView
 from fasaco_edge.wire.messages.pheromone import encode_pheromone
 from tests.support.statuses import extreme_statuses

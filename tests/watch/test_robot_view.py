@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from fasaco_edge.bus.arrival import Sample
+from fasaco_edge.client.events import KEPT, EventLog
+from fasaco_edge.client.feed import SUBSCRIBED
+from fasaco_edge.client.robot_state import PathProgress
 from fasaco_edge.grid.geometry import Pose2D, StampedPose, Window
 from fasaco_edge.grid.occupancy import MapPatch
-from fasaco_edge.watch.events import KEPT, EventLog
-from fasaco_edge.watch.feed import SUBSCRIBED
-from fasaco_edge.watch.robot_state import PathProgress
 from fasaco_edge.watch.robot_view import RobotView
 from fasaco_edge.wire.messages.maps import encode_map_update
 from fasaco_edge.wire.messages.poses import encode_pose_stamped

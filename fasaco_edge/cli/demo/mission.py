@@ -25,9 +25,9 @@ from fasaco_edge.bus.settings import BusSettings
 from fasaco_edge.cli.console.terminal import ProgressLines, err
 from fasaco_edge.cli.demo.mishaps import Mishaps
 from fasaco_edge.cli.demo.robots import FLEET, DemoRobot, fleet_recorder
+from fasaco_edge.client import phrases
 from fasaco_edge.errors import ProcessEnded
 from fasaco_edge.host.processes import python_program
-from fasaco_edge.watch import phrases
 from fasaco_edge.wire import topics
 from fasaco_edge.wire.documents.json_text import decode_tolerant
 from fasaco_edge.wire.documents.status import Status

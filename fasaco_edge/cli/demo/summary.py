@@ -11,13 +11,6 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.bench.floor import (
-    JudgedFloor,
-    SweepingRobot,
-    judge_floor,
-    share_words,
-    swept_words,
-)
 from fasaco_edge.cli.console import terminal
 from fasaco_edge.cli.console.streams import print_json
 from fasaco_edge.cli.demo.mission import Ending
@@ -30,6 +23,13 @@ from fasaco_edge.grid.geometry import Pose2D
 from fasaco_edge.grid.lattice import CoverageLattice, Footprint
 from fasaco_edge.grid.map_files import find_map, read_map
 from fasaco_edge.grid.occupancy import OccupancyGrid
+from fasaco_edge.judge.floor import (
+    JudgedFloor,
+    SweepingRobot,
+    judge_floor,
+    share_words,
+    swept_words,
+)
 from fasaco_edge.mission.coverage.ledger import CoverageLedger
 from fasaco_edge.mission.map.reachable_area import ReachableArea, anchor_cell
 

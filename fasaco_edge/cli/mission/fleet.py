@@ -16,9 +16,9 @@ from fasaco_edge.cli.console.arguments import Exit, robot_on_bus
 from fasaco_edge.cli.console.question import agrees, may_ask
 from fasaco_edge.cli.console.streams import print_json
 from fasaco_edge.cli.console.terminal import out
+from fasaco_edge.client import phrases
 from fasaco_edge.errors import MalformedMessage, NobodyAnswersError, WouldForget
 from fasaco_edge.text import one_line
-from fasaco_edge.watch import phrases
 from fasaco_edge.wire.documents import replies
 from fasaco_edge.wire.documents.json_text import decode_json, decode_tolerant, encode_json, tolerant
 from fasaco_edge.wire.documents.status import Status

@@ -12,8 +12,8 @@ from pathlib import Path
 
 from PIL import Image
 
-from fasaco_edge.bench.floor import share_words
 from fasaco_edge.drawing.chart import COLOURS, Panel
+from fasaco_edge.judge.floor import share_words
 from fasaco_edge.review.comparison import (
     compared_rows,
     reason_counts,

@@ -9,13 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from fasaco_edge.bench.floor import swept_words
 from fasaco_edge.drawing import palette
 from fasaco_edge.drawing.chart import draw_panels
 from fasaco_edge.drawing.pictures import draw_mission, draw_order, draw_unswept
 from fasaco_edge.drawing.plot import MapLayer, Plot, View, bounds_of
 from fasaco_edge.drawing.sheet import KeyEntry, Sheet
 from fasaco_edge.grid.geometry import Window
+from fasaco_edge.judge.floor import swept_words
 from fasaco_edge.review.instant import Scene
 from fasaco_edge.review.output.panels import coverage_panel, replan_panel, state_panel
 from fasaco_edge.review.output.rows import instant_rows, spot_rows

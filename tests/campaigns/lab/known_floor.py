@@ -1,6 +1,6 @@
 """Accounts of the floor that a mission ever knew to be reachable, by a judge of its maps.
 
-The judge (``bench.floor``) shares nothing with the mission's own count. Two things are to hold:
+The judge (``judge.floor``) shares nothing with the mission's own count. Two things are to hold:
 what the mission claims to have swept of the reachable floor, its record has of it; and all
 floor that was ever reachable, and is free by the newest map, is told: as reachable now, or as out
 of reach.
@@ -12,9 +12,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fasaco_edge.bench.floor import SweepingRobot, judge_floor
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D, Window
 from fasaco_edge.grid.occupancy import FREE
+from fasaco_edge.judge.floor import SweepingRobot, judge_floor
 from tests.campaigns.lab.mission import LabRun
 from tests.campaigns.lab.truth import claimed_on, values_on
 

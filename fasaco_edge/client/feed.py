@@ -10,9 +10,9 @@ from fasaco_edge.bus.mailbox import Mailbox, Queue
 from fasaco_edge.bus.queries import Reply
 from fasaco_edge.bus.session import Bus
 from fasaco_edge.bus.settings import BusSettings
+from fasaco_edge.client.joining import Joining
+from fasaco_edge.client.robot_state import Token
 from fasaco_edge.errors import BusUnavailable
-from fasaco_edge.watch.joining import Joining
-from fasaco_edge.watch.robot_state import Token
 from fasaco_edge.wire.keys import VERSION, Keys
 from fasaco_edge.wire.limits import MAX_JSON_BYTES, MAX_MESSAGE_BYTES
 from fasaco_edge.wire.topic_types import NEWEST, Topic

@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from fasaco_edge.bench.driven_line import DriveLimits, drive_seconds
 from fasaco_edge.grid.geometry import Pose2D
+from fasaco_edge.judge.driven_line import DriveLimits, drive_seconds
 from fasaco_edge.kernels.floor.turning import limited_turning, turn_seconds
 from fasaco_edge.simulation.robot import ARRIVED_M, DriveState, SimulationConfig, driven
 

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from fasaco_edge.bench import floor
-from fasaco_edge.bench.floor import JudgedFloor, SweepingRobot, judge_floor, swept_words
-from fasaco_edge.bench.pixels import Patches, within
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D
 from fasaco_edge.grid.occupancy import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
+from fasaco_edge.judge import floor
+from fasaco_edge.judge.floor import JudgedFloor, SweepingRobot, judge_floor, swept_words
+from fasaco_edge.judge.pixels import Patches, within
 
 PIXEL_M = 0.05
 ROBOT = SweepingRobot(tool_m=0.4, radius_m=0.2, speed_m_s=0.5, turn_s=2.0)
@@ -234,7 +234,7 @@ SHAPES = [(1, 1), (1, 9), (9, 1), (13, 17), (30, 20)]
 def test_within_a_distance_as_compared_pixel_by_pixel(
     shape: tuple[int, int], distance: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("fasaco_edge.bench.pixels.BLOCK_PIXELS", 64)
+    monkeypatch.setattr("fasaco_edge.judge.pixels.BLOCK_PIXELS", 64)
     rng = np.random.default_rng(5)
     for share in (0.0, 0.03, 0.5, 1.0):
         mask = rng.random(shape) < share

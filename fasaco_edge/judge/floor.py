@@ -26,16 +26,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fasaco_edge.bench.driven_line import (
+from fasaco_edge.grid.geometry import GridGeometry, Pose2D, Window
+from fasaco_edge.grid.occupancy import FREE, OccupancyGrid, marked_window
+from fasaco_edge.judge.driven_line import (
     TOUCH_TOLERANCE_PX,
     DriveLimits,
     DrivenLine,
     Points,
     drive_seconds,
 )
-from fasaco_edge.bench.pixels import Mask, Patches, through, within
-from fasaco_edge.grid.geometry import GridGeometry, Pose2D, Window
-from fasaco_edge.grid.occupancy import FREE, OccupancyGrid, marked_window
+from fasaco_edge.judge.pixels import Mask, Patches, through, within
 
 # Largest pixel [m], unless that makes more than this many of them.
 FINE_M = 0.025

@@ -14,8 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.bench.pixels import Mask
 from fasaco_edge.grid.geometry import GridGeometry
+from fasaco_edge.judge.pixels import Mask
 
 # Distances of whole pixels are reached; rounding must not decide otherwise [pixels].
 TOUCH_TOLERANCE_PX = 1e-3

@@ -11,10 +11,10 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from fasaco_edge.bus.arrival import Sample
+from fasaco_edge.client.events import BAD, GOOD, ORDER, EventLog, differences
 from fasaco_edge.errors import FasacoError, MalformedMessage
 from fasaco_edge.grid.geometry import Pose2D
 from fasaco_edge.text import is_reported
-from fasaco_edge.watch.events import BAD, GOOD, ORDER, EventLog, differences
 from fasaco_edge.wire.documents.json_text import decode_document, decode_json
 from fasaco_edge.wire.documents.settings import KnownSettings, known_settings
 from fasaco_edge.wire.documents.status import Status

@@ -6,7 +6,7 @@ import pytest
 
 from fasaco_edge.bus.session import open_bus
 from fasaco_edge.bus.settings import BusSettings
-from fasaco_edge.watch.feed import Feed
+from fasaco_edge.client.feed import Feed
 from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.topics import PHEROMONE
 from tests.bus.test_session import until

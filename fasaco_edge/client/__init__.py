@@ -1,0 +1,1 @@
+"""Client of one robot: its messages from the bus, its state, and words for people."""
