@@ -13,7 +13,6 @@ from rich.table import Table
 from rich.text import Text
 
 from fasaco_edge.bench.benchmark import Benchmark, Report, Sample, machine, peak_mb
-from fasaco_edge.bench.fleet import FLEET
 from fasaco_edge.bench.footprint import FOOTPRINT
 from fasaco_edge.bench.jitter import JITTER
 from fasaco_edge.bench.latency import LATENCY
@@ -24,9 +23,7 @@ from fasaco_edge.cli.console.arguments import Command, Exit, add_common, add_jso
 from fasaco_edge.cli.console.streams import print_json
 
 WIDTH = 80
-BENCHMARKS: tuple[Benchmark[Any], ...] = (
-    PLANNERS, SPEED, FOOTPRINT, LATENCY, JITTER, FLEET,
-)  # fmt: skip
+BENCHMARKS: tuple[Benchmark[Any], ...] = (PLANNERS, SPEED, FOOTPRINT, LATENCY, JITTER)
 
 EPILOG = """\
 examples:

@@ -39,16 +39,6 @@ def assert_ordered(spread):
     assert 0 < spread["low"] <= spread["median"] <= spread["high"]
 
 
-def test_fleet(capsys, tmp_path):
-    file = tmp_path / "hall.npy"
-    np.save(file, np.ones((12, 20), bool))
-    words = ["--grids", str(file), "--robots", "1", "2", "--budget", "0.3"]
-    alone, two = figures(capsys, "fleet", *words)["plans"]
-    assert (alone["cells"], alone["longest_steps"], alone["passed_twice"]) == (240, 240, 0.0)
-    assert two["bound_steps"] <= two["longest_steps"] < 150
-    assert two["ratio"] == pytest.approx(two["longest_steps"] * 2 / 240, abs=1e-3)
-
-
 def test_speed(capsys, tmp_path):
     file = tmp_path / "room.npy"
     np.save(file, np.ones((7, 9), bool))
@@ -292,8 +282,7 @@ def test_help_teaches_by_example(benchmark, capsys):
         ("speed", ["--repeats", "-1"]),
         ("speed", ["--threads", "nan"]),
         ("speed", ["--seed", "-1"]),
-        ("fleet", ["--seed", "-1"]),
-        ("fleet", ["--seed", str(2**63)]),
+        ("speed", ["--seed", str(2**63)]),
     ],
 )
 def test_impossible_options_are_refused(benchmark, words, capsys):

@@ -22,12 +22,12 @@ from fasaco_edge.bench.benchmark import (
     add_grid_options,
     positive,
 )
-from fasaco_edge.bench.fleet import SharedWalks, drawn_starts, plan_shared
 from fasaco_edge.grid.lattice import Cell
 from fasaco_edge.planners.cost import CoverageCost
+from fasaco_edge.planners.fleet.division import Division, divide
 from fasaco_edge.planners.fleet.first_tours import Fleet
 from fasaco_edge.planners.grids import NamedGrid, read_grid
-from fasaco_edge.planners.planner import SearchProgress
+from fasaco_edge.planners.planner import SearchProgress, StoppingCriterion
 from fasaco_edge.planners.warmup import warm_up
 from tests.benchmarks.buildings import building
 from tests.benchmarks.harness import WrongWalkError, check_names, grid_name
@@ -47,6 +47,72 @@ HEADER = (
     "twice",
 )
 MEAN = "mean"
+
+
+@dataclass(frozen=True, slots=True)
+class SharedWalks:
+    """A building that robots share, each on a walk that returns to its start.
+
+    Attributes:
+        building, robots: the question.
+        cells: to cover.
+        longest_steps: steps of the longest walk.
+        steps: of all walks.
+        bound_steps: the lower bound of the longest walk.
+        passed_twice: share of the cells that two or more robots pass.
+        cpu_s: processor time [s].
+    """
+
+    building: str
+    robots: int
+    cells: int
+    longest_steps: int
+    steps: int
+    bound_steps: int
+    passed_twice: float
+    cpu_s: float
+
+    @property
+    def ratio(self) -> float:
+        """The longest walk's steps over an even share of the cells."""
+        return self.longest_steps * self.robots / self.cells
+
+    @property
+    def bound_ratio(self) -> float:
+        """Its lower bound over an even share of the cells."""
+        return self.bound_steps * self.robots / self.cells
+
+
+def plan_shared(
+    grid: NamedGrid, fleet: Fleet, stop: StoppingCriterion
+) -> tuple[SharedWalks, Division]:
+    """Plan one walk for each robot; return the figures, and the walks."""
+    began = time.process_time()
+    division = divide(grid.lattice, fleet, stop)
+    cpu_s = time.process_time() - began
+    window = grid.lattice.window
+    times = np.zeros(grid.lattice.states.shape, np.int64)
+    for walk in division.walks:
+        times[tuple((np.unique(walk, axis=0) - (window.row0, window.col0)).T)] += 1
+    steps = [len(walk) - 1 for walk in division.walks]
+    shared = SharedWalks(
+        building=grid.name,
+        robots=len(steps),
+        cells=division.cells,
+        longest_steps=max(steps),
+        steps=sum(steps),
+        bound_steps=division.lower_bound_steps,
+        passed_twice=round(np.count_nonzero(times > 1) / division.cells, 4),
+        cpu_s=round(cpu_s, 3),
+    )
+    return shared, division
+
+
+def drawn_starts(cells: NDArray[np.int64], count: int, seed: int) -> list[Cell]:
+    """Return some of cells, int64 (n, 2), drawn at random, the same for one seed."""
+    random = Random(PCG64((seed, count)))
+    chosen = random.choice(cells, min(count, len(cells)), replace=False)
+    return [(row, col) for row, col in chosen.tolist()]
 
 
 @dataclass(frozen=True, slots=True)
