@@ -20,7 +20,9 @@ Read in this order:
     coverage/progress    progress on the path, of the coverage, of each zone
     coverage/unreached   uncovered cells, and the causes
 
+    company              what all of this asks about other robots; the answers of one alone
     fleet/layer          the other robots, and this one's part of the remaining area
+    fleet/giving_way     when the robot waits for others, and makes way for them
     fleet/shared         cells that the others have swept
     fleet/division       who sweeps what
 

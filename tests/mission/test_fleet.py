@@ -75,7 +75,7 @@ def test_what_a_robot_that_dies_had_to_do_is_taken_over(at):
     del fleet.robots["r2"]
     survivor = fleet.robots["r1"].mission
     fleet.run(int(GONE_S) + 3)
-    assert not survivor.fleet.has_company
+    assert not survivor.company.has_company
     fleet.finish()
     assert fleet.left_out() == set()
 
@@ -85,10 +85,10 @@ def test_a_robot_that_stands_is_not_waited_for_and_may_come_back():
     fleet.run(20)
     fleet.robots["r2"].hangs = True
     fleet.run(12)
-    assert not fleet.robots["r1"].mission.fleet.has_company
+    assert not fleet.robots["r1"].mission.company.has_company
     fleet.robots["r2"].hangs = False
     fleet.run(4)
-    assert fleet.robots["r1"].mission.fleet.has_company
+    assert fleet.robots["r1"].mission.company.has_company
     fleet.finish()
     assert fleet.left_out() == set()
 
@@ -110,13 +110,13 @@ def test_a_newer_division_without_this_robot_hides_no_other():
     fleet = FleetDrive(HALL, THREE)
     fleet.run(20)
     robots = fleet.robots
-    number = robots["r3"].mission.fleet.numbers.number
+    number = robots["r3"].mission.company.numbers.number
     shifted = tuple(replace(part, handicap_s=1.5) for part in robots["r2"].report().parts)
     alone = replace(robots["r1"].report(), division=number + 2, by="r1", parts=())
     of_r2 = replace(robots["r2"].report(), division=number + 1, by="r2", parts=shifted)
     robots["r3"].tell(alone, of_r2)
     robots["r3"].tick()
-    fleet = robots["r3"].mission.fleet
+    fleet = robots["r3"].mission.company
     assert (fleet.numbers.number, fleet.numbers.by) == (number + 1, "r2")
     assert fleet.parts == shifted
 
@@ -168,8 +168,8 @@ def test_a_robot_that_does_not_fit_is_named_and_left_out(changes, why):
     report = other.report()
     ours.tell(replace(report, **changes))
     ours.tick()
-    assert ours.mission.fleet.members["r2"].absence(ours.now).startswith(why)
-    assert not ours.mission.fleet.has_company
+    assert ours.mission.company.members["r2"].absence(ours.now).startswith(why)
+    assert not ours.mission.company.has_company
     assert ours.mission.shared.cells_of("r2") == 0
 
 
@@ -216,14 +216,17 @@ def test_a_cell_that_cannot_be_swept_is_given_up_while_another_robot_works():
         ours.tell(replace(report, x=0.5 + second % 2))
         ours.tick()
         reasons.append(ours.mission.reason)
-    assert ours.mission.fleet.has_company
+    assert ours.mission.company.has_company
     assert "1 cell not reached: tried again after 30 s (1 of 1)" in reasons
     assert "0.1 m2 not reached: left over after" in reasons[-1]
     assert ours.mission.route.plans < 40
 
 
 def test_after_a_loop_closure_nothing_uncertain_is_given_back():
-    ledger, block = MissionLedger(0.3, 0.3), {(row, col) for row in range(10) for col in range(10)}
+    ledger, block = (
+        MissionLedger(0.3, 0.3, shared=SharedProgress()),
+        {(row, col) for row in range(10) for col in range(10)},
+    )
     ledger.shared.begin(5)
     ledger.shared.hear("r2", 1, tiles_of(block))
     ledger.note_map_motion(Pose2D(1.5, 1.5))
@@ -249,7 +252,7 @@ def test_no_more_is_kept_of_a_robot_that_lies_than_there_is_room_for():
     assert [fault.code for fault in decision.faults] == ["fleet_member"]
     ours.tick()
     assert ours.mission.state == "covering"
-    assert ours.mission.fleet.members["r2"].absence(ours.now).endswith("are kept at most")
+    assert ours.mission.company.members["r2"].absence(ours.now).endswith("are kept at most")
     # There is room for others.
     assert not ours.tell(replace(other.report(), robot="r3", tiles=tiles[:2])).faults
 
@@ -266,7 +269,7 @@ def test_of_many_robots_those_that_are_gone_and_swept_least_make_room():
 
 
 def test_a_zone_swept_again_holds_nobody_up_however_many_have_swept_it():
-    ledger, bits = MissionLedger(0.3, 0.3), b"\xff" * TILE_BYTES
+    ledger, bits = MissionLedger(0.3, 0.3, shared=SharedProgress()), b"\xff" * TILE_BYTES
     angles = np.linspace(0.0, 2.0 * np.pi, 900, endpoint=False)
     ring = tuple((48.0 + 40.0 * math.cos(angle), 48.0 + 40.0 * math.sin(angle)) for angle in angles)
     for robot in range(MOST_ROBOTS - 1):
@@ -393,8 +396,8 @@ def test_more_robots_than_there_is_room_for_do_not_push_each_other_out():
         decision = ours.tell(*said, after=0.0)
         assert [fault.code for fault in decision.faults] == ["fleet_member"] * 8
         ours.tick()
-    assert list(ours.mission.fleet.members) == names[:MOST_ROBOTS]
-    assert ours.mission.fleet.numbers.number <= 3
+    assert list(ours.mission.company.members) == names[:MOST_ROBOTS]
+    assert ours.mission.company.numbers.number <= 3
     # Those that are gone make room.
     later = [replace(report, robot=name) for name in names[8:]]
     assert not ours.tell(*later, after=GONE_S + 1.0).faults
@@ -408,7 +411,7 @@ def test_one_that_comes_and_goes_does_not_change_the_path_of_others_each_time():
         state = "covering" if second % 2 else "blocked"
         ours.tell(replace(report, state=state, x=1.0 + 0.1 * (second % 3)), after=0.0)
         ours.tick()
-    assert 2 <= ours.mission.fleet.numbers.number <= 9
+    assert 2 <= ours.mission.company.numbers.number <= 9
     assert ours.mission.route.plans - plans <= 9
 
 
@@ -421,8 +424,8 @@ def test_a_robot_without_a_part_does_not_divide_again_and_again():
     for second in range(20):
         ours.tell(replace(report, x=5.6 + 0.2 * (second % 2)), after=0.0)
         ours.tick()
-    assert ours.mission.fleet.part_cells() < 200
-    assert 0 < ours.mission.fleet.numbers.number <= 4
+    assert ours.mission.company.part_cells() < 200
+    assert 0 < ours.mission.company.numbers.number <= 4
 
 
 @pytest.mark.parametrize("begun", [0, 4])
@@ -434,19 +437,19 @@ def test_a_number_that_no_count_leads_to_is_nobodys_division(begun):
     for _ in range(6):
         ours.tell(liar)
         fleet.tick()
-    assert 0 < ours.mission.fleet.numbers.number < 10
-    assert abs(ours.mission.fleet.numbers.number - other.mission.fleet.numbers.number) <= 1
+    assert 0 < ours.mission.company.numbers.number < 10
+    assert abs(ours.mission.company.numbers.number - other.mission.company.numbers.number) <= 1
     del fleet.robots["r2"]
-    before = ours.mission.fleet.numbers.number
+    before = ours.mission.company.numbers.number
     fleet.run(int(GONE_S) + 3)
-    assert ours.mission.fleet.numbers.number > before
+    assert ours.mission.company.numbers.number > before
 
 
 @pytest.mark.parametrize("lead", [MOST_AHEAD - 100, MOST_AHEAD + 100, MOST_FIRST - 100])
 def test_a_robot_far_behind_in_counting_agrees_once_the_other_has_told_it_for_long(lead):
     fleet = FleetDrive(HALL, TWO)
     fleet.run(4)
-    ours, other = (robot.mission.fleet for robot in fleet.robots.values())
+    ours, other = (robot.mission.company for robot in fleet.robots.values())
     # It has counted on with a third robot, where this one heard none of it.
     fleet.hears = lambda speaker, listener: False
     fleet.run(8)
@@ -467,7 +470,7 @@ def test_a_number_far_ahead_that_one_tells_for_a_moment_is_not_believed(said):
     for second in range(30):
         ours.tell(liar if second in said else replace(liar, division=3))
         fleet.tick()
-    assert 0 < ours.mission.fleet.numbers.number < 10
+    assert 0 < ours.mission.company.numbers.number < 10
 
 
 @examples(60)

@@ -76,14 +76,14 @@ def test_what_a_robot_has_tried_in_vain_stays_the_others_whatever_maps_come():
 
     def untried():
         area = ours.mission.area
-        return ours.mission.fleet.untried(area.reachable, area)[area.lattice.local((12, 5))]
+        return ours.mission.company.untried(area.reachable, area)[area.lattice.local((12, 5))]
 
     while untried():
         fleet.tick()
         assert fleet.seconds < 300
     ours.tell(patch("#", at=(0, 23)))
     assert not untried()
-    assert ours.mission.fleet.has_company
+    assert ours.mission.company.has_company
     fleet.run(2)
     ours.tell(patch(".", at=(0, 23)))
     assert not untried()
@@ -162,7 +162,7 @@ def test_a_robot_that_stands_for_want_of_a_part_stays_in_the_fleet():
         shared.run(1)
         assert not shared.ours.walk
         other.tell(shared.ours.report(), after=1.0)
-    (ours,) = other.mission.fleet.members.values()
+    (ours,) = other.mission.company.members.values()
     assert ours.absence(other.now) == ""
 
 
@@ -232,7 +232,7 @@ def between(first, second):
         reports = first.report(), second.report()
         first.tell(reports[1], after=0.0)
         second.tell(reports[0], after=0.0)
-    return max(robot.mission.fleet.numbers.number for robot in (first, second))
+    return max(robot.mission.company.numbers.number for robot in (first, second))
 
 
 def test_robots_of_which_one_sees_no_way_to_the_other_share_by_one_division():
@@ -242,5 +242,5 @@ def test_robots_of_which_one_sees_no_way_to_the_other_share_by_one_division():
     wall = [row[:10] + "#" + row[11:] for row in hall]
     first, second = FleetRobot("r1", (0, 0), wall), FleetRobot("r2", (6, 20), hall)
     assert between(first, second) < 5
-    assert {part.robot for part in first.mission.fleet.parts} == {"r1", "r2"}
-    assert len(first.mission.fleet.parts) == 2
+    assert {part.robot for part in first.mission.company.parts} == {"r1", "r2"}
+    assert len(first.mission.company.parts) == 2

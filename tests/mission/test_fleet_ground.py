@@ -14,7 +14,7 @@ from fasaco_edge.mission.fleet import ground as shared_ground
 from fasaco_edge.mission.fleet.division import Division, Robot, divide
 from fasaco_edge.mission.fleet.ground import GroundTelling, SharedGround
 from fasaco_edge.mission.fleet.members import Members
-from fasaco_edge.mission.fleet.shared import MOST_ROBOTS, MOST_TILES_OF_ONE
+from fasaco_edge.mission.fleet.shared import MOST_ROBOTS, MOST_TILES_OF_ONE, SharedProgress
 from fasaco_edge.mission.fleet.tiles import TILE_BYTES
 from fasaco_edge.mission.map.inputs import PATIENCE_S
 from fasaco_edge.mission.map.reachable_area import ReachableArea
@@ -135,7 +135,7 @@ def test_ground_that_is_lost_again_is_told():
 @pytest.fixture
 def members():
     """What r1 knows of r2, which can reach more than itself."""
-    ledger = MissionLedger(CELL, CELL)
+    ledger = MissionLedger(CELL, CELL, shared=SharedProgress())
     ledger.move_to("map")
     ledger.shared.begin(1)
     members = Members("r1", ledger, CELL)
@@ -169,7 +169,7 @@ def test_ground_told_in_another_frame_counts_no_longer_once_the_frame_is_left():
     ours = fleet.robots["r1"]
     fleet.tick()
     ours.tell(LARGER)
-    ground, own = ours.mission.fleet.others.ground, area_of("....")
+    ground, own = ours.mission.company.others.ground, area_of("....")
     assert cells_of(ground.joint(own)) > cells_of(own)
     for _ in range(int(PATIENCE_S) + 2):
         ours.tell(MapReceived(building("....", frame="map2")), pose_at(0, 0, "map2"), after=1.0)
@@ -250,7 +250,7 @@ def test_cells_that_no_seed_reaches_go_by_handicap_whatever_the_pace(own):
 def test_all_robots_take_over_one_division():
     fleet = FleetDrive(CORRIDOR, {"r3": (0, 0), "r1": (0, 1), "r2": (0, 39)})
     fleet.run(8)
-    layers = [robot.mission.fleet for robot in fleet.robots.values()]
+    layers = [robot.mission.company for robot in fleet.robots.values()]
     assert len({layer.numbers.number for layer in layers}) == 1
     assert len({layer.numbers.by for layer in layers}) == 1
     assert len({layer.parts for layer in layers}) == 1

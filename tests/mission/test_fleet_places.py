@@ -64,7 +64,7 @@ def test_where_another_robots_map_lies_elsewhere_all_that_it_told_before_is_drop
     nothing = ReachableArea(
         CoverageLattice(lattice.window, lattice.cell_m, *unknown), np.zeros((20, 60), np.bool_)
     )
-    ground = drive.mission.fleet.others.ground.joint(nothing).lattice
+    ground = drive.mission.company.others.ground.joint(nothing).lattice
     assert cells_in(ground.window, ground.coverable) == moved
 
 
@@ -139,7 +139,7 @@ class OnFloors(Drive):
     def hear(self, payload):
         """Return why the other robot does not belong to the fleet."""
         self.tell(self.ear.event(Sample("fasaco/@v1/r2/fleet", payload)))
-        return self.mission.fleet.members["r2"].left_out
+        return self.mission.company.members["r2"].left_out
 
     def told(self):
         said = json.loads(self.listener.payload)

@@ -66,19 +66,19 @@ def test_a_robot_whose_frame_changes_is_left_out_by_name_until_it_fits_again(aga
     fleet = FleetDrive(HALL, {"r1": (0, 0), "r2": (9, 15)})
     fleet.run(15)
     ours, other = fleet.robots.values()
-    assert ours.mission.fleet.has_company
+    assert ours.mission.company.has_company
     fleet.hears = lambda speaker, listener: False
     for _ in range(5):
         ours.tell(replace(other.report(), frame="elsewhere"))
         fleet.tick()
-    member = ours.mission.fleet.members["r2"]
+    member = ours.mission.company.members["r2"]
     assert "its frame is 'elsewhere'" in member.absence(fleet.seconds)
-    assert not ours.mission.fleet.has_company
+    assert not ours.mission.company.has_company
     assert ours.mission.state == "covering"
     if again:
         fleet.hears = lambda speaker, listener: True
         fleet.run(4)
-        assert ours.mission.fleet.has_company
+        assert ours.mission.company.has_company
         fleet.finish()
         assert fleet.left_out() == set()
     else:
@@ -92,7 +92,7 @@ def test_where_a_robot_stood_in_the_way_is_swept_once_it_is_silent(dies_at):
     # Its wheels are stuck, and it goes on telling that it will drive.
     other.hangs = True
     fleet.run(dies_at)
-    assert ours.mission.fleet.others.is_avoided("r2")
+    assert ours.mission.company.others.is_avoided("r2")
     del fleet.robots["r2"]
     fleet.run(int(OLD_S) + 2)
     fleet.finish_one(ours)
@@ -116,18 +116,18 @@ def test_two_that_do_not_hear_each_other_leave_the_division_to_one_that_hears_bo
     fleet.hears = lambda speaker, listener: (speaker, listener) not in pairs
     fleet.finish()
     assert not fleet.left_out()
-    assert max(robot.mission.fleet.numbers.number for robot in fleet.robots.values()) < 30
+    assert max(robot.mission.company.numbers.number for robot in fleet.robots.values()) < 30
 
 
 def test_one_that_is_gone_is_missed_though_another_has_made_the_division():
     fleet = FleetDrive(["." * 40] * 16, {"a": (0, 0), "b": (0, 39), "c": (15, 20)})
     fleet.run(6)
-    made_by = fleet.robots["a"].mission.fleet.numbers.by
+    made_by = fleet.robots["a"].mission.company.numbers.by
     (dead, *_) = sorted({"a", "b", "c"} - {made_by})
     del fleet.robots[dead]
     fleet.run(7)
     for robot in fleet.robots.values():
-        assert dead not in {part.robot for part in robot.mission.fleet.parts}
+        assert dead not in {part.robot for part in robot.mission.company.parts}
     fleet.finish()
     assert not fleet.left_out()
 
@@ -144,4 +144,4 @@ def test_a_division_names_no_more_robots_than_others_read():
         robot.tick()
         others = [fleet.robots[name].report() for name in "bc"]
         robot.tell(said, *others, after=0.0)
-    assert 2 < len(robot.mission.fleet.parts) <= MOST_ROBOTS + 1
+    assert 2 < len(robot.mission.company.parts) <= MOST_ROBOTS + 1

@@ -65,7 +65,7 @@ def test_floor_of_a_passed_cell_stays_this_robots_where_the_cell_becomes_another
         for number in range(1, 9):
             robot.tell(replace(divided_by("r2", number), x=0.3 + 0.2 * (number % 2)))
             robot.drive(is_checked=False)
-        assert robot.mission.fleet.part_cells() == 0
+        assert robot.mission.company.part_cells() == 0
         to_sweep = robot.mission.floor_to_sweep()
         unswept_m2.append(to_sweep.ahead_m2 + to_sweep.left_m2)
     assert unswept_m2[1] - unswept_m2[0] > 0.5 * CELL_M**2

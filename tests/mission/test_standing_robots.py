@@ -11,6 +11,7 @@ from fasaco_edge.grid.lattice import CoverageLattice
 from fasaco_edge.mission.core.events import MapReceived, MemberHeard
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
 from fasaco_edge.mission.fleet.members import Members
+from fasaco_edge.mission.fleet.shared import SharedProgress
 from fasaco_edge.mission.fleet.tiles import TILE_BYTES
 from fasaco_edge.mission.fleet.traffic import OLD_S, PATIENCE_S, STANDS_S
 from fasaco_edge.mission.map.reachable_area import ReachableArea
@@ -38,7 +39,7 @@ def area():
 
 @pytest.fixture
 def members():
-    return Members("r1", MissionLedger(CELL_M, CELL_M, 0.0), CELL_M)
+    return Members("r1", MissionLedger(CELL_M, CELL_M, shared=SharedProgress()), CELL_M)
 
 
 def test_cells_within_reach_of_a_robot_that_stands_in_the_way_are_closed(area, members):
@@ -96,11 +97,11 @@ def test_one_stopped_beside_another_plans_around_it_though_the_paths_lead_past()
     # Two cells behind it, where its path does not lead.
     behind = member((4.5 - (col - 4)) * CELL_M, (2.5 - (row - 2)) * CELL_M)
     for _ in range(int(PATIENCE_S) + 1):
-        assert not drive.mission.fleet.others.is_avoided("r2")
+        assert not drive.mission.company.others.is_avoided("r2")
         drive.tell(pose_at(2, 4), behind, after=1.0)
         if drive.request is not None:
             drive.plan()
-    assert drive.mission.fleet.others.is_avoided("r2")
+    assert drive.mission.company.others.is_avoided("r2")
     assert len(drive.mission.route.path.ahead) > 1
 
 
@@ -159,7 +160,7 @@ def test_those_that_stand_in_the_way_now_and_then_are_planned_around(names):
         drive.tell(pose_at(row, col), *heard, after=1.0)
         if drive.request is not None:
             drive.plan()
-    assert any(map(drive.mission.fleet.others.is_avoided, names))
+    assert any(map(drive.mission.company.others.is_avoided, names))
 
 
 def test_whether_another_is_near_is_told_at_rest_too():

@@ -164,7 +164,7 @@ def test_a_robot_tells_its_pace_as_it_is_now_and_after_forgetting_all_tiles_at_o
     ledger, voice = robot.mission.ledger, FleetVoice(listener, CONFIG)
     for row in range(TILES):
         ledger.credit((64 * row, 0))
-    robot.mission.fleet.step_s = 7.5
+    robot.mission.company.step_s = 7.5
     for now in (0.0, 1.0, 2.0):
         robot.mission.shared.note_forgotten()
         voice.publish(robot.mission, now)
@@ -231,7 +231,7 @@ def test_robots_on_a_map_in_utm_divide_its_cells(northing_m):
                 drives[other].tell(event, pose_at(*ends[other]), after=1.0)
                 if drives[other].request is not None:
                     drives[other].plan()
-    parts = [drive.mission.fleet.parts for drive in drives.values()]
+    parts = [drive.mission.company.parts for drive in drives.values()]
     assert parts[0] == parts[1]
     assert [part.robot for part in parts[0]] == ["r1", "r2"]
 

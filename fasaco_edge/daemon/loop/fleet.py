@@ -22,6 +22,7 @@ from fasaco_edge.grid.geometry import Pose2D
 from fasaco_edge.mission.core.events import MemberHeard, Part
 from fasaco_edge.mission.fleet.frames import FleetFrames
 from fasaco_edge.mission.fleet.ground import GroundTelling
+from fasaco_edge.mission.fleet.kind import fleet_of
 from fasaco_edge.mission.fleet.shared import Telling
 from fasaco_edge.wire.documents.fleet import (
     FLEET_VERSION,
@@ -161,8 +162,9 @@ class FleetVoice:
         is_too_soon = now - self._said_at < LEAST_PERIOD_S
         if is_too_soon or stamped is None or not mission.ledger.frame:
             return
+        others = fleet_of(mission)
         is_near, waits_for = mission.giving_way.is_near, mission.waits_for
-        key = mission.state, mission.fleet.numbers.number, mission.shared.epoch, waits_for
+        key = mission.state, others.numbers.number, others.shared.epoch, waits_for
         is_news, is_due = key != self._said, now - self._told_at >= PERIOD_S
         if not (is_news or is_due or is_near):
             return
@@ -171,10 +173,10 @@ class FleetVoice:
         if is_due:
             self._told_at, most = now, TILES
         tiles = mission.ledger.snapshot().tiles
-        if mission.shared.epoch != self._epoch:
+        if others.shared.epoch != self._epoch:
             # Published changes are forgotten. What was swept before a restart is not known.
             before = tiles if self._epoch else None
-            self._epoch, self._telling, most = mission.shared.epoch, Telling(before), TILES
+            self._epoch, self._telling, most = others.shared.epoch, Telling(before), TILES
         swept = self._telling.next(tiles, most)
         kept = self._telling.kept(swept)
         ground = self._telling_ground.next(mission.area, most)
@@ -187,16 +189,16 @@ class FleetVoice:
             state=str(mission.state),
             x=round(stamped.pose.x, 3),
             y=round(stamped.pose.y, 3),
-            step_s=mission.fleet.step_s,
-            epoch=mission.shared.epoch,
-            division=mission.fleet.numbers.number,
+            step_s=others.step_s,
+            epoch=others.shared.epoch,
+            division=others.numbers.number,
             open_cells=mission.open_cells(),
             swept=tuple(CellTile(*place, bits) for place, bits in swept),
             ground=tuple(CellTile(*place, bits) for place, bits in ground),
-            by=mission.fleet.numbers.by,
+            by=others.numbers.by,
             parts=tuple(
                 FleetPart(part.robot, *part.seed, part.handicap_s, part.step_s)
-                for part in mission.fleet.parts
+                for part in others.parts
             ),
             radius_m=self._radius_m,
             ahead=tuple((round(x, 3), round(y, 3)) for x, y in _thinned(mission.next_metres())),
@@ -209,7 +211,7 @@ class FleetVoice:
     def _frame_told(self, mission: Mission) -> str:
         """Return the frame of the fleet; that of the map where the map has no place in it."""
         frame = mission.ledger.frame
-        if not mission.shared.why_misplaced(frame):
+        if not fleet_of(mission).shared.why_misplaced(frame):
             return self._frame or frame
         # Nobody may take it for the fleet's.
         return frame if self._frame not in ("", frame) else f"{frame} of another map"

@@ -200,19 +200,20 @@ class StatusBoard:
             return None
         if mission is None:
             return FleetReport(fleet.name)
+        from fasaco_edge.mission.fleet.kind import fleet_of  # noqa: PLC0415 - of a fleet alone
+
+        others = fleet_of(mission)
         members = tuple(
             MemberReport(
                 name,
                 member.newest.state,
                 round(max(now - member.heard_at, 0.0), 1),
                 member.absence(now) or None,
-                mission.shared.cells_of(name),
+                others.shared.cells_of(name),
             )
-            for name, member in sorted(mission.fleet.members.items())
+            for name, member in sorted(others.members.items())
         )
-        return FleetReport(
-            fleet.name, mission.fleet.numbers.number, mission.fleet.part_cells(), members
-        )
+        return FleetReport(fleet.name, others.numbers.number, others.part_cells(), members)
 
     def _drive(self, mission: Mission | None) -> DriveReport:
         planned_s = round(self._cost.quarter_turn_s, 3)

@@ -8,6 +8,7 @@ from functools import partial
 
 from fasaco_edge.errors import FasacoError, LedgerMismatchError, WrongFrame
 from fasaco_edge.grid.geometry import Pose2D, StampedPose
+from fasaco_edge.mission.company import Company
 from fasaco_edge.mission.core.blocked_follower import BlockedFollower
 from fasaco_edge.mission.core.charging import BatteryGauge
 from fasaco_edge.mission.core.events import (
@@ -33,7 +34,6 @@ from fasaco_edge.mission.core.trail_layer import TrailLayer
 from fasaco_edge.mission.core.way_out import WayOut
 from fasaco_edge.mission.coverage.drive_meter import DriveMeter
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
-from fasaco_edge.mission.fleet.layer import FleetLayer
 from fasaco_edge.mission.line.layer import LineLayer
 from fasaco_edge.mission.map.inputs import InputMonitor
 from fasaco_edge.mission.map.map_state import MapState
@@ -52,7 +52,7 @@ class EventHandler:
     line: LineLayer
     trail: TrailLayer
     drive: DriveMeter
-    fleet: FleetLayer
+    company: Company
     battery: BatteryGauge
     way_out: WayOut
     blocked: BlockedFollower
@@ -124,7 +124,7 @@ class EventHandler:
                 self._hear_member(event)
 
     def _hear_member(self, event: MemberHeard) -> None:
-        if reason := self.fleet.others.hear(event, self._now):
+        if reason := self.company.hear(event, self._now):
             self.route.want(reason)
 
     def _close_floor(self, event: FollowerBlocked) -> None:
@@ -198,7 +198,7 @@ class EventHandler:
         if self.map.grid is None or not self.map.building.look(self._now):
             return
         misfit = self.ledger.begin_elsewhere(self.map.grid.frame)
-        self.fleet.others.ground.clear()
+        self.company.forget_ground()
         self._record()
         self._change_building(misfit)
 
@@ -227,7 +227,7 @@ class EventHandler:
         misfit = self.ledger.move_to(frame)
         if before not in ("", frame):
             # As the ledger forgets what they swept there.
-            self.fleet.others.ground.clear()
+            self.company.forget_ground()
         if misfit is None and before not in ("", frame):
             why = f"map and poses are in frame {frame!r} now, no longer in {before!r}"
             self.changes.begin(self.orders.order_state.in_other_frame(why))

@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 
 from fasaco_edge.errors import NothingToCover
 from fasaco_edge.grid.lattice import Cell
+from fasaco_edge.mission.company import Company, Waiting
 from fasaco_edge.mission.core.blocked_follower import BlockedFollower
 from fasaco_edge.mission.core.charging import Charging
 from fasaco_edge.mission.core.events import Decision, PathUpdate, State
-from fasaco_edge.mission.core.giving_way import GivingWay
 from fasaco_edge.mission.core.in_dock import InDock
 from fasaco_edge.mission.core.path_checks import PathChecks
 from fasaco_edge.mission.core.route import NO_CELLS, Route
@@ -21,7 +21,6 @@ from fasaco_edge.mission.core.trail_layer import TrailLayer
 from fasaco_edge.mission.core.trouble import DRIVING, Troubles
 from fasaco_edge.mission.core.way_out import WayOut
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
-from fasaco_edge.mission.fleet.layer import FleetLayer
 from fasaco_edge.mission.line.layer import LineLayer
 from fasaco_edge.mission.map.inputs import InputMonitor
 from fasaco_edge.mission.map.map_state import MapState
@@ -55,9 +54,9 @@ class Executive:
     route: Route
     line: LineLayer
     trail: TrailLayer
-    fleet: FleetLayer
+    company: Company
     charging: Charging
-    giving_way: GivingWay
+    giving_way: Waiting
     dock: InDock
     way_out: WayOut
     blocked: BlockedFollower
@@ -144,7 +143,7 @@ class Executive:
         route, orders, now = self.route, self.orders, self._now
         if self._state in DRIVING:
             self._checks.check_deviation(cell, now)
-        if self._state is State.COVERING and self.fleet.members:
+        if self._state is State.COVERING and self.company.has_members:
             self._checks.check_worth(now)
         if reason := orders.begin(cell, now):
             route.want(reason)
@@ -186,7 +185,7 @@ class Executive:
         is_docked = order.errand == "charge" and self._why_in_dock() is not None
         lacks_map = self.map.building.why or self._why_no_mask()
         may_drive = self.monitor.is_sound(self._now) and not lacks_map
-        if not (is_going and self.fleet.members and may_drive) or is_docked:
+        if not (is_going and self.company.has_members and may_drive) or is_docked:
             way.end()
             return None
         # Others may have swept meanwhile what this robot waits to drive to.
@@ -330,7 +329,7 @@ class Executive:
         """Divide the rest among the fleet if due; return why a plan is wanted, or ""."""
         if self.orders.order_state.stage is Stage.RETURNING:
             return ""
-        return self.fleet.share(self.orders.cells.open_cells, cell, self._now, at_once=at_once)
+        return self.company.share(self.orders.cells.open_cells, cell, self._now, at_once=at_once)
 
     def _return_home(self, cell: Cell, update: PathUpdate | None) -> Decision:
         route, area, home = self.route, self.map.area, self.orders.goal()

@@ -9,10 +9,14 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import replace
 
+import numpy as np
+from numpy.typing import NDArray
+
 from fasaco_edge.grid.geometry import StampedPose
 from fasaco_edge.grid.lattice import Cell, CoverageLattice
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.grid.rotation import rotated_points
+from fasaco_edge.mission.company import OthersCells, company_kind
 from fasaco_edge.mission.config import MissionConfig
 from fasaco_edge.mission.core.blocked_follower import BlockedFollower
 from fasaco_edge.mission.core.charging import BatteryGauge, Charging
@@ -26,7 +30,6 @@ from fasaco_edge.mission.core.events import (
     State,
 )
 from fasaco_edge.mission.core.executive import Executive
-from fasaco_edge.mission.core.giving_way import GivingWay
 from fasaco_edge.mission.core.in_dock import InDock
 from fasaco_edge.mission.core.lattice_angle import LatticeAngle
 from fasaco_edge.mission.core.lattice_rotation import LatticeRotation
@@ -43,9 +46,6 @@ from fasaco_edge.mission.coverage.rotated_ledger import rotated_ledger
 from fasaco_edge.mission.coverage.swept_floor import SweptFloor
 from fasaco_edge.mission.coverage.tool_sight import ToolSight
 from fasaco_edge.mission.coverage.unreached import Unreached
-from fasaco_edge.mission.fleet.layer import FleetLayer
-from fasaco_edge.mission.fleet.shared import SharedProgress
-from fasaco_edge.mission.fleet.traffic import Points
 from fasaco_edge.mission.line.layer import FloorToSweep, LineLayer
 from fasaco_edge.mission.map.idle_places import IdlePlaces
 from fasaco_edge.mission.map.inputs import InputMonitor
@@ -65,7 +65,7 @@ class Mission:
     Attributes:
         state, reason: its state, and why.
         route: the path and the pending plan, with counts; read-only.
-        fleet: the other robots; read-only.
+        company: the other robots; read-only.
         charging: the battery, and when to charge; read-only.
     """
 
@@ -95,16 +95,11 @@ class Mission:
             sight = ToolSight(
                 tool_m, radius_m, config.footprint.free_at_most, lambda: map_state.grid
             )
-        self._ledger = MissionLedger(cell_m, tool_m, ahead_m, config.map_place, sight)
+        kind = company_kind(config)
+        self._ledger = MissionLedger(cell_m, tool_m, ahead_m, kind.cells(config), sight)
         monitor = InputMonitor(config)
-        self.fleet = FleetLayer(
-            config.robot,
-            config.cost,
-            config.footprint.cell_m,
-            self._map,
-            self._ledger,
-        )
-        self._orders = Sequencer(config, self._map, self._ledger, self.fleet)
+        self.company = kind.company(config, self._map, self._ledger)
+        self._orders = Sequencer(config, self._map, self._ledger, self.company)
         self.route = Route(config.spare_share, self._map, self._orders)
         owners = self._map, self._ledger, monitor, self._orders, self.route
         self._line = LineLayer(sweeping, self._map, self._ledger, self._orders, self.route)
@@ -114,10 +109,10 @@ class Mission:
         self._changes = OrderChanges(*ordered, config.policy, self._rotation.deg)
         way_out = WayOut(self._map, self.route)
         blocked = BlockedFollower()
-        measured = self._drive, self.fleet, self._gauge, way_out, blocked
+        measured = self._drive, self.company, self._gauge, way_out, blocked
         self._handler = EventHandler(*owners, self._line, self._trail, *measured, self._changes)
-        self.giving_way = GivingWay(config, self._map, self.route, self.fleet)
-        decided_by = self._line, self._trail, self.fleet, self.charging, self.giving_way
+        self.giving_way = kind.waiting(config, self._map, self.route, self.company)
+        decided_by = self._line, self._trail, self.company, self.charging, self.giving_way
         in_dock = InDock(self._map, self._gauge)
         mask = mask_frame(self._config.policy.keep_out_mask)
         self._executive = Executive(*owners, *decided_by, in_dock, way_out, blocked, mask)
@@ -337,11 +332,11 @@ class Mission:
         return self._ledger
 
     @property
-    def shared(self) -> SharedProgress:
+    def shared(self) -> OthersCells:
         """The cells swept by other robots."""
         return self._ledger.shared
 
-    def next_metres(self) -> Points:
+    def next_metres(self) -> NDArray[np.float64]:
         """Return the points of the path's next metres in the map frame [m], float64 (n, 2)."""
         line = self.giving_way.line()[1:]
         return rotated_points(line, self._rotation.deg) if len(line) else line
@@ -353,7 +348,7 @@ class Mission:
         stands = is_covering and len(self.route.path.ahead) < 2
         if self.giving_way.waits_for or not (stands and self._orders.waits_for_others):
             return self.giving_way.waits_for
-        return self.fleet.busiest(self._orders.cells.open_cells)
+        return self.company.busiest(self._orders.cells.open_cells)
 
     def open_cells(self) -> int:
         """Return the number of cells still to be swept, by this robot or another."""

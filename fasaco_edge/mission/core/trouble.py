@@ -9,12 +9,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
+from fasaco_edge.mission.company import Waiting
 from fasaco_edge.mission.config import MissionPolicy
 from fasaco_edge.mission.core.blocked_follower import BlockedFollower
 from fasaco_edge.mission.core.charging import Charging
 from fasaco_edge.mission.core.dock_current import DockCurrent
 from fasaco_edge.mission.core.events import State
-from fasaco_edge.mission.core.giving_way import GivingWay
 from fasaco_edge.mission.core.in_dock import InDock
 from fasaco_edge.mission.core.standing import Standing
 from fasaco_edge.mission.core.way_out import WayOut
@@ -74,7 +74,7 @@ class Troubles:
     map: MapState
     monitor: InputMonitor
     charging: Charging
-    giving_way: GivingWay
+    giving_way: Waiting
     standing: Standing
     dock: InDock
     way_out: WayOut

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from fasaco_edge.errors import LedgerFullError, LedgerMismatchError
 from fasaco_edge.grid.geometry import Point, Pose2D, Window
 from fasaco_edge.grid.lattice import Cell, CoverageLattice
-from fasaco_edge.mission.config import MapPlace
+from fasaco_edge.mission.company import OthersCells
 from fasaco_edge.mission.coverage.fit import Fit, Verdict
 from fasaco_edge.mission.coverage.floor_tiles import FLOOR_TILE, PIXEL_M
 from fasaco_edge.mission.coverage.ledger import (
@@ -36,7 +36,6 @@ from fasaco_edge.mission.coverage.swept_floor import (
     MOST_FLOOR_TILES,
     SweptFloor,
 )
-from fasaco_edge.mission.fleet.shared import SharedProgress
 from fasaco_edge.mission.map.loop_closure import Motion, certain_floor, uncertain_cells
 
 if TYPE_CHECKING:
@@ -98,7 +97,7 @@ class MissionLedger:
         cell_m: float,
         tool_m: float,
         ahead_m: float = 0.0,
-        map_place: MapPlace | None = None,
+        shared: OthersCells | None = None,
         sight: ToolSight | None = None,
     ) -> None:
         """Start empty.
@@ -107,7 +106,7 @@ class MissionLedger:
             cell_m: edge of a cell [m].
             tool_m: width of the tool [m].
             ahead_m: from where the robot turns about to the tool's centre, ahead [m].
-            map_place: where its map lies in the frame of its fleet; None without such a frame.
+            shared: cells swept by other robots; None for a robot alone.
             sight: of a tool that sticks out of the robot; None for one that does not.
         """
         self._sight = sight
@@ -115,7 +114,7 @@ class MissionLedger:
         self._covered = self._nothing("")
         self.first_plan_reason = "first plan"
         self.reopened = 0
-        self.shared = SharedProgress(map_place)
+        self.shared = shared or OthersCells()
         self.passed, self.missed = PassedCells(), MissedCells()
         # The ledger from before a restart while no map has confirmed it, and what was covered
         # since, which is true in any building.

@@ -8,7 +8,7 @@ takes over a part of the remaining area.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +16,9 @@ from numpy.typing import NDArray
 from fasaco_edge.grid.changes import carried
 from fasaco_edge.grid.geometry import Window
 from fasaco_edge.grid.lattice import Cell
-from fasaco_edge.mission.core.events import Part
+from fasaco_edge.mission.company import Company, OpenCells
+from fasaco_edge.mission.config import MissionConfig
+from fasaco_edge.mission.core.events import MemberHeard, Part
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
 from fasaco_edge.mission.fleet.at_work import AtWork
 from fasaco_edge.mission.fleet.division import Division, Robot, divide
@@ -24,7 +26,7 @@ from fasaco_edge.mission.fleet.division_numbers import DivisionNumbers
 from fasaco_edge.mission.fleet.ground import viewpoint
 from fasaco_edge.mission.fleet.members import Member, Members
 from fasaco_edge.mission.fleet.remainder import Remainder
-from fasaco_edge.mission.fleet.shared import MOST_ROBOTS
+from fasaco_edge.mission.fleet.shared import MOST_ROBOTS, SharedProgress
 from fasaco_edge.mission.map.map_state import MapState
 from fasaco_edge.mission.map.reachable_area import ReachableArea
 from fasaco_edge.planners.cost import CoverageCost
@@ -38,10 +40,8 @@ UNEVEN, UNEVEN_S = 1.25, 40.0
 MANY_TAKEN = 30
 LATER = "another robot has a newer division"
 
-OpenCells = Callable[[Window], NDArray[np.bool_]]
 
-
-class FleetLayer:
+class FleetLayer(Company):
     """Divides the remaining area among the robots; inactive without a fleet.
 
     Attributes:
@@ -80,6 +80,33 @@ class FleetLayer:
         # at the last check.
         self._taken, self._counted = 0, 0
         self._remainder = Remainder()
+
+    @classmethod
+    def of(cls, config: MissionConfig, map_state: MapState, ledger: MissionLedger) -> FleetLayer:
+        """Return the layer of a robot's mission."""
+        return cls(config.robot, config.cost, config.footprint.cell_m, map_state, ledger)
+
+    def hear(self, event: MemberHeard, now: float) -> str:
+        """Take in another robot's message; return why it requires a plan, or ""."""
+        return self.others.hear(event, now)
+
+    def forget_ground(self) -> None:
+        """Forget what others have seen: it belongs to another map."""
+        self.others.ground.clear()
+
+    def passable(self, area: ReachableArea, cell: Cell, radius_m: float) -> ReachableArea:
+        """Return an area as a robot in ``cell`` can drive it: around robots in the way."""
+        return self.others.passable(area, cell, radius_m)
+
+    @property
+    def has_members(self) -> bool:
+        """Whether other robots are heard."""
+        return bool(self.others.known)
+
+    @property
+    def shared(self) -> SharedProgress:
+        """The cells that the others have swept."""
+        return self.others.shared
 
     @property
     def members(self) -> dict[str, Member]:

@@ -15,7 +15,7 @@ from fasaco_edge.mission.core.events import MemberHeard, State
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
 from fasaco_edge.mission.fleet.ground import SharedGround
 from fasaco_edge.mission.fleet.refuge import without
-from fasaco_edge.mission.fleet.shared import MOST_ROBOTS
+from fasaco_edge.mission.fleet.shared import MOST_ROBOTS, SharedProgress
 from fasaco_edge.mission.fleet.traffic import OLD_S, Neighbour, least_apart_m
 from fasaco_edge.mission.map.reachable_area import ReachableArea
 
@@ -100,6 +100,13 @@ class Members:
             if not member.left_out and now - member.heard_at < OLD_S
         }
 
+    @property
+    def shared(self) -> SharedProgress:
+        """The cells that they have swept."""
+        shared = self._ledger.shared
+        assert isinstance(shared, SharedProgress)
+        return shared
+
     def avoid(self, robot: str) -> None:
         """Plan around a robot where it stands now, until it moves."""
         newest = self.known[robot].newest
@@ -172,7 +179,7 @@ class Members:
         if not self._robot:
             return ""
         before, frame = self.known.get(event.robot), self._ledger.current.frame
-        left_out = event.misfit or self._ledger.shared.why_misplaced(frame)
+        left_out = event.misfit or self.shared.why_misplaced(frame)
         if not left_out and event.frame not in ("", frame):
             left_out = f"its frame is {event.frame!r}, here it is {frame!r}"
         place, moved_at = (event.x, event.y), now
@@ -190,7 +197,7 @@ class Members:
             self.ground.drop(event.robot)
         swept = event.robot, event.epoch, event.tiles
         try:
-            is_open_again = self._ledger.shared.hear(*swept, self.known, event.kept, event.lattice)
+            is_open_again = self.shared.hear(*swept, self.known, event.kept, event.lattice)
         except FleetError as error:
             self.known[event.robot] = replace(member, left_out=str(error))
             self.ground.drop(event.robot)

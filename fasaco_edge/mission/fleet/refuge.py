@@ -17,6 +17,7 @@ from fasaco_edge.kernels import EAST, NORTH, SOUTH, WEST
 from fasaco_edge.kernels.fleet.split import FAR, ways_from
 from fasaco_edge.kernels.lattice.reach import shortest_walk
 from fasaco_edge.mission.fleet.traffic import AHEAD_M, Neighbour, Points, least_apart_m, spaced
+from fasaco_edge.mission.line.way import comes_nearer
 from fasaco_edge.mission.map.reachable_area import ReachableArea
 
 Places = Callable[[NDArray[np.int32]], Points]
@@ -28,19 +29,6 @@ def discs(radius_m: float, neighbours: Mapping[str, Neighbour]) -> Points:
     heard = [near.heard for _, near in sorted(neighbours.items())]
     rows = [(one.x, one.y, least_apart_m(radius_m, one)) for one in heard]
     return np.array(rows, np.float64).reshape(-1, 3)
-
-
-def comes_nearer(a: Points, b: Points, beside: Points) -> bool:
-    """Tell whether a straight way enters one of some discs, or goes farther into one.
-
-    Args:
-        a, b: its ends, (2,).
-        beside: the discs, float64 (k, 3): their middles, in the same units, and radii.
-    """
-    edge, to = b - a, beside[:, :2] - a
-    share = np.clip(to @ edge / max(float(edge @ edge), 1e-12), 0.0, 1.0)
-    nearest = np.hypot(*(to - share[:, None] * edge).T)
-    return bool((nearest < np.minimum(beside[:, 2], np.hypot(*to.T)) - 1e-6).any())
 
 
 def refuge(

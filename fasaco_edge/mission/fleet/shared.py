@@ -13,7 +13,7 @@ never heard of, they stay disregarded, and are swept once more than needed.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
@@ -22,8 +22,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.errors import FleetError
+from fasaco_edge.mission.company import Inside, OthersCells
 from fasaco_edge.mission.core.events import SAME_LATTICE
-from fasaco_edge.mission.coverage.ledger import TILE, Cells, LedgerSnapshot
+from fasaco_edge.mission.coverage.ledger import TILE, LedgerSnapshot
 from fasaco_edge.mission.fleet.heard import Heard, Kept
 from fasaco_edge.mission.fleet.tiles import (
     EMPTY,
@@ -46,10 +47,8 @@ if TYPE_CHECKING:
 MOST_ROBOTS, MOST_TILES = 32, 4096
 MOST_TILES_OF_ONE = MOST_TILES // 8
 
-Inside = Callable[[Cells, Cells], NDArray[np.bool_]]
 
-
-class SharedProgress:
+class SharedProgress(OthersCells):
     """The cells that other robots have swept, on this robot's lattice.
 
     Args:
@@ -73,7 +72,7 @@ class SharedProgress:
         self._known: tuple[Window | None, NDArray[np.bool_]]
         self._known = None, np.zeros((0, 0), np.bool_)
         self._grown: set[Cell] = set()
-        self._kept: tuple[int, bytes] = 0, b""
+        self._encoded: tuple[int, bytes] = 0, b""
 
     def begin(self, epoch: int) -> None:
         """Start an epoch that no earlier ledger of this robot used, unless one was restored."""
@@ -247,11 +246,11 @@ class SharedProgress:
 
     def encode(self) -> bytes:
         """Return everything as bytes, to be kept with the ledger; b"" for nothing."""
-        if self._kept[0] != self.version:
+        if self._encoded[0] != self.version:
             robots = {name: heard.kept() for name, heard in self._robots.items()}
             note = _Note(_VERSION, self.epoch, robots, self._origin, self._map_frame, self._left)
-            self._kept = self.version, msgspec.json.encode(note)
-        return self._kept[1]
+            self._encoded = self.version, msgspec.json.encode(note)
+        return self._encoded[1]
 
     def resume(self, kept: bytes) -> None:
         """Restore the bytes of ``encode``; those of another release are ignored.

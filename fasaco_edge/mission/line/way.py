@@ -21,7 +21,6 @@ from fasaco_edge.kernels.floor.capsule import is_clear
 from fasaco_edge.kernels.floor.turning import turn_seconds
 from fasaco_edge.kernels.lattice.reach import shortest_walk
 from fasaco_edge.mission.config import Sweeping
-from fasaco_edge.mission.fleet.refuge import comes_nearer
 from fasaco_edge.mission.line.polyline import Points
 
 # A point is connected straight to one of so many next ones, the farthest possible: each is a corner
@@ -47,6 +46,19 @@ def sees_on(floor: FloorMap, a: Points, b: Points) -> bool:
     """Tell whether the robot can drive straight between two points, (2,): x, y [m]."""
     ends = [np.array(map_to_raster(floor.geometry, *point.tolist())) for point in (a, b)]
     return is_clear_between(floor, ends[0], ends[1])
+
+
+def comes_nearer(a: Points, b: Points, beside: Points) -> bool:
+    """Tell whether a straight way enters one of some discs, or goes farther into one.
+
+    Args:
+        a, b: its ends, (2,).
+        beside: the discs, float64 (k, 3): their middles, in the same units, and radii.
+    """
+    edge, to = b - a, beside[:, :2] - a
+    share = np.clip(to @ edge / max(float(edge @ edge), 1e-12), 0.0, 1.0)
+    nearest = np.hypot(*(to - share[:, None] * edge).T)
+    return bool((nearest < np.minimum(beside[:, 2], np.hypot(*to.T)) - 1e-6).any())
 
 
 def shortened(

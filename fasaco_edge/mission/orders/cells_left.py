@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.grid.geometry import Window
+from fasaco_edge.mission.company import Company
 from fasaco_edge.mission.config import MissionConfig
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
-from fasaco_edge.mission.fleet.layer import FleetLayer
 from fasaco_edge.mission.map.map_state import MapState
 from fasaco_edge.mission.map.reachable_area import ReachableArea
 from fasaco_edge.mission.orders.exploration import Exploration, frontier
@@ -19,10 +19,10 @@ from fasaco_edge.mission.orders.zones import in_zones
 
 
 class CellsLeft:
-    """Derives the cells left from map, ledger and fleet; owns nothing.
+    """Derives the cells left from map, ledger and company; owns nothing.
 
     Args:
-        config, map_state, ledger, fleet: what they are derived from.
+        config, map_state, ledger, company: what they are derived from.
         zones: the zones of the order that are due; None without an order.
         exploration: the viewpoints.
     """
@@ -32,11 +32,11 @@ class CellsLeft:
         config: MissionConfig,
         map_state: MapState,
         ledger: MissionLedger,
-        fleet: FleetLayer,
+        company: Company,
         zones: Callable[[], tuple[Zone, ...] | None],
         exploration: Callable[[], Exploration],
     ) -> None:
-        self._config, self._map, self._ledger, self._fleet = config, map_state, ledger, fleet
+        self._config, self._map, self._ledger, self._company = config, map_state, ledger, company
         self._zones, self._exploration = zones, exploration
 
     def open_cells(self, window: Window) -> NDArray[np.bool_]:
@@ -57,7 +57,7 @@ class CellsLeft:
     def open_to_me(self, area: ReachableArea) -> NDArray[np.bool_]:
         """Return the cells that still need a visit by this robot: its part, in a fleet."""
         window = area.lattice.window
-        cells = self._fleet.mine(self.unswept(window), area).copy()
+        cells = self._company.mine(self.unswept(window), area).copy()
         self._exploration().mark(cells, window)
         return cells
 
@@ -87,13 +87,13 @@ class CellsLeft:
     @property
     def keeps_passed(self) -> bool:
         """Whether floor of cells that it has passed stays this robot's, whoever's part they are."""
-        return bool(self._fleet.members)
+        return self._company.has_members
 
     def asked_of_me(self, area: ReachableArea) -> NDArray[np.bool_]:
         """Return on which cells of an area this robot has to sweep the floor, covered or not."""
         window = area.lattice.window
         asked = self.asked_for(window)
-        mine = self._fleet.mine_to_sweep(asked, self.unswept(window), area)
+        mine = self._company.mine_to_sweep(asked, self.unswept(window), area)
         if self.keeps_passed:
             mine = mine | (self._ledger.passed.inside(window) & asked)
         return mine

@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.grid.lattice import Cell, CoverageLattice
+from fasaco_edge.mission.company import Company
 from fasaco_edge.mission.config import MissionConfig
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
 from fasaco_edge.mission.coverage.unreached import Unreached, UnreachedFinder
-from fasaco_edge.mission.fleet.layer import FleetLayer
 from fasaco_edge.mission.map.loop_closure import Motion, moved_cells
 from fasaco_edge.mission.map.map_state import MapState
 from fasaco_edge.mission.map.reachable_area import ReachableArea, anchor_cell
@@ -61,18 +61,18 @@ class Sequencer:
     """
 
     def __init__(
-        self, config: MissionConfig, map_state: MapState, ledger: MissionLedger, fleet: FleetLayer
+        self, config: MissionConfig, map_state: MapState, ledger: MissionLedger, company: Company
     ) -> None:
         self.order_state = OrderState.idle(NO_ORDER)
         self._config = config
         self._map = map_state
         self._ledger = ledger
-        self._fleet = fleet
+        self._company = company
         self._run = _Run()
         # Returns at the end of an order how much floor was swept, as text; "" for no text.
         self._sum_up: Callable[[], str] = str
         self.cells = CellsLeft(
-            config, map_state, ledger, fleet, self._zones, lambda: self._run.exploration
+            config, map_state, ledger, company, self._zones, lambda: self._run.exploration
         )
         self._unreached = UnreachedFinder(map_state, ledger)
         # Cached result: whether a retry is worthwhile, for a given map and ledger.
@@ -100,7 +100,7 @@ class Sequencer:
     @property
     def waits_for_others(self) -> bool:
         """Whether all that is left is others' to sweep, who go on with it."""
-        return self._fleet.others_go_on and not self.cells.left_to_me()
+        return self._company.others_go_on and not self.cells.left_to_me()
 
     @property
     def ending(self) -> str:
@@ -127,7 +127,7 @@ class Sequencer:
         self.order_state, self._run = state, _Run()
         self._retry_check = (None, False)
         self._unreached.restart()
-        self._fleet.try_again()
+        self._company.try_again()
 
     def set_state(self, state: OrderState) -> None:
         """Continue with the same order in another state, after a command."""
@@ -181,7 +181,7 @@ class Sequencer:
             self._ledger.forget(partial(in_zones, (zone,)))
         self.order_state = replace(state, begun=True, home=state.home or cell)
         run.done, run.in_vain = -1, 0
-        self._fleet.try_again()
+        self._company.try_again()
         if state.pass_number == 1:
             run.exploration.begin()
         return "" if state.automatic else state.title
@@ -221,7 +221,7 @@ class Sequencer:
     def passable(self, area: ReachableArea, cell: Cell) -> ReachableArea:
         """Return an area as a robot in ``cell`` can drive it: around robots in the way."""
         radius_m = self._config.footprint.robot_radius_m
-        return self._fleet.others.passable(area, cell, radius_m)
+        return self._company.passable(area, cell, radius_m)
 
     def explore(self, cell: Cell) -> str:
         """Look for a path to an unreachable zone or part; return why a plan is wanted, or ""."""
@@ -230,7 +230,7 @@ class Sequencer:
         free = None if area is None else self.passable(area, cell)
         if reason := exploration.seek(zone, area, free, cell):
             return reason
-        viewpoints = self._fleet.viewpoints(self.cells.open_cells, cell)
+        viewpoints = self._company.viewpoints(self.cells.open_cells, cell)
         return next(filter(None, (exploration.look_beyond(at, cell) for at in viewpoints)), "")
 
     def why_standing(self, now: float) -> str:
@@ -267,7 +267,7 @@ class Sequencer:
         is_given_up = cells > 0 and run.in_vain > MAX_IN_VAIN
         if is_given_up and run.exploration.skip_viewpoint():
             return False
-        if is_given_up and self._fleet.has_company:
+        if is_given_up and self._company.has_company:
             # Other robots may leave before they have swept their parts: those come first.
             is_given_up, run.in_vain = self._leave_to_others(), 0
         return is_given_up
@@ -282,8 +282,8 @@ class Sequencer:
         area = self._map.area
         assert area is not None
         unswept = self.cells.unswept(area.lattice.window) & area.reachable
-        self._fleet.give_up(self._fleet.mine(unswept, area), area)
-        return not self._fleet.untried(unswept, area).any()
+        self._company.give_up(self._company.mine(unswept, area), area)
+        return not self._company.untried(unswept, area).any()
 
     def pass_over_unreachable(self) -> bool:
         """Pass over what this robot cannot come to now, in a fleet; tell whether there was any.
@@ -291,11 +291,11 @@ class Sequencer:
         What it can come to of the others' parts comes before a retry.
         """
         area = self._map.area
-        if area is None or not self._fleet.has_company:
+        if area is None or not self._company.has_company:
             return False
         unswept = self.cells.unswept(area.lattice.window) & area.reachable
-        mine = self._fleet.mine(unswept, area)
-        self._fleet.pass_over(mine, area)
+        mine = self._company.mine(unswept, area)
+        self._company.pass_over(mine, area)
         return bool(mine.any())
 
     def advance(self, now: float) -> None:
@@ -349,7 +349,7 @@ class Sequencer:
         run = self._run
         run.retry_at = None
         run.exploration.aim_at(self._viewpoints() - {cell})
-        self._fleet.try_again()
+        self._company.try_again()
         # In a retry, one path without progress is enough to give up.
         run.done, run.in_vain = self._done, MAX_IN_VAIN
         return f"tried again, {self.order_state.tries + 1} of {self._config.policy.retries}"

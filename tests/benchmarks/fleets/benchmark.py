@@ -15,6 +15,7 @@ from fasaco_edge.cli.demo.robots import apart
 from fasaco_edge.grid.lattice import CoverageLattice, Footprint
 from fasaco_edge.grid.map_files import find_map, read_map
 from fasaco_edge.grid.occupancy import OccupancyGrid
+from fasaco_edge.mission.fleet.kind import fleet_of
 from fasaco_edge.planners.grids import start_point
 from fasaco_edge.planners.warmup import warm_up
 from tests.benchmarks.buildings import building
@@ -154,7 +155,7 @@ def _figures(name: str, run: FleetRun, alone: FleetRun) -> FleetFigures:
         touches=sum(robot.world.touches for robot in run.robots),
         meetings=sum(robot.world.meetings for robot in run.robots),
         plans=sum(robot.plans for robot in run.robots),
-        divisions=max(robot.mission.fleet.numbers.number for robot in run.robots),
+        divisions=max(fleet_of(robot.mission).numbers.number for robot in run.robots),
         plan_ms=_p99(run, "plan_ms"),
         step_ms=_p99(run, "step_ms"),
         plan_alone_ms=_p99(alone, "plan_ms"),

@@ -33,6 +33,7 @@ from fasaco_edge.mission.core.mission import Mission
 from fasaco_edge.mission.core.spare_time import most_s
 from fasaco_edge.mission.coverage.ledger import CoverageLedger
 from fasaco_edge.mission.fleet.ground import GroundTelling
+from fasaco_edge.mission.fleet.kind import fleet_of
 from fasaco_edge.mission.fleet.shared import Telling
 from fasaco_edge.planners.cost import CoverageCost, SearchWork
 from fasaco_edge.planners.line import LINES
@@ -143,13 +144,13 @@ class FleetRobot:
             state=str(mission.state),
             x=round(mission.pose.pose.x, 3),
             y=round(mission.pose.pose.y, 3),
-            step_s=mission.fleet.step_s,
+            step_s=fleet_of(mission).step_s,
             epoch=mission.shared.epoch,
-            division=mission.fleet.numbers.number,
+            division=fleet_of(mission).numbers.number,
             tiles=tiles,
             ground=self.telling_ground.next(mission.area, MOST_TILES),
-            by=mission.fleet.numbers.by,
-            parts=mission.fleet.parts,
+            by=fleet_of(mission).numbers.by,
+            parts=fleet_of(mission).parts,
             radius_m=self.world.config.robot_radius_m,
             ahead=tuple((x, y) for x, y in mission.next_metres().tolist()),
             waits_for=mission.waits_for,

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.grid.lattice import Cell
+from fasaco_edge.mission.company import Company, Waiting
 from fasaco_edge.mission.config import MissionConfig
 from fasaco_edge.mission.core.events import PathUpdate
 from fasaco_edge.mission.core.route import NO_CELLS, Route
@@ -53,7 +54,7 @@ STAYS_M, LONG_S, TOO_LONG_S = 0.2, 30.0, 60.0
 AGAIN_S = 2.0
 
 
-class GivingWay:
+class GivingWay(Waiting):
     """Decides when the robot waits, where it makes way to, and when it goes on.
 
     Attributes:
@@ -85,8 +86,18 @@ class GivingWay:
         # Why it waited last, and when.
         self._waited, self._waited_at = "", -math.inf
 
-    def succeed(self, before: GivingWay) -> None:
+    @classmethod
+    def of(
+        cls, config: MissionConfig, map_state: MapState, route: Route, company: Company
+    ) -> GivingWay:
+        """Return that of a robot's mission, whose company is a fleet's."""
+        assert isinstance(company, FleetLayer)
+        return cls(config, map_state, route, company)
+
+    def succeed(self, before: Waiting) -> None:
         """Go on with the count of another one: where the robot stays, and why it waited."""
+        if not isinstance(before, GivingWay):
+            return
         self._waited, self._waited_at = before._waited, before._waited_at
         self._stays_at, self._stays_since = before._stays_at, before._stays_since
 

@@ -1,0 +1,218 @@
+"""Company: what a mission asks about other robots in its building, and the answers of one alone.
+
+A robot of a fleet has another ``Company``, in ``mission.fleet``; nothing else of the mission knows
+of it. The area is divided among robots there, and who waits for whom is decided there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from types import MappingProxyType
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fasaco_edge.grid.geometry import Window
+from fasaco_edge.mission.coverage.ledger import Cells, LedgerSnapshot
+
+if TYPE_CHECKING:
+    # For types only: an idle daemon loads no kernels.
+    from fasaco_edge.grid.lattice import Cell
+    from fasaco_edge.mission.config import MissionConfig
+    from fasaco_edge.mission.core.events import MemberHeard, PathUpdate
+    from fasaco_edge.mission.core.route import Route
+    from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
+    from fasaco_edge.mission.map.map_state import MapState
+    from fasaco_edge.mission.map.reachable_area import ReachableArea
+    from fasaco_edge.mission.orders.order import Errand
+
+OpenCells = Callable[[Window], NDArray[np.bool_]]
+Inside = Callable[[Cells, Cells], NDArray[np.bool_]]
+
+
+class OthersCells:
+    """The cells that others have swept, a part of the ledger: none.
+
+    What a fleet's robot kept of them is kept on, until this robot forgets cells of its own.
+
+    Attributes:
+        version: counter of changes.
+        epoch: changes whenever this robot forgets cells.
+    """
+
+    version = epoch = 0
+
+    def __init__(self) -> None:
+        self._kept = b""
+
+    def swept(self, window: Window) -> NDArray[np.bool_]:
+        """Return which cells of ``window`` others have swept, bool (rows, cols), read-only."""
+        return np.zeros((window.rows, window.cols), np.bool_)
+
+    def begin(self, epoch: int) -> None:
+        """Start an epoch that no earlier ledger of this robot used, unless one was restored."""
+
+    def note_forgotten(self) -> None:
+        """Note that this robot has forgotten some of its own cells."""
+        self._kept = b""
+
+    def disregard(self, inside: Inside) -> None:
+        """Disregard all sweeps so far of the cells that a mask function chooses."""
+
+    def clear(self) -> None:
+        """Forget all that others reported: it belongs to another frame or building."""
+        self._kept = b""
+
+    def enter(self, frame: str) -> None:
+        """Note the active frame."""
+
+    def leave_building(self, frame: str) -> None:
+        """Note that the map in a frame shows another building than others mean."""
+        self._kept = b""
+
+    def begin_anew(self) -> None:
+        """Take the next map for one that others share."""
+        self._kept = b""
+
+    def snapshot(self, cell_m: float) -> LedgerSnapshot:
+        """Return the cells swept by others as one ledger."""
+        return LedgerSnapshot(cell_m, "", 0, MappingProxyType({}))
+
+    def encode(self) -> bytes:
+        """Return everything as bytes, to be kept with the ledger; b"" for nothing."""
+        return self._kept
+
+    def resume(self, kept: bytes) -> None:
+        """Restore the bytes of ``encode``."""
+        self._kept = kept
+
+
+class Company:
+    """The other robots, and this one's part of the area: none, and all of it."""
+
+    @property
+    def has_members(self) -> bool:
+        """Whether other robots are heard."""
+        return False
+
+    @property
+    def has_company(self) -> bool:
+        """Whether other robots are at work on the remaining area."""
+        return False
+
+    @property
+    def others_go_on(self) -> bool:
+        """Whether all that is left is others' to sweep, who are at it."""
+        return False
+
+    def hear(self, event: MemberHeard, now: float) -> str:
+        """Take in another robot's message; return why it requires a plan, or ""."""
+        return ""
+
+    def forget_ground(self) -> None:
+        """Forget what others have seen: it belongs to another map."""
+
+    def share(self, open_cells: OpenCells, cell: Cell, now: float, *, at_once: bool = False) -> str:
+        """Divide the remaining area again if worthwhile; return why a plan is wanted, or "".
+
+        Args:
+            open_cells: mask function: a window to the cells that still need a visit.
+            cell: this robot's cell.
+            now: time [s].
+            at_once: whether this robot is out of work.
+        """
+        return ""
+
+    def mine(self, cells: NDArray[np.bool_], area: ReachableArea) -> NDArray[np.bool_]:
+        """Return which cells are this robot's to sweep."""
+        return cells
+
+    def mine_to_sweep(
+        self, cells: NDArray[np.bool_], unvisited: NDArray[np.bool_], area: ReachableArea
+    ) -> NDArray[np.bool_]:
+        """Return on which cells the floor is this robot's to sweep, visited or not."""
+        return cells
+
+    def untried(self, cells: NDArray[np.bool_], area: ReachableArea) -> NDArray[np.bool_]:
+        """Return the cells that this robot has not given up."""
+        return cells
+
+    def give_up(self, cells: NDArray[np.bool_], area: ReachableArea) -> None:
+        """Leave cells that this robot tried in vain to the others, whatever maps come."""
+
+    def pass_over(self, cells: NDArray[np.bool_], area: ReachableArea) -> None:
+        """Leave cells that this robot cannot come to to the others, until the next map."""
+
+    def try_again(self) -> None:
+        """Clear the list of cells given up."""
+
+    def passable(self, area: ReachableArea, cell: Cell, radius_m: float) -> ReachableArea:
+        """Return an area as a robot in ``cell`` can drive it: around robots in the way."""
+        return area
+
+    def viewpoints(self, open_cells: OpenCells, cell: Cell) -> Iterator[Cell]:
+        """Yield where to look for work that others alone see."""
+        return iter(())
+
+    def busiest(self, open_cells: OpenCells) -> str:
+        """Return the name of the other robot with most cells left in its part; "" for none."""
+        return ""
+
+
+class Waiting:
+    """When the robot waits for others, and makes way for them: never.
+
+    Attributes:
+        waits_for: name of the robot that it waits for; "" for none.
+        reason: that as text.
+        is_near: whether another robot is near.
+    """
+
+    waits_for = reason = ""
+    is_near = False
+
+    def succeed(self, before: Waiting) -> None:
+        """Go on with what another one remembers."""
+
+    def line(self) -> NDArray[np.float64]:
+        """Return the next metres, from the robot's place on, points (x, y) [m], float64 (n, 2)."""
+        return np.zeros((0, 2))
+
+    def look_around(self, now: float) -> None:
+        """Note whether another robot is near."""
+
+    def look(self, now: float, *, has_work: bool = True, errand: Errand = "") -> PathUpdate | None:
+        """Decide again after ``look_around``; return the path to publish, if any."""
+        return None
+
+    def end(self) -> None:
+        """Wait no longer."""
+
+    def why_stuck(self, now: float) -> str:
+        """Return why the robot is thought to be held up for good, or ""."""
+        return ""
+
+
+class CompanyKind(NamedTuple):
+    """What makes the parts of a mission that know of other robots."""
+
+    cells: Callable[[MissionConfig], OthersCells]
+    company: Callable[[MissionConfig, MapState, MissionLedger], Company]
+    waiting: Callable[[MissionConfig, MapState, Route, Company], Waiting]
+
+
+ALONE = CompanyKind(
+    lambda _config: OthersCells(),
+    lambda _config, _map, _ledger: Company(),
+    lambda _config, _map, _route, _company: Waiting(),
+)
+
+
+def company_kind(config: MissionConfig) -> CompanyKind:
+    """Return what a robot of a fleet, which has a name there, or one alone needs."""
+    if not config.robot:
+        return ALONE
+    from fasaco_edge.mission.fleet.kind import FLEET  # noqa: PLC0415 - a robot alone has none
+
+    return FLEET
