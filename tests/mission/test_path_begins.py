@@ -8,6 +8,9 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from fasaco_edge.grid.geometry import GridGeometry, Pose2D
+from fasaco_edge.grid.occupancy import OccupancyGrid
+from fasaco_edge.mission.core.events import MapReceived
 from tests.mission.line_robot import RADIUS_M, TOOL_M, LineRobot
 
 
@@ -61,3 +64,16 @@ def test_wherever_the_robot_is_pushed_to_the_path_begins_there(seed):
     assert nearest.min() > min(gap, RADIUS_M) - 0.008
     robot.is_stuck = False
     assert robot.wait(900.0, lambda robot: robot.mission.state == "done")
+
+
+@pytest.mark.parametrize("after_s", [5.0, 9.3, 17.7, 33.1, 40.2])
+def test_on_another_raster_the_path_begins_at_the_robot(after_s):
+    """Not as far along its first edge as the robot was on the line before."""
+    robot = LineRobot(room_with_box(), (0.75, 0.75))
+    robot.wait(after_s, lambda _: False)
+    fine = room_with_box().repeat(2, axis=0).repeat(2, axis=1)
+    geometry = GridGeometry(*fine.shape, 0.025, Pose2D(0.0, 0.0))
+    robot.step(MapReceived(OccupancyGrid(geometry, fine)))
+    _, points, why = robot.paths[-1]
+    assert why == "map on another raster"
+    assert math.dist(points[0], (robot.x, robot.y)) < 0.01

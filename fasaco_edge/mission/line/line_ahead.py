@@ -418,8 +418,9 @@ class LineAhead:
         """
         old = self.line
         new, goes, comes = exchanged(old, pieces)
-        if len(old) > 1 and not np.array_equal(old.points[:2], new.points[:2]):
-            self.tally.pass_line(np.stack([old.points[0], self._place.on(old.points)]))
+        if not np.array_equal(old.points[:2], new.points[:2]):
+            if len(old) > 1:
+                self.tally.pass_line(np.stack([old.points[0], self._place.on(old.points)]))
             self._place.along = 0.0
         self.tally.exchange(goes, comes)
         self.line = new
