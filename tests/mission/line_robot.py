@@ -8,6 +8,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from fasaco_edge.daemon.ledger.codec import decode_ledger, encode_ledger
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D, StampedPose
 from fasaco_edge.grid.lattice import Footprint
 from fasaco_edge.grid.occupancy import OccupancyGrid
@@ -17,6 +18,7 @@ from fasaco_edge.mission.core.mission import Mission
 from fasaco_edge.mission.core.path_exit import PathExit
 from fasaco_edge.mission.orders.keep_outs import KeepOut
 from fasaco_edge.mission.orders.order import CommandName
+from fasaco_edge.mission.orders.order_state import OrderState
 from fasaco_edge.planners.cost import CoverageCost
 from fasaco_edge.planners.line import LINES
 from tests.mission.world import answer
@@ -40,6 +42,7 @@ class LineRobot:
     """A mission, and a robot that drives its line exactly.
 
     Attributes:
+        config: of the mission.
         mission: the mission.
         now: its time [s].
         x, y: the robot's position [m].
@@ -52,6 +55,7 @@ class LineRobot:
     def __init__(
         self, pixels: NDArray[np.int8], start: tuple[float, float], config: MissionConfig = CONFIG
     ) -> None:
+        self.config = config
         self.mission = Mission(config)
         self.exit = PathExit()
         self.now, self.yaw = 0.0, 0.0
@@ -83,6 +87,15 @@ class LineRobot:
     def show(self, pixels: NDArray[np.int8]) -> None:
         """Let a tick pass in which a map comes."""
         self.step(MapReceived(map_of(pixels)))
+
+    def restart(self, pixels: NDArray[np.int8]) -> None:
+        """Let another mission go on from what is kept, on a map that comes first."""
+        kept = self.mission.snapshot()
+        self.mission, self.exit = Mission(self.config), PathExit()
+        self.mission.restore_ledger(decode_ledger(encode_ledger(kept), kept.cell_m))
+        self.mission.restore_order(OrderState.from_json(kept.note))
+        self.path, self._plan = [], None
+        self.show(pixels)
 
     def command(self, name: CommandName, keep_out: KeepOut | None = None) -> None:
         """Give a command."""

@@ -1,6 +1,7 @@
 """A robot that drives home by command, or at the end of its order: mission.home, mission.dock."""
 
 import math
+from dataclasses import replace
 
 import pytest
 from msgspec import structs
@@ -279,7 +280,8 @@ def test_the_errand_survives_a_restart():
     drive = covering(20)
     drive.command("home")
     note = drive.mission.snapshot().note
-    assert OrderState.from_json(note) == drive.mission.order_state
+    kept = OrderState.from_json(note)
+    assert replace(kept, reached=None) == drive.mission.order_state
     assert drive.mission.order_state.errand == "home"
     again = robot(drive.cell, OrderState.from_json(note))
     assert again.mission.state is State.RETURNING

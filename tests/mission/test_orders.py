@@ -23,9 +23,11 @@ from fasaco_edge.mission.orders.order import (
     read_recorded,
 )
 from fasaco_edge.mission.orders.order_state import OrderState, Stage
+from fasaco_edge.mission.orders.reached_cells import ReachedCells
 from tests.support.examples import examples
 
 SQUARE = [[0, 0], [2, 0], [2, 2], [0, 2]]
+REACHED = ReachedCells(-1, 2, 3, 3, b"\xab\x80")
 KITCHEN = {"name": "kitchen", "polygon": SQUARE}
 
 
@@ -205,6 +207,7 @@ def test_the_legs_of_an_order():
         OrderState(MissionOrder(return_home=True), stage=Stage.OVER),
         OrderState.idle("cancelled").commanded(Command("keep_out_add", keep_out=VASE)),
         OrderState(TWO, errand="home", paused=True, home=(2, 1), keep_out=(VASE,)),
+        OrderState(TWO, reached=REACHED),
     ],
 )
 def test_what_is_kept_is_what_was(order_state):
@@ -221,6 +224,8 @@ def test_what_is_kept_is_what_was(order_state):
         {"pass": 0},
         {"stage": "dancing"},
         {"home": [1]},
+        {"reached": {"row0": 0, "col0": 0, "rows": 3, "cols": 3, "bits": "AA=="}},
+        {"reached": {"row0": 0, "col0": 0, "rows": 900_000, "cols": 1, "bits": "AAA="}},
         {"more": 1},
         {"order": {"zones": [{"name": "a", "polygon": [[0, 0], [0, 0], [0, 0]]}]}},
         {"keep_out": [{"name": "a", "polygon": [[0, 0], [0, 0], [0, 0]]}]},

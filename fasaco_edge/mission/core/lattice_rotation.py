@@ -94,7 +94,9 @@ class LatticeRotation:
         if home is not None and rotated_by_deg:
             x, y = rotated_point(home[1] + 0.5, home[0] + 0.5, -rotated_by_deg)
             home = math.floor(y), math.floor(x)
-        return replace(state, order=order, home=home)
+        # Cells at another angle are others.
+        reached = None if rotated_by_deg else state.reached
+        return replace(state, order=order, home=home, reached=reached)
 
     def path(self, update: PathUpdate, lattice: CoverageLattice | None) -> PathUpdate:
         """Return a path in the map frame, as published."""

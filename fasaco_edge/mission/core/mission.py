@@ -273,7 +273,8 @@ class Mission:
 
     def snapshot(self) -> LedgerSnapshot:
         """Return everything that is kept over a restart: coverage, and the order's progress."""
-        trail, note = self._trail.snapshot(), self.order_state.to_json()
+        trail = self._trail.snapshot()
+        note = replace(self.order_state, reached=self._orders.reached).to_json()
         ledger, lattice_deg = self._ledger.snapshot(), self._rotation.deg
         return replace(ledger, trail=trail, note=note, lattice_deg=lattice_deg)
 

@@ -8,8 +8,8 @@ from enum import IntEnum
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.grid.changes import carried
-from fasaco_edge.grid.geometry import Window
+from fasaco_edge.grid.changes import carried_copy
+from fasaco_edge.grid.geometry import MAX_LATTICE_CELLS, Window
 from fasaco_edge.grid.lattice import BLOCKED, UNKNOWN, Cell, CoverageLattice
 from fasaco_edge.kernels.lattice.areas import cells_beside, find_areas
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
@@ -17,6 +17,7 @@ from fasaco_edge.mission.map.map_state import MapState
 from fasaco_edge.mission.map.reachable_area import ReachableArea
 from fasaco_edge.mission.orders.order import MissionOrder
 from fasaco_edge.mission.orders.order_state import OrderState, Stage
+from fasaco_edge.mission.orders.reached_cells import ReachedCells
 from fasaco_edge.mission.orders.zones import in_zones
 
 # Limit on the areas listed, the largest first; the others are counted.
@@ -99,20 +100,25 @@ class UnreachedFinder:
         self._ledger = ledger
         # Number of paths that left cells over.
         self._failures = 0
-        # The newest area, and which cells of its lattice have ever been reachable.
         self._newest: ReachableArea | None = None
-        self._once_reachable: NDArray[np.bool_] | None = None
+        # Which cells of a window around all maps so far have ever been reachable.
+        self._once: tuple[Window, NDArray[np.bool_]] | None = None
         self._found: tuple[object, Unreached] = (None, Unreached())
 
-    def restart(self) -> None:
-        """Begin another order."""
-        self._failures, self._newest, self._once_reachable = 0, None, None
+    def restart(self, reached: ReachedCells | None) -> None:
+        """Begin another order, or go on with one that had reached some cells before a restart."""
+        self._failures, self._newest = 0, None
+        self._once = None if reached is None else (reached.window, reached.mask)
         self.note_area()
 
     def succeed(self, before: UnreachedFinder) -> None:
         """Go on with what another one remembers of the same cells."""
-        self._failures, self._newest = before._failures, before._newest
-        self._once_reachable = before._once_reachable
+        self._failures, self._newest, self._once = before._failures, before._newest, before._once
+
+    @property
+    def reached(self) -> ReachedCells | None:
+        """The cells that have ever been reachable; None for none."""
+        return None if self._once is None else ReachedCells.of(self._once[1], self._once[0])
 
     def note_area(self) -> None:
         """Remember the cells that are reachable now."""
@@ -120,8 +126,19 @@ class UnreachedFinder:
         if area is not None and area is not self._newest:
             decided = self._map.is_decided(area.lattice.window)
             reachable = area.reachable if decided is None else area.reachable & decided
-            self._once_reachable = self._once_on(area.lattice.window) | reachable
-            self._newest = area
+            window = self._around(area.lattice.window)
+            once = self._once_on(window)
+            once[area.lattice.window.slices_in(window)] |= reachable
+            self._once, self._newest = (window, once), area
+
+    def _around(self, window: Window) -> Window:
+        """Return the window of the newest map with that of the maps before, if not too large.
+
+        A map that was cut is still known to have been larger.
+        """
+        whole = Window.around(window, None if self._once is None else self._once[0])
+        assert whole is not None
+        return whole if whole.rows * whole.cols <= MAX_LATTICE_CELLS else window
 
     def known(self, lattice: CoverageLattice) -> NDArray[np.bool_]:
         """Return which cells of a lattice are reachable or have been, bool (rows, cols).
@@ -166,20 +183,25 @@ class UnreachedFinder:
         if order is None or lattice is None:
             return "the order was carried out"
         zones = "" if order.zones[0].polygon is None else " of the zones"
-        asked = self.known(lattice) & in_zones(order.zones, lattice.window, lattice.cell_m)
-        left = asked & (self._ledger.visits(lattice.window) == 0)
+        # Of a map that was cut, what lay beyond counts, too.
+        whole, cell_m = self._around(lattice.window), lattice.cell_m
+        here, asked = lattice.window.slices_in(whole), self._once_on(whole)
+        asked[here] = self.known(lattice)
+        asked &= in_zones(order.zones, whole, cell_m)
+        left = asked & (self._ledger.visits(whole) == 0)
         asked_cells, left_cells = np.count_nonzero(asked), np.count_nonzero(left)
         if not left_cells:
             return f"every reachable cell{zones} is covered"
-        percent, cell_m2 = 100 * (asked_cells - left_cells) // asked_cells, lattice.cell_m**2
+        percent, cell_m2 = 100 * (asked_cells - left_cells) // asked_cells, cell_m**2
         ending = (
             f"{percent} % of {asked_cells * cell_m2:.1f} m2{zones} covered; "
             f"{left_cells * cell_m2:.1f} m2 not reached"
         )
         if area is None:
             return ending
-        causes = self._causes(order, area, state.stage)[left]
-        counts = np.bincount(causes, minlength=len(Cause) + 1)[1:]
+        causes = np.full(left.shape, Cause.UNKNOWN, np.uint8)
+        causes[here] = self._causes(order, area, state.stage)
+        counts = np.bincount(causes[left], minlength=len(Cause) + 1)[1:]
         order_of = np.argsort(-counts, kind="stable")
         why = [
             f"{self._reason(Cause(n + 1))} ({counts[n] * cell_m2:.1f} m2)"
@@ -218,11 +240,11 @@ class UnreachedFinder:
         """Return the cause of each cell, uint8 (rows, cols); a later one overrides."""
         lattice, reachable, free = area.lattice, area.reachable, self._map.free
         assert free is not None
-        causes = np.zeros(lattice.states.shape, np.uint8)
-        if order.zones[0].polygon is not None:
-            # An order for everything does not ask for unknown cells.
-            causes[lattice.states == UNKNOWN] = Cause.UNKNOWN
-        causes[self._once_on(lattice.window) & ~lattice.coverable] = Cause.CLOSED
+        causes, once = np.zeros(lattice.states.shape, np.uint8), self._once_on(lattice.window)
+        causes[once & ~lattice.coverable] = Cause.CLOSED
+        # An order for everything does not ask for cells that were unknown all the time.
+        is_asked = once if order.zones[0].polygon is None else True
+        causes[is_asked & (lattice.states == UNKNOWN)] = Cause.UNKNOWN
         causes[lattice.coverable & ~reachable] = Cause.BEHIND_OBSTACLES
         if free is not lattice:
             causes[free.coverable & (lattice.states == BLOCKED)] = Cause.KEPT_OUT
@@ -247,6 +269,6 @@ class UnreachedFinder:
 
     def _once_on(self, window: Window) -> NDArray[np.bool_]:
         """Return which cells of a window have ever been reachable."""
-        if self._newest is None or self._once_reachable is None:
+        if self._once is None:
             return np.zeros((window.rows, window.cols), bool)
-        return carried(self._once_reachable, self._newest.lattice.window, window).copy()
+        return carried_copy(self._once[1], self._once[0], window)

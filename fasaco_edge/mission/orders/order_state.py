@@ -32,6 +32,7 @@ from fasaco_edge.mission.orders.order import (
     order_document,
     order_of,
 )
+from fasaco_edge.mission.orders.reached_cells import ReachedCells
 
 # Reason of being idle without autostart.
 NO_ORDER = "no order yet: start a mission"
@@ -84,11 +85,14 @@ class OrderState:
         home: the cell (row, col) where the first order began, since a reset or a change of map.
         paused: whether the robot must stand.
         errand: destination to drive to first.
-        why: why there is no order; for a paused order, what led to the pause.
+        why: why there is no order; for a paused order, what led to the pause; for one that is
+            over, how it ended.
         frame: frame of the map that zones, keep-out zones and home were given for; "" while no
             frame is in use.
         places: which map the places of the configuration belong to.
         keep_out: keep-outs of the operator, under any order.
+        reached: cells that have been reachable since the order began; only as kept with the ledger,
+            None in a mission.
     """
 
     order: MissionOrder | None = None
@@ -105,6 +109,7 @@ class OrderState:
     frame: str = ""
     places: PlacesNote = NO_PLACES
     keep_out: KeepOuts = ()
+    reached: ReachedCells | None = None
 
     @classmethod
     def autostart(cls) -> OrderState:
@@ -311,7 +316,8 @@ class _Note(
 ):
     """An order state as kept on disk; member names are those of the files.
 
-    Without errand, keep-outs, frame and places the form is the one that older daemons read.
+    Without errand, keep-outs, frame, places and reached cells the form is the one that older
+    daemons read.
     """
 
     version: Literal[1]
@@ -329,3 +335,4 @@ class _Note(
     frame: str = ""
     places: PlacesNote = NO_PLACES
     keep_out: _KeepOuts = []
+    reached: ReachedCells | None = None

@@ -21,6 +21,7 @@ from fasaco_edge.mission.orders.cells_left import CellsLeft
 from fasaco_edge.mission.orders.exploration import Exploration, is_in_reach
 from fasaco_edge.mission.orders.order import Errand, Zone
 from fasaco_edge.mission.orders.order_state import NO_ORDER, OrderState, Stage
+from fasaco_edge.mission.orders.reached_cells import ReachedCells
 from fasaco_edge.mission.orders.zones import in_zones
 from fasaco_edge.planners.problem import CoverageProblem
 
@@ -124,9 +125,11 @@ class Sequencer:
 
     def start(self, state: OrderState) -> None:
         """Begin another order, or none."""
-        self.order_state, self._run = state, _Run()
+        self.order_state, self._run = replace(state, reached=None), _Run()
+        if state.stage is Stage.OVER and state.why:
+            self._run.ending = state.why
         self._retry_check = (None, False)
-        self._unreached.restart()
+        self._unreached.restart(state.reached)
         self._company.try_again()
 
     def set_state(self, state: OrderState) -> None:
@@ -151,6 +154,11 @@ class Sequencer:
     def known(self, lattice: CoverageLattice) -> NDArray[np.bool_]:
         """Return which cells of a lattice are reachable or have been, bool (rows, cols)."""
         return self._unreached.known(lattice)
+
+    @property
+    def reached(self) -> ReachedCells | None:
+        """The cells that have been reachable since the order began; None without one to go on."""
+        return self._unreached.reached if self.order_state.is_open else None
 
     def reached_m2(self, area: ReachableArea) -> tuple[float, float]:
         """Return how large an area is, and all that was ever reachable [m2]."""
@@ -331,7 +339,7 @@ class Sequencer:
     def reopen(self) -> None:
         """Continue an automatic order: the map has changed since it was over."""
         if self.order_state.automatic and self.order_state.stage is Stage.OVER:
-            self.order_state = replace(self.order_state, stage=Stage.COVERING)
+            self.order_state = replace(self.order_state, stage=Stage.COVERING, why="")
 
     def waiting_reason(self) -> str:
         """Return as text what the robot waits for before a retry."""
@@ -357,12 +365,13 @@ class Sequencer:
     def _end(self) -> None:
         run, order = self._run, self.order_state.order
         run.retry_at = None
-        self.order_state = replace(self.order_state, stage=Stage.OVER)
+        state = self.order_state = replace(self.order_state, stage=Stage.OVER)
         every = order is None or order.zones[0].polygon is None
-        run.ending = self._unreached.ending(self.order_state) + self._sum_up()
+        run.ending = self._unreached.ending(state) + self._sum_up()
         area, named = self._map.area, () if every or order is None else order.zones
         if area is not None and (beyond := [z.name for z in named if not is_in_reach(z, area)]):
             run.ending += f"; not reached: {', '.join(map(repr, beyond))}"
+        self.order_state = replace(state, why=run.ending)
 
     def _is_worth_trying(self) -> bool:
         """Tell whether a retry is worthwhile; recomputed if anything changed.

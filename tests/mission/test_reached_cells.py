@@ -1,0 +1,91 @@
+"""What was reachable once, and no longer is: never counted as done, and said at the end."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from fasaco_edge.grid.geometry import Window
+from fasaco_edge.mission.orders.reached_cells import ReachedCells
+from tests.mission.line_robot import LineRobot
+from tests.mission.test_shut_in import room_with_niche, shut_in
+
+START = (1.0, 1.0)
+WALL = slice(60, 62)
+
+
+def two_rooms():
+    """Two rooms of 3 m x 2.5 m, and a door between them."""
+    pixels = np.full((52, 124), 100, np.int8)
+    pixels[1:51, 1:60] = pixels[1:51, 62:123] = 0
+    pixels[18:34, WALL] = 0
+    return pixels
+
+
+def changed(how):
+    """The same where the door is closed, the other room is unknown, or the map is cut there."""
+    pixels = two_rooms()
+    pixels[:, WALL] = 100
+    if how == "unknown":
+        pixels[:, 62:] = -1
+    return pixels[:, :62] if how == "cut" else pixels
+
+
+def in_first_room():
+    """A robot that has come back from the other room before that was swept."""
+    robot = LineRobot(two_rooms(), START)
+    assert robot.wait(100.0, lambda robot: robot.x > 3.5)
+    assert robot.wait(100.0, lambda robot: robot.x < 2.5)
+    return robot
+
+
+@pytest.mark.parametrize("is_restarted", [False, True])
+@pytest.mark.parametrize(
+    ("how", "why"),
+    [
+        ("closed", "closed off by obstacles"),
+        ("unknown", "unknown to the map"),
+        ("cut", "unknown to the map"),
+    ],
+)
+def test_the_end_says_what_is_out_of_reach_now(how, why, is_restarted):
+    robot = in_first_room()
+    robot.show(changed(how))
+    if is_restarted:
+        robot.restart(changed(how))
+    assert robot.wait(600.0, lambda robot: robot.mission.state == "done")
+    assert " of 15.1 m2 covered; 2.5 m2 not reached: " in robot.mission.reason
+    assert why in robot.mission.reason
+
+
+def test_a_robot_that_is_shut_in_is_not_done_after_a_restart():
+    robot = shut_in(by=5)
+    robot.wait(20.0, lambda _: False)
+    closed = robot.mission.grid.cells
+    robot.restart(closed)
+    assert not robot.wait(100.0, lambda robot: robot.mission.state == "done")
+    assert robot.mission.state == "blocked"
+    assert "shut in" in robot.mission.reason
+    robot.show(room_with_niche())
+    assert robot.wait(900.0, lambda robot: robot.mission.state == "done")
+
+
+def test_an_order_that_is_over_says_the_same_after_a_restart():
+    robot = in_first_room()
+    robot.show(changed("closed"))
+    assert robot.wait(600.0, lambda robot: robot.mission.state == "done")
+    said = robot.mission.reason
+    robot.restart(changed("closed"))
+    robot.wait(10.0, lambda _: False)
+    assert robot.mission.state == "done"
+    assert robot.mission.reason == said
+
+
+def test_cells_are_kept_as_they_were():
+    window = Window(-7, 3, 5, 24)
+    mask = np.random.default_rng(1).random((window.rows, window.cols)) < 0.1
+    kept = ReachedCells.of(mask, window)
+    again = np.zeros_like(mask)
+    again[kept.window.slices_in(window)] = kept.mask
+    assert np.array_equal(again, mask)
+    assert ReachedCells.of(np.zeros_like(mask), window) is None
