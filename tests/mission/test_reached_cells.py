@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 
-from fasaco_edge.grid.geometry import Window
+from fasaco_edge.grid.geometry import GridGeometry, Pose2D, Window
+from fasaco_edge.grid.occupancy import OccupancyGrid
+from fasaco_edge.mission.core.events import MapReceived
 from fasaco_edge.mission.orders.reached_cells import ReachedCells
-from tests.mission.line_robot import LineRobot
+from tests.mission.line_robot import PIXEL_M, LineRobot
 from tests.mission.test_shut_in import room_with_niche, shut_in
 
 START = (1.0, 1.0)
@@ -79,6 +83,44 @@ def test_an_order_that_is_over_says_the_same_after_a_restart():
     robot.wait(10.0, lambda _: False)
     assert robot.mission.state == "done"
     assert robot.mission.reason == said
+
+
+def with_map_moved(robot, pixels, x, y, deg):
+    """The same robot, once its map and pose have turned about the origin and moved."""
+    yaw = math.radians(deg)
+    cos, sin = math.cos(yaw), math.sin(yaw)
+    robot.x, robot.y = cos * robot.x - sin * robot.y + x, sin * robot.x + cos * robot.y + y
+    robot.yaw += yaw
+    robot.path = []
+    geometry = GridGeometry(*pixels.shape, PIXEL_M, Pose2D(x, y, yaw))
+    robot.step(MapReceived(OccupancyGrid(geometry, np.ascontiguousarray(pixels))))
+    return robot
+
+
+MOTIONS = [(0.5, 0.3, 0.0), (0.0, 0.0, 3.0), (0.5, 0.3, 8.0), (2.0, 1.0, 0.0)]
+
+
+@pytest.mark.parametrize("motion", MOTIONS)
+def test_what_was_reachable_moves_with_the_map(motion):
+    robot = LineRobot(two_rooms(), START)
+    robot.wait(60.0, lambda _: False)
+    with_map_moved(robot, two_rooms(), *motion)
+    assert robot.wait(900.0, lambda robot: robot.mission.state == "done")
+    assert robot.mission.reason.startswith("every reachable cell is covered")
+    covered = robot.mission.coverage()
+    assert covered.coverable == np.count_nonzero(robot.mission.area.reachable)
+
+
+@pytest.mark.parametrize("motion", MOTIONS[1:])
+def test_a_room_that_is_closed_as_the_map_moves_is_told_once(motion):
+    robot = LineRobot(two_rooms(), START)
+    assert robot.wait(100.0, lambda robot: robot.x < 2.0)
+    with_map_moved(robot, changed("closed"), *motion)
+    assert robot.wait(900.0, lambda robot: robot.mission.state == "done")
+    # The rooms have 99 cells each and the door 9 at most, as they lie before the motion.
+    not_reached = robot.mission.coverage().remaining
+    assert 80 <= not_reached <= 115
+    assert "unknown" not in robot.mission.reason
 
 
 def test_cells_are_kept_as_they_were():

@@ -162,6 +162,7 @@ class EventHandler:
         before = self._compare_buildings()
         if before is not None and (self.map.has_moved or self.map.building.is_foreign):
             self.ledger.note_map_motion(before)
+            self.orders.note_map_motion()
             self.trail.note_map_motion()
             self.route.note_map_motion()
             self.way_out.begin_anew()
@@ -270,8 +271,10 @@ class EventHandler:
             motion = self.ledger.map_motion(stamped.pose)
             self.trail.note_motion(motion)
             uncertain = self.ledger.forget_uncertain(stamped.pose)
-            if motion is not None and self.map.building.take_closure():
-                self.orders.move_home(motion)
+            if motion is not None:
+                self.orders.move_reached(motion)
+                if self.map.building.take_closure():
+                    self.orders.move_home(motion)
             self._record()
         self.line.note_pose(stamped.pose, self.monitor.farthest_m)
         cell = self.map.robot_cell()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import IntEnum
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +14,7 @@ from fasaco_edge.grid.geometry import MAX_LATTICE_CELLS, Window
 from fasaco_edge.grid.lattice import BLOCKED, UNKNOWN, Cell, CoverageLattice
 from fasaco_edge.kernels.lattice.areas import cells_beside, find_areas
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
+from fasaco_edge.mission.map.loop_closure import Motion
 from fasaco_edge.mission.map.map_state import MapState
 from fasaco_edge.mission.map.reachable_area import ReachableArea
 from fasaco_edge.mission.orders.order import MissionOrder
@@ -89,6 +91,14 @@ def viewpoints(closed: NDArray[np.bool_], reachable: NDArray[np.bool_]) -> list[
     return [(row, col) for row, col in beside[largest].tolist()]
 
 
+def _widened(cells: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Return cells and those beside them, bool (rows, cols)."""
+    padded = np.pad(cells, 1)
+    rows = padded[:-2] | padded[1:-1] | padded[2:]
+    widened: NDArray[np.bool_] = rows[:, :-2] | rows[:, 1:-1] | rows[:, 2:]
+    return widened
+
+
 class UnreachedFinder:
     """Finds the uncovered cells of an order; remembers which cells were reachable since it began.
 
@@ -103,12 +113,16 @@ class UnreachedFinder:
         self._newest: ReachableArea | None = None
         # Which cells of a window around all maps so far have ever been reachable.
         self._once: tuple[Window, NDArray[np.bool_]] | None = None
+        # The same before the map moved, and whether cells have moved since the newest area.
+        self._before_motion: tuple[Window, NDArray[np.bool_]] | None = None
+        self._have_moved = False
         self._found: tuple[object, Unreached] = (None, Unreached())
 
     def restart(self, reached: ReachedCells | None) -> None:
         """Begin another order, or go on with one that had reached some cells before a restart."""
         self._failures, self._newest = 0, None
         self._once = None if reached is None else (reached.window, reached.mask)
+        self._before_motion, self._have_moved = None, False
         self.note_area()
 
     def succeed(self, before: UnreachedFinder) -> None:
@@ -128,8 +142,45 @@ class UnreachedFinder:
             reachable = area.reachable if decided is None else area.reachable & decided
             window = self._around(area.lattice.window)
             once = self._once_on(window)
-            once[area.lattice.window.slices_in(window)] |= reachable
-            self._once, self._newest = (window, once), area
+            here = once[area.lattice.window.slices_in(window)]
+            if self._have_moved:
+                # Beside what is reachable, cells that have moved by parts of a cell are walls.
+                here &= area.lattice.coverable | ~_widened(area.reachable)
+            here |= reachable
+            self._once, self._newest, self._have_moved = (window, once), area, False
+
+    def note_map_motion(self) -> None:
+        """Note that the newest map has moved; ``move`` tells how."""
+        self._before_motion = self._before_motion or self._once
+
+    def move(self, motion: Motion) -> None:
+        """Move the cells with the map: its areas since have been looked for from a pose before."""
+        before, self._before_motion = self._before_motion, None
+        if before is not None and not motion.is_still:
+            self._once, self._newest, self._have_moved = self._moved(*before, motion), None, True
+            self.note_area()
+
+    def _moved(
+        self, window: Window, once: NDArray[np.bool_], motion: Motion
+    ) -> tuple[Window, NDArray[np.bool_]] | None:
+        """Return cells of a window after a motion, with their window; None if that is too large."""
+        lattice = self._map.lattice
+        assert lattice is not None
+        cell_m = lattice.cell_m
+        rows, cols = (window.row0, window.row1), (window.col0, window.col1)
+        y, x = np.array(list(product(rows, cols))).T * cell_m
+        x, y = motion.forward(x, y)
+        row0, col0, row1, col1 = (
+            int(edge // cell_m) for edge in (y.min(), x.min(), y.max() + cell_m, x.max() + cell_m)
+        )
+        whole = Window(row0, col0, row1, col1)
+        if whole.rows * whole.cols > MAX_LATTICE_CELLS:
+            return None
+        y, x = (np.mgrid[row0:row1, col0:col1].reshape(2, -1) + 0.5) * cell_m
+        x, y = motion.back(1.0, x, y)
+        were = np.floor(np.stack((y, x), axis=1) / cell_m).astype(np.int32)
+        moved = window.values_at(once, were, 0).reshape(whole.rows, whole.cols)
+        return whole, moved.astype(np.bool_)
 
     def _around(self, window: Window) -> Window:
         """Return the window of the newest map with that of the maps before, if not too large.

@@ -147,6 +147,14 @@ class Sequencer:
             ((row, col),) = moved_cells(cells, motion, self._config.footprint.cell_m).tolist()
             self.order_state = replace(self.order_state, home=(row, col))
 
+    def note_map_motion(self) -> None:
+        """Note that the newest map has moved; ``move_reached`` tells how."""
+        self._unreached.note_map_motion()
+
+    def move_reached(self, motion: Motion) -> None:
+        """Move what was reachable with the map."""
+        self._unreached.move(motion)
+
     def note_area(self) -> None:
         """Remember the cells that are reachable now."""
         self._unreached.note_area()
