@@ -77,3 +77,29 @@ def test_on_another_raster_the_path_begins_at_the_robot(after_s):
     _, points, why = robot.paths[-1]
     assert why == "map on another raster"
     assert math.dist(points[0], (robot.x, robot.y)) < 0.01
+
+
+def two_rooms(*, is_open):
+    """Two rooms of 3 m x 2.5 m, and a door of 0.8 m between them."""
+    pixels = np.full((52, 124), 100, np.int8)
+    pixels[1:51, 1:60] = pixels[1:51, 62:123] = 0
+    if is_open:
+        pixels[18:34, 60:62] = 0
+    return pixels
+
+
+@pytest.mark.parametrize("door_s", [6.0, 33.0, 71.0])
+def test_a_path_cut_off_by_a_door_begins_at_the_robot(door_s):
+    robot = LineRobot(two_rooms(is_open=True), (1.0, 1.0))
+    robot.wait(door_s, lambda _: False)
+    apart = []
+    for tick in range(80):
+        count = len(robot.paths)
+        if tick % 6:
+            robot.step()
+        else:
+            robot.show(two_rooms(is_open=tick % 12 > 0))
+        for _, points, _ in robot.paths[count:]:
+            if len(points):
+                apart.append(math.dist(points[0], robot.track[-1]))
+    assert max(apart) < 0.01

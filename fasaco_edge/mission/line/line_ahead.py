@@ -352,23 +352,22 @@ class LineAhead:
         return raster_to_map(self._floor.geometry, self._from_place()[:count])
 
     def _from_place(self) -> Points:
-        """Return the points to publish, from the robot's place on the line."""
-        points = self._up_to_cut()
+        """Return the points to publish, from the robot's place on the line up to its cut."""
+        points = self.line.points
         if len(points) > 1:
             points = points.copy()
             points[0] = self._place.on(points)
-        return points
+        return points if self._cut is None else self._up_to_cut(points, self._cut)
 
-    def _up_to_cut(self) -> Points:
-        """Return the points of the line, which ends at a cut."""
-        points = self.line.points
-        if not self._cut:
-            return points if self._cut is None else points[:0]
-        end = self._floor.stands.stand(self._walk[self._cut - 1])
-        count = self.line.before(self._cut - 1)
+    def _up_to_cut(self, points: Points, cut: int) -> Points:
+        """Return the beginning of points that leads to the last cell before a cut."""
+        if not cut or not len(points):
+            return points[:0]
+        end = self._floor.stands.stand(self._walk[cut - 1])
+        count = max(self.line.before(cut - 1), 1)
         while count > 1 and not self._is_clear(points[count - 1], end):
             count -= 1
-        if count == 1 and not self._is_clear(points[0], end):
+        if not self._is_clear(points[count - 1], end):
             return points[:1]
         return np.concatenate([points[:count], end[None]])
 
