@@ -10,6 +10,7 @@ import pytest
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D, Window
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.mission.core.events import MapReceived
+from fasaco_edge.mission.orders.keep_outs import KeepOut
 from fasaco_edge.mission.orders.reached_cells import ReachedCells
 from tests.mission.line_robot import PIXEL_M, LineRobot
 from tests.mission.test_shut_in import room_with_niche, shut_in
@@ -72,6 +73,17 @@ def test_a_robot_that_is_shut_in_is_not_done_after_a_restart():
     assert "shut in" in robot.mission.reason
     robot.show(room_with_niche())
     assert robot.wait(900.0, lambda robot: robot.mission.state == "done")
+
+
+def test_one_that_is_shut_in_with_nothing_left_beyond_is_done():
+    robot = LineRobot(two_rooms(), START)
+    assert robot.wait(300.0, lambda robot: robot.mission.coverage().remaining < 15)
+    assert robot.x > 3.3
+    # With the door the cells beside it are closed, so less than half remains in reach.
+    door = ((2.9, 0.0), (3.2, 0.0), (3.2, 2.6), (2.9, 2.6))
+    robot.command("keep_out_add", KeepOut("door", door))
+    assert robot.wait(100.0, lambda robot: robot.mission.state == "done")
+    assert robot.mission.reason.startswith("every reachable cell is covered")
 
 
 def test_an_order_that_is_over_says_the_same_after_a_restart():

@@ -234,11 +234,8 @@ class UnreachedFinder:
         if order is None or lattice is None:
             return "the order was carried out"
         zones = "" if order.zones[0].polygon is None else " of the zones"
-        # Of a map that was cut, what lay beyond counts, too.
         whole, cell_m = self._around(lattice.window), lattice.cell_m
-        here, asked = lattice.window.slices_in(whole), self._once_on(whole)
-        asked[here] = self.known(lattice)
-        asked &= in_zones(order.zones, whole, cell_m)
+        asked = self._asked(order, lattice, whole)
         left = asked & (self._ledger.visits(whole) == 0)
         asked_cells, left_cells = np.count_nonzero(asked), np.count_nonzero(left)
         if not left_cells:
@@ -251,7 +248,7 @@ class UnreachedFinder:
         if area is None:
             return ending
         causes = np.full(left.shape, Cause.UNKNOWN, np.uint8)
-        causes[here] = self._causes(order, area, state.stage)
+        causes[lattice.window.slices_in(whole)] = self._causes(order, area, state.stage)
         counts = np.bincount(causes[left], minlength=len(Cause) + 1)[1:]
         order_of = np.argsort(-counts, kind="stable")
         why = [
@@ -260,6 +257,26 @@ class UnreachedFinder:
             if counts[n]
         ]
         return f"{ending}: {', '.join(why)}" if why else ending
+
+    def is_any_left(self, order: MissionOrder) -> bool:
+        """Tell whether any cell that was ever reachable, and is asked for, is not covered."""
+        lattice = self._map.lattice
+        assert lattice is not None
+        whole = self._around(lattice.window)
+        asked = self._asked(order, lattice, whole)
+        return bool((asked & (self._ledger.visits(whole) == 0)).any())
+
+    def _asked(
+        self, order: MissionOrder, lattice: CoverageLattice, whole: Window
+    ) -> NDArray[np.bool_]:
+        """Return what is asked for of what was ever reachable, bool (rows, cols) of a window.
+
+        Of a map that was cut, what lay beyond counts, too.
+        """
+        asked = self._once_on(whole)
+        asked[lattice.window.slices_in(whole)] = self.known(lattice)
+        asked &= in_zones(order.zones, whole, lattice.cell_m)
+        return asked
 
     def _reason(self, cause: Cause) -> str:
         tries = "1 try" if self._failures == 1 else f"{self._failures} tries"

@@ -173,10 +173,20 @@ class Sequencer:
         return self._unreached.reached_m2(area)
 
     def is_shut_in(self, area: ReachableArea) -> bool:
-        """Tell whether most of the floor and home are out of reach from an area, or nearly all."""
+        """Tell whether most of the floor and home are out of reach from an area, or nearly all.
+
+        Not where all is covered: then nothing keeps the order from its end.
+        """
         (reached, once), home = self.reached_m2(area), self.goal()
         share = HOME_SHARE if home is None or area.contains(home) else MOST_SHARE
-        return reached < share * once
+        return reached < share * once and self._is_any_left()
+
+    def _is_any_left(self) -> bool:
+        """Tell whether anything of the order is left that was ever reachable."""
+        state = self.order_state
+        if state.order is None or state.next_pass() is not state:
+            return True
+        return self._unreached.is_any_left(state.order)
 
     def note_cell(self, cell: Cell) -> None:
         """Note that the robot is in ``cell``."""
