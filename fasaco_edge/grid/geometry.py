@@ -209,8 +209,8 @@ class GridGeometry:
         cos, sin = math.cos(self.origin.yaw), math.sin(self.origin.yaw)
         return (cos * dx + sin * dy) / self.resolution, (cos * dy - sin * dx) / self.resolution
 
-    def to_map(self, col: float, row: float) -> tuple[float, float]:
-        """Return the point (x, y) [m] at pixel coordinates (column, row)."""
+    def to_map(self, col: _Coordinate, row: _Coordinate) -> tuple[_Coordinate, _Coordinate]:
+        """Return one or many points (x, y) [m] at pixel coordinates (column, row)."""
         cos, sin = math.cos(self.origin.yaw), math.sin(self.origin.yaw)
         u, v = col * self.resolution, row * self.resolution
         return self.origin.x + cos * u - sin * v, self.origin.y + sin * u + cos * v

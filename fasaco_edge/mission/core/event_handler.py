@@ -168,15 +168,17 @@ class EventHandler:
             self.way_out.begin_anew()
         else:
             self._record()  # the pose may have come before the map
-        self._change_building(self.ledger.check(self.map.free, self.map.grid.frame))
+        free = self.map.without_obstacles(self.map.free)
+        self._change_building(self.ledger.check(free, self.map.grid.frame))
 
     def _compare_buildings(self) -> Pose2D | None:
         """Compare the newest map with those before; return the robot's pose on these."""
         if self.map.plain is None or self.map.free is None:
             return None
         pose = None if self.map.pose is None else self.map.pose.pose
-        contradicts = partial(self.ledger.contradicts, self.map.free)
-        return self.map.building.note_map(self.map.plain, pose, self._now, contradicts)
+        plain, free = map(self.map.without_obstacles, (self.map.plain, self.map.free))
+        contradicts = partial(self.ledger.contradicts, free)
+        return self.map.building.note_map(plain, pose, self._now, contradicts)
 
     def _note_frame(self) -> None:
         """Bind places that have no map yet to the one in use; leave those of another frame."""

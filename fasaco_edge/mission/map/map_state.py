@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -136,6 +137,28 @@ class MapState:
         """Draw the newest map anew: what is closed on it has changed."""
         if self.given is not None:
             self._take_map(self.given)
+            self.has_moved = False  # its walls are where they were
+
+    def without_obstacles(self, lattice: CoverageLattice) -> CoverageLattice:
+        """Return a lattice over the newest map on which cells near obstacles are unknown.
+
+        For what the map alone says: of the building, not of who stands in it.
+        """
+        if self.grid is None or self.given is None or self.grid is self.given:
+            return lattice
+        rows, cols = np.nonzero(self.grid.cells != self.given.cells)
+        x, y = self.grid.geometry.to_map(
+            cols.astype(np.float64) + 0.5, rows.astype(np.float64) + 0.5
+        )
+        window, cell_m = lattice.window, lattice.cell_m
+        reach = 1 + math.ceil(self._config.footprint.robot_radius_m / cell_m)
+        found = np.unique(np.floor(np.stack((y, x), axis=1) / cell_m).astype(np.int64), axis=0)
+        states = lattice.states.copy()
+        for row, col in found.tolist():
+            around = Window(row - reach, col - reach, row + reach + 1, col + reach + 1)
+            if (part := around.intersection(window)) is not None:
+                states[part.slices_in(window)] = UNKNOWN
+        return replace(lattice, states=states)
 
     def _take_map(self, given: OccupancyGrid, within: Window | None = None) -> None:
         grid = self.obstacles.on(given)

@@ -1,0 +1,32 @@
+"""What a follower meets says nothing of the building: not that it is another, nor that it moved."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from fasaco_edge.mission.core.events import FollowerBlocked
+from tests.mission.line_robot import LineRobot
+from tests.mission.test_path_begins import two_rooms
+
+
+def all_round(robot):
+    """A follower that says it meets something wherever it looks."""
+    angles = np.linspace(0.0, 6.2, 20).tolist()
+    points = tuple((robot.x + 0.4 * math.cos(a), robot.y + 0.4 * math.sin(a)) for a in angles)
+    return FollowerBlocked(0, "obstacle", 5.0, "map", robot.x, robot.y, points)
+
+
+@pytest.mark.parametrize("begun_s", [45.0, 65.0])
+def test_a_robot_that_is_crowded_keeps_its_ledger(begun_s):
+    robot = LineRobot(two_rooms(is_open=True), (1.0, 1.0))
+    robot.wait(begun_s, lambda _: False)
+    covered = robot.mission.ledger.total
+    for _ in range(1000):
+        robot.step(*([all_round(robot)] if robot.path and round(10 * robot.now) % 10 == 0 else []))
+        assert robot.mission.ledger.total >= covered, robot.mission.reason
+        assert "another building" not in robot.mission.reason
+    assert robot.wait(900.0, lambda robot: robot.mission.state == "done")
+    assert robot.mission.coverage().remaining == 0
