@@ -7,7 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from fasaco_edge.mission.core.events import FollowerBlocked
+from fasaco_edge.mission.core.events import CommandReceived, FollowerBlocked
+from fasaco_edge.mission.orders.order import read_order
 from tests.mission.line_robot import LineRobot
 from tests.mission.test_path_begins import two_rooms
 
@@ -28,5 +29,20 @@ def test_a_robot_that_is_crowded_keeps_its_ledger(begun_s):
         robot.step(*([all_round(robot)] if robot.path and round(10 * robot.now) % 10 == 0 else []))
         assert robot.mission.ledger.total >= covered, robot.mission.reason
         assert "another building" not in robot.mission.reason
+    assert robot.wait(900.0, lambda robot: robot.mission.state == "done")
+    assert robot.mission.coverage().remaining == 0
+
+
+def test_an_order_that_begins_in_a_crowd_is_not_done_in_it():
+    robot = LineRobot(two_rooms(is_open=True), (1.0, 1.0))
+    robot.wait(30.0, lambda _: False)
+    robot.step(all_round(robot))
+    for tick in range(700):
+        robot.step(*([all_round(robot)] if robot.path and tick % 10 == 0 else []))
+    order = read_order({"return_home": True})
+    robot.step(CommandReceived(1, "start", order, discard=True))
+    for tick in range(600):
+        robot.step(*([all_round(robot)] if robot.path and tick % 10 == 0 else []))
+        assert robot.mission.state != "done"
     assert robot.wait(900.0, lambda robot: robot.mission.state == "done")
     assert robot.mission.coverage().remaining == 0

@@ -129,7 +129,9 @@ class Sequencer:
         if state.stage is Stage.OVER and state.why:
             self._run.ending = state.why
         self._retry_check = (None, False)
-        self._unreached.restart(state.reached)
+        # What obstacles close for a while is in reach of another order on the same map, too.
+        is_crowded = state.home is not None and self._map.obstacles.closed > 0
+        self._unreached.restart(self._unreached.reached if is_crowded else state.reached)
         self._company.try_again()
 
     def set_state(self, state: OrderState) -> None:
