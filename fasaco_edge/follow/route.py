@@ -116,6 +116,8 @@ class Route:
         self._legs: list[Leg] = []
         self._ahead: list[Point] = []
         self._is_read = False
+        # How far it was from the corner that it returns to; infinity where it does not return [m].
+        self._missed_by = math.inf
 
     @property
     def leg(self) -> Leg | None:
@@ -127,14 +129,19 @@ class Route:
         """Go on to the next leg.
 
         A robot ``here``, at rest, that has overshot the corner by more than ``MISSED_M`` returns to
-        it first: the straight line to the next leg may cross a wall.
+        it first: the straight line to the next leg may cross a wall. It does so again only where
+        that brought it nearer: one whose pose is beside the point that it turns about, or late,
+        would turn for ever about a corner that it cannot hit.
         """
         self._fill(2)
         corner = self._legs[0].end if self._legs else None
         del self._legs[:1]
+        before, self._missed_by = self._missed_by, math.inf
         if here is None or corner is None or not self._legs:
             return
-        if self._legs[0].distance(here) > MISSED_M:
+        missed_by = math.dist(here, corner)
+        if self._legs[0].distance(here) > MISSED_M and missed_by < before - MISSED_M:
+            self._missed_by = missed_by
             self._legs.insert(0, _leg(here, corner))
 
     def pass_bends(self, here: Point) -> None:

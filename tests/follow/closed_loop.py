@@ -34,10 +34,14 @@ def path_message(xy, frame="map"):
 
 
 class ClosedLoop:
-    """A follower drives a world; poses and commands take a while, and cycles come late."""
+    """A follower drives a world; poses and commands take a while, and cycles come late.
+
+    The robot turns about a point ``left_m`` to the left of its poses.
+    """
 
     def __init__(self, truth: OccupancyGrid, start: Pose2D, *, delay_s=0.02, jitter_s=0.0,
-                 noise=0.0, turn_gain=1.0, pose_hz=10.0, late_s=0.0, seed=0):  # fmt: skip
+                 noise=0.0, turn_gain=1.0, pose_hz=10.0, late_s=0.0, left_m=0.0,
+                 seed=0):  # fmt: skip
         self.world = World(truth, start, CONFIG)
         self.follower = Follower(LIMITS)
         self.follower.take_planner("a1")
@@ -46,7 +50,7 @@ class ClosedLoop:
         self.states: Counter[State] = Counter()
         self.truth_at: list[Pose2D] = []
         self._delay_s, self._jitter_s, self._noise = delay_s, jitter_s, noise
-        self._turn_gain, self._late_s = turn_gain, late_s
+        self._turn_gain, self._late_s, self._left_m = turn_gain, late_s, left_m
         self._rng = np.random.default_rng(seed)
         self._poses, self._commands = deque(), deque()
         self._tick, self._pose_ticks = 0, CONFIG.period_ticks(pose_hz)
@@ -75,6 +79,8 @@ class ClosedLoop:
         self.truth_at.append(pose)
         if self._tick % self._pose_ticks == 0:
             dx, dy, turn = self._rng.normal(0.0, self._noise, 3) if self._noise else (0, 0, 0)
+            dx += self._left_m * math.sin(pose.yaw)
+            dy -= self._left_m * math.cos(pose.yaw)
             told = Pose2D(pose.x + dx, pose.y + dy, pose.yaw + turn)
             self._poses.append((self.now + self._late(), StampedPose(told)))
         while self._poses and self._poses[0][0] <= self.now:

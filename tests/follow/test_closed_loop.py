@@ -146,6 +146,15 @@ def test_a_corner_that_was_missed_is_driven_back_to():
     assert distances_to(np.array([(1, 1), (3.2, 1), (3, 1), (3, 3)]), way).max() < 0.02
 
 
+def test_a_corner_that_cannot_be_hit_is_not_returned_to_for_ever():
+    """A path began where the robot turns about: its pose went round that point for minutes."""
+    loop = ClosedLoop(ROOM, Pose2D(1.0, 1.0), left_m=0.1, pose_hz=5.0)
+    loop.send([(1, 1), (1.02, 1.05), (1, 3), (3, 3)])
+    loop.run(lambda: loop.world.pose.y > 1.5, most_s=20.0)
+    driven(loop)
+    assert loop.now < 60.0
+
+
 def test_a_path_that_goes_elsewhere_is_joined_from_rest():
     loop = ClosedLoop(ROOM, Pose2D(1.0, 1.0), delay_s=0.05)
     loop.send([(1, 1), (5, 1)])
