@@ -11,7 +11,7 @@ import pytest
 
 from fasaco_edge.grid.fine_raster import RobotDiscs
 from fasaco_edge.grid.floor_map import FloorMap
-from fasaco_edge.grid.geometry import GridGeometry, Pose2D
+from fasaco_edge.grid.geometry import GridGeometry, Pose2D, Window
 from fasaco_edge.grid.lattice import CoverageLattice, Footprint
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.host.processes import peak_mb
@@ -149,6 +149,24 @@ def test_a_robot_beside_a_long_straight_line_gets_one_that_turns_off_it():
     ahead.lay(np.array(turns_off, np.int32), aside)
     assert ahead.xy()[0].tolist() == pytest.approx([aside.x, aside.y])
     assert ahead.xy()[-1].tolist() == pytest.approx([16.5 * 0.25, 8.5 * 0.25], abs=0.03)
+
+
+def test_a_robot_that_does_not_fit_is_led_out_once_however_many_maps_come():
+    """Each map put one more step before the one before, to and fro."""
+    free = np.ones((60, 60), bool)
+    free[:, :4] = False
+    grid, footprint = grid_of(free), Footprint(0.25, 0.12)
+    plain = CoverageLattice.from_map(grid, footprint)
+    floor = FloorMap(grid, plain, footprint, RobotDiscs(0.12, 0.27), 10_000_000)
+    whole = Window(0, 0, floor.geometry.rows, floor.geometry.cols)
+    ahead, beside_wall = LineAhead(floor), Pose2D(0.3, 0.9)
+    ahead.lay(np.array([(row, 1) for row in range(3, 9)], np.int32), beside_wall)
+    line = ahead.line.points.tolist()
+    for off_m in (0.03, 0.0, 0.03, 0.0):
+        # Poses scatter while it stands there.
+        ahead.drive(Pose2D(beside_wall.x, beside_wall.y + off_m))
+        assert not ahead.check(whole)
+    assert ahead.line.points.tolist() == line
 
 
 def test_without_its_last_keep_out_the_whole_floor_is_swept():

@@ -6,6 +6,8 @@ no nearer to anything than it is, so the step leads away from what it is too nea
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from fasaco_edge.grid.floor_map import FloorMap
@@ -40,6 +42,19 @@ def fitting_radius(floor: FloorMap, here: Points) -> float:
         else:
             too_large = middle
     return fits
+
+
+def leads_out(floor: FloorMap, here: Points, to: Points) -> bool:
+    """Tell whether a robot whose disc does not fit is led straight to a point, as by ``lead_out``.
+
+    Args:
+        floor: the floor.
+        here, to: the robot's position and the point, (2,): y, x [pixels].
+    """
+    radius, most = fitting_radius(floor, here), floor.discs.radius_m / floor.geometry.resolution
+    if not LEAST_SHARE * most <= radius < most or math.dist(here, to) > 2 * most:
+        return False
+    return is_clear_between(floor, to, to) and is_clear_between(floor, here, to, radius)
 
 
 def lead_out(floor: FloorMap, here: Points) -> Points:

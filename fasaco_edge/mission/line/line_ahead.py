@@ -18,7 +18,7 @@ from fasaco_edge.grid.floor_map import FloorMap
 from fasaco_edge.grid.geometry import GridGeometry, Point, Pose2D, Window
 from fasaco_edge.kernels.floor.line import LEAST_EDGE
 from fasaco_edge.mission.line.alignment import aligned, by_distance
-from fasaco_edge.mission.line.lead_out import fitting_radius, lead_out
+from fasaco_edge.mission.line.lead_out import fitting_radius, lead_out, leads_out
 from fasaco_edge.mission.line.line_aside import LineAside
 from fasaco_edge.mission.line.offset import Beside
 from fasaco_edge.mission.line.pieces import Joiner, Piece, exchanged, kept_pieces
@@ -262,6 +262,9 @@ class LineAhead:
             for number in edges_near(line.points, touched, self.tally.shape, margin)
             if not self._is_clear(line.points[number], line.points[number + 1])
         ]
+        if blocked[:1] == [0] and self.is_followed:
+            # A step that leads out is never clear: one more with each map would lead nowhere.
+            blocked = blocked[leads_out(self._floor, self._place.here, line.points[1]) :]
         if not blocked:
             return False
         first, last = blocked[0], blocked[-1] + 1
