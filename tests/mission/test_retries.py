@@ -1,5 +1,7 @@
 """Cells that are blocked or left over: tried again later, and named in the end."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from fasaco_edge.grid.geometry import Pose2D, StampedPose
@@ -157,6 +159,18 @@ def test_a_cell_left_over_after_several_tries_is_tried_again_later():
         "66 % of 0.2 m2 covered; 0.1 m2 not reached: left over after 6 tries (0.1 m2)"
     )
     assert reasons(drive) == [(1, "left over after 6 tries")]
+
+
+def test_a_robot_that_yet_turns_in_its_last_cell_is_not_at_the_end():
+    """A try to come to the cell in which it had waited was over within a second."""
+    drive = drives("...")
+    drive.go()
+    drive.cell = (0, 2)
+    at = short_of(drive, 0, 2).pose
+    for number in range(8):
+        turned = replace(at, pose=replace(at.pose, yaw=0.4 * number))
+        assert drive.tell(PoseReceived(turned), after=0.5).plan is None
+    assert drive.tell(PoseReceived(turned), after=1.0).plan.reason == "cells left over"
 
 
 def test_a_cell_left_over_can_be_covered_at_a_later_try():

@@ -47,9 +47,11 @@ class PathChecks:
                 route.want(monitor.doubt)
             return
         last = tuple(path.cells[-1].tolist()) if len(path.cells) else None
-        if (
-            path.finished and (waited or (last and self._ledger.current.has_visited(last)))
-        ) or self._standing.is_at(last):
+        has_visited = last is not None and self._ledger.current.has_visited(last)
+        # A path may lead no further than the robot's cell: it may yet turn to drive it.
+        has_stopped = waited and not self._standing.turns
+        at_end = path.finished and (has_visited or has_stopped)
+        if at_end or (has_stopped and self._standing.is_at(last)):
             self._line.open_missed()
             if self._orders.note_path_end():
                 self._orders.advance(now)

@@ -23,6 +23,8 @@ PATIENCE_S = 1.0
 STANDING_S, STANDING_M = 30.0, 0.1
 # So often a standing robot gets the path again before its mission is reported as degraded.
 TRIES = 2
+# A robot turns that has turned by so much lately [rad].
+TURNS_RAD = 0.1
 # A robot that stands beside its path gets a new one after this time: an obstacle may separate it
 # from the path.
 BESIDE_S = 2.0
@@ -44,6 +46,8 @@ class Standing:
         self._had_path = 0.0, 0
         # How often it was given its path again in that place.
         self._tries = 0
+        # Its yaw when it was last seen to turn [rad], and when that was.
+        self._yaw, self._turned_at = 0.0, -math.inf
 
     def succeed(self, before: Standing) -> None:
         """Go on with the count of another one, whose path was the last that the robot had."""
@@ -58,6 +62,7 @@ class Standing:
         """Note the robot's cell, and its place."""
         self._now = now
         self._note_place()
+        self._note_yaw()
         if cell != self._cell:
             self._cell, self._entered_at = cell, now
 
@@ -70,6 +75,11 @@ class Standing:
     def has_waited(self) -> bool:
         """Whether the robot has had its path for a moment."""
         return self._now - self._route.published_at >= PATIENCE_S
+
+    @property
+    def turns(self) -> bool:
+        """Whether the robot has turned within a moment, as on the spot to drive its path."""
+        return self._now - self._turned_at < PATIENCE_S
 
     def is_at(self, last: Cell | None) -> bool:
         """Tell whether the robot stands in the last cell of a path that it did not complete.
@@ -128,6 +138,13 @@ class Standing:
             had_at, had_ns = self._had_path
             self._since = since + begun_at - had_at, since_ns + at[1] - had_ns
         self._had_path = at
+
+    def _note_yaw(self) -> None:
+        """Note whether the robot turns."""
+        assert self._map.pose is not None
+        yaw = self._map.pose.pose.yaw
+        if abs(math.remainder(yaw - self._yaw, math.tau)) > TURNS_RAD:
+            self._yaw, self._turned_at = yaw, self._now
 
     def _in_place_s(self) -> float:
         """Return how long the robot has stood in one place with a path to drive.
