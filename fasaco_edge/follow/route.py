@@ -264,9 +264,14 @@ class Route:
         return Joining.JOINED
 
     def _lead_to(self, point: Point, here: Point) -> list[Leg]:
-        """Return the legs up to a point that they pass soon; none if they do not."""
+        """Return the legs up to a point that they pass soon; none if they do not.
+
+        Nor for a robot that is off its leg: the leg would not lead it anywhere.
+        """
         leg = self.leg
-        way, index = -leg.placed(here)[0] if leg is not None else 0.0, 0
+        if leg is None or leg.distance(here) > NEAREST_M:
+            return []
+        way, index = -leg.placed(here)[0], 0
         while way <= LEAD_M and (leg := self._leg(index)):
             along, aside = leg.placed(point)
             # Nearer, the robot may not come to rest there.

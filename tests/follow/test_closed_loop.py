@@ -204,3 +204,19 @@ def test_it_stands_once_it_is_off_the_path():
         loop.run(lambda until=loop.now + 0.3: loop.now > until)
     assert loop.follower.state in (State.OFF_PATH, State.POSE_JUMPED)
     assert loop.world.activity.value == "idle"
+
+
+def test_off_its_path_it_joins_one_that_begins_further_on_along_that():
+    """It was led along the path that it was off, and stood for good."""
+    loop = ClosedLoop(ROOM, Pose2D(1.0, 1.0))
+    loop.send([(1, 1), (5, 1)])
+    loop.run(lambda: loop.world.pose.x > 2.0)
+    while loop.follower.state is not State.OFF_PATH:
+        drive = loop.world._drive
+        loop.world._drive = type(drive)(Pose2D(drive.pose.x, drive.pose.y + 0.06, drive.pose.yaw))
+        loop.run(lambda until=loop.now + 0.2: loop.now > until)
+        assert loop.now < 20.0
+    loop.run(lambda until=loop.now + 1.0: loop.now > until)
+    here = loop.world.pose
+    loop.send([(here.x + 0.4, 1.0), (5, 1)])
+    driven(loop)
