@@ -35,7 +35,7 @@ examples:
   fasaco-edge watch                                    a daemon on this machine
   fasaco-edge watch --connect tcp/192.168.1.20:7447 --robot hall2
   fasaco-edge watch --connect tcp/192.168.1.20:7447 --fleet building_7
-  fasaco-edge watch --once                             one picture of the current state
+  fasaco-edge watch --once                             one page of the current state
   fasaco-edge watch | tee mission.log                  lines of text, without a terminal
   fasaco-edge watch --json | jq .coverage.fraction
 
@@ -44,16 +44,16 @@ lead. q or Ctrl-C quits. The picture shows the map with north up: y grows upward
 published on the native key `map` (under ROS 2, say) only the coverage is drawn. NO_COLOR=1 and
 TERM=dumb are honoured.
 
---fleet shows all robots of a fleet on one map, also those that come later: what each has swept, its
-part of what is left and its next metres, in its colour; and what it does, as a table. It asks one
-robot every two seconds for its map. With --json a line a second, if something has changed.
+--fleet shows a table of all robots of a fleet, also those that come later: what each does, how much
+it has swept, and how much is left of its part. With --json a line a second, if something has
+changed. For all robots on one map record the fleet: fasaco-edge record --fleet NAME --out DIR.
 
 exit codes: 0 quit by the user; 1 --once without an answer, or the terminal is gone
 """
 
 
 def _add_options(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--once", action="store_true", help="print one picture and exit")
+    parser.add_argument("--once", action="store_true", help="print one page and exit")
     parser.add_argument("--json", action="store_true", help="print each status as a line of JSON")
     parser.add_argument(
         "--timeout",
@@ -160,7 +160,7 @@ def _no_robot(keys: Keys, feed: FleetFeed, view: FleetView) -> NobodyAnswersErro
 COMMAND = Command(
     description="Show map, coverage, the path ahead and the robot, with state, figures and "
     "what happened lately, as they come over Zenoh; on the robot or on any other machine. With "
-    "--fleet one map of all robots of a fleet, and who does what.",
+    "--fleet, which robot of a fleet does what.",
     run=run,
     add_options=_add_options,
     epilog=EPILOG,

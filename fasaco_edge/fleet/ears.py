@@ -61,24 +61,19 @@ class Ears:
             self._bus.unsubscribe(subscription)
         self.end_map_turn(robot)
 
-    def ask_for_maps(self, robots: Sequence[str], now_ns: int, *, at_once: bool = False) -> str:
+    def ask_for_maps(self, robots: Sequence[str], now_ns: int) -> None:
         """Ask robots for their maps, one after another; call it often.
-
-        Returns the name of the robot that is asked now, "" if none is.
 
         Args:
             robots: their names.
             now_ns: time [ns].
-            at_once: whether it is the next one's turn as soon as a map has come.
         """
-        is_over = now_ns >= self._turn_until_ns or (at_once and self._map is None)
-        if not robots or not is_over:
-            return ""
+        if not robots or now_ns < self._turn_until_ns:
+            return
         self.end_map_turn(self._turn)
         after = (robots.index(self._turn) + 1) % len(robots) if self._turn in robots else 0
         self._turn, self._turn_until_ns = robots[after], now_ns + MAP_TURN_NS
         self._map = self._listen(self._turn, MAP)
-        return self._turn
 
     def end_map_turn(self, robot: str) -> None:
         """Hear no more maps of a robot until its next turn."""

@@ -13,7 +13,7 @@ from fasaco_edge.client.phrases import steady_now
 from fasaco_edge.fleet.ears import Ears
 from fasaco_edge.fleet.inbox import FleetInbox, Heard, Traffic
 from fasaco_edge.wire.keys import VERSION, Keys
-from fasaco_edge.wire.topics import POSE, STATUS
+from fasaco_edge.wire.topics import STATUS
 
 # Of all samples that wait [bytes]; of each robot no more than a quarter.
 CAPACITY_BYTES = 128_000_000
@@ -25,7 +25,7 @@ class FleetFeed(Joining):
     """The samples of the robots of a fleet; a context manager.
 
     Which robots these are is decided by the reader: it hears the messages to fleets of all robots,
-    and says by ``attend`` of whom it wants poses, statuses and maps.
+    and says by ``attend`` of whom it wants statuses.
     """
 
     def __init__(self, settings: BusSettings, keys: Keys) -> None:
@@ -33,7 +33,6 @@ class FleetFeed(Joining):
         self._keys = keys
         self._inbox = FleetInbox(CAPACITY_BYTES, _stamped)
         self._ears: Ears | None = None
-        self._asked: set[str] = set()
         self._here: set[str] = set()
         # Not that of the session: tokens may come while it listens.
         self._naming = threading.Lock()
@@ -42,14 +41,8 @@ class FleetFeed(Joining):
         """Return what has arrived, robot by robot; wait up to ``timeout_s`` [s] for a sample."""
         return self._inbox.take(timeout_s)
 
-    def attend(self, robots: Collection[str], without_map: Collection[str], now: float) -> None:
-        """Hear these robots, and no others; call it often.
-
-        Args:
-            robots: their names.
-            without_map: those of them whose map is not known: it is asked for first, once.
-            now: time since the epoch [s].
-        """
+    def attend(self, robots: Collection[str]) -> None:
+        """Hear the robots of these names, and no others; call it often."""
         ears = self._ears
         if ears is None:
             return
@@ -58,15 +51,6 @@ class FleetFeed(Joining):
             self._inbox.forget(robot)
         for robot in set(robots) - ears.robots:
             ears.hear(robot)
-        self._asked &= set(robots)
-        first = sorted(set(without_map) - self._asked)
-        asked = ears.ask_for_maps(first or sorted(robots), _ns(now), at_once=bool(first))
-        self._asked |= {asked} - {""}
-
-    def map_came(self, robot: str) -> None:
-        """Hear no more maps of a robot until its next turn."""
-        if self._ears is not None:
-            self._ears.end_map_turn(robot)
 
     def forget(self, robot: str) -> None:
         """Drop the queues of a robot of no concern."""
@@ -83,7 +67,7 @@ class FleetFeed(Joining):
 
     def _listen(self, bus: Bus) -> None:
         bus.watch_tokens(f"{self._keys.base}/{VERSION}/*/alive", self._note_token)
-        ears = Ears(bus, self._keys, (STATUS, POSE), self._inbox.post)
+        ears = Ears(bus, self._keys, (STATUS,), self._inbox.post)
         ears.listen()
         self._ears = ears
 
@@ -97,9 +81,5 @@ class FleetFeed(Joining):
 
 
 def _stamped(topic: str, sample: Sample) -> Arrival:
-    at_ns = _ns(steady_now())
+    at_ns = int(1e9 * steady_now())
     return Arrival(topic, sample, at_ns, at_ns)
-
-
-def _ns(at_s: float) -> int:
-    return int(1e9 * at_s)

@@ -16,13 +16,8 @@ from fasaco_edge.fleet.cells import MOST_SPAN, Seat, mask_of, window_of
 from fasaco_edge.fleet.members import MOST_MEMBERS, Member, Members
 from fasaco_edge.fleet.shares import NOBODY, owners_of
 from fasaco_edge.grid.geometry import Window
-from fasaco_edge.grid.occupancy import UNKNOWN, OccupancyGrid, coarser
 from fasaco_edge.wire.documents.fleet import TILE
 
-# Values of a robot's own cells.
-REACHED, SWEPT = 0, 1
-# Of all robots' maps together, and of all their cells.
-MOST_PIXELS = 2_000_000
 # How far cells are looked for from the places of a division's robots, all together: of a maze as
 # large as can be told some stay nobody's.
 MOST_STEPS = 60_000
@@ -37,10 +32,7 @@ class FleetFloor:
     """The cells of a fleet's robots at a time.
 
     Attributes:
-        cells: of each robot by name, int8: REACHED, SWEPT by itself, UNKNOWN for none; placed in
-            the fleet's frame.
-        parts: number of the robot that each cell left is given to, NOBODY for none; None without
-            a division.
+        robots: names of the robots that it was made of.
         left: number of cells left to each robot, by name.
         area: number of cells that any robot can reach or has swept.
         swept: number of cells that any has swept.
@@ -50,8 +42,7 @@ class FleetFloor:
         by: name of the robot that made it.
     """
 
-    cells: dict[str, OccupancyGrid] = field(default_factory=dict)
-    parts: OccupancyGrid | None = None
+    robots: frozenset[str] = frozenset()
     left: Counter[str] = field(default_factory=Counter)
     area: int = 0
     swept: int = 0
@@ -93,15 +84,14 @@ class FloorSurvey:
 
 def floor_of(members: Members[Member], telling: Member | None) -> FleetFloor:
     """Return the floor of robots, of which one tells the division in force."""
-    most_pixels = MOST_PIXELS // max(len(members), 1)
-    grids = {member.name: _cells(member, most_pixels) for member in members}
-    cells = {name: grid for name, grid in grids.items() if grid is not None}
-    if not cells:
+    seats = [member.seat for member in members]
+    if not seats:
         return FleetFloor()
-    seat = (telling or next(iter(members))).seat
+    seat = seats[0] if telling is None else telling.seat
+    robots = frozenset(member.name for member in members)
     window = _window(seat, members)
     if window is None:
-        return FleetFloor(cells)
+        return FleetFloor(robots)
     ground, once, twice = (np.zeros((window.rows, window.cols), np.bool_) for _ in range(3))
     for member in members:
         ground |= mask_of(member.seat.carried(member.ground.cells(), seat), window)
@@ -109,7 +99,7 @@ def floor_of(members: Members[Member], telling: Member | None) -> FleetFloor:
         twice |= once & swept
         once |= swept
     floor = FleetFloor(
-        cells,
+        robots,
         area=int(np.count_nonzero(ground | once)),
         swept=int(np.count_nonzero(once)),
         twice=int(np.count_nonzero(twice)),
@@ -122,23 +112,10 @@ def floor_of(members: Members[Member], telling: Member | None) -> FleetFloor:
     counts = np.bincount(owners[owners != NOBODY], minlength=MOST_MEMBERS)
     return replace(
         floor,
-        parts=OccupancyGrid(seat.geometry(window), owners.astype(np.int8)),
         left=Counter({member.name: int(counts[member.number]) for member in members}),
         division=telling.newest.division,
         by=telling.newest.by,
     )
-
-
-def _cells(member: Member, most_pixels: int) -> OccupancyGrid | None:
-    """Return a robot's own cells on its own lattice."""
-    ground, swept = member.ground.cells(), member.swept.cells()
-    window = Window.around(window_of(ground), window_of(swept))
-    if window is None or window.rows * window.cols > MOST_CELLS:
-        return None
-    values = np.full((window.rows, window.cols), UNKNOWN, np.int8)
-    values[mask_of(ground, window)] = REACHED
-    values[mask_of(swept, window)] = SWEPT
-    return coarser(OccupancyGrid(member.seat.geometry(window), values), most_pixels)
 
 
 def _window(seat: Seat, members: Members[Member]) -> Window | None:

@@ -2,12 +2,8 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-
-import numpy as np
-from numpy.typing import NDArray
 
 from fasaco_edge.text import one_line
 from fasaco_edge.watch.fleet_floor import FleetFloor
@@ -20,20 +16,15 @@ LONGEST = 40
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FleetRobot:
-    """A robot of the fleet at a time; places are in the fleet's frame.
+    """A robot of the fleet at a time.
 
     Attributes:
         name: of the robot.
-        number: in order of joining, as in ``FleetFloor.parts``.
-        place: among the names of all robots, from 0: it keeps its colour when others go.
         state: of its mission, in its last message; one line.
         waits_for: name of the robot it waits for; "" for none.
         silent_s: time since its last message, where that is so long that it is gone; else None.
         away: why others give it no part of what is left; "" where they do.
-        x, y: its position [m].
-        yaw: its heading [rad]; None where it is not known.
-        radius_m: of its disc [m].
-        ahead: points of the path's next metres, float64 (n, 2) [m].
+        x, y: its position in the fleet's frame, in its last message [m].
         swept_cells, swept_m2: cells it has swept, and their area.
         left_cells, left_m2: cells left to it by the division in force, and their area; None without
             a division.
@@ -43,17 +34,12 @@ class FleetRobot:
     """
 
     name: str
-    number: int
-    place: int
     state: str
     waits_for: str
     silent_s: float | None
     away: str
     x: float
     y: float
-    yaw: float | None
-    radius_m: float
-    ahead: NDArray[np.float64]
     swept_cells: int
     swept_m2: float
     left_cells: int | None
@@ -111,13 +97,3 @@ def short(text: str) -> str:
     """Return a text of a robot's as one short line."""
     line = one_line(text)
     return line if len(line) <= LONGEST else f"{line[: LONGEST - 3]}..."
-
-
-def heading_to(at: tuple[float, float], ahead: NDArray[np.float64]) -> float | None:
-    """Return the heading towards the next point of the path that is not where the robot is."""
-    way = ahead - at
-    far = np.hypot(way[:, 0], way[:, 1]) > 0.05
-    if not far.any():
-        return None
-    dx, dy = way[far][0]
-    return math.atan2(dy, dx)

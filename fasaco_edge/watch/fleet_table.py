@@ -1,4 +1,4 @@
-"""The table beside the picture of a fleet: who does what, a row a robot."""
+"""The table of a fleet: who does what, a row a robot, and what all have done together."""
 
 from __future__ import annotations
 
@@ -8,45 +8,44 @@ from rich.table import Table
 from rich.text import Text
 
 from fasaco_edge.client import phrases
-from fasaco_edge.watch import picture
 from fasaco_edge.watch.blocks import FAINT
 from fasaco_edge.watch.fleet_floor import FleetFloor
 from fasaco_edge.watch.fleet_robot import FleetRobot, short
 from fasaco_edge.watch.glyphs import GlyphSet
 from fasaco_edge.watch.status_table import LONGEST_BAR, state_colour
 
-# Longest name [characters], and the width from which units and rates are shown.
-LONGEST_NAME, UNITS, RATES = 12, 40, 47
+# Names have a third of the width, or so much; the width from which units and rates are shown, and
+# the most of it [characters].
+LEAST_NAME, UNITS, RATES, WIDEST = 12, 40, 47, 80
 GONE_COLOUR, WAITING_COLOUR = "red", "yellow"
 
 
-def robot_table(robots: Sequence[FleetRobot], width: int, lines: int, glyphs: GlyphSet) -> Table:
+def robot_table(robots: Sequence[FleetRobot], width: int, lines: int) -> Table:
     """Return a table of robots of a given width, in at most so many lines, at least 1."""
     table = Table.grid(padding=(0, 1), pad_edge=False)
-    table.width = width
+    table.width = width = min(width, WIDEST)
     longest = max([len(robot.name) for robot in robots], default=5)
     # Where each has room for a second line, what it does is told whole.
     is_folded = 2 * len(robots) < lines
-    table.add_column(width=1)
-    table.add_column(width=min(max(longest, 5), LONGEST_NAME), no_wrap=True, overflow="ellipsis")
+    name = min(max(longest, 5), max(LEAST_NAME, width // 3))
+    table.add_column(width=name, no_wrap=True, overflow="ellipsis")
     table.add_column(ratio=1, no_wrap=not is_folded, overflow="fold" if is_folded else "ellipsis")
     unit = " m2" if width >= UNITS else ""
     heads = [f"swept{unit}", f"left{unit}", *(["kB/s"] if width >= RATES else [])]
     for head in heads:
         table.add_column(width=max(len(head), 6 if unit else 5), justify="right", no_wrap=True)
-    table.add_row("", *(Text(head, FAINT) for head in ("robot", "does", *heads)))
+    table.add_row(*(Text(head, FAINT) for head in ("robot", "does", *heads)))
     shown = robots if len(robots) < lines else robots[: max(lines - 2, 0)]
     for robot in shown:
-        table.add_row(*_row(robot, glyphs)[: 3 + len(heads)])
+        table.add_row(*_row(robot)[: 2 + len(heads)])
     if more := len(robots) - len(shown):
-        table.add_row("", "", Text(f"{more} more", FAINT))
+        table.add_row("", Text(f"{more} more", FAINT))
     return table
 
 
-def _row(robot: FleetRobot, glyphs: GlyphSet) -> list[Text]:
+def _row(robot: FleetRobot) -> list[Text]:
     left = "-" if robot.left_m2 is None else f"{robot.left_m2:.1f}"
     return [
-        glyphs.sample(picture.DISCS[robot.place % picture.COLOURS]),
         Text(robot.name, FAINT if robot.silent_s is not None else ""),
         _doing(robot),
         Text(f"{robot.swept_m2:.1f}"),

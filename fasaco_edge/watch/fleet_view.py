@@ -1,38 +1,24 @@
-"""The view of a fleet by what its robots tell: who does what, their maps, and the latest events."""
+"""The view of a fleet by what its robots tell: who does what, and the latest events."""
 
 from __future__ import annotations
 
 import math
 from collections import Counter, deque
-from collections.abc import Callable
-from dataclasses import dataclass, field, replace
-
-import numpy as np
+from dataclasses import dataclass, field
 
 from fasaco_edge.bus.arrival import Sample
 from fasaco_edge.client.events import BAD, GOOD, PLAIN, TROUBLED, EventLog
 from fasaco_edge.errors import FasacoError
-from fasaco_edge.fleet.cells import Seat
-from fasaco_edge.fleet.inbox import LEAST_SHARING, Heard
+from fasaco_edge.fleet.inbox import Heard
 from fasaco_edge.fleet.members import JOINED, MOST_MEMBERS, Member, Members
-from fasaco_edge.grid.geometry import Pose2D
-from fasaco_edge.grid.occupancy import OccupancyGrid, coarser
-from fasaco_edge.mission.fleet.frames import placed_point
 from fasaco_edge.text import is_reported
-from fasaco_edge.watch.fleet_floor import MOST_PIXELS, FleetFloor, FloorSurvey
-from fasaco_edge.watch.fleet_robot import FleetRobot, document_of, heading_to, short
+from fasaco_edge.watch.fleet_floor import FleetFloor, FloorSurvey
+from fasaco_edge.watch.fleet_robot import FleetRobot, document_of, short
 from fasaco_edge.wire.documents.fleet import decode_member, fleet_of
 from fasaco_edge.wire.documents.json_text import decode_tolerant
-from fasaco_edge.wire.documents.settings import KnownSettings, known_settings
 from fasaco_edge.wire.documents.status import FleetReport, Status
 from fasaco_edge.wire.keys import is_chunk
-from fasaco_edge.wire.limits import MAX_COORDINATE_M
-from fasaco_edge.wire.messages.maps import decode_occupancy_grid
-from fasaco_edge.wire.messages.poses import decode_pose
-from fasaco_edge.wire.schemas import POSE_STAMPED
 
-# Without poses of its own on the native keys, the place that it tells its fleet is shown [s].
-POSE_LASTS_S = 2.0
 # A robot's changes of state are noted at most so often [s]; its rate is a mean of so many seconds.
 NOTED_EVERY_S, RATE_S = 1.0, 5
 # Robots that others have heard within this time are named, though they may be silent by now [s].
@@ -46,11 +32,6 @@ class _Seen:
     """What is known of a robot beside what it tells its fleet."""
 
     status: Status | None = None
-    settings: KnownSettings = field(default_factory=KnownSettings)
-    posed_at: float = -math.inf
-    map: OccupancyGrid | None = None
-    # The map in the fleet's frame, and the seat that this was made by.
-    placed: tuple[Seat, OccupancyGrid] | None = None
     noted: str = ""
     noted_at: float = -math.inf
     rates: deque[float] = field(default_factory=lambda: deque(maxlen=RATE_S))
@@ -77,11 +58,6 @@ class FleetView:
         self._survey = FloorSurvey()
         self._division = 0
         self._faults: Counter[tuple[str, str]] = Counter()
-        self._readers: dict[str, Callable[[Member, Sample, float], None]] = {
-            "status": self._read_status,
-            "pose": self._read_pose,
-            "map": self._read_map,
-        }
 
     @property
     def floor(self) -> FleetFloor:
@@ -95,7 +71,7 @@ class FleetView:
             if arrival.topic == "fleet":
                 self._read_fleet(robot, arrival.sample, arrival.wall_ns)
             elif (member := self.members.get(robot)) is not None:
-                self._readers[arrival.topic](member, arrival.sample, 1e-9 * arrival.wall_ns)
+                self._read_status(member, arrival.sample)
         except FasacoError as error:
             text = f"{arrival.topic} cannot be read: {error}"
             self._note_often(robot, arrival.topic, text, 1e-9 * arrival.wall_ns)
@@ -121,10 +97,6 @@ class FleetView:
         """Return the names of the robots."""
         return [member.name for member in self.members]
 
-    def without_map(self) -> list[str]:
-        """Return the names of the robots whose map is not known yet."""
-        return [name for name, seen in self._seen.items() if seen.map is None]
-
     def unheard(self, now: float) -> list[str]:
         """Return the names of robots that others have heard lately, and that are not heard here."""
         told = {
@@ -135,60 +107,32 @@ class FleetView:
         }
         return sorted(map(short, told - set(self._seen)))[:MOST_MEMBERS]
 
-    def maps(self) -> list[OccupancyGrid]:
-        """Return the robots' maps in the fleet's frame; the same objects until they change."""
-        found = []
-        for member in self.members:
-            seen = self._seen[member.name]
-            if seen.map is None:
-                continue
-            if seen.placed is None or seen.placed[0] != member.seat:
-                seen.placed = member.seat, _placed(seen.map, member.seat.frame)
-            found.append(seen.placed[1])
-        return found
-
     def robots(self, now: float) -> list[FleetRobot]:
         """Return the robots by name."""
         now_ns = int(1e9 * now)
         away = self._absences(now_ns)
-        names = {name: place for place, name in enumerate(sorted(self.names()))}
-        found = [
-            self._robot(member, names[member.name], away.get(member.name, ""), now)
-            for member in self.members
-        ]
-        return sorted(found, key=lambda robot: robot.place)
+        found = [self._robot(member, away.get(member.name, ""), now) for member in self.members]
+        return sorted(found, key=lambda robot: robot.name)
 
     def document(self, now: float) -> dict[str, object]:
         """Return what ``--json`` prints."""
         document = document_of(self.fleet, self._division, self.floor, self.robots(now))
         return document | {"unheard": self.unheard(now)}
 
-    def _robot(self, member: Member, place: int, away: str, now: float) -> FleetRobot:
+    def _robot(self, member: Member, away: str, now: float) -> FleetRobot:
         said, seen, cell_m2 = member.newest, self._seen[member.name], member.seat.cell_m**2
-        pose = member.pose if now - seen.posed_at <= POSE_LASTS_S else None
-        at = (pose.x, pose.y) if pose is not None else (said.x, said.y)
-        x, y = member.placed(*at)
-        ahead = np.array([member.placed(*point) for point in said.ahead], np.float64).reshape(-1, 2)
-        if pose is not None:
-            yaw: float | None = pose.yaw + member.seat.frame.yaw
-        else:
-            yaw = heading_to((x, y), ahead)
+        x, y = member.placed(said.x, said.y)
         floor, is_gone = self.floor, member.is_gone(int(1e9 * now))
-        left = floor.left.get(member.name) if floor.parts is not None else None
+        left = floor.left.get(member.name) if floor.division else None
         path = seen.status.path if seen.status is not None else None
         return FleetRobot(
             name=member.name,
-            number=member.number,
-            place=place,
             state=short(said.state),
             waits_for=short(said.waits_for),
             silent_s=now - 1e-9 * member.heard_ns if is_gone else None,
             away=away,
             x=x,
             y=y,
-            yaw=yaw,
-            radius_m=said.radius_m,
-            ahead=ahead,
             swept_cells=member.swept.count,
             swept_m2=member.swept.count * cell_m2,
             left_cells=left,
@@ -229,35 +173,11 @@ class FleetView:
         elif news:
             self._note_often(robot, "frame", news, 1e-9 * at_ns)
 
-    def _read_status(self, member: Member, sample: Sample, now: float) -> None:
+    def _read_status(self, member: Member, sample: Sample) -> None:
         status = decode_tolerant(sample.payload, Status)
         # A second daemon of the robot's name does not plan.
-        if status.claim.stand != "plans":
-            return
-        seen = self._seen[member.name]
-        if seen.status is None or status.config != seen.status.config:
-            seen.settings = known_settings(status.config)
-        seen.status = status
-        pose = status.pose
-        if pose is not None and now - seen.posed_at > POSE_LASTS_S:
-            self._move(member, Pose2D(pose.x, pose.y, pose.yaw), now)
-
-    def _read_pose(self, member: Member, sample: Sample, now: float) -> None:
-        seen = self._seen[member.name]
-        schema = sample.schema or seen.settings.pose.schema or POSE_STAMPED
-        self._move(member, decode_pose(sample.payload, schema).pose, now)
-
-    def _move(self, member: Member, pose: Pose2D, now: float) -> None:
-        far = max(abs(pose.x), abs(pose.y))
-        # A negated comparison, so that NaN is caught too.
-        if not far <= MAX_COORDINATE_M or not math.isfinite(pose.yaw):
-            return
-        member.pose, self._seen[member.name].posed_at = pose, now
-
-    def _read_map(self, member: Member, sample: Sample, _: float) -> None:
-        seen = self._seen[member.name]
-        most_pixels = MOST_PIXELS // max(len(self._seen), LEAST_SHARING)
-        seen.map, seen.placed = coarser(decode_occupancy_grid(sample.payload), most_pixels), None
+        if status.claim.stand == "plans":
+            self._seen[member.name].status = status
 
     def _note_state(self, robot: FleetRobot, now: float) -> None:
         """Note what a robot does, if that is another than before."""
@@ -289,11 +209,3 @@ class FleetView:
         if is_reported(count):
             again = f" ({count} so far)" if count > 1 else ""
             self.events.add(now, f"{short(fault[0])}: {text}{again}", BAD)
-
-
-def _placed(grid: OccupancyGrid, frame: Pose2D) -> OccupancyGrid:
-    """Return a map in the frame in which its own frame has that pose."""
-    origin = grid.geometry.origin
-    x, y = placed_point(frame, origin.x, origin.y)
-    placed = Pose2D(x, y, origin.yaw + frame.yaw)
-    return replace(grid, geometry=replace(grid.geometry, origin=placed))

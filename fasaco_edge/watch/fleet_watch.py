@@ -10,10 +10,9 @@ from fasaco_edge.text import one_line
 from fasaco_edge.watch.fleet_feed import FleetFeed
 from fasaco_edge.watch.fleet_page import FleetPage
 from fasaco_edge.watch.fleet_view import FleetView
-from fasaco_edge.wire.topics import MAP
 
-# Time to wait for the rest once a robot is heard: for the maps of all [s]. Each tells its fleet
-# where it is and what it has swept once a second.
+# Time to wait for the rest once a robot is heard [s]. Each tells its fleet where it is and what it
+# has swept once a second.
 REST_S, TOLD_S = 4.0, 1.3
 # Rates are counted, and JSON is printed, so often [s].
 EVERY_S = 1.0
@@ -48,8 +47,6 @@ class FleetWatch:
         was_known = self.is_known()
         for heard in items:
             view.take(heard)
-            if heard.arrival.topic == MAP.name:
-                feed.map_came(heard.robot)
             if view.members.get(heard.robot) is None:
                 # Any number of names would each keep a queue from others.
                 feed.forget(heard.robot)
@@ -57,7 +54,7 @@ class FleetWatch:
         if not was_known:
             self._known_at = now
         view.trouble = feed.trouble
-        feed.attend(view.names(), view.without_map(), now)
+        feed.attend(view.names())
         self._count(now)
         view.tick(now)
         return bool(items)
@@ -101,11 +98,10 @@ class FleetWatch:
         return len(self._view.members) > 0
 
     def is_whole(self) -> bool:
-        """Tell whether all robots have had the time to tell of themselves, and have shown maps."""
+        """Tell whether all robots have had the time to tell of themselves."""
         view = self._view
         is_told = phrases.steady_now() - self._known_at > TOLD_S
-        telling = (member.name for member in view.members if member.ground.count)
-        return is_told and not view.without_map() and view.floor.cells.keys() >= set(telling)
+        return is_told and view.floor.robots >= set(view.names())
 
     def _count(self, now: float) -> None:
         passed_s = now - self._counted_at

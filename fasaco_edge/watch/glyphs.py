@@ -13,17 +13,11 @@ from rich.segment import Segment
 from rich.style import Style
 from rich.text import Text
 
-from fasaco_edge.drawing.palette import ROBOTS, Colour
+from fasaco_edge.drawing.palette import Colour
 from fasaco_edge.watch import picture
 
 HALF = "▀"
 ARROWS, PLAIN_ARROWS = "→↗↑↖←↙↓↘", ">/^\\<,v."
-
-
-def _lighter(colour: Colour, share: float) -> Colour:
-    """Return a colour with a share of white in it."""
-    red, green, blue = (round((1 - share) * one + share * 255) for one in colour)
-    return red, green, blue
 
 
 # By kind: its colour, the ANSI colour, the plain character. Dark, so that the path stands out;
@@ -34,7 +28,6 @@ _LOOKS: dict[int, tuple[Colour, str, str]] = {
     picture.TO_COVER: ((98, 104, 116), "white", "-"),
     picture.COVERED: ((24, 112, 82), "green", "o"),
     picture.RECOVERED: ((176, 122, 40), "yellow", "8"),
-    picture.TWICE: ((150, 150, 156), "bright_red", "8"),
     picture.WALL: ((214, 218, 226), "bright_white", "#"),
     picture.AHEAD: ((72, 128, 240), "bright_blue", "+"),
     picture.NEXT: ((255, 240, 110), "bright_magenta", "*"),
@@ -56,28 +49,6 @@ _LOOKS: dict[int, tuple[Colour, str, str]] = {
         strict=True,
     )
 }
-
-# Of a fleet's robots, in the order of the palette: what is left to them, what they have swept, and
-# the nearest ANSI colour. Apart in a terminal of 256 colours, too, but for the parts of the fourth
-# and the last, of the second and the seventh. Six ANSI colours are no greys: two are there twice.
-_ROBOTS = (
-    ((38, 46, 102), (4, 88, 136), "blue"),
-    ((86, 66, 30), (172, 120, 10), "yellow"),
-    ((28, 84, 44), (6, 122, 90), "green"),
-    ((98, 44, 84), (142, 72, 128), "magenta"),
-    ((50, 84, 122), (66, 130, 158), "cyan"),
-    ((90, 36, 24), (152, 46, 16), "red"),
-    ((72, 52, 42), (126, 86, 68), "yellow"),
-    ((56, 34, 96), (88, 44, 148), "magenta"),
-)
-for _number, ((_, _colour), (_part, _swept, _ansi)) in enumerate(zip(ROBOTS, _ROBOTS, strict=True)):
-    _letter, _bright = chr(ord("a") + _number), f"bright_{_ansi}"
-    _LOOKS |= {
-        picture.PARTS[_number]: (_part, "white", "-"),
-        picture.SWEPT[_number]: (_swept, _ansi, _letter),
-        picture.DISCS[_number]: (_lighter(_colour, 0.2), _bright, _letter.upper()),
-        picture.WAYS[_number]: (_lighter(_colour, 0.55), _bright, "+"),
-    }
 
 _SYSTEMS = {
     "standard": ColorSystem.STANDARD,
@@ -167,10 +138,7 @@ def _glyph(glyphs: GlyphSet, upper: int, lower: int) -> tuple[str, int, int]:
     shown = max(upper, lower)
     if shown >= picture.HEADING:
         arrows = ARROWS if glyphs.unicode else PLAIN_ARROWS
-        whose, eighth = divmod(shown - picture.HEADING, picture.EIGHTHS)
-        if not whose:
-            return arrows[eighth], picture.WALL, picture.ROBOT
-        return arrows[eighth], picture.UNKNOWN, picture.DISCS[whose - 1]
+        return arrows[shown - picture.HEADING], picture.WALL, picture.ROBOT
     if glyphs.colours is None:
         return _LOOKS[shown][2], shown, shown
     if not glyphs.unicode:

@@ -65,7 +65,7 @@ class Watched(Protocol):
         """Tell whether there is something to show."""
 
     def is_whole(self) -> bool:
-        """Tell whether all is known that a picture shows."""
+        """Tell whether all is known that a page shows."""
 
 
 def watch_on_screen(watched: Watched) -> None:
@@ -118,7 +118,7 @@ def watch_as_json(watched: Watched) -> None:
 
 
 def look_once(watched: Watched, timeout_s: float) -> bool:
-    """Wait up to ``timeout_s`` [s] until enough is known for a picture; return whether it is."""
+    """Wait up to ``timeout_s`` [s] until enough is known for a page; return whether it is."""
     deadline = time.monotonic() + timeout_s
     with stop_event(*END_SIGNALS) as stop:
         while not watched.is_known():

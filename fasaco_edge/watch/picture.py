@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.drawing.palette import ROBOTS
 from fasaco_edge.grid.geometry import Bounds, Pose2D, union_bounds
 from fasaco_edge.grid.occupancy import OccupancyGrid, known_bounds
 from fasaco_edge.watch.robot_view import FIELD_LEVELS, RobotView
@@ -92,19 +91,12 @@ class Frame:
         return sampled
 
 
-# If several kinds share a character without colours, the larger number is shown. Ranges of robots
-# have a kind for each of the colours of a fleet's robots.
-UNKNOWN, FLOOR, TO_COVER, COVERED, RECOVERED = range(5)
-COLOURS = len(ROBOTS)
-PARTS, SWEPT = range(5, 5 + COLOURS), range(5 + COLOURS, 5 + 2 * COLOURS)
-TWICE, WALL, AHEAD, NEXT, ROBOT = range(SWEPT.stop, SWEPT.stop + 5)
+# If several kinds share a character without colours, the larger number is shown.
+UNKNOWN, FLOOR, TO_COVER, COVERED, RECOVERED, WALL, AHEAD, NEXT, ROBOT = range(9)
 # The living trail, from least to most, when shown in place of coverage and path.
 FIELD = range(ROBOT + 1, ROBOT + 1 + FIELD_LEVELS)
-WAYS = range(FIELD.stop, FIELD.stop + COLOURS)
-DISCS = range(WAYS.stop, WAYS.stop + COLOURS)
-HEADING = DISCS.stop
-"""The character of the robot's centre: this plus its heading in eighths of a turn; of a fleet's
-robots this plus 8 for each colour, from 8 on."""
+HEADING = FIELD.stop
+"""The character of the robot's centre: this plus its heading in eighths of a turn."""
 EIGHTHS = 8
 
 # By the defaults of the daemon's configuration; only the picture depends on them.
@@ -163,41 +155,26 @@ def draw_path(kinds: Kinds, frame: Frame, xy: NDArray[np.float64]) -> bool:
     points = np.stack([np.interp(at, way, xy[:, axis]) for axis in (0, 1)], axis=-1)
     # The nearest last: it is visible where the path crosses itself.
     for kind, some in ((AHEAD, points[at > NEXT_M]), (NEXT, points[at <= NEXT_M])):
-        draw_points(kinds, frame, some, kind)
+        _put(kinds, frame.pixels(some), kind)
     return bool(drawn_m == way[-1])
 
 
 def draw_robot(kinds: Kinds, frame: Frame, pose: Pose2D, radius_m: float) -> None:
     """Draw the robot's disc, and its heading as the character its centre lies in."""
-    draw_disc(kinds, frame, pose.x, pose.y, radius_m, ROBOT)
-    draw_heading(kinds, frame, pose, HEADING)
-
-
-def draw_disc(kinds: Kinds, frame: Frame, x: float, y: float, radius_m: float, kind: int) -> None:
-    """Draw a disc around a point [m]."""
     rows, cols = frame.shape
-    across = frame.left + (np.arange(cols) + 0.5) * frame.pixel_m - x
-    down = frame.top - (np.arange(rows) + 0.5) * frame.pixel_m - y
-    kinds[np.hypot(across[None, :], down[:, None]) <= radius_m] = kind
-
-
-def draw_heading(kinds: Kinds, frame: Frame, pose: Pose2D, kind: int) -> None:
-    """Draw a heading as the character that a pose lies in; ``kind``: of the heading 0."""
+    across = frame.left + (np.arange(cols) + 0.5) * frame.pixel_m - pose.x
+    down = frame.top - (np.arange(rows) + 0.5) * frame.pixel_m - pose.y
+    kinds[np.hypot(across[None, :], down[:, None]) <= radius_m] = ROBOT
     row, col = frame.pixels(np.array([[pose.x, pose.y]]))[0]
     upper = int(row) // 2 * 2
     eighth = round(pose.yaw / (math.pi / 4)) % EIGHTHS
-    _put(kinds, np.array([[upper, col], [upper + 1, col]]), kind + eighth)
+    _put(kinds, np.array([[upper, col], [upper + 1, col]]), HEADING + eighth)
 
 
 def _coverage(frame: Frame, coverage: OccupancyGrid, *, blocked: bool) -> Kinds:
     table = _COVERAGE_AND_BLOCKED_KINDS if blocked else _COVERAGE_KINDS
     kinds: Kinds = table[frame.sampled(coverage, 1, CoverageValue.UNKNOWN).view(np.uint8)]
     return kinds
-
-
-def draw_points(kinds: Kinds, frame: Frame, xy: NDArray[np.float64], kind: int) -> None:
-    """Draw points, float64 (n, 2) [m]."""
-    _put(kinds, frame.pixels(xy), kind)
 
 
 def _put(kinds: Kinds, pixels: NDArray[np.int64], kind: int) -> None:

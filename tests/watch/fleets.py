@@ -6,14 +6,10 @@ from typing import Any
 
 from fasaco_edge.bus.arrival import Arrival, Sample
 from fasaco_edge.fleet.inbox import Heard
-from fasaco_edge.grid.geometry import Pose2D, StampedPose
 from fasaco_edge.watch.fleet_view import FleetView
 from fasaco_edge.wire.documents.fleet import FleetPart
 from fasaco_edge.wire.documents.json_text import encode_json
-from fasaco_edge.wire.messages.poses import encode_pose_stamped
-from fasaco_edge.wire.schemas import POSE_STAMPED
 from tests.support.fleet_told import member
-from tests.support.rooms import map_bytes, room
 from tests.watch.grids import NOW
 
 # Two robots that have divided a hall of 20 x 30 cells; the second one's part is on the right.
@@ -21,11 +17,9 @@ PARTS = tuple(FleetPart(name, *cell, 0.0, 1.2) for name, cell in (("a", (9, 0)),
 AHEAD = ((1.3, 1.0), (1.6, 1.0), (1.6, 2.5))
 
 
-def tell(
-    view: FleetView, robot: str, topic: str, payload: bytes, now: float = NOW, schema: str = ""
-) -> None:
+def tell(view: FleetView, robot: str, topic: str, payload: bytes, now: float = NOW) -> None:
     """Let a sample come."""
-    sample = Sample(f"fasaco/@v1/{robot}/{topic}", payload, schema)
+    sample = Sample(f"fasaco/@v1/{robot}/{topic}", payload)
     at_ns = int(1e9 * now)
     view.take(Heard(robot, Arrival(topic, sample, at_ns, at_ns)))
 
@@ -35,20 +29,12 @@ def say(view: FleetView, robot: str, now: float = NOW, **members: Any) -> None:
     tell(view, robot, "fleet", encode_json(member(**members)), now)
 
 
-def stand(view: FleetView, robot: str, x: float, y: float, yaw: float, now: float = NOW) -> None:
-    """Let a pose come."""
-    payload = encode_pose_stamped(StampedPose(Pose2D(x, y, yaw)))
-    tell(view, robot, "pose", payload, now, POSE_STAMPED)
-
-
 def two_in_a_hall() -> FleetView:
     """Return the view of two robots: one drives east, the other waits for it."""
     view = FleetView("house")
     lane = [(2, col) for col in range(4)]
-    ours = {"division": 7, "by": "b", "parts": PARTS, "radius_m": 0.18}
+    ours = {"division": 7, "by": "b", "parts": PARTS}
     say(view, "a", cells=lane, ahead=AHEAD, **ours)
     say(view, "b", cells=[(17, 28), (17, 27), (2, 3)], x=8.3, y=5.2, waits_for="a", **ours)
-    stand(view, "a", 1.0, 1.0, 0.0)
-    tell(view, "a", "map", map_bytes(room(9.0, 6.0)))
     view.tick(NOW)
     return view

@@ -25,8 +25,7 @@ from fasaco_edge.wire.limits import (
     MAX_FLEET_TILES,
 )
 from tests.support.fleet_told import CELL_M, member, tiles
-from tests.support.rooms import map_bytes, room
-from tests.watch.fleets import PARTS, say, stand, tell, two_in_a_hall
+from tests.watch.fleets import PARTS, say, tell, two_in_a_hall
 from tests.watch.grids import NOW, status
 
 GONE_S, REPLACED_S = 1e-9 * GONE_NS + 0.1, 1e-9 * REPLACED_NS + 0.1
@@ -52,7 +51,7 @@ def test_it_tells_who_does_what():
     view = two_in_a_hall()
     a, b = view.robots(NOW)
     assert doing(view) == {"a": "covering", "b": "waits for a"}
-    assert (a.x, a.y, a.yaw, a.radius_m) == (1.0, 1.0, 0.0, 0.18)
+    assert (a.x, a.y) == (1.0, 1.0)
     assert (a.swept_cells, b.swept_cells) == (4, 3)
     assert a.swept_m2 == pytest.approx(4 * CELL_M**2)
     # Each cell counts once, and cells that are swept are no part of what is left.
@@ -106,36 +105,21 @@ def test_a_robot_that_is_silent_is_gone_and_may_come_back():
     assert texts(view)[-2:] == ["b is gone: nothing is heard of it", "b is back: covering"]
 
 
-def test_colours_go_by_name_whoever_comes_first():
+def test_places_are_in_the_frame_of_the_fleet():
+    view = FleetView("house")
+    # Its map lies 10 m to the east, turned by a quarter.
+    say(view, "a", x=1.0, y=0.5, origin=(10.0, 0.0, 90.0), cells=[(0, 0)])
+    (a,) = view.robots(NOW)
+    assert (a.x, a.y) == pytest.approx((9.5, 1.0))
+    say(view, "a", NOW + 1, origin=(0.0, 0.0, 0.0))
+    assert "its frame has changed" in texts(view)[-1]
+
+
+def test_robots_are_in_order_of_their_names_whoever_comes_first():
     view = FleetView("house")
     for name in ("c", "a", "b"):
         say(view, name)
-    assert [(robot.name, robot.place) for robot in view.robots(NOW)] == [
-        ("a", 0),
-        ("b", 1),
-        ("c", 2),
-    ]
-    view.tick(NOW + GONE_S)
-    assert [robot.place for robot in view.robots(NOW + GONE_S)] == [0, 1, 2]
-
-
-def test_maps_and_places_are_in_the_frame_of_the_fleet():
-    view = FleetView("house")
-    # Its map lies 10 m to the east, turned by a quarter.
-    say(view, "a", x=1.0, y=0.5, ahead=((1.0, 2.5),), origin=(10.0, 0.0, 90.0), cells=[(0, 0)])
-    stand(view, "a", 1.0, 0.5, 0.0)
-    tell(view, "a", "map", map_bytes(room(9.0, 6.0)))
-    (a,) = view.robots(NOW)
-    assert (a.x, a.y) == pytest.approx((9.5, 1.0))
-    assert a.yaw == pytest.approx(math.pi / 2)
-    assert a.ahead.tolist() == [pytest.approx([7.5, 1.0])]
-    (grid,) = view.maps()
-    assert grid.geometry.origin.x == pytest.approx(10.0)
-    assert grid.geometry.origin.yaw == pytest.approx(math.pi / 2)
-    assert view.maps()[0] is grid
-    say(view, "a", NOW + 1, origin=(0.0, 0.0, 0.0))
-    assert view.maps()[0].geometry.origin.x == 0.0
-    assert "its frame has changed" in texts(view)[-1]
+    assert [robot.name for robot in view.robots(NOW)] == ["a", "b", "c"]
 
 
 def test_robots_with_turned_maps_share_the_floor():
@@ -147,19 +131,6 @@ def test_robots_with_turned_maps_share_the_floor():
     say(view, "b", cells=square[:50], origin=(3.0, 3.0, 180.0), **ours)
     view.tick(NOW)
     assert (view.floor.area, view.floor.swept, view.floor.twice) == (100, 100, 50)
-
-
-def test_without_poses_the_place_is_what_it_tells_and_the_heading_its_way():
-    view = FleetView("house")
-    say(view, "a", ahead=((1.0, 1.0), (1.0, 3.0)))
-    (a,) = view.robots(NOW)
-    assert (a.x, a.y, a.yaw) == (1.0, 1.0, pytest.approx(math.pi / 2))
-    say(view, "a", NOW + 1)
-    assert view.robots(NOW + 1)[0].yaw is None
-    tell(view, "a", "status", status(pose={"x": 2.0, "y": 3.0, "yaw": 0.5}))
-    assert view.robots(NOW)[0].yaw == 0.5
-    # One that is old is not.
-    assert view.robots(NOW + 3)[0].x == 1.0
 
 
 def test_a_robot_that_others_leave_out_is_shown_as_such():
@@ -197,9 +168,9 @@ def test_there_is_room_for_as_many_robots_as_a_fleet_has():
     view = FleetView("house")
     for number in range(MOST_MEMBERS + 7):
         say(view, f"r{number:02}")
-        tell(view, f"r{number:02}", "map", map_bytes(room(1.0, 1.0)))
+        tell(view, f"r{number:02}", "status", status())
     view.tick(NOW)
-    assert len(view.robots(NOW)) == len(view.maps()) == MOST_MEMBERS
+    assert [robot.revision for robot in view.robots(NOW)] == [7] * MOST_MEMBERS
     assert f"{MOST_MEMBERS} robots of a fleet" in texts(view)[0]
     # One that is long gone gives its place to another, with all that was known of it.
     for number in range(1, MOST_MEMBERS):
@@ -208,8 +179,7 @@ def test_there_is_room_for_as_many_robots_as_a_fleet_has():
     names = view.names()
     assert "late" in names
     assert "r00" not in names
-    assert len(view.maps()) == MOST_MEMBERS - 1
-    assert view.without_map() == ["late"]
+    assert [robot.name for robot in view.robots(NOW) if robot.revision is None] == ["late"]
 
 
 def test_a_robot_that_jumps_on_and_off_does_not_fill_the_log():
@@ -228,7 +198,7 @@ def test_a_robot_that_jumps_on_and_off_does_not_fill_the_log():
     ("topic", "payload"),
     [
         ("fleet", b""), ("fleet", b"\xff"), ("fleet", b"[" * 100_000), ("fleet", b'{"version": 1}'),
-        ("fleet", b'{"version": 2, "fleet": "house"}'), ("map", b"no map"), ("pose", b"\x00\x01"),
+        ("fleet", b'{"version": 2, "fleet": "house"}'),
         ("status", b"[]"), ("status", b"\xff"), ("fleet", b" " * 2_000_000),
     ],
 )  # fmt: skip

@@ -50,8 +50,6 @@ class Hall:
         self._thread = threading.Thread(target=self._tell)
 
     def __enter__(self) -> Hall:
-        for teller in self.tellers.values():
-            teller.show(HALL)
         self._thread.start()
         return self
 
@@ -64,7 +62,6 @@ class Hall:
             for name, teller in self.tellers.items():
                 if name not in self.silent:
                     teller.tell(**self.said[name])
-                    teller.stand(1.0 if name == "a" else 8.0, 1.0)
 
 
 @pytest.fixture(scope="module")
@@ -83,13 +80,12 @@ def hall() -> Iterator[tuple[Hall, str]]:
             yield robots, endpoint
 
 
-def test_it_shows_all_robots_on_one_map(hall):
+def test_it_shows_all_robots(hall):
     robots, endpoint = hall
     with Terminal("--fleet", "house", "--connect", endpoint, columns=100, lines=30) as terminal:
         screen = terminal.wait(lambda seen: "2 of 2 robots at work" in seen and "% swept" in seen)
         assert "a joined: covering" in screen
         assert "stranger" not in screen
-        terminal.wait_text("→")
         resident = resident_mb(terminal.process.pid)
         print(f"watch --fleet: {resident:.1f} MB")
         assert resident < WATCH_MB
@@ -99,7 +95,7 @@ def test_it_shows_all_robots_on_one_map(hall):
         robots.said["b"] |= {"waits_for": "a", "cells": [(17, 28)]}
         terminal.wait_text("b     waits for a")
         robots.tellers["a"].send("fleet", b"\xff")
-        robots.tellers["a"].send("map", b"no map")
+        robots.tellers["a"].send("status", b"[]")
         robots.silent.add("b")
         terminal.wait_text("b is gone")
         robots.silent.clear()
@@ -110,15 +106,11 @@ def test_it_shows_all_robots_on_one_map(hall):
         assert "Traceback" not in terminal.written
 
 
-def test_once_is_one_picture(hall):
-    robots, endpoint = hall
-    for name in ("a", "b"):
-        robots.tellers[name].show(HALL)
+def test_once_is_one_page(hall):
+    _, endpoint = hall
     ended = fasaco_edge("watch", "--fleet", "house", "--once", "--connect", endpoint)
     assert ended.code == 0
     assert "2 of 2 robots at work" in ended.out
-    # The maps of both are there.
-    assert "####" in ended.out
     assert "\x1b" not in ended.out
     ended = fasaco_edge("watch", "--fleet", "house", "--once", "--json", "--connect", endpoint)
     document = json.loads(ended.out)

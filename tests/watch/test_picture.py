@@ -6,10 +6,12 @@ import math
 
 import numpy as np
 import pytest
+from rich.color import ColorSystem
 
 from fasaco_edge.grid.geometry import Pose2D
 from fasaco_edge.grid.occupancy import known_bounds
 from fasaco_edge.watch import picture
+from fasaco_edge.watch.glyphs import GlyphSet
 from fasaco_edge.watch.picture import (
     AHEAD,
     COVERED,
@@ -23,7 +25,7 @@ from fasaco_edge.watch.picture import (
     WALL,
     Frame,
 )
-from tests.watch.grids import grid_of
+from tests.watch.grids import grid_of, plain
 
 
 def test_south_is_at_the_bottom():
@@ -118,3 +120,12 @@ def test_everything_known_fits_and_pixels_are_square(columns, lines):
     assert frame.top >= bounds[3]
     assert frame.left + columns * frame.pixel_m >= bounds[2]
     assert frame.top - 2 * lines * frame.pixel_m <= bounds[1]
+
+
+def test_every_kind_has_a_look():
+    kinds = np.arange(HEADING + picture.EIGHTHS, dtype=np.uint8)
+    for colours in (ColorSystem.TRUECOLOR, ColorSystem.EIGHT_BIT, ColorSystem.STANDARD, None):
+        for unicode in (True, False):
+            for below in (kinds, kinds[::-1]):
+                (line,) = GlyphSet(colours, unicode).lines(np.stack([kinds, below]))
+                assert len(plain(line)) == len(kinds)
