@@ -41,7 +41,7 @@ from fasaco_edge.host.processes import (
 from fasaco_edge.wire import topics
 
 if TYPE_CHECKING:
-    from fasaco_edge.daemon.loop.fleet import FleetEar, FleetVoice
+    from fasaco_edge.daemon.loop.fleet import FleetReceiver, FleetSender
 
 LOG = logging.getLogger(__name__)
 
@@ -171,20 +171,20 @@ def _afforded(config: DaemonConfig) -> DaemonConfig:
     return smaller
 
 
-def _ear(config: DaemonConfig) -> FleetEar | None:
+def _receiver(config: DaemonConfig) -> FleetReceiver | None:
     if not config.fleet:
         return None
-    from fasaco_edge.daemon.loop.fleet import FleetEar  # noqa: PLC0415
+    from fasaco_edge.daemon.loop.fleet import FleetReceiver  # noqa: PLC0415
 
-    return FleetEar(config)
+    return FleetReceiver(config)
 
 
-def _voice(config: DaemonConfig, bus: Bus) -> FleetVoice | None:
+def _sender(config: DaemonConfig, bus: Bus) -> FleetSender | None:
     if not config.fleet:
         return None
-    from fasaco_edge.daemon.loop.fleet import FleetVoice  # noqa: PLC0415
+    from fasaco_edge.daemon.loop.fleet import FleetSender  # noqa: PLC0415
 
-    return FleetVoice(bus.advertise(config.keys(), topics.FLEET), config)
+    return FleetSender(bus.advertise(config.keys(), topics.FLEET), config)
 
 
 def _serve(
@@ -207,11 +207,17 @@ def _serve(
     ports = BusPorts(
         mailbox=mailbox,
         inbox=Inbox(
-            bus, keys, mailbox, config.poses(), max_pixels, [ros.map] if ros else [], _ear(config)
+            bus,
+            keys,
+            mailbox,
+            config.poses(),
+            max_pixels,
+            [ros.map] if ros else [],
+            _receiver(config),
         ),
         commands=Commands(bus, keys, mailbox, ros.commands if ros else {}),
         outbox=Outbox(bus, keys, ros),
-        fleet=_voice(config, bus),
+        fleet=_sender(config, bus),
         turns=TurnLog(bus.advertise(keys, topics.TURNS), config, ledger.restored),
         claim=NameClaim(bus, keys),
     )

@@ -10,8 +10,8 @@ from fasaco_edge.bus.session import Bus
 from fasaco_edge.bus.settings import BusSettings
 from fasaco_edge.client.joining import Joining
 from fasaco_edge.client.phrases import steady_now
-from fasaco_edge.fleet.ears import Ears
 from fasaco_edge.fleet.inbox import FleetInbox, Heard, Traffic
+from fasaco_edge.fleet.subscriptions import FleetSubscriptions
 from fasaco_edge.wire.keys import VERSION, Keys
 from fasaco_edge.wire.topics import STATUS
 
@@ -32,7 +32,7 @@ class FleetFeed(Joining):
         super().__init__(settings)
         self._keys = keys
         self._inbox = FleetInbox(CAPACITY_BYTES, _stamped)
-        self._ears: Ears | None = None
+        self._subscriptions: FleetSubscriptions | None = None
         self._here: set[str] = set()
         # Not that of the session: tokens may come while it listens.
         self._naming = threading.Lock()
@@ -43,14 +43,14 @@ class FleetFeed(Joining):
 
     def attend(self, robots: Collection[str]) -> None:
         """Hear the robots of these names, and no others; call it often."""
-        ears = self._ears
-        if ears is None:
+        subscriptions = self._subscriptions
+        if subscriptions is None:
             return
-        for robot in ears.robots - set(robots):
-            ears.leave(robot)
+        for robot in subscriptions.robots - set(robots):
+            subscriptions.leave(robot)
             self._inbox.forget(robot)
-        for robot in set(robots) - ears.robots:
-            ears.hear(robot)
+        for robot in set(robots) - subscriptions.robots:
+            subscriptions.hear(robot)
 
     def forget(self, robot: str) -> None:
         """Drop the queues of a robot of no concern."""
@@ -67,9 +67,9 @@ class FleetFeed(Joining):
 
     def _listen(self, bus: Bus) -> None:
         bus.watch_tokens(f"{self._keys.base}/{VERSION}/*/alive", self._note_token)
-        ears = Ears(bus, self._keys, (STATUS,), self._inbox.post)
-        ears.listen()
-        self._ears = ears
+        subscriptions = FleetSubscriptions(bus, self._keys, (STATUS,), self._inbox.post)
+        subscriptions.listen()
+        self._subscriptions = subscriptions
 
     def _note_token(self, key: str, here: bool) -> None:
         robot = self._keys.robot_of(key)

@@ -24,7 +24,7 @@ from fasaco_edge.errors import BusUnavailable
 from fasaco_edge.wire import topics
 from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.topics import QOS
-from tests.support.outsider import Ear, open_client
+from tests.support.outsider import Collector, open_client
 from tests.support.processes import free_endpoint
 from tests.support.senders import Sender
 
@@ -87,25 +87,28 @@ def test_a_map_and_its_updates_come_as_they_were_sent(bus, endpoint):
 
 
 def test_a_sample_goes_out_with_type_and_attachment(bus, client):
-    ear = Ear()
-    client.declare_subscriber(KEY, ear)
+    receiver = Collector()
+    client.declare_subscriber(KEY, receiver)
     publisher = bus.publisher(KEY, SCHEMA)
     until(publisher.has_listeners)
     publisher.put(b"payload", b"attached")
     publisher.put(b"")
-    first, second = ear.wait(lambda h: h.payload != b""), ear.wait(lambda h: h.payload == b"")
+    first, second = (
+        receiver.wait(lambda h: h.payload != b""),
+        receiver.wait(lambda h: h.payload == b""),
+    )
     assert (first.payload, first.attachment) == (b"payload", b"attached")
     assert first.encoding == f"application/cdr;{SCHEMA}"
     assert second.attachment is None
 
 
 def test_without_a_schema_it_is_json(bus, client):
-    ear = Ear()
-    client.declare_subscriber(KEY, ear)
+    receiver = Collector()
+    client.declare_subscriber(KEY, receiver)
     publisher = bus.publisher(KEY)
     until(publisher.has_listeners)
     publisher.put(b"{}")
-    assert ear.wait(lambda h: True).encoding == "application/json"
+    assert receiver.wait(lambda h: True).encoding == "application/json"
 
 
 @pytest.mark.parametrize("latched", [False, True])
@@ -125,11 +128,11 @@ def test_who_comes_late_gets_the_newest_of_a_latched_key(bus, client):
     publisher = bus.publisher(KEY, SCHEMA, QOS["path"])
     for number in range(5):
         publisher.put(b"%d" % number, b"attached")
-    ear = Ear()
-    zenoh.ext.declare_advanced_subscriber(client, KEY, ear, history=history())
-    ear.wait(lambda h: h.payload == b"4" and h.attachment == b"attached")
-    assert len(ear.heard) == 1
-    plain = Ear()
+    receiver = Collector()
+    zenoh.ext.declare_advanced_subscriber(client, KEY, receiver, history=history())
+    receiver.wait(lambda h: h.payload == b"4" and h.attachment == b"attached")
+    assert len(receiver.heard) == 1
+    plain = Collector()
     client.declare_subscriber(KEY, plain)
     publisher.put(b"5")
     plain.wait(lambda h: h.payload == b"5")
@@ -167,7 +170,7 @@ def test_it_knows_whether_anybody_listens(bus, client):
     for latched in (False, True):
         publisher = bus.publisher(f"{KEY}/{latched}", qos=QOS["path" if latched else "pose"])
         assert not publisher.has_listeners()
-        subscriber = client.declare_subscriber(f"{KEY}/{latched}", Ear())
+        subscriber = client.declare_subscriber(f"{KEY}/{latched}", Collector())
         until(publisher.has_listeners)
         subscriber.undeclare()
         until(lambda publisher=publisher: not publisher.has_listeners())

@@ -182,7 +182,7 @@ def secured_rows(folder: Path, only: str) -> list[Row]:
     with (
         secured_daemon(folder, security={"limits": {}}) as house,
         Boss(house.endpoint, transport=transport(house.ca.files("boss"))) as boss,
-        house.voice("slam") as mapper,
+        house.sender("slam") as mapper,
     ):
         begin(boss, mapper)
         for title, attack in attacks(foreign).items():

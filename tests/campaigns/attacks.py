@@ -66,7 +66,7 @@ def plain_tcp(house: House) -> str:
 
 def viewer_gives_a_map(house: House) -> str:
     """A viewer publishes a map and a pose."""
-    with house.voice("eye") as eye:
+    with house.sender("eye") as eye:
         eye.put("map", map_bytes(room(3.0, 3.0)))
         eye.put("pose", pose_bytes(2.0, 2.0))
         time.sleep(0.5)
@@ -75,7 +75,7 @@ def viewer_gives_a_map(house: House) -> str:
 
 def mapper_commands(house: House) -> str:
     """A mapper asks @rpc/mission to pause."""
-    with house.voice("slam") as slam:
+    with house.sender("slam") as slam:
         key = f"{slam.prefix}/@rpc/mission"
         answers = list(slam.session.get(key, payload=PAUSE, timeout=1.0))
     return f"{len(answers)} answers"
@@ -83,7 +83,7 @@ def mapper_commands(house: House) -> str:
 
 def mapper_speaks_to_all(house: House) -> str:
     """A mapper publishes on fasaco/@v1/** and on **."""
-    with house.voice("slam") as slam:
+    with house.sender("slam") as slam:
         for key in ("fasaco/@v1/**", "fasaco/@v1/*/map", "**"):
             slam.session.put(key, map_bytes(room(3.0, 3.0)))
         time.sleep(0.5)
@@ -93,7 +93,7 @@ def mapper_speaks_to_all(house: House) -> str:
 def stranger_listens(house: House) -> str:
     """A certificate without a role subscribes to everything, tokens too."""
     heard: list[Any] = []
-    with house.voice("stranger") as stranger:
+    with house.sender("stranger") as stranger:
         for key in ("**", "fasaco/@v1/**", f"{stranger.prefix}/status", f"{stranger.prefix}/alive"):
             stranger.session.declare_subscriber(key, heard.append)
             stranger.session.liveliness().declare_subscriber(key, heard.append, history=True)
@@ -104,7 +104,7 @@ def stranger_listens(house: House) -> str:
 def viewer_passes_for_the_robot(house: House) -> str:
     """A viewer gives a path, answers @rpc/status, and shows the robot's token."""
     heard: list[Any] = []
-    with house.guest("boss") as boss, house.voice("eye") as eye:
+    with house.guest("boss") as boss, house.sender("eye") as eye:
         boss.session.declare_subscriber(f"{boss.prefix}/path", heard.append)
         eye.session.declare_queryable(f"{eye.prefix}/@rpc/status", lambda query: query.drop())
         eye.session.liveliness().declare_token(f"{eye.prefix}/alive")
@@ -118,7 +118,7 @@ def oversized(megabytes: float) -> Callable[[House], str]:
     """Return an attack: a mapper sends one map of that size."""
 
     def send(house: House) -> str:
-        with house.voice("slam") as slam:
+        with house.sender("slam") as slam:
             slam.put("map", bytes(int(megabytes * 1e6)))
             time.sleep(2.0)
         return "sent"
@@ -130,8 +130,8 @@ def flood(name: str, topic: str, payload: bytes, hertz: float = FLOOD_HZ) -> Cal
     """Return an attack: somebody sends one message over and over."""
 
     def send(house: House) -> str:
-        with house.voice(name) as voice:
-            return pour(voice.session, f"{voice.prefix}/{topic}", payload, hertz)
+        with house.sender(name) as sender:
+            return pour(sender.session, f"{sender.prefix}/{topic}", payload, hertz)
 
     return send
 
@@ -148,7 +148,7 @@ def pour(session: zenoh.Session, key: str, payload: bytes, hertz: float) -> str:
 
 def queries(house: House) -> str:
     """A viewer asks for the status as fast as it can, without waiting."""
-    with house.voice("eye") as eye:
+    with house.sender("eye") as eye:
         began, asked, answers = time.monotonic(), 0, []
         while time.monotonic() < began + FLOOD_S:
             eye.session.get(f"{eye.prefix}/@rpc/status", answers.append, timeout=1.0)
@@ -200,7 +200,7 @@ def let_in(house: House) -> str:
 
 def many_keys(house: House) -> str:
     """A certificate without a role subscribes to 5,000 keys of its own."""
-    with house.voice("stranger") as stranger:
+    with house.sender("stranger") as stranger:
         for number in range(MANY):
             stranger.session.declare_subscriber(f"{'x' * 200}/{number}", lambda sample: None)
         time.sleep(2.0)

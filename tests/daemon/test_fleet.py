@@ -58,14 +58,14 @@ def test_nobody_hears_another_robots_map(seats):
 
 def test_nobody_hears_another_robots_path_or_obeys_its_commands(seats):
     first, *others = (seats[name] for name in FLEET)
-    ears = [other.listen("path", late=False) for other in others]
+    subscriptions = [other.listen("path", late=False) for other in others]
     first.put("map", map_bytes(pillared_room()))
     first.put("pose", pose_bytes(0.75, 0.75))
     first.wait_status(lambda status: status["state"] == "covering")
     list(first.session.get(f"{first.prefix}/@rpc/mission", payload=b'{"command":"pause"}'))
     first.wait_status(lambda status: status["state"] == "paused")
     time.sleep(SILENCE_S)
-    assert all(ear.heard == [] for ear in ears)
+    assert all(receiver.heard == [] for receiver in subscriptions)
     assert [other.ask_status()["state"] != "paused" for other in others] == [True, True]
 
 

@@ -17,7 +17,7 @@ from fasaco_edge.bus.session import open_bus
 from fasaco_edge.bus.settings import BusSettings
 from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.daemon.loop.answers import Commands
-from fasaco_edge.daemon.loop.fleet import FleetEar
+from fasaco_edge.daemon.loop.fleet import FleetReceiver
 from fasaco_edge.daemon.loop.held_events import HeldEvents
 from fasaco_edge.daemon.loop.inbox import (
     MOST_POSES,
@@ -117,8 +117,8 @@ def test_what_a_fleet_says_too_long_is_dropped_on_arrival():
     config = msgspec.convert({"robot": {"name": "r1"}, "fleet": {"name": "hall"}}, DaemonConfig)
     keys, mailbox = config.keys(), make_mailbox(MAX_PIXELS)
     with open_bus(BusSettings("peer", (), (free_endpoint(),))) as bus:
-        poses, ear = PoseDecoder(POSE_STAMPED, None), FleetEar(config)
-        inbox = Inbox(bus, keys, mailbox, poses, MAX_PIXELS, fleet=ear)
+        poses, receiver = PoseDecoder(POSE_STAMPED, None), FleetReceiver(config)
+        inbox = Inbox(bus, keys, mailbox, poses, MAX_PIXELS, fleet=receiver)
         bus.publisher(Keys("r2").of(FLEET)).put(bytes(MAX_JSON_BYTES + 1))
         batch = take_batch(mailbox, TIMEOUT_S)
         assert batch.samples == []
@@ -141,11 +141,13 @@ def test_what_a_fleet_says_before_the_mission_is_not_heard():
         payload = json.dumps(said | {"origin": [3.0, 0.0, 20.0]}).encode()
         told.append(Received("fleet", Sample("fasaco/@v1/r2/fleet", payload), 0.0))
     with open_bus(BusSettings("peer", (), (free_endpoint(),))) as bus:
-        poses, ear = PoseDecoder(POSE_STAMPED, None), FleetEar(config)
-        inbox = Inbox(bus, config.keys(), make_mailbox(MAX_PIXELS), poses, MAX_PIXELS, fleet=ear)
+        poses, receiver = PoseDecoder(POSE_STAMPED, None), FleetReceiver(config)
+        inbox = Inbox(
+            bus, config.keys(), make_mailbox(MAX_PIXELS), poses, MAX_PIXELS, fleet=receiver
+        )
         assert inbox.decode(Batch(samples=told[:1]), has_mission=False) == ([], [])
         events, faults = inbox.decode(Batch(samples=told[1:]))
-    assert events == [FleetEar(config).event(told[1].sample)]
+    assert events == [FleetReceiver(config).event(told[1].sample)]
     assert faults == []
 
 

@@ -43,10 +43,10 @@ def test_by_default_the_path_is_a_line_that_sweeps_the_rims(tmp_path):
         daemon_process(tmp_path, planner={"line": by_default}) as running,
         Outsider(running.endpoint) as outsider,
     ):
-        ear = outsider.listen("path")
+        receiver = outsider.listen("path")
         outsider.put("map", map_bytes(pixels))
         outsider.put("pose", pose_bytes(*START))
-        points, _ = planned(ear.wait(lambda heard: True))
+        points, _ = planned(receiver.wait(lambda heard: True))
         figures = swept_by(pixels, points)
         assert figures.illegal_share == 0.0
         # Cells beside a wall have their centre within reach of it; a line goes nearer.

@@ -65,10 +65,10 @@ def pixels():
 def path(daemon, pixels):
     """The path of the room with the pillar."""
     with Outsider(daemon.endpoint) as outsider:
-        ear = outsider.listen("path")
+        receiver = outsider.listen("path")
         outsider.put("map", map_bytes(pixels, stamp_ns=12_000_000_034))
         outsider.put("pose", pose_bytes(*START))
-        heard = ear.wait(lambda heard: True)
+        heard = receiver.wait(lambda heard: True)
         # The robot does not move: this path stays.
         outsider.wait_status(lambda status: status["state"] == "covering")
         return heard
@@ -144,9 +144,9 @@ def test_who_asks_gets_the_same_bytes(path, outsider):
 
 
 def test_who_comes_late_gets_it_at_once(path, outsider):
-    ear = outsider.listen("path")
-    assert ear.wait(lambda heard: True) == path
-    assert len(ear.heard) == 1
+    receiver = outsider.listen("path")
+    assert receiver.wait(lambda heard: True) == path
+    assert len(receiver.heard) == 1
 
 
 def test_the_coverage_tells_what_is_where(path, pixels, outsider):
@@ -254,17 +254,17 @@ def fresh(tmp_path):
 
 def test_an_update_that_opens_a_door_leads_to_a_new_path(fresh):
     closed, opened = two_rooms(door=False), two_rooms(door=True)
-    ear = fresh.listen("path")
+    receiver = fresh.listen("path")
     fresh.put("map", map_bytes(closed))
     fresh.put("pose", pose_bytes(*START))
-    first = ear.wait(lambda heard: True)
+    first = receiver.wait(lambda heard: True)
     west = {cell for cell in coverable_cells(closed) if cell[1] < 10}
     assert set(cells_of(planned(first)[0])) == west
     status = fresh.wait_status(lambda status: status["coverage"] is not None)
     assert status["coverage"]["unreachable"] == len(coverable_cells(closed)) - len(west)
 
     fresh.put("map_update", update_bytes(opened, 2.5, 0.5, 3.5, 2.5))
-    second = ear.wait(lambda heard: True, since=1)
+    second = receiver.wait(lambda heard: True, since=1)
     assert set(cells_of(planned(second)[0])) >= coverable_cells(opened) - set(
         cells_of(np.array([START]))
     )
@@ -274,16 +274,16 @@ def test_an_update_that_opens_a_door_leads_to_a_new_path(fresh):
 
     # A door that is shut again cuts the path off, and a new one stays on this side.
     fresh.put("map_update", update_bytes(closed, 2.5, 0.5, 3.5, 2.5))
-    third = ear.wait(lambda heard: set(cells_of(planned(heard)[0])) <= west, since=2)
+    third = receiver.wait(lambda heard: set(cells_of(planned(heard)[0])) <= west, since=2)
     assert about(third)["map_revision"] == 3
 
 
 def test_a_change_that_touches_no_coverable_cell_changes_no_path(fresh):
     pixels = pillared_room()
-    ear = fresh.listen("path")
+    receiver = fresh.listen("path")
     fresh.put("map", map_bytes(pixels))
     fresh.put("pose", pose_bytes(*START))
-    ear.wait(lambda heard: True)
+    receiver.wait(lambda heard: True)
     # Inside the pillar; and more of the unknown around.
     hollow = fill(pixels, 2.15, 1.15, 2.25, 1.25, UNKNOWN)
     wider = np.full((pixels.shape[0] + 30, pixels.shape[1] + 30), UNKNOWN, np.int8)
@@ -295,14 +295,14 @@ def test_a_change_that_touches_no_coverable_cell_changes_no_path(fresh):
         )
     status = fresh.wait_status(lambda status: True)
     assert status["plan"]["plans"] == 1
-    assert len(ear.heard) == 1
+    assert len(receiver.heard) == 1
 
 
 def test_poses_may_come_as_other_messages_that_say_so(fresh):
-    ear = fresh.listen("path")
+    receiver = fresh.listen("path")
     fresh.put("map", map_bytes(room(3.0, 3.0)))
     fresh.put("pose", covariant_bytes(0.75, 0.75), "geometry_msgs/msg/PoseWithCovarianceStamped")
-    ear.wait(lambda heard: True)
+    receiver.wait(lambda heard: True)
     fresh.put("pose", odometry_bytes(1.05, 0.75), "nav_msgs/msg/Odometry")
     status = fresh.wait_status(lambda status: (status["pose"] or {}).get("x") == 1.05)
     assert status["errors"]["total"] == 0
@@ -330,16 +330,16 @@ def test_poses_that_do_not_say_are_what_the_configuration_says(tmp_path, name):
 
 def test_a_robot_that_covers_all_is_done(fresh):
     pixels = room(1.5, 1.2)
-    ear = fresh.listen("path")
+    receiver = fresh.listen("path")
     fresh.put("map", map_bytes(pixels))
     fresh.put("pose", pose_bytes(0.45, 0.45))
-    points, _ = planned(ear.wait(lambda heard: True))
+    points, _ = planned(receiver.wait(lambda heard: True))
     for x, y in points:
         fresh.put("pose", pose_bytes(x, y))
     status = fresh.wait_status(lambda status: status["state"] == "done")
     assert status["coverage"]["remaining"] == 0
     assert status["coverage"]["covered"] == len(coverable_cells(pixels)) == len(points)
-    last = ear.wait(lambda heard: True, since=1)
+    last = receiver.wait(lambda heard: True, since=1)
     assert len(planned(last)[0]) == 0
     assert about(last)["reason"] == "every reachable cell is covered"
 
@@ -399,10 +399,10 @@ def test_the_swept_floor_is_sent_to_who_listens(fresh):
 
 
 def test_the_pheromone_is_sent_only_to_who_listens(fresh):
-    ear = fresh.listen("pheromone", late=False)
+    receiver = fresh.listen("pheromone", late=False)
     fresh.put("map", map_bytes(room(3.0, 3.0)))
     fresh.put("pose", pose_bytes(*START))
-    heard = ear.wait(lambda heard: True)
+    heard = receiver.wait(lambda heard: True)
     assert heard.encoding == "application/cdr;fasaco_msgs/msg/PheromoneGrid"
     grid = oracle.from_bytes("fasaco_msgs/msg/PheromoneGrid", heard.payload)
     assert grid.header.frame_id == "map"
@@ -411,10 +411,10 @@ def test_the_pheromone_is_sent_only_to_who_listens(fresh):
 
 
 def test_the_living_trail_is_sent_with_how_decided_it_is(fresh):
-    ear = fresh.listen("pheromone", late=False)
+    receiver = fresh.listen("pheromone", late=False)
     fresh.put("map", map_bytes(room(3.0, 3.0)))
     fresh.put("pose", pose_bytes(*START))
-    first = ear.wait(lambda heard: bool(heard.attachment) and about(heard)["revision"] == 1)
+    first = receiver.wait(lambda heard: bool(heard.attachment) and about(heard)["revision"] == 1)
     trail, told = decode_pheromone(first.payload), about(first)
     assert (trail.velocity, trail.ants, trail.cohort) == (0, 0, 0)
     assert told["cells"] == np.count_nonzero(trail.levels)
@@ -423,7 +423,7 @@ def test_the_living_trail_is_sent_with_how_decided_it_is(fresh):
     ahead = planned(fresh.listen("path").wait(lambda heard: True))[0]
     for x, y in ahead[1:4].tolist():
         fresh.put("pose", pose_bytes(x, y))
-    last = ear.wait(lambda heard: bool(heard.attachment) and heard.payload != first.payload)
+    last = receiver.wait(lambda heard: bool(heard.attachment) and heard.payload != first.payload)
     assert about(last)["cells"] == told["cells"]
     # Who comes late gets the newest, though nothing changes any more.
     late = fresh.listen("pheromone").wait(lambda heard: True)
@@ -431,7 +431,7 @@ def test_the_living_trail_is_sent_with_how_decided_it_is(fresh):
 
 
 def test_where_the_trail_points_to_is_sent_to_who_listens(fresh):
-    ear = fresh.listen("directions", late=False)
+    receiver = fresh.listen("directions", late=False)
     fresh.put("map", map_bytes(room(3.0, 3.0)))
     fresh.put("pose", pose_bytes(*START))
     ahead = planned(fresh.listen("path").wait(lambda heard: True))[0]
@@ -449,4 +449,4 @@ def test_where_the_trail_points_to_is_sent_to_who_listens(fresh):
         value = int(grid.cells[at])
         return value // 25 == direction and value % 25 > 24 / 4
 
-    ear.wait(points_along)
+    receiver.wait(points_along)

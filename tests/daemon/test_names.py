@@ -19,7 +19,7 @@ from fasaco_edge.doctor import session
 from fasaco_edge.doctor.finding import CheckContext, Level
 from fasaco_edge.host.processes import peak_mb
 from tests.campaigns.memory import Flood, map_payload, update_payload
-from tests.support.outsider import Ear, Outsider
+from tests.support.outsider import Collector, Outsider
 from tests.support.processes import daemon_process, free_endpoint, slowness
 from tests.support.rooms import map_bytes, pose_bytes, room
 from tests.support.router import router_process
@@ -38,7 +38,7 @@ def until(holds):
 
 
 class Robot:
-    """A mapper, and ears, beside the router."""
+    """A mapper, and subscriptions, beside the router."""
 
     def __init__(self, endpoint):
         config = {
@@ -51,7 +51,7 @@ class Robot:
             },
         }
         self.session = zenoh.open(zenoh.Config.from_json5(json.dumps(config)))
-        self.paths, self.statuses = Ear(), Ear()
+        self.paths, self.statuses = Collector(), Collector()
         self.session.declare_subscriber(f"{PREFIX}/path", self.paths)
         self.session.declare_subscriber(f"{PREFIX}/status", self.statuses)
 
@@ -235,10 +235,10 @@ def test_where_a_network_grows_together_one_goes_on(tmp_path, robot_at):
             assert sorted(map(waits, daemons)) == [False, True]
             # Who joins now gets one path, and it is one to drive.
             with Outsider(one) as late:
-                ear = late.listen("path")
-                ear.wait(lambda heard: True)
+                receiver = late.listen("path")
+                receiver.wait(lambda heard: True)
                 time.sleep(0.5)
-                assert [attached(path)["steps"] > 0 for path in ear.heard] == [True]
+                assert [attached(path)["steps"] > 0 for path in receiver.heard] == [True]
 
 
 def test_a_router_that_comes_late_with_another_behind_it(tmp_path, robot_at):

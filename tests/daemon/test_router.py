@@ -9,7 +9,7 @@ import pytest
 import zenoh
 import zenoh.ext
 
-from tests.support.outsider import Ear, Outsider
+from tests.support.outsider import Collector, Outsider
 from tests.support.processes import ENVIRONMENT, daemon_process, fasaco_edge, free_endpoint
 from tests.support.rooms import WALL, fill, map_bytes, pose_bytes, room
 from tests.support.router import router_process
@@ -45,11 +45,11 @@ def test_who_joins_late_has_path_and_status(daemon, outsider):
     for _ in range(5):
         with Outsider(daemon.endpoint) as late:
             started = time.monotonic()
-            ears = late.listen("path"), late.listen("status")
-            for ear in ears:
-                ear.wait(lambda heard: True)
+            subscriptions = late.listen("path"), late.listen("status")
+            for receiver in subscriptions:
+                receiver.wait(lambda heard: True)
             took.append(time.monotonic() - started)
-            assert ears[0].heard[0].payload == path.heard[-1].payload
+            assert subscriptions[0].heard[0].payload == path.heard[-1].payload
     print(f"late joiner: path and status after {1e3 * max(took):.0f} ms at most")
     assert max(took) < LATE_S
 
@@ -84,14 +84,16 @@ class _Heard:
         self._session = session
         self._maps = 0
         history = zenoh.ext.HistoryConfig(max_samples=1, detect_late_publishers=True)
-        self._ears = {"path": Ear(), "status": Ear()}
-        for name, ear in self._ears.items():
-            zenoh.ext.declare_advanced_subscriber(session, f"{PREFIX}/{name}", ear, history=history)
+        self._subscriptions = {"path": Collector(), "status": Collector()}
+        for name, receiver in self._subscriptions.items():
+            zenoh.ext.declare_advanced_subscriber(
+                session, f"{PREFIX}/{name}", receiver, history=history
+            )
         session.liveliness().declare_subscriber(f"{PREFIX}/alive", self._note, history=True)
 
     def wait_all(self, losses):
         """Wait until all comes anew; return for each the seconds it took."""
-        since = {name: len(ear.heard) for name, ear in self._ears.items()}
+        since = {name: len(receiver.heard) for name, receiver in self._subscriptions.items()}
         missing = {
             "path": lambda: self._is_new("path", since),
             "status": lambda: self._is_new("status", since),
@@ -113,7 +115,7 @@ class _Heard:
         self.tokens.append(token.kind == zenoh.SampleKind.PUT)
 
     def _is_new(self, name, since):
-        return len(self._ears[name].heard) > since[name]
+        return len(self._subscriptions[name].heard) > since[name]
 
     def _is_answered(self):
         replies = self._session.get(f"{PREFIX}/@rpc/version", timeout=2.0)

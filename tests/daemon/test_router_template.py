@@ -44,7 +44,7 @@ def endpoint(ca, tmp_path_factory):
 
 
 @pytest.fixture
-def voice(ca, endpoint):
+def sender(ca, endpoint):
     """Open sessions by name."""
     with contextlib.ExitStack() as stack:
         yield lambda name: stack.enter_context(open_client(endpoint, transport(ca.files(name))))
@@ -63,9 +63,9 @@ def status(seat):
     return seat.ask_status()
 
 
-def test_a_mapper_is_heard_by_its_own_robot_alone(office, voice):
+def test_a_mapper_is_heard_by_its_own_robot_alone(office, sender):
     first, second = office
-    slam = voice("slam-r1")
+    slam = sender("slam-r1")
     for robot in FLEET:
         slam.put(f"fasaco/@v1/{robot}/map", map_bytes(pillared_room()))
         slam.put(f"fasaco/@v1/{robot}/pose", pose_bytes(0.75, 0.75))
@@ -83,36 +83,36 @@ def test_an_operator_commands_both(office):
         assert reply.ok is not None
 
 
-def test_a_robot_does_not_pass_for_another_nor_command_it(office, voice):
-    robot, second = voice("r1"), office[1]
+def test_a_robot_does_not_pass_for_another_nor_command_it(office, sender):
+    robot, second = sender("r1"), office[1]
     before = status(second)
-    ear = second.listen("status", late=False)
+    receiver = second.listen("status", late=False)
     robot.put("fasaco/@v1/r2/status", b"{}")
     robot.put("fasaco/@v1/r2/map", map_bytes(pillared_room()))
     assert list(robot.get("fasaco/@v1/r2/@rpc/mission", timeout=SILENCE_S, payload=PAUSE)) == []
     # What the daemon itself says once a second, after all of that.
-    ear.wait(lambda heard: heard.json().get("uptime_s", 0.0) > before["uptime_s"] + 1.0)
-    assert all(heard.json().get("robot") == "r2" for heard in ear.heard)
+    receiver.wait(lambda heard: heard.json().get("uptime_s", 0.0) > before["uptime_s"] + 1.0)
+    assert all(heard.json().get("robot") == "r2" for heard in receiver.heard)
     assert status(second)["map"] == before["map"]
 
 
-def test_robots_of_a_fleet_hear_each_other_and_nobody_speaks_for_another(office, voice):
+def test_robots_of_a_fleet_hear_each_other_and_nobody_speaks_for_another(office, sender):
     for seat, name in zip(office, FLEET, strict=True):
-        slam, deadline = voice(f"slam-{name}"), time.monotonic() + 60.0
+        slam, deadline = sender(f"slam-{name}"), time.monotonic() + 60.0
         # Another session at once: what it says first may come before who listens is known to it.
         while not (told := status(seat))["map"] or not told["pose"]:
             assert time.monotonic() < deadline, told
             slam.put(f"fasaco/@v1/{name}/map", map_bytes(pillared_room()))
             slam.put(f"fasaco/@v1/{name}/pose", pose_bytes(0.75, 0.75))
             time.sleep(0.5)
-    ear = office[0].listen("fleet", late=False)
+    receiver = office[0].listen("fleet", late=False)
     for seat, other in zip(office, reversed(FLEET), strict=True):
         deadline = time.monotonic() + 60.0
         while [member["name"] for member in status(seat)["fleet"]["members"]] != [other]:
             assert time.monotonic() < deadline
-    said = ear.wait(lambda heard: True).payload
+    said = receiver.wait(lambda heard: True).payload
     for name in ("r1", "slam-r1", "tablet"):
-        voice(name).put("fasaco/@v1/r3/fleet", said)
+        sender(name).put("fasaco/@v1/r3/fleet", said)
     time.sleep(SILENCE_S)
     assert [m["name"] for m in status(office[1])["fleet"]["members"]] == ["r1"]
 
@@ -125,9 +125,9 @@ def test_a_viewer_views_both(ca, endpoint):
             assert list(tablet.session.get(key, timeout=SILENCE_S, payload=PAUSE)) == []
 
 
-def test_a_robot_alone_claims_its_name(office, voice, ca, endpoint, tmp_path):
+def test_a_robot_alone_claims_its_name(office, sender, ca, endpoint, tmp_path):
     """Whoever else says that it plans is not heard; a second daemon with its certificate is."""
-    sessions = [voice(name) for name in ("slam-r1", "tablet", "office", "r2")]
+    sessions = [sender(name) for name in ("slam-r1", "tablet", "office", "r2")]
     tokens = [s.liveliness().declare_token("fasaco/@v1/r1/claim/0/plans") for s in sessions]
     time.sleep(SILENCE_S)
     assert status(office[0])["claim"]["stand"] == "plans"

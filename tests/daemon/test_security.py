@@ -12,7 +12,7 @@ import zenoh
 import zenoh.ext
 
 from fasaco_edge.daemon.loop.inbox import MAP_SPACING_S
-from tests.support.outsider import Ear, Outsider, open_client
+from tests.support.outsider import Collector, Outsider, open_client
 from tests.support.processes import PROGRAM, daemon_process, free_endpoint
 from tests.support.rooms import map_bytes, pillared_room, pose_bytes, room
 from tests.support.secured import NAMES, authority, needs_openssl, secured_daemon, transport
@@ -33,7 +33,7 @@ def house(tmp_path_factory):
 
 
 def begin(house):
-    with house.guest("boss") as boss, house.voice("slam") as slam:
+    with house.guest("boss") as boss, house.sender("slam") as slam:
         slam.put("map", map_bytes(pillared_room()))
         slam.put("pose", pose_bytes(0.75, 0.75))
         boss.wait_status(lambda s: s["state"] == "covering" and not s["plan"]["planning"])
@@ -59,7 +59,7 @@ def unharmed(boss):
 
 
 def test_a_mapper_is_heard_and_a_viewer_sees(house, boss):
-    with house.guest("eye") as eye, house.voice("slam") as slam:
+    with house.guest("eye") as eye, house.sender("slam") as slam:
         path = eye.listen("path")
         path.wait(lambda heard: heard.payload != b"")
         revision = boss.ask_status()["map"]["revision"]
@@ -70,26 +70,26 @@ def test_a_mapper_is_heard_and_a_viewer_sees(house, boss):
 
 @pytest.mark.parametrize("name", [name for name in NAMES if name != "slam"])
 def test_nobody_else_gives_maps_and_poses(house, unharmed, name):
-    with house.voice(name) as voice:
-        voice.put("map", map_bytes(room(3.0, 3.0)))
-        voice.put("map_update", b"")
-        voice.put("pose", pose_bytes(1.5, 1.5))
+    with house.sender(name) as sender:
+        sender.put("map", map_bytes(room(3.0, 3.0)))
+        sender.put("map_update", b"")
+        sender.put("pose", pose_bytes(1.5, 1.5))
         time.sleep(SILENCE_S)
 
 
 @pytest.mark.parametrize("key", ["fasaco/@v1/*/map", "fasaco/@v1/**", "fasaco/@v1/robot/*", "**"])
 def test_a_mapper_may_not_speak_to_many_at_once(house, unharmed, key):
-    with house.voice("slam") as slam:
+    with house.sender("slam") as slam:
         slam.session.put(key, map_bytes(room(3.0, 3.0)))
         time.sleep(SILENCE_S)
 
 
 @pytest.mark.parametrize("name", [name for name in NAMES if name != "boss"])
 def test_nobody_else_commands(house, unharmed, name):
-    with house.voice(name) as voice:
+    with house.sender(name) as sender:
         for payload in (PAUSE, None):
-            key = f"{voice.prefix}/@rpc/mission"
-            assert list(voice.session.get(key, timeout=SILENCE_S, payload=payload)) == []
+            key = f"{sender.prefix}/@rpc/mission"
+            assert list(sender.session.get(key, timeout=SILENCE_S, payload=payload)) == []
 
 
 def test_an_operator_commands(boss):
@@ -101,40 +101,40 @@ def test_an_operator_commands(boss):
 
 
 def test_who_has_no_role_hears_nothing(house):
-    ear, tokens = Ear(), []
-    with house.voice("stranger") as stranger:
+    receiver, tokens = Collector(), []
+    with house.sender("stranger") as stranger:
         session, prefix = stranger.session, stranger.prefix
         for key in (f"{prefix}/status", f"{prefix}/**", "fasaco/@v1/**", "**", "@/**"):
-            session.declare_subscriber(key, ear)
+            session.declare_subscriber(key, receiver)
         history = zenoh.ext.HistoryConfig(max_samples=1, detect_late_publishers=True)
-        zenoh.ext.declare_advanced_subscriber(session, f"{prefix}/path", ear, history=history)
+        zenoh.ext.declare_advanced_subscriber(session, f"{prefix}/path", receiver, history=history)
         for key in (f"{prefix}/alive", f"{prefix}/**", "**", f"{prefix}/path/@adv/**"):
             session.liveliness().declare_subscriber(key, tokens.append, history=True)
             assert list(session.liveliness().get(key, timeout=SILENCE_S)) == []
         for key in (f"{prefix}/status", f"{prefix}/@rpc/status", "**", f"{prefix}/path/@adv/**"):
             assert list(session.get(key, timeout=SILENCE_S)) == []
         time.sleep(1.2)  # longer than from one status to the next
-    assert ear.heard == []
+    assert receiver.heard == []
     assert tokens == []
 
 
 @pytest.mark.parametrize("name", ["eye", "slam", "boss", "stranger"])
 def test_nobody_passes_for_the_robot(house, boss, name):
     """Neither by what it says, nor by an answer, nor by a token."""
-    with house.voice(name) as voice:
-        ear = boss.listen("path", late=False)
-        voice.session.put(f"{voice.prefix}/path", b"elsewhere")
-        voice.session.put(f"{voice.prefix}/status", b"{}")
-        voice.session.delete(f"{voice.prefix}/path")
-        voice.session.liveliness().declare_token(f"{voice.prefix}/alive")
-        voice.session.declare_queryable(
-            f"{voice.prefix}/@rpc/status", lambda query: query.reply(query.key_expr, b"{}")
+    with house.sender(name) as sender:
+        receiver = boss.listen("path", late=False)
+        sender.session.put(f"{sender.prefix}/path", b"elsewhere")
+        sender.session.put(f"{sender.prefix}/status", b"{}")
+        sender.session.delete(f"{sender.prefix}/path")
+        sender.session.liveliness().declare_token(f"{sender.prefix}/alive")
+        sender.session.declare_queryable(
+            f"{sender.prefix}/@rpc/status", lambda query: query.reply(query.key_expr, b"{}")
         )
         time.sleep(SILENCE_S)
         assert boss.ask("@rpc/status").json()["robot"] == "robot"
         tokens = list(boss.session.liveliness().get(f"{boss.prefix}/alive", timeout=2.0))
         assert len(tokens) == 1
-        assert ear.heard == []
+        assert receiver.heard == []
     assert boss.alive()
 
 
@@ -143,7 +143,7 @@ def test_a_map_beyond_the_limit_is_dropped_before_it_is_looked_at(tmp_path):
         tmp_path, security={"limits": {"map_bytes": 20_000, "queries_hz": 10_000.0}}
     ) as house:
         begin(house)
-        with house.guest("boss") as boss, house.voice("slam") as slam:
+        with house.guest("boss") as boss, house.sender("slam") as slam:
             before = boss.ask_status()
             large, good = map_bytes(room(9.0, 9.0)), map_bytes(pillared_room())
             assert len(good) < 20_000 < len(large)
@@ -157,7 +157,7 @@ def test_a_map_beyond_the_limit_is_dropped_before_it_is_looked_at(tmp_path):
 def test_of_a_flood_few_are_taken_in_and_the_last_in_the_end(house, boss):
     before = boss.ask_status()
     flood, last = map_bytes(pillared_room()), map_bytes(pillared_room(), stamp_ns=7)
-    with house.voice("slam") as slam:
+    with house.sender("slam") as slam:
         began = time.monotonic()
         for _ in range(300):
             slam.put("map", flood)

@@ -72,14 +72,14 @@ def test_a_map_that_nothing_could_be_told_of_is_refused(tmp_path, corner):
 )
 def test_a_map_at_the_limit_is_covered(tmp_path, corner):
     with daemon_process(tmp_path) as running, Outsider(running.endpoint) as client:
-        ears = [client.listen(name) for name in ("path", "coverage", "pheromone")]
+        subscriptions = [client.listen(name) for name in ("path", "coverage", "pheromone")]
         client.put("map", far_map(*corner))
         x, y = corner[0] + 1.05, corner[1] + 1.05
         status = stand(client, lambda status: status["state"] == "covering", x, y)
         assert status["errors"]["total"] == 0
         assert status["coverage"]["coverable"] >= 49
-        for ear in ears[:2]:
-            ear.wait(lambda heard: True)
+        for receiver in subscriptions[:2]:
+            receiver.wait(lambda heard: True)
 
 
 def test_a_planner_that_breaks_costs_this_map_alone(breaking):

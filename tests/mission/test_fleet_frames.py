@@ -10,7 +10,7 @@ from msgspec import structs
 from fasaco_edge.bus.arrival import Sample
 from fasaco_edge.config.config import DaemonConfig, FleetConfig
 from fasaco_edge.config.robot import RobotConfig
-from fasaco_edge.daemon.loop.fleet import PERIOD_S, FleetEar, FleetVoice
+from fasaco_edge.daemon.loop.fleet import PERIOD_S, FleetReceiver, FleetSender
 from fasaco_edge.grid.geometry import Pose2D, StampedPose
 from fasaco_edge.grid.lattice import CoverageLattice
 from fasaco_edge.mission.core.events import MapReceived, MemberHeard, Part, PoseReceived
@@ -139,20 +139,20 @@ def test_a_division_that_could_not_be_told_to_others_is_left_out_and_named(sign)
     said = FleetMember(1, "hall", config.cell_m, "house", "covering", 1.0, 2.0, 1.0, 1, 7, 5, ())
     parts = FleetPart("r1", 0, 0, 0.0, 1.0), FleetPart("r2", 0, sign * 2**30, 0.0, 1.0)
     said = structs.replace(said, swept=(tile,), parts=parts, by="r2", origin=(sign * 9.0, 0.0, 0.0))
-    ear = FleetEar(config)
+    receiver = FleetReceiver(config)
 
     def heard(said):
-        return ear.event(Sample("fasaco/@v1/r2/fleet", encode_json(said)))
+        return receiver.event(Sample("fasaco/@v1/r2/fleet", encode_json(said)))
 
     event = heard(said)
     assert (event.parts, event.division, event.by, event.misfit) == ((), 0, "", "")
     assert (event.x, event.y) == (1.0 + sign * 9.0, 2.0)
     assert cells_of(event.tiles)
-    (fault,) = ear.take_faults()
+    (fault,) = receiver.take_faults()
     assert str(fault) == "r2: its division has a seed farther off than cells may lie here"
     fits = structs.replace(said, origin=(-sign * 9.0, 0.0, 0.0))
     assert heard(fits).division == 7
-    assert ear.take_faults() == []
+    assert receiver.take_faults() == []
 
 
 def test_a_seed_that_the_map_does_not_show_counts_as_on_the_nearest_cell():
@@ -175,8 +175,8 @@ class Robot(Drive):
         tool = {"tool_width_m": CELL, "radius_m": CELL / 2}
         config = DaemonConfig(robot=RobotConfig(name=name, overlap=0.0, **tool), fleet=fleet)
         self.name, self.origin, self.rows, self.heard = name, origin, rows, []
-        self.said, self.ear = [], FleetEar(config)
-        self.voice = FleetVoice(self, config)
+        self.said, self.receiver = [], FleetReceiver(config)
+        self.sender = FleetSender(self, config)
         super().__init__(cell, config=replace(CONFIG, robot=name))
         self.mission.shared.begin(1)
         map_frame = seen_from(Pose2D(0.0, 0.0), origin)
@@ -209,11 +209,11 @@ def test_two_robots_whose_maps_lie_askew_share_a_hall():
             swept[robot.name].append(at[robot.name])
             x, y = placed_point(back, *at[robot.name])
             robot.tell(PoseReceived(StampedPose(Pose2D(x, y), "map")), after=1.0)
-            robot.voice.publish(robot.mission, second * PERIOD_S * 1.01)
+            robot.sender.publish(robot.mission, second * PERIOD_S * 1.01)
         for speaker, listener in (robots, robots[::-1]):
             for payload in speaker.said:
                 sample = Sample(f"fasaco/@v1/{speaker.name}/fleet", payload)
-                listener.tell(listener.ear.event(sample), after=0.0)
+                listener.tell(listener.receiver.event(sample), after=0.0)
             speaker.said.clear()
         if all(robot.mission.state == "done" for robot in robots):
             break

@@ -11,7 +11,7 @@ from msgspec import structs
 from fasaco_edge.bus.arrival import Sample
 from fasaco_edge.config.config import DaemonConfig, FleetConfig
 from fasaco_edge.config.robot import RobotConfig
-from fasaco_edge.daemon.loop.fleet import FleetEar, FleetVoice
+from fasaco_edge.daemon.loop.fleet import FleetReceiver, FleetSender
 from fasaco_edge.daemon.loop.loader import mission_config
 from fasaco_edge.grid.geometry import Pose2D, Window
 from fasaco_edge.grid.lattice import UNKNOWN, CoverageLattice
@@ -51,12 +51,12 @@ def swept_by_others(mission):
 
 def test_where_another_robots_map_lies_elsewhere_all_that_it_told_before_is_dropped():
     """It was restarted with an origin put right, and keeps its epoch."""
-    ear, drive = FleetEar(HALL), Drive((3, 3), config=IN_HOUSE)
+    receiver, drive = FleetReceiver(HALL), Drive((3, 3), config=IN_HOUSE)
     drive.mission.shared.begin(1)
     drive.tell(MapReceived(building(*["." * 60] * 20)), pose_at(3, 3))
-    drive.tell(ear.event(told_from(0.0)))
+    drive.tell(receiver.event(told_from(0.0)))
     assert swept_by_others(drive.mission) == BLOCK
-    drive.tell(ear.event(told_from(20 * CELL)))
+    drive.tell(receiver.event(told_from(20 * CELL)))
     moved = {(row, col + 20) for row, col in BLOCK}
     assert swept_by_others(drive.mission) == moved
     lattice = drive.mission.lattice
@@ -126,19 +126,19 @@ class OnFloors(Drive):
             self.mission.restore_ledger(before)
         self.mission.shared.begin(1)
         fleet = FleetConfig("hall", frame, place.origin[0])
-        self.ear = FleetEar(structs.replace(HALL, fleet=fleet))
+        self.receiver = FleetReceiver(structs.replace(HALL, fleet=fleet))
         self.listener = Listener()
-        self.voice = FleetVoice(self.listener, structs.replace(HALL, fleet=fleet))
+        self.sender = FleetSender(self.listener, structs.replace(HALL, fleet=fleet))
 
     def stay_on(self, floor, seconds=15):
         for second in range(seconds):
             pose = pose_at(1, second % 10, frame=floor.frame)
             self.tell(MapReceived(floor), pose, after=1.0)
-        self.voice.publish(self.mission, self.now)
+        self.sender.publish(self.mission, self.now)
 
     def hear(self, payload):
         """Return why the other robot does not belong to the fleet."""
-        self.tell(self.ear.event(Sample("fasaco/@v1/r2/fleet", payload)))
+        self.tell(self.receiver.event(Sample("fasaco/@v1/r2/fleet", payload)))
         return self.mission.company.members["r2"].left_out
 
     def told(self):

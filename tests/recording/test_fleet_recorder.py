@@ -206,7 +206,7 @@ def test_nothing_is_kept_of_names_without_end(studio, monkeypatch):
         studio.pass_time(0.1)
     studio.pass_time(1.2)
     kept = studio.recorder
-    assert len(kept._poses) == len(kept._rates) == len(kept._ears.robots) == 1
+    assert len(kept._poses) == len(kept._rates) == len(kept._subscriptions.robots) == 1
     assert len(kept._faults) <= 8 + 2
     (part,) = studio.parts()
     log = log_of(part)

@@ -40,7 +40,7 @@ class Heard:
         return json.loads(self.payload)
 
 
-class Ear:
+class Collector:
     """What came in on one key, in order.
 
     Args:
@@ -95,7 +95,7 @@ class Outsider:
     def __exit__(self, *_: object) -> None:
         self.session.close()  # type: ignore[no-untyped-call]
 
-    def listen(self, name: str, *, late: bool = True, begins: bool = False) -> Ear:
+    def listen(self, name: str, *, late: bool = True, begins: bool = False) -> Collector:
         """Subscribe.
 
         Args:
@@ -103,14 +103,14 @@ class Outsider:
             late: get what was published last, too.
             begins: take the empty path with which a daemon begins, too.
         """
-        ear = Ear(begins=begins)
+        receiver = Collector(begins=begins)
         key = f"{self.prefix}/{name}"
         if late:
             history = zenoh.ext.HistoryConfig(max_samples=1, detect_late_publishers=True)
-            zenoh.ext.declare_advanced_subscriber(self.session, key, ear, history=history)
+            zenoh.ext.declare_advanced_subscriber(self.session, key, receiver, history=history)
         else:
-            self.session.declare_subscriber(key, ear)
-        return ear
+            self.session.declare_subscriber(key, receiver)
+        return receiver
 
     def put(self, name: str, payload: bytes, schema: str | None = None) -> None:
         """Publish; with the schema of the native contract, another one, or "" for none."""

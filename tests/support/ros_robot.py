@@ -19,7 +19,7 @@ import zenoh
 import zenoh.ext
 
 from fasaco_edge.grid.geometry import Pose2D
-from tests.support.outsider import TIMEOUT_S, Ear, Heard
+from tests.support.outsider import TIMEOUT_S, Collector, Heard
 from tests.wire import oracle
 
 GRID, PATH, POSE = (
@@ -109,18 +109,18 @@ class RosRobot:
         message = oracle.transforms((frame, child, time.time_ns(), oracle.pose(where)))
         self.put(topic, TF, oracle.to_bytes(TF, message), latched=topic == "tf_static")
 
-    def listen(self, topic: str, schema: str) -> Ear:
+    def listen(self, topic: str, schema: str) -> Collector:
         """Subscribe as to a transient-local topic."""
-        ear = Ear()
+        receiver = Collector()
         zenoh.ext.declare_advanced_subscriber(
             self.session,
             self.naming.key(topic, schema),
-            ear,
+            receiver,
             history=zenoh.ext.HistoryConfig(max_samples=1, detect_late_publishers=True),
             recovery=zenoh.ext.RecoveryConfig(heartbeat=True),
             subscriber_detection=True,
         )
-        return ear
+        return receiver
 
     def call(self, service: str) -> tuple[bool, str, bytes]:
         """Call a Trigger as a client does: ask whoever answers for all.

@@ -109,16 +109,16 @@ class House:
         return open_client(self.endpoint, transport(files))
 
     @contextmanager
-    def voice(self, name: str) -> Iterator[Voice]:
+    def sender(self, name: str) -> Iterator[Sender]:
         """Open a session that says something, heard or not."""
         session = self.session(self.ca.files(name))
         try:
-            yield Voice(session)
+            yield Sender(session)
         finally:
             session.close()  # type: ignore[no-untyped-call]
 
 
-class Voice:
+class Sender:
     """Speaks whether it may or not."""
 
     put = Outsider.put

@@ -14,7 +14,7 @@ from msgspec import structs
 from fasaco_edge.bus.arrival import Sample
 from fasaco_edge.config.config import DaemonConfig, FleetConfig
 from fasaco_edge.config.robot import RobotConfig
-from fasaco_edge.daemon.loop.fleet import TILES, FleetEar, FleetVoice
+from fasaco_edge.daemon.loop.fleet import TILES, FleetReceiver, FleetSender
 from fasaco_edge.errors import FleetError, MalformedMessage
 from fasaco_edge.grid.lattice import Footprint
 from fasaco_edge.mission.core.events import MapReceived, Part
@@ -53,8 +53,8 @@ def said(**members):
 
 
 def heard(payload, robot="r2"):
-    ear = FleetEar(CONFIG)
-    return ear.event(Sample(f"fasaco/@v1/{robot}/fleet", payload))
+    receiver = FleetReceiver(CONFIG)
+    return receiver.event(Sample(f"fasaco/@v1/{robot}/fleet", payload))
 
 
 def test_it_comes_back_as_it_was_and_is_that_of_the_schema():
@@ -138,7 +138,7 @@ def test_robots_of_a_frame_of_their_own_need_the_same_one():
     ):
         # Their maps may lie at any angle to each other, and so may their cells.
         payload = said(cell_m=CONFIG.cell_m, frame=frame, lattice_deg=20.0, origin=[1.0, 2.0, 30.0])
-        event = FleetEar(config).event(Sample("fasaco/@v1/r2/fleet", payload))
+        event = FleetReceiver(config).event(Sample("fasaco/@v1/r2/fleet", payload))
         assert event.misfit == misfit
     assert event.frame == ""
 
@@ -161,29 +161,29 @@ class Listener:
 
 def test_a_robot_tells_its_pace_as_it_is_now_and_after_forgetting_all_tiles_at_once():
     robot, listener = FleetRobot("r1", (0, 0), ["." * 12] * 4), Listener()
-    ledger, voice = robot.mission.ledger, FleetVoice(listener, CONFIG)
+    ledger, sender = robot.mission.ledger, FleetSender(listener, CONFIG)
     for row in range(TILES):
         ledger.credit((64 * row, 0))
     robot.mission.company.step_s = 7.5
     for now in (0.0, 1.0, 2.0):
         robot.mission.shared.note_forgotten()
-        voice.publish(robot.mission, now)
+        sender.publish(robot.mission, now)
     assert [said.step_s for said in listener.heard] == [7.5] * 3
     assert [len(said.swept) for said in listener.heard] == [TILES] * 3
 
 
 def test_a_robot_tells_which_of_its_cells_are_from_before_their_epoch_where_it_knows():
     robot, listener = FleetRobot("r1", (0, 0), ["." * 12] * 4), Listener()
-    ledger, voice = robot.mission.ledger, FleetVoice(listener, CONFIG)
+    ledger, sender = robot.mission.ledger, FleetSender(listener, CONFIG)
     ledger.credit((64, 0))
-    voice.publish(robot.mission, 0.0)
+    sender.publish(robot.mission, 0.0)
     before = {tile.row: tile for tile in listener.heard[-1].swept}
     assert listener.heard[-1].kept is None
     robot.mission.shared.note_forgotten()
-    voice.publish(robot.mission, 1.0)
+    sender.publish(robot.mission, 1.0)
     ledger.credit((64, 9))
     ledger.credit((128, 0))
-    voice.publish(robot.mission, 2.0)
+    sender.publish(robot.mission, 2.0)
     told = listener.heard[-1]
     assert {64 * tile.row for tile in told.swept} >= {64, 128}
     assert {tile.row: tile for tile in told.kept}[1] == before[1]
@@ -199,7 +199,7 @@ def test_a_robot_tells_its_next_metres_whatever_the_size_of_its_cells(cell_m, mo
     drive.tell(MapReceived(building("." * 600)), pose_at(0, 0))
     drive.plan()
     line, listener = drive.mission.next_metres(), Listener()
-    FleetVoice(listener, CONFIG).publish(drive.mission, 0.0)
+    FleetSender(listener, CONFIG).publish(drive.mission, 0.0)
     told = np.array(listener.heard[-1].ahead)
     assert told[-1] == pytest.approx(line[-1], abs=1e-3)
     assert told[0] == pytest.approx(line[0], abs=1e-3)
@@ -212,21 +212,21 @@ def test_a_robot_tells_its_next_metres_whatever_the_size_of_its_cells(cell_m, mo
 def test_robots_on_a_map_in_utm_divide_its_cells(northing_m):
     corner = round(northing_m / CELL), round(500_000 / CELL)
     ends = {"r1": corner, "r2": (corner[0] + 3, corner[1] + 11)}
-    drives, ears = {}, {}
+    drives, subscriptions = {}, {}
     for name, cell in ends.items():
         drives[name] = Drive(cell, config=replace(WORLD, robot=name))
         drives[name].mission.shared.begin(1)
         drives[name].tell(MapReceived(building(*["." * 12] * 4, at=corner)), pose_at(*cell))
         drives[name].plan()
-        ears[name] = FleetEar(structs.replace(CONFIG, robot=RobotConfig(name=name)))
+        subscriptions[name] = FleetReceiver(structs.replace(CONFIG, robot=RobotConfig(name=name)))
     for now in range(4):
         for name, drive in drives.items():
             listener = Listener()
-            FleetVoice(listener, CONFIG).publish(drive.mission, float(now))
+            FleetSender(listener, CONFIG).publish(drive.mission, float(now))
             (payload,) = listener.payloads
             sample = Sample(f"fasaco/@v1/{name}/fleet", payload)
             for other in drives.keys() - {name}:
-                event = ears[other].event(sample)
+                event = subscriptions[other].event(sample)
                 assert event.misfit == ""
                 drives[other].tell(event, pose_at(*ends[other]), after=1.0)
                 if drives[other].request is not None:

@@ -45,7 +45,7 @@ PERIOD_S, LEAST_PERIOD_S = 1.0, 0.25
 TILES, FEW_TILES = 10, 2
 
 
-class FleetEar:
+class FleetReceiver:
     """Receiver of the messages of a fleet's other robots.
 
     Args:
@@ -137,7 +137,7 @@ class FleetEar:
         return faults + self._arrivals.take_faults()
 
 
-class FleetVoice:
+class FleetSender:
     """Publisher of this robot's message: once a second, on change, and more often near others.
 
     Args:

@@ -38,7 +38,7 @@ from fasaco_edge.wire.messages.poses import PoseDecoder
 from fasaco_edge.wire.schemas import TF_MESSAGE
 
 if TYPE_CHECKING:
-    from fasaco_edge.daemon.loop.fleet import FleetEar
+    from fasaco_edge.daemon.loop.fleet import FleetReceiver
     from fasaco_edge.planners.planner import ColonySnapshot
 
 MAPS = ("map", "map_update")
@@ -187,7 +187,7 @@ class Inbox:
         poses: PoseDecoder,
         max_pixels: int,
         maps: Sequence[Subscription] = (),
-        fleet: FleetEar | None = None,
+        fleet: FleetReceiver | None = None,
     ) -> None:
         self._poses = poses
         self._max_pixels = max_pixels
@@ -242,8 +242,8 @@ class Inbox:
         """Return the events in a batch, and the faults; a malformed sample affects no other.
 
         For each frame the newest readable map counts. It replaces earlier updates of that frame,
-        lost ones included. Of a fleet nothing is heard before there is a mission: the ear keeps
-        what robots tell, and the turn log, of which a replay hears, has them from then on.
+        lost ones included. Messages of a fleet wait in their receiver until there is a mission;
+        with it they come to the turn log, which a replay reads.
         """
         maps, faults = self._newest_maps(batch.samples)
         events = list[Event](MapReceived(grid) for grid, _ in maps.values())

@@ -17,9 +17,9 @@ from fasaco_edge.bus.session import Bus
 from fasaco_edge.bus.settings import BusSettings
 from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.errors import FasacoError
-from fasaco_edge.fleet.ears import Ears
 from fasaco_edge.fleet.inbox import FleetInbox, Heard
 from fasaco_edge.fleet.members import JOINED
+from fasaco_edge.fleet.subscriptions import FleetSubscriptions
 from fasaco_edge.host.processes import memory_limit
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.fleet.layout import build_layout
@@ -80,7 +80,9 @@ class FleetRecorder:
         self._members = RecordedMembers()
         self._scene = FleetScene(self._writer, self._members)
         self._inbox = FleetInbox(afforded_bytes(memory_limit()), self._clock.arrival)
-        self._ears = Ears(bus, config.keys(), (STATUS, PATH, POSE), self._inbox.post)
+        self._subscriptions = FleetSubscriptions(
+            bus, config.keys(), (STATUS, PATH, POSE), self._inbox.post
+        )
         self._first: list[Heard] = []
         self._gathers = True
         self._poses: dict[str, PoseDecoder] = {}
@@ -93,7 +95,7 @@ class FleetRecorder:
 
     def listen(self) -> None:
         """Subscribe to what all robots tell their fleets."""
-        self._ears.listen()
+        self._subscriptions.listen()
 
     def step(self, timeout_s: float) -> None:
         """Write and draw what arrives within ``timeout_s`` [s], and what is due."""
@@ -109,7 +111,7 @@ class FleetRecorder:
         if now_ns >= self._next_write_ns:
             self._next_write_ns = now_ns + WRITE_NS
             self._write()
-        self._ears.ask_for_maps([member.name for member in self._members], now_ns)
+        self._subscriptions.ask_for_maps([member.name for member in self._members], now_ns)
         self._scene.catch_up()
         self._writer.sync(time.monotonic_ns())
 
@@ -196,7 +198,7 @@ class FleetRecorder:
         elif arrival.topic == PATH.name:
             self._scene.add_path(member, decode_path(sample.payload).xy)
         elif arrival.topic == MAP.name:
-            self._ears.end_map_turn(robot)
+            self._subscriptions.end_map_turn(robot)
             self._scene.add_map(member, decode_occupancy_grid(sample.payload))
         elif arrival.topic == STATUS.name:
             status = decode_tolerant(sample.payload, Status)
@@ -225,12 +227,12 @@ class FleetRecorder:
     def _join(self, member: RecordedMember) -> None:
         """Hear a robot from now on."""
         self._poses[member.name] = PoseDecoder(self._schema)
-        self._ears.hear(member.name)
+        self._subscriptions.hear(member.name)
         self._scene.add_line(f"{member.name}: joined, cells of {member.seat.cell_m:g} m")
         self._scene.join(member)
 
     def _leave(self, robot: str) -> None:
-        self._ears.leave(robot)
+        self._subscriptions.leave(robot)
         self._inbox.forget(robot)
         self._scene.leave(robot)
         for kept in (self._poses, self._rates):

@@ -21,7 +21,7 @@ MAP_TURN_NS = 2_000_000_000
 Post = Callable[[str, str, Sample], None]
 
 
-class Ears:
+class FleetSubscriptions:
     """Subscriptions to the robots of a fleet.
 
     Args:
