@@ -1,4 +1,4 @@
-"""Planner of the user's own, in this process."""
+"""Planner of the user's own, as planners of the registry are called."""
 
 from __future__ import annotations
 
