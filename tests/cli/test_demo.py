@@ -136,19 +136,6 @@ def test_robots_of_a_fleet_cover_a_building_together(tmp_path, building):
     assert not [pid for pid in processes_of(out) if is_running(pid)]
 
 
-def test_a_benchmark_of_missions_tells_what_a_robot_that_is_killed_leaves_to_the_other(building):
-    pytest.importorskip("rerun")
-    options = ("--maps", building, "--robots", 2, "--speed", 20, "--kill-after", 12)
-    ended = fasaco_edge("bench", "fleet", "--online", *options, "--json")
-    assert ended.code == 0, ended.err
-    (run,) = json.loads(ended.out)["runs"]
-    assert (run["robots"], run["killed"], run["complete"]) == (2, "r2", True)
-    assert run["swept_share"] > 0.9
-    assert run["time_ratio"] is None
-    assert 0 < run["kb_s"] <= run["peak_kb_s"] < 20
-    assert run["plan_ms_p50"] <= run["plan_ms_p99"]
-
-
 def test_mishaps_need_a_fleet(tmp_path, building):
     ended = fasaco_edge("demo", "--map", building, "--kill-after", 5, "--out", tmp_path)
     assert ended.code == Exit.CONFIG

@@ -71,9 +71,10 @@ def test_on_another_raster_the_path_begins_at_the_robot(after_s):
     """Not as far along its first edge as the robot was on the line before."""
     robot = LineRobot(room_with_box(), (0.75, 0.75))
     robot.wait(after_s, lambda _: False)
-    fine = room_with_box().repeat(2, axis=0).repeat(2, axis=1)
-    geometry = GridGeometry(*fine.shape, 0.025, Pose2D(0.0, 0.0))
-    robot.step(MapReceived(OccupancyGrid(geometry, fine)))
+    pixels = room_with_box()
+    # The same room by a mapper that has its rows where columns were.
+    geometry = GridGeometry(*pixels.T.shape, 0.05, Pose2D(0.05 * pixels.shape[1], 0.0, math.pi / 2))
+    robot.step(MapReceived(OccupancyGrid(geometry, np.ascontiguousarray(pixels.T[::-1]))))
     _, points, why = robot.paths[-1]
     assert why == "map on another raster"
     assert math.dist(points[0], (robot.x, robot.y)) < 0.01
