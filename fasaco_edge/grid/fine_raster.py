@@ -142,6 +142,14 @@ def raster_to_map(geometry: GridGeometry, points: NDArray[np.float64]) -> NDArra
     return np.stack([origin.x + cos * u - sin * v, origin.y + sin * u + cos * v], axis=1)
 
 
+def raster_to_raster(
+    before: GridGeometry, after: GridGeometry, points: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return points y, x of a raster [pixels], float64 (n, 2), as those of another one."""
+    cols, rows = after.to_pixels(*raster_to_map(before, points).T)
+    return np.stack([rows, cols], axis=1) - 0.5
+
+
 def map_to_raster(geometry: GridGeometry, x: float, y: float) -> tuple[float, float]:
     """Return the point y, x of a raster [pixels] at x, y [m] in the map frame."""
     col, row = geometry.to_pixels(x, y)

@@ -17,7 +17,7 @@ from fasaco_edge.grid.tool_reach import tool_reach
 from fasaco_edge.kernels.floor.bits import Bits, packed, unpacked
 from fasaco_edge.kernels.floor.places import connected, disc_rows, keep_in_cells, places_of
 
-# On a larger raster it is not computed: it would take more than a tenth of a second [pixels].
+# On a larger raster it is not computed: it would take more than a quarter of a second [pixels].
 MOST_PIXELS = 8_000_000
 
 
@@ -26,7 +26,7 @@ def possible_m2(
     thinner_m: float,
     at: Point,
     asked: NDArray[np.bool_],
-    once: NDArray[np.bool_],
+    cut_off: NDArray[np.bool_],
 ) -> float | None:
     """Return the area that the tool would reach if walls were thinner on each side [m2].
 
@@ -37,8 +37,8 @@ def possible_m2(
         thinner_m: by how much: the edge of a pixel of the map [m].
         at: where the robot is, x, y [m].
         asked: bool (rows, cols) of the lattice: the cells whose floor counts.
-        once: likewise: cells that were ever reachable. They count with what is connected to them,
-            also where no way leads there any more.
+        cut_off: likewise: cells that were reachable once and are no more. They count with what is
+            connected to them.
     """
     geometry = floor.geometry
     if geometry.rows * geometry.cols > MOST_PIXELS:
@@ -54,26 +54,22 @@ def possible_m2(
     nearest = found[np.argmin(((found + 0.5 - np.array((row, col))) ** 2).sum(axis=1))]
     row, col = nearest.tolist()
     reachable = connected(fits, row, col)
-    cut_off = _in_cells(floor, packed(fits & ~reachable, beyond=False), once)
-    while cut_off.any():
-        more = connected(fits, *divmod(int(np.argmax(cut_off)), geometry.cols))
-        reachable |= more
-        cut_off &= ~more
+    if cut_off.any():
+        lost = packed(fits & ~reachable, beyond=False)
+        _keep_in(lost, floor, cut_off)
+        left = unpacked(lost, geometry.cols)
+        while left.any():
+            more = connected(fits, *divmod(int(np.argmax(left)), geometry.cols))
+            reachable |= more
+            left &= ~more
     places = packed(reachable, beyond=False)
     if not asked.all():
-        places = packed(_in_cells(floor, places, asked), beyond=False)
+        _keep_in(places, floor, asked)
     reached = tool_reach(places, floor.blocked, radius, floor.discs.tool_m / 2 / unit)
     return int(np.count_nonzero(unpacked(reached, geometry.cols))) * unit**2
 
 
-def _in_cells(floor: FloorMap, pixels: Bits, cells: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Return which pixels of a floor's raster lie in some cells of its lattice; ``pixels`` change.
-
-    Args:
-        floor: gives raster and lattice.
-        pixels: bits, uint64 (rows, words).
-        cells: bool (rows, cols) of the lattice.
-    """
+def _keep_in(pixels: Bits, floor: FloorMap, cells: NDArray[np.bool_]) -> None:
+    """Keep only the pixels, uint64 (rows, words) of a floor, in cells, bool (rows, cols)."""
     window = floor.stands.lattice.window
     keep_in_cells(pixels, floor.placement, cells, (window.row0, window.col0), (0, 0))
-    return unpacked(pixels, floor.geometry.cols)

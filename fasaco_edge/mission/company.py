@@ -34,7 +34,8 @@ Inside = Callable[[Cells, Cells], NDArray[np.bool_]]
 class OthersCells:
     """The cells that others have swept, a part of the ledger: none.
 
-    What a fleet's robot kept of them is kept on, until this robot forgets cells of its own.
+    What the ledger holds of them from a time in a fleet stays in it until this robot forgets cells
+    of its own: a fleet that it joins again would count these as swept.
 
     Attributes:
         version: counter of changes.
@@ -93,7 +94,7 @@ class Company:
 
     @property
     def has_members(self) -> bool:
-        """Whether other robots are heard."""
+        """Whether messages of other robots have come."""
         return False
 
     @property

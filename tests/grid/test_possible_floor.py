@@ -65,11 +65,11 @@ def test_a_room_behind_a_wall_is_not_possible():
 
 def test_a_room_that_was_reachable_before_a_wall_came_is_possible():
     floor = floor_of(building(0, 0))
-    once = nowhere(floor)
+    cut_off = nowhere(floor)
     row, col = floor.stands.lattice.local(floor.stands.lattice.cell_at(3.4, 1.2))
-    once[row, col] = True
+    cut_off[row, col] = True
     one_m2 = possible_m2(floor, PIXEL_M, (1.0, 1.0), everywhere(floor), nowhere(floor))
-    both_m2 = possible_m2(floor, PIXEL_M, (1.0, 1.0), everywhere(floor), once)
+    both_m2 = possible_m2(floor, PIXEL_M, (1.0, 1.0), everywhere(floor), cut_off)
     assert both_m2 == pytest.approx(2 * one_m2, rel=0.01)
 
 

@@ -100,7 +100,7 @@ class FleetLayer(Company):
 
     @property
     def has_members(self) -> bool:
-        """Whether other robots are heard."""
+        """Whether messages of other robots have come."""
         return bool(self.others.known)
 
     @property

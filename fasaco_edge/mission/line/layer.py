@@ -242,9 +242,9 @@ class LineLayer:
         if floor is None or grid is None or stamped is None or self._map.area is None:
             return ""
         asked, pose = self._orders.cells.asked_of_me(self._map.area), stamped.pose
-        once = self._orders.known(self._map.area.lattice)
+        cut_off = self._orders.known(self._map.area.lattice) & ~self._map.area.reachable
         thinner_m = grid.geometry.resolution
-        self._possible_m2 = possible_m2(floor, thinner_m, (pose.x, pose.y), asked, once)
+        self._possible_m2 = possible_m2(floor, thinner_m, (pose.x, pose.y), asked, cut_off)
         found = self.to_sweep
         if found is None:
             return ""

@@ -8,12 +8,13 @@ the line gives its place on the walk.
 from __future__ import annotations
 
 import math
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.grid.fine_raster import map_to_raster, raster_to_map
+from fasaco_edge.grid.fine_raster import map_to_raster, raster_to_map, raster_to_raster
 from fasaco_edge.grid.floor_map import FloorMap
 from fasaco_edge.grid.geometry import GridGeometry, Point, Pose2D, Window
 from fasaco_edge.kernels.floor.line import LEAST_EDGE
@@ -92,13 +93,8 @@ class LineAhead:
 
         A mapper whose map begins at the farthest point seen moves all its pixels with that point.
         """
-        geometry = self._geometry
-
-        def carried(points: Points) -> Points:
-            cols, rows = geometry.to_pixels(*raster_to_map(before, points).T)
-            return np.stack([rows, cols], axis=1) - 0.5
-
-        whole = Window(0, 0, geometry.rows, geometry.cols)
+        carried = partial(raster_to_raster, before, self._geometry)
+        whole = Window(0, 0, self._geometry.rows, self._geometry.cols)
         self.line = self.line.at(carried(self.line.points))
         self.tally.exchange(NO_EDGES, edges_between(self.line.points))
         self._place.here = carried(self._place.here[None])[0]
