@@ -1,5 +1,7 @@
 """Settings for all tests."""
 
+import faulthandler
+import os
 import signal
 from collections.abc import Callable, Iterator
 
@@ -8,6 +10,9 @@ from hypothesis import settings
 
 from fasaco_edge.cli.console import terminal
 from tests.support.examples import MOST, examples
+
+# What pytest captures is not shown where the process ends at once.
+STDERR = os.dup(2)
 
 settings.register_profile("suite", examples(MOST))
 settings.load_profile("suite")
@@ -49,6 +54,13 @@ def terminal_width(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[int], 
     yield set_width
     for console in (terminal.out, terminal.err):
         console.cache_clear()
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_exception_interact(node: pytest.Item | pytest.Collector) -> None:
+    """Limit what comes after a failure, too: pytest stops its own watch over hangs there."""
+    limit_s = float(node.config.getini("faulthandler_timeout"))
+    faulthandler.dump_traceback_later(limit_s, file=STDERR, exit=True)
 
 
 FAILED = pytest.StashKey[bool]()

@@ -350,7 +350,8 @@ class Loop:
         status.faults.count(self._guard.take_faults(), is_logged=True)
         due = status.due(runner, now)
         if due is not None:
-            self._bus.outbox.status(due)
-            self._host.watchdog.tell(due)
+            # First, so that the metrics are never older than the status on the bus.
             if self._host.metrics is not None:
                 self._host.metrics.show(due)
+            self._bus.outbox.status(due)
+            self._host.watchdog.tell(due)
