@@ -45,7 +45,7 @@ def run(args: argparse.Namespace) -> int:
         [*map_sources(find_map(args.map)), *request.sources],
     )
     if args.robots or args.robots_xy:
-        from fasaco_edge.cli.planning.fleet import plan_fleet
+        from fasaco_edge.fleet.cli.plan import plan_fleet
 
         return plan_fleet(args, request)
     if args.pheromone_png and (request.own or search.planner not in WITH_PHEROMONE):

@@ -19,16 +19,13 @@ from fasaco_edge.cli.console.arguments import (
 from fasaco_edge.cli.console.logs import say_why
 from fasaco_edge.cli.console.terminal import out
 from fasaco_edge.client.phrases import steady_now
-from fasaco_edge.errors import BusUnavailable, FasacoError, NobodyAnswersError
-from fasaco_edge.text import one_line
+from fasaco_edge.errors import BusUnavailable, FasacoError
 from fasaco_edge.watch import live
 from fasaco_edge.watch.live import Watched
-from fasaco_edge.wire.keys import VERSION, Keys
+from fasaco_edge.wire.keys import Keys
 
 if TYPE_CHECKING:
     from fasaco_edge.bus.settings import BusSettings
-    from fasaco_edge.watch.fleet_feed import FleetFeed
-    from fasaco_edge.watch.fleet_view import FleetView
 
 EPILOG = """\
 examples:
@@ -73,9 +70,14 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Watch until a signal."""
     keys, bus, _ = robot_on_bus(args)
-    watch = _watch_robot if args.fleet is None else _watch_fleet
     try:
-        watch(args, keys, bus)
+        if args.fleet is None:
+            _watch_robot(args, keys, bus)
+        else:
+            from fasaco_edge.fleet.cli.watch import fleet_on_bus
+
+            with fleet_on_bus(args.fleet, keys, bus) as (watched, nobody):
+                _watch(args, watched, nobody)
         sys.stdout.flush()
         code = Exit.OK
     except FasacoError as error:
@@ -109,16 +111,6 @@ def _watch_robot(args: argparse.Namespace, keys: Keys, bus: BusSettings) -> None
         )
 
 
-def _watch_fleet(args: argparse.Namespace, keys: Keys, bus: BusSettings) -> None:
-    from fasaco_edge.watch.fleet_feed import FleetFeed
-    from fasaco_edge.watch.fleet_view import FleetView
-    from fasaco_edge.watch.fleet_watch import FleetWatch
-
-    view = FleetView(args.fleet)
-    with FleetFeed(bus, keys) as feed:
-        _watch(args, FleetWatch(feed, view, out()), lambda: _no_robot(keys, feed, view))
-
-
 def _watch(args: argparse.Namespace, watched: Watched, nobody: Callable[[], FasacoError]) -> None:
     """Watch in the form that the options ask for; ``nobody``: the error if nothing is heard."""
     if args.once:
@@ -142,19 +134,6 @@ def _once(args: argparse.Namespace, watched: Watched, nobody: Callable[[], Fasac
     for line in watched.page(steady_now(), console.width, console.height - 1):
         # Its colours have to go through; its texts are clean.
         console.file.write(f"{line.rstrip()}\n")
-
-
-def _no_robot(keys: Keys, feed: FleetFeed, view: FleetView) -> NobodyAnswersError:
-    """Return the error that no robot of a fleet is heard."""
-    robots = len(feed.robots())
-    if not robots and not view.others:
-        return nobody_answers(f"{keys.base}/{VERSION}/*", ())
-    fleets = ", ".join(sorted(view.others)) or "none"
-    return NobodyAnswersError(
-        f"no robot of a fleet {one_line(view.fleet)!r} is heard",
-        hint=f"{robots} robots are on this bus, of these fleets: {fleets}; "
-        "`fleet: {name: ...}` in its configuration makes a robot one of a fleet",
-    )
 
 
 COMMAND = Command(

@@ -20,7 +20,7 @@ from fasaco_edge.config.ros import RosConfig
 from fasaco_edge.config.security import SecurityConfig
 from fasaco_edge.errors import BadConfiguration, OrderError
 from fasaco_edge.grid.geometry import FARTHEST_M
-from fasaco_edge.mission.config import BatteryPolicy, MapPlace, MissionPolicy
+from fasaco_edge.mission.config import BatteryPolicy, MissionPolicy
 from fasaco_edge.mission.orders.mask import INLINE, mask_polygons
 from fasaco_edge.mission.orders.order import OrderDocument, ZoneDocument, order_of
 from fasaco_edge.planners.paper.colony import ColonyConfig, parse_velocities
@@ -207,13 +207,6 @@ class FleetConfig(Section, frozen=True):
     y_m: Annotated[float, Meta(ge=-FARTHEST_M, le=FARTHEST_M)] = 0.0
     yaw_deg: Annotated[float, Meta(ge=-360, le=360)] = 0.0
     map_frame: Annotated[str, Meta(max_length=MAX_STRING_BYTES)] = ""
-
-    @property
-    def map_place(self) -> MapPlace | None:
-        """Where the map lies in that frame; None without one."""
-        if not self.frame:
-            return None
-        return MapPlace((self.x_m, self.y_m, self.yaw_deg), self.map_frame)
 
 
 class BatteryConfig(Section, BatteryPolicy, frozen=True, kw_only=True):

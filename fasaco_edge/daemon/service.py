@@ -9,7 +9,6 @@ import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from fasaco_edge.bus.session import Bus, open_bus
 from fasaco_edge.bus.settings import BusSettings
@@ -17,6 +16,7 @@ from fasaco_edge.config.cautions import log_cautions
 from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.daemon.claim import NameClaim
 from fasaco_edge.daemon.compiling import KernelCompiler
+from fasaco_edge.daemon.fleet_wing import receiver_of, sender_of
 from fasaco_edge.daemon.ledger.writer import LedgerKeeper, LedgerWriter, open_ledger
 from fasaco_edge.daemon.loop.answers import Commands, serve_about
 from fasaco_edge.daemon.loop.inbox import Inbox, make_mailbox
@@ -39,9 +39,6 @@ from fasaco_edge.host.processes import (
     return_soon,
 )
 from fasaco_edge.wire import topics
-
-if TYPE_CHECKING:
-    from fasaco_edge.daemon.loop.fleet import FleetReceiver, FleetSender
 
 LOG = logging.getLogger(__name__)
 
@@ -171,22 +168,6 @@ def _afforded(config: DaemonConfig) -> DaemonConfig:
     return smaller
 
 
-def _receiver(config: DaemonConfig) -> FleetReceiver | None:
-    if not config.fleet:
-        return None
-    from fasaco_edge.daemon.loop.fleet import FleetReceiver  # noqa: PLC0415
-
-    return FleetReceiver(config)
-
-
-def _sender(config: DaemonConfig, bus: Bus) -> FleetSender | None:
-    if not config.fleet:
-        return None
-    from fasaco_edge.daemon.loop.fleet import FleetSender  # noqa: PLC0415
-
-    return FleetSender(bus.advertise(config.keys(), topics.FLEET), config)
-
-
 def _serve(
     config: DaemonConfig,
     bus: Bus,
@@ -213,11 +194,11 @@ def _serve(
             config.poses(),
             max_pixels,
             [ros.map] if ros else [],
-            _receiver(config),
+            receiver_of(config),
         ),
         commands=Commands(bus, keys, mailbox, ros.commands if ros else {}),
         outbox=Outbox(bus, keys, ros),
-        fleet=_sender(config, bus),
+        fleet=sender_of(config, bus),
         turns=TurnLog(bus.advertise(keys, topics.TURNS), config, ledger.restored),
         claim=NameClaim(bus, keys),
     )

@@ -1,1 +1,1 @@
-"""A fleet from outside: what its robots tell, for those that record or watch all of them."""
+"""Wing of fleets: several robots that share one area. A robot alone needs nothing of it."""

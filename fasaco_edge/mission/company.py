@@ -1,14 +1,15 @@
 """Company: what a mission asks about other robots in its building, and the answers of one alone.
 
-A robot of a fleet has another ``Company``, in ``mission.fleet``; nothing else of the mission knows
-of it. The area is divided among robots there, and who waits for whom is decided there.
+A robot of a fleet has another ``Company``, that of ``fleet.mission``, which its configuration
+names; the mission knows nothing else of a fleet. The area is divided among robots there, and who
+waits for whom is decided there.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from types import MappingProxyType
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -195,25 +196,22 @@ class Waiting:
         return ""
 
 
-class CompanyKind(NamedTuple):
-    """What makes the parts of a mission that know of other robots."""
+class CompanyKind:
+    """What makes the parts of a mission that know of other robots; here, of a robot alone."""
 
-    cells: Callable[[MissionConfig], OthersCells]
-    company: Callable[[MissionConfig, MapState, MissionLedger], Company]
-    waiting: Callable[[MissionConfig, MapState, Route, Company], Waiting]
+    def cells(self) -> OthersCells:
+        """Return the cells that others have swept."""
+        return OthersCells()
+
+    def company(self, config: MissionConfig, map_state: MapState, ledger: MissionLedger) -> Company:
+        """Return the other robots."""
+        return Company()
+
+    def waiting(
+        self, config: MissionConfig, map_state: MapState, route: Route, company: Company
+    ) -> Waiting:
+        """Return what decides when the robot waits for others."""
+        return Waiting()
 
 
-ALONE = CompanyKind(
-    lambda _config: OthersCells(),
-    lambda _config, _map, _ledger: Company(),
-    lambda _config, _map, _route, _company: Waiting(),
-)
-
-
-def company_kind(config: MissionConfig) -> CompanyKind:
-    """Return what a robot of a fleet, which has a name there, or one alone needs."""
-    if not config.robot:
-        return ALONE
-    from fasaco_edge.mission.fleet.kind import FLEET  # noqa: PLC0415 - a robot alone has none
-
-    return FLEET
+ALONE = CompanyKind()

@@ -10,6 +10,7 @@ import msgspec
 from msgspec import Meta
 
 from fasaco_edge.grid.geometry import FARTHEST_M, MAX_LATTICE_CELLS, Polygon, Pose2D
+from fasaco_edge.mission.company import ALONE, CompanyKind
 from fasaco_edge.mission.orders.keep_outs import MOST_KEEP_OUT
 from fasaco_edge.mission.orders.order import MOST_ZONES, Errand, StandingZone
 from fasaco_edge.planners.cost import STEPS_ALONE, CoverageCost
@@ -134,19 +135,6 @@ class Sweeping:
 
 
 @dataclass(frozen=True, slots=True)
-class MapPlace:
-    """Where the robot's map lies in the frame of its fleet.
-
-    Attributes:
-        origin: its origin's x, y [m], and the angle of its x axis [deg].
-        frame: the frame of the map that this is said of; "" for the first map that comes.
-    """
-
-    origin: tuple[float, float, float]
-    frame: str = ""
-
-
-@dataclass(frozen=True, slots=True)
 class MissionConfig:
     """Robot, cost, limits and policy of a mission; by default without retries.
 
@@ -160,12 +148,11 @@ class MissionConfig:
         sweeping: how floor is swept; None to drive through the centres of cells.
         trail: rules of the living trail.
         plans_on_trail: whether the planner's ants start from the living trail.
-        robot: its name in a fleet that shares the work; "" without one.
         battery: when to charge; None for never.
         speed_m_s: speed of the robot; 0 where it is not known [m/s].
         lattice_deg: angle of the cells' rows to the x axis of the map frame [deg]; None to align
             them with the walls, once their direction is certain.
-        map_place: where its map lies in the frame of its fleet; None without such a frame.
+        company: what it knows of other robots.
         given: the policy with its places as given, if those in ``policy`` are rotated.
     """
 
@@ -177,9 +164,8 @@ class MissionConfig:
     sweeping: Sweeping | None = None
     trail: TrailRules = PAPERS_RULES
     plans_on_trail: bool = False
-    robot: str = ""
     battery: BatteryPolicy | None = None
     lattice_deg: float | None = 0.0
-    map_place: MapPlace | None = None
+    company: CompanyKind = ALONE
     given: MissionPolicy | None = None
     speed_m_s: float = 0.0

@@ -9,6 +9,9 @@ from functools import cached_property, partial
 import numpy as np
 from numpy.typing import NDArray
 
+from fasaco_edge.fleet.planning.annealing import PIECES
+from fasaco_edge.fleet.planning.division import divide
+from fasaco_edge.fleet.planning.first_tours import Fleet
 from fasaco_edge.grid.changes import LatticeChange
 from fasaco_edge.grid.fine_raster import RobotDiscs
 from fasaco_edge.grid.floor import Floor, StandLattice
@@ -29,9 +32,6 @@ from fasaco_edge.kernels.lattice.polygons import add_near, count_in, turn_inside
 from fasaco_edge.kernels.lattice.reach import update_reach
 from fasaco_edge.planners.bound import lower_bound_of
 from fasaco_edge.planners.cost import CoverageCost
-from fasaco_edge.planners.fleet.annealing import PIECES
-from fasaco_edge.planners.fleet.division import divide
-from fasaco_edge.planners.fleet.first_tours import Fleet
 from fasaco_edge.planners.line import LineConfig, line_over, memory_for_moves
 from fasaco_edge.planners.paper.colony import ColonyConfig
 from fasaco_edge.planners.path import CoveragePath, walk_figures

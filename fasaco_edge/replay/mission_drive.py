@@ -10,8 +10,8 @@ from fasaco_edge.bus.claim import ClaimState
 from fasaco_edge.bus.latched import Subscription
 from fasaco_edge.bus.session import Bus
 from fasaco_edge.config.config import DaemonConfig
+from fasaco_edge.daemon.fleet_wing import receiver_of
 from fasaco_edge.daemon.ledger.writer import LedgerKeeper, LedgerWriter
-from fasaco_edge.daemon.loop.fleet import FleetReceiver
 from fasaco_edge.daemon.loop.inbox import Batch, Inbox, make_mailbox
 from fasaco_edge.daemon.loop.loader import Loader
 from fasaco_edge.daemon.loop.mission_runner import MissionRunner
@@ -71,9 +71,13 @@ class MissionDrive:
     def __init__(self, config: DaemonConfig, ledger: LedgerSnapshot | None = None) -> None:
         max_pixels, planner = config.map.max_pixels, config.planner
         self.mailbox = make_mailbox(max_pixels, map_spacing_s=0.0, most_poses=math.inf)
-        receiver = FleetReceiver(config) if config.fleet else None
         self._inbox = Inbox(
-            _NoBus(), config.keys(), self.mailbox, config.poses(), max_pixels, fleet=receiver
+            _NoBus(),
+            config.keys(),
+            self.mailbox,
+            config.poses(),
+            max_pixels,
+            fleet=receiver_of(config),
         )
         loader = Loader(config, self.mailbox)
         while (loaded := loader.poll()) is None:

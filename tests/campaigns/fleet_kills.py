@@ -29,7 +29,7 @@ from typing import Any, Literal
 
 from fasaco_edge.bench.processes import warm_kernels
 from tests.campaigns.services import show
-from tests.support.fleet_robots import FleetRobot
+from tests.fleet.robots import FleetRobot
 from tests.support.outsider import TIMEOUT_S
 from tests.support.processes import Daemon, daemon_process, free_endpoint
 from tests.support.rooms import WALL, Cell, coverable_cells, fill, room

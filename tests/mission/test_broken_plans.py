@@ -7,7 +7,7 @@ import numpy as np
 from fasaco_edge.errors import PlanFailed
 from fasaco_edge.mission.core.events import MapReceived, PlanBroken, State
 from fasaco_edge.mission.core.plan_requests import BROKEN_S
-from tests.mission.test_standing_robots import member, planned
+from tests.fleet.mission.test_standing_robots import member, planned
 from tests.mission.world import CELL, building, patch, pose_at, started
 
 ROOM = ("......",) * 4

@@ -2,14 +2,12 @@
 
 import subprocess
 import sys
-from dataclasses import replace
 
 import pytest
 
 from fasaco_edge.mission.company import Company, OthersCells
 from fasaco_edge.mission.core.mission import Mission
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
-from fasaco_edge.mission.fleet.kind import fleet_of
 from tests.mission.world import CONFIG
 
 LOADED = """
@@ -26,9 +24,8 @@ def test_the_mission_of_one_robot_loads_nothing_of_a_fleet():
     assert run.stdout == "\n"
 
 
-def test_a_name_in_a_fleet_makes_the_mission_one_of_a_fleet():
+def test_a_robot_alone_has_no_others():
     assert type(Mission(CONFIG).company) is Company
-    assert fleet_of(Mission(replace(CONFIG, robot="r1"))).members == {}
 
 
 @pytest.mark.parametrize("forgets", ["note_forgotten", "clear", "begin_anew"])

@@ -1,14 +1,10 @@
 """A map of another floor or building in the frame of the map before, in mid-mission."""
 
-from dataclasses import replace
-
-import numpy as np
 import pytest
 
 from fasaco_edge.errors import LedgerMismatchError
-from fasaco_edge.mission.core.events import MapReceived, MemberHeard, State
-from fasaco_edge.mission.fleet.shared import tile_bits
-from tests.mission.world import CONFIG, Drive, building, patch, pose_at
+from fasaco_edge.mission.core.events import MapReceived, State
+from tests.mission.world import Drive, building, patch, pose_at
 
 HERE = (1, 1)
 # A floor of two rooms; another one, whose lift is at the same place; a hall without its walls.
@@ -246,21 +242,6 @@ def test_a_paused_robot_stays_paused_on_the_other_floor():
     faults = stand(drive, 8.0, NEW)
     assert [type(fault) for fault in faults] == [LedgerMismatchError]
     assert drive.mission.state is State.PAUSED
-
-
-def test_what_others_of_a_fleet_swept_on_the_floor_before_does_not_count():
-    """They go on telling of it, in the frame that the map here has, too."""
-    everywhere = tile_bits(np.ones((64, 64), np.uint16))
-    other = MemberHeard("b", frame="map", state="covering", epoch=1, tiles=(((0, 0), everywhere),))
-    drive = Drive(HERE, OLD, pose_at(*HERE), config=replace(CONFIG, robot="a"))
-    drive.tell(other)
-    assert drive.mission.coverage().remaining == 0
-    stand(drive, 8.0, NEW)
-    drive.tell(other)
-    assert drive.mission.coverage().remaining == 39
-    assert "another building" in drive.mission.shared.why_misplaced("map")
-    drive.command("reset")
-    assert drive.mission.shared.why_misplaced("map") == ""
 
 
 @pytest.mark.parametrize("other", [OTHER, OPEN], ids=["walls elsewhere", "walls gone"])

@@ -7,14 +7,10 @@ import math
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
 import yaml
 
-from fasaco_edge.errors import StartBlocked
-from fasaco_edge.grid.geometry import Pose2D
 from fasaco_edge.grid.lattice import CoverageLattice, Footprint
 from fasaco_edge.grid.map_files import find_map, read_map
-from fasaco_edge.mission.map.reachable_area import anchor_cell
 from fasaco_edge.planners.grids import start_point
 from fasaco_edge.simulation.robot import SimulationConfig
 from fasaco_edge.wire.keys import Keys
@@ -109,37 +105,9 @@ def demo_robots(args: argparse.Namespace, out: Path) -> list[DemoRobot]:
     first = start_point(file, truth, args.robot_radius)
     if args.robots == 1:
         return [DemoRobot(Keys().robot, first, out)]
+    from fasaco_edge.fleet.cli.demo import apart
+
     lattice = CoverageLattice.from_map(truth, Footprint(args.cell, args.robot_radius))
     starts = [first, *apart(lattice, first, args.robots - 1)]
     names = [f"r{number}" for number in range(1, args.robots + 1)]
     return [DemoRobot(name, at, out / name) for name, at in zip(names, starts, strict=True)]
-
-
-def apart(lattice: CoverageLattice, first: Point, count: int) -> list[Point]:
-    """Return places, each with the largest walking distance from all earlier ones."""
-    from fasaco_edge.kernels.fleet.split import FAR, ways_from
-
-    start = anchor_cell(lattice, Pose2D(*first))
-    if start is None:
-        raise StartBlocked(f"the robot does not fit where it starts, {first} m")
-    row, col = lattice.local(start)
-    cols = lattice.steps.shape[1]
-    nearest = ways_from(lattice.steps, row * cols + col)
-    nearest[nearest >= FAR] = 0
-    places: list[Point] = []
-    for _ in range(count):
-        flat = int(nearest.argmax())
-        if nearest[flat] <= 0:
-            raise StartBlocked(
-                f"there is no place for a robot beside the other {len(places) + 1}",
-                hint="let fewer robots start",
-            )
-        ((x, y),) = lattice.centres(np.array([_cell(lattice, flat)], np.int32)).tolist()
-        places.append((x, y))
-        nearest = np.minimum(nearest, ways_from(lattice.steps, flat))
-    return places
-
-
-def _cell(lattice: CoverageLattice, flat: int) -> tuple[int, int]:
-    row, col = divmod(flat, lattice.steps.shape[1])
-    return row + lattice.window.row0, col + lattice.window.col0

@@ -15,7 +15,6 @@ from fasaco_edge.cli.console import terminal
 from fasaco_edge.cli.console.streams import print_json
 from fasaco_edge.cli.demo.mission import Ending
 from fasaco_edge.cli.demo.robots import DemoRobot
-from fasaco_edge.drawing.fleet import draw_fleet_mission
 from fasaco_edge.drawing.pictures import draw_mission
 from fasaco_edge.drawing.plot import MapLayer
 from fasaco_edge.errors import ProcessEnded
@@ -228,6 +227,8 @@ def _draw(args: argparse.Namespace, truth: _Truth, summary: Summary) -> None:
     geometry = truth.floor.geometry
     unswept = MapLayer(geometry, truth.floor.unswept)
     if len(truth.trails) > 1:
+        from fasaco_edge.fleet.review.drawing import draw_fleet_mission
+
         swept = [MapLayer(geometry, floor.swept) for floor in truth.floors]
         names = [robot.name for robot in summary.robots]
         picture = draw_fleet_mission(

@@ -14,7 +14,6 @@ from fasaco_edge.cli.console.arguments import Command, Exit, add_common
 from fasaco_edge.cli.console.question import agrees, may_ask
 from fasaco_edge.cli.console.streams import print_json
 from fasaco_edge.cli.console.terminal import err
-from fasaco_edge.cli.mission.fleet import command_fleet
 from fasaco_edge.cli.mission.keep_outs import add_actions, asked_by, names_of, show_keep_outs
 from fasaco_edge.errors import OrderError, WouldForget
 from fasaco_edge.host.plain_yaml import load, read_bounded
@@ -156,6 +155,8 @@ def run(args: argparse.Namespace) -> int:
         asked["discard"] = True
     is_list = args.mission_command == "keep-out" and args.keep_out_action == "list"
     if args.fleet is not None:
+        from fasaco_edge.fleet.cli.mission import command_fleet
+
         return command_fleet(args, asked, names_of if is_list else None)
     reply = _answer(args, asked)
     if reply is None:

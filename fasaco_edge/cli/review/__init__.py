@@ -133,10 +133,10 @@ def run(args: argparse.Namespace) -> int:
     for file in recordings:
         with open_part(file):  # what is none is told before all else is loaded
             pass
-    from fasaco_edge.recording.fleet.notes import is_fleet_recording
+    from fasaco_edge.recording.read.frames import is_fleet_recording
 
     if is_fleet_recording(args.recordings[0]):
-        from fasaco_edge.cli.review.fleet import print_fleet
+        from fasaco_edge.fleet.cli.review import print_fleet
 
         return print_fleet(args)
     import msgspec

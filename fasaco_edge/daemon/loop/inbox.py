@@ -38,7 +38,7 @@ from fasaco_edge.wire.messages.poses import PoseDecoder
 from fasaco_edge.wire.schemas import TF_MESSAGE
 
 if TYPE_CHECKING:
-    from fasaco_edge.daemon.loop.fleet import FleetReceiver
+    from fasaco_edge.daemon.fleet_wing import MessagesOfOthers
     from fasaco_edge.planners.planner import ColonySnapshot
 
 MAPS = ("map", "map_update")
@@ -187,7 +187,7 @@ class Inbox:
         poses: PoseDecoder,
         max_pixels: int,
         maps: Sequence[Subscription] = (),
-        fleet: FleetReceiver | None = None,
+        fleet: MessagesOfOthers | None = None,
     ) -> None:
         self._poses = poses
         self._max_pixels = max_pixels

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 from fasaco_edge.bus.mailbox import Mailbox
 from fasaco_edge.config.config import DaemonConfig
+from fasaco_edge.daemon.fleet_wing import company_of
 from fasaco_edge.daemon.memory import floor_pixels
 from fasaco_edge.host.processes import release_unused
 from fasaco_edge.mission.config import MissionConfig, Sweeping
@@ -98,10 +99,9 @@ def mission_config(config: DaemonConfig, chosen: CoveragePlanner) -> MissionConf
         _sweeping(config),
         TrailRules(planner.alpha, planner.tau0),
         isinstance(chosen, Fasaco),
-        robot.name if config.fleet else "",
         config.battery or None,
         config.lattice_deg,
-        config.fleet.map_place if config.fleet else None,
+        company_of(config),
         speed_m_s=robot.speed_m_s,
     )
 

@@ -40,7 +40,7 @@ from fasaco_edge.mission.core.events import (
 )
 
 if TYPE_CHECKING:
-    from fasaco_edge.daemon.loop.fleet import FleetSender
+    from fasaco_edge.daemon.fleet_wing import MessageToOthers
     from fasaco_edge.daemon.metrics import MetricsServer
 
 LOG = logging.getLogger(__name__)
@@ -63,7 +63,7 @@ class BusPorts:
     outbox: Outbox
     turns: TurnLog
     claim: NameClaim
-    fleet: FleetSender | None = None
+    fleet: MessageToOthers | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,6 +13,7 @@ from msgspec.structs import replace
 from fasaco_edge import __version__
 from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.daemon.figures import CycleTimes, Faults
+from fasaco_edge.daemon.fleet_wing import report_of
 from fasaco_edge.daemon.loop.answers import config_document
 from fasaco_edge.daemon.loop.mission_reports import (
     battery_report,
@@ -33,10 +34,8 @@ from fasaco_edge.wire.documents.replies import (
 from fasaco_edge.wire.documents.status import (
     ClaimReport,
     DriveReport,
-    FleetReport,
     Latencies,
     LedgerReport,
-    MemberReport,
     Status,
     SupervisedRecorder,
     TroubleReport,
@@ -140,7 +139,7 @@ class StatusBoard:
             threads=thread_count(),
             config=self._shown_config,
             mission=mission_report(mission, order_state, self._standing),
-            fleet=self._fleet(mission, now),
+            fleet=report_of(self._config, mission, now),
             troubles=troubles,
         )
 
@@ -193,27 +192,6 @@ class StatusBoard:
         since_s = round(now - self._unbegun_at - BEGUN_S, 1)
         text, to_do = f"the mission cannot begin: {self.waits}", "publish what it waits for"
         return (TroubleReport("not_begun", text, to_do, since_s),) if since_s >= 0.0 else ()
-
-    def _fleet(self, mission: Mission | None, now: float) -> FleetReport | None:
-        fleet = self._config.fleet
-        if not fleet:
-            return None
-        if mission is None:
-            return FleetReport(fleet.name)
-        from fasaco_edge.mission.fleet.kind import fleet_of  # noqa: PLC0415 - of a fleet alone
-
-        others = fleet_of(mission)
-        members = tuple(
-            MemberReport(
-                name,
-                member.newest.state,
-                round(max(now - member.heard_at, 0.0), 1),
-                member.absence(now) or None,
-                others.shared.cells_of(name),
-            )
-            for name, member in sorted(others.members.items())
-        )
-        return FleetReport(fleet.name, others.numbers.number, others.part_cells(), members)
 
     def _drive(self, mission: Mission | None) -> DriveReport:
         planned_s = round(self._cost.quarter_turn_s, 3)

@@ -16,7 +16,7 @@ from fasaco_edge.grid.geometry import StampedPose
 from fasaco_edge.grid.lattice import Cell, CoverageLattice
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.grid.rotation import rotated_points
-from fasaco_edge.mission.company import OthersCells, company_kind
+from fasaco_edge.mission.company import OthersCells
 from fasaco_edge.mission.config import MissionConfig
 from fasaco_edge.mission.core.blocked_follower import BlockedFollower
 from fasaco_edge.mission.core.charging import BatteryGauge, Charging
@@ -95,8 +95,8 @@ class Mission:
             sight = ToolSight(
                 tool_m, radius_m, config.footprint.free_at_most, lambda: map_state.grid
             )
-        kind = company_kind(config)
-        self._ledger = MissionLedger(cell_m, tool_m, ahead_m, kind.cells(config), sight)
+        kind = config.company
+        self._ledger = MissionLedger(cell_m, tool_m, ahead_m, kind.cells(), sight)
         monitor = InputMonitor(config)
         self.company = kind.company(config, self._map, self._ledger)
         self._orders = Sequencer(config, self._map, self._ledger, self.company)

@@ -11,11 +11,12 @@ from __future__ import annotations
 import struct
 from collections.abc import Iterator
 from dataclasses import dataclass
+from pathlib import Path
 from typing import BinaryIO
 
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.arrow import pa
-from fasaco_edge.recording.read.repair import FOOTER_KIND, FRAME, HEADER_BYTES, Scan
+from fasaco_edge.recording.read.repair import FOOTER_KIND, FRAME, HEADER_BYTES, Scan, open_part
 
 CHUNK_KIND = 2
 # Limit of an uncompressed chunk: the largest that a recorder writes is a map of 64 million pixels.
@@ -206,3 +207,17 @@ def _varint(message: bytes, at: int) -> tuple[int, int]:
         if byte < 0x80:
             return value, at + place + 1
     raise ValueError("a number of more than ten bytes")
+
+
+def is_fleet_recording(path: Path) -> bool:
+    """Tell whether a file is a fleet's recording, by its first frames.
+
+    Raises:
+        UnreadableRecording: it is missing, or is no recording.
+    """
+    with open_part(path) as (recording, scan):
+        for chunk in chunks(recording, scan):
+            root = "" if chunk is None else chunk.entity.partition("/")[0]
+            if root in (entities.FLEET, entities.WORLD, entities.INPUTS):
+                return root == entities.FLEET
+    return False

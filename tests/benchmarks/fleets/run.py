@@ -15,6 +15,10 @@ from typing import TypeVar
 
 import numpy as np
 
+from fasaco_edge.fleet.mission.ground import GroundTelling
+from fasaco_edge.fleet.mission.kind import FleetKind, fleet_of
+from fasaco_edge.fleet.mission.shared import Telling
+from fasaco_edge.fleet.review.report import RobotTrack, find_again
 from fasaco_edge.grid.geometry import Pose2D, Window
 from fasaco_edge.grid.lattice import Cell, Footprint
 from fasaco_edge.grid.occupancy import OccupancyGrid
@@ -32,14 +36,10 @@ from fasaco_edge.mission.core.events import (
 from fasaco_edge.mission.core.mission import Mission
 from fasaco_edge.mission.core.spare_time import most_s
 from fasaco_edge.mission.coverage.ledger import CoverageLedger
-from fasaco_edge.mission.fleet.ground import GroundTelling
-from fasaco_edge.mission.fleet.kind import fleet_of
-from fasaco_edge.mission.fleet.shared import Telling
 from fasaco_edge.planners.cost import CoverageCost, SearchWork
 from fasaco_edge.planners.line import LINES
 from fasaco_edge.planners.planner import WorkLimit
 from fasaco_edge.planners.search.near_optimal import NearOptimal
-from fasaco_edge.review.fleet import RobotTrack, find_again
 from fasaco_edge.simulation.robot import SimulationConfig
 from fasaco_edge.simulation.world import World
 
@@ -100,7 +100,11 @@ class Fleet:
             sweeping = Sweeping(TOOL_M, 25_000_000, line)
         footprint = Footprint(cell_m, self.radius_m)
         return MissionConfig(
-            footprint, cost=cost, sweeping=sweeping, robot=name, spare_share=SPARE_SHARE
+            footprint,
+            cost=cost,
+            sweeping=sweeping,
+            company=FleetKind(name),
+            spare_share=SPARE_SHARE,
         )
 
 

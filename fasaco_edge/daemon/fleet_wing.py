@@ -1,0 +1,78 @@
+"""Door to the wing of fleets: what a daemon needs of it, loaded where a fleet is configured."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Protocol
+
+from fasaco_edge.mission.company import ALONE, CompanyKind
+from fasaco_edge.wire.topics import FLEET
+
+if TYPE_CHECKING:
+    from fasaco_edge.bus.arrival import Sample
+    from fasaco_edge.bus.session import Bus
+    from fasaco_edge.config.config import DaemonConfig
+    from fasaco_edge.errors import FasacoError
+    from fasaco_edge.mission.core.events import MemberHeard
+    from fasaco_edge.mission.core.mission import Mission
+    from fasaco_edge.wire.documents.status import FleetReport
+
+
+class MessagesOfOthers(Protocol):
+    """Receiver of the messages of a fleet's other robots."""
+
+    def listen(self, bus: Bus, post: Callable[[Sample], None]) -> None:
+        """Pass on the messages of this fleet within their rate limit."""
+
+    def event(self, sample: Sample) -> MemberHeard | None:
+        """Return a robot's message as an event; None from another fleet or from this robot.
+
+        Raises:
+            MalformedMessage: it is malformed.
+        """
+
+    def take_faults(self) -> list[FasacoError]:
+        """Return the faults since the last call that ``event`` did not raise."""
+
+
+class MessageToOthers(Protocol):
+    """Publisher of this robot's message to the other robots of its fleet."""
+
+    def publish(self, mission: Mission, now: float) -> None:
+        """Publish a message if due; the caller catches failures."""
+
+
+def company_of(config: DaemonConfig) -> CompanyKind:
+    """Return what the mission knows of other robots."""
+    if not config.fleet:
+        return ALONE
+    from fasaco_edge.fleet.daemon.exchange import kind_of  # noqa: PLC0415
+
+    return kind_of(config)
+
+
+def receiver_of(config: DaemonConfig) -> MessagesOfOthers | None:
+    """Return the receiver of the other robots' messages; None without a fleet."""
+    if not config.fleet:
+        return None
+    from fasaco_edge.fleet.daemon.exchange import FleetReceiver  # noqa: PLC0415
+
+    return FleetReceiver(config)
+
+
+def sender_of(config: DaemonConfig, bus: Bus) -> MessageToOthers | None:
+    """Return the publisher of this robot's message to the others; None without a fleet."""
+    if not config.fleet:
+        return None
+    from fasaco_edge.fleet.daemon.exchange import FleetSender  # noqa: PLC0415
+
+    return FleetSender(bus.advertise(config.keys(), FLEET), config)
+
+
+def report_of(config: DaemonConfig, mission: Mission | None, now: float) -> FleetReport | None:
+    """Return what the status says of the fleet at ``now`` [s]; None without a fleet."""
+    if not config.fleet:
+        return None
+    from fasaco_edge.fleet.daemon.report import report  # noqa: PLC0415
+
+    return report(config.fleet.name, mission, now)

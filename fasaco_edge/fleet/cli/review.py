@@ -1,0 +1,109 @@
+"""The report of ``fasaco-edge review`` on a fleet: one screen, JSON, a picture."""
+
+from __future__ import annotations
+
+import argparse
+
+import msgspec
+from rich.table import Table
+
+from fasaco_edge.cli.console import terminal
+from fasaco_edge.cli.console.arguments import writing
+from fasaco_edge.cli.console.streams import print_json
+from fasaco_edge.errors import BadConfiguration
+from fasaco_edge.fleet.review.report import FleetFigures, review_fleet
+from fasaco_edge.review.wording import clock
+from fasaco_edge.text import one_line
+
+ONE_ROBOT = ("long", "at", "point", "against", "html", "export")
+HEADER = (
+    "robot", "state", "busy", "waited", "swept m2", "through", "again", "driven m", "kB/s",
+    "plan ms",
+)  # fmt: skip
+
+
+def print_fleet(args: argparse.Namespace) -> int:
+    """Review a fleet's recording.
+
+    Raises:
+        BadConfiguration: an option is for the recording of one robot.
+    """
+    for name in ONE_ROBOT:
+        value = getattr(args, name)
+        # Not by its truth: 0 is a time.
+        if value is not None and value is not False:
+            raise BadConfiguration(
+                f"--{name}: this is the recording of a fleet",
+                hint="review the recording of one of its robots",
+            )
+    review = review_fleet(args.recordings)
+    if args.json:
+        print_json(msgspec.to_builtins(review.figures))
+    else:
+        _print(review.figures)
+    if args.png:
+        from fasaco_edge.fleet.review.output import draw_fleet_review
+
+        with writing(args.png) as file:
+            draw_fleet_review(review).save(file, "PNG")
+    if args.view:
+        from fasaco_edge.recording.read.repair import view
+
+        view(args.recordings)
+    return 0
+
+
+def _print(figures: FleetFigures) -> None:
+    console = terminal.out()
+    console.print(f"fleet {one_line(figures.fleet)}: {len(figures.robots)} robots", style="bold")
+    console.print(
+        terminal.figures(
+            [
+                (
+                    "makespan",
+                    f"{clock(figures.makespan_s)} of {clock(figures.duration_s)} recorded",
+                ),
+                (
+                    "balance",
+                    f"least over most: {figures.busy_balance:.2f} of time at work, "
+                    f"{figures.swept_balance:.2f} of area swept",
+                ),
+                (
+                    "swept",
+                    f"{figures.swept_m2:.1f} m2; after another robot: {figures.again_m2:.1f} m2 "
+                    f"swept again ({figures.again_share:.1%}), {figures.through_m2:.1f} m2 "
+                    "driven through",
+                ),
+                ("waited", f"{figures.waited_s:.0f} s in all"),
+                ("divisions", str(figures.divisions)),
+            ]
+        )
+    )
+    table = Table(*HEADER, box=None, padding=(0, 1, 0, 0))
+    for column in table.columns[2:]:
+        column.justify = "right"
+    for robot in figures.robots:
+        plan = (
+            "-"
+            if robot.plan_ms_p99 is None
+            else f"{robot.plan_ms_p50:.0f}, {robot.plan_ms_p99:.0f}"
+        )
+        waited = f"{robot.waits} x, {robot.waited_s:.0f} s" if robot.waits else "-"
+        table.add_row(
+            one_line(robot.name),
+            one_line(robot.state),
+            clock(robot.busy_s),
+            waited,
+            f"{robot.swept_m2:.1f}",
+            f"{robot.through_m2:.1f}",
+            f"{robot.again_m2:.1f}",
+            f"{robot.driven_m:.0f}",
+            f"{robot.kb_s:.1f} ({robot.peak_kb_s:.1f})",
+            plan,
+        )
+    console.print(table)
+    console.print(
+        "through, again: m2 that another had swept. kB/s: messages to the fleet (most over 5 s). "
+        "plan ms: median, 99 %.",
+        style="dim",
+    )

@@ -1,0 +1,39 @@
+"""Fleet on the bus, for ``fasaco-edge watch --fleet``."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+from fasaco_edge.bus.settings import BusSettings
+from fasaco_edge.cli.ask import nobody_answers
+from fasaco_edge.cli.console.terminal import out
+from fasaco_edge.errors import FasacoError, NobodyAnswersError
+from fasaco_edge.fleet.watch.feed import FleetFeed
+from fasaco_edge.fleet.watch.session import FleetWatch
+from fasaco_edge.fleet.watch.view import FleetView
+from fasaco_edge.text import one_line
+from fasaco_edge.wire.keys import VERSION, Keys
+
+
+@contextmanager
+def fleet_on_bus(
+    fleet: str, keys: Keys, bus: BusSettings
+) -> Iterator[tuple[FleetWatch, Callable[[], FasacoError]]]:
+    """Yield what is watched of a fleet, and what makes the error that no robot of it is there."""
+    view = FleetView(fleet)
+    with FleetFeed(bus, keys) as feed:
+        yield FleetWatch(feed, view, out()), lambda: _no_robot(keys, feed, view)
+
+
+def _no_robot(keys: Keys, feed: FleetFeed, view: FleetView) -> NobodyAnswersError:
+    """Return the error that no robot of a fleet is heard."""
+    robots = len(feed.robots())
+    if not robots and not view.others:
+        return nobody_answers(f"{keys.base}/{VERSION}/*", ())
+    fleets = ", ".join(sorted(view.others)) or "none"
+    return NobodyAnswersError(
+        f"no robot of a fleet {one_line(view.fleet)!r} is heard",
+        hint=f"{robots} robots are on this bus, of these fleets: {fleets}; "
+        "`fleet: {name: ...}` in its configuration makes a robot one of a fleet",
+    )

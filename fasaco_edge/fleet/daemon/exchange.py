@@ -1,0 +1,249 @@
+"""Fleet messages: this robot's message to the others, and theirs as events.
+
+Unused without a block ``fleet`` in the configuration.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from fasaco_edge.bus.arrival import Sample
+from fasaco_edge.bus.publisher import Publisher
+from fasaco_edge.bus.session import Bus
+from fasaco_edge.config.config import DaemonConfig, FleetConfig
+from fasaco_edge.errors import FasacoError, FleetError
+from fasaco_edge.fleet.daemon.arrivals import FleetArrivals
+from fasaco_edge.fleet.mission.frames import FleetFrames
+from fasaco_edge.fleet.mission.ground import GroundTelling
+from fasaco_edge.fleet.mission.kind import FleetKind, fleet_of
+from fasaco_edge.fleet.mission.shared import MapPlace, Telling
+from fasaco_edge.grid.geometry import Pose2D
+from fasaco_edge.mission.core.events import MemberHeard, Part
+from fasaco_edge.wire.documents.fleet import (
+    FLEET_VERSION,
+    CellTile,
+    FleetMember,
+    FleetPart,
+    decode_member,
+)
+from fasaco_edge.wire.documents.json_text import encode_json
+from fasaco_edge.wire.limits import MAX_FLEET_POINTS
+from fasaco_edge.wire.topics import FLEET
+
+if TYPE_CHECKING:
+    from fasaco_edge.fleet.mission.traffic import Points
+    from fasaco_edge.mission.core.mission import Mission
+
+PERIOD_S, LEAST_PERIOD_S = 1.0, 0.25
+# Tiles of progress, and as many of ground, in a message sent once a second, and in one on change:
+# 20 kB a second in all, and up to 7 more where cells were kept from before an epoch.
+TILES, FEW_TILES = 10, 2
+
+
+def kind_of(config: DaemonConfig) -> FleetKind:
+    """Return the kind of company of a daemon with a block ``fleet``."""
+    fleet = config.fleet
+    assert fleet
+    place = MapPlace(_origin(fleet), fleet.map_frame) if fleet.frame else None
+    return FleetKind(config.robot.name, place)
+
+
+class FleetReceiver:
+    """Receiver of the messages of a fleet's other robots.
+
+    Args:
+        config: with a block ``fleet``.
+    """
+
+    def __init__(self, config: DaemonConfig) -> None:
+        assert config.fleet
+        self._keys, self._fleet, self._cell_m = config.keys(), config.fleet.name, config.cell_m
+        self._lattice_deg = config.lattice_deg or 0.0
+        self._frame, self._frames = config.fleet.frame, None
+        if self._frame:
+            origin = _origin(config.fleet)
+            self._frames = FleetFrames(_pose(*origin), self._lattice_deg, self._cell_m)
+        self._arrivals = FleetArrivals(self._keys, self._fleet)
+        # Of messages that are taken but for a part.
+        self._faults: list[FasacoError] = []
+
+    def listen(self, bus: Bus, post: Callable[[Sample], None]) -> None:
+        """Pass on the messages of this fleet within their rate limit."""
+
+        def post_due(sample: Sample) -> None:
+            if self._arrivals.is_due(sample, time.monotonic()):
+                post(sample)
+
+        bus.subscribe(self._keys.of_all(FLEET), post_due)
+
+    def event(self, sample: Sample) -> MemberHeard | None:
+        """Return a robot's message as an event; None from another fleet or from this robot.
+
+        Raises:
+            MalformedMessage: it is malformed.
+        """
+        robot = self._keys.robot_of(sample.key)
+        if robot in ("", self._keys.robot):
+            return None
+        try:
+            member = decode_member(sample.payload, self._fleet)
+        except FleetError as error:
+            return MemberHeard(robot, misfit=str(error))
+        except FasacoError as error:
+            raise type(error)(f"{robot}: {error}") from error
+        if member is None:
+            return None
+        misfit = ""
+        if abs(member.cell_m - self._cell_m) > 1e-9:
+            misfit = f"its cells are {member.cell_m:g} m wide, here they are {self._cell_m:g} m"
+        if self._frame and member.frame != self._frame:
+            misfit = f"its frame is {member.frame!r}, that of this fleet is {self._frame!r}"
+        if not self._frame and abs(member.lattice_deg - self._lattice_deg) > 1e-9:
+            misfit = (
+                f"its cells lie at {member.lattice_deg:g} degrees to the map frame, here at "
+                f"{self._lattice_deg:g}"
+            )
+        heard = MemberHeard(
+            robot=robot,
+            misfit=misfit,
+            frame=member.frame,
+            state=member.state,
+            x=member.x,
+            y=member.y,
+            step_s=member.step_s,
+            epoch=member.epoch,
+            division=member.division,
+            tiles=_placed(member.swept),
+            ground=_placed(member.ground),
+            by=member.by,
+            parts=tuple(
+                Part(part.robot, (part.row, part.col), part.handicap_s, part.step_s)
+                for part in member.parts
+            ),
+            radius_m=member.radius_m,
+            ahead=member.ahead,
+            waits_for=member.waits_for,
+            kept=None if member.kept is None else _placed(member.kept),
+        )
+        if self._frames is None or misfit:
+            return heard
+        placed = self._frames.event(heard, _pose(*member.origin), member.lattice_deg)
+        if heard.parts and not placed.parts:
+            self._faults.append(
+                FleetError(f"{robot}: its division has a seed farther off than cells may lie here")
+            )
+        return placed
+
+    def take_faults(self) -> list[FasacoError]:
+        """Return the faults since the last call that ``event`` did not raise."""
+        faults, self._faults = self._faults, []
+        return faults + self._arrivals.take_faults()
+
+
+class FleetSender:
+    """Publisher of this robot's message: once a second, on change, and more often near others.
+
+    Args:
+        publisher: of the robot's own key.
+        config: with a block ``fleet``.
+    """
+
+    def __init__(self, publisher: Publisher, config: DaemonConfig) -> None:
+        assert config.fleet
+        self._publisher, self._fleet, self._cell_m = publisher, config.fleet.name, config.cell_m
+        self._radius_m = config.robot.radius_m
+        self._frame, self._origin = config.fleet.frame, _origin(config.fleet)
+        self._telling, self._telling_ground = Telling(), GroundTelling()
+        self._said: tuple[object, ...] = ()
+        self._epoch = 0
+        # When a message was published, and one with tiles in turn.
+        self._said_at = self._told_at = float("-inf")
+
+    def publish(self, mission: Mission, now: float) -> None:
+        """Publish a message if due; the caller catches failures."""
+        stamped = mission.pose
+        is_too_soon = now - self._said_at < LEAST_PERIOD_S
+        if is_too_soon or stamped is None or not mission.ledger.frame:
+            return
+        others = fleet_of(mission)
+        is_near, waits_for = mission.giving_way.is_near, mission.waits_for
+        key = mission.state, others.numbers.number, others.shared.epoch, waits_for
+        is_news, is_due = key != self._said, now - self._told_at >= PERIOD_S
+        if not (is_news or is_due or is_near):
+            return
+        self._said, self._said_at = key, now
+        most = FEW_TILES if is_news else 0
+        if is_due:
+            self._told_at, most = now, TILES
+        tiles = mission.ledger.snapshot().tiles
+        if others.shared.epoch != self._epoch:
+            # Published changes are forgotten. What was swept before a restart is not known.
+            before = tiles if self._epoch else None
+            self._epoch, self._telling, most = others.shared.epoch, Telling(before), TILES
+        swept = self._telling.next(tiles, most)
+        kept = self._telling.kept(swept)
+        ground = self._telling_ground.next(mission.area, most)
+        member = FleetMember(
+            version=FLEET_VERSION,
+            fleet=self._fleet,
+            cell_m=self._cell_m,
+            lattice_deg=mission.rotation.deg,
+            frame=self._frame_told(mission),
+            state=str(mission.state),
+            x=round(stamped.pose.x, 3),
+            y=round(stamped.pose.y, 3),
+            step_s=others.step_s,
+            epoch=others.shared.epoch,
+            division=others.numbers.number,
+            open_cells=mission.open_cells(),
+            swept=tuple(CellTile(*place, bits) for place, bits in swept),
+            ground=tuple(CellTile(*place, bits) for place, bits in ground),
+            by=others.numbers.by,
+            parts=tuple(
+                FleetPart(part.robot, *part.seed, part.handicap_s, part.step_s)
+                for part in others.parts
+            ),
+            radius_m=self._radius_m,
+            ahead=tuple((round(x, 3), round(y, 3)) for x, y in _thinned(mission.next_metres())),
+            waits_for=waits_for,
+            origin=self._origin,
+            kept=None if kept is None else tuple(CellTile(*place, bits) for place, bits in kept),
+        )
+        self._publisher.put(encode_json(member))
+
+    def _frame_told(self, mission: Mission) -> str:
+        """Return the frame of the fleet; that of the map where the map has no place in it."""
+        frame = mission.ledger.frame
+        if not fleet_of(mission).shared.why_misplaced(frame):
+            return self._frame or frame
+        # Nobody may take it for the fleet's.
+        return frame if self._frame not in ("", frame) else f"{frame} of another map"
+
+
+def _thinned(points: Points) -> list[list[float]]:
+    """Return at most as many points of a line as a message holds, evenly, with both ends [m].
+
+    Cells of less than 3.2 cm have more centres in the next 2 m.
+    """
+    count = len(points)
+    if count > MAX_FLEET_POINTS:
+        points = points[np.linspace(0, count - 1, MAX_FLEET_POINTS).round().astype(np.intp)]
+    found: list[list[float]] = points.tolist()
+    return found
+
+
+def _origin(fleet: FleetConfig) -> tuple[float, float, float]:
+    return fleet.x_m, fleet.y_m, fleet.yaw_deg
+
+
+def _pose(x: float, y: float, deg: float) -> Pose2D:
+    return Pose2D(x, y, math.radians(deg))
+
+
+def _placed(tiles: tuple[CellTile, ...]) -> tuple[tuple[tuple[int, int], bytes], ...]:
+    return tuple(((tile.row, tile.col), tile.cells) for tile in tiles)

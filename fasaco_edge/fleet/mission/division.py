@@ -1,0 +1,320 @@
+"""Division of the remaining cells among the robots at work: a seed and a handicap for each.
+
+A cell belongs to the robot whose seed has the shortest travel time to it, plus the robot's
+handicap. So each part is connected, and cells that a map shows later have an owner, too. Handicaps
+balance the workload of the parts. Seeds start at the robots, or far from one another; then they
+move to the centres of the parts (Lloyd's algorithm, with travel times as distances). Of all these
+divisions the one is taken whose last robot ends first, if each walks from cell to nearest cell.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fasaco_edge.fleet.mission.travel import Seconds, Travel, cell_of, on_ground, times_of, ways
+from fasaco_edge.grid.lattice import Cell, CoverageLattice
+from fasaco_edge.kernels.fleet.nearest import walk_parts
+from fasaco_edge.mission.core.events import Part
+
+# With more cells every second, third ... is used; on larger lattices there are fewer rounds.
+MOST_CELLS, MOST_SEARCHED = 2_000, 3_000_000
+# Rounds of moving the seeds; updates of the handicaps, and the factor between successive ones.
+ROUNDS, CHANGES, DAMPING = 3, 30, 0.85
+# How often handicaps are sought for the same seeds: for equal numbers of cells first, then for the
+# times that a cell took each robot.
+EVENED = 3
+# Seeds are kept unless others end before this share of their time. The share of cells that go to
+# another robot with a part, of the mean time, counts as so much time of the last robot.
+STABLE, CHANGED = 0.9, 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class Robot:
+    """A robot that takes a part.
+
+    Attributes:
+        name: its name.
+        cell: its cell.
+        step_s: its time to sweep one cell [s].
+    """
+
+    name: str
+    cell: Cell
+    step_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class Division:
+    """Assignment of cells to robots.
+
+    Attributes:
+        robots: the robots at work, sorted by name.
+        seeds: a cell for each.
+        handicaps_s: added to the travel times from the seeds [s].
+    """
+
+    robots: tuple[Robot, ...]
+    seeds: tuple[Cell, ...]
+    handicaps_s: tuple[float, ...]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The names of the robots."""
+        return tuple(robot.name for robot in self.robots)
+
+    @classmethod
+    def of(cls, parts: Iterable[Part]) -> Division:
+        """Return a division as others tell of it."""
+        parts = sorted(parts, key=lambda part: part.robot)
+        robots = tuple(Robot(part.robot, part.seed, part.step_s) for part in parts)
+        seeds, handicaps_s = (part.seed for part in parts), (part.handicap_s for part in parts)
+        return cls(robots, tuple(seeds), tuple(handicaps_s))
+
+    @property
+    def parts(self) -> tuple[Part, ...]:
+        """The division as others are told."""
+        told = zip(self.robots, self.seeds, self.handicaps_s, strict=True)
+        return tuple(Part(robot.name, seed, s, robot.step_s) for robot, seed, s in told)
+
+    def is_like(self, other: Division) -> bool:
+        """Tell whether it assigns all cells as another one, wherever the robots are now."""
+        mine, theirs = ((one.names, one.seeds, one.handicaps_s) for one in (self, other))
+        return mine == theirs
+
+    def busiest(self, owners: NDArray[np.int8], robot: str) -> str:
+        """Return which robot but ``robot`` owns most of some cells; "" where none owns any.
+
+        Args:
+            owners: int8 (n,), the index of each cell's robot.
+            robot: a name.
+        """
+        cells = np.bincount(owners, minlength=len(self.robots)).tolist()
+        others = {name: n for name, n in zip(self.names, cells, strict=True) if n and name != robot}
+        return max(others, key=lambda name: others[name], default="")
+
+    def owners(self, lattice: CoverageLattice) -> NDArray[np.int8]:
+        """Return the index of each cell's robot, int8 (rows, cols)."""
+        first = np.full(lattice.steps.size, np.float32(np.inf))
+        owners = np.zeros(lattice.steps.size, np.int8)
+        # One robot at a time: large lattices would take much memory for many robots.
+        for index, (robot, seed) in enumerate(zip(self.robots, self.seeds, strict=True)):
+            times_s = times_of(ways(lattice, seed), np.float32(robot.step_s))
+            times_s += np.float32(self.handicaps_s[index])
+            is_earlier = times_s < first
+            owners[is_earlier] = index
+            np.minimum(first, times_s, out=first)
+        return owners.reshape(lattice.steps.shape)
+
+
+def divide(
+    lattice: CoverageLattice,
+    wanted: NDArray[np.bool_],
+    robots: Sequence[Robot],
+    before: Division | None = None,
+    turn_steps: float = 0.0,
+) -> Division:
+    """Divide cells among robots; independent of the order in which these are given.
+
+    Args:
+        lattice: the cells where robots fit.
+        wanted: bool (rows, cols), the cells to divide.
+        robots: at least one. One without a way to any of the cells gets a seed where it is: it has
+            what it alone can reach, on its own map.
+        before: the last division; its seeds are kept unless others end much earlier, and where
+            nothing is gained, cells keep their robot.
+        turn_steps: time of a quarter turn, in steps.
+    """
+    cells = np.flatnonzero(wanted)
+    every = -(-len(cells) // MOST_CELLS) or 1
+    travel = Travel(lattice, cells[::every], every)
+    reached = [robot for robot in robots if travel.has_ways_from(robot.cell)]
+    divided = {robot.name: (robot, robot.cell, 0.0) for robot in robots}
+    if len(reached) > 1:
+        reached.sort(key=lambda robot: robot.name)
+        seeds, handicaps_s = _divided(travel, reached, before, turn_steps)
+        found = zip(reached, seeds, handicaps_s, strict=True)
+        divided |= {robot.name: (robot, seed, s) for robot, seed, s in found}
+    return Division(*zip(*(divided[name] for name in sorted(divided)), strict=True))
+
+
+def _divided(
+    travel: Travel, robots: Sequence[Robot], before: Division | None, turn_steps: float
+) -> tuple[list[Cell], list[float]]:
+    """Return seeds and handicaps [s] of robots that have ways to the cells, as ``divide`` does."""
+    lattice, cells = travel.lattice, travel.cells
+    starts, steps_s = [robot.cell for robot in robots], np.array([one.step_s for one in robots])
+    from_starts_s = travel.times_s(starts, steps_s)
+    choice = _Choice(travel, starts, steps_s, _owners_before(before, robots, travel), turn_steps)
+    names = [robot.name for robot in robots]
+    if before is not None and set(before.names) & set(names):
+        kept = dict(
+            zip(before.names, zip(before.seeds, before.handicaps_s, strict=True), strict=True)
+        )
+        # A seed that others see and this robot cannot reach would take a huge handicap.
+        kept = {name: pair for name, pair in kept.items() if travel.has_ways_from(pair[0])}
+        pairs = [kept.get(robot.name, (robot.cell, 0.0)) for robot in robots]
+        seeds, old_s = [seed for seed, _ in pairs], np.array([s for _, s in pairs], np.float32)
+        times_s = travel.times_s(seeds, steps_s)
+        balanced_s = (_handicaps_s(times_s, steps_s, first_s) for first_s in (old_s, None))
+        for handicaps_s in (old_s, *balanced_s):
+            choice.offer(seeds, handicaps_s, times_s, STABLE)
+    rounds = max(1, min(ROUNDS, MOST_SEARCHED // (len(robots) * lattice.steps.size)))
+    for begin in (starts, _spread(travel, from_starts_s)):
+        seeds = begin
+        for _ in range(rounds):
+            times_s, cells_s = travel.times_s(seeds, steps_s), steps_s
+            for _ in range(EVENED if rounds > 1 else 1):
+                handicaps_s = _handicaps_s(times_s, cells_s)
+                owner, ends_s = choice.offer(seeds, handicaps_s, times_s)
+                cells_s = _cells_s(owner, ends_s, steps_s)
+            seeds = _middles(lattice, cells, owner, seeds)
+    return choice.seeds, choice.handicaps_s.tolist()
+
+
+class _Choice:
+    """The best of the divisions offered.
+
+    Attributes:
+        seeds, handicaps_s: of the best, see ``Division``; handicaps float32 (k,).
+    """
+
+    def __init__(
+        self,
+        travel: Travel,
+        starts: Sequence[Cell],
+        steps_s: NDArray[np.float64],
+        before: NDArray[np.int64],
+        turn_steps: float,
+    ) -> None:
+        self.seeds: list[Cell] = []
+        self.handicaps_s = np.zeros(0, np.float32)
+        self._travel, self._before, self._turn_steps = travel, before, turn_steps
+        # Which robots had cells: one without waits for some, whoever has to give them.
+        self._had = np.bincount(before[before >= 0], minlength=len(starts)) > 0
+        self._steps_s = steps_s
+        lattice, cols = travel.lattice, travel.lattice.steps.shape[1]
+        ground = [on_ground(lattice, *lattice.local(start)) for start in starts]
+        self._starts = np.array([row * cols + col for row, col in ground], np.int64)
+        # Writable, as for other arrays kernels would be compiled again.
+        self._steps = lattice.steps.ravel().copy()
+        self._offsets = np.array([1, cols, -1, -cols], np.int64)
+        self._cost_s = np.inf
+
+    def offer(
+        self, seeds: list[Cell], handicaps_s: Seconds, times_s: Seconds, factor: float = 1.0
+    ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+        """Take a division if it costs less.
+
+        Args:
+            seeds, handicaps_s: the division.
+            times_s: travel times from its seeds, float32 (k, n) [s].
+            factor: on the time of its last robot.
+
+        Returns:
+            the owner of each cell, int64 (n,), and when each robot ends, float64 (k,) [s].
+        """
+        owner: NDArray[np.int64] = (times_s + handicaps_s[:, None]).argmin(axis=0)
+        ends_s = self._ends_s(owner)
+        changed = np.count_nonzero((self._before >= 0) & (owner != self._before) & self._had[owner])
+        changed_s = changed / len(owner) * float(ends_s.mean())
+        cost_s = factor * float(ends_s.max()) + CHANGED * changed_s
+        if cost_s < self._cost_s:
+            self.seeds, self.handicaps_s, self._cost_s = seeds, handicaps_s, cost_s
+        return owner, ends_s
+
+    def _ends_s(self, owner: NDArray[np.int64]) -> NDArray[np.float64]:
+        """Return when each robot ends, float64 (k,) [s], if it walks from cell to nearest cell.
+
+        Of so many cells that only some are looked at, each takes a step.
+        """
+        if self._travel.every > 1:
+            steps = self._travel.every * np.bincount(owner, minlength=len(self._starts))
+        else:
+            walks = walk_parts(self._steps, self._offsets, self._travel.cells, owner, self._starts)
+            steps = walks[:, 0] + self._turn_steps * walks[:, 1]
+        ends_s: NDArray[np.float64] = steps * self._steps_s
+        return ends_s
+
+
+def _cells_s(
+    owner: NDArray[np.int64], ends_s: NDArray[np.float64], steps_s: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return how long a cell takes each robot, float64 (k,) [s]; one without any as on average.
+
+    Not less than a step: one that stands on its only cell would have it for nothing.
+    """
+    count = np.bincount(owner, minlength=len(ends_s))
+    mean_s = ends_s.sum() / len(owner)
+    return np.maximum(np.where(count > 0, ends_s / np.maximum(count, 1), mean_s), steps_s)
+
+
+def _owners_before(
+    before: Division | None, robots: Sequence[Robot], travel: Travel
+) -> NDArray[np.int64]:
+    """Return the index of the robot that had each cell, int64 (n,); -1 for one that is gone."""
+    if before is None:
+        return np.full(len(travel.cells), -1)
+    index = {robot.name: number for number, robot in enumerate(robots)}
+    numbers = np.array([index.get(name, -1) for name in before.names])
+    times_s = travel.times_s(before.seeds, np.array([robot.step_s for robot in before.robots]))
+    handicaps_s = np.array(before.handicaps_s, np.float32)
+    owners: NDArray[np.int64] = numbers[(times_s + handicaps_s[:, None]).argmin(axis=0)]
+    return owners
+
+
+def _handicaps_s(
+    times_s: Seconds, steps_s: NDArray[np.float64], first_s: Seconds | None = None
+) -> Seconds:
+    """Return handicaps, float32 (k,), that balance the load, for travel times float32 (k, n).
+
+    They are sought from the first ones on, which are kept unless others balance better.
+    """
+    handicaps = np.zeros(len(times_s), np.float32) if first_s is None else first_s
+    best, least = handicaps, np.inf
+    change = float(np.ptp(times_s)) / 2
+    for _ in range(CHANGES):
+        owner = (times_s + handicaps[:, None]).argmin(axis=0)
+        load_s = np.bincount(owner, minlength=len(times_s)) * steps_s
+        if load_s.max() < least:
+            best, least = handicaps, load_s.max()
+        handicaps = (handicaps + change * (load_s / load_s.mean() - 1.0)).astype(np.float32)
+        change *= DAMPING
+    return best
+
+
+def _spread(travel: Travel, from_starts_s: Seconds) -> list[Cell]:
+    """Return seeds far from one another, each assigned to a robot near it."""
+    count, nearest_s = len(from_starts_s), from_starts_s.min(axis=0)
+    places: list[Cell] = []
+    seeds: list[int] = []
+    for _ in range(count):
+        seeds.append(int(nearest_s.argmax()))
+        places.append(cell_of(travel.lattice, int(travel.cells[seeds[-1]])))
+        (times_s,) = travel.times_s(places[-1:], np.ones(1))
+        nearest_s = np.minimum(nearest_s, times_s) if len(seeds) > 1 else times_s
+    apart_s, order = from_starts_s[:, seeds].copy(), [0] * count
+    for _ in range(count):
+        robot, seed = divmod(int(apart_s.argmin()), count)
+        order[robot] = seed
+        apart_s[robot], apart_s[:, seed] = np.inf, np.inf
+    return [places[seed] for seed in order]
+
+
+def _middles(
+    lattice: CoverageLattice, cells: NDArray[np.int64], owner: NDArray[np.int64], seeds: list[Cell]
+) -> list[Cell]:
+    """Return the cell nearest to the centre of each part; the seed for an empty part."""
+    rows, cols = np.divmod(cells, lattice.steps.shape[1])
+    found = []
+    for robot, seed in enumerate(seeds):
+        own = np.flatnonzero(owner == robot)
+        if not own.size:
+            found.append(seed)
+            continue
+        off = (rows[own] - rows[own].mean()) ** 2 + (cols[own] - cols[own].mean()) ** 2
+        found.append(cell_of(lattice, int(cells[own[off.argmin()]])))
+    return found

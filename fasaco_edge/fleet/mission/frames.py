@@ -1,0 +1,182 @@
+"""Frames of a fleet: what another robot tells of its cells, on this robot's lattice.
+
+Robots with maps of their own are given where the origin of each map lies in one frame that they
+share. Their cells then lie askew to each other: a cell takes the value of the other robot's cell in
+which its centre lies.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import replace
+
+import numpy as np
+
+from fasaco_edge.fleet.mission.shared import MOST_TILES_OF_ONE
+from fasaco_edge.fleet.mission.tiles import EMPTY, Placed, bits_of, packed, unpacked
+from fasaco_edge.grid.geometry import MOST_INDEX, Point, Pose2D
+from fasaco_edge.mission.core.events import MemberHeard
+from fasaco_edge.mission.coverage.ledger import TILE
+
+# Number of robots heard at once. More than can be members: a robot that is refused may become one,
+# and its tiles come in turn.
+MOST_HEARD = 64
+
+# Tiles of another robot that only touch one of this robot's do not count, nor do angles that only
+# rounding makes [cells], [rad].
+TOUCH, STRAIGHT = 1e-6, 1e-9
+
+
+def seen_from(frame: Pose2D, other: Pose2D) -> Pose2D:
+    """Return the pose of a frame in another one; both are given in a third."""
+    x, y = frame.x - other.x, frame.y - other.y
+    cos, sin = math.cos(other.yaw), math.sin(other.yaw)
+    yaw = math.remainder(frame.yaw - other.yaw, math.tau)
+    yaw = 0.0 if abs(yaw) < STRAIGHT else yaw
+    return Pose2D(cos * x + sin * y, cos * y - sin * x, yaw)
+
+
+def placed_point(frame: Pose2D, x: float, y: float) -> Point:
+    """Return a point of a frame, where the frame has that pose."""
+    cos, sin = math.cos(frame.yaw), math.sin(frame.yaw)
+    return frame.x + cos * x - sin * y, frame.y + sin * x + cos * y
+
+
+class Relaid:
+    """Tiles of another robot's cells, on this robot's lattice.
+
+    Args:
+        lattice: pose of the other lattice in this one [m].
+        cell_m: edge of a cell of both [m].
+    """
+
+    def __init__(self, lattice: Pose2D, cell_m: float) -> None:
+        self.lattice = lattice
+        self._shift = lattice.x / cell_m, lattice.y / cell_m
+        self._cos, self._sin = math.cos(lattice.yaw), math.sin(lattice.yaw)
+        self._given: dict[tuple[int, int], bytes] = {}
+        # The tiles of this lattice, until one that they are made of changes.
+        self._made: dict[tuple[int, int], bytes] = {}
+        # Those that had a cell.
+        self._shown: set[tuple[int, int]] = set()
+
+    def tiles(self, told: Iterable[Placed]) -> tuple[Placed, ...]:
+        """Return all tiles of this robot's lattice that the other's new tiles have to do with."""
+        wanted: set[tuple[int, int]] = set()
+        for place, bits in told:
+            if place not in self._given and len(self._given) >= MOST_TILES_OF_ONE:
+                continue
+            below = self._below(place)
+            if self._given.get(place) != bits:
+                self._given[place] = bits
+                for made in below:
+                    self._made.pop(made, None)
+            wanted.update(below)
+        for place in wanted - self._made.keys():
+            self._made[place] = self._make(place)
+            if self._made[place] != EMPTY:
+                self._shown.add(place)
+        # Where nothing ever was nothing need be told.
+        return tuple((place, self._made[place]) for place in sorted(wanted & self._shown))
+
+    def cell(self, row: int, col: int) -> tuple[int, int]:
+        """Return this robot's cell (row, col) in which the centre of the other's cell lies."""
+        x, y = self._here(col + 0.5, row + 0.5)
+        return math.floor(y), math.floor(x)
+
+    def _here(self, x: float, y: float) -> Point:
+        """Return a point of the other lattice in this one [cells]."""
+        cos, sin = self._cos, self._sin
+        return self._shift[0] + cos * x - sin * y, self._shift[1] + sin * x + cos * y
+
+    def _below(self, place: tuple[int, int]) -> list[tuple[int, int]]:
+        """Return the places of this lattice's tiles that a tile of the other reaches into."""
+        row, col = place
+        corners = [self._here(x * TILE, y * TILE) for y in (row, row + 1) for x in (col, col + 1)]
+        cols, rows = (
+            range(math.floor((min(values) + TOUCH) / TILE), math.ceil((max(values) - TOUCH) / TILE))
+            for values in zip(*corners, strict=True)
+        )
+        return [(row, col) for row in rows for col in cols]
+
+    def _make(self, place: tuple[int, int]) -> bytes:
+        """Return the bits of one of this lattice's tiles."""
+        y, x = np.mgrid[:TILE, :TILE] + 0.5
+        x += place[1] * TILE - self._shift[0]
+        y += place[0] * TILE - self._shift[1]
+        cols = np.floor(self._cos * x + self._sin * y).astype(np.int64)
+        rows = np.floor(self._cos * y - self._sin * x).astype(np.int64)
+        found = np.zeros((TILE, TILE), np.bool_)
+        tile_rows, tile_cols = rows // TILE, cols // TILE
+        for row in range(int(tile_rows.min()), int(tile_rows.max()) + 1):
+            for col in range(int(tile_cols.min()), int(tile_cols.max()) + 1):
+                if (bits := self._given.get((row, col))) is not None:
+                    cells = unpacked(bits_of(bits))
+                    inside = (tile_rows == row) & (tile_cols == col)
+                    found[inside] = cells[rows[inside] % TILE, cols[inside] % TILE]
+        return packed(found)
+
+
+class FleetFrames:
+    """What robots with maps of their own tell, in this robot's frames.
+
+    Args:
+        map_frame: pose of this robot's map frame in the frame of the fleet.
+        lattice_deg: the angle of its cells' rows to the x axis of the map frame [deg].
+        cell_m: edge of a cell [m].
+    """
+
+    def __init__(self, map_frame: Pose2D, lattice_deg: float, cell_m: float) -> None:
+        self._map_frame, self._cell_m = map_frame, cell_m
+        self._lattice = turned(map_frame, lattice_deg)
+        # For each robot its epoch, its swept cells and those that it can reach; the one heard
+        # longest ago is first.
+        self._robots: dict[str, tuple[int, Relaid, Relaid]] = {}
+
+    def event(self, heard: MemberHeard, map_frame: Pose2D, lattice_deg: float) -> MemberHeard:
+        """Return another robot's message in this robot's frames.
+
+        It has no division where a seed lies farther off than this robot could tell others.
+
+        Args:
+            heard: the message in the robot's own frames.
+            map_frame, lattice_deg: as of ``FleetFrames``, of the other robot.
+        """
+        frame = seen_from(map_frame, self._map_frame)
+        lattice = seen_from(turned(map_frame, lattice_deg), self._lattice)
+        epoch, swept, ground = self._of(heard.robot, heard.epoch, lattice)
+        self._robots.pop(heard.robot, None)
+        self._robots[heard.robot] = epoch, swept, ground
+        x, y = placed_point(frame, heard.x, heard.y)
+        parts = tuple(replace(part, seed=swept.cell(*part.seed)) for part in heard.parts)
+        if any(abs(index) > MOST_INDEX for part in parts for index in part.seed):
+            heard, parts = replace(heard, division=0, by=""), ()
+        return replace(
+            heard,
+            frame="",
+            x=x,
+            y=y,
+            ahead=tuple(placed_point(frame, *point) for point in heard.ahead),
+            tiles=swept.tiles(heard.tiles),
+            # A tile here is made of several of theirs, which come one after the other.
+            kept=None,
+            ground=ground.tiles(heard.ground),
+            parts=parts,
+            lattice=lattice,
+        )
+
+    def _of(self, robot: str, epoch: int, lattice: Pose2D) -> tuple[int, Relaid, Relaid]:
+        """Return what is known of a robot; nothing once its frame has moved."""
+        known = self._robots.get(robot)
+        if known is None and len(self._robots) >= MOST_HEARD:
+            del self._robots[next(iter(self._robots))]
+        if known is None or known[1].lattice != lattice:
+            return epoch, Relaid(lattice, self._cell_m), Relaid(lattice, self._cell_m)
+        # With an epoch all earlier progress ends.
+        return known if known[0] == epoch else (epoch, Relaid(lattice, self._cell_m), known[2])
+
+
+def turned(frame: Pose2D, by_deg: float) -> Pose2D:
+    """Return a frame turned about its origin by an angle [deg]."""
+    return replace(frame, yaw=frame.yaw + math.radians(by_deg))

@@ -1,0 +1,304 @@
+"""Giving way: the robot waits for others of its fleet, and makes way for them.
+
+Its path is set aside meanwhile, and taken up afterwards; a way home is looked for anew. What keeps
+it from going on is decided in ``fleet.traffic``.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fasaco_edge.fleet.mission.layer import FleetLayer
+from fasaco_edge.fleet.mission.refuge import discs, refuge
+from fasaco_edge.fleet.mission.traffic import (
+    AHEAD_M,
+    NEAR_M,
+    PATIENCE_S,
+    SPACING_M,
+    STANDS_S,
+    WAIT_M,
+    Neighbour,
+    Obstruction,
+    Points,
+    least_apart_m,
+    obstruction,
+    spaced,
+)
+from fasaco_edge.grid.lattice import Cell, Footprint
+from fasaco_edge.mission.company import Waiting
+from fasaco_edge.mission.core.events import PathUpdate
+from fasaco_edge.mission.core.route import NO_CELLS, Route
+from fasaco_edge.mission.line.way import sees_on
+from fasaco_edge.mission.map.map_state import MapState
+from fasaco_edge.mission.map.reachable_area import ReachableArea
+from fasaco_edge.mission.orders.order import Errand
+
+# A robot that stands on its path this near to another one is blocked by it [m]; motion that counts.
+BESIDE_M, MOVED_M = 0.4, 0.1
+# It has come to its refuge at this distance from its place there [m].
+ARRIVED_M = 0.05
+# On its way there it looks so far ahead for others that have come in its way [points].
+LOOK_POINTS = int(WAIT_M / 2 / SPACING_M)
+# One has come in its way that is nearer to it by this than when the way was chosen [m].
+COMES_M = 0.05
+# A robot that has not got farther than this for so long plans around whoever keeps it, and is
+# reported after so long [m], [s], [s]: the poses of the other scatter perhaps, as if it moved.
+STAYS_M, LONG_S, TOO_LONG_S = 0.2, 30.0, 60.0
+# A robot that made way, or waits, looks for another place no sooner than this [s].
+AGAIN_S = 2.0
+
+
+class GivingWay(Waiting):
+    """Decides when the robot waits, where it makes way to, and when it goes on.
+
+    Attributes:
+        waits_for: name of the robot that it waits for; "" for none.
+        reason: that as text.
+        is_near: whether another robot is near.
+    """
+
+    def __init__(
+        self,
+        robot: str,
+        footprint: Footprint,
+        map_state: MapState,
+        route: Route,
+        fleet: FleetLayer,
+    ) -> None:
+        self.waits_for = self.reason = ""
+        self.is_near = False
+        self._neighbours: Mapping[str, Neighbour] = {}
+        self._robot, self._radius_m = robot, footprint.robot_radius_m
+        self._cell_m = footprint.cell_m
+        self._map, self._route, self._fleet = map_state, route, fleet
+        self._since = self._sought_at = 0.0
+        self._refuge: Cell | None = None
+        # How near the way there led to others when it was chosen [m].
+        self._apart_m: dict[str, float] = {}
+        self._has_work = True
+        # The path that it waits to go on with, and the errand that leads along it.
+        self._held, self._errand = NO_CELLS, ""
+        # Its place, and since when it has had a path there and was free to drive.
+        self._place, self._free_since = (math.inf, math.inf), 0.0
+        # Where it stays, and since when.
+        self._stays_at, self._stays_since = (math.inf, math.inf), 0.0
+        # Why it waited last, and when.
+        self._waited, self._waited_at = "", -math.inf
+
+    def succeed(self, before: Waiting) -> None:
+        """Go on with the count of another one: where the robot stays, and why it waited."""
+        if not isinstance(before, GivingWay):
+            return
+        self._waited, self._waited_at = before._waited, before._waited_at
+        self._stays_at, self._stays_since = before._stays_at, before._stays_since
+
+    def line(self) -> Points:
+        """Return the next metres, from the robot's place on, points (x, y) [m], float64 (n, 2)."""
+        pose = self._map.pose
+        if pose is None or self._map.lattice is None:
+            return np.zeros((0, 2))
+        count = int(AHEAD_M / self._cell_m) + 2
+        # A way to a refuge may begin with a cell beside the robot's own.
+        first = 1 if self._refuge is None else 0
+        cells = self._cells()[first : count + 1]
+        here = np.array([[pose.pose.x, pose.pose.y]])
+        return np.concatenate((here, self._map.lattice.centres(cells))) if len(cells) else here
+
+    def _cells(self) -> NDArray[np.int32]:
+        """Return the path ahead, also one that is set aside."""
+        if self._refuge is not None and len(self._route.path.ahead):
+            return self._route.path.ahead
+        if not self._has_work:
+            return NO_CELLS
+        is_held = self.waits_for and self._route.aside is not None
+        return self._held if is_held else self._route.path.ahead
+
+    def look_around(self, now: float) -> None:
+        """Note whether another robot is near: then all tell more often, also one at rest."""
+        pose = self._map.pose
+        here = None if pose is None else (pose.pose.x, pose.pose.y)
+        self._neighbours = self._fleet.others.neighbours(now)
+        self.is_near = here is not None and _is_near(here, self._neighbours)
+
+    def why_stuck(self, now: float) -> str:
+        """Return why the robot is thought to be held up for good, or ""."""
+        is_stuck = now - self._waited_at <= STANDS_S and now - self._stays_since > TOO_LONG_S
+        return f"{self._waited} for more than a minute" if is_stuck else ""
+
+    def end(self) -> None:
+        """Wait no longer."""
+        self.waits_for = self.reason = ""
+        self._refuge = None
+
+    def look(self, now: float, *, has_work: bool = True, errand: Errand = "") -> PathUpdate | None:
+        """Decide again after ``look_around``; return the path to publish, if any.
+
+        ``waits_for`` tells the result.
+
+        A robot without work left has no path, but for one to a refuge: it makes way alone. Another
+        errand leads elsewhere, perhaps past nobody: the wait ends.
+
+        The first case that holds:
+
+        | case | this robot |
+        |---|---|
+        | it has no place, or no other robot is within NEAR_M | goes on |
+        | it is on its way to a refuge, for PATIENCE_S at most | goes there |
+        | another robot keeps it from going on (``traffic.obstruction``) | waits or makes way |
+        | it was free to drive, and stood for PATIENCE_S beside another robot | is blocked by that |
+        | none of these | goes on |
+        """
+        self._has_work = has_work
+        if errand != self._errand:
+            self._errand = errand
+            self.end()
+        # A refuge is sought from where the robot is, which on a short cut is far from its path.
+        area, cell, pose = self._map.area, self._map.cell_at_pose(), self._map.pose
+        neighbours = self._neighbours
+        here = (math.inf, math.inf) if pose is None else (pose.pose.x, pose.pose.y)
+        self._note_place(here, now)
+        if area is None or cell is None or not self.is_near:
+            self.end()
+            return None
+        if self._is_underway(here, neighbours, now):
+            return None
+        self._refuge = None
+        if found := self._obstruction(here, neighbours, now):
+            return self._hold(found, neighbours, area, cell, here, now)
+        self.end()
+        return None
+
+    def _note_place(self, here: tuple[float, float], now: float) -> None:
+        """Note where the robot is, and since when it has been free to drive on from there."""
+        if math.dist(here, self._place) > MOVED_M or len(self._cells()) < 2:
+            self._place, self._free_since = here, now
+        if self.waits_for:
+            self._waited, self._waited_at = self.reason, now
+        # Let go for a moment, it has not got on.
+        has_waited = now - self._waited_at <= STANDS_S
+        if math.dist(here, self._stays_at) > STAYS_M or not has_waited:
+            self._stays_at, self._stays_since = here, now
+
+    def _is_underway(
+        self, here: tuple[float, float], neighbours: Mapping[str, Neighbour], now: float
+    ) -> bool:
+        """Tell whether the robot drives to its refuge, and nobody has come in its way there."""
+        ahead = self._route.path.ahead
+        is_there = self._refuge is None or self._is_in(self._refuge, here)
+        is_stuck = now - self._sought_at > PATIENCE_S
+        if is_there or is_stuck or not len(ahead):
+            return False
+        line = spaced(self.line())[: LOOK_POINTS + 1]
+        return all(
+            apart_m >= self._apart_m.get(name, self._clear_m(neighbours[name])) - COMES_M
+            for name, apart_m in self._apart_of(line, neighbours).items()
+        )
+
+    def _apart_of(self, line: Points, neighbours: Mapping[str, Neighbour]) -> dict[str, float]:
+        """Return how near a line comes to others, at most what is kept clear of them [m]."""
+        return {
+            name: min(
+                self._clear_m(near),
+                float(np.hypot(*(line - (near.heard.x, near.heard.y)).T).min()),
+            )
+            for name, near in neighbours.items()
+        }
+
+    def _clear_m(self, near: Neighbour) -> float:
+        return least_apart_m(self._radius_m, near.heard)
+
+    def _is_in(self, refuge: Cell, here: tuple[float, float]) -> bool:
+        """Tell whether the robot has come to its refuge: at the edge it may be in the way."""
+        place = self._map.place_of(refuge)
+        return place is None or math.dist(here, place) <= ARRIVED_M
+
+    def _sees(self, area: ReachableArea, a: Points, b: Points) -> bool:
+        """Tell whether the robot can drive straight between two points, (2,): x, y [m].
+
+        Where cells are counted: between those of one cell, and of two that a step connects.
+        """
+        if self._map.floor is not None:
+            return sees_on(self._map.floor, a, b)
+        ends = [area.lattice.cell_at(*point.tolist()) for point in (a, b)]
+        return 1 <= len(area.shortest_path(ends[0], ends[1])) <= 2
+
+    def _obstruction(
+        self, here: tuple[float, float], neighbours: Mapping[str, Neighbour], now: float
+    ) -> Obstruction | None:
+        """Return what keeps the robot from going on; None for nothing."""
+        line, pace_s_m = self.line(), self._fleet.step_s / self._cell_m
+        found = obstruction(
+            self._robot, self._radius_m, pace_s_m, spaced(line), neighbours, self.waits_for
+        )
+        if found is None and self._hangs(now) and len(line) > 1:
+            # It should drive: its line passes nearer than its cells, or it is stopped by a sensor.
+            return self._beside(here, neighbours)
+        return found
+
+    def _hangs(self, now: float) -> bool:
+        """Tell whether the robot stands though it has long been free to drive."""
+        return now - self._free_since > PATIENCE_S
+
+    def _beside(
+        self, here: tuple[float, float], neighbours: Mapping[str, Neighbour]
+    ) -> Obstruction | None:
+        """Return the robot that this one stands beside; None for none."""
+        for name, near in sorted(neighbours.items()):
+            reach_m = self._radius_m + near.heard.radius_m + BESIDE_M
+            if math.dist(here, (near.heard.x, near.heard.y)) < reach_m:
+                return Obstruction(name, is_blocked=True)
+        return None
+
+    def _hold(
+        self,
+        found: Obstruction,
+        neighbours: Mapping[str, Neighbour],
+        area: ReachableArea,
+        cell: Cell,
+        here: tuple[float, float],
+        now: float,
+    ) -> PathUpdate | None:
+        route = self._route
+        if found.robot != self.waits_for:
+            # Not now: let go for a moment, or for another one in turn, it has not got on.
+            self._since = self._stays_since
+        was_waiting = bool(self.waits_for)
+        self.waits_for, self.reason = found.robot, found.reason
+        has_path = len(route.path.cells) > 0
+        ahead = route.path.ahead
+        # After a new order the path set aside is another.
+        if route.set_aside() or not was_waiting:
+            self._held = ahead
+        is_long = now - self._since > PATIENCE_S or self._hangs(now)
+        # While it is held it stands for that reason: let go, it has all the time to drive again.
+        self._free_since = now
+        # Also one that is to go first: it may be jammed, and the wait for it without end.
+        stands = neighbours[found.robot].stands_s > STANDS_S or now - self._stays_since > LONG_S
+        if is_long and stands:
+            self._fleet.others.avoid(found.robot)
+        if (found.is_on_path or is_long) and now - self._sought_at >= AGAIN_S:
+            self._sought_at = now
+            places, sees = self._map.places_of, partial(self._sees, area)
+            way = refuge(area, cell, here, self._radius_m, neighbours, places, sees)
+            to = None if way is None else (int(way[-1, 0]), int(way[-1, 1]))
+            if way is not None and to is not None and not self._is_in(to, here):
+                self._refuge = to
+                beside = discs(self._radius_m, neighbours)
+                update = route.publish(way, self.reason, now, beside=beside)
+                self._apart_m = self._apart_of(spaced(self.line()), neighbours)
+                return update
+            if self._fleet.others.is_avoided(found.robot):
+                self.end()
+                return None
+        return route.publish(NO_CELLS, self.reason, now) if has_path else None
+
+
+def _is_near(here: tuple[float, float], neighbours: Mapping[str, Neighbour]) -> bool:
+    return any(
+        math.dist((near.heard.x, near.heard.y), here) < NEAR_M for near in neighbours.values()
+    )

@@ -1,0 +1,209 @@
+"""Shared ground: the cells that the robots of a fleet can reach, each on its own map.
+
+Cells that only others' maps show take part in the division, so that all robots divide nearly the
+same area. This robot's own map decides where it shows anything; paths are planned on it alone. A
+door that was seen in part is shut on it: ``with_doors`` shows what lies beyond.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fasaco_edge.fleet.mission.shared import MOST_TILES_OF_ONE
+from fasaco_edge.fleet.mission.tiles import EMPTY, Placed, bits_of, packed, unpacked, window_of
+from fasaco_edge.grid.changes import carried
+from fasaco_edge.grid.geometry import Window
+from fasaco_edge.grid.lattice import BLOCKED, COVERABLE, UNKNOWN, Cell, CoverageLattice
+from fasaco_edge.kernels.fleet.split import FAR, ways_from
+from fasaco_edge.mission.coverage.ledger import TILE
+from fasaco_edge.mission.map.reachable_area import ReachableArea
+
+# Limit on the cells that the ground of others may add to the lattice; beyond it is left out.
+MOST_ADDED = 1_000_000
+
+
+class SharedGround:
+    """The cells that other robots can reach; its user drops robots that it keeps no longer.
+
+    Attributes:
+        version: counter of changes.
+    """
+
+    def __init__(self) -> None:
+        self.version = 0
+        self._robots: dict[str, dict[Cell, bytes]] = {}
+        # The last joint areas, without and with doors, and what each was made of.
+        self._last: dict[bool, tuple[ReachableArea, int, ReachableArea]] = {}
+
+    def hear(self, robot: str, tiles: Iterable[Placed]) -> None:
+        """Take in a robot's tiles, each with TILE_BYTES of bits; the newest of a place counts."""
+        known = self._robots.setdefault(robot, {})
+        for place, bits in tiles:
+            has_room = place in known or len(known) < MOST_TILES_OF_ONE
+            if has_room and known.get(place) != bits:
+                known[place] = bits
+                self.version += 1
+
+    def drop(self, robot: str) -> None:
+        """Forget a robot's ground: it is in another frame, or the robot is kept no longer."""
+        if self._robots.pop(robot, None):
+            self.version += 1
+
+    def clear(self) -> None:
+        """Forget all ground: it lies in another frame."""
+        self._robots.clear()
+        self.version += 1
+
+    def joint(self, area: ReachableArea) -> ReachableArea:
+        """Return an area with the ground of others, where its map shows nothing."""
+        return self._with(area, doors=False)
+
+    def with_doors(self, area: ReachableArea) -> ReachableArea:
+        """Return what ``joint`` does, also of ground beyond doors that only others show open.
+
+        Those are cells that the area shows blocked and another robot can reach: seen in part, or
+        shut to this robot. They lead on, but are not reachable themselves.
+        """
+        return self._with(area, doors=True)
+
+    def _with(self, area: ReachableArea, *, doors: bool) -> ReachableArea:
+        # A robot that looks at a door asks in each step.
+        last = self._last.get(doors)
+        if last is None or last[0] is not area or last[1] != self.version:
+            joined = _joined(area, self._merged(), doors=doors) if self._robots else area
+            last = self._last[doors] = area, self.version, joined
+        return last[2]
+
+    def _merged(self) -> dict[Cell, NDArray[np.uint8]]:
+        merged: dict[Cell, NDArray[np.uint8]] = {}
+        for tiles in self._robots.values():
+            for place, told in tiles.items():
+                bits = bits_of(told)
+                merged[place] = merged[place] | bits if place in merged else bits
+        return merged
+
+
+def viewpoint(
+    area: ReachableArea, joint: ReachableArea, wanted: NDArray[np.bool_], cell: Cell
+) -> Cell | None:
+    """Return where to look for the nearest wanted cell beyond a robot's own area; None for none.
+
+    That is the last cell (row, col) of its own area on the shortest way there.
+
+    Args:
+        area: what it can reach itself.
+        joint: that with the ground of others.
+        wanted: cells of the joint area, bool (rows, cols).
+        cell: the robot's cell.
+    """
+    beyond = wanted & joint.reachable
+    beyond[area.lattice.window.slices_in(joint.lattice.window)] &= ~area.reachable
+    if not beyond.any() or not area.contains(cell):
+        return None
+    lattice = joint.lattice
+    row, col = lattice.local(cell)
+    ways = ways_from(lattice.steps, row * lattice.window.cols + col)
+    nearest = int(np.where(beyond.ravel(), ways, FAR).argmin())
+    at = divmod(nearest, lattice.window.cols)
+    way = joint.shortest_path(cell, (at[0] + lattice.window.row0, at[1] + lattice.window.col0))
+    seen = cell
+    for step in map(tuple, way.tolist()):
+        if not area.contains(step):
+            break
+        seen = step
+    return seen
+
+
+class GroundTelling:
+    """Selects the tiles of the next report: changed ones first, then all others in turn."""
+
+    def __init__(self) -> None:
+        # The tiles reported, in the order of reporting.
+        self._told: dict[Cell, bytes] = {}
+        self._area: ReachableArea | None = None
+        self._tiles: dict[Cell, bytes] = {}
+
+    def next(self, area: ReachableArea | None, most: int) -> tuple[Placed, ...]:
+        """Return places and bits of a limited number of tiles."""
+        if area is not self._area and area is not None:
+            self._area, self._tiles = area, _tiles_of(area)
+            # What is no longer reachable is reported as empty.
+            self._tiles |= {place: EMPTY for place in self._told if place not in self._tiles}
+        tiles = self._tiles
+        new = [place for place, bits in tiles.items() if self._told.get(place) != bits]
+        chosen = [*sorted(new), *(place for place in self._told if place not in new)][:most]
+        for place in chosen:
+            self._told.pop(place, None)
+            self._told[place] = tiles[place]
+        return tuple((place, tiles[place]) for place in chosen)
+
+
+def _joined(
+    area: ReachableArea, tiles: dict[Cell, NDArray[np.uint8]], *, doors: bool
+) -> ReachableArea:
+    """Return an area with the cells of tiles where its lattice knows nothing.
+
+    With ``doors`` those that it shows blocked lead on.
+    """
+    lattice, window = area.lattice, area.lattice.window
+    # The nearest tiles first: those far away may be of a robot that lies.
+    row, col = (window.row0 + window.row1) / 2, (window.col0 + window.col1) / 2
+    places = sorted(tiles, key=lambda at: (abs(at[0] * TILE - row) + abs(at[1] * TILE - col), at))
+    around = window
+    for place in places:
+        larger = Window.around(around, window_of(place))
+        assert larger is not None
+        if larger.rows * larger.cols - window.rows * window.cols > MOST_ADDED:
+            break
+        around = larger
+    ground = np.zeros((around.rows, around.cols), np.bool_)
+    for place in places:
+        whole = window_of(place)
+        if common := whole.intersection(around):
+            cells = unpacked(tiles[place])
+            ground[common.slices_in(around)] |= cells[common.slices_in(whole)]
+    inside, told = window.slices_in(around), ground.copy()
+    ground[inside] &= lattice.states == UNKNOWN
+    door = np.zeros_like(ground)
+    if doors:
+        door[inside] = told[inside] & (lattice.states == BLOCKED)
+    if not (ground | door).any():
+        return area
+    own = np.zeros_like(ground)
+    own[inside] = lattice.coverable
+    # Between two cells of one's own map its own steps hold.
+    free = ground | own | door
+    steps = CoverageLattice.from_free(free).steps.copy()
+    between = CoverageLattice.from_free(own).steps
+    steps &= ~between
+    steps[inside] |= lattice.steps
+    states = np.zeros(ground.shape, np.uint8)
+    states[inside] = lattice.states
+    states[ground] = COVERABLE
+    whole_lattice = CoverageLattice(around, lattice.cell_m, states, steps)
+    reached = carried(area.reachable, window, around)
+    seeds = np.argwhere(reached)
+    if not len(seeds):
+        return ReachableArea(whole_lattice, reached)
+    first = int(seeds[0, 0]) + around.row0, int(seeds[0, 1]) + around.col0
+    joined = ReachableArea.around(whole_lattice, first).reachable
+    # Own cells beyond the ground of others, which nobody can reach, may lie behind a wall there.
+    return ReachableArea(whole_lattice, joined & (reached | told) & ~door)
+
+
+def _tiles_of(area: ReachableArea) -> dict[Cell, bytes]:
+    """Return the reachable cells as tiles of bits; no tile where there are none."""
+    window, found = area.lattice.window, {}
+    for row in range(window.row0 // TILE, -(-window.row1 // TILE)):
+        for col in range(window.col0 // TILE, -(-window.col1 // TILE)):
+            whole = window_of((row, col))
+            if common := whole.intersection(window):
+                part = area.reachable[common.slices_in(window)]
+                if part.any():
+                    cells = np.zeros((TILE, TILE), np.bool_)
+                    cells[common.slices_in(whole)] = part
+                    found[row, col] = packed(cells)
+    return found

@@ -1,0 +1,99 @@
+"""Cells heard of one robot of a fleet, and how they are kept with the ledger."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Annotated
+
+import msgspec
+import numpy as np
+from msgspec import Meta
+
+from fasaco_edge.fleet.mission.tiles import TILE_BYTES, Bits, bits_of
+from fasaco_edge.grid.geometry import Pose2D
+from fasaco_edge.mission.core.events import SAME_LATTICE
+
+if TYPE_CHECKING:
+    # For types only: a daemon announces itself to its fleet before the kernels are loaded.
+    from fasaco_edge.grid.lattice import Cell
+
+# Number of bits set in each byte value.
+_ONES = np.unpackbits(np.arange(256, dtype=np.uint8)[:, None], axis=1).sum(axis=1)
+
+Tiles = dict["Cell", Bits]
+
+
+@dataclass(slots=True)
+class Heard:
+    """Cells swept by one robot: tiles of bits, and the bits that are disregarded.
+
+    Attributes:
+        epoch: of the tiles.
+        lattice: pose of its lattice in this robot's [m], as they were placed.
+        is_doubtful: whether all that it tells in this epoch is disregarded: something was, before
+            its lattice moved, and where that lies now is not known.
+    """
+
+    epoch: int
+    lattice: Pose2D = SAME_LATTICE
+    tiles: Tiles = field(default_factory=dict)
+    disregarded: Tiles = field(default_factory=dict)
+    is_doubtful: bool = False
+
+    def begin(self, epoch: int) -> None:
+        """Drop the tiles of the epoch before."""
+        self.epoch, self.tiles, self.is_doubtful = epoch, {}, False
+
+    def move(self, epoch: int, lattice: Pose2D) -> None:
+        """Drop everything: it was placed elsewhere."""
+        is_doubtful = bool(self.disregarded) or self.is_doubtful
+        self.is_doubtful = is_doubtful and epoch == self.epoch
+        self.epoch, self.lattice, self.tiles, self.disregarded = epoch, lattice, {}, {}
+
+    def drop_gone(self) -> None:
+        """Drop what is disregarded of tiles that were not repeated in this epoch."""
+        known = self.disregarded.items()
+        self.disregarded = {place: bits for place, bits in known if place in self.tiles}
+
+    @property
+    def count(self) -> int:
+        """Number of cells that count."""
+        counted = [self.counted(place) for place in self.tiles]
+        return int(_ONES[np.concatenate(counted)].sum()) if counted else 0
+
+    def counted(self, place: Cell) -> Bits:
+        """Return the bits of a tile that count."""
+        tile, without = self.tiles[place], self.disregarded.get(place)
+        return tile if without is None else tile & ~without
+
+    def kept(self) -> Kept:
+        """Return everything in the form that is kept."""
+        tiles, without, pose = _listed(self.tiles), _listed(self.disregarded), self.lattice
+        return Kept(self.epoch, tiles, without, (pose.x, pose.y, pose.yaw), self.is_doubtful)
+
+
+_Tile = tuple[int, int, Annotated[bytes, Meta(min_length=TILE_BYTES, max_length=TILE_BYTES)]]
+
+
+class Kept(msgspec.Struct, frozen=True, array_like=True):
+    """What is kept of a robot; as ``Heard``."""
+
+    epoch: int
+    tiles: list[_Tile]
+    disregarded: list[_Tile]
+    lattice: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    is_doubtful: bool = False
+
+    def heard(self, *, is_in_place: bool) -> Heard:
+        """Return it as it was; without its tiles if this robot's own lattice has moved since."""
+        tiles = _placed(self.tiles) if is_in_place else {}
+        lattice, without = Pose2D(*self.lattice), _placed(self.disregarded)
+        return Heard(self.epoch, lattice, tiles, without, self.is_doubtful)
+
+
+def _listed(tiles: Tiles) -> list[_Tile]:
+    return [(*place, tiles[place].tobytes()) for place in sorted(tiles)]
+
+
+def _placed(tiles: list[_Tile]) -> Tiles:
+    return {(row, col): bits_of(bits) for row, col, bits in tiles}

@@ -1,0 +1,55 @@
+"""Kind of company: the parts of a mission that know of the other robots of a fleet."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from fasaco_edge.fleet.mission.giving_way import GivingWay
+from fasaco_edge.fleet.mission.layer import FleetLayer
+from fasaco_edge.fleet.mission.shared import MapPlace, SharedProgress
+from fasaco_edge.mission.company import Company, CompanyKind
+
+if TYPE_CHECKING:
+    from fasaco_edge.mission.config import MissionConfig
+    from fasaco_edge.mission.core.mission import Mission
+    from fasaco_edge.mission.core.route import Route
+    from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
+    from fasaco_edge.mission.map.map_state import MapState
+
+
+@dataclass(frozen=True, slots=True)
+class FleetKind(CompanyKind):
+    """A robot of a fleet.
+
+    Attributes:
+        robot: its name there.
+        map_place: where its map lies in the frame of the fleet; None without such a frame.
+    """
+
+    robot: str
+    map_place: MapPlace | None = None
+
+    def cells(self) -> SharedProgress:
+        """Return the cells that others have swept."""
+        return SharedProgress(self.map_place)
+
+    def company(
+        self, config: MissionConfig, map_state: MapState, ledger: MissionLedger
+    ) -> FleetLayer:
+        """Return the other robots."""
+        cell_m = config.footprint.cell_m
+        return FleetLayer(self.robot, config.cost, cell_m, map_state, ledger)
+
+    def waiting(
+        self, config: MissionConfig, map_state: MapState, route: Route, company: Company
+    ) -> GivingWay:
+        """Return what decides when the robot waits for others."""
+        assert isinstance(company, FleetLayer)
+        return GivingWay(self.robot, config.footprint, map_state, route, company)
+
+
+def fleet_of(mission: Mission) -> FleetLayer:
+    """Return the other robots of a mission that has a name in a fleet."""
+    assert isinstance(mission.company, FleetLayer)
+    return mission.company

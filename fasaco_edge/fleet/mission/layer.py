@@ -1,0 +1,369 @@
+"""Fleet layer: this robot's part of the area that remains for a fleet.
+
+There is no leader. Whoever sees a reason divides the remaining area anew and tells the others, who
+take over the division of the highest number, among those of one number that by the first name.
+While two robots disagree, cells may be swept twice; none is left out, because a robot that finishes
+takes over a part of the remaining area.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fasaco_edge.fleet.mission.at_work import AtWork
+from fasaco_edge.fleet.mission.division import Division, Robot, divide
+from fasaco_edge.fleet.mission.division_numbers import DivisionNumbers
+from fasaco_edge.fleet.mission.ground import viewpoint
+from fasaco_edge.fleet.mission.members import Member, Members
+from fasaco_edge.fleet.mission.remainder import Remainder
+from fasaco_edge.fleet.mission.shared import MOST_ROBOTS, SharedProgress
+from fasaco_edge.grid.changes import carried
+from fasaco_edge.grid.geometry import Window
+from fasaco_edge.grid.lattice import Cell
+from fasaco_edge.mission.company import Company, OpenCells
+from fasaco_edge.mission.core.events import MemberHeard, Part
+from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
+from fasaco_edge.mission.map.map_state import MapState
+from fasaco_edge.mission.map.reachable_area import ReachableArea
+from fasaco_edge.planners.cost import CoverageCost
+
+# Period of checks; least life of a division while no robot leaves: in general, and for balance [s].
+LOOK_S, HOLDS_S, EVEN_S = 1.0, 2.0, 10.0
+# Parts are rebalanced only above this ratio and this difference [s].
+UNEVEN, UNEVEN_S = 1.25, 40.0
+# Number of cells of this robot's part swept by another one that triggers a new plan: more than by
+# merely passing through. In unknown buildings 4 cost 7 % of two robots' time.
+MANY_TAKEN = 30
+LATER = "another robot has a newer division"
+
+
+class FleetLayer(Company):
+    """Divides the remaining area among the robots; inactive without a fleet.
+
+    Attributes:
+        others: the other robots.
+        numbers: the newest division's number, and who made it.
+        step_s: this robot's time to sweep one cell [s].
+    """
+
+    def __init__(
+        self,
+        robot: str,
+        cost: CoverageCost,
+        cell_m: float,
+        map_state: MapState,
+        ledger: MissionLedger,
+    ) -> None:
+        self.others = Members(robot, ledger, cell_m)
+        self.numbers = DivisionNumbers(robot, self.others)
+        self._robot, self.step_s = robot, cost.step_s
+        self._at_work = AtWork(self.others, self.numbers)
+        self._turn_steps = cost.quarter_turn_s / cost.step_s
+        self._map, self._ledger = map_state, ledger
+        self._division: Division | None = None
+        self._divided_at = self._looked_at = float("-inf")
+        # The owners of the cells of a joint area.
+        self._owners: tuple[ReachableArea | None, NDArray[np.int8]]
+        self._owners = None, np.zeros((0, 0), np.int8)
+        # The joint area of an area at the last look: others tell of theirs many times a second.
+        self._seen: tuple[ReachableArea, ReachableArea] | None = None
+        # Cells that this robot tried in vain, while others are at work; and those of an area that
+        # it cannot come to: another map may show a way.
+        self._tried = Window(0, 0, 0, 0), np.zeros((0, 0), np.bool_)
+        self._shut: tuple[ReachableArea | None, NDArray[np.bool_]]
+        self._shut = None, np.zeros((0, 0), np.bool_)
+        # Number of own cells that others had swept at the last plan; version of the shared progress
+        # at the last check.
+        self._taken, self._counted = 0, 0
+        self._remainder = Remainder()
+
+    def hear(self, event: MemberHeard, now: float) -> str:
+        """Take in another robot's message; return why it requires a plan, or ""."""
+        return self.others.hear(event, now)
+
+    def forget_ground(self) -> None:
+        """Forget what others have seen: it belongs to another map."""
+        self.others.ground.clear()
+
+    def passable(self, area: ReachableArea, cell: Cell, radius_m: float) -> ReachableArea:
+        """Return an area as a robot in ``cell`` can drive it: around robots in the way."""
+        return self.others.passable(area, cell, radius_m)
+
+    @property
+    def has_members(self) -> bool:
+        """Whether messages of other robots have come."""
+        return bool(self.others.known)
+
+    @property
+    def shared(self) -> SharedProgress:
+        """The cells that the others have swept."""
+        return self.others.shared
+
+    @property
+    def members(self) -> dict[str, Member]:
+        """The other robots, by name."""
+        return self.others.known
+
+    @property
+    def has_company(self) -> bool:
+        """Whether other robots are at work on the remaining area."""
+        return self._division is not None
+
+    def busiest(self, open_cells: OpenCells) -> str:
+        """Return the name of the other robot with most cells left in its part; "" for none."""
+        area, division = self._map.area, self._division
+        if area is None or division is None:
+            return ""
+        joint, left = self._left(open_cells, area)
+        return division.busiest(self._owners_on(division, joint)[left], self._robot)
+
+    def viewpoints(self, open_cells: OpenCells, cell: Cell) -> Iterator[Cell]:
+        """Yield where to look for work that others alone see.
+
+        For this robot's part, then for any cells left, beyond a door that others show open.
+        """
+        area, division = self._map.area, self._division
+        if area is None or not self.members:
+            return
+        if division is not None:
+            joint, left = self._left(open_cells, area)
+            if at := viewpoint(area, joint, left & self._of_me(division, joint), cell):
+                yield at
+        beyond = self.others.ground.with_doors(area)
+        if at := viewpoint(area, beyond, open_cells(beyond.lattice.window), cell):
+            yield at
+
+    def _left(
+        self, open_cells: OpenCells, area: ReachableArea
+    ) -> tuple[ReachableArea, NDArray[np.bool_]]:
+        """Return the joint area, and which of its cells are left and untried, bool (rows, cols)."""
+        joint = self._joint(area)
+        left = open_cells(joint.lattice.window) & joint.reachable
+        inside = area.lattice.window.slices_in(joint.lattice.window)
+        left[inside] = self.untried(left[inside], area)
+        return joint, left
+
+    def _joint(self, area: ReachableArea) -> ReachableArea:
+        """Return the joint area, of this area as at the last look."""
+        if self._seen is None or self._seen[0] is not area:
+            self._seen = area, self.others.ground.joint(area)
+        return self._seen[1]
+
+    @property
+    def others_go_on(self) -> bool:
+        """Whether all that is left is others' to sweep, who are at it."""
+        return self._division is not None and self._remainder.others_go_on
+
+    def mine(self, cells: NDArray[np.bool_], area: ReachableArea) -> NDArray[np.bool_]:
+        """Return which cells are this robot's to sweep.
+
+        All of them if its part has none and the others do not go on. Cells that it has given up
+        are left to the others.
+        """
+        if self._division is None:
+            return cells
+        cells = self.untried(cells, area)
+        part = cells & self._is_own(self._division, area)
+        return part if self.others_go_on or (part & area.reachable).any() else cells
+
+    def mine_to_sweep(
+        self, cells: NDArray[np.bool_], unvisited: NDArray[np.bool_], area: ReachableArea
+    ) -> NDArray[np.bool_]:
+        """Return on which cells the floor is this robot's to sweep, visited or not.
+
+        Those of its part; all of them if none of its part is unvisited and the others do not go on,
+        as for ``mine``: wherever its path leads to a cell, the floor there is its own, too.
+        """
+        if self._division is None:
+            return cells
+        own = self._is_own(self._division, area)
+        if self.others_go_on:
+            return cells & own
+        has_work = (self.untried(unvisited, area) & own & area.reachable).any()
+        return cells & own if has_work else cells
+
+    def give_up(self, cells: NDArray[np.bool_], area: ReachableArea) -> None:
+        """Leave cells that this robot tried in vain to the others, whatever maps come."""
+        self._tried = area.lattice.window, cells | self._tried_on(area)
+
+    def pass_over(self, cells: NDArray[np.bool_], area: ReachableArea) -> None:
+        """Leave cells that this robot cannot come to to the others, until the next map."""
+        self._shut = area, cells | (self._shut[1] if self._shut[0] is area else np.False_)
+
+    def try_again(self) -> None:
+        """Clear the list of cells given up."""
+        self._tried = Window(0, 0, 0, 0), np.zeros((0, 0), np.bool_)
+        self._shut = None, self._shut[1]
+
+    def share(self, open_cells: OpenCells, cell: Cell, now: float, *, at_once: bool = False) -> str:
+        """Divide the remaining area again if worthwhile; return why a plan is wanted, or "".
+
+        Args:
+            open_cells: mask function: a window to the cells that still need a visit.
+            cell: this robot's cell.
+            now: time [s].
+            at_once: whether this robot is out of work.
+        """
+        area = self._map.area
+        if silent := self.others.forget_silent(now):
+            return f"{silent} is silent: only the map shows whether it stands in the way"
+        if area is None or not self.members:
+            return ""
+        if not (at_once or now - self._looked_at >= LOOK_S):
+            return self._why_by_taken()
+        self._looked_at, self._seen = now, None
+        (joint, left), before = self._left(open_cells, area), self._division
+        inside = area.lattice.window.slices_in(joint.lattice.window)
+        own = left if before is None else left & self._of_me(before, joint)
+        at_work = [one.newest for one in self.members.values() if not one.absence(now)]
+        self._remainder.note_others(now, wait=all(heard.waits_for for heard in at_work))
+        swept = self._ledger.shared.swept(joint.lattice.window) & joint.reachable
+        swept_cells = int(np.count_nonzero(swept))
+        self._remainder.note(int(left.sum()), int(own.sum()), swept_cells, now)
+        if newer := self.numbers.newer():
+            why = LATER
+            self.numbers.follow(newer)
+            self._division = Division.of(newer.parts)
+        else:
+            robots = [
+                Robot(self._robot, cell, self.step_s),
+                *self._at_work.in_reach(joint, now),
+            ]
+            if not (why := self._why_anew(joint, left, robots, now, at_once=at_once)):
+                return self._why_by_taken()
+            robots += self._at_work.unseen(before, joint.lattice, robots, self._divided_at, now)
+            # Others refuse more parts.
+            robots = robots[: MOST_ROBOTS + 1]
+            divided = divide(joint.lattice, left, robots, before, self._turn_steps)
+            if before is None or not divided.is_like(before):
+                self.numbers.count_on()
+                self._division = divided if len(robots) > 1 else None
+        self._divided_at, self._owners = now, (None, self._owners[1])
+        self._taken = self._count_taken()
+        after = left if self._division is None else left & self._of_me(self._division, joint)
+        self._remainder.note_division(int(left.sum()), int(after.sum()), swept_cells, now)
+        return why if (own != after)[inside].any() else ""
+
+    @property
+    def parts(self) -> tuple[Part, ...]:
+        """The newest division, as others are told."""
+        return () if self._division is None else self._division.parts
+
+    def part_cells(self) -> int | None:
+        """Return the number of cells in this robot's part; None if all are."""
+        if self._division is None or self._map.area is None:
+            return None
+        area = self._map.area
+        return int(np.count_nonzero(self._is_own(self._division, area) & area.reachable))
+
+    def _why_anew(
+        self,
+        joint: ReachableArea,
+        left: NDArray[np.bool_],
+        robots: list[Robot],
+        now: float,
+        *,
+        at_once: bool,
+    ) -> str:
+        """Return why to divide again, or ""."""
+        division = self._division
+        names = {robot.name for robot in robots}
+        known = set() if division is None else set(division.names)
+        if len(names) == 1 and division is None:
+            return ""
+        if gone := sorted(name for name in known - names if self._is_gone(name, now)):
+            if now - self._divided_at < EVEN_S:
+                self.others.note_left(set(gone), now)
+            return f"{', '.join(gone)} no longer at work"
+        if now - self._divided_at < HOLDS_S and not at_once:
+            return ""
+        # A robot that leaves and returns repeatedly would change all paths each time.
+        new = names - known - {self._robot}
+        if more := sorted(name for name in new if now - self.members[name].left_at >= EVEN_S):
+            return f"shared with {', '.join(more)}"
+        return "" if division is None else self._why_by_parts(division, joint, left, names, now)
+
+    def _is_gone(self, name: str, now: float) -> bool:
+        """Tell whether a robot of the division takes no part any more."""
+        return name != self._robot and self._at_work.is_gone(name, self._divided_at, now)
+
+    def _why_by_parts(
+        self,
+        division: Division,
+        joint: ReachableArea,
+        left: NDArray[np.bool_],
+        names: set[str],
+        now: float,
+    ) -> str:
+        """Return why the parts should change, or ""; ``names``: the robots that it can reach."""
+        owners = self._owners_on(division, joint)
+        cells = np.bincount(owners[left], minlength=len(division.robots))
+        if not cells[division.names.index(self._robot)]:
+            # If there was no part for it, there will be none soon after.
+            is_other = self._remainder.had_part or cells.sum() > self._remainder.divided
+            is_other |= now - self._divided_at >= EVEN_S
+            return "own part is done" if left.any() and is_other else ""
+        # Only who can reach all of them sees all that is left to each.
+        if not names.issuperset(division.names):
+            return ""
+        steps_s = np.array([robot.step_s for robot in division.robots])
+        even_s = UNEVEN * cells.sum() / (1.0 / steps_s).sum() + UNEVEN_S
+        is_uneven = (cells * steps_s).max() > even_s and now - self._divided_at >= EVEN_S
+        return "parts have become uneven" if is_uneven else ""
+
+    def untried(self, cells: NDArray[np.bool_], area: ReachableArea) -> NDArray[np.bool_]:
+        """Return the cells that this robot has not given up."""
+        cells = cells & ~self._tried_on(area)
+        return cells & ~self._shut[1] if self._shut[0] is area else cells
+
+    def _tried_on(self, area: ReachableArea) -> NDArray[np.bool_]:
+        return carried(self._tried[1], self._tried[0], area.lattice.window)
+
+    def _is_own(self, division: Division, area: ReachableArea) -> NDArray[np.bool_]:
+        """Return which cells of this robot's area are in its part."""
+        joint = self._joint(area)
+        return self._of_me(division, joint)[area.lattice.window.slices_in(joint.lattice.window)]
+
+    def _of_me(self, division: Division, joint: ReachableArea) -> NDArray[np.bool_]:
+        """Return which cells of a joint area are in this robot's part."""
+        own: NDArray[np.bool_] = self._owners_on(division, joint) == division.names.index(
+            self._robot
+        )
+        return own
+
+    def _owners_on(self, division: Division, joint: ReachableArea) -> NDArray[np.int8]:
+        if division is not self._division:
+            return division.owners(joint.lattice)
+        if self._owners[0] is not joint:
+            self._owners = joint, division.owners(joint.lattice)
+        return self._owners[1]
+
+    def _why_by_taken(self) -> str:
+        """Return why a plan is wanted after others swept cells of this robot's part, or "".
+
+        Checked once per batch of messages: a fleet sends many.
+        """
+        if self._counted == self._ledger.shared.version:
+            return ""
+        taken = self._count_taken()
+        self._taken = min(self._taken, taken)
+        if taken < self._taken + MANY_TAKEN:
+            return ""
+        self._taken = taken
+        return "others have swept cells of this robot's part"
+
+    def _count_taken(self) -> int:
+        """Return the number of this robot's cells that only others have swept."""
+        self._counted = self._ledger.shared.version
+        area = self._map.area
+        if area is None:
+            return 0
+        window = area.lattice.window
+        swept = self._ledger.shared.swept(window) & area.reachable
+        swept &= self._ledger.current.visits(window) == 0
+        if self._division is not None:
+            swept = swept & self._is_own(self._division, area)
+        return int(np.count_nonzero(swept))

@@ -1,0 +1,229 @@
+"""Members of a fleet: the other robots, what each has told last, and which stand in the way."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fasaco_edge.errors import FleetError
+from fasaco_edge.fleet.mission.ground import SharedGround
+from fasaco_edge.fleet.mission.refuge import without
+from fasaco_edge.fleet.mission.shared import MOST_ROBOTS, SharedProgress
+from fasaco_edge.fleet.mission.traffic import OLD_S, Neighbour, least_apart_m
+from fasaco_edge.grid.geometry import Window
+from fasaco_edge.grid.lattice import Cell
+from fasaco_edge.mission.core.events import MemberHeard, State
+from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
+from fasaco_edge.mission.map.reachable_area import ReachableArea
+
+# Timeouts of a silent robot, and of one that should move; motion that counts [s], [s], [m].
+GONE_S, HANGING_S, STANDING_M = 5.0, 8.0, 0.05
+# A robot that is planned around has driven on once it is this far from there [m]: the poses of one
+# that stands scatter.
+LEFT_M = 0.2
+
+# Absence of a robot that is silent.
+GONE = "gone"
+AT_WORK = (State.PLANNING, State.COVERING, State.DEGRADED)
+
+
+@dataclass(slots=True)
+class Member:
+    """State of another robot.
+
+    Attributes:
+        newest: its newest message.
+        heard_at: time of that [s].
+        left_out: why it does not belong to this fleet; "" where it does.
+        place: its position, to STANDING_M, x, y [m].
+        moved_at: time of the last motion [s].
+        left_at: when it last left a new division [s].
+    """
+
+    newest: MemberHeard
+    heard_at: float
+    left_out: str
+    place: tuple[float, float]
+    moved_at: float
+    left_at: float = float("-inf")
+
+    def has_moved(self, heard: MemberHeard) -> bool:
+        """Tell whether it has moved, has started to work, or has just ended a wait."""
+        has_begun = self.newest.state not in AT_WORK and heard.state in AT_WORK
+        has_begun |= bool(self.newest.waits_for) and not heard.waits_for
+        return has_begun or math.dist(self.place, (heard.x, heard.y)) > STANDING_M
+
+    def absence(self, now: float) -> str:
+        """Return why it takes no part now; "" if it does."""
+        if self.left_out:
+            return self.left_out
+        if now - self.heard_at > GONE_S:
+            return GONE
+        if self.newest.state not in AT_WORK:
+            return self.newest.state
+        is_hanging = now - self.moved_at > HANGING_S and not self.newest.waits_for
+        return "stands" if is_hanging else ""
+
+
+class Members:
+    """Tracks the other robots; empty without a fleet.
+
+    Attributes:
+        known: the others, by name.
+        ground: the cells that those of them can reach that fit.
+    """
+
+    def __init__(self, robot: str, ledger: MissionLedger, cell_m: float) -> None:
+        self.known: dict[str, Member] = {}
+        self.ground = SharedGround()
+        self._robot, self._ledger, self._cell_m = robot, ledger, cell_m
+        # Places of robots that stand in the way [m], by name.
+        self._avoided: dict[str, tuple[float, float]] = {}
+
+    def neighbours(self, now: float) -> dict[str, Neighbour]:
+        """Return the other robots in this robot's frame that are heard.
+
+        Where a silent one is, only this robot's map may show.
+        """
+        return {
+            name: Neighbour(
+                member.newest,
+                now - member.heard_at,
+                now - member.moved_at,
+                member.newest.step_s / self._cell_m,
+                self._is_at_avoided(name),
+            )
+            for name, member in self.known.items()
+            if not member.left_out and now - member.heard_at < OLD_S
+        }
+
+    @property
+    def shared(self) -> SharedProgress:
+        """The cells that they have swept."""
+        shared = self._ledger.shared
+        assert isinstance(shared, SharedProgress)
+        return shared
+
+    def avoid(self, robot: str) -> None:
+        """Plan around a robot where it stands now, until it moves."""
+        newest = self.known[robot].newest
+        self._avoided[robot] = newest.x, newest.y
+
+    def is_avoided(self, robot: str) -> bool:
+        """Tell whether paths are planned around a robot."""
+        return robot in self._avoided
+
+    def _is_at_avoided(self, robot: str) -> bool:
+        """Tell whether paths are planned around a robot, and it is still there."""
+        place, member = self._avoided.get(robot), self.known.get(robot)
+        if place is None or member is None or member.left_out:
+            return False
+        return math.dist(place, (member.newest.x, member.newest.y)) < LEFT_M
+
+    def forget_silent(self, now: float) -> str:
+        """Plan around silent robots no longer; return the name of one, or "".
+
+        They may be gone or not: only this robot's map may show it.
+        """
+        silent = [
+            name
+            for name in sorted(self._avoided)
+            if name not in self.known or now - self.known[name].heard_at >= OLD_S
+        ]
+        for name in silent:
+            del self._avoided[name]
+        return silent[0] if silent else ""
+
+    def closed(self, area: ReachableArea, radius_m: float) -> NDArray[np.bool_] | None:
+        """Return the cells where robots stand in the way, bool (rows, cols); None for none."""
+        for name in list(self._avoided):
+            if not self._is_at_avoided(name):
+                del self._avoided[name]
+        if not self._avoided:
+            return None
+        window, cell_m = area.lattice.window, area.lattice.cell_m
+        closed = np.zeros(area.reachable.shape, np.bool_)
+        for name, (x, y) in self._avoided.items():
+            clear_m = least_apart_m(radius_m, self.known[name].newest)
+            # Only the cells around it: lattices are large.
+            (row0, row1), (col0, col1) = (
+                (math.floor((at - clear_m) / cell_m), math.ceil((at + clear_m) / cell_m))
+                for at in (y, x)
+            )
+            near = Window(row0, col0, row1, col1).intersection(window)
+            if near is None:
+                continue
+            rows, cols = np.ogrid[near.row0 : near.row1, near.col0 : near.col1]
+            apart = np.hypot((cols + 0.5) * cell_m - x, (rows + 0.5) * cell_m - y)
+            closed[near.slices_in(window)] |= apart < clear_m
+        return closed
+
+    def passable(self, area: ReachableArea, cell: Cell, radius_m: float) -> ReachableArea:
+        """Return an area as a robot in ``cell`` can drive it: around robots in the way."""
+        closed = self.closed(area, radius_m)
+        if closed is None or not area.contains(cell):
+            return area
+        lattice = area.lattice
+        closed[lattice.local(cell)] = False
+        return ReachableArea.around(replace(lattice, steps=without(lattice.steps, closed)), cell)
+
+    def hear(self, event: MemberHeard, now: float) -> str:
+        """Take in another robot's message; return why it requires a plan, or "".
+
+        Raises:
+            FleetError: there is no room for its data.
+        """
+        if not self._robot:
+            return ""
+        before, frame = self.known.get(event.robot), self._ledger.current.frame
+        left_out = event.misfit or self.shared.why_misplaced(frame)
+        if not left_out and event.frame not in ("", frame):
+            left_out = f"its frame is {event.frame!r}, here it is {frame!r}"
+        place, moved_at = (event.x, event.y), now
+        if before is None:
+            self._make_room(event.robot, now)
+        elif not before.has_moved(event):
+            place, moved_at = before.place, before.moved_at
+        left_at = float("-inf") if before is None else before.left_at
+        member = Member(event, now, left_out, place, moved_at, left_at)
+        self.known[event.robot] = member
+        if left_out:
+            self.ground.drop(event.robot)
+            return ""
+        if before is not None and before.newest.lattice != event.lattice:
+            self.ground.drop(event.robot)
+        swept = event.robot, event.epoch, event.tiles
+        try:
+            is_open_again = self.shared.hear(*swept, self.known, event.kept, event.lattice)
+        except FleetError as error:
+            self.known[event.robot] = replace(member, left_out=str(error))
+            self.ground.drop(event.robot)
+            raise
+        self.ground.hear(event.robot, event.ground)
+        return f"{event.robot}: cells must be swept again" if is_open_again else ""
+
+    def division_numbers(self) -> dict[str, int]:
+        """Return the numbers of the divisions that they have told, by name."""
+        return {name: m.newest.division for name, m in self.known.items() if not m.left_out}
+
+    def note_left(self, names: set[str], now: float) -> None:
+        """Note that robots have left a new division."""
+        for name in self.known.keys() & names:
+            self.known[name] = replace(self.known[name], left_at=now)
+
+    def _make_room(self, robot: str, now: float) -> None:
+        """Make room for another robot: the longest silent one is removed, if it is gone.
+
+        Otherwise one robot too many would displace another in turn, and each time cause a new
+        division.
+        """
+        if len(self.known) < MOST_ROBOTS:
+            return
+        name = min(self.known, key=lambda name: (self.known[name].heard_at, name))
+        if now - self.known[name].heard_at <= GONE_S:
+            raise FleetError(f"{robot}: {MOST_ROBOTS} others of a fleet are heard at most")
+        del self.known[name]
+        self.ground.drop(name)

@@ -1,0 +1,138 @@
+"""Refuge: where a robot of a fleet goes that makes way for another, and how.
+
+Two robots may stand all but in touch, in a doorway for instance: whoever makes way must not come
+nearer to the other at first, as the base's sensors, or the other's side, would stop it for good.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fasaco_edge.fleet.mission.traffic import AHEAD_M, Neighbour, Points, least_apart_m, spaced
+from fasaco_edge.grid.lattice import Cell
+from fasaco_edge.kernels import EAST, NORTH, SOUTH, WEST
+from fasaco_edge.kernels.fleet.split import FAR, ways_from
+from fasaco_edge.kernels.lattice.reach import shortest_walk
+from fasaco_edge.mission.line.way import comes_nearer
+from fasaco_edge.mission.map.reachable_area import ReachableArea
+
+Places = Callable[[NDArray[np.int32]], Points]
+Sees = Callable[[Points, Points], bool]
+
+
+def discs(radius_m: float, neighbours: Mapping[str, Neighbour]) -> Points:
+    """Return where the middle of a robot's disc is too near to others, as ``Route.beside``."""
+    heard = [near.heard for _, near in sorted(neighbours.items())]
+    rows = [(one.x, one.y, least_apart_m(radius_m, one)) for one in heard]
+    return np.array(rows, np.float64).reshape(-1, 3)
+
+
+def refuge(
+    area: ReachableArea,
+    cell: Cell,
+    place: tuple[float, float],
+    radius_m: float,
+    neighbours: Mapping[str, Neighbour],
+    places: Places,
+    sees: Sees,
+) -> NDArray[np.int32] | None:
+    """Return the way to the nearest cell off the discs and paths of other robots; None for none.
+
+    It leads through none of their discs: cells, int32 (n, 2). The first one is the robot's or one
+    beside it, such that straight there the robot comes no nearer to any, if there is such a way;
+    else its own.
+
+    Args:
+        area: the reachable area.
+        cell: the robot's cell.
+        place: the robot's place in it (x, y) [m].
+        radius_m: radius of its disc [m].
+        neighbours: the other robots.
+        places: returns the points of cells.
+        sees: tells whether the robot can drive straight between two points.
+    """
+    lattice, window = area.lattice, area.lattice.window
+    reach = math.ceil((2 * AHEAD_M + 2.0) / lattice.cell_m)
+    row, col = lattice.local(cell)
+    rows = slice(max(row - reach, 0), row + reach + 1)
+    cols = slice(max(col - reach, 0), col + reach + 1)
+    at = np.argwhere(area.reachable[rows, cols])
+    corner = np.array((window.row0 + rows.start, window.col0 + cols.start))
+    points = places((at + corner).astype(np.int32))
+    is_free, is_passable = np.ones(len(at), np.bool_), np.ones(len(at), np.bool_)
+    local = row - rows.start, col - cols.start
+    here = (at == local).all(axis=1)
+    for near in neighbours.values():
+        heard = near.heard
+        clear_m = least_apart_m(radius_m, heard)
+        theirs = spaced([(heard.x, heard.y), *heard.ahead])
+        apart = np.hypot(*(points[:, None] - theirs[None]).transpose(2, 0, 1))
+        is_free &= (apart >= clear_m).all(axis=1)
+        # From too near it may go where it is farther from that robot.
+        is_farther = apart[:, 0] > math.dist(place, (heard.x, heard.y)) + 1e-6
+        is_passable &= (apart[:, 0] >= clear_m) | here | is_farther
+    closed = np.zeros(area.reachable[rows, cols].shape, np.bool_)
+    closed[tuple(at[~is_passable].T)] = True
+    steps = _inside(without(lattice.steps[rows, cols], closed))
+    beside, first = discs(radius_m, neighbours), np.array(place)
+    is_beside = (np.abs(at - local) <= 1).all(axis=1) & is_passable
+    begins = [
+        (math.dist(place, point) / lattice.cell_m, (begin[0], begin[1]))
+        for begin, point in zip(at[is_beside].tolist(), points[is_beside], strict=True)
+        if sees(first, point) and not comes_nearer(first, point, beside)
+    ]
+    way = _nearest(steps, begins, at[is_free], corner)
+    # Where each leads nearer to another robot, it may still be let past.
+    return _nearest(steps, [(0.0, local)], at[is_free], corner) if way is None else way
+
+
+def _nearest(
+    steps: NDArray[np.uint8],
+    begins: Sequence[tuple[float, Cell]],
+    ends: NDArray[np.int64],
+    corner: NDArray[np.int64],
+) -> NDArray[np.int32] | None:
+    """Return the shortest way from one of some cells to one of others, int32 (n, 2), or None.
+
+    Args:
+        steps: step masks, uint8 (rows, cols).
+        begins: cells in these, and how far the robot is from each [steps].
+        ends: cells in these, int64 (k, 2).
+        corner: the cell of the first one, int64 (2,).
+    """
+    best, way = float(FAR), None
+    for far, begin in begins:
+        away = ways_from(steps, begin[0] * steps.shape[1] + begin[1]).reshape(steps.shape)
+        lengths = away[tuple(ends.T)]
+        if len(ends) and lengths.min() < FAR and far + lengths.min() < best:
+            best, way = far + float(lengths.min()), (begin, ends[int(lengths.argmin())].tolist())
+    if way is None:
+        return None
+    begin, (row, col) = way
+    cells: NDArray[np.int32] = (shortest_walk(steps, begin, (row, col)) + corner).astype(np.int32)
+    return cells
+
+
+def _inside(steps: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """Return the step masks of a part of a lattice without those that lead out of it."""
+    edges = ((EAST, np.s_[:, -1]), (WEST, np.s_[:, 0]), (NORTH, np.s_[-1]), (SOUTH, np.s_[0]))
+    for direction, edge in edges:
+        steps[edge] &= np.uint8(0xFF ^ (1 << direction))
+    return steps
+
+
+def without(steps: NDArray[np.uint8], closed: NDArray[np.bool_]) -> NDArray[np.uint8]:
+    """Return step masks without steps from and to closed cells, uint8 (rows, cols)."""
+    steps = np.where(closed, 0, steps).astype(np.uint8)
+    for direction, here, there in (
+        (EAST, np.s_[:, :-1], np.s_[:, 1:]),
+        (WEST, np.s_[:, 1:], np.s_[:, :-1]),
+        (NORTH, np.s_[:-1], np.s_[1:]),
+        (SOUTH, np.s_[1:], np.s_[:-1]),
+    ):
+        steps[here] &= ~(closed[there].astype(np.uint8) << direction)
+    return steps

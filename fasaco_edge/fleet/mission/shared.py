@@ -1,0 +1,362 @@
+"""Shared progress: the cells that the other robots of a fleet report as swept.
+
+Each report carries an epoch number, changed whenever the sender forgets cells. Within an epoch the
+set only grows, so reports are merged by union: lost, repeated and late messages do no harm, and two
+halves of a split fleet agree once they hear each other again. When the epoch changes, the sender's
+earlier reports are dropped. The progress of a robot that is gone stays.
+
+Cells that this robot has to sweep again, whoever swept them (a second pass, a reset, a map that
+moved), are disregarded until the robot that swept them has forgotten them itself. It tells which of
+its cells are from before its epoch. Where it does not know, or swept some anew in an epoch that was
+never heard of, they stay disregarded, and are swept once more than needed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import TYPE_CHECKING
+
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+
+from fasaco_edge.errors import FleetError
+from fasaco_edge.fleet.mission.heard import Heard, Kept
+from fasaco_edge.fleet.mission.tiles import (
+    EMPTY,
+    TILE_BYTES,
+    Bits,
+    Placed,
+    bits_of,
+    packed,
+    unpacked,
+    window_of,
+)
+from fasaco_edge.mission.company import Inside, OthersCells
+from fasaco_edge.mission.core.events import SAME_LATTICE
+from fasaco_edge.mission.coverage.ledger import TILE, LedgerSnapshot
+
+if TYPE_CHECKING:
+    # For types only: a daemon announces itself to its fleet before the kernels are loaded.
+    from fasaco_edge.grid.geometry import Pose2D, Window
+    from fasaco_edge.grid.lattice import Cell
+
+# Limits on the robots and, over all of them, on the tiles: 16 million cells.
+MOST_ROBOTS, MOST_TILES = 32, 4096
+MOST_TILES_OF_ONE = MOST_TILES // 8
+
+
+@dataclass(frozen=True, slots=True)
+class MapPlace:
+    """Where the robot's map lies in the frame of its fleet.
+
+    Attributes:
+        origin: its origin's x, y [m], and the angle of its x axis [deg].
+        frame: the frame of the map that this is said of; "" for the first map that comes.
+    """
+
+    origin: tuple[float, float, float]
+    frame: str = ""
+
+
+class SharedProgress(OthersCells):
+    """The cells that other robots have swept, on this robot's lattice.
+
+    Args:
+        place: where its map lies in the frame of the fleet; None without such a frame.
+
+    Attributes:
+        epoch: epoch of this robot's own cells; 0 without a fleet.
+        version: counter of changes.
+    """
+
+    def __init__(self, place: MapPlace | None = None) -> None:
+        self._place = place
+        # The frame of the map that has this place; "" while none has come.
+        self._map_frame = "" if place is None else place.frame
+        # The frame whose map has become that of another building; "" for none.
+        self._left = ""
+        self.epoch = 0
+        self.version = 0
+        self._robots: dict[str, Heard] = {}
+        # The last query and its result; the tiles that have gained cells since.
+        self._known: tuple[Window | None, NDArray[np.bool_]]
+        self._known = None, np.zeros((0, 0), np.bool_)
+        self._grown: set[Cell] = set()
+        self._encoded: tuple[int, bytes] = 0, b""
+
+    def begin(self, epoch: int) -> None:
+        """Start an epoch that no earlier ledger of this robot used, unless one was restored."""
+        if not self.epoch:
+            self.epoch = epoch
+            self.version += 1
+
+    def note_forgotten(self) -> None:
+        """Note that this robot has forgotten some of its own cells."""
+        if self.epoch:
+            self.epoch += 1
+            self.version += 1
+
+    def enter(self, frame: str) -> None:
+        """Note the active frame: unless one is given, the first has the place in the fleet's frame.
+
+        A robot on another floor has another map, and nobody has told where that one lies.
+        """
+        if self._place is not None and not self._map_frame:
+            self._map_frame = frame
+            self.version += 1
+
+    def leave_building(self, frame: str) -> None:
+        """Note that the map in a frame shows another building: others do not mean this one."""
+        self._left = frame
+        self.version += 1
+
+    def begin_anew(self) -> None:
+        """Take the next map for one that the fleet shares."""
+        self._left = ""
+        self.version += 1
+
+    def why_misplaced(self, frame: str) -> str:
+        """Return why nothing in a map frame has a place in the frame of the fleet; "" if it has."""
+        if self._left and frame == self._left:
+            return (
+                "the map shows another building than before: `mission reset` makes it the fleet's"
+            )
+        if self._place is None or self._map_frame in ("", frame):
+            return ""
+        here = f"the map frame is {frame!r} here" if frame else "no map frame is known here"
+        place = f"fleet.x_m, y_m and yaw_deg belong to {self._map_frame!r} (fleet.map_frame)"
+        return f"{here}, {place}"
+
+    def hear(
+        self,
+        robot: str,
+        epoch: int,
+        tiles: Iterable[Placed],
+        members: Collection[str] = (),
+        kept: Iterable[Placed] | None = None,
+        lattice: Pose2D = SAME_LATTICE,
+    ) -> bool:
+        """Take in a robot's report; tell whether cells need sweeping again because of it.
+
+        Args:
+            robot: its name.
+            epoch: epoch of its cells.
+            tiles: places, with TILE_BYTES of bits each.
+            members: names of robots that must not be displaced.
+            kept: as the tiles, their cells swept before the epoch; None where that is not known.
+            lattice: pose of its lattice in this robot's [m]; where it is another one than before,
+                nothing that it has told before counts.
+
+        Raises:
+            FleetError: there is no room for its data.
+        """
+        heard, has_lost = self._robots.get(robot), False
+        if heard is None:
+            has_lost = self._make_room(robot, members)
+            heard = self._robots[robot] = Heard(epoch, lattice)
+        if heard.lattice != lattice:
+            has_lost = bool(heard.tiles)
+            heard.move(epoch, lattice)
+            self._note_lost()
+        elif heard.epoch != epoch:
+            has_lost = bool(heard.tiles)
+            if sum(len(one.disregarded) for one in self._robots.values()) > MOST_TILES:
+                heard.drop_gone()
+            heard.begin(epoch)
+            self._note_lost()
+        known = None if kept is None else dict(kept)
+        for place, told in tiles:
+            bits, before = bits_of(told), heard.tiles.get(place)
+            if before is None:
+                self._check_room(robot)
+                from_before = bits if known is None else bits & bits_of(known.get(place, EMPTY))
+                without = heard.disregarded.pop(place, np.uint8(0)) & from_before
+                if without.any():
+                    heard.disregarded[place] = without
+            after = bits if before is None else before | bits
+            if before is None or not np.array_equal(before, after):
+                heard.tiles[place] = after
+                if heard.is_doubtful:
+                    heard.disregarded[place] = after
+                self.version += 1
+                self._grown.add(place)
+        return has_lost
+
+    def swept(self, window: Window) -> NDArray[np.bool_]:
+        """Return which cells of ``window`` others have swept, bool (rows, cols), read-only."""
+        known, found = self._known
+        if window != known:
+            found = np.zeros((window.rows, window.cols), np.bool_)
+            self._grown = self._places()
+        elif self._grown:
+            found = found.copy()
+        for place in self._grown:
+            whole = window_of(place)
+            if common := whole.intersection(window):
+                found[common.slices_in(window)] |= self._swept_of(place)[common.slices_in(whole)]
+        self._grown = set()
+        found.flags.writeable = False
+        self._known = window, found
+        return found
+
+    def _swept_of(self, place: Cell) -> NDArray[np.bool_]:
+        """Return which cells of a tile others have swept, bool (TILE, TILE)."""
+        bits = np.zeros(TILE_BYTES, np.uint8)
+        for heard in self._robots.values():
+            if place in heard.tiles:
+                bits |= heard.counted(place)
+        return unpacked(bits)
+
+    def _note_lost(self) -> None:
+        """Note that some cells may need sweeping again."""
+        self._known = None, self._known[1]
+        self.version += 1
+
+    def disregard(self, inside: Inside) -> None:
+        """Disregard all sweeps so far of some cells.
+
+        Args:
+            inside: mask function: rows and columns int64 (n,) to bool (n,).
+        """
+        for place in self._places():
+            # Once for all robots: evaluating ``inside`` is the expensive part.
+            swept = (heard.tiles[place] for heard in self._robots.values() if place in heard.tiles)
+            at = np.argwhere(unpacked(np.bitwise_or.reduce(list(swept))))
+            rows, cols = (at + np.multiply(place, TILE)).T
+            chosen = inside(rows, cols) if len(at) else np.zeros(0, np.bool_)
+            if chosen.any():
+                marked = np.zeros((TILE, TILE), np.bool_)
+                marked[tuple(at[chosen].T)] = True
+                self._disregard(place, np.packbits(marked))
+
+    def _disregard(self, place: Cell, bits: Bits) -> None:
+        for heard in self._robots.values():
+            if place in heard.tiles and (gone := heard.tiles[place] & bits).any():
+                heard.disregarded[place] = gone | heard.disregarded.get(place, np.uint8(0))
+        self._note_lost()
+
+    def _places(self) -> set[Cell]:
+        return {place for heard in self._robots.values() for place in heard.tiles}
+
+    def clear(self) -> None:
+        """Forget all reports: they belong to another frame or building."""
+        if self._robots:
+            self._robots.clear()
+            self._note_lost()
+
+    def snapshot(self, cell_m: float) -> LedgerSnapshot:
+        """Return the cells swept by others as one ledger."""
+        tiles = {place: self._swept_of(place).astype(np.uint16) for place in self._places()}
+        return LedgerSnapshot(cell_m, "", 0, MappingProxyType(tiles))
+
+    def cells_of(self, robot: str) -> int:
+        """Return the number of a robot's cells that count."""
+        heard = self._robots.get(robot)
+        return 0 if heard is None else heard.count
+
+    def encode(self) -> bytes:
+        """Return everything as bytes, to be kept with the ledger; b"" for nothing."""
+        if self._encoded[0] != self.version:
+            robots = {name: heard.kept() for name, heard in self._robots.items()}
+            note = _Note(_VERSION, self.epoch, robots, self._origin, self._map_frame, self._left)
+            self._encoded = self.version, msgspec.json.encode(note)
+        return self._encoded[1]
+
+    def resume(self, kept: bytes) -> None:
+        """Restore the bytes of ``encode``; those of another release are ignored.
+
+        So are cells that were placed while this robot's map had another place.
+        """
+        try:
+            if not kept or msgspec.json.decode(kept, type=_Head).version != _VERSION:
+                return
+            note = msgspec.json.decode(kept, type=_Note)
+        except (msgspec.DecodeError, UnicodeDecodeError, RecursionError):
+            return
+        self.epoch, self._left = note.epoch, note.left
+        self._note_lost()
+        is_in_place = note.origin == self._origin
+        if is_in_place:
+            self._map_frame = self._map_frame or note.map_frame
+        robots = note.robots.items()
+        self._robots = {name: kept.heard(is_in_place=is_in_place) for name, kept in robots}
+
+    @property
+    def _origin(self) -> tuple[float, float, float] | None:
+        return None if self._place is None else self._place.origin
+
+    def _make_room(self, robot: str, members: Collection[str]) -> bool:
+        """Make room for another robot; tell whether cells need sweeping again because of it."""
+        if len(self._robots) < MOST_ROBOTS:
+            return False
+        gone = sorted(self._robots.keys() - set(members))
+        if not gone:
+            raise FleetError(f"{robot}: progress of {MOST_ROBOTS} robots is kept at most")
+        least = self._robots.pop(min(gone, key=self.cells_of))
+        self._note_lost()
+        return least.count > 0
+
+    def _check_room(self, robot: str) -> None:
+        if len(self._robots[robot].tiles) >= MOST_TILES_OF_ONE:
+            raise FleetError(f"{robot}: {MOST_TILES_OF_ONE} tiles of a robot are kept at most")
+        if sum(len(heard.tiles) for heard in self._robots.values()) >= MOST_TILES:
+            raise FleetError(f"{robot}: {MOST_TILES} tiles of others' progress are kept at most")
+
+
+# Version of the bytes.
+_VERSION = 1
+
+
+class _Head(msgspec.Struct, frozen=True):
+    """Members common to all versions."""
+
+    version: int
+
+
+class _Note(msgspec.Struct, frozen=True):
+    version: int
+    epoch: int
+    robots: dict[str, Kept]
+    # Of this robot's map in the frame of the fleet, and which map that is.
+    origin: tuple[float, float, float] | None = None
+    map_frame: str = ""
+    # The frame whose map has become that of another building.
+    left: str = ""
+
+
+class Telling:
+    """Selects the tiles of the next report: new ones first, then all others in turn.
+
+    Args:
+        kept: the ledger's tiles when the epoch began; None where that is not known.
+    """
+
+    def __init__(self, kept: Mapping[Cell, NDArray[np.uint16]] | None = None) -> None:
+        self._kept = None
+        if kept is not None:
+            self._kept = {place: tile_bits(tile) for place, tile in kept.items()}
+        # Cells reported per tile, in the order of reporting.
+        self._told: dict[Cell, NDArray[np.uint16]] = {}
+
+    def next(self, tiles: Mapping[Cell, NDArray[np.uint16]], most: int) -> tuple[Placed, ...]:
+        """Return places and bits of a limited number of tiles of a ledger's snapshot."""
+        self._told = {place: tile for place, tile in self._told.items() if place in tiles}
+        new = [place for place, tile in tiles.items() if self._told.get(place) is not tile]
+        chosen = [*sorted(new), *(place for place in self._told if place not in new)][:most]
+        for place in chosen:
+            self._told.pop(place, None)
+            self._told[place] = tiles[place]
+        return tuple((place, tile_bits(tiles[place])) for place in chosen)
+
+    def kept(self, told: Iterable[Placed]) -> tuple[Placed, ...] | None:
+        """Return which cells of tiles were swept before this epoch; None where not known."""
+        kept = self._kept
+        return None if kept is None else tuple((at, kept[at]) for at, _ in told if at in kept)
+
+
+def tile_bits(tile: NDArray[np.uint16]) -> bytes:
+    """Return the visited cells of a ledger's tile as TILE_BYTES of bits."""
+    return packed(tile > 0)

@@ -1,0 +1,1 @@
+"""Fleet as an observer sees it: its robots, their cells and shares, from their messages."""

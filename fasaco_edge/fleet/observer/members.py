@@ -1,0 +1,157 @@
+"""The robots of a fleet as an observer knows them, from what each of them tells."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import Generic, TypeVar
+
+from fasaco_edge.errors import FleetError
+from fasaco_edge.fleet.mission.frames import placed_point
+from fasaco_edge.fleet.observer.cells import Seat, TileSet
+from fasaco_edge.grid.geometry import Pose2D
+from fasaco_edge.wire.documents.fleet import CellTile, FleetMember
+from fasaco_edge.wire.limits import MAX_FLEET_PARTS
+
+# Robots of a fleet that are observed: as many as one may have. A robot silent for this long is
+# gone, and gives its place to another after that [ns].
+MOST_MEMBERS = MAX_FLEET_PARTS
+GONE_NS, REPLACED_NS = 5_000_000_000, 60_000_000_000
+# Messages beyond this rate are counted, not read [ns].
+LEAST_SPACING_NS = 100_000_000
+JOINED, GONE, WAITING = "joined", "gone", "waiting"
+
+
+@dataclass(slots=True)
+class Member:
+    """A robot of the fleet.
+
+    Attributes:
+        name: on the bus.
+        number: in order of joining, from 0.
+        seat: of its cells.
+        newest: its newest message.
+        heard_ns: time of that.
+        swept, ground: cells it has swept, and can reach.
+        changes: how often these cells have changed, or their seat.
+        pose: its newest pose in its map frame.
+    """
+
+    name: str
+    number: int
+    seat: Seat
+    newest: FleetMember
+    heard_ns: int
+    swept: TileSet = field(default_factory=TileSet)
+    ground: TileSet = field(default_factory=TileSet)
+    changes: int = 0
+    pose: Pose2D | None = None
+
+    def is_due(self, at_ns: int) -> bool:
+        """Tell whether a message that arrived then is read."""
+        return at_ns - self.heard_ns >= LEAST_SPACING_NS
+
+    def hear(self, said: FleetMember, at_ns: int) -> str:
+        """Take in a message; return what has changed of its frame, "" for nothing."""
+        moved = ""
+        if self.is_moved_by(said):
+            self.seat = Seat.of(said)
+            for tiles in (self.swept, self.ground):
+                tiles.clear()
+            self.changes += 1
+            self._forget()
+            moved = f"its frame has changed: {said.frame!r}, {self.seat}"
+        elif said.epoch != self.newest.epoch:
+            self.swept.clear()
+            self.changes += 1
+        self.newest, self.heard_ns = said, at_ns
+        swept = self.swept.take(said.swept, grows=True)
+        ground = self.ground.take(said.ground, grows=False)
+        if swept or ground:
+            self.changes += 1
+            self._note_cells(swept, ground)
+        return moved
+
+    def is_moved_by(self, said: FleetMember) -> bool:
+        """Tell whether a message places its cells anew."""
+        return Seat.of(said) != self.seat or said.frame != self.newest.frame
+
+    def is_gone(self, now_ns: int) -> bool:
+        """Tell whether it is silent."""
+        return now_ns - self.heard_ns > GONE_NS
+
+    def state(self, now_ns: int) -> str:
+        """Return the state of its mission, or that it waits for another, or is gone."""
+        if self.is_gone(now_ns):
+            return GONE
+        return WAITING if self.newest.waits_for else self.newest.state
+
+    def placed(self, x: float, y: float) -> tuple[float, float]:
+        """Return a point of its map frame in the fleet's frame [m]."""
+        return placed_point(self.seat.frame, x, y)
+
+    def _note_cells(self, swept: Sequence[CellTile], ground: Sequence[CellTile]) -> None:
+        """Note the tiles that have changed."""
+
+    def _forget(self) -> None:
+        """Forget what was noted of its cells: they lie elsewhere."""
+
+
+M = TypeVar("M", bound=Member)
+
+
+class Members(Generic[M]):
+    """The robots of one fleet, in order of joining.
+
+    ``make`` returns a robot by its name, number, seat, first message and the time of that [ns].
+    """
+
+    def __init__(self, make: Callable[[str, int, Seat, FleetMember, int], M]) -> None:
+        self._make = make
+        self._by_name: dict[str, M] = {}
+
+    def hear(self, robot: str, said: FleetMember, at_ns: int) -> tuple[M, str]:
+        """Take in a message; return its robot, and what is new: JOINED, what moved, or "".
+
+        Raises:
+            FleetError: there are as many robots as are observed.
+        """
+        member = self._by_name.get(robot)
+        if member is None:
+            member = self._make(robot, self._number(robot, at_ns), Seat.of(said), said, at_ns)
+            self._by_name[robot] = member
+            member.hear(said, at_ns)
+            return member, JOINED
+        if not member.is_due(at_ns):
+            return member, ""
+        return member, member.hear(said, at_ns)
+
+    def _number(self, robot: str, at_ns: int) -> int:
+        """Return the number of a robot that joins: the next, or that of one long gone."""
+        if len(self) < MOST_MEMBERS:
+            return len(self)
+        longest = min(self, key=lambda member: member.heard_ns)
+        if at_ns - longest.heard_ns < REPLACED_NS:
+            raise FleetError(f"{robot}: {MOST_MEMBERS} robots of a fleet are observed at most")
+        del self._by_name[longest.name]
+        return longest.number
+
+    def get(self, robot: str) -> M | None:
+        """Return a robot; None if it has not joined."""
+        return self._by_name.get(robot)
+
+    def __iter__(self) -> Iterator[M]:
+        return iter(sorted(self._by_name.values(), key=lambda member: member.number))
+
+    def __len__(self) -> int:
+        return len(self._by_name)
+
+    def dividing(self, now_ns: int) -> M | None:
+        """Return a robot that tells the division in force; None if none tells one.
+
+        One left alone tells a new number without parts: all that is left is its own. What a robot
+        that is gone told last counts only where all are gone.
+        """
+        dividing = [member for member in self if member.newest.division]
+        telling = [member for member in dividing if not member.is_gone(now_ns)] or dividing
+        return min(telling, key=lambda m: (-m.newest.division, m.newest.by), default=None)

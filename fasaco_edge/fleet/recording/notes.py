@@ -1,0 +1,158 @@
+"""The log of a fleet: what each robot told, second by second, beside the drawings.
+
+A review reads it. Notes are gathered for some seconds and written as one blob: deflated MessagePack
+with a version in it. The first one of each part also holds all cells told so far, so that the part
+can be read without those before it.
+"""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Annotated, Final
+
+import msgspec
+import numpy as np
+from msgspec import Meta
+
+from fasaco_edge.errors import DifferentRuns, UnreadableRecording
+from fasaco_edge.recording import entities
+from fasaco_edge.recording.arrow import pa
+from fasaco_edge.recording.read.frames import chunks, column
+from fasaco_edge.recording.read.repair import HINT, open_part
+from fasaco_edge.wire.documents.fleet import CellEdge, CellTile
+
+NOTES_VERSION: Final = 1
+# Largest content of a batch, checked while it is inflated [bytes].
+MOST_BYTES = 64_000_000
+COMPONENT = f"{entities.INPUTS_ARCHETYPE}:{entities.INPUTS_COMPONENT}"
+
+Text = Annotated[str, Meta(max_length=256)]
+Count = Annotated[int, Meta(ge=0, le=2**62)]
+
+
+class Pass(msgspec.Struct, frozen=True, array_like=True):
+    """A cell that a robot came into, and when, since the recording began [ms]."""
+
+    at_ms: int
+    row: int
+    col: int
+
+
+class Note(msgspec.Struct, array_like=True):
+    """What was heard of a robot since its last note.
+
+    Attributes:
+        robot: its number in ``NoteBatch.robots``.
+        at_ms: time since the recording began [ms].
+        state: of its mission; "gone" once it is silent.
+        x, y: its position in its map frame [m].
+        waits_for: name of the robot it waits for; "" for none.
+        division: number of its division.
+        open_cells: cells known to it that are still to sweep.
+        messages, bytes: of the fleet, since the last note.
+        driven_m: what it drove since [m].
+        plans_ms: time of each plan heard of since [ms].
+        passes: cells it came into since.
+        swept, ground: tiles that have changed since, whole; of all time in a note of all in force.
+        in_force: whether this repeats what earlier parts have.
+    """
+
+    robot: Count
+    at_ms: Count
+    state: Text
+    x: float
+    y: float
+    waits_for: Text
+    division: Count
+    open_cells: Count
+    messages: Count
+    bytes: Count
+    driven_m: float
+    plans_ms: list[float]
+    passes: list[Pass]
+    swept: list[CellTile]
+    ground: list[CellTile]
+    in_force: bool = False
+
+
+class NotedRobot(msgspec.Struct, frozen=True, array_like=True):
+    """A robot of a fleet: its name, its disc [m], and the seat of its cells (``cells.Seat``)."""
+
+    name: Text
+    radius_m: float
+    cell_m: CellEdge
+    lattice_deg: float
+    x: float
+    y: float
+    deg: float
+
+
+class NoteBatch(msgspec.Struct, frozen=True, array_like=True):
+    """Notes of some seconds; ``run`` identifies the recording by its beginning [ns]."""
+
+    version: int
+    run: int
+    fleet: Text
+    robots: list[NotedRobot]
+    notes: list[Note]
+
+
+class _Head(msgspec.Struct, frozen=True, array_like=True):
+    version: int
+
+
+def encode_notes(batch: NoteBatch) -> bytes:
+    """Return a batch as a blob."""
+    return zlib.compress(msgspec.msgpack.encode(batch), 6)
+
+
+def decode_notes(blob: bytes) -> NoteBatch:
+    """Return the batch of a blob.
+
+    Raises:
+        ValueError: it is malformed, or of another version.
+    """
+    inflate = zlib.decompressobj()
+    try:
+        body = inflate.decompress(blob, MOST_BYTES)
+    except zlib.error as error:
+        raise ValueError(f"notes of a fleet: {error}") from error
+    if inflate.unconsumed_tail or not inflate.eof:
+        raise ValueError("notes of a fleet: they break off, or are too long")
+    version = msgspec.msgpack.decode(body, type=_Head).version
+    if version != NOTES_VERSION:
+        raise ValueError(f"notes of a fleet of version {version}, not {NOTES_VERSION}")
+    batch = msgspec.msgpack.decode(body, type=NoteBatch)
+    if any(note.robot >= len(batch.robots) for note in batch.notes):
+        raise ValueError("notes of a fleet: of a robot that is not listed")
+    return batch
+
+
+def read_notes(paths: Sequence[Path]) -> list[NoteBatch]:
+    """Return the batches in the parts of one run, in order of time.
+
+    Raises:
+        UnreadableRecording: a file is missing, damaged, or no recording of a fleet.
+        DifferentRuns: the parts are not of one run.
+    """
+    batches = [batch for path in sorted(set(paths)) for batch in _batches(path)]
+    if not batches:
+        names = ", ".join(str(path) for path in paths)
+        raise UnreadableRecording(f"{names}: holds no notes of a fleet", hint=HINT)
+    if len({batch.run for batch in batches}) > 1:
+        raise DifferentRuns(f"parts of different runs: {', '.join(map(str, paths))}")
+    return sorted(batches, key=lambda batch: batch.notes[0].at_ms if batch.notes else 0)
+
+
+def _batches(path: Path) -> Iterator[NoteBatch]:
+    with open_part(path) as (recording, scan):
+        for chunk in chunks(recording, scan):
+            if chunk is None or chunk.entity != entities.FLEET_NOTES:
+                continue
+            for blob in column(chunk.batch, COMPONENT, pa.list_(pa.uint8())) or ():
+                try:
+                    yield decode_notes(np.asarray(blob.values, np.uint8).tobytes())
+                except (ValueError, msgspec.DecodeError) as error:
+                    raise UnreadableRecording(f"{path}: {error}", hint=HINT) from error

@@ -1,0 +1,298 @@
+"""The recorder of a whole fleet, a process that records all its robots into one file.
+
+Robots are recorded from the first message that they send to the fleet, also those that come later.
+Of each the newest status, path and pose are heard; maps are asked for in turn, one at a time, so
+that a network carries no more than one. What a robot sends harms no other: each has its own queues,
+its own decoders, and its own share of what is drawn.
+"""
+
+from __future__ import annotations
+
+import re
+import time
+from collections import Counter
+
+from fasaco_edge.bus.arrival import Arrival
+from fasaco_edge.bus.session import Bus
+from fasaco_edge.bus.settings import BusSettings
+from fasaco_edge.config.config import DaemonConfig
+from fasaco_edge.errors import FasacoError
+from fasaco_edge.fleet.observer.inbox import FleetInbox, Heard
+from fasaco_edge.fleet.observer.members import JOINED
+from fasaco_edge.fleet.observer.subscriptions import FleetSubscriptions
+from fasaco_edge.fleet.recording.layout import build_layout
+from fasaco_edge.fleet.recording.members import RecordedMember, RecordedMembers
+from fasaco_edge.fleet.recording.notes import NOTES_VERSION, Note, NoteBatch, encode_notes
+from fasaco_edge.fleet.recording.scene import FleetScene
+from fasaco_edge.host.processes import memory_limit
+from fasaco_edge.recording import entities
+from fasaco_edge.recording.scene.blueprint import NO_MAP
+from fasaco_edge.recording.write.inbox import afforded_bytes
+from fasaco_edge.recording.write.process import Output, record
+from fasaco_edge.text import is_reported, one_line
+from fasaco_edge.wire.documents.fleet import decode_member, fleet_of
+from fasaco_edge.wire.documents.json_text import decode_tolerant
+from fasaco_edge.wire.documents.status import Status
+from fasaco_edge.wire.messages.maps import decode_occupancy_grid
+from fasaco_edge.wire.messages.paths import decode_path
+from fasaco_edge.wire.messages.poses import PoseDecoder
+from fasaco_edge.wire.topics import FLEET, MAP, PATH, POSE, STATUS
+
+NOTE_NS, WRITE_NS = 1_000_000_000, 5_000_000_000
+# Robots heard within so long of the first are recorded in the order of their names; of so many
+# messages at most.
+GATHER_NS, MOST_GATHERED = 2_000_000_000, 1_000
+# A robot's rate of messages is plotted over this time.
+RATE_NOTES = 5
+# Robots and topics whose faults are counted apart, beside those of the robots recorded.
+MOST_FAULTS = 256
+TOO_LARGE = "what is larger than its share of the memory is left out, its map, say"
+TOO_WIDE = "cells farther apart than are recorded, or more, are left out"
+
+
+def run_fleet_recorder(
+    config: DaemonConfig, bus_settings: BusSettings, fleet: str, output: Output
+) -> int:
+    """Record a fleet until SIGTERM or SIGINT; return the process's exit code, see ``record``.
+
+    Args:
+        config: for the prefix of all keys, and the type of poses whose samples name none.
+        bus_settings: how to join the bus.
+        fleet: name of the fleet.
+        output: where and how to write.
+    """
+    return record(
+        output.folder, bus_settings, lambda bus: FleetRecorder(config, bus, fleet, output)
+    )
+
+
+class FleetRecorder:
+    """Connects the bus to the writer: ``step`` takes samples, writes and draws them."""
+
+    def __init__(self, config: DaemonConfig, bus: Bus, fleet: str, output: Output) -> None:
+        self._fleet = fleet
+        self._schema = config.pose.schema
+        recording = output.begin(file_name(fleet), build_layout((), NO_MAP))
+        self._writer, self._clock = recording.writer, recording.clock
+        self._began_ns = recording.began_ns
+        self._title = f"fleet {fleet} {recording.began} UTC"
+        self._writer.describe(self._title, {"fleet": fleet, "began": recording.began})
+        self._members = RecordedMembers()
+        self._scene = FleetScene(self._writer, self._members)
+        self._inbox = FleetInbox(afforded_bytes(memory_limit()), self._clock.arrival)
+        self._subscriptions = FleetSubscriptions(
+            bus, config.keys(), (STATUS, PATH, POSE), self._inbox.post
+        )
+        self._first: list[Heard] = []
+        self._gathers = True
+        self._poses: dict[str, PoseDecoder] = {}
+        self._notes: list[Note] = []
+        self._rates: dict[str, list[int]] = {}
+        self._next_note_ns = self._next_write_ns = self._began_ns
+        self._noted_ns = self._began_ns
+        self._part = 0
+        self._faults: Counter[tuple[str, str]] = Counter()
+
+    def listen(self) -> None:
+        """Subscribe to what all robots tell their fleets."""
+        self._subscriptions.listen()
+
+    def step(self, timeout_s: float) -> None:
+        """Write and draw what arrives within ``timeout_s`` [s], and what is due."""
+        for heard in self._gathered(self._inbox.take(timeout_s)):
+            self._writer.message(heard.arrival.wall_ns)
+            self._attempt(heard)
+            self._writer.sync(time.monotonic_ns())
+        now_ns = self._clock.now_ns()
+        self._writer.at(now_ns)
+        if now_ns >= self._next_note_ns:
+            self._next_note_ns = now_ns + NOTE_NS
+            self._note(now_ns)
+        if now_ns >= self._next_write_ns:
+            self._next_write_ns = now_ns + WRITE_NS
+            self._write()
+        self._subscriptions.ask_for_maps([member.name for member in self._members], now_ns)
+        self._scene.catch_up()
+        self._writer.sync(time.monotonic_ns())
+
+    def end(self) -> bool:
+        """Write what waits, and the footer; False if the disk fails."""
+        self._gathers = False
+        for heard in self._gathered(self._inbox.take(0.0)):
+            self._attempt(heard)
+        now_ns = self._clock.now_ns()
+        self._writer.at(now_ns)
+        self._note(now_ns)
+        self._write()
+        self._scene.finish()
+        return self._writer.close()
+
+    def _gathered(self, arrived: list[Heard]) -> list[Heard]:
+        """Return what to take in now: of the robots heard at first all at once, by name.
+
+        In the order of names they have the same colours in all recordings and pictures.
+        """
+        if self._gathers:
+            strange = {
+                one.robot for one in arrived if fleet_of(one.arrival.sample.payload) != self._fleet
+            }
+            for robot in strange:
+                self._inbox.forget(robot)
+            arrived = [one for one in arrived if one.robot not in strange]
+        self._first += arrived
+        if self._gathers and self._first:
+            since_ns = time.monotonic_ns() - self._first[0].arrival.at_ns
+            self._gathers = since_ns < GATHER_NS and len(self._first) < MOST_GATHERED
+        if self._gathers:
+            return []
+        first, self._first = self._first, []
+        return sorted(first, key=lambda heard: heard.robot)
+
+    @property
+    def hangs(self) -> bool:
+        """Whether rerun would hang when the interpreter exits."""
+        return self._writer.hangs
+
+    def note(self, line: str) -> None:
+        """Log a fault from before the recording began."""
+        self._scene.add_line(line, "WARN")
+
+    def _attempt(self, heard: Heard) -> None:
+        """Take in a sample; what cannot be used is logged with its robot's name."""
+        try:
+            self._take(heard.robot, heard.arrival)
+        except FasacoError as error:
+            what = heard.robot, heard.arrival.topic
+            if self._members.get(heard.robot) is None:
+                # Any number of names would each keep a queue from others.
+                self._inbox.forget(heard.robot)
+                if what not in self._faults and len(self._faults) >= MOST_FAULTS:
+                    what = "other robots", heard.arrival.topic
+            self._faults[what] += 1
+            count = self._faults[what]
+            # A robot may send nothing else.
+            if is_reported(count):
+                self._scene.add_line(
+                    one_line(f"{': '.join(what)}: {count} refused: {error}"), "WARN"
+                )
+
+    def _warn_once(self, robot: str, fault: str) -> None:
+        """Log what a robot's recording lacks, once."""
+        if (robot, fault) not in self._faults:
+            self._scene.add_line(one_line(f"{robot}: {fault}"), "WARN")
+        self._faults[robot, fault] += 1
+
+    def _take(self, robot: str, arrival: Arrival) -> None:
+        if arrival.topic == FLEET.name:
+            self._take_fleet(robot, arrival)
+            return
+        member = self._members.get(robot)
+        if member is None:
+            return
+        sample = arrival.sample
+        if arrival.topic == POSE.name:
+            stamped = self._poses[robot].decode(sample.payload, sample.schema)
+            if stamped is not None:
+                member.move(stamped.pose, self._ms(arrival.wall_ns))
+                self._scene.add_pose(member, stamped.pose)
+        elif arrival.topic == PATH.name:
+            self._scene.add_path(member, decode_path(sample.payload).xy)
+        elif arrival.topic == MAP.name:
+            self._subscriptions.end_map_turn(robot)
+            self._scene.add_map(member, decode_occupancy_grid(sample.payload))
+        elif arrival.topic == STATUS.name:
+            status = decode_tolerant(sample.payload, Status)
+            # A second daemon of the robot's name does not plan.
+            if status.claim.stand == "plans":
+                member.note_status(status)
+
+    def _take_fleet(self, robot: str, arrival: Arrival) -> None:
+        said = decode_member(arrival.sample.payload, self._fleet)
+        if said is None or not robot:
+            if self._members.get(robot) is None:
+                self._inbox.forget(robot)
+            return
+        known, before = {member.name for member in self._members}, self._members.get(robot)
+        if before is None or before.is_moved_by(said):
+            # Notes are of the robots and frames that their batch names.
+            self._write()
+        member, news = self._members.hear(robot, said, arrival.wall_ns)
+        if news == JOINED:
+            for gone in known - {one.name for one in self._members}:
+                self._leave(gone)
+            self._join(member)
+        elif news:
+            self._scene.add_line(one_line(f"{robot}: {news}"), "WARN")
+
+    def _join(self, member: RecordedMember) -> None:
+        """Hear a robot from now on."""
+        self._poses[member.name] = PoseDecoder(self._schema)
+        self._subscriptions.hear(member.name)
+        self._scene.add_line(f"{member.name}: joined, cells of {member.seat.cell_m:g} m")
+        self._scene.join(member)
+
+    def _leave(self, robot: str) -> None:
+        self._subscriptions.leave(robot)
+        self._inbox.forget(robot)
+        self._scene.leave(robot)
+        for kept in (self._poses, self._rates):
+            kept.pop(robot, None)
+        for fault in [fault for fault in self._faults if fault[0] == robot]:
+            del self._faults[fault]
+
+    def _note(self, now_ns: int) -> None:
+        """Note what was heard since the last note, and show it."""
+        passed_s = max(1e-9 * (now_ns - self._noted_ns), 1e-3)
+        self._noted_ns = now_ns
+        for member in self._members:
+            traffic = self._inbox.traffic(member.name)
+            if traffic.too_large:
+                self._warn_once(member.name, TOO_LARGE)
+            if member.swept.refused or member.ground.refused:
+                self._warn_once(member.name, TOO_WIDE)
+            note = member.note(self._ms(now_ns), now_ns, (traffic.messages, traffic.bytes))
+            self._notes.append(note)
+            rates = self._rates.setdefault(member.name, [])
+            rates.append(traffic.bytes)
+            del rates[:-RATE_NOTES]
+            figures = {
+                "left_cells": float(note.open_cells),
+                "kb_s": round(sum(rates) / len(rates) / passed_s / 1000, 2),
+            }
+            if note.plans_ms:
+                figures["plan_ms"] = max(note.plans_ms)
+            if note.swept:
+                figures["swept_m2"] = member.swept.count * member.seat.cell_m**2
+                self._scene.add_cells(member)
+            self._scene.add_figures(member, figures)
+            self._scene.enter(member, member.state(now_ns), _why(member))
+        if len(self._members):
+            self._scene.add_division()
+            self._scene.describe(self._title)
+
+    def _write(self) -> None:
+        """Write the notes gathered; in a new part all that is in force with them."""
+        if self._part != self._writer.part_number:
+            self._part = self._writer.part_number
+            at_ms = self._notes[0].at_ms if self._notes else self._ms(self._writer.wall_ns)
+            self._notes = [*(member.in_force(at_ms) for member in self._members), *self._notes]
+        if not self._notes:
+            return
+        robots = [member.noted() for member in self._members]
+        batch = NoteBatch(NOTES_VERSION, self._began_ns, self._fleet, robots, self._notes)
+        self._notes = []
+        if not self._writer.write_blob(encode_notes(batch), entities.FLEET_NOTES):
+            # All of it is in the next part, but for what only happens once.
+            self._part = 0
+
+    def _ms(self, wall_ns: int) -> int:
+        return max(wall_ns - self._began_ns, 0) // 1_000_000
+
+
+def _why(member: RecordedMember) -> str:
+    return f"for {member.newest.waits_for}" if member.newest.waits_for else ""
+
+
+def file_name(fleet: str) -> str:
+    """Return the name of a fleet's recordings: letters, digits, ``_`` and ``-``."""
+    return "fleet-" + re.sub(r"[^A-Za-z0-9_-]", "_", fleet)

@@ -1,0 +1,347 @@
+"""The scene of a fleet: what its robots tell, as entities, all in the fleet's frame.
+
+Each robot has a colour, and a tree of entities of its own. All of them together are drawn no faster
+than the scene of one robot: a layer's rate is shared out among the robots.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fasaco_edge.fleet.observer.cells import mask_of, window_of
+from fasaco_edge.fleet.observer.inbox import LEAST_SHARING
+from fasaco_edge.fleet.observer.members import GONE
+from fasaco_edge.fleet.observer.shares import shares_of, swept_twice
+from fasaco_edge.fleet.recording.card import RobotRow, card_of, colour_of
+from fasaco_edge.fleet.recording.layout import build_layout, robot_entity
+from fasaco_edge.fleet.recording.members import RecordedMember, RecordedMembers
+from fasaco_edge.grid.geometry import Bounds, GridGeometry, Pose2D, union_bounds
+from fasaco_edge.grid.occupancy import OccupancyGrid, coarser, known_bounds
+from fasaco_edge.recording import entities
+from fasaco_edge.recording.scene import archetypes as draw
+from fasaco_edge.recording.scene.blueprint import NO_MAP
+from fasaco_edge.recording.scene.layers import Anchor, Layers, is_far_from, size_in_file
+from fasaco_edge.recording.sdk import rr
+from fasaco_edge.recording.write.writer import RecordingWriter
+
+# In the file, of all robots together [bytes/s]; each drawing begins a chunk of about so many bytes.
+RATES = {
+    "map": 3_000, "swept": 3_000, "path": 2_500, "trail": 2_000, "pose": 2_000, "metrics": 2_000,
+}  # fmt: skip
+FLEET_RATES = {entities.FLEET_SHARES: 1_000, entities.FLEET_TWICE: 1_000, entities.RUN_CARD: 800}
+CHUNK_BYTES = 1_200
+# Of a layer of cells in four bytes each, beyond that.
+GRID_BYTES = 1_200
+# Of all maps. Each part of a recording begins with all of them, four bytes a pixel: they must not
+# fill it.
+MOST_PIXELS = 2_000_000
+# The view follows the growing map in steps of this share of its size.
+REFRAME = 0.15
+MAP_ORDER, SHARE_ORDER, SWEPT_ORDER, TWICE_ORDER = 0.0, 1.0, 2.0, 3.0
+SHARE_ALPHA, SWEPT_ALPHA, TWICE_COLOUR = 55, 150, (60, 60, 70, 150)
+PATH_Z, TRAIL_Z, LABEL_Z = 0.05, 0.04, 0.1
+TRAIL_SPACING_M = 0.05
+MOST_TRAIL = 4_000
+METRICS = ("swept_m2", "left_cells", "plan_ms", "kb_s")
+STATES = {
+    **draw.STATES[entities.MISSION_STATE],
+    "waiting": 0xDB2777FF,
+    GONE: 0x111827FF,
+}
+
+
+@dataclass(slots=True)
+class _Drawn:
+    """What was drawn of a robot."""
+
+    state: str = ""
+    known: Bounds | None = None
+    trail: list[tuple[float, float]] = field(default_factory=list)
+    figures: dict[str, float] = field(default_factory=dict)
+
+
+class FleetScene:
+    """Draws a fleet into a writer; the caller sets the time."""
+
+    def __init__(self, writer: RecordingWriter, members: RecordedMembers) -> None:
+        self._writer = writer
+        self._members = members
+        self._layers = Layers(FLEET_RATES)
+        self._anchor: Anchor | None = None
+        self._drawn: dict[str, _Drawn] = {}
+        self._framed: Bounds | None = None
+        self._shown: tuple[str, ...] = ()
+        self._shares: Counter[str] = Counter()
+        self._twice_m2, self._card = 0.0, ""
+        writer.log_static(entities.FLEET, rr.ViewCoordinates.RIGHT_HAND_Z_UP)
+
+    def join(self, member: RecordedMember) -> None:
+        """Draw a robot from now on."""
+        self._drawn[member.name] = _Drawn()
+        self._limit()
+        colour = _colour(member)
+        styles = (("path", 1.3, colour), ("trail", 1.1, _darker(colour)))
+        for name, width, tone in styles:
+            style = draw.LineStyle(tone, 0.0, width)
+            self._writer.log_static(_world(member, name), draw.style_archetype(style))
+        body, heading = draw.body_archetypes(max(member.newest.radius_m, 0.05), colour)
+        self._writer.log_static(_world(member, "robot/body"), body)
+        self._writer.log_static(_world(member, "robot/heading"), heading)
+        label = rr.Points3D(
+            [(0.0, 0.0, LABEL_Z)], radii=0.0, labels=[member.name], colors=_darker(colour),
+            show_labels=True,
+        )  # fmt: skip
+        self._writer.log_static(_world(member, "robot/label"), label)
+        for name in METRICS:
+            line = rr.SeriesLines(
+                names=member.name, colors=colour, widths=1.8, interpolation_mode="StepAfter"
+            )
+            self._writer.log_static(robot_entity(member.name, f"metrics/{name}"), line)
+        palette = np.array(list(STATES.values()), np.uint32)
+        states = rr.StateConfiguration(values=list(STATES), labels=list(STATES), colors=palette)
+        self._writer.log_static(robot_entity(member.name, "state"), states)
+        self._show()
+
+    def leave(self, robot: str) -> None:
+        """Draw a robot no more: another has its number."""
+        self._drawn.pop(robot, None)
+
+    def add_pose(self, member: RecordedMember, pose: Pose2D) -> None:
+        """Move a robot, and add to its trail."""
+        x, y = self._here(member, pose.x, pose.y)
+        placed = Pose2D(x, y, pose.yaw + member.seat.frame.yaw)
+
+        def draw_pose() -> None:
+            archetype = draw.pose_archetype(placed)
+            self._writer.log(_world(member, "robot"), archetype, latched=True)
+
+        self._draw(member, "pose", 60, draw_pose)
+        drawn = self._drawn[member.name]
+        last = drawn.trail[-1] if drawn.trail else None
+        if last is not None and abs(last[0] - x) + abs(last[1] - y) < TRAIL_SPACING_M:
+            return
+        drawn.trail.append((x, y))
+        if len(drawn.trail) > MOST_TRAIL:
+            # Nothing could be drawn for long: every other point has to do.
+            drawn.trail = drawn.trail[::2]
+
+        def draw_trail() -> None:
+            piece, drawn.trail = drawn.trail, drawn.trail[-1:]
+            if len(piece) > 1:
+                line = _line(np.array(piece), TRAIL_Z)
+                self._writer.log(_world(member, "trail"), line, size=12 * len(piece))
+
+        self._draw(member, "trail", 24 * len(drawn.trail), draw_trail)
+
+    def add_path(self, member: RecordedMember, xy: NDArray[np.float64]) -> None:
+        """Draw the path that a robot has before it."""
+        points = np.array([self._here(member, x, y) for x, y in draw.corners(xy).tolist()])
+        points = points.reshape(-1, 2)
+
+        def draw_path() -> None:
+            line = _line(points, PATH_Z)
+            self._writer.log(_world(member, "path"), line, latched=True, size=points.nbytes)
+
+        self._draw(member, "path", 12 * len(points), draw_path)
+
+    def add_map(self, member: RecordedMember, grid: OccupancyGrid) -> None:
+        """Draw a robot's map; what it does not know is clear, so that the others' maps show."""
+        grid = coarser(grid, MOST_PIXELS // max(len(self._drawn), LEAST_SHARING))
+        x, y = self._here(member, grid.geometry.origin.x, grid.geometry.origin.y)
+        yaw = grid.geometry.origin.yaw + member.seat.frame.yaw
+        placed = replace(grid, geometry=replace(grid.geometry, origin=Pose2D(x, y, yaw)))
+        tones = np.zeros((256, 4), np.uint8)
+        tones[:101, :3] = np.rint(np.linspace(250, 20, 101))[:, None]
+        tones[:101, 3] = 255
+        drawn = self._drawn[member.name]
+
+        def draw_map() -> None:
+            pixels = tones[grid.cells.view(np.uint8)]
+            archetype = draw.grid_archetype(placed.geometry, pixels, None, MAP_ORDER)
+            entity = _world(member, "map")
+            self._writer.log(entity, archetype, latched=True, size=pixels.nbytes)
+            drawn.known = known_bounds(placed)
+            self._show()
+
+        self._draw(member, "map", 2 * size_in_file(grid.cells), draw_map)
+
+    def add_cells(self, member: RecordedMember) -> None:
+        """Draw the cells a robot has swept."""
+        self._draw(
+            member, "swept", GRID_BYTES + member.swept.count // 8, lambda: self._draw_swept(member)
+        )
+
+    def add_division(self) -> None:
+        """Draw who is to sweep what is left, and what two robots swept."""
+        layers, now_ns = self._layers, self._writer.wall_ns
+        # Also a measure of the time that it takes.
+        size = CHUNK_BYTES + sum(member.ground.count for member in self._members) // 8
+        layers.draw(entities.FLEET_SHARES, size, self._draw_shares, now_ns)
+        layers.draw(entities.FLEET_TWICE, size, self._draw_twice, now_ns)
+
+    def add_figures(self, member: RecordedMember, figures: dict[str, float]) -> None:
+        """Plot figures of a robot, of METRICS, where they have changed."""
+        drawn = self._drawn[member.name]
+        drawn.figures |= figures
+
+        def draw_figures() -> None:
+            for name, value in drawn.figures.items():
+                entity = robot_entity(member.name, f"metrics/{name}")
+                self._writer.log(entity, rr.Scalars(value))
+            drawn.figures = {}
+
+        self._draw(member, "metrics", CHUNK_BYTES * (len(drawn.figures) - 1), draw_figures)
+
+    def enter(self, member: RecordedMember, state: str, why: str = "") -> None:
+        """Show that a robot is in a state from now on; log it."""
+        drawn = self._drawn[member.name]
+        if not state or drawn.state == state:
+            return
+        drawn.state = state
+        entity = robot_entity(member.name, "state")
+        self._writer.log(entity, rr.StateChange(state=state), latched=True)
+        self.add_line(f"{member.name}: {state}{' ' if why else ''}{why}")
+
+    def add_line(self, line: str, level: str = "INFO") -> None:
+        """Add a line to the log."""
+        self._writer.log(entities.FLEET_LOG, rr.TextLog(line, level=level))
+
+    def catch_up(self) -> None:
+        """Make the drawings that are due; call it often."""
+        self._layers.catch_up(self._writer.wall_ns)
+
+    def describe(self, title: str) -> None:
+        """Show the card: who does what."""
+        cell_m2 = {member.name: member.seat.cell_m**2 for member in self._members}
+        rows = [
+            RobotRow(
+                name=member.name,
+                number=member.number,
+                state=self._drawn[member.name].state,
+                swept_m2=member.swept.count * cell_m2[member.name],
+                share_m2=self._shares[member.name] * cell_m2[member.name],
+                waits_for=member.newest.waits_for,
+            )
+            for member in self._members
+        ]
+        card = card_of(title, rows, self._twice_m2)
+        if card == self._card:
+            return
+        self._card = card
+        document = rr.TextDocument(card, media_type="text/markdown")
+
+        def draw_card() -> None:
+            self._writer.log(entities.RUN_CARD, document, latched=True)
+
+        size = CHUNK_BYTES + len(card)
+        self._layers.draw(entities.RUN_CARD, size, draw_card, self._writer.wall_ns)
+
+    def finish(self) -> None:
+        """Make all waiting drawings, and fit the view to all maps."""
+        self.add_division()
+        for member in self._members:
+            self.add_cells(member)
+        self._layers.finish()
+        self._framed = None
+        self._show()
+
+    def _draw(
+        self, member: RecordedMember, layer: str, size: int, make: Callable[[], None]
+    ) -> None:
+        name = f"{layer}/{member.name}"
+        self._layers.draw(name, CHUNK_BYTES + size, make, self._writer.wall_ns)
+
+    def _limit(self) -> None:
+        """Share each layer's rate out among the robots."""
+        each = {
+            f"{layer}/{name}": rate / max(len(self._drawn), 1)
+            for layer, rate in RATES.items()
+            for name in self._drawn
+        }
+        self._layers.limit(FLEET_RATES | each)
+
+    def _anchored(self, x: float, y: float) -> Anchor:
+        if self._anchor is None:
+            self._anchor = Anchor.near(x, y)
+        return self._anchor
+
+    def _here(self, member: RecordedMember, x: float, y: float) -> tuple[float, float]:
+        """Return where a point of a robot's map frame is drawn."""
+        x, y = member.placed(x, y)
+        anchor = self._anchored(x, y)
+        return x - anchor.x, y - anchor.y
+
+    def _draw_swept(self, member: RecordedMember) -> None:
+        cells = member.swept.cells()
+        window = window_of(cells)
+        if window is None:
+            return
+        pixels = np.zeros((window.rows, window.cols, 4), np.uint8)
+        pixels[mask_of(cells, window)] = (*_colour(member), SWEPT_ALPHA)
+        geometry = self._shifted(member.seat.geometry(window))
+        self._log_grid(_world(member, "swept"), geometry, pixels, SWEPT_ORDER)
+
+    def _draw_shares(self) -> None:
+        shares = shares_of(self._members, self._writer.wall_ns)
+        if shares is None:
+            return
+        self._shares = shares.cells
+        pixels = np.zeros((*shares.owners.shape, 4), np.uint8)
+        for member in self._members:
+            pixels[shares.owners == member.number] = (*_colour(member), SHARE_ALPHA)
+        geometry = self._shifted(shares.geometry)
+        self._log_grid(entities.FLEET_SHARES, geometry, pixels, SHARE_ORDER)
+
+    def _draw_twice(self) -> None:
+        twice = swept_twice(self._members)
+        if twice is None:
+            return
+        geometry, mask = twice
+        self._twice_m2 = int(np.count_nonzero(mask)) * geometry.resolution**2
+        pixels = np.zeros((*mask.shape, 4), np.uint8)
+        pixels[mask] = TWICE_COLOUR
+        self._log_grid(entities.FLEET_TWICE, self._shifted(geometry), pixels, TWICE_ORDER)
+
+    def _log_grid(
+        self, entity: str, geometry: GridGeometry, pixels: NDArray[np.uint8], order: float
+    ) -> None:
+        archetype = draw.grid_archetype(geometry, pixels, None, order)
+        self._writer.log(entity, archetype, latched=True, size=pixels.nbytes)
+
+    def _shifted(self, geometry: GridGeometry) -> GridGeometry:
+        anchor = self._anchored(geometry.origin.x, geometry.origin.y)
+        return replace(geometry, origin=anchor.pose(geometry.origin))
+
+    def _show(self) -> None:
+        """Fit the layout to the robots and their maps, if these have changed much."""
+        robots = tuple(member.name for member in self._members)
+        known: Bounds | None = None
+        for drawn in self._drawn.values():
+            known = union_bounds(known, drawn.known)
+        framed = self._framed
+        is_far = known is not None and (framed is None or is_far_from(framed, known, REFRAME))
+        if robots != self._shown or is_far:
+            self._shown, self._framed = robots, known
+            self._writer.show(build_layout(robots, known or NO_MAP))
+
+
+def _world(member: RecordedMember, name: str) -> str:
+    return robot_entity(member.name, f"world/{name}")
+
+
+def _colour(member: RecordedMember) -> tuple[int, int, int]:
+    return colour_of(member.number)
+
+
+def _darker(colour: tuple[int, int, int]) -> tuple[int, int, int]:
+    red, green, blue = (round(0.6 * one) for one in colour)
+    return red, green, blue
+
+
+def _line(xy: NDArray[np.float64], z: float) -> rr.LineStrips3D:
+    return draw.line_archetype(xy, draw.LineStyle((0, 0, 0), z, 0.0))

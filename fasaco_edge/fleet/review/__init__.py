@@ -1,0 +1,1 @@
+"""Report of a recorded fleet: its figures, its text and its picture."""

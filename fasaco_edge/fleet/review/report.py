@@ -1,0 +1,319 @@
+"""The review of a fleet's recording: makespan, balance, floor swept again, waiting, messages.
+
+A cell that two robots passed over is swept again, or only driven through: while a robot is on floor
+that others have swept, it takes a number of steps from where it comes onto it to where it leaves.
+The shortest way between the two is driving through; what it takes beyond that is sweeping again.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from itertools import pairwise
+from pathlib import Path
+
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+
+from fasaco_edge.fleet.observer.cells import (
+    FAR,
+    Cells,
+    Place,
+    Seat,
+    cells_of,
+    distances,
+    mask_of,
+    together,
+    window_of,
+)
+from fasaco_edge.fleet.recording.notes import Note, NoteBatch, NotedRobot, read_notes
+from fasaco_edge.grid.geometry import Window
+
+AT_WORK = ("planning", "covering", "degraded")
+# Messages are counted over this time for their highest rate [s].
+PEAK_S = 5.0
+# Notes come once a second: more than that apart nothing was heard in between [s].
+LONGEST_NOTE_S = 3.0
+NEVER_MS = math.inf
+
+
+class FleetRobotFigures(msgspec.Struct, frozen=True):
+    """What one robot of a fleet did.
+
+    Attributes:
+        name: of the robot.
+        state: its last.
+        busy_s: planning or covering, without waiting [s].
+        waited_s: waited or made way for another robot [s].
+        waits, longest_wait_s: how often, and the longest [s].
+        driven_m: by its poses [m].
+        swept_m2: cells it swept [m2].
+        through_m2: of these, swept by another before, and only driven through [m2].
+        again_m2: of these, swept by another before, and swept again [m2].
+        messages_s, kb_s: messages to the fleet, and their size, a second.
+        peak_kb_s: the most over five seconds.
+        plans: how many were heard of.
+        plan_ms_p50, plan_ms_p99: time of a plan [ms]; null without one.
+    """
+
+    name: str
+    state: str
+    busy_s: float
+    waited_s: float
+    waits: int
+    longest_wait_s: float
+    driven_m: float
+    swept_m2: float
+    through_m2: float
+    again_m2: float
+    messages_s: float
+    kb_s: float
+    peak_kb_s: float
+    plans: int
+    plan_ms_p50: float | None
+    plan_ms_p99: float | None
+
+
+class FleetFigures(msgspec.Struct, frozen=True):
+    """What a fleet did.
+
+    Attributes:
+        fleet: its name.
+        duration_s: of the recording [s].
+        makespan_s: from when the first robot works until the last has ended [s].
+        busy_balance: the least busy robot's time at work over the busiest one's.
+        swept_balance: the same of the swept area.
+        swept_m2: cells that any robot swept [m2].
+        through_m2, again_m2: of these, driven through and swept again by another robot [m2].
+        again_share: the latter as a share of what is swept.
+        waited_s: by all robots [s].
+        divisions: number of the last one.
+        robots: each.
+    """
+
+    fleet: str
+    duration_s: float
+    makespan_s: float
+    busy_balance: float
+    swept_balance: float
+    swept_m2: float
+    through_m2: float
+    again_m2: float
+    again_share: float
+    waited_s: float
+    divisions: int
+    robots: list[FleetRobotFigures]
+
+
+@dataclass(slots=True, eq=False)
+class RobotTrack:
+    """What was noted of a robot, its cells on the lattice of the first robot.
+
+    Attributes:
+        name, number: of the robot, the latter in order of joining: its colour.
+        notes: in order of time.
+        swept_ms: the cells it swept, and when that was first told [ms].
+        passes: the cells it came into, in order, int64 (n, 3): when [ms], row, col.
+        again: those of ``swept_ms`` that another had swept before: for each the share of the
+            passes around it that was sweeping again.
+    """
+
+    name: str
+    number: int = 0
+    notes: list[Note] = field(default_factory=list)
+    swept_ms: dict[Place, int] = field(default_factory=dict)
+    passes: NDArray[np.int64] = field(default_factory=lambda: np.zeros((0, 3), np.int64))
+    again: dict[Place, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FleetReview:
+    """A fleet's recording, read.
+
+    Attributes:
+        figures: of the fleet.
+        seat: of the lattice of all cells.
+        ground: cells that any robot could reach, int64 (n, 2).
+        tracks: of each robot.
+    """
+
+    figures: FleetFigures
+    seat: Seat
+    ground: Cells
+    tracks: list[RobotTrack]
+
+
+def review_fleet(paths: Sequence[Path]) -> FleetReview:
+    """Read the parts of a fleet's recording.
+
+    Raises:
+        UnreadableRecording: a file is missing, damaged, or no recording of a fleet.
+        DifferentRuns: the parts are not of one run.
+    """
+    batches = read_notes(paths)
+    robots = [robot for batch in batches for robot in batch.robots]
+    seat = _seat(robots[0]) if robots else Seat(1.0)
+    tracks, ground = _tracks(batches, seat)
+    find_again(tracks, ground)
+    return FleetReview(_figures(batches[0].fleet, tracks, seat), seat, ground, tracks)
+
+
+def _seat(robot: NotedRobot) -> Seat:
+    return Seat(robot.cell_m, robot.lattice_deg, robot.x, robot.y, robot.deg)
+
+
+def _tracks(batches: Sequence[NoteBatch], seat: Seat) -> tuple[list[RobotTrack], Cells]:
+    """Return the robots by name, and the cells that any of them could reach."""
+    tracks: dict[str, RobotTrack] = {}
+    passes: dict[str, list[NDArray[np.int64]]] = {}
+    ground: list[Cells] = []
+    for batch in batches:
+        for note in batch.notes:
+            robot = batch.robots[note.robot]
+            own = _seat(robot)
+            track = tracks.setdefault(robot.name, RobotTrack(robot.name, note.robot))
+            for cell in own.carried(cells_of(note.swept), seat).tolist():
+                track.swept_ms.setdefault((cell[0], cell[1]), note.at_ms)
+            ground.append(np.unique(own.carried(cells_of(note.ground), seat), axis=0))
+            if note.in_force:
+                continue
+            track.notes.append(note)
+            if note.passes:
+                told = np.array([(p.at_ms, p.row, p.col) for p in note.passes], np.int64)
+                told[:, 1:] = own.carried(told[:, 1:], seat)
+                passes.setdefault(robot.name, []).append(told)
+    for name, pieces in passes.items():
+        tracks[name].passes = np.concatenate(pieces)
+    return sorted(tracks.values(), key=lambda track: track.name), together(ground)
+
+
+def find_again(tracks: Sequence[RobotTrack], ground: Cells) -> None:
+    """Find the cells that robots swept after others, and how much of that was sweeping again.
+
+    Args:
+        tracks: their passes and swept cells; ``again`` is filled in.
+        ground: int64 (n, 2), the cells that they could reach.
+    """
+    window = window_of(ground)
+    if window is None:
+        return
+    known = mask_of(ground, window)
+    for track in tracks:
+        others = [other for other in tracks if other is not track]
+        _find_again_of(track, others, known, window)
+
+
+def _find_again_of(
+    track: RobotTrack, others: Sequence[RobotTrack], known: NDArray[np.bool_], window: Window
+) -> None:
+    steps = [(ms, (row, col)) for ms, row, col in track.passes.tolist()]
+    foreign = [
+        any(other.swept_ms.get(cell, NEVER_MS) < ms for other in others) for ms, cell in steps
+    ]
+    seen: set[Place] = set()
+    at = 0
+    while at < len(steps):
+        end = at
+        while end < len(steps) and foreign[end]:
+            end += 1
+        if end > at:
+            new = {cell for _, cell in steps[at:end]} & track.swept_ms.keys() - seen
+            if new:
+                way = [cell for _, cell in steps[max(at - 1, 0) : end + 1]]
+                track.again.update(dict.fromkeys(new, _share_again(way, known, window)))
+        seen.update(cell for _, cell in steps[at : end + 1])
+        at = end + 1
+
+
+def _share_again(way: Sequence[Place], known: NDArray[np.bool_], window: Window) -> float:
+    """Return which share of a way is beyond the shortest one between its ends."""
+    taken = sum(abs(a[0] - b[0]) + abs(a[1] - b[1]) for a, b in pairwise(way))
+    start, end = ((row - window.row0, col - window.col0) for row, col in (way[0], way[-1]))
+    away = distances(known, start)
+    inside = 0 <= end[0] < window.rows and 0 <= end[1] < window.cols
+    least = int(away[end]) if inside else FAR
+    if not taken or least >= taken:
+        return 0.0
+    return 1.0 - least / taken
+
+
+def _figures(fleet: str, tracks: Sequence[RobotTrack], seat: Seat) -> FleetFigures:
+    cell_m2 = seat.cell_m**2
+    robots = [_robot(track, cell_m2) for track in tracks]
+    worked = [note.at_ms for track in tracks for note in track.notes if note.state in AT_WORK]
+    ends = [note.at_ms for track in tracks for note in track.notes]
+    swept = {cell for track in tracks for cell in track.swept_ms}
+    through_m2, again_m2 = (
+        sum(getattr(robot, name) for robot in robots) for name in ("through_m2", "again_m2")
+    )
+    swept_m2 = len(swept) * cell_m2
+    return FleetFigures(
+        fleet=fleet,
+        duration_s=round(max(ends, default=0) / 1000, 1),
+        makespan_s=round((max(worked) - min(worked)) / 1000, 1) if worked else 0.0,
+        busy_balance=_balance([robot.busy_s for robot in robots]),
+        swept_balance=_balance([robot.swept_m2 for robot in robots]),
+        swept_m2=round(swept_m2, 2),
+        through_m2=round(through_m2, 2),
+        again_m2=round(again_m2, 2),
+        again_share=round(again_m2 / swept_m2, 4) if swept else 0.0,
+        waited_s=round(sum(robot.waited_s for robot in robots), 1),
+        divisions=max((note.division for track in tracks for note in track.notes), default=0),
+        robots=robots,
+    )
+
+
+def _balance(values: Sequence[float]) -> float:
+    return round(min(values) / max(values), 3) if values and max(values) > 0 else 1.0
+
+
+def _robot(track: RobotTrack, cell_m2: float) -> FleetRobotFigures:
+    notes = track.notes
+    times = [note.at_ms / 1000 for note in notes]
+    lasting = [min(b - a, LONGEST_NOTE_S) for a, b in pairwise(times)] + [0.0]
+    waits: list[float] = []
+    was_waiting = False
+    for note, seconds in zip(notes, lasting, strict=True):
+        if note.waits_for:
+            waits = [*waits[:-1], waits[-1] + seconds] if was_waiting else [*waits, seconds]
+        was_waiting = bool(note.waits_for)
+    busy_s = sum(
+        seconds
+        for note, seconds in zip(notes, lasting, strict=True)
+        if note.state in AT_WORK and not note.waits_for
+    )
+    heard_s = max(sum(lasting), 1.0)
+    plans = [ms for note in notes for ms in note.plans_ms]
+    again = sum(track.again.values())
+    return FleetRobotFigures(
+        name=track.name,
+        state=notes[-1].state if notes else "",
+        busy_s=round(busy_s, 1),
+        waited_s=round(sum(waits), 1),
+        waits=len(waits),
+        longest_wait_s=round(max(waits, default=0.0), 1),
+        driven_m=round(sum(note.driven_m for note in notes), 1),
+        swept_m2=round(len(track.swept_ms) * cell_m2, 2),
+        through_m2=round((len(track.again) - again) * cell_m2, 2),
+        again_m2=round(again * cell_m2, 2),
+        messages_s=round(sum(note.messages for note in notes) / heard_s, 2),
+        kb_s=round(sum(note.bytes for note in notes) / heard_s / 1000, 2),
+        peak_kb_s=_peak_kb_s(notes),
+        plans=len(plans),
+        plan_ms_p50=round(float(np.percentile(plans, 50)), 1) if plans else None,
+        plan_ms_p99=round(float(np.percentile(plans, 99)), 1) if plans else None,
+    )
+
+
+def _peak_kb_s(notes: Sequence[Note]) -> float:
+    """Return the highest rate of messages over some seconds [kB/s]."""
+    most, first, total = 0.0, 0, 0
+    for note in notes:
+        total += note.bytes
+        while note.at_ms - notes[first].at_ms > 1000 * PEAK_S:
+            total -= notes[first].bytes
+            first += 1
+        most = max(most, total)
+    return round(most / PEAK_S / 1000, 2)

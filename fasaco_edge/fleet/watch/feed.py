@@ -1,0 +1,85 @@
+"""The feed of samples of all robots of a fleet from the bus, and the names of all robots on it."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Collection
+
+from fasaco_edge.bus.arrival import Arrival, Sample
+from fasaco_edge.bus.session import Bus
+from fasaco_edge.bus.settings import BusSettings
+from fasaco_edge.client.joining import Joining
+from fasaco_edge.client.phrases import steady_now
+from fasaco_edge.fleet.observer.inbox import FleetInbox, Heard, Traffic
+from fasaco_edge.fleet.observer.subscriptions import FleetSubscriptions
+from fasaco_edge.wire.keys import VERSION, Keys
+from fasaco_edge.wire.topics import STATUS
+
+# Of all samples that wait [bytes]; of each robot no more than a quarter.
+CAPACITY_BYTES = 128_000_000
+# Names of robots that are kept.
+MOST_ROBOTS = 256
+
+
+class FleetFeed(Joining):
+    """The samples of the robots of a fleet; a context manager.
+
+    Which robots these are is decided by the reader: it hears the messages to fleets of all robots,
+    and says by ``attend`` of whom it wants statuses.
+    """
+
+    def __init__(self, settings: BusSettings, keys: Keys) -> None:
+        super().__init__(settings)
+        self._keys = keys
+        self._inbox = FleetInbox(CAPACITY_BYTES, _stamped)
+        self._subscriptions: FleetSubscriptions | None = None
+        self._here: set[str] = set()
+        # Not that of the session: tokens may come while it listens.
+        self._naming = threading.Lock()
+
+    def take(self, timeout_s: float) -> list[Heard]:
+        """Return what has arrived, robot by robot; wait up to ``timeout_s`` [s] for a sample."""
+        return self._inbox.take(timeout_s)
+
+    def attend(self, robots: Collection[str]) -> None:
+        """Hear the robots of these names, and no others; call it often."""
+        subscriptions = self._subscriptions
+        if subscriptions is None:
+            return
+        for robot in subscriptions.robots - set(robots):
+            subscriptions.leave(robot)
+            self._inbox.forget(robot)
+        for robot in set(robots) - subscriptions.robots:
+            subscriptions.hear(robot)
+
+    def forget(self, robot: str) -> None:
+        """Drop the queues of a robot of no concern."""
+        self._inbox.forget(robot)
+
+    def traffic(self, robot: str) -> Traffic:
+        """Return what a robot has told its fleet since the last call."""
+        return self._inbox.traffic(robot)
+
+    def robots(self) -> set[str]:
+        """Return the names of the robots on the bus."""
+        with self._naming:
+            return set(self._here)
+
+    def _listen(self, bus: Bus) -> None:
+        bus.watch_tokens(f"{self._keys.base}/{VERSION}/*/alive", self._note_token)
+        subscriptions = FleetSubscriptions(bus, self._keys, (STATUS,), self._inbox.post)
+        subscriptions.listen()
+        self._subscriptions = subscriptions
+
+    def _note_token(self, key: str, here: bool) -> None:
+        robot = self._keys.robot_of(key)
+        with self._naming:
+            if not here:
+                self._here.discard(robot)
+            elif robot and len(self._here) < MOST_ROBOTS:
+                self._here.add(robot)
+
+
+def _stamped(topic: str, sample: Sample) -> Arrival:
+    at_ns = int(1e9 * steady_now())
+    return Arrival(topic, sample, at_ns, at_ns)

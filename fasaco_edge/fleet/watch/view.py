@@ -1,0 +1,211 @@
+"""The view of a fleet by what its robots tell: who does what, and the latest events."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter, deque
+from dataclasses import dataclass, field
+
+from fasaco_edge.bus.arrival import Sample
+from fasaco_edge.client.events import BAD, GOOD, PLAIN, TROUBLED, EventLog
+from fasaco_edge.errors import FasacoError
+from fasaco_edge.fleet.observer.inbox import Heard
+from fasaco_edge.fleet.observer.members import JOINED, MOST_MEMBERS, Member, Members
+from fasaco_edge.fleet.watch.floor import FleetFloor, FloorSurvey
+from fasaco_edge.fleet.watch.robot import FleetRobot, document_of, short
+from fasaco_edge.text import is_reported
+from fasaco_edge.wire.documents.fleet import decode_member, fleet_of
+from fasaco_edge.wire.documents.json_text import decode_tolerant
+from fasaco_edge.wire.documents.status import FleetReport, Status
+from fasaco_edge.wire.keys import is_chunk
+
+# A robot's changes of state are noted at most so often [s]; its rate is a mean of so many seconds.
+NOTED_EVERY_S, RATE_S = 1.0, 5
+# Robots that others have heard within this time are named, though they may be silent by now [s].
+TOLD_S = 600.0
+# Robots and topics whose faults are counted apart; other fleets that are named.
+MOST_FAULTS, MOST_FLEETS = 256, 32
+
+
+@dataclass(slots=True)
+class _Seen:
+    """What is known of a robot beside what it tells its fleet."""
+
+    status: Status | None = None
+    noted: str = ""
+    noted_at: float = -math.inf
+    rates: deque[float] = field(default_factory=lambda: deque(maxlen=RATE_S))
+
+
+class FleetView:
+    """The newest of all robots of one fleet, and the latest events.
+
+    Attributes:
+        fleet: name of the fleet.
+        members: its robots.
+        events: what happened.
+        trouble: why the bus cannot be reached; "" if it can.
+        others: names of other fleets that were heard of, each one line.
+    """
+
+    def __init__(self, fleet: str) -> None:
+        self.fleet = fleet
+        self.members: Members[Member] = Members(Member)
+        self.events = EventLog()
+        self.trouble = ""
+        self.others: set[str] = set()
+        self._seen: dict[str, _Seen] = {}
+        self._survey = FloorSurvey()
+        self._division = 0
+        self._faults: Counter[tuple[str, str]] = Counter()
+
+    @property
+    def floor(self) -> FleetFloor:
+        """The cells of all robots."""
+        return self._survey.floor
+
+    def take(self, heard: Heard) -> None:
+        """Take in a sample. One that cannot be read is dropped and noted."""
+        arrival, robot = heard.arrival, heard.robot
+        try:
+            if arrival.topic == "fleet":
+                self._read_fleet(robot, arrival.sample, arrival.wall_ns)
+            elif (member := self.members.get(robot)) is not None:
+                self._read_status(member, arrival.sample)
+        except FasacoError as error:
+            text = f"{arrival.topic} cannot be read: {error}"
+            self._note_often(robot, arrival.topic, text, 1e-9 * arrival.wall_ns)
+
+    def tick(self, now: float) -> None:
+        """Note what has changed by ``now``, since the epoch [s]; call it often."""
+        now_ns = int(1e9 * now)
+        self._survey.update(self.members, now_ns)
+        telling = self.members.dividing(now_ns)
+        if telling is not None and telling.newest.division != self._division:
+            self._division = telling.newest.division
+            among = f", {len(telling.newest.parts)} parts" if telling.newest.parts else ""
+            self.events.add(now, f"division {self._division} by {short(telling.newest.by)}{among}")
+        for robot in self.robots(now):
+            self._note_state(robot, now)
+
+    def note_rate(self, robot: str, kb_s: float) -> None:
+        """Note what a robot told its fleet in the last second [kB/s]."""
+        if robot in self._seen:
+            self._seen[robot].rates.append(kb_s)
+
+    def names(self) -> list[str]:
+        """Return the names of the robots."""
+        return [member.name for member in self.members]
+
+    def unheard(self, now: float) -> list[str]:
+        """Return the names of robots that others have heard lately, and that are not heard here."""
+        told = {
+            other.name
+            for status in self._reports(int(1e9 * now)).values()
+            for other in status.members
+            if other.heard_s <= TOLD_S and is_chunk(other.name)
+        }
+        return sorted(map(short, told - set(self._seen)))[:MOST_MEMBERS]
+
+    def robots(self, now: float) -> list[FleetRobot]:
+        """Return the robots by name."""
+        now_ns = int(1e9 * now)
+        away = self._absences(now_ns)
+        found = [self._robot(member, away.get(member.name, ""), now) for member in self.members]
+        return sorted(found, key=lambda robot: robot.name)
+
+    def document(self, now: float) -> dict[str, object]:
+        """Return what ``--json`` prints."""
+        document = document_of(self.fleet, self._division, self.floor, self.robots(now))
+        return document | {"unheard": self.unheard(now)}
+
+    def _robot(self, member: Member, away: str, now: float) -> FleetRobot:
+        said, seen, cell_m2 = member.newest, self._seen[member.name], member.seat.cell_m**2
+        x, y = member.placed(said.x, said.y)
+        floor, is_gone = self.floor, member.is_gone(int(1e9 * now))
+        left = floor.left.get(member.name) if floor.division else None
+        path = seen.status.path if seen.status is not None else None
+        return FleetRobot(
+            name=member.name,
+            state=short(said.state),
+            waits_for=short(said.waits_for),
+            silent_s=now - 1e-9 * member.heard_ns if is_gone else None,
+            away=away,
+            x=x,
+            y=y,
+            swept_cells=member.swept.count,
+            swept_m2=member.swept.count * cell_m2,
+            left_cells=left,
+            left_m2=None if left is None else left * floor.cell_m2,
+            division=said.division,
+            revision=None if path is None else path.revision,
+            kb_s=sum(seen.rates) / len(seen.rates) if seen.rates else 0.0,
+        )
+
+    def _reports(self, now_ns: int) -> dict[str, FleetReport]:
+        """Return what robots that are there report of their fleet, by their names."""
+        found = {}
+        for member in self.members:
+            status = self._seen[member.name].status
+            if not member.is_gone(now_ns) and status is not None and status.fleet is not None:
+                found[member.name] = status.fleet
+        return found
+
+    def _absences(self, now_ns: int) -> dict[str, str]:
+        """Return why robots are given no part by others, by their names."""
+        return {
+            other.name: short(other.away)
+            for report in self._reports(now_ns).values()
+            for other in report.members
+            if other.away and other.name in self._seen
+        }
+
+    def _read_fleet(self, robot: str, sample: Sample, at_ns: int) -> None:
+        said = decode_member(sample.payload, self.fleet)
+        if said is None or not robot:
+            if not self._seen and len(self.others) < MOST_FLEETS:
+                self.others |= {short(fleet_of(sample.payload) or "")} - {""}
+            return
+        _, news = self.members.hear(robot, said, at_ns)
+        if news == JOINED:
+            # One that is long gone may have had its place.
+            self._seen = {name: self._seen.get(name, _Seen()) for name in self.names()}
+        elif news:
+            self._note_often(robot, "frame", news, 1e-9 * at_ns)
+
+    def _read_status(self, member: Member, sample: Sample) -> None:
+        status = decode_tolerant(sample.payload, Status)
+        # A second daemon of the robot's name does not plan.
+        if status.claim.stand == "plans":
+            self._seen[member.name].status = status
+
+    def _note_state(self, robot: FleetRobot, now: float) -> None:
+        """Note what a robot does, if that is another than before."""
+        seen, doing = self._seen[robot.name], robot.doing
+        if doing == seen.noted or now - seen.noted_at < NOTED_EVERY_S:
+            return
+        before, seen.noted, seen.noted_at = seen.noted, doing, now
+        name, status = short(robot.name), seen.status
+        if doing == "gone":
+            self.events.add(now, f"{name} is gone: nothing is heard of it", BAD)
+            return
+        name += {"": " joined", "gone": " is back"}.get(before, "")
+        is_troubled = not robot.waits_for and robot.state in TROUBLED
+        why = f": {short(status.reason)}" if is_troubled and status is not None else ""
+        is_good = doing == "done" or before in ("", "gone")
+        tone = BAD if is_troubled else GOOD if is_good else PLAIN
+        self.events.add(now, f"{name}: {doing}{why}", tone)
+
+    def _note_often(self, robot: str, what: str, text: str, now: float) -> None:
+        """Note what a robot may do again and again: the 1st, 2nd, 4th, 8th ... time."""
+        fault = robot, what
+        if fault not in self._faults and (
+            robot not in self._seen or len(self._faults) >= MOST_FAULTS
+        ):
+            # Of any number of names.
+            fault = "other robots", what
+        self._faults[fault] += 1
+        count = self._faults[fault]
+        if is_reported(count):
+            again = f" ({count} so far)" if count > 1 else ""
+            self.events.add(now, f"{short(fault[0])}: {text}{again}", BAD)

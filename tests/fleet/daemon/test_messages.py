@@ -1,0 +1,259 @@
+"""What a robot says to its fleet: read back as it was, and refused beyond any limit."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from msgspec import structs
+
+from fasaco_edge.bus.arrival import Sample
+from fasaco_edge.config.config import DaemonConfig, FleetConfig
+from fasaco_edge.config.robot import RobotConfig
+from fasaco_edge.errors import FleetError, MalformedMessage
+from fasaco_edge.fleet.daemon.exchange import TILES, FleetReceiver, FleetSender
+from fasaco_edge.fleet.mission.kind import FleetKind
+from fasaco_edge.fleet.mission.shared import MOST_ROBOTS
+from fasaco_edge.grid.lattice import Footprint
+from fasaco_edge.mission.core.events import MapReceived, Part
+from fasaco_edge.wire.documents.fleet import CellTile, FleetMember, FleetPart, decode_member
+from fasaco_edge.wire.documents.json_text import encode_json
+from fasaco_edge.wire.limits import (
+    MAX_FLEET_PARTS,
+    MAX_FLEET_POINTS,
+    MAX_FLEET_TILES,
+    MAX_JSON_BYTES,
+)
+from tests.fleet.mission.fleets import FleetRobot
+from tests.mission import world
+from tests.mission.world import CELL, Drive, building, pose_at
+from tests.mission.world import CONFIG as WORLD
+from tests.wire.schemas import check
+
+TILE = CellTile(-1, 2, bytes(range(256)) * 2)
+MEMBER = FleetMember(1, "hall", 0.3, "map", "covering", 1.5, -2.0, 1.2, 7, 3, 500, (TILE,))
+MEMBER = structs.replace(
+    MEMBER,
+    ground=(TILE,),
+    by="r2",
+    parts=(FleetPart("r1", 3, -4, -1.5, 1.2), FleetPart("r2", 0, 9, 0.0, 2.0)),
+    radius_m=0.2,
+    ahead=((1.5, -2.0), (1.5, -1.75)),
+    waits_for="r3",
+    kept=(TILE,),
+)
+CONFIG = DaemonConfig(robot=RobotConfig(name="r1"), fleet=FleetConfig("hall"))
+
+
+def said(**members):
+    return json.dumps(json.loads(encode_json(MEMBER)) | members).encode()
+
+
+def heard(payload, robot="r2"):
+    receiver = FleetReceiver(CONFIG)
+    return receiver.event(Sample(f"fasaco/@v1/{robot}/fleet", payload))
+
+
+def test_it_comes_back_as_it_was_and_is_that_of_the_schema():
+    payload = encode_json(MEMBER)
+    assert decode_member(payload, "hall") == MEMBER
+    check("fleet.json", json.loads(payload))
+    assert decode_member(payload, "yard") is None
+
+
+@pytest.mark.parametrize(
+    "members",
+    [
+        {"x": float("nan")},
+        {"y": float("inf")},
+        {"x": 1e9},
+        {"cell_m": 0.0},
+        {"cell_m": 5e-324},
+        {"cell_m": 1e200},
+        {"step_s": 0.0},
+        {"epoch": 0},
+        {"division": 2**31},
+        {"frame": "m" * 300},
+        {"state": 5},
+        {"state": ""},
+        {"swept": [[0, 0, "AAAA"]]},
+        {"ground": [[0, 0, "AAAA"]]},
+        {"radius_m": -0.1},
+        {"ahead": [[0.0, 1e9]]},
+        {"ahead": [[0.0, 0.0]] * (MAX_FLEET_POINTS + 1)},
+        {"parts": [["r1", 0, 0, 0.0, 0.0]]},
+        {"origin": [0.0, 1e9, 0.0]},
+        {"origin": [0.0, 0.0, 361.0]},
+        {"parts": [["r1", 0, 2**30 + 1, 0.0, 1.0]]},
+        {"parts": [["r1", 0, 0, 1e300, 1.0]]},
+        {"parts": [["r1", 0, 0, 0.0, 1.0]] * (MAX_FLEET_PARTS + 1)},
+        {"swept": [[2**24 + 1, 0, "A" * 682 + "=="]]},
+        {"swept": [[0, 0, "A" * 682 + "=="]] * (MAX_FLEET_TILES + 1)},
+    ],
+    ids=str,
+)
+def test_what_is_beyond_a_limit_is_refused_and_the_robot_named(members):
+    with pytest.raises(MalformedMessage, match=r"^r2: fleet: "):
+        heard(said(**members))
+
+
+@given(st.binary(max_size=60))
+def test_other_bytes_are_refused(payload):
+    with pytest.raises(MalformedMessage):
+        decode_member(payload, "hall")
+
+
+def test_a_division_has_a_part_for_this_robot_and_for_each_other_that_it_keeps():
+    assert MAX_FLEET_PARTS == 1 + MOST_ROBOTS
+
+
+def test_what_is_too_long_is_not_looked_at():
+    with pytest.raises(MalformedMessage, match="at most"):
+        decode_member(b" " * (MAX_JSON_BYTES + 1), "hall")
+
+
+def test_another_version_is_told_apart_even_where_nothing_else_can_be_read():
+    with pytest.raises(FleetError, match="version 2, not 1"):
+        decode_member(b'{"version": 2, "fleet": "hall"}', "hall")
+    assert heard(said(version=2)).misfit == "its messages are of version 2, not 1"
+    # The status names it with each member.
+    with pytest.raises(MalformedMessage, match="version"):
+        decode_member(b'{"version": ' + b"9" * 4000 + b', "fleet": "hall"}', "hall")
+
+
+def test_cells_of_another_size_do_not_fit():
+    cell_m = CONFIG.cell_m
+    assert heard(said(cell_m=cell_m)).misfit == ""
+    assert "its cells are 0.5 m wide" in heard(said(cell_m=0.5)).misfit
+
+
+def test_robots_of_a_frame_of_their_own_need_the_same_one():
+    config = structs.replace(CONFIG, fleet=FleetConfig("hall", frame="house"))
+    for frame, misfit in (
+        ("map", "its frame is 'map', that of this fleet is 'house'"),
+        ("house", ""),
+    ):
+        # Their maps may lie at any angle to each other, and so may their cells.
+        payload = said(cell_m=CONFIG.cell_m, frame=frame, lattice_deg=20.0, origin=[1.0, 2.0, 30.0])
+        event = FleetReceiver(config).event(Sample("fasaco/@v1/r2/fleet", payload))
+        assert event.misfit == misfit
+    assert event.frame == ""
+
+
+@pytest.mark.parametrize("robot", ["r1", "*", "r$*"])
+def test_nobody_speaks_for_this_robot_or_for_all(robot):
+    assert heard(said(), robot) is None
+
+
+class Listener:
+    """Keeps what is published."""
+
+    def __init__(self):
+        self.payloads, self.heard = [], []
+
+    def put(self, payload):
+        self.payloads.append(payload)
+        self.heard.append(decode_member(payload, "hall"))
+
+
+def test_a_robot_tells_its_pace_as_it_is_now_and_after_forgetting_all_tiles_at_once():
+    robot, listener = FleetRobot("r1", (0, 0), ["." * 12] * 4), Listener()
+    ledger, sender = robot.mission.ledger, FleetSender(listener, CONFIG)
+    for row in range(TILES):
+        ledger.credit((64 * row, 0))
+    robot.mission.company.step_s = 7.5
+    for now in (0.0, 1.0, 2.0):
+        robot.mission.shared.note_forgotten()
+        sender.publish(robot.mission, now)
+    assert [said.step_s for said in listener.heard] == [7.5] * 3
+    assert [len(said.swept) for said in listener.heard] == [TILES] * 3
+
+
+def test_a_robot_tells_which_of_its_cells_are_from_before_their_epoch_where_it_knows():
+    robot, listener = FleetRobot("r1", (0, 0), ["." * 12] * 4), Listener()
+    ledger, sender = robot.mission.ledger, FleetSender(listener, CONFIG)
+    ledger.credit((64, 0))
+    sender.publish(robot.mission, 0.0)
+    before = {tile.row: tile for tile in listener.heard[-1].swept}
+    assert listener.heard[-1].kept is None
+    robot.mission.shared.note_forgotten()
+    sender.publish(robot.mission, 1.0)
+    ledger.credit((64, 9))
+    ledger.credit((128, 0))
+    sender.publish(robot.mission, 2.0)
+    told = listener.heard[-1]
+    assert {64 * tile.row for tile in told.swept} >= {64, 128}
+    assert {tile.row: tile for tile in told.kept}[1] == before[1]
+    assert 2 not in {tile.row for tile in told.kept}
+
+
+@pytest.mark.parametrize("cell_m", [0.005, 0.028, CELL])
+def test_a_robot_tells_its_next_metres_whatever_the_size_of_its_cells(cell_m, monkeypatch):
+    monkeypatch.setattr(world, "CELL", cell_m)
+    footprint = Footprint(cell_m=cell_m, robot_radius_m=cell_m / 2)
+    drive = Drive((0, 0), config=replace(WORLD, company=FleetKind("r1"), footprint=footprint))
+    drive.mission.shared.begin(1)
+    drive.tell(MapReceived(building("." * 600)), pose_at(0, 0))
+    drive.plan()
+    line, listener = drive.mission.next_metres(), Listener()
+    FleetSender(listener, CONFIG).publish(drive.mission, 0.0)
+    told = np.array(listener.heard[-1].ahead)
+    assert told[-1] == pytest.approx(line[-1], abs=1e-3)
+    assert told[0] == pytest.approx(line[0], abs=1e-3)
+    steps = np.hypot(*np.diff(told, axis=0).T)
+    assert steps.max() < max(1.1 * cell_m, 0.06)
+    assert steps.min() > 0.0
+
+
+@pytest.mark.parametrize("northing_m", [5_500_000, 9_999_000])
+def test_robots_on_a_map_in_utm_divide_its_cells(northing_m):
+    corner = round(northing_m / CELL), round(500_000 / CELL)
+    ends = {"r1": corner, "r2": (corner[0] + 3, corner[1] + 11)}
+    drives, subscriptions = {}, {}
+    for name, cell in ends.items():
+        drives[name] = Drive(cell, config=replace(WORLD, company=FleetKind(name)))
+        drives[name].mission.shared.begin(1)
+        drives[name].tell(MapReceived(building(*["." * 12] * 4, at=corner)), pose_at(*cell))
+        drives[name].plan()
+        subscriptions[name] = FleetReceiver(structs.replace(CONFIG, robot=RobotConfig(name=name)))
+    for now in range(4):
+        for name, drive in drives.items():
+            listener = Listener()
+            FleetSender(listener, CONFIG).publish(drive.mission, float(now))
+            (payload,) = listener.payloads
+            sample = Sample(f"fasaco/@v1/{name}/fleet", payload)
+            for other in drives.keys() - {name}:
+                event = subscriptions[other].event(sample)
+                assert event.misfit == ""
+                drives[other].tell(event, pose_at(*ends[other]), after=1.0)
+                if drives[other].request is not None:
+                    drives[other].plan()
+    parts = [drive.mission.company.parts for drive in drives.values()]
+    assert parts[0] == parts[1]
+    assert [part.robot for part in parts[0]] == ["r1", "r2"]
+
+
+def test_a_robot_whose_cells_lie_at_another_angle_is_left_out():
+    cell_m = CONFIG.cell_m
+    assert heard(said(cell_m=cell_m, lattice_deg=0.0)).misfit == ""
+    told = heard(said(cell_m=cell_m, lattice_deg=12.5)).misfit
+    assert told == "its cells lie at 12.5 degrees to the map frame, here at 0"
+    older = json.loads(said(cell_m=cell_m))
+    older.pop("lattice_deg", None)
+    assert heard(json.dumps(older).encode()).misfit == ""
+
+
+def test_a_division_comes_with_its_parts_and_one_that_lacks_them_is_read():
+    heard_now = heard(said())
+    assert heard_now.by == "r2"
+    assert heard_now.parts[0] == Part("r1", (3, -4), -1.5, 1.2)
+    assert heard_now.ground == heard_now.kept == (((-1, 2), TILE.cells),)
+    older = json.loads(said())
+    for member in ("ground", "by", "parts", "radius_m", "ahead", "waits_for", "kept"):
+        del older[member]
+    assert heard(json.dumps(older).encode()).parts == ()
+    assert heard(json.dumps(older).encode()).kept is None

@@ -1,0 +1,246 @@
+"""The end of a fleet's mission: who has no part left stands until others have swept it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from fasaco_edge.fleet.mission.ground import GroundTelling
+from fasaco_edge.fleet.mission.members import HANGING_S
+from fasaco_edge.fleet.mission.remainder import STUCK_S, WAITING_S, Remainder
+from fasaco_edge.mission.core.events import CommandReceived, MapReceived, Part
+from fasaco_edge.mission.orders.order import MissionOrder, Zone
+from tests.fleet.mission.fleets import FleetDrive, FleetRobot
+from tests.fleet.mission.test_fleet import tiles_of
+from tests.mission.world import CONFIG, building, patch, with_policy
+
+HALL = ["." * 24] * 12
+CELLS = [(row, col) for row in range(12) for col in range(24)]
+ALL_TO_R2 = (Part("r1", (0, 0), 1e6, 1.0), Part("r2", (6, 12), 0.0, 1.0))
+
+
+class Shared:
+    """A robot, r1, in a hall whose cells another one, r2, gives itself and sweeps one by one."""
+
+    def __init__(self, config=CONFIG):
+        fleet = FleetDrive(HALL, {"r1": (0, 0), "r2": (6, 12)}, config)
+        self.ours, other = fleet.robots.values()
+        self._report, self.swept, self._number = other.report(), 0, 0
+
+    def run(self, seconds, sweeps=1):
+        for _ in range(seconds):
+            self._number += 1
+            self.swept += sweeps
+            report = replace(
+                self._report,
+                division=self._number,
+                by="r2",
+                parts=ALL_TO_R2,
+                tiles=tiles_of(CELLS[len(CELLS) - self.swept :]) if self.swept else (),
+                x=3.0 + 0.2 * (self._number % 2),
+            )
+            self.ours.tell(report, after=0.0)
+            self.ours.tick()
+
+
+def test_a_robot_without_a_part_stands_while_another_sweeps_what_is_left():
+    shared = Shared()
+    shared.run(40)
+    ours = shared.ours
+    plans = ours.mission.route.plans
+    shared.run(60)
+    assert (ours.mission.state, ours.mission.reason) == ("covering", "others sweep what is left")
+    assert not ours.walk
+    assert ours.mission.route.plans == plans
+    # By that others know that it does not hang.
+    assert ours.mission.waits_for == "r2"
+    shared.run(len(CELLS) - shared.swept)
+    assert ours.mission.state == "done"
+
+
+def test_what_another_leaves_is_swept_by_a_robot_without_a_part():
+    shared = Shared()
+    shared.run(40)
+    assert not shared.ours.walk
+    shared.run(int(STUCK_S) + 2, sweeps=0)
+    assert shared.ours.walk
+
+
+def test_what_a_robot_has_tried_in_vain_stays_the_others_whatever_maps_come():
+    # With each map it was tried anew, while the others were at work.
+    niche = ["#####.##################", *HALL]
+    fleet = FleetDrive(niche, {"r1": (0, 0), "r2": (0, 1)})
+    ours, other = fleet.robots.values()
+    ours.cannot = other.cannot = {(12, 5)}
+
+    def untried():
+        area = ours.mission.area
+        return ours.mission.company.untried(area.reachable, area)[area.lattice.local((12, 5))]
+
+    while untried():
+        fleet.tick()
+        assert fleet.seconds < 300
+    ours.tell(patch("#", at=(0, 23)))
+    assert not untried()
+    assert ours.mission.company.has_company
+    fleet.run(2)
+    ours.tell(patch(".", at=(0, 23)))
+    assert not untried()
+
+
+def test_robots_do_not_stand_for_one_another():
+    remainder = Remainder()
+    for now in range(int(WAITING_S) + 4):
+        remainder.note_others(now, wait=now > 0)
+        remainder.note(100 - now, 0, now, now)
+        assert remainder.others_go_on == (now <= WAITING_S + 1)
+    remainder.note_others(now, wait=False)
+    remainder.note(50, 0, 50, now)
+    assert remainder.others_go_on
+
+
+def test_others_that_find_as_many_cells_as_they_sweep_go_on():
+    # One was done with 160 cells left, and out of the fleet, for the last 390 s of 950.
+    remainder = Remainder()
+    for second in range(3 * int(STUCK_S)):
+        remainder.note(160 + second, 0, second, float(second))
+        assert remainder.others_go_on
+
+
+@pytest.mark.parametrize(
+    "swept", [[50] * 50, [51, 50] * 25, range(51, 100)], ids=["none", "up and down", "later"]
+)
+def test_a_robot_does_not_stand_again_for_others_that_did_not_go_on(swept):
+    remainder = Remainder()
+    for second in range(int(STUCK_S) + 2):
+        remainder.note(59 + second % 2, 0, 50 - second % 2, float(second))
+    assert not remainder.others_go_on
+    for second, cells in enumerate(swept):
+        remainder.note(40, 0, cells, STUCK_S + 2 + second)
+        assert not remainder.others_go_on
+    remainder.note(40, 3, 100, 100.0)
+    remainder.note(40, 0, 100, 101.0)
+    assert remainder.others_go_on
+
+
+def test_a_robot_that_is_paused_tells_of_nobody_that_it_waits_for():
+    shared = Shared()
+    shared.run(40)
+    assert shared.ours.mission.waits_for == "r2"
+    shared.ours.tell(CommandReceived(1, "pause"), after=1.0)
+    assert (shared.ours.mission.state, shared.ours.mission.waits_for) == ("paused", "")
+
+
+def test_a_robot_that_stands_tells_whom_it_waits_for_in_trouble_too():
+    # Else the others took it for one that hangs, and left it out of the next division.
+    shared = Shared(with_policy(CONFIG, stale_map_s=20.0))
+    shared.run(40)
+    mission = shared.ours.mission
+    assert [trouble.code for trouble in mission.troubles] == ["no_map"]
+    assert (mission.state, mission.waits_for) == ("degraded", "r2")
+
+
+def test_a_robot_whose_part_others_alone_can_see_sweeps_what_it_sees():
+    # The east half is still unknown to it, and its part lies there.
+    ours = FleetRobot("r1", (0, 0), [row[:12] for row in HALL])
+    other = FleetRobot("r2", (6, 12), HALL)
+    report = replace(other.report(), ground=GroundTelling().next(other.mission.area, 100))
+    parts = (Part("r1", (6, 22), 0.0, 1.0), Part("r2", (6, 4), 0.0, 1.0))
+    for second in range(20):
+        place = 3.0 + 0.2 * (second % 2)
+        ours.tell(replace(report, division=second + 1, by="r2", parts=parts, x=place), after=0.0)
+        ours.tick()
+    assert ours.mission.reason != "others sweep what is left"
+    assert len(set(ours.driven)) > 10
+
+
+def test_a_robot_that_stands_for_want_of_a_part_stays_in_the_fleet():
+    shared, other = Shared(), FleetRobot("r2", (6, 12), HALL)
+    shared.run(40)
+    for _ in range(int(HANGING_S) + 4):
+        shared.run(1)
+        assert not shared.ours.walk
+        other.tell(shared.ours.report(), after=1.0)
+    (ours,) = other.mission.company.members.values()
+    assert ours.absence(other.now) == ""
+
+
+def heard_from_the_east(other, number, to_r1):
+    """What r2 tells, who has swept the west half and sees the whole hall."""
+    seed = (6, 22) if to_r1 else (0, 0)
+    return replace(
+        other.report(),
+        ground=GroundTelling().next(other.mission.area, 100),
+        tiles=tiles_of([cell for cell in CELLS if cell[1] < 12]),
+        parts=(Part("r1", seed, 0.0 if to_r1 else 1e6, 1.0), Part("r2", (6, 14), 0.0, 1.0)),
+        division=number,
+        by="r2",
+        x=4.0 + 0.2 * (number % 2),
+    )
+
+
+@pytest.mark.parametrize("to_r1", [True, False], ids=["a part", "no part"])
+def test_a_robot_that_sees_nothing_left_goes_where_its_part_is_and_without_one_stands(to_r1):
+    ours = FleetRobot("r1", (6, 0), [row[:12] for row in HALL])
+    other = FleetRobot("r2", (6, 16), HALL)
+    for second in range(25):
+        ours.tell(heard_from_the_east(other, second + 1, to_r1), after=0.0)
+        ours.tick()
+    if to_r1:
+        # At the edge of what its map shows, on the way there; it has looked, and saw nothing new.
+        assert ours.cell[1] == 11
+        assert ours.mission.state == "done"
+    else:
+        assert ours.mission.reason == "others sweep what is left"
+        assert not ours.walk
+
+
+def test_a_robot_sweeps_its_part_once_it_has_come_to_see_it():
+    ours = FleetRobot("r1", (6, 0), [row[:12] for row in HALL])
+    # Off the way of the first.
+    other = FleetRobot("r2", (11, 16), HALL)
+    for second in range(60):
+        if ours.cell[1] == 10:
+            ours.tell(MapReceived(building(*HALL)), after=0.0)
+        ours.tell(heard_from_the_east(other, second + 1, True), after=0.0)
+        ours.tick()
+    assert max(col for _, col in ours.driven) > 18
+
+
+@pytest.mark.parametrize("late_s", [1, 4])
+def test_a_robot_waits_a_moment_for_the_map_that_shows_its_part(late_s):
+    ours = FleetRobot("r1", (6, 0), [row[:12] for row in HALL])
+    whole = Zone("hall", ((0.0, 0.0), (24.0, 0.0), (24.0, 12.0), (0.0, 12.0)))
+    ours.tell(CommandReceived(1, "start", MissionOrder((whole,))), after=0.0)
+    other = FleetRobot("r2", (6, 16), HALL)
+    there = 0
+    for second in range(40):
+        there += ours.cell[1] == 11
+        if there == late_s:
+            ours.tell(MapReceived(building(*HALL)), after=0.0)
+        ours.tell(heard_from_the_east(other, second + 1, True), after=0.0)
+        ours.tick()
+    assert max(col for _, col in ours.driven) > 11
+
+
+def between(first, second):
+    """Let two robots tell each other for a minute; return how many divisions they counted."""
+    for _ in range(60):
+        for robot in (first, second):
+            robot.tick()
+        reports = first.report(), second.report()
+        first.tell(reports[1], after=0.0)
+        second.tell(reports[0], after=0.0)
+    return max(robot.mission.company.numbers.number for robot in (first, second))
+
+
+def test_robots_of_which_one_sees_no_way_to_the_other_share_by_one_division():
+    # Each left the other out that it saw no way to, and was left out in turn: every other second
+    # all cells changed hands.
+    hall = HALL * 2
+    wall = [row[:10] + "#" + row[11:] for row in hall]
+    first, second = FleetRobot("r1", (0, 0), wall), FleetRobot("r2", (6, 20), hall)
+    assert between(first, second) < 5
+    assert {part.robot for part in first.mission.company.parts} == {"r1", "r2"}
+    assert len(first.mission.company.parts) == 2

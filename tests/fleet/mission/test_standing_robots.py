@@ -1,0 +1,222 @@
+"""Robots that stand: cells closed around them, and one that is stopped beside another."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from fasaco_edge.fleet.mission.kind import FleetKind
+from fasaco_edge.fleet.mission.members import Members
+from fasaco_edge.fleet.mission.shared import SharedProgress
+from fasaco_edge.fleet.mission.tiles import TILE_BYTES
+from fasaco_edge.fleet.mission.traffic import OLD_S, PATIENCE_S, STANDS_S
+from fasaco_edge.grid.lattice import CoverageLattice
+from fasaco_edge.mission.core.events import MapReceived, MemberHeard
+from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
+from fasaco_edge.mission.map.reachable_area import ReachableArea
+from tests.mission.world import CONFIG, Drive, building, pose_at, with_policy
+
+CELL_M, RADIUS_M = 0.25, 0.1
+
+
+def member(x, y):
+    return MemberHeard("r2", state="covering", x=x, y=y, epoch=1, radius_m=0.1)
+
+
+def planned(**policy):
+    """A robot, r1, in a hall that has its first path."""
+    drive = Drive((2, 4), config=with_policy(replace(CONFIG, company=FleetKind("r1")), **policy))
+    drive.tell(MapReceived(building(*["." * 24] * 5)), pose_at(2, 4))
+    drive.plan()
+    return drive
+
+
+@pytest.fixture
+def area():
+    return ReachableArea.around(CoverageLattice.from_free(np.ones((9, 40), bool), CELL_M), (0, 0))
+
+
+@pytest.fixture
+def members():
+    return Members("r1", MissionLedger(CELL_M, CELL_M, shared=SharedProgress()), CELL_M)
+
+
+def test_cells_within_reach_of_a_robot_that_stands_in_the_way_are_closed(area, members):
+    members.hear(member(1.125, 1.125), 0.0)
+    assert members.closed(area, RADIUS_M) is None
+    members.avoid("r2")
+    closed = members.closed(area, RADIUS_M)
+    # Two discs of 0.1 m, and 0.1 m between them: the cell of its place, and the four beside it.
+    assert set(map(tuple, np.argwhere(closed).tolist())) == {(4, 4), (3, 4), (5, 4), (4, 3), (4, 5)}
+
+
+@pytest.mark.parametrize("x", [-0.1, 10.1, 90.0])
+def test_of_a_robot_at_the_edge_or_off_the_map_only_cells_of_the_map_are_closed(area, members, x):
+    members.hear(member(x, 1.125), 0.0)
+    members.avoid("r2")
+    assert np.count_nonzero(members.closed(area, RADIUS_M)) == (0 if x == 90.0 else 1)
+
+
+def test_no_cells_stay_closed_behind_a_robot_that_drives_on(area, members):
+    members.hear(member(1.125, 1.125), 0.0)
+    members.avoid("r2")
+    members.hear(member(2.125, 1.125), 1.0)
+    assert members.closed(area, RADIUS_M) is None
+    assert not members.is_avoided("r2")
+
+
+def test_cells_stay_closed_where_the_poses_of_a_robot_that_stands_scatter(area, members):
+    members.hear(member(1.125, 1.125), 0.0)
+    members.avoid("r2")
+    closed = members.closed(area, RADIUS_M)
+    members.hear(member(1.18, 1.07), 1.0)
+    assert members.is_avoided("r2")
+    assert members.closed(area, RADIUS_M).sum() == closed.sum()
+
+
+def test_no_cells_stay_closed_for_a_robot_on_another_map(area, members):
+    members.hear(member(1.125, 1.125), 0.0)
+    members.avoid("r2")
+    members.hear(replace(member(1.125, 1.125), misfit="its map is another"), 1.0)
+    assert members.closed(area, RADIUS_M) is None
+
+
+def test_where_a_silent_robot_is_only_the_map_shows(area, members):
+    members.hear(member(1.125, 1.125), 0.0)
+    members.avoid("r2")
+    assert members.forget_silent(OLD_S - 0.1) == ""
+    assert members.closed(area, RADIUS_M).any()
+    assert members.forget_silent(OLD_S) == "r2"
+    assert members.closed(area, RADIUS_M) is None
+
+
+def test_one_stopped_beside_another_plans_around_it_though_the_paths_lead_past():
+    drive = planned()
+    row, col = drive.walk[1]
+    # Two cells behind it, where its path does not lead.
+    behind = member((4.5 - (col - 4)) * CELL_M, (2.5 - (row - 2)) * CELL_M)
+    for _ in range(int(PATIENCE_S) + 1):
+        assert not drive.mission.company.others.is_avoided("r2")
+        drive.tell(pose_at(2, 4), behind, after=1.0)
+        if drive.request is not None:
+            drive.plan()
+    assert drive.mission.company.others.is_avoided("r2")
+    assert len(drive.mission.route.path.ahead) > 1
+
+
+def test_one_that_has_waited_beside_another_gets_the_time_to_drive_on():
+    # Two such stood for minutes: the time of the wait counted as if they could not drive.
+    drive = planned()
+    row, col = drive.walk[1]
+    x, y = (col + 0.5) * CELL_M, (row + 0.5) * CELL_M
+    for _ in range(int(PATIENCE_S)):
+        drive.tell(pose_at(2, 4), member(x, y), after=1.0)
+        assert drive.mission.giving_way.waits_for == "r2"
+    # Now it stands where the path does not lead.
+    behind = member((8.5 - col) * CELL_M, (4.5 - row) * CELL_M)
+    for _ in range(int(PATIENCE_S)):
+        drive.tell(pose_at(2, 4), behind, after=1.0)
+        if drive.request is not None:
+            drive.plan()
+        assert drive.mission.giving_way.waits_for == ""
+    assert len(drive.mission.route.path.ahead) > 1
+
+
+@pytest.mark.parametrize("scatter_m", [0.02, 0.05])
+@pytest.mark.parametrize("state", ["charging", "covering"])
+def test_one_that_stands_in_the_way_is_planned_around_though_its_poses_scatter(state, scatter_m):
+    # Each jump of more than 5 cm counted as motion: it was waited for to the end.
+    random, drive = np.random.default_rng(1), planned(retries=2, retry_s=30.0)
+    for _ in range(400):
+        if drive.request is not None:
+            drive.plan()
+        if drive.walk:
+            drive.cell = drive.walk.pop(0)
+        x, y = random.normal((12.5 * CELL_M, 2.5 * CELL_M), scatter_m)
+        drive.tell(pose_at(*drive.cell), replace(member(x, y), state=state), after=1.0)
+        if drive.mission.state == "done":
+            break
+    else:
+        raise AssertionError(drive.mission.reason)
+    # Those around its disc, and what that closes in a corner of the grid of cells.
+    assert len(drive.visited) >= 24 * 5 - 10
+
+
+@pytest.mark.parametrize("names", [("r2",), ("r2", "r3")], ids=["one", "two in turn"])
+def test_those_that_stand_in_the_way_now_and_then_are_planned_around(names):
+    # Where they were told to be scattered about what has to be kept clear: each moment without them
+    # began the wait anew, and so did the other one of two.
+    drive = planned()
+    (row, col), (to_row, to_col) = drive.cell, drive.walk[0]
+    ahead, aside = np.array([to_col - col, to_row - row]), np.array([to_row - row, to_col - col])
+    here = (np.array([col, row]) + 0.5) * CELL_M
+    for tick in range(int(PATIENCE_S) + 3):
+        heard = []
+        for place, name in enumerate(names):
+            off_m = 0.31 if tick % 2 == place else 0.34
+            x, y = here + CELL_M * ahead + (1 - 2 * place) * off_m * aside
+            heard.append(replace(member(x, y), robot=name))
+        drive.tell(pose_at(row, col), *heard, after=1.0)
+        if drive.request is not None:
+            drive.plan()
+    assert any(map(drive.mission.company.others.is_avoided, names))
+
+
+def test_whether_another_is_near_is_told_at_rest_too():
+    drive = planned()
+    drive.command("pause")
+    for x, near in ((3.0, True), (20.0, False)):
+        drive.tell(pose_at(2, 4), member(x, 0.6), after=1.0)
+        assert drive.mission.giving_way.is_near == near
+
+
+def test_one_that_is_waited_for_but_is_jammed_is_planned_around():
+    # Nobody moved again: the first by name goes first, and could not.
+    drive = planned()
+    row, col = drive.walk[1]
+    x, y = (col + 0.5) * CELL_M, (row + 0.5) * CELL_M
+    away = (x + (col - 4) * CELL_M, y + (row - 2) * CELL_M)
+    jammed = replace(member(x, y), robot="r0", ahead=(away,), waits_for="r1")
+    for _ in range(int(PATIENCE_S + STANDS_S) + 2):
+        drive.tell(pose_at(2, 4), jammed, after=1.0)
+        if drive.request is not None:
+            drive.plan()
+    assert drive.mission.giving_way.waits_for == ""
+    assert len(drive.mission.route.path.ahead) > 1
+
+
+def test_who_waits_while_others_sweep_all_that_is_left_is_done_and_leads_nowhere():
+    drive = planned()
+    x, y = ((at + 0.5) * CELL_M for at in drive.walk[1][::-1])
+    ahead = replace(member(x, y), waits_for="r3")
+    for _ in range(3):
+        drive.tell(pose_at(2, 4), ahead, after=1.0)
+    assert drive.mission.giving_way.waits_for == "r2"
+    assert len(drive.mission.next_metres())
+    swept = replace(ahead, tiles=(((0, 0), b"\xff" * TILE_BYTES),))
+    for _ in range(3):
+        drive.tell(pose_at(2, 4), swept, after=1.0)
+        if drive.request is not None:
+            drive.plan()
+    assert drive.mission.state == "done"
+    assert drive.mission.giving_way.waits_for == ""
+    assert not len(drive.mission.next_metres())
+
+
+def test_one_that_makes_way_drives_to_the_middle_of_its_refuge():
+    drive = planned()
+    x, y = ((at + 0.5) * CELL_M for at in drive.walk[1][::-1])
+    drive.tell(pose_at(2, 4), replace(member(x, y), waits_for="r3"), after=1.0)
+    assert drive.mission.giving_way.waits_for == "r2"
+    over = replace(member(x, y), ahead=((4.5 * CELL_M, 2.5 * CELL_M),))
+    drive.tell(pose_at(2, 4), over, after=2.0)
+    assert "makes way for r2" in drive.mission.reason
+    way = drive.mission.route.path.cells
+    (before, last) = way[-2:]
+    edge = last + 0.4 * (before - last)
+    drive.tell(pose_at(*edge.tolist()), over, after=2.0)
+    assert len(drive.mission.route.path.cells)
+    drive.tell(pose_at(*last.tolist()), over, after=1.0)
+    assert not len(drive.mission.route.path.cells)

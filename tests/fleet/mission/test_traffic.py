@@ -1,0 +1,263 @@
+"""Traffic of a fleet: who waits, who makes way, and that a narrow passage is no dead end."""
+
+import math
+
+import numpy as np
+import pytest
+
+from fasaco_edge.fleet.mission.refuge import refuge, without
+from fasaco_edge.fleet.mission.traffic import Neighbour, obstruction, spaced
+from fasaco_edge.grid.lattice import CoverageLattice
+from fasaco_edge.mission.core.events import MemberHeard
+from fasaco_edge.mission.map.reachable_area import ReachableArea
+
+RADIUS_M, PACE_S_M = 0.2, 4.0
+
+
+def heard(name, *points, waits_for=""):
+    (x, y), *ahead = points
+    return MemberHeard(
+        name, state="covering", x=x, y=y, radius_m=RADIUS_M, ahead=tuple(ahead), waits_for=waits_for
+    )
+
+
+def seen(name, line, other, waits_for="", stands_s=0.0, pace_s_m=PACE_S_M):
+    return obstruction(
+        name,
+        RADIUS_M,
+        PACE_S_M,
+        spaced(line),
+        {other.robot: Neighbour(other, 0.0, stands_s, pace_s_m)},
+        waits_for,
+    )
+
+
+EAST = [(0.0, 0.0), (2.0, 0.0)]
+NORTH = [(1.0, -1.0), (1.0, 1.0)]
+
+
+def test_of_two_that_would_meet_one_waits():
+    first = seen("r1", EAST, heard("r2", *NORTH))
+    second = seen("r2", NORTH, heard("r1", *EAST))
+    assert first is None
+    assert second.reason == "waits for r1"
+
+
+def test_the_nearer_one_goes_first_whatever_its_name():
+    near = [(0.7, 0.0), (2.0, 0.0)]
+    assert seen("r9", near, heard("r2", *NORTH)) is None
+    assert seen("r2", NORTH, heard("r9", *near)).robot == "r9"
+
+
+@pytest.mark.parametrize(
+    "other",
+    [
+        heard("r1", (0.0, 3.0), (2.0, 3.0)),
+        heard("r1", (-1.0, 0.0), (-3.0, 0.0)),
+        heard("r1", (1.9, 1.0), (1.9, -1.0)),
+        heard("r1", (0.0, 0.45), (0.0, 3.0)),
+    ],
+    ids=["far away", "behind", "there later", "parting"],
+)
+def test_robots_that_do_not_meet_are_not_held_up(other):
+    assert seen("r2", EAST, other) is None
+
+
+def test_the_other_one_drives_at_its_own_pace():
+    # It comes across 1 m away: as fast as this one both meet, at a tenth of the pace it is late.
+    line, other = [(0.5, 0.0), (2.5, 0.0)], heard("r1", (1.0, -1.2), (1.0, 1.2))
+    assert seen("r2", line, other, "r1").reason == "waits for r1"
+    assert seen("r2", line, other, "r1", pace_s_m=40.0) is None
+
+
+def test_who_waits_goes_on_waiting_until_there_is_more_time():
+    line, other = [(0.5, 0.0), (2.5, 0.0)], heard("r1", (1.0, -1.6), (1.0, 1.2))
+    assert seen("r2", line, other) is None
+    assert seen("r2", line, other, "r1").reason == "waits for r1"
+
+
+def test_one_that_stops_for_this_robot_is_waited_for_by_the_second_alone():
+    # Face to face, each waits for the other: the first by name is blocked, and plans around.
+    there = [(0.6, 0.0), (0.6, 2.0)]
+    held = seen("r2", EAST, heard("r1", *there, waits_for="r2"), "r1")
+    assert held.reason == "waits for r1"
+    assert seen("r1", EAST, heard("r2", *there, waits_for="r1"), "r2").is_blocked
+
+
+def test_one_that_has_no_path_and_cannot_make_way_is_not_waited_for():
+    # Each waited for the other for ever: it had no place to go to.
+    stands = heard("r1", (0.6, 0.0), waits_for="r2")
+    assert seen("r2", EAST, stands, "r1").is_blocked
+    assert seen("r1", [(0.6, 0.0)], heard("r2", *EAST, waits_for="r1"), "r2").is_on_path
+
+
+def test_one_on_the_path_of_a_robot_that_waits_for_a_third_stays():
+    other = heard("r1", (1.2, 0.0), (0.0, 0.0), waits_for="r3")
+    held = seen("r2", [(0.0, 0.0)], other)
+    assert held is None
+
+
+def test_one_that_waits_on_the_others_path_makes_way():
+    other = heard("r1", (1.2, 0.0), (0.0, 0.0), waits_for="r2")
+    held = seen("r2", EAST, other, waits_for="r1")
+    assert held.is_on_path
+    assert held.reason == "makes way for r1"
+    # The other has the way, and does not make way at the same time.
+    first = seen("r1", [(0.8, 0.0), (0.0, 0.0)], heard("r2", *EAST, waits_for="r1"), "r2")
+    assert not first.is_on_path
+
+
+def test_one_that_has_nothing_to_do_makes_way_whatever_its_name():
+    assert seen("r1", [(1.0, 0.0)], heard("r2", *EAST)).is_on_path
+
+
+def test_one_that_stands_in_the_way_is_named():
+    held = seen("r1", EAST, heard("r2", (0.8, 0.0)))
+    assert held.is_blocked
+    assert held.reason == "r2 stands in the way"
+    assert seen("r1", EAST, heard("r2", (1.9, 0.0))) is None
+
+
+def at(cell):
+    """The middle of a cell."""
+    return (cell[1] + 0.5) * 0.25, (cell[0] + 0.5) * 0.25
+
+
+def test_a_path_planned_around_one_that_stands_is_driven_though_it_passes_near():
+    other = heard("r2", (0.4, 0.45))
+    for is_avoided in (False, True):
+        near = {"r2": Neighbour(other, 0.0, 9.0, PACE_S_M, is_avoided)}
+        held = obstruction("r1", RADIUS_M, PACE_S_M, spaced(EAST), near, "")
+        assert (held is None) == is_avoided
+    near = {"r2": Neighbour(heard("r2", (0.4, 0.3)), 0.0, 9.0, PACE_S_M, True)}
+    assert obstruction("r1", RADIUS_M, PACE_S_M, spaced(EAST), near, "").is_blocked
+
+
+def sees_in(area):
+    """Whether two points lie in one cell, or in two that a step connects."""
+
+    def sees(a, b):
+        first, second = (area.lattice.cell_at(*point) for point in (a, b))
+        return 1 <= len(area.shortest_path(first, second)) <= 2
+
+    return sees
+
+
+def test_a_refuge_lies_off_discs_and_paths_and_is_reached_past_none_of_them():
+    free = np.zeros((12, 24), np.bool_)
+    free[5], free[6:9, 4] = True, True  # a corridor with a niche
+    lattice = CoverageLattice.from_free(free, 0.25)
+    area = ReachableArea.around(lattice, (5, 8))
+    other = heard("r2", (3.2, 1.375), (0.1, 1.375))
+    way = refuge(
+        area,
+        (5, 8),
+        at((5, 8)),
+        RADIUS_M,
+        {"r2": Neighbour(other, 0.0, 0.0, PACE_S_M)},
+        lattice.centres,
+        sees_in(area),
+    )
+    assert tuple(way[-1].tolist()) in {(7, 4), (5, 2)}
+    # Behind the other there is a place, too, but no way to it.
+    free[6:9, 4] = False
+    lattice = CoverageLattice.from_free(free, 0.25)
+    area = ReachableArea.around(lattice, (5, 8))
+    other = heard("r2", (1.2, 1.375), (3.2, 1.375))
+    way = refuge(
+        area,
+        (5, 8),
+        at((5, 8)),
+        RADIUS_M,
+        {"r2": Neighbour(other, 0.0, 0.0, PACE_S_M)},
+        lattice.centres,
+        sees_in(area),
+    )
+    assert way[-1, 1] > 13
+
+
+def test_the_way_to_a_refuge_leads_round_the_disc_of_the_other():
+    # A ring of corridors: the other one comes from the east, where the way would be shorter.
+    free = np.ones((3, 6), np.bool_)
+    free[1, 1:5] = False
+    lattice = CoverageLattice.from_free(free, 0.25)
+    area = ReachableArea.around(lattice, (0, 2))
+    ahead = [(0.125, 0.125), (0.125, 0.625), (0.625, 0.625)]
+    near = {"r2": Neighbour(heard("r2", (1.125, 0.125), *ahead), 0.0, 0.0, PACE_S_M)}
+    way = refuge(area, (0, 2), at((0, 2)), RADIUS_M, near, lattice.centres, sees_in(area))
+    assert way.tolist()[-1] == [2, 4]
+    assert [0, 0] in way.tolist()
+    assert len(area.shortest_path((0, 2), (2, 4))) < len(way)
+
+
+def test_one_that_is_nearer_to_the_other_than_its_cell_is_gets_away_past_cells_near_it():
+    free = np.zeros((2, 12), np.bool_)
+    free[0, 4], free[1, 4:] = True, True
+    lattice = CoverageLattice.from_free(free, 0.25)
+    area = ReachableArea.around(lattice, (0, 4))
+    near = {"r2": Neighbour(heard("r2", (0.7, 0.45), at((0, 4))), 0.0, 0.0, PACE_S_M)}
+    # 0.41 m from the other; its cell is at 0.54 m, the next one of the way at 0.43 m.
+    way = refuge(area, (0, 4), (1.02, 0.2), RADIUS_M, near, lattice.centres, sees_in(area))
+    assert way is not None
+    assert way.tolist() == [[0, 4], [1, 4], [1, 5], [1, 6]]
+    assert refuge(area, (0, 4), at((0, 4)), RADIUS_M, near, lattice.centres, sees_in(area)) is None
+
+
+def test_one_that_sees_no_cell_a_step_away_begins_with_one_beside_its_own():
+    # Two stood in a doorway for good: the way through the next cell led round a corner, nearer to
+    # the other; the way on which it had come led straight away, from a cell beside its own.
+    lattice = CoverageLattice.from_free(np.ones((6, 12), np.bool_), 0.25)
+    area = ReachableArea.around(lattice, (2, 5))
+    (x, y), behind = at((2, 5)), at((1, 4))
+    near = {"r2": Neighbour(heard("r2", (x, y + 0.3), (x, y)), 0.0, 0.0, PACE_S_M)}
+
+    def sees(_, to):
+        return math.dist(to, behind) < 0.01
+
+    way = refuge(area, (2, 5), (x, y), RADIUS_M, near, lattice.centres, sees)
+    assert tuple(way[0].tolist()) == (1, 4)
+
+
+def test_cells_far_from_one_robot_are_no_way_through_another():
+    # A corridor: r1 stands in it, and r2 comes from the other side.
+    free = np.zeros((3, 24), np.bool_)
+    free[1] = True
+    lattice = CoverageLattice.from_free(free, 0.25)
+    area = ReachableArea.around(lattice, (1, 8))
+    near = {
+        name: Neighbour(other, 0.0, 0.0, PACE_S_M)
+        for name, other in (
+            ("r1", heard("r1", at((1, 5)))),
+            ("r2", heard("r2", at((1, 12)), at((1, 7)))),
+        )
+    }
+    assert refuge(area, (1, 8), at((1, 8)), RADIUS_M, near, lattice.centres, sees_in(area)) is None
+
+
+def test_a_refuge_is_sought_no_farther_than_the_cells_around_the_robot():
+    free = np.zeros((12, 100), np.bool_)
+    free[5, 20:91] = free[5:11, 90] = free[10, 8:91] = True
+    # At the other edge of these cells lies a room, connected far away only.
+    free[6:11, 8:19] = True
+    lattice = CoverageLattice.from_free(free, 0.25)
+    area = ReachableArea.around(lattice, (5, 40))
+    # Others, beside the corridor, are to drive all along it.
+    near = {
+        f"r{x}": Neighbour(
+            heard(f"r{x}", (x, 2.0), (x, 1.375), (x + 1.0, 1.375)), 0.0, 0.0, PACE_S_M
+        )
+        for x in range(5, 24)
+    }
+    assert area.reachable[7, 16]
+    assert (
+        refuge(area, (5, 40), at((5, 40)), RADIUS_M, near, lattice.centres, sees_in(area)) is None
+    )
+
+
+def test_closed_cells_have_no_steps_left():
+    lattice = CoverageLattice.from_free(np.ones((3, 4), np.bool_))
+    closed = np.zeros((3, 4), np.bool_)
+    closed[1, 2] = True
+    steps = without(lattice.steps, closed)
+    rest = CoverageLattice.from_free(~closed)
+    assert (steps == rest.steps).all()

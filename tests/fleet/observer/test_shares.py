@@ -1,0 +1,67 @@
+"""Who is shown to sweep what: the division in force among the robots of a fleet that are there."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from fasaco_edge.fleet.observer.members import GONE_NS, Member, Members
+from fasaco_edge.fleet.observer.shares import NOBODY, owners_of, shares_of
+from fasaco_edge.grid.geometry import Window
+from fasaco_edge.wire.documents.fleet import FleetPart
+from tests.fleet.told import member
+
+SECOND = 1_000_000_000
+HALL = 20 * 30
+PARTS = tuple(FleetPart(name, *cell, 0.0, 1.2) for name, cell in (("a", (0, 0)), ("b", (19, 29))))
+
+
+@pytest.fixture
+def halved():
+    """Two robots that have divided a hall."""
+    members = Members(Member)
+    assert shares_of(members, 0) is None
+    for name in ("a", "b"):
+        members.hear(name, member(division=7, by="a", parts=PARTS), SECOND)
+    return members
+
+
+def test_each_has_the_part_that_it_is_nearer_to(halved):
+    cells = shares_of(halved, SECOND).cells
+    assert cells.keys() == {"a", "b"}
+    assert cells.total() == HALL
+    assert abs(cells["a"] - cells["b"]) <= 20
+
+
+def test_one_left_alone_has_all_that_is_left(halved):
+    swept = [(0, col) for col in range(30)]
+    now = SECOND + GONE_NS + 1
+    halved.hear("b", member(cells=swept, division=8, by="b"), now)
+    assert shares_of(halved, now).cells == {"b": HALL - 30}
+
+
+def test_a_robot_that_comes_and_has_not_divided_yet_changes_nothing(halved):
+    halved.hear("c", member(division=0), SECOND)
+    assert shares_of(halved, SECOND).cells.keys() == {"a", "b"}
+
+
+def test_what_a_robot_that_is_gone_told_is_not_in_force(halved):
+    halved.hear("c", member(division=9, by="c", parts=(FleetPart("c", 0, 0, 0.0, 1.2),)), SECOND)
+    now = SECOND + GONE_NS
+    for name in ("a", "b"):
+        halved.hear(name, member(division=8, by="b", parts=PARTS), now)
+    assert shares_of(halved, now).cells == {"c": HALL}
+    assert shares_of(halved, now + 1).cells.keys() == {"a", "b"}
+    # Once all are gone the last division stays drawn.
+    assert shares_of(halved, now + GONE_NS + 1).cells == {"c": HALL}
+
+
+def test_cells_beyond_the_steps_that_are_looked_for_are_nobodys(halved):
+    telling = halved.dividing(SECOND)
+    window = Window(0, 0, 20, 30)
+    known = np.ones((20, 30), np.bool_)
+    owners = owners_of(telling, halved, known, window, 10)
+    # Both together: the second one has what the first one leaves.
+    assert np.count_nonzero(owners == 0) == 11 * 12 // 2
+    assert np.count_nonzero(owners == 1) <= 3
+    assert (owners_of(telling, halved, known, window) != NOBODY).all()

@@ -1,0 +1,93 @@
+"""A fleet's review: what was swept again is told from what was driven through."""
+
+from __future__ import annotations
+
+import pytest
+
+pytest.importorskip("rerun")
+
+from fasaco_edge.fleet.recording.notes import NOTES_VERSION, Note, NoteBatch, NotedRobot, Pass
+from fasaco_edge.fleet.review import report as fleet
+from fasaco_edge.fleet.review.report import review_fleet
+from tests.fleet.told import tiles
+
+CELL_M = 0.5
+GROUND = [(row, col) for row in range(8) for col in range(12)]
+
+
+def noted(robot, way, begin_s, *, waits=()):
+    """Return notes of a robot that comes into a cell a second, and has swept it then."""
+    swept, notes = [], []
+    for second, cell in enumerate(way):
+        swept.append(cell)
+        at_ms = 1000 * (begin_s + second)
+        notes.append(
+            Note(
+                robot, at_ms, "covering", 0.0, 0.0, "other" if second in waits else "", 3, 9, 2,
+                500, CELL_M, [4.0], [Pass(at_ms, *cell)], list(tiles(swept)),
+                list(tiles(GROUND)) if not second else [],
+            )
+        )  # fmt: skip
+    return notes
+
+
+def lane(row, first, last):
+    """Return the cells of a row, from one column to another."""
+    step = 1 if last >= first else -1
+    return [(row, col) for col in range(first, last + step, step)]
+
+
+def reviewed(monkeypatch, *ways, waits=(), begin_s=0):
+    """Return the review of robots that drive one after another."""
+    robots = [
+        NotedRobot(f"r{number + 1}", 0.2, CELL_M, 0.0, 0.0, 0.0, 0.0) for number in range(len(ways))
+    ]
+    notes = []
+    for number, way in enumerate(ways):
+        notes += noted(number, way, begin_s, waits=waits if number else ())
+        begin_s += len(way)
+    batch = NoteBatch(NOTES_VERSION, 1, "house", robots, notes)
+    monkeypatch.setattr(fleet, "read_notes", lambda paths: [batch])
+    return review_fleet([]).figures
+
+
+SWEPT = [*lane(0, 0, 11), *lane(1, 11, 0), *lane(2, 0, 11)]
+
+
+def test_to_cross_swept_floor_is_driving_through(monkeypatch):
+    across = [(4, 3), (3, 3), (2, 3), (1, 3), (0, 3)]
+    figures = reviewed(monkeypatch, SWEPT, across)
+    second = figures.robots[1]
+    assert (second.through_m2, second.again_m2) == (3 * CELL_M**2, 0.0)
+    assert figures.again_share == 0.0
+
+
+def test_lanes_over_swept_floor_are_sweeping_again(monkeypatch):
+    lanes = [(3, 0), *lane(2, 0, 11), *lane(1, 11, 0), *lane(0, 0, 11)]
+    figures = reviewed(monkeypatch, SWEPT, lanes)
+    second = figures.robots[1]
+    # 37 steps, where 14 would have led to the end: 36 cells, of which 22.4 again.
+    assert second.again_m2 == pytest.approx(36 * (1 - 14 / 36) * CELL_M**2, abs=0.01)
+    assert second.again_m2 + second.through_m2 == pytest.approx(36 * CELL_M**2, abs=0.02)
+    assert figures.swept_m2 == 37 * CELL_M**2
+    assert figures.robots[0].again_m2 == 0.0
+
+
+def test_after_a_month_floor_that_nobody_swept_before_is_new(monkeypatch):
+    lanes = [*lane(4, 0, 11), *lane(5, 11, 0), *lane(6, 0, 11)]
+    figures = reviewed(monkeypatch, SWEPT, lanes, begin_s=30 * 24 * 3600)
+    assert figures.again_m2 == figures.through_m2 == 0.0
+
+
+def test_makespan_balance_waiting_and_messages(monkeypatch):
+    figures = reviewed(monkeypatch, lane(0, 0, 10), lane(4, 0, 10), waits=(2, 3, 7))
+    first, second = figures.robots
+    assert figures.makespan_s == 21.0
+    assert (first.waits, first.waited_s) == (0, 0.0)
+    assert (second.waits, second.waited_s, second.longest_wait_s) == (2, 3.0, 2.0)
+    assert (first.busy_s, second.busy_s) == (10.0, 7.0)
+    assert figures.busy_balance == 0.7
+    assert figures.swept_balance == 1.0
+    assert (first.messages_s, first.kb_s) == (2.2, 0.55)
+    assert first.driven_m == 11 * CELL_M
+    assert (first.plans, first.plan_ms_p99) == (11, 4.0)

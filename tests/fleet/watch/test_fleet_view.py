@@ -1,0 +1,294 @@
+"""What is known of a fleet by what its robots tell, whatever one of them sends."""
+
+from __future__ import annotations
+
+import json
+import math
+import time
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from fasaco_edge.client.events import KEPT
+from fasaco_edge.fleet.observer.members import GONE_NS, MOST_MEMBERS, REPLACED_NS
+from fasaco_edge.fleet.watch import floor as fleet_floor
+from fasaco_edge.fleet.watch.robot import LONGEST
+from fasaco_edge.fleet.watch.view import MOST_FAULTS, MOST_FLEETS, FleetView
+from fasaco_edge.wire.documents.fleet import CellTile, FleetPart
+from fasaco_edge.wire.documents.json_text import encode_json
+from fasaco_edge.wire.limits import (
+    MAX_COORDINATE_M,
+    MAX_FLEET_INDEX,
+    MAX_FLEET_PARTS,
+    MAX_FLEET_TILES,
+)
+from tests.fleet.told import CELL_M, member, tiles
+from tests.fleet.watch.fleets import PARTS, say, tell, two_in_a_hall
+from tests.watch.grids import NOW, status
+
+GONE_S, REPLACED_S = 1e-9 * GONE_NS + 0.1, 1e-9 * REPLACED_NS + 0.1
+HALL = 20 * 30
+
+
+@pytest.fixture(autouse=True)
+def _at_once(monkeypatch):
+    """The floor is made again as often as it changes."""
+    monkeypatch.setattr(fleet_floor, "LEAST_AGE_S", 0.0)
+    monkeypatch.setattr(fleet_floor, "LEAST_REST", 0.0)
+
+
+def texts(view):
+    return [entry.text for entry in view.events.entries]
+
+
+def doing(view, now=NOW):
+    return {robot.name: robot.doing for robot in view.robots(now)}
+
+
+def test_it_tells_who_does_what():
+    view = two_in_a_hall()
+    a, b = view.robots(NOW)
+    assert doing(view) == {"a": "covering", "b": "waits for a"}
+    assert (a.x, a.y) == (1.0, 1.0)
+    assert (a.swept_cells, b.swept_cells) == (4, 3)
+    assert a.swept_m2 == pytest.approx(4 * CELL_M**2)
+    # Each cell counts once, and cells that are swept are no part of what is left.
+    assert view.floor.area == HALL
+    assert (view.floor.swept, view.floor.twice) == (6, 1)
+    assert a.left_cells + b.left_cells == HALL - 6
+    assert abs(a.left_cells - b.left_cells) <= 20
+    assert texts(view) == [
+        "division 7 by b, 2 parts",
+        "a joined: covering",
+        "b joined: waits for a",
+    ]
+
+
+def test_the_same_as_json():
+    document = two_in_a_hall().document(NOW)
+    json.dumps(document, allow_nan=False)
+    robots = document.pop("robots")
+    assert document == {
+        "fleet": "house", "at_work": 2, "division": 7, "cells": HALL, "swept_cells": 6,
+        "swept_twice_cells": 1, "swept_m2": 0.54, "fraction": 0.01, "unheard": [],
+    }  # fmt: skip
+    assert robots[1] | {"part_cells": 0} == {
+        "name": "b", "state": "covering", "x": 8.3, "y": 5.2, "waits_for": "a", "away": None,
+        "division": 7, "swept_cells": 3, "swept_m2": 0.27, "part_cells": 0, "path": None,
+    }  # fmt: skip
+
+
+def test_what_changes_is_told_once():
+    view = two_in_a_hall()
+    for seconds in range(1, 4):
+        now = NOW + seconds
+        say(view, "a", now, state="blocked", division=8, by="a", parts=PARTS)
+        say(view, "b", now, state="done")
+        view.tick(now)
+    assert texts(view)[3:] == ["division 8 by a, 2 parts", "a: blocked", "b: done"]
+
+
+def test_a_robot_that_is_silent_is_gone_and_may_come_back():
+    view = two_in_a_hall()
+    later = NOW + GONE_S
+    say(view, "a", later)
+    view.tick(later)
+    a, b = view.robots(later)
+    assert (a.silent_s, b.silent_s) == (None, pytest.approx(GONE_S))
+    assert (a.is_at_work, b.is_at_work) == (True, False)
+    # What it has swept stays.
+    assert b.swept_cells == 3
+    say(view, "b", later + 2.0)
+    view.tick(later + 2.0)
+    assert texts(view)[-2:] == ["b is gone: nothing is heard of it", "b is back: covering"]
+
+
+def test_places_are_in_the_frame_of_the_fleet():
+    view = FleetView("house")
+    # Its map lies 10 m to the east, turned by a quarter.
+    say(view, "a", x=1.0, y=0.5, origin=(10.0, 0.0, 90.0), cells=[(0, 0)])
+    (a,) = view.robots(NOW)
+    assert (a.x, a.y) == pytest.approx((9.5, 1.0))
+    say(view, "a", NOW + 1, origin=(0.0, 0.0, 0.0))
+    assert "its frame has changed" in texts(view)[-1]
+
+
+def test_robots_are_in_order_of_their_names_whoever_comes_first():
+    view = FleetView("house")
+    for name in ("c", "a", "b"):
+        say(view, name)
+    assert [robot.name for robot in view.robots(NOW)] == ["a", "b", "c"]
+
+
+def test_robots_with_turned_maps_share_the_floor():
+    view = FleetView("house")
+    square = [(row, col) for row in range(10) for col in range(10)]
+    ours = {"ground": tiles(square)}
+    say(view, "a", cells=square, **ours)
+    # The same floor, seen from the corner across.
+    say(view, "b", cells=square[:50], origin=(3.0, 3.0, 180.0), **ours)
+    view.tick(NOW)
+    assert (view.floor.area, view.floor.swept, view.floor.twice) == (100, 100, 50)
+
+
+def test_a_robot_that_others_leave_out_is_shown_as_such():
+    view = two_in_a_hall()
+    others = [
+        {"name": "b", "away": "stands", "heard_s": 0.5},
+        {"name": "c", "away": "gone", "heard_s": 20.0},
+        {"name": "long-gone", "away": "gone", "heard_s": 9000.0},
+        {"name": "no name\x1b", "away": "gone", "heard_s": 20.0},
+    ]
+    tell(view, "a", "status", status(fleet={"name": "house", "members": others}))
+    a, b = view.robots(NOW)
+    assert (a.away, b.away) == ("", "stands")
+    assert a.revision == 7
+    assert view.unheard(NOW) == ["c"]
+    assert view.unheard(NOW + GONE_S) == []
+
+
+def test_a_second_daemon_of_a_name_tells_nothing():
+    view = two_in_a_hall()
+    tell(view, "a", "status", status(claim={"id": "2f", "stand": "waits"}))
+    assert view.robots(NOW)[0].revision is None
+
+
+def test_other_fleets_are_named_until_one_of_this_is_heard():
+    view = FleetView("house")
+    for number in range(2 * MOST_FLEETS):
+        say(view, f"r{number}", fleet=f"yard{number:03}\x1b[2J")
+    assert len(view.others) == MOST_FLEETS
+    assert min(view.others) == r"yard000\x1b[2J"
+    assert view.robots(NOW) == []
+
+
+def test_there_is_room_for_as_many_robots_as_a_fleet_has():
+    view = FleetView("house")
+    for number in range(MOST_MEMBERS + 7):
+        say(view, f"r{number:02}")
+        tell(view, f"r{number:02}", "status", status())
+    view.tick(NOW)
+    assert [robot.revision for robot in view.robots(NOW)] == [7] * MOST_MEMBERS
+    assert f"{MOST_MEMBERS} robots of a fleet" in texts(view)[0]
+    # One that is long gone gives its place to another, with all that was known of it.
+    for number in range(1, MOST_MEMBERS):
+        say(view, f"r{number:02}", NOW + REPLACED_S)
+    say(view, "late", NOW + REPLACED_S)
+    names = view.names()
+    assert "late" in names
+    assert "r00" not in names
+    assert [robot.name for robot in view.robots(NOW) if robot.revision is None] == ["late"]
+
+
+def test_a_robot_that_jumps_on_and_off_does_not_fill_the_log():
+    view = two_in_a_hall()
+    count = view.events.count
+    for tenth in range(1, 300):
+        now = NOW + 0.1 * tenth
+        say(view, "a", now, state=f"state {tenth}", origin=(float(tenth % 2), 0.0, 0.0))
+        say(view, "b", now)
+        view.tick(now)
+    # Its states once a second, its frames ever more seldom.
+    assert view.events.count - count < 45
+
+
+@pytest.mark.parametrize(
+    ("topic", "payload"),
+    [
+        ("fleet", b""), ("fleet", b"\xff"), ("fleet", b"[" * 100_000), ("fleet", b'{"version": 1}'),
+        ("fleet", b'{"version": 2, "fleet": "house"}'),
+        ("status", b"[]"), ("status", b"\xff"), ("fleet", b" " * 2_000_000),
+    ],
+)  # fmt: skip
+def test_what_cannot_be_read_costs_only_itself(topic, payload):
+    view = two_in_a_hall()
+    before = view.document(NOW)
+    for _ in range(9):
+        tell(view, "a", topic, payload)
+        tell(view, "stranger", topic, payload)
+        view.tick(NOW)
+    assert view.document(NOW) == before
+    told = [text for text in texts(view) if "cannot be read" in text and text.startswith("a: ")]
+    assert len(told) == 4
+    assert told[-1].endswith("(8 so far)")
+
+
+def test_names_that_nobody_knows_fill_nothing():
+    view = two_in_a_hall()
+    for number in range(2000):
+        tell(view, f"r{number}", "fleet", b"no message")
+        say(view, f"r{number}", fleet="yard")
+    assert len(view._faults) <= MOST_FAULTS
+    assert len(view._seen) == 2
+    assert len(view.events.entries) < KEPT
+
+
+def test_texts_of_robots_are_short_and_do_nothing():
+    view = FleetView("house")
+    evil = "\x1b[2J\n\u202e" + "x" * 250
+    say(view, "a", state=evil, waits_for=evil, by=evil, division=1)
+    tell(view, "a", "status", status(fleet={"members": [{"name": "a", "away": evil}]}))
+    view.tick(NOW)
+    (a,) = view.robots(NOW)
+    for text in (a.state, a.waits_for, a.away, *texts(view)):
+        assert text.isprintable()
+        assert len(text) <= 2 * LONGEST
+
+
+def test_absurd_numbers_stay_in_bounds():
+    view = two_in_a_hall()
+    far = (MAX_FLEET_INDEX // 64, -MAX_FLEET_INDEX // 64 + 1)
+    say(
+        view, "far", x=MAX_COORDINATE_M, y=-MAX_COORDINATE_M, radius_m=100.0, division=2**31 - 1,
+        ground=tiles([(64 * far[0], 64 * far[1])]), cell_m=100.0, by="far",
+        origin=(MAX_COORDINATE_M, MAX_COORDINATE_M, 45.0),
+        ahead=((MAX_COORDINATE_M, MAX_COORDINATE_M), (-MAX_COORDINATE_M, 0.0)),
+        parts=(FleetPart("a", MAX_FLEET_INDEX, MAX_FLEET_INDEX, -1e9, 1e-3),),
+    )  # fmt: skip
+    for x, yaw in ((1e15, 0.0), (1e300, 0.0), (math.nan, 0.0), (1.0, 1e15)):
+        tell(view, "far", "status", encode_status(x, yaw))
+    view.tick(NOW)
+    json.dumps(view.document(NOW), allow_nan=False)
+
+
+def encode_status(x, yaw):
+    return status(pose={"x": 7.0, "y": 1.0, "yaw": yaw}).replace(b"7.0", repr(x).encode(), 1)
+
+
+def test_a_maze_as_large_as_can_be_told_takes_a_moment_only():
+    """A serpentine: a step further for each of a million cells."""
+    view = FleetView("house")
+    edge = 22
+    maze = np.zeros((64 * edge, 64 * edge), np.bool_)
+    maze[::2] = True
+    maze[1::4, -1] = maze[3::4, 0] = True
+    blocks = maze.reshape(edge, 64, edge, 64).swapaxes(1, 2)
+    said = [
+        CellTile(row, col, np.packbits(blocks[row, col]).tobytes())
+        for row in range(edge)
+        for col in range(edge)
+    ]
+    parts = tuple(FleetPart("a", 0, 0, 0.0, 1.0) for _ in range(MAX_FLEET_PARTS))
+    for number in range(0, len(said), MAX_FLEET_TILES):
+        ground = tuple(said[number : number + MAX_FLEET_TILES])
+        say(view, "a", NOW + 0.2 * number, ground=ground, division=1, parts=parts)
+    began = time.monotonic()
+    view.tick(NOW + 0.2 * number)
+    print(f"{time.monotonic() - began:.1f} s")
+    assert view.floor.area == np.count_nonzero(maze) > 900_000
+    assert fleet_floor.MOST_STEPS <= view.floor.left["a"] < 2 * fleet_floor.MOST_STEPS
+
+
+SAID = member(cells=[(1, 2)], division=3, by="a", parts=PARTS, waits_for="b", ahead=((1.0, 2.0),))
+WIRE = encode_json(SAID)
+
+
+@given(st.integers(0, len(WIRE) - 1), st.binary(max_size=9), st.sampled_from(["a", "z"]))
+def test_a_message_with_anything_in_it_raises_nothing(at, anything, robot):
+    view = two_in_a_hall()
+    tell(view, robot, "fleet", WIRE[:at] + anything + WIRE[at + len(anything) :], NOW + 1)
+    view.tick(NOW + 1)
+    json.dumps(view.document(NOW + 1), allow_nan=False)
+    assert {"a", "b"} <= set(view.names())
