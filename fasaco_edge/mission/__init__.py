@@ -6,7 +6,8 @@ Read in this order:
     core/events          events and decisions
     core/event_handler   applies each event
     core/order_changes   begins orders, and carries out commands
-    core/executive       then decides the state, and what the robot does next
+    core/executive       then decides what the robot does next: a list of rules, in their order
+    core/resting, errands, order_work, shut_in   what the rules say
     core/route           owns the path and the pending plan; better paths in spare time
 
     map/map_state        owns the map, the robot's cell and the reachable area
@@ -21,10 +22,6 @@ Read in this order:
     coverage/unreached   uncovered cells, and the causes
 
     company              what all of this asks about other robots; the answers of one alone
-    fleet/layer          the other robots, and this one's part of the remaining area
-    fleet/giving_way     when the robot waits for others, and makes way for them
-    fleet/shared         cells that the others have swept
-    fleet/division       who sweeps what
 
     orders/sequencer     owns the order: zones, passes, retries, return home
     orders/order_state   an order and its progress; kept on disk with the ledger

@@ -1,0 +1,106 @@
+"""Errands: the drive home or to the dock, by the shortest path; coverage waits meanwhile."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fasaco_edge.grid.lattice import Cell
+from fasaco_edge.mission.core.charging import Charging
+from fasaco_edge.mission.core.doing import Doing
+from fasaco_edge.mission.core.events import PathUpdate, State
+from fasaco_edge.mission.core.resting import Resting
+from fasaco_edge.mission.core.route import NO_CELLS, Route
+from fasaco_edge.mission.core.shut_in import ShutIn
+from fasaco_edge.mission.core.standing import Standing
+from fasaco_edge.mission.map.inputs import InputMonitor
+from fasaco_edge.mission.map.map_state import MapState
+from fasaco_edge.mission.map.reachable_area import ReachableArea
+from fasaco_edge.mission.orders.order import Errand
+from fasaco_edge.mission.orders.sequencer import Sequencer
+
+# An errand ends once the robot was in the last cell for this long [s]: its path leads to the centre
+# and ends with a turn.
+ARRIVAL_S = 2.0
+NO_WAY = "no way {}: waits for a map that shows one"
+PLACES: dict[Errand, str] = {"home": "home", "charge": "to the dock"}
+
+
+@dataclass(frozen=True, slots=True)
+class Errands:
+    """Begins, drives and ends errands."""
+
+    map: MapState
+    monitor: InputMonitor
+    orders: Sequencer
+    route: Route
+    charging: Charging
+    standing: Standing
+    resting: Resting
+    shut_in: ShutIn
+
+    def consider_charging(self, state: State, now: float) -> None:
+        """Begin to charge if due, and end charging if it is enough."""
+        orders, charging = self.orders, self.charging
+        charging.look(now)
+        errand, docked = orders.order_state.errand, state is State.CHARGING
+        if errand == "charge" and charging.is_enough(now, docked=docked):
+            orders.set_state(replace(orders.order_state, errand=""))
+        elif not errand and charging.is_due(now):
+            orders.set_state(replace(orders.order_state, errand="charge"))
+
+    def run(self, cell: Cell, update: PathUpdate | None, state: State, now: float) -> Doing:
+        """Drive on to the destination of the errand, or arrive there.
+
+        Args:
+            cell: the robot's cell.
+            update: the path that this step has made so far.
+            state: of the mission so far.
+            now: time [s].
+        """
+        route, orders, area, path = self.route, self.orders, self.map.area, self.route.path
+        errand = orders.order_state.errand
+        is_new = route.set_aside()
+        route.drop()
+        goal = orders.goal(errand)
+        if cell == goal and not is_new and self.standing.in_cell_s >= ARRIVAL_S:
+            if errand == "charge":
+                return Doing(State.CHARGING, self.charging.why(now), update)
+            return self._arrive(update, state, now)
+        is_off = path.finished or path.is_far(cell) or bool(self.monitor.doubt)
+        stands = cell != goal and self.standing.is_on_path
+        if stands and not is_new:
+            self.standing.note_again()
+        is_lost = cell != goal and ((is_off and self.standing.has_waited) or stands)
+        to = PLACES[errand]
+        if is_new or is_lost or not len(path.cells) or tuple(path.cells[-1].tolist()) != goal:
+            self.monitor.clear_doubt()
+            if goal is None:
+                return Doing(State.BLOCKED, NO_WAY.format(to), update)
+            if area is None or not area.contains(goal):
+                return self.shut_in.lead_out(NO_WAY.format(to), update, now, goal)
+            here = self.map.cell_at_pose() or cell
+            why = self.charging.why_due() if errand == "charge" else ""
+            update = self.lead(self.way(area, here, goal), f"drives {to}{why}", errand, now)
+        return Doing(State.RETURNING, f"on the way {to}", update)
+
+    def way(self, area: ReachableArea, cell: Cell, goal: Cell) -> NDArray[np.int32]:
+        """Return the shortest path, around robots that stand in the way where that is possible."""
+        around = self.orders.passable(area, cell)
+        path = around.shortest_path(cell, goal) if around.contains(goal) else NO_CELLS
+        return path if len(path) else area.shortest_path(cell, goal)
+
+    def lead(self, path: NDArray[np.int32], reason: str, errand: Errand, now: float) -> PathUpdate:
+        """Publish a path to the destination of an errand, with the heading there."""
+        place = self.map.places.place(errand)
+        yaw = None if place is None else place.stand.yaw
+        return self.route.publish(path, reason, now, end_yaw=yaw)
+
+    def _arrive(self, update: PathUpdate | None, state: State, now: float) -> Doing:
+        """End an errand on arrival."""
+        self.orders.set_state(self.orders.order_state.arrived())
+        resting = self.resting.why(state, now)
+        assert resting is not None
+        return Doing(*resting, update)

@@ -1,0 +1,133 @@
+"""Order work: the next plan of an order, or its end where nothing is left to plan."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fasaco_edge.errors import NothingToCover
+from fasaco_edge.grid.lattice import Cell
+from fasaco_edge.mission.company import Company
+from fasaco_edge.mission.core.doing import Doing
+from fasaco_edge.mission.core.errands import NO_WAY, Errands
+from fasaco_edge.mission.core.events import PathUpdate, State
+from fasaco_edge.mission.core.route import Route
+from fasaco_edge.mission.core.shut_in import ShutIn
+from fasaco_edge.mission.core.trail_layer import TrailLayer
+from fasaco_edge.mission.line.layer import LineLayer
+from fasaco_edge.mission.map.inputs import InputMonitor
+from fasaco_edge.mission.map.map_state import MapState
+from fasaco_edge.mission.orders.order_state import Stage
+from fasaco_edge.mission.orders.sequencer import Sequencer
+
+
+@dataclass(frozen=True, slots=True)
+class OrderWork:
+    """Plans the rest of an order, and ends it."""
+
+    map: MapState
+    monitor: InputMonitor
+    orders: Sequencer
+    route: Route
+    line: LineLayer
+    trail: TrailLayer
+    company: Company
+    errands: Errands
+    shut_in: ShutIn
+
+    def plan(self, cell: Cell, update: PathUpdate | None, state: State, now: float) -> Doing:
+        """Request the wanted plan; if nothing is left to cover, continue with the order.
+
+        Args:
+            cell: the robot's cell.
+            update: the path that this step has made so far.
+            state: of the mission so far.
+            now: time [s].
+        """
+        route, orders = self.route, self.orders
+        orders.reopen()
+        # One that stands, as others go on or for a map, has no more reason in each step.
+        stands = state is State.COVERING and not len(route.path.cells)
+        self.share(cell, now, at_once=not stands)
+        while orders.order_state.stage is not Stage.RETURNING:
+            if why := orders.why_standing(now):
+                return self._stand_by(why, update, now)
+            try:
+                problem = orders.problem(cell, route.path_to_keep)
+            except NothingToCover:
+                if ended := self._go_on_elsewhere(cell, update, now):
+                    return ended
+                continue
+            request = route.request_plan(self.trail.posed(problem))
+            self.monitor.note_request(request.number)
+            state = State.COVERING if len(route.path.cells) else State.PLANNING
+            return Doing(state, request.reason, update, request)
+        return self._return_home(cell, update, now)
+
+    def _go_on_elsewhere(self, cell: Cell, update: PathUpdate | None, now: float) -> Doing | None:
+        """Find work for a robot that cannot come to any; None once there may be some.
+
+        In this order: out of where it is shut in, a place to look from, a wait for others, floor
+        that the line has missed, cells that it cannot come to; then the next stage of the order.
+        """
+        route, orders, area = self.route, self.orders, self.map.area
+        if area is not None and (why := self.shut_in.why(area)):
+            return self.shut_in.lead_out(why, update, now)
+        if reason := orders.explore(cell):
+            route.want(reason)
+            return None
+        if why := orders.why_looking(cell, now):
+            return self._stand_by(why, update, now)
+        if self.line.open_missed():
+            return None
+        if orders.pass_over_unreachable():
+            self.share(cell, now, at_once=True)
+            return None
+        return self._next_stage(cell, update, now)
+
+    def _next_stage(self, cell: Cell, update: PathUpdate | None, now: float) -> Doing | None:
+        """Advance the order; None where its next stage has something to plan."""
+        route, orders = self.route, self.orders
+        orders.advance(now)
+        if orders.is_waiting or orders.order_state.stage is Stage.OVER:
+            route.drop()
+            return self.settle(update, now)
+        if reason := orders.begin(cell, now):
+            route.want(reason)
+        return None
+
+    def settle(self, update: PathUpdate | None, now: float) -> Doing:
+        """Stop: all is covered, or the rest waits for a retry."""
+        orders, area = self.orders, self.map.area
+        if not orders.is_waiting:
+            return Doing(State.DONE, orders.ending, update)
+        if area is not None and (why := self.shut_in.why(area)):
+            return self.shut_in.lead_out(why, update, now)
+        return Doing(State.BLOCKED, orders.waiting_reason(), update)
+
+    def share(self, cell: Cell, now: float, *, at_once: bool = False) -> str:
+        """Divide the rest among the robots if due; return why a plan is wanted, or ""."""
+        if self.orders.order_state.stage is Stage.RETURNING:
+            return ""
+        return self.company.share(self.orders.cells.open_cells, cell, now, at_once=at_once)
+
+    def _stand_by(self, reason: str, update: PathUpdate | None, now: float) -> Doing:
+        """Stand in the middle of an order, without a path."""
+        return Doing(State.COVERING, reason, self.route.stop(reason, now) or update)
+
+    def _return_home(self, cell: Cell, update: PathUpdate | None, now: float) -> Doing:
+        """Drive to where the order ends, or end it there."""
+        route, area, home = self.route, self.map.area, self.orders.goal()
+        assert area is not None
+        route.drop()
+        self.monitor.clear_doubt()
+        if home is None or cell == home:
+            self.orders.advance(now)
+            return self.settle(update, now)
+        path = self.errands.way(area, cell, home)
+        if not len(path):
+            return self.shut_in.lead_out(NO_WAY.format("home"), update, now, home)
+        if not np.array_equal(path, route.path.ahead):
+            update = self.errands.lead(path, "returning home", "home", now)
+        return Doing(State.RETURNING, "on the way home", update)
