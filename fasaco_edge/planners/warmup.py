@@ -9,9 +9,7 @@ from functools import cached_property, partial
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.fleet.planning.annealing import PIECES
-from fasaco_edge.fleet.planning.division import divide
-from fasaco_edge.fleet.planning.first_tours import Fleet
+from fasaco_edge.fleet.mission.division import Robot, divide
 from fasaco_edge.grid.changes import LatticeChange
 from fasaco_edge.grid.fine_raster import RobotDiscs
 from fasaco_edge.grid.floor import Floor, StandLattice
@@ -20,7 +18,6 @@ from fasaco_edge.grid.geometry import GridGeometry, Pose2D, Window
 from fasaco_edge.grid.lattice import CoverageLattice, Footprint, pixels_of, placement_on
 from fasaco_edge.grid.occupancy import OCCUPIED, OccupancyGrid
 from fasaco_edge.kernels.code_files import note_all_compiled
-from fasaco_edge.kernels.fleet.nearest import walk_parts
 from fasaco_edge.kernels.floor.capsule import is_clear
 from fasaco_edge.kernels.floor.certain import TILE, FloorTiles, Whereabouts, certain_floor
 from fasaco_edge.kernels.floor.open_floor import pass_line, set_causes, set_open
@@ -146,12 +143,8 @@ def _take_windows(room: _TinyRoom) -> None:
 
 
 def _take_shares(room: _TinyRoom) -> None:
-    fleet = Fleet([(0, 0), (3, 3)], room.costly.cost)
-    # Until pairs have shared anew in either way.
-    divide(room.lattice, fleet, lambda progress: progress.work.perturbations > PIECES + 8)
-    steps, cols = room.lattice.steps.ravel().copy(), room.lattice.steps.shape[1]
-    offsets, cells = np.array([1, cols, -1, -cols], np.int64), np.arange(2, dtype=np.int64)
-    walk_parts(steps, offsets, cells, cells, cells)
+    robots = [Robot("a", (0, 0), 1.0), Robot("b", (3, 3), 1.0)]
+    divide(room.lattice, np.ones((4, 4), np.bool_), robots)
 
 
 def _take_repair(room: _TinyRoom) -> None:

@@ -22,8 +22,7 @@ from fasaco_edge.bench.benchmark import (
     add_grid_options,
     positive,
 )
-from fasaco_edge.fleet.planning.division import Division, divide
-from fasaco_edge.fleet.planning.first_tours import Fleet
+from fasaco_edge.fleet.planning.division import Division, Fleet, divide
 from fasaco_edge.grid.lattice import Cell
 from fasaco_edge.planners.cost import CoverageCost
 from fasaco_edge.planners.grids import NamedGrid, read_grid

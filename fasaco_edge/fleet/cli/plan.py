@@ -39,8 +39,7 @@ def plan_fleet(args: argparse.Namespace, request: PlanRequest) -> int:
     _check(args, request)
     compile_kernels()
     # After that, as they import the compiler.
-    from fasaco_edge.fleet.planning.division import divide
-    from fasaco_edge.fleet.planning.first_tours import Fleet
+    from fasaco_edge.fleet.planning.division import Fleet, divide
     from fasaco_edge.offline.maps import load_map
 
     map = load_map(args.map, resolution_m=args.resolution, unknown_free=args.unknown_free)

@@ -159,7 +159,7 @@ def _divided(
         pairs = [kept.get(robot.name, (robot.cell, 0.0)) for robot in robots]
         seeds, old_s = [seed for seed, _ in pairs], np.array([s for _, s in pairs], np.float32)
         times_s = travel.times_s(seeds, steps_s)
-        balanced_s = (_handicaps_s(times_s, steps_s, first_s) for first_s in (old_s, None))
+        balanced_s = (balanced_handicaps_s(times_s, steps_s, first_s) for first_s in (old_s, None))
         for handicaps_s in (old_s, *balanced_s):
             choice.offer(seeds, handicaps_s, times_s, STABLE)
     rounds = max(1, min(ROUNDS, MOST_SEARCHED // (len(robots) * lattice.steps.size)))
@@ -168,10 +168,10 @@ def _divided(
         for _ in range(rounds):
             times_s, cells_s = travel.times_s(seeds, steps_s), steps_s
             for _ in range(EVENED if rounds > 1 else 1):
-                handicaps_s = _handicaps_s(times_s, cells_s)
+                handicaps_s = balanced_handicaps_s(times_s, cells_s)
                 owner, ends_s = choice.offer(seeds, handicaps_s, times_s)
                 cells_s = _cells_s(owner, ends_s, steps_s)
-            seeds = _middles(lattice, cells, owner, seeds)
+            seeds = middles(lattice, cells, owner, seeds)
     return choice.seeds, choice.handicaps_s.tolist()
 
 
@@ -266,7 +266,7 @@ def _owners_before(
     return owners
 
 
-def _handicaps_s(
+def balanced_handicaps_s(
     times_s: Seconds, steps_s: NDArray[np.float64], first_s: Seconds | None = None
 ) -> Seconds:
     """Return handicaps, float32 (k,), that balance the load, for travel times float32 (k, n).
@@ -304,7 +304,7 @@ def _spread(travel: Travel, from_starts_s: Seconds) -> list[Cell]:
     return [places[seed] for seed in order]
 
 
-def _middles(
+def middles(
     lattice: CoverageLattice, cells: NDArray[np.int64], owner: NDArray[np.int64], seeds: list[Cell]
 ) -> list[Cell]:
     """Return the cell nearest to the centre of each part; the seed for an empty part."""
