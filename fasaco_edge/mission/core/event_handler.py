@@ -168,14 +168,18 @@ class EventHandler:
             self.way_out.begin_anew()
         else:
             self._record()  # the pose may have come before the map
-        free = self.map.without_obstacles(self.map.free)
-        self._change_building(self.ledger.check(free, self.map.grid.frame))
+        free, frame = self.map.without_obstacles(self.map.free), self.map.grid.frame
+        shows_floor = self.map.shows_floor
+        self._change_building(self.ledger.check(free, frame) if shows_floor else None)
 
     def _compare_buildings(self) -> Pose2D | None:
         """Compare the newest map with those before; return the robot's pose on these."""
         if self.map.plain is None or self.map.free is None:
             return None
         pose = None if self.map.pose is None else self.map.pose.pose
+        if not self.map.shows_floor:
+            self.map.building.note_no_floor()
+            return pose
         plain, free = map(self.map.without_obstacles, (self.map.plain, self.map.free))
         contradicts = partial(self.ledger.contradicts, free)
         return self.map.building.note_map(plain, pose, self._now, contradicts)

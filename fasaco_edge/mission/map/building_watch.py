@@ -138,6 +138,8 @@ class BuildingWatch:
         # then; None while the newest agrees.
         self._foreign: tuple[float, Agreement, Pose2D | None] | None = None
         self._agreed_at = 0.0
+        # Whether the newest map shows no floor, so that nothing is decided.
+        self._is_blind = False
         # Changes of building, and the last one.
         self._changes, self._changed_at = 0, float("-inf")
         # How a map that still shows the building before agrees with the reference, and the pose by
@@ -157,7 +159,7 @@ class BuildingWatch:
         """Take the next map as the first one."""
         self.why, self._reference, self._newest = "", None, None
         self._foreign = self._jump = self._shifted = None
-        self._has_closed = False
+        self._has_closed = self._is_blind = False
 
     def accept(self, now: float) -> None:
         """Take the newest map's building for the one that the robot is in from now on."""
@@ -169,6 +171,10 @@ class BuildingWatch:
     def note_jump(self, start: Pose2D, end: Pose2D, now: float) -> None:
         """Note that the pose has jumped: a map that has moved with it may still come."""
         self._jump = Motion(start, end), now
+
+    def note_no_floor(self) -> None:
+        """Note a map without floor: it is of any building, and the time with it does not count."""
+        self._is_blind = True
 
     def note_map(
         self,
@@ -190,6 +196,9 @@ class BuildingWatch:
             The robot's pose on the map before, which differs from ``pose`` if that moved first.
         """
         self._newest, before = lattice, self._reference
+        if self._is_blind and self._foreign is not None:
+            self._foreign = now, *self._foreign[1:]
+        self._is_blind = False
         if before is None:
             self._reference, self._reference_at, self._agreed_at = lattice, now, now
             return pose
@@ -232,6 +241,8 @@ class BuildingWatch:
 
     def look(self, now: float) -> bool:
         """Update ``why``; return whether the map has shown another building for long enough."""
+        if self._is_blind:
+            return False
         if self._foreign is None:
             if now - self._agreed_at >= SETTLED_S:
                 self.why = ""

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from fasaco_edge.grid.changes import LatticeChange
 from fasaco_edge.grid.geometry import Pose2D, Window
-from fasaco_edge.grid.lattice import UNKNOWN
+from fasaco_edge.grid.lattice import UNKNOWN, CoverageLattice
 from fasaco_edge.kernels.floor import certain as kernels
 from fasaco_edge.kernels.floor.certain import FloorTiles, Whereabouts
 from fasaco_edge.mission.coverage.floor_tiles import (
@@ -34,6 +34,8 @@ from fasaco_edge.mission.coverage.ledger import Cells, LedgerSnapshot
 # Threshold on the cells that change between free and blocked with one map: number, and share of
 # those known before. Doors and passers-by change fewer.
 LEAST_CELLS, LEAST_SHARE = 20, 0.1
+# A map with fewer cells to drive on shows no floor: it says nothing of walls, or of the building.
+LEAST_FLOOR = LEAST_CELLS
 # Smaller motions are ignored: [m], [rad].
 STILL_M, STILL_RAD = 0.02, math.radians(0.2)
 # A point this close to a row, or column, of cell centres [cells] needs only that one covered, not
@@ -44,6 +46,11 @@ BETWEEN = (0.25, 0.5, 0.75, 1.0)
 # For swept floor one position per pixel of the motion is tested, up to this many: motions of more
 # than 0.4 m, which are rare, are tested more coarsely.
 MOST_BETWEEN = 16
+
+
+def shows_floor(lattice: CoverageLattice) -> bool:
+    """Tell whether a map shows floor, and so says where walls are."""
+    return int(np.count_nonzero(lattice.coverable)) >= LEAST_FLOOR
 
 
 def has_moved(change: LatticeChange) -> bool:

@@ -29,7 +29,7 @@ from fasaco_edge.mission.coverage.progress import Coverage, FreeArea
 from fasaco_edge.mission.map.building_watch import BuildingWatch
 from fasaco_edge.mission.map.ground import Ground
 from fasaco_edge.mission.map.inputs import FrameSelector
-from fasaco_edge.mission.map.loop_closure import has_moved
+from fasaco_edge.mission.map.loop_closure import has_moved, shows_floor
 from fasaco_edge.mission.map.obstacles import Obstacles
 from fasaco_edge.mission.map.reachable_area import ReachableArea, anchor_cell
 from fasaco_edge.mission.map.standing_places import StandingPlaces
@@ -50,6 +50,7 @@ class MapState:
             before the first.
         pose: the newest pose in the map's frame; before the first map, in any frame.
         has_moved: whether the newest map shows the walls at other places: a loop closure.
+        shows_floor: whether the newest map shows floor; one that shows none says nothing of walls.
         area: the reachable area as of the last ``update_area``; None while the robot's pose is on
             no coverable cell.
         frames: selects the active frame; keeps the inputs of another.
@@ -65,7 +66,9 @@ class MapState:
         self.map_revision = 0
         self.pose: StampedPose | None = None
         self.area: ReachableArea | None = None
-        self.has_moved = False
+        self.has_moved = self.shows_floor = False
+        # The newest lattice of cell centres of a map that shows floor.
+        self._shown: CoverageLattice | None = None
         self.frames = FrameSelector()
         self.building = BuildingWatch()
         self.places = StandingPlaces(config.policy, config.given or config.policy)
@@ -166,14 +169,24 @@ class MapState:
             change = self._ground.begin(grid)
             if self.grid is not None:
                 self.building.begin_anew()
-            self.area = None
+            self.area = self._shown = None
         else:
             change = self._ground.follow((self.grid, grid), within)
-        self.has_moved = has_moved(change)
+        self._compare(change)
         self.grid, self.given = grid, given
         self.map_revision += 1
         if self.pose is not None and self.pose.frame != grid.frame:
             self.pose = self.frames.pose_in(grid.frame)
+
+    def _compare(self, change: LatticeChange) -> None:
+        """Find whether the newest map shows floor, and has moved since the last that did."""
+        assert self.free is not None
+        self.has_moved, self.shows_floor = False, shows_floor(self.free)
+        if not self.shows_floor:
+            return
+        if self._shown is not None and self._shown is not change.before:
+            change = LatticeChange.to(self._shown, change.after)
+        self.has_moved, self._shown = has_moved(change), change.after
 
     def watch_on(self, building: BuildingWatch) -> None:
         """Compare maps with the building that another mission, on the same cells, was in."""
