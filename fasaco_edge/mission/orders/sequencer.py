@@ -19,6 +19,7 @@ from fasaco_edge.mission.map.map_state import MapState
 from fasaco_edge.mission.map.reachable_area import ReachableArea, anchor_cell
 from fasaco_edge.mission.orders.cells_left import CellsLeft
 from fasaco_edge.mission.orders.exploration import Exploration, is_in_reach
+from fasaco_edge.mission.orders.left_behind import LeftBehind
 from fasaco_edge.mission.orders.order import Errand, Zone
 from fasaco_edge.mission.orders.order_state import NO_ORDER, OrderState, Stage
 from fasaco_edge.mission.orders.reached_cells import ReachedCells
@@ -42,6 +43,7 @@ class _Run:
         done: number of cells covered, and looked from, by the end of the last path; -1 before the
             first.
         in_vain: number of paths in a row that ended with that many.
+        left_behind: floor that opens while the robot is on its way home.
         retry_at: time of the next retry [s]; None if nothing waits.
         ending: how the order ended.
     """
@@ -49,6 +51,7 @@ class _Run:
     exploration: Exploration = field(default_factory=Exploration)
     done: int = -1
     in_vain: int = 0
+    left_behind: LeftBehind = field(default_factory=LeftBehind)
     retry_at: float | None = None
     ending: str = "the order was carried out"
 
@@ -352,14 +355,25 @@ class Sequencer:
                 run.retry_at = now + self._config.policy.retry_s
         elif state.returns_home_next:
             run.retry_at = None
+            run.left_behind.set_out(area)
             self.order_state = replace(state, stage=Stage.RETURNING, begun=False)
         else:
             self._end()
 
     def reopen(self) -> None:
-        """Continue an automatic order: the map has changed since it was over."""
-        if self.order_state.automatic and self.order_state.stage is Stage.OVER:
-            self.order_state = replace(self.order_state, stage=Stage.COVERING, why="")
+        """Continue an order after a change of the map: an automatic one that was over, and one on
+        its way home for floor that has opened, once and as often as there are retries."""
+        state, run, area = self.order_state, self._run, self._map.area
+        if state.automatic and state.stage is Stage.OVER:
+            self.order_state = replace(state, stage=Stage.COVERING, why="")
+        if state.stage is not Stage.RETURNING or area is None:
+            return
+        may_turn = run.left_behind.times <= self._config.policy.retries
+        if may_turn and run.left_behind.is_open(self.cells.open_to_me(area), area):
+            run.left_behind.turn_back()
+            self.order_state = replace(state, stage=Stage.RETRYING, begun=True)
+            run.done, run.in_vain = -1, 0
+            self._company.try_again()
 
     def waiting_reason(self) -> str:
         """Return as text what the robot waits for before a retry."""
