@@ -1,4 +1,4 @@
-"""Polygons in the map frame: checks of validity."""
+"""Polygons in the map frame: checks of validity, and areas."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def polygon_flaw(polygon: Polygon) -> str:
             return f"has point {index} twice in a row"
     if crossing := _crossing(polygon):
         return "crosses or touches itself: edges from points {} and {}".format(*crossing)
-    area = abs(_signed_area(polygon))
+    area = area_m2(polygon)
     if area < LEAST_AREA_M2:
         return f"must have an area of at least {LEAST_AREA_M2:g} m2, got {area:.3g}"
     return ""
@@ -54,12 +54,14 @@ def _edges(polygon: Polygon) -> Iterator[tuple[Point, Point]]:
     return zip(polygon, (*polygon[1:], polygon[0]), strict=True)
 
 
-def _signed_area(polygon: Polygon) -> float:
+def area_m2(polygon: Polygon) -> float:
+    """Return the area of a polygon, of points (x, y) [m]."""
     # Relative to a corner: far from the origin rounding would swamp the differences.
     x0, y0 = polygon[0]
-    return 0.5 * math.fsum(
+    twice = math.fsum(
         (ax - x0) * (by - y0) - (bx - x0) * (ay - y0) for (ax, ay), (bx, by) in _edges(polygon)
     )
+    return 0.5 * abs(twice)
 
 
 def _crossing(polygon: Polygon) -> tuple[int, int] | None:

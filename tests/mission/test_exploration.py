@@ -3,6 +3,7 @@
 import itertools
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -15,6 +16,8 @@ from tests.mission.world import (
     FOOTPRINT,
     PIXELS,
     Drive,
+    building,
+    patch,
     placed,
     pose_at,
     reachable_cells,
@@ -137,3 +140,52 @@ def test_walls_that_come_and_go_never_lead_to_an_illegal_step(seed, pace):
     drive.tell(MapReceived(placed(np.zeros_like(truth), (0, 0))))
     drive.finish()
     assert drive.visited == set(np.ndindex(6, 7))
+
+
+def test_a_zone_that_stays_out_of_reach_is_named_at_the_end():
+    drive = Drive((0, 0), order_state=OrderState.idle("no order yet"))
+    drive.tell(MapReceived(building("....#....")), pose_at(0, 0))
+    drive.command("start", {"zones": [{"name": "z", "polygon": rectangle(0, 6, 1, 8)}]})
+    drive.finish()
+    ending = "every reachable cell of the zones is covered; not reached: 'z' (0.1 m2)"
+    assert drive.mission.reason == ending
+
+
+@pytest.mark.parametrize(
+    ("wall", "col0", "col1", "area"),
+    [
+        ("#", 6, 8, "0.2"),
+        ("#", 6, 16, "1.2"),  # most of it lies beyond the map
+        ("?", 6, 8, "0.2"),
+    ],
+)
+def test_the_area_of_a_zone_that_was_not_reached_is_said(wall, col0, col1, area):
+    drive = Drive((0, 0), order_state=OrderState.idle("no order yet"))
+    rows = (f"...#{wall}#...",) * 2
+    drive.tell(MapReceived(building(*rows)), pose_at(0, 0))
+    zones = [
+        {"name": "here", "polygon": rectangle(0, 0, 2, 2)},
+        {"name": "there", "polygon": rectangle(0, col0, 2, col1)},
+    ]
+    drive.command("start", {"zones": zones})
+    drive.finish()
+    assert drive.mission.reason.endswith(f"; not reached: 'there' ({area} m2)")
+
+
+def test_a_zone_that_was_covered_before_its_door_shut_is_not_named():
+    drive = Drive((0, 8), order_state=OrderState.idle("no order yet"))
+    drive.tell(MapReceived(building("." * 9)), pose_at(0, 8))
+    zones = [
+        {"name": "a", "polygon": rectangle(0, 6, 1, 9)},
+        {"name": "b", "polygon": rectangle(0, 0, 1, 3)},
+    ]
+    drive.command("start", {"zones": zones})
+    for _ in range(100):
+        if drive.request is not None:
+            drive.plan()
+        if drive.cell == (0, 3):
+            break
+        drive.go()
+    drive.tell(patch("#", at=(0, 4)))
+    drive.finish()
+    assert drive.mission.reason == "every reachable cell of the zones is covered"

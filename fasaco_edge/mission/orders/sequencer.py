@@ -18,12 +18,13 @@ from fasaco_edge.mission.map.loop_closure import Motion, moved_cells
 from fasaco_edge.mission.map.map_state import MapState
 from fasaco_edge.mission.map.reachable_area import ReachableArea, anchor_cell
 from fasaco_edge.mission.orders.cells_left import CellsLeft
-from fasaco_edge.mission.orders.exploration import Exploration, is_in_reach
+from fasaco_edge.mission.orders.exploration import Exploration
 from fasaco_edge.mission.orders.left_behind import LeftBehind
 from fasaco_edge.mission.orders.order import Errand, Zone
 from fasaco_edge.mission.orders.order_state import NO_ORDER, OrderState, Stage
 from fasaco_edge.mission.orders.reached_cells import ReachedCells
 from fasaco_edge.mission.orders.zones import in_zones
+from fasaco_edge.mission.orders.zones_beyond import zones_beyond
 from fasaco_edge.planners.problem import CoverageProblem
 
 # After this many paths in a row that cover no further cell, those left wait for the retry: the
@@ -400,11 +401,10 @@ class Sequencer:
         run, order = self._run, self.order_state.order
         run.retry_at = None
         state = self.order_state = replace(self.order_state, stage=Stage.OVER)
-        every = order is None or order.zones[0].polygon is None
         run.ending = self._unreached.ending(state) + self._sum_up()
-        area, named = self._map.area, () if every or order is None else order.zones
-        if area is not None and (beyond := [z.name for z in named if not is_in_reach(z, area)]):
-            run.ending += f"; not reached: {', '.join(map(repr, beyond))}"
+        area, free = self._map.area, self._map.free
+        if order is not None and area is not None and free is not None:
+            run.ending += zones_beyond(order, area, free, self._ledger.visits(free.window))
         self.order_state = replace(state, why=run.ending)
 
     def _is_worth_trying(self) -> bool:

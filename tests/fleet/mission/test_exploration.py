@@ -40,12 +40,3 @@ def test_a_zone_behind_a_robot_that_stands_is_waited_for():
         drive.go(away)
     assert drive.mission.reason == "every reachable cell of the zones is covered"
     assert {(0, col) for col in range(20, 24)} <= drive.visited
-
-
-def test_a_zone_that_stays_out_of_reach_is_named_at_the_end():
-    drive = Drive((0, 0), order_state=OrderState.idle("no order yet"))
-    drive.tell(MapReceived(building("....#....")), pose_at(0, 0))
-    drive.command("start", {"zones": [{"name": "z", "polygon": rectangle(0, 6, 1, 8)}]})
-    drive.finish()
-    ending = "every reachable cell of the zones is covered; not reached: 'z'"
-    assert drive.mission.reason == ending
