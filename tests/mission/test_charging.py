@@ -5,7 +5,7 @@ import math
 import pytest
 
 from fasaco_edge.grid.geometry import Pose2D, StampedPose
-from fasaco_edge.mission.config import Dock
+from fasaco_edge.mission.config import BatteryPolicy, Dock
 from fasaco_edge.mission.core.charging import ALL_AFTER_S, BatteryGauge
 from fasaco_edge.mission.core.events import BatteryReceived, PoseReceived, State
 from fasaco_edge.mission.orders.order_state import NO_ORDER, OrderState
@@ -187,6 +187,56 @@ def test_a_full_battery_is_enough_whatever_its_gauge_says():
     drive.power = "full"
     drive.go()
     assert drive.mission.order_state.errand == ""
+
+
+@pytest.mark.parametrize(("low", "full"), [(0.1, 0.25), (0.15, 0.25), (0.2, 0.35)])
+def test_a_battery_that_is_full_at_little_does_not_go_to_and_fro(low, full):
+    dock = Dock(x_m=0.5 * CELL, y_m=1.5 * CELL, approach_m=0.0)
+    policy = BatteryPolicy(low=low)
+    drive = Battery(0.3, rows=("." * 60,) * 2, dock=dock, battery=policy)
+    drive.mission.charging.gauge._drains.extend([0.002] * 5)
+    begun, covered = [], []
+    for _ in range(600):
+        if drive.request is not None:
+            drive.plan()
+        was, docked = drive.cell, drive.mission.state is State.CHARGING
+        drive.go()
+        if drive.mission.state is State.CHARGING and not docked:
+            begun.append(drive.level)
+            covered.append(len(drive.visited))
+        if drive.cell != was:
+            drive.level, drive.power = drive.level - 0.002, "discharging"
+        elif docked:
+            drive.level, drive.power = min(drive.level + 0.01, max(full, drive.level)), "full"
+    assert len(begun) <= 6
+    assert covered[1] - covered[0] > 30
+    assert min(begun) > 0.1 - 0.002
+
+
+def test_full_counts_a_tenth_above_where_it_turned_back():
+    """Far from its dock it turns back early, and would again."""
+    drive = Battery(0.9, rows=("." * 60,) * 2, dock=None)
+    drive.command("start", {"passes": 2})
+    charging = drive.mission.charging
+    charging.gauge._drains.extend([0.01] * 5)
+    while not drive.mission.order_state.errand:
+        if drive.request is not None:
+            drive.plan()
+        was = drive.cell
+        drive.go()
+        drive.level -= 0.006 * (drive.cell != was)
+    turned_at = charging.turns_back_at
+    assert turned_at > 0.25
+    drive.run(State.CHARGING)
+    for level, goes in ((turned_at + 0.08, False), (turned_at + 0.12, True)):
+        drive.level, drive.power = level, "charging"
+        for _ in range(8):
+            drive.go()
+        drive.power = "full"
+        drive.go()
+        assert (drive.mission.state is not State.CHARGING) is goes
+        if not goes:
+            assert drive.mission.reason == f"battery at {level:.0%}, but full, goes on at 90%"
 
 
 def test_a_dock_out_of_reach_is_named():

@@ -11,6 +11,7 @@ from fasaco_edge.grid.geometry import Window
 from fasaco_edge.grid.lattice import CoverageLattice
 from fasaco_edge.grid.occupancy import MapPatch
 from fasaco_edge.mission.core.events import MapReceived, PatchReceived, State
+from fasaco_edge.mission.orders.order_state import OrderState
 from tests import naive
 from tests.mission.world import (
     FOOTPRINT,
@@ -21,6 +22,7 @@ from tests.mission.world import (
     placed,
     pose_at,
     reachable_cells,
+    rectangle,
 )
 from tests.support.examples import examples
 

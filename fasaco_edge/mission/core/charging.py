@@ -143,11 +143,15 @@ class Charging:
     _is_best_here: bool = field(default=False, init=False)
     # The highest level since the robot is in its dock, and since when; None elsewhere.
     _best: tuple[float, float] | None = field(default=None, init=False)
+    # The level of turning back when the robot went to charge, and the level at which the battery
+    # last took no more, where that is less than it has to go on with; None for none.
+    _turned_at: float = field(default=0.0, init=False)
+    _most: float | None = field(default=None, init=False)
 
     def succeed(self, before: Charging) -> None:
-        """Go on with the gauge of another one, and with its wait for the last percents."""
+        """Go on with the gauge of another one, and with what it knows of this battery."""
         self.gauge.succeed(before.gauge)
-        self._best = before._best
+        self._best, self._turned_at, self._most = before._best, before._turned_at, before._most
 
     @property
     def policy(self) -> BatteryPolicy | None:
@@ -212,6 +216,10 @@ class Charging:
         is_low = level <= self.turns_back_at or self._is_best_here
         return self.orders.goal("charge") is not None and is_low
 
+    def begin(self) -> None:
+        """Note that the robot goes to charge."""
+        self._turned_at = self.turns_back_at
+
     def why_due(self) -> str:
         """Return why the robot goes and charges, as the end of a path's reason."""
         if self.gauge.level is None:
@@ -252,7 +260,11 @@ class Charging:
         # Some batteries report full, others only stop rising.
         power, waited_s = self.gauge.power, now - self._best[1]
         is_all = power == "full" or (power != "discharging" and waited_s >= ALL_AFTER_S)
-        return level >= self.goes_on_at or (is_all and level >= self.policy.low + BETWEEN)
+        is_charged = level >= self.goes_on_at
+        # With less it would soon be back.
+        least = max(self.policy.low, self._turned_at) + BETWEEN
+        self._most = level if is_all and not is_charged else None
+        return is_charged or (is_all and level >= least)
 
     def why(self, now: float) -> str:
         """Return what a robot in its dock waits for."""
@@ -260,7 +272,8 @@ class Charging:
             return f"{why}: waits for one"
         if self.gauge.level is None:
             return "waits for the charge of the battery"
-        but = ", but discharging" if self.gauge.power == "discharging" else ""
+        power = self.gauge.power
+        but = f", but {power}" if power in ("discharging", "full") else ""
         return f"battery at {self.gauge.level:.0%}{but}, goes on at {self.goes_on_at:.0%}"
 
     def _finds_nothing_better(self) -> bool:
@@ -276,7 +289,8 @@ class Charging:
             return False
         assert self.policy is not None
         spare, ahead = level - self.turns_back_at, self.route.path.ahead
-        if not 0.0 < spare <= min(EARLY, self.policy.enough - level):
+        most = self.policy.enough if self._most is None else self._most
+        if not 0.0 < spare <= min(EARLY, most - level):
             return False
         if area.lattice.states.size > MOST_CELLS:
             return False
@@ -291,7 +305,7 @@ class Charging:
             row, col = ahead[index].tolist()
             way = area.shortest_path((row, col), goal)
             then = level - drain * cost.of_walk(ahead[: index + 1])
-            used = self.policy.enough - then
+            used = most - then
             rates.append(cost.of_walk(way) / used if len(way) else float("inf"))
         return rates[0] <= min(rates)
 

@@ -49,6 +49,7 @@ class Errands:
         if errand == "charge" and charging.is_enough(now, docked=docked):
             orders.set_state(replace(orders.order_state, errand=""))
         elif not errand and charging.is_due(now):
+            charging.begin()
             orders.set_state(replace(orders.order_state, errand="charge"))
 
     def run(self, cell: Cell, update: PathUpdate | None, state: State, now: float) -> Doing:
