@@ -74,7 +74,7 @@ class LineRobot:
         self._drive(0.0 if self.is_stuck else SPEED_M_S * TICK_S)
         self.track.append((self.x, self.y))
         stamp_ns = round(self.now * 1e9)
-        pose = PoseReceived(StampedPose(Pose2D(self.x, self.y, self.yaw), "map", stamp_ns))
+        pose = PoseReceived(StampedPose(self.reported, "map", stamp_ns))
         plans = [] if self._plan is None else [answer(self._plan)]
         decision = self.mission.step([*events, pose, *plans], self.now)
         self._plan = decision.plan
@@ -83,6 +83,11 @@ class LineRobot:
         if sent is not None:
             self.paths.append((self.now, sent.xy, sent.reason))
             self.path = [(x, y) for x, y in sent.xy.tolist()]
+
+    @property
+    def reported(self) -> Pose2D:
+        """The pose that its localiser reports."""
+        return Pose2D(self.x, self.y, self.yaw)
 
     def show(self, pixels: NDArray[np.int8]) -> None:
         """Let a tick pass in which a map comes."""

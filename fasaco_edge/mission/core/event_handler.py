@@ -33,6 +33,7 @@ from fasaco_edge.mission.core.route import Route
 from fasaco_edge.mission.core.trail_layer import TrailLayer
 from fasaco_edge.mission.core.way_out import WayOut
 from fasaco_edge.mission.coverage.drive_meter import DriveMeter
+from fasaco_edge.mission.coverage.driven_poses import Driven
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
 from fasaco_edge.mission.line.layer import LineLayer
 from fasaco_edge.mission.map.inputs import InputMonitor
@@ -167,7 +168,7 @@ class EventHandler:
             self.route.note_map_motion()
             self.way_out.begin_anew()
         else:
-            self._record()  # the pose may have come before the map
+            self._record_again()  # the pose may have come before the map
         free, frame = self.map.without_obstacles(self.map.free), self.map.grid.frame
         shows_floor = self.map.shows_floor
         self._change_building(self.ledger.check(free, frame) if shows_floor else None)
@@ -206,7 +207,7 @@ class EventHandler:
             return
         misfit = self.ledger.begin_elsewhere(self.map.grid.frame)
         self.company.forget_ground()
-        self._record()
+        self._record_again()
         self._change_building(misfit)
 
     def _change_building(self, misfit: LedgerMismatchError | None) -> None:
@@ -245,7 +246,7 @@ class EventHandler:
         self.line.note_map()
         self._compare_buildings()
         if misfit is not None:
-            self._record()
+            self._record_again()
         self._go_on(misfit)
 
     def _leave_map(self, why: str) -> None:
@@ -281,7 +282,9 @@ class EventHandler:
                 self.orders.move_reached(motion)
                 if self.map.building.take_closure():
                     self.orders.move_home(motion)
-            self._record()
+                self.monitor.driven.break_track()
+            for driven in self.monitor.driven.take(stamped):
+                self._record(driven)
         self.line.note_pose(stamped.pose, self.monitor.farthest_m)
         cell = self.map.robot_cell()
         if cell is None:
@@ -296,14 +299,20 @@ class EventHandler:
         self.route.follow(cell, self.ledger.current.has_visited)
         self.trail.note_drive()
 
-    def _record(self) -> None:
-        """Record what is under the tool; a pose far outside the map is ignored."""
-        lattice, stamped = self.map.lattice, self.map.pose
-        if lattice is None or stamped is None:
+    def _record_again(self) -> None:
+        """Record what is under the tool on another map."""
+        if self.map.pose is not None and not self.monitor.driven.holds:
+            self._record(Driven(self.map.pose.pose, self.monitor.farthest_m))
+
+    def _record(self, driven: Driven) -> None:
+        """Record what was swept on the way to a pose; one far outside the map is ignored."""
+        lattice, pose = self.map.lattice, driven.pose
+        if lattice is None:
             return
-        pose = stamped.pose
+        if not driven.is_joined:
+            self.ledger.break_track()
         if lattice.contains(lattice.cell_at(pose.x, pose.y)):
-            full = self.ledger.record(pose, self.map.place_of, self.monitor.farthest_m)
+            full = self.ledger.record(pose, self.map.place_of, driven.farthest_m)
             if full is not None:
                 self._faults.append(full)
 
@@ -337,4 +346,4 @@ class EventHandler:
         self.map.building.begin_anew()
         self._compare_buildings()
         self.route.forget_failure()
-        self._record()
+        self._record_again()

@@ -16,15 +16,13 @@ from fasaco_edge.errors import FasacoError, WrongFrame
 from fasaco_edge.grid.geometry import StampedPose
 from fasaco_edge.grid.occupancy import MapPatch, OccupancyGrid
 from fasaco_edge.mission.config import MissionConfig
+from fasaco_edge.mission.coverage.driven_poses import DrivenPoses
 from fasaco_edge.mission.coverage.ledger import JUMP_CELLS
 
 # Time for which map and poses must arrive in another frame alone before it becomes active [s].
 PATIENCE_S = 10.0
 # Longer gaps between poses restart that time [s].
 GAP_S = 3.0
-# A base may drive by this factor faster than configured. Between two poses farther apart in time
-# nothing is known of its track, whatever the timeout of the pose [s].
-SPEED_MARGIN, LONGEST_S = 1.2, 3.0
 
 
 class FrameSelector:
@@ -172,11 +170,13 @@ class InputMonitor:
         doubt_since: when that began.
         farthest_m: how far the robot can have driven between the last two poses, by their stamps
             and its speed; 0 where that is not known [m].
+        driven: which poses count for what was swept.
     """
 
     def __init__(self, config: MissionConfig) -> None:
         self.doubt = ""
         self.doubt_since = self.farthest_m = 0.0
+        self.driven = DrivenPoses(config.speed_m_s, config.footprint.cell_m)
         self._config = config
         self._pose: StampedPose | None = None
         # Whether a pose has come, in whatever frame.
@@ -218,9 +218,10 @@ class InputMonitor:
         self.farthest_m = 0.0
         if last is None:
             return False
-        took_s = (stamped.stamp_ns - last.stamp_ns) * 1e-9
-        if not lost and 0.0 < took_s <= LONGEST_S:
-            self.farthest_m = SPEED_MARGIN * self._config.speed_m_s * took_s
+        if lost:
+            self.driven.break_track()
+        else:
+            self.farthest_m = self.driven.farthest_m(last, stamped)
         distance = math.hypot(pose.x - last.pose.x, pose.y - last.pose.y)
         # Consecutive poses may be some cells apart, or as far as the robot can have driven; after a
         # timeout half a cell is a gap.
@@ -236,6 +237,7 @@ class InputMonitor:
     def forget_pose(self, now: float) -> None:
         """Forget the last pose: the next one is in another frame, and due from now on."""
         self._pose, self._pose_at, self.doubt = None, now, ""
+        self.driven.break_track()
 
     def clear_doubt(self) -> None:
         """Trust the robot's pose."""

@@ -1,0 +1,75 @@
+"""Driven poses: those that count for what was swept, as the robot can have driven there.
+
+A localiser errs now and then by more than its noise: a pose lies beside the track, the next one on
+it again. What lies farther than the robot can have driven since the pose before is not counted
+before the next pose: it was an error if that one can be driven to without it. Else the robot is
+there, and its track from the pose before is unknown.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from fasaco_edge.grid.geometry import Pose2D, StampedPose
+
+# A base may drive by this factor faster than configured. Between two poses farther apart in time
+# nothing is known of its track, whatever the timeout of the pose [s].
+SPEED_MARGIN, LONGEST_S = 1.2, 3.0
+# By how much two poses may be farther apart than was driven: noise, and corrections [cells].
+NOISE_CELLS = 0.5
+
+
+class Driven(NamedTuple):
+    """A pose that counts.
+
+    Attributes:
+        pose: the pose.
+        farthest_m: how far the robot can have driven to it from the one before; 0 if not known [m].
+        is_joined: whether it has driven from there.
+    """
+
+    pose: Pose2D
+    farthest_m: float = 0.0
+    is_joined: bool = True
+
+
+class DrivenPoses:
+    """Holds a pose that may be an error until the next one comes."""
+
+    def __init__(self, speed_m_s: float, cell_m: float) -> None:
+        """Start without a pose; ``speed_m_s``: of the robot [m/s], 0 if not known."""
+        self._speed_m_s, self._noise_m = speed_m_s, NOISE_CELLS * cell_m
+        self._sure: StampedPose | None = None
+        self._held: StampedPose | None = None
+
+    @property
+    def holds(self) -> bool:
+        """Whether the newest pose may be an error."""
+        return self._held is not None
+
+    def break_track(self) -> None:
+        """Note that the next pose counts wherever it is, as after a motion of the map."""
+        self._sure = self._held = None
+
+    def farthest_m(self, before: StampedPose, after: StampedPose) -> float:
+        """Return how far the robot can have driven between two poses; 0 if not known [m]."""
+        took_s = (after.stamp_ns - before.stamp_ns) * 1e-9
+        return SPEED_MARGIN * self._speed_m_s * took_s if 0.0 < took_s <= LONGEST_S else 0.0
+
+    def take(self, stamped: StampedPose) -> list[Driven]:
+        """Take in the next pose; return those that count now."""
+        sure, held = self._sure, self._held
+        farthest_m = 0.0 if sure is None else self.farthest_m(sure, stamped)
+        if sure is None or not farthest_m or self._is_near(sure, stamped, farthest_m):
+            self._sure, self._held = stamped, None
+            return [Driven(stamped.pose, farthest_m)]
+        if held is None:
+            self._held = stamped
+            return []
+        self._sure, self._held = held, None
+        return [Driven(held.pose, is_joined=False), *self.take(stamped)]
+
+    def _is_near(self, before: StampedPose, after: StampedPose, farthest_m: float) -> bool:
+        one, other = before.pose, after.pose
+        return math.hypot(other.x - one.x, other.y - one.y) <= farthest_m + self._noise_m

@@ -1,0 +1,88 @@
+"""Poses that lie farther away than the robot can have driven: none of them sweeps floor."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from fasaco_edge.grid.geometry import Pose2D, StampedPose, Window
+from fasaco_edge.mission.coverage.driven_poses import Driven, DrivenPoses
+from fasaco_edge.mission.coverage.swept_floor import SweptFloor
+from tests.mission.line_robot import CONFIG, SPEED_M_S, TOOL_M, LineRobot
+
+ROOM = np.pad(np.zeros((56, 56), np.int8), 2, constant_values=100)
+AROUND = Window(-40, -40, 180, 180)
+
+
+class OftenLost(LineRobot):
+    """A robot with one pose in ten beside where it is."""
+
+    off_m = 0.0
+
+    def _drive(self, way):
+        super()._drive(way)
+        self.number = getattr(self, "number", 0) + 1
+        self.is_off = self.number % 10 == 0
+
+    @property
+    def reported(self):
+        turn = 2.4 * self.number
+        off_m = self.off_m if self.is_off else 0.0
+        x, y = self.x + off_m * math.cos(turn), self.y + off_m * math.sin(turn)
+        return Pose2D(x, y, self.yaw)
+
+
+@pytest.mark.parametrize("off_m", [0.3, 0.6, 1.0])
+def test_a_pose_in_ten_that_is_off_sweeps_no_floor(off_m):
+    robot = OftenLost(ROOM, (1.0, 1.0), replace(CONFIG, speed_m_s=SPEED_M_S))
+    robot.off_m = off_m
+    robot.wait(60.0, lambda _: False)
+    truth = SweptFloor(TOOL_M)
+    for x, y in robot.track:
+        truth.record(Pose2D(x, y))
+    swept, true = (floor.swept_in(AROUND) for floor in (robot.mission.floor, truth))
+    assert np.count_nonzero(swept & ~true) == 0
+    assert np.count_nonzero(swept) > 0.97 * np.count_nonzero(true)
+
+
+def poses(*xs, every_s=1.0):
+    return [
+        StampedPose(Pose2D(x, 0.0), "map", round(1e9 * every_s * index))
+        for index, x in enumerate(xs, start=1)
+    ]
+
+
+def taken(*xs, speed_m_s=0.5, every_s=1.0):
+    driven = DrivenPoses(speed_m_s, cell_m=0.2)
+    return [driven.take(pose) for pose in poses(*xs, every_s=every_s)]
+
+
+def test_a_pose_that_comes_back_counts_for_nothing():
+    assert taken(0.0, 0.5, 2.0, 1.5) == [
+        [Driven(Pose2D(0.0, 0.0))],
+        [Driven(Pose2D(0.5, 0.0), pytest.approx(0.6))],
+        [],
+        [Driven(Pose2D(1.5, 0.0), pytest.approx(1.2))],
+    ]
+
+
+def test_one_that_stays_counts_with_the_next():
+    *_, held, last = taken(0.0, 3.0, 3.4)
+    assert held == []
+    assert last == [
+        Driven(Pose2D(3.0, 0.0), is_joined=False),
+        Driven(Pose2D(3.4, 0.0), pytest.approx(0.6)),
+    ]
+
+
+def test_a_robot_faster_than_configured_sweeps_where_it_is_alone():
+    found = [driven for each in taken(0.0, 1.0, 2.0, 3.0, 4.0) for driven in each]
+    assert [driven.pose.x for driven in found] == [0.0, 1.0, 2.0, 3.0]
+    assert not any(driven.is_joined for driven in found[1:])
+
+
+@pytest.mark.parametrize(("speed_m_s", "every_s"), [(0.0, 1.0), (0.5, 0.0), (0.5, 4.0)])
+def test_where_nothing_is_known_of_the_way_all_count(speed_m_s, every_s):
+    found = taken(0.0, 3.0, 0.1, speed_m_s=speed_m_s, every_s=every_s)
+    assert [len(each) for each in found] == [1, 1, 1]
