@@ -76,7 +76,7 @@ class LineRobot:
         stamp_ns = round(self.now * 1e9)
         pose = PoseReceived(StampedPose(self.reported, "map", stamp_ns))
         plans = [] if self._plan is None else [answer(self._plan)]
-        decision = self.mission.step([*events, pose, *plans], self.now)
+        decision = self.mission.step(self.arrived([*events, pose, *plans]), self.now)
         self._plan = decision.plan
         self.exit.follow(self.mission, decision.path)
         sent = self.exit.send(lambda path: True)
@@ -88,6 +88,10 @@ class LineRobot:
     def reported(self) -> Pose2D:
         """The pose that its localiser reports."""
         return Pose2D(self.x, self.y, self.yaw)
+
+    def arrived(self, events: list[Event]) -> list[Event]:
+        """Return which events of a tick come to the mission."""
+        return events
 
     def show(self, pixels: NDArray[np.int8]) -> None:
         """Let a tick pass in which a map comes."""

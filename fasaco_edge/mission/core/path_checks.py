@@ -12,6 +12,9 @@ from fasaco_edge.mission.orders.sequencer import Sequencer
 
 # Period of checks whether a path leads to anything [s].
 WORTH_S = 1.0
+# Where poses are too far apart, a path that has covered nothing more for so long is over [s].
+VAIN_S = 60.0
+FAR_APART = "poses are too far apart"
 
 
 class PathChecks:
@@ -32,12 +35,17 @@ class PathChecks:
         self._ledger, self._monitor, self._orders = ledger, monitor, orders
         self._route, self._line, self._standing = route, line, standing
         self._worth_at = float("-inf")
+        # The number of cells covered at a time [s], while poses are too far apart.
+        self._progress: tuple[int, float] | None = None
 
     def check_deviation(self, cell: Cell, now: float) -> None:
         """Want a new plan for a robot in ``cell`` that is off its path or at its end."""
         route, monitor, path = self._route, self._monitor, self._route.path
         waited = self._standing.has_waited
         if self._has_plan_due:
+            return
+        if self._drives_in_vain(now):
+            self._end_path(now, FAR_APART)
             return
         if monitor.doubt:
             doubted = route.published_at < monitor.doubt_since
@@ -53,12 +61,26 @@ class PathChecks:
         at_end = path.finished and (has_visited or has_stopped)
         if at_end or (has_stopped and self._standing.is_at(last)):
             self._line.open_missed()
-            if self._orders.note_path_end():
-                self._orders.advance(now)
-            else:
-                route.want("cells left over")
+            self._end_path(now)
         elif waited and (path.is_far(cell) or self._standing.is_beside_path):
             route.want("robot left the path")
+
+    def _end_path(self, now: float, why: str = "") -> None:
+        if self._orders.note_path_end(why):
+            self._orders.advance(now)
+        else:
+            self._route.want("cells left over")
+
+    def _drives_in_vain(self, now: float) -> bool:
+        """Tell whether poses are too far apart to cover anything more: no path would end."""
+        if not self._monitor.are_poses_far_apart:
+            self._progress = None
+            return False
+        if self._progress is not None and now - self._progress[1] < VAIN_S:
+            return False
+        before, covered = self._progress, self._orders.done
+        self._progress = covered, now
+        return before is not None and covered <= before[0]
 
     def check_worth(self, now: float) -> None:
         """Want a new plan for a fleet's robot where others have swept all that lay ahead."""

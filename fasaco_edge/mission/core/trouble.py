@@ -16,6 +16,7 @@ from fasaco_edge.mission.core.charging import Charging
 from fasaco_edge.mission.core.dock_current import DockCurrent
 from fasaco_edge.mission.core.events import State
 from fasaco_edge.mission.core.in_dock import InDock
+from fasaco_edge.mission.core.path_checks import FAR_APART
 from fasaco_edge.mission.core.standing import Standing
 from fasaco_edge.mission.core.way_out import WayOut
 from fasaco_edge.mission.line.offset import Offset
@@ -125,6 +126,8 @@ class Troubles:
         if not monitor.is_pose_lost(now) or monitor.pose_silent_s(now) <= limit:
             return ""
         kept = ": the path is kept, but nothing counts as covered until one comes"
+        if monitor.are_poses_far_apart:
+            kept = f": {FAR_APART}, and what lies between them does not count as covered"
         path = kept if state in DRIVING else ""
         return f"no pose for {limit:g} s{path}{self.map.why_other_frame()}"
 

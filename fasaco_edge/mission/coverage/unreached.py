@@ -110,6 +110,8 @@ class UnreachedFinder:
         self._ledger = ledger
         # Number of paths that left cells over.
         self._failures = 0
+        # Why the last one did; "" if that is not known.
+        self._why_left = ""
         self._newest: ReachableArea | None = None
         # Which cells of a window around all maps so far have ever been reachable.
         self._once: tuple[Window, NDArray[np.bool_]] | None = None
@@ -120,7 +122,7 @@ class UnreachedFinder:
 
     def restart(self, reached: ReachedCells | None) -> None:
         """Begin another order, or go on with one that had reached some cells before a restart."""
-        self._failures, self._newest = 0, None
+        self._failures, self._why_left, self._newest = 0, "", None
         self._once = None if reached is None else (reached.window, reached.mask)
         self._before_motion, self._have_moved = None, False
         self.note_area()
@@ -128,6 +130,7 @@ class UnreachedFinder:
     def succeed(self, before: UnreachedFinder) -> None:
         """Go on with what another one remembers of the same cells."""
         self._failures, self._newest, self._once = before._failures, before._newest, before._once
+        self._why_left = before._why_left
 
     @property
     def reached(self) -> ReachedCells | None:
@@ -203,9 +206,9 @@ class UnreachedFinder:
             known &= ~(self._map.free.coverable & ~lattice.coverable)
         return known
 
-    def note_failure(self) -> None:
-        """Note that a path left cells over."""
-        self._failures += 1
+    def note_failure(self, why: str = "") -> None:
+        """Note that a path left cells over, and why."""
+        self._failures, self._why_left = self._failures + 1, why
 
     def unreached(self, state: OrderState) -> Unreached:
         """Return what stays uncovered; the last result while the robot is on no coverable cell."""
@@ -280,7 +283,8 @@ class UnreachedFinder:
 
     def _reason(self, cause: Cause) -> str:
         tries = "1 try" if self._failures == 1 else f"{self._failures} tries"
-        return REASONS.get(cause, f"left over after {tries}")
+        why = f", {self._why_left}" if self._why_left else ""
+        return REASONS.get(cause, f"left over after {tries}{why}")
 
     def viewpoints(self, order: MissionOrder, area: ReachableArea) -> set[Cell]:
         """Return the cells (row, col) from which to look at areas that were closed."""

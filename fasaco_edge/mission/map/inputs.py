@@ -10,6 +10,7 @@ message in a wrong frame changes nothing, whenever it arrives.
 from __future__ import annotations
 
 import math
+from collections import deque
 from collections.abc import Sequence
 
 from fasaco_edge.errors import FasacoError, WrongFrame
@@ -23,6 +24,10 @@ from fasaco_edge.mission.coverage.ledger import JUMP_CELLS
 PATIENCE_S = 10.0
 # Longer gaps between poses restart that time [s].
 GAP_S = 3.0
+
+
+# Poses are too far apart where the track to half of the last so many is unknown.
+LOOKED_BACK = 10
 
 
 class FrameSelector:
@@ -178,6 +183,8 @@ class InputMonitor:
         self.doubt_since = self.farthest_m = 0.0
         self.driven = DrivenPoses(config.speed_m_s, config.footprint.cell_m)
         self._config = config
+        # Whether the track to each of the newest poses is unknown.
+        self._gaps: deque[bool] = deque(maxlen=LOOKED_BACK)
         self._pose: StampedPose | None = None
         # Whether a pose has come, in whatever frame.
         self._has_pose = False
@@ -232,7 +239,13 @@ class InputMonitor:
             self._answered_by = -1
             self.doubt_since = self.doubt_since if self.doubt else now
             self.doubt = f"the pose {how if lost else f'jumped {distance:.2f} m'}"
+        self._gaps.append(jumped or lost)
         return jumped or lost
+
+    @property
+    def are_poses_far_apart(self) -> bool:
+        """Whether most of what is driven lies between poses, and does not count."""
+        return 2 * sum(self._gaps) >= LOOKED_BACK
 
     def forget_pose(self, now: float) -> None:
         """Forget the last pose: the next one is in another frame, and due from now on."""

@@ -287,13 +287,16 @@ class Sequencer:
         zone = self.order_state.current_zone
         return "others stand in the way" + (f" to zone {zone.name!r}" if zone else "")
 
-    def note_path_end(self) -> bool:
-        """Note the end of a path; return whether the cells it left over must wait for a retry."""
+    def note_path_end(self, why: str = "") -> bool:
+        """Note the end of a path; return whether the cells it left over must wait for a retry.
+
+        ``why``: why it left them over; "" if that is not known.
+        """
         run, cells = self._run, self.cells.left_to_me()
         if cells > 0:
-            self._unreached.note_failure()
+            self._unreached.note_failure(why)
         # Not by the cells left: the map may show some now and then.
-        done = self._done
+        done = self.done
         run.in_vain = run.in_vain + 1 if cells and done <= run.done else 1
         run.done = done
         is_given_up = cells > 0 and run.in_vain > MAX_IN_VAIN
@@ -305,7 +308,7 @@ class Sequencer:
         return is_given_up
 
     @property
-    def _done(self) -> int:
+    def done(self) -> int:
         """Number of cells that this robot has covered, and has come to only to look from there."""
         return self._ledger.current.snapshot().cells + self._run.exploration.reached
 
@@ -394,7 +397,7 @@ class Sequencer:
         run.exploration.aim_at(self._viewpoints() - {cell})
         self._company.try_again()
         # In a retry, one path without progress is enough to give up.
-        run.done, run.in_vain = self._done, MAX_IN_VAIN
+        run.done, run.in_vain = self.done, MAX_IN_VAIN
         return f"tried again, {self.order_state.tries + 1} of {self._config.policy.retries}"
 
     def _end(self) -> None:

@@ -1,0 +1,51 @@
+"""Poses so seldom that the track between them is unknown: the mission ends, and says so."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from fasaco_edge.mission.core.events import PoseReceived
+from tests.mission.line_robot import CONFIG, SPEED_M_S, TICK_S, LineRobot
+from tests.mission.world import with_policy
+
+
+class SeldomKnown(LineRobot):
+    """A robot whose mission gets a pose each so many ticks alone."""
+
+    every, number = 50, 0
+
+    def arrived(self, events):
+        self.number += 1
+        if self.number % self.every == 1:
+            return events
+        return [event for event in events if not isinstance(event, PoseReceived)]
+
+
+def robot(rows, cols, every_s=5.0):
+    """A robot in a room of so many pixels."""
+    config = replace(CONFIG, speed_m_s=SPEED_M_S)
+    config = with_policy(config, retries=1, retry_s=5.0, lost_pose_s=3.0)
+    room = np.pad(np.zeros((rows, cols), np.int8), 1, constant_values=100)
+    found = SeldomKnown(room, (0.5, 0.5), config)
+    found.every = round(every_s / TICK_S)
+    return found
+
+
+def test_what_lies_between_poses_is_said_not_to_count():
+    found = robot(40, 60)
+    assert found.wait(100.0, lambda robot: "poses are too far apart" in robot.mission.reason)
+    assert found.mission.state == "degraded"
+
+
+@pytest.mark.parametrize(
+    ("size", "said"),
+    [
+        ((40, 60), "every reachable cell is covered; "),
+        ((50, 122), " tries, poses are too far apart (0.5 m2); "),
+    ],
+)
+def test_a_mission_with_poses_far_apart_ends(size, said):
+    found = robot(*size)
+    assert found.wait(1500.0, lambda robot: robot.mission.state == "done")
+    assert said in found.mission.reason
