@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -61,6 +63,18 @@ def test_the_end_says_what_is_out_of_reach_now(how, why, is_restarted):
     assert robot.wait(600.0, lambda robot: robot.mission.state == "done")
     assert " of 15.1 m2 covered; 2.5 m2 not reached: " in robot.mission.reason
     assert why in robot.mission.reason
+
+
+@pytest.mark.parametrize("how", ["closed", "unknown"])
+def test_what_was_reachable_turns_with_the_lattice(how):
+    """As after a restart with another ``lattice_deg``."""
+    robot = in_first_room()
+    robot.show(changed(how))
+    robot.config = replace(robot.config, lattice_deg=30.0)
+    robot.restart(changed(how))
+    assert robot.wait(600.0, lambda robot: robot.mission.state == "done")
+    said = re.search(r"; (\d\.\d) m2 not reached: ", robot.mission.reason)
+    assert 1.7 <= float(said[1]) <= 3.0, robot.mission.reason
 
 
 def test_a_robot_that_is_shut_in_is_not_done_after_a_restart():

@@ -13,7 +13,7 @@ from typing import TypeVar
 
 import msgspec
 
-from fasaco_edge.grid.geometry import GridGeometry, Point, StampedPose, Window
+from fasaco_edge.grid.geometry import GridGeometry, Point, Pose2D, StampedPose, Window
 from fasaco_edge.grid.lattice import Cell, CoverageLattice
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.grid.rotation import (
@@ -32,9 +32,11 @@ from fasaco_edge.mission.core.events import (
     PathUpdate,
     PoseReceived,
 )
+from fasaco_edge.mission.map.loop_closure import Motion, moved_mask
 from fasaco_edge.mission.orders.mask import mask_polygons
 from fasaco_edge.mission.orders.order import rotated_order
 from fasaco_edge.mission.orders.order_state import OrderState
+from fasaco_edge.mission.orders.reached_cells import ReachedCells
 
 _AnyPlace = TypeVar("_AnyPlace", bound=Place)
 
@@ -94,8 +96,9 @@ class LatticeRotation:
         if home is not None and rotated_by_deg:
             x, y = rotated_point(home[1] + 0.5, home[0] + 0.5, -rotated_by_deg)
             home = math.floor(y), math.floor(x)
-        # Cells at another angle are others.
-        reached = None if rotated_by_deg else state.reached
+        reached = state.reached
+        if reached is not None and rotated_by_deg:
+            reached = _rotated_reached(reached, -rotated_by_deg)
         return replace(state, order=order, home=home, reached=reached)
 
     def path(self, update: PathUpdate, lattice: CoverageLattice | None) -> PathUpdate:
@@ -138,6 +141,13 @@ class LatticeRotation:
 
 def _rotated_grid(grid: OccupancyGrid, by_deg: float) -> OccupancyGrid:
     return replace(grid, geometry=rotated_geometry(grid.geometry, by_deg))
+
+
+def _rotated_reached(reached: ReachedCells, by_deg: float) -> ReachedCells | None:
+    turn = Motion(Pose2D(0.0, 0.0), Pose2D(0.0, 0.0, math.radians(by_deg)))
+    moved = moved_mask(reached.window, reached.mask, turn, 1.0)
+    found = None if moved is None else ReachedCells.of(moved[1], moved[0])
+    return None if found is None else msgspec.structs.replace(found, have_moved=True)
 
 
 def _rotated_stamped(stamped: StampedPose, by_deg: float) -> StampedPose:

@@ -215,7 +215,8 @@ class Mission:
 
     def _rotate_lattice(self, why: str, now: float) -> PathUpdate | None:
         """Continue on a lattice at the new angle; return the path that stops the robot, if any."""
-        before, order, route = self.snapshot(), self.order_state, self.route
+        before, route = self.snapshot(), self.route
+        order = replace(self.order_state, reached=self._orders.reached)
         is_confirmed = self._ledger.is_confirmed and not self._map.building.is_foreign
         executive, held = self._executive, self.held()
         # No path may be driven that is no longer checked.

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import IntEnum
-from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +13,7 @@ from fasaco_edge.grid.geometry import MAX_LATTICE_CELLS, Window
 from fasaco_edge.grid.lattice import BLOCKED, UNKNOWN, Cell, CoverageLattice
 from fasaco_edge.kernels.lattice.areas import cells_beside, find_areas
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
-from fasaco_edge.mission.map.loop_closure import Motion
+from fasaco_edge.mission.map.loop_closure import Motion, moved_mask
 from fasaco_edge.mission.map.map_state import MapState
 from fasaco_edge.mission.map.reachable_area import ReachableArea
 from fasaco_edge.mission.orders.order import MissionOrder
@@ -124,7 +123,8 @@ class UnreachedFinder:
         """Begin another order, or go on with one that had reached some cells before a restart."""
         self._failures, self._why_left, self._newest = 0, "", None
         self._once = None if reached is None else (reached.window, reached.mask)
-        self._before_motion, self._have_moved = None, False
+        self._before_motion = None
+        self._have_moved = reached is not None and reached.have_moved
         self.note_area()
 
     def succeed(self, before: UnreachedFinder) -> None:
@@ -160,30 +160,11 @@ class UnreachedFinder:
         """Move the cells with the map: its areas since have been looked for from a pose before."""
         before, self._before_motion = self._before_motion, None
         if before is not None and not motion.is_still:
-            self._once, self._newest, self._have_moved = self._moved(*before, motion), None, True
+            lattice = self._map.lattice
+            assert lattice is not None
+            self._once = moved_mask(*before, motion, lattice.cell_m)
+            self._newest, self._have_moved = None, True
             self.note_area()
-
-    def _moved(
-        self, window: Window, once: NDArray[np.bool_], motion: Motion
-    ) -> tuple[Window, NDArray[np.bool_]] | None:
-        """Return cells of a window after a motion, with their window; None if that is too large."""
-        lattice = self._map.lattice
-        assert lattice is not None
-        cell_m = lattice.cell_m
-        rows, cols = (window.row0, window.row1), (window.col0, window.col1)
-        y, x = np.array(list(product(rows, cols))).T * cell_m
-        x, y = motion.forward(x, y)
-        row0, col0, row1, col1 = (
-            int(edge // cell_m) for edge in (y.min(), x.min(), y.max() + cell_m, x.max() + cell_m)
-        )
-        whole = Window(row0, col0, row1, col1)
-        if whole.rows * whole.cols > MAX_LATTICE_CELLS:
-            return None
-        y, x = (np.mgrid[row0:row1, col0:col1].reshape(2, -1) + 0.5) * cell_m
-        x, y = motion.back(1.0, x, y)
-        were = np.floor(np.stack((y, x), axis=1) / cell_m).astype(np.int32)
-        moved = window.values_at(once, were, 0).reshape(whole.rows, whole.cols)
-        return whole, moved.astype(np.bool_)
 
     def _around(self, window: Window) -> Window:
         """Return the window of the newest map with that of the maps before, if not too large.

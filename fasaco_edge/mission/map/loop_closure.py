@@ -10,12 +10,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.grid.changes import LatticeChange
-from fasaco_edge.grid.geometry import Pose2D, Window
+from fasaco_edge.grid.geometry import MAX_LATTICE_CELLS, Pose2D, Window
 from fasaco_edge.grid.lattice import UNKNOWN, CoverageLattice
 from fasaco_edge.kernels.floor import certain as kernels
 from fasaco_edge.kernels.floor.certain import FloorTiles, Whereabouts
@@ -121,6 +122,29 @@ def moved_cells(cells: NDArray[np.int32], motion: Motion, cell_m: float) -> NDAr
     is_other = np.ones(len(moved), bool)
     is_other[1:] = (moved[1:] != moved[:-1]).any(axis=1)
     return moved[is_other]
+
+
+def moved_mask(
+    window: Window, mask: NDArray[np.bool_], motion: Motion, cell_m: float
+) -> tuple[Window, NDArray[np.bool_]] | None:
+    """Return which cells have their centre on a marked one after a motion, with their window.
+
+    None if that is too large. ``mask``: bool (rows, cols) of a window before.
+    """
+    rows, cols = (window.row0, window.row1), (window.col0, window.col1)
+    y, x = np.array(list(product(rows, cols))).T * cell_m
+    x, y = motion.forward(x, y)
+    row0, col0, row1, col1 = (
+        int(edge // cell_m) for edge in (y.min(), x.min(), y.max() + cell_m, x.max() + cell_m)
+    )
+    whole = Window(row0, col0, row1, col1)
+    if whole.rows * whole.cols > MAX_LATTICE_CELLS:
+        return None
+    y, x = (np.mgrid[row0:row1, col0:col1].reshape(2, -1) + 0.5) * cell_m
+    x, y = motion.back(1.0, x, y)
+    were = np.floor(np.stack((y, x), axis=1) / cell_m).astype(np.int32)
+    moved = window.values_at(mask, were, 0).reshape(whole.rows, whole.cols)
+    return whole, moved.astype(np.bool_)
 
 
 def uncertain_cells(

@@ -14,12 +14,13 @@ from fasaco_edge.grid.geometry import MAX_LATTICE_CELLS, Window
 Count = Annotated[int, Meta(ge=1, le=MAX_LATTICE_CELLS)]
 
 
-class ReachedCells(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+class ReachedCells(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
     """Cells of a window of the lattice.
 
     Attributes:
         row0, col0, rows, cols: the window.
         bits: a bit for each cell, row by row, the first of eight the highest.
+        have_moved: whether they have moved by parts of a cell, so that some may lie in walls.
     """
 
     row0: int
@@ -27,6 +28,7 @@ class ReachedCells(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     rows: Count
     cols: Count
     bits: bytes
+    have_moved: bool = False
 
     def __post_init__(self) -> None:
         """Check the sizes; raise ValueError where they do not fit."""
