@@ -169,6 +169,8 @@ class EventHandler:
             self.way_out.begin_anew()
         else:
             self._record_again()  # the pose may have come before the map
+            if self.map.shift is not None:
+                self.orders.shift_reached(self.map.shift)
         free, frame = self.map.without_obstacles(self.map.free), self.map.grid.frame
         shows_floor = self.map.shows_floor
         self._change_building(self.ledger.check(free, frame) if shows_floor else None)

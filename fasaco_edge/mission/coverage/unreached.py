@@ -166,6 +166,12 @@ class UnreachedFinder:
             self._newest, self._have_moved = None, True
             self.note_area()
 
+    def shift(self, motion: Motion) -> None:
+        """Move the cells with the newest map, whose area is not known yet."""
+        if self._once is not None and self._map.lattice is not None:
+            self._once = moved_mask(*self._once, motion, self._map.lattice.cell_m)
+            self._have_moved = True
+
     def _around(self, window: Window) -> Window:
         """Return the window of the newest map with that of the maps before, if not too large.
 

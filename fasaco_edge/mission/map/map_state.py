@@ -29,9 +29,10 @@ from fasaco_edge.mission.coverage.progress import Coverage, FreeArea
 from fasaco_edge.mission.map.building_watch import BuildingWatch
 from fasaco_edge.mission.map.ground import Ground
 from fasaco_edge.mission.map.inputs import FrameSelector
-from fasaco_edge.mission.map.loop_closure import has_moved, shows_floor
+from fasaco_edge.mission.map.loop_closure import Motion, has_moved, shows_floor
 from fasaco_edge.mission.map.obstacles import Obstacles
 from fasaco_edge.mission.map.reachable_area import ReachableArea, anchor_cell
+from fasaco_edge.mission.map.small_shift import closes_cells, small_shift
 from fasaco_edge.mission.map.standing_places import StandingPlaces
 from fasaco_edge.mission.orders.order import MissionOrder
 
@@ -50,6 +51,7 @@ class MapState:
             before the first.
         pose: the newest pose in the map's frame; before the first map, in any frame.
         has_moved: whether the newest map shows the walls at other places: a loop closure.
+        shift: a small shift of the newest map against the one before; None for none.
         shows_floor: whether the newest map shows floor; one that shows none says nothing of walls.
         area: the reachable area as of the last ``update_area``; None while the robot's pose is on
             no coverable cell.
@@ -67,6 +69,7 @@ class MapState:
         self.pose: StampedPose | None = None
         self.area: ReachableArea | None = None
         self.has_moved = self.shows_floor = False
+        self.shift: Motion | None = None
         # The newest lattice of cell centres of a map that shows floor.
         self._shown: CoverageLattice | None = None
         self.frames = FrameSelector()
@@ -164,7 +167,7 @@ class MapState:
         return replace(lattice, states=states)
 
     def _take_map(self, given: OccupancyGrid, within: Window | None = None) -> None:
-        grid = self.obstacles.on(given)
+        grid, lattice, before = self.obstacles.on(given), self.lattice, self.given
         if self.grid is None or self.grid.frame != grid.frame:
             change = self._ground.begin(grid)
             if self.grid is not None:
@@ -173,6 +176,10 @@ class MapState:
         else:
             change = self._ground.follow((self.grid, grid), within)
         self._compare(change)
+        self.shift = None
+        is_other = lattice is not None and self.lattice is not lattice and self.shows_floor
+        if before is not None and is_other and closes_cells(self.change):
+            self.shift = small_shift(before, given, self._config.footprint)
         self.grid, self.given = grid, given
         self.map_revision += 1
         if self.pose is not None and self.pose.frame != grid.frame:

@@ -161,6 +161,10 @@ class Sequencer:
         """Move what was reachable with the map."""
         self._unreached.move(motion)
 
+    def shift_reached(self, motion: Motion) -> None:
+        """Move what was reachable with the newest map, whose area is not known yet."""
+        self._unreached.shift(motion)
+
     def note_area(self) -> None:
         """Remember the cells that are reachable now."""
         self._unreached.note_area()
