@@ -75,7 +75,7 @@ def test_of_two_that_wait_the_one_with_the_smaller_id_takes_over():
     assert (claims[B].state, claims[C].state) == (ClaimState.PLANS, ClaimState.WAITS)
 
 
-def test_one_that_could_plan_and_does_not_is_not_waited_for_for_ever():
+def test_a_daemon_that_could_plan_but_does_not_is_not_waited_for():
     claim, now = Claim(B), 0.0
     claim.decide({A: ClaimState.WAITS}, now)
     while now < SETTLE_S + PATIENCE_S:
@@ -86,8 +86,8 @@ def test_one_that_could_plan_and_does_not_is_not_waited_for_for_ever():
     assert claim.state is ClaimState.PLANS
 
 
-def test_where_two_plan_one_goes_on_and_knows_when_the_other_has_stopped():
-    """A network that was in two parts, each with its own."""
+def test_of_two_planners_one_goes_on_and_sees_the_other_stop():
+    """A network partition left each half with a planner of its own."""
     first, second = planning(A), planning(B)
     first.decide({B: ClaimState.PLANS}, 5.0)
     second.decide({A: ClaimState.PLANS}, 5.0)
@@ -128,7 +128,7 @@ def test_out_of_touch_nobody_takes_over():
     assert not claim.is_uncertain(6.0 + SETTLE_S)
 
 
-def test_who_was_frozen_says_nothing_until_it_has_seen_who_plans_now():
+def test_a_resumed_planner_is_silent_until_it_knows_who_plans():
     claim = planning(B)
     claim.decide({}, LEASE_S / 2)
     assert not claim.is_uncertain(LEASE_S / 2)

@@ -260,10 +260,8 @@ def test_an_answer_waits_for_what_it_has_overtaken(bus, endpoint, monkeypatch, a
 
 
 @pytest.mark.parametrize("arrive", [True, False])
-def test_where_several_count_an_answer_waits_for_what_is_before_it(
-    bus, endpoint, monkeypatch, arrive
-):
-    """A publisher keeps three; what it published before them is under way, or lost."""
+def test_an_answer_waits_for_earlier_samples_under_way(bus, endpoint, monkeypatch, arrive):
+    """A publisher caches three samples; earlier ones are under way, or lost."""
     monkeypatch.setattr(sample_order, "UNDER_WAY_S", 1000.0 if arrive else 0.2)
     samples = Queue()
     hear, under_way, answers = held_under_way(monkeypatch)
@@ -289,9 +287,7 @@ def test_where_several_count_an_answer_waits_for_what_is_before_it(
         assert samples.empty()
 
 
-def test_what_is_lost_of_one_publisher_is_not_waited_for_longer_as_another_publishes(
-    bus, endpoint, monkeypatch
-):
+def test_the_wait_for_a_lost_sample_ignores_other_publishers(bus, endpoint, monkeypatch):
     monkeypatch.setattr(sample_order, "UNDER_WAY_S", 0.5)
     samples = Queue()
     hear, under_way, answers = held_under_way(monkeypatch)
@@ -344,7 +340,7 @@ def test_a_publisher_heard_before_it_is_found_is_heard_once(bus, endpoint, numbe
 
 
 @pytest.mark.parametrize("numbered", [True, False])
-def test_what_was_said_before_is_heard_before_what_is_said_meanwhile(bus, endpoint, numbered):
+def test_cached_samples_arrive_before_newer_ones(bus, endpoint, numbered):
     with publishing(endpoint, numbered, cache=10) as publisher:
         for number in range(30):
             samples = Queue()
@@ -359,7 +355,7 @@ def test_what_was_said_before_is_heard_before_what_is_said_meanwhile(bus, endpoi
             assert samples.empty()
 
 
-def test_of_a_flood_of_publishers_no_more_are_asked_than_are_remembered(bus, endpoint):
+def test_a_flood_of_publishers_gets_a_bounded_number_of_queries(bus, endpoint):
     samples = Queue()
     with publishing(endpoint) as honest:
         honest.put(b"one")

@@ -41,7 +41,7 @@ os._exit(0)
 """
 
 
-def test_a_publisher_forgets_while_zenoh_waits_for_the_interpreter():
+def test_a_publisher_closes_while_zenoh_waits_for_the_gil():
     command = [sys.executable, "-c", FORGETTING, free_endpoint()]
     ended = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
     assert ended.stdout == "forgot\n", ended.stderr

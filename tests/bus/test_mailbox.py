@@ -216,7 +216,7 @@ def test_of_a_flood_few_are_taken_and_the_newest_always():
     assert turns < 5 * takes
 
 
-def test_what_is_held_waits_until_it_is_let_go_and_nothing_else_does():
+def test_held_topics_wait_until_released_and_others_do_not():
     box = spaced()
     box.hold()
     box.post("update", 1)
@@ -251,7 +251,7 @@ def test_what_follows_a_map_waits_with_it_and_nothing_else_does():
     assert box.take(60.0) == [("map", "new"), ("update", 2), ("update", 3)]
 
 
-def test_a_map_that_comes_while_somebody_waits_is_taken_in_its_time():
+def test_a_map_posted_during_a_take_keeps_its_spacing():
     box = spaced()
     box.post("map", "old")
     box.take(0)

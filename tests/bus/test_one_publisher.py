@@ -43,7 +43,7 @@ def test_another_counts_once_the_first_is_silent():
     assert not one.takes("a", SILENT_S + 0.2)
 
 
-def test_another_counts_at_once_if_the_session_of_the_first_has_ended():
+def test_another_publisher_takes_over_when_the_session_ends():
     sessions = Sessions(linked="a")
     one = OnePublisher("maps", SILENT_S, sessions)
     assert one.takes("a", 0.0)
@@ -56,7 +56,8 @@ def test_another_counts_at_once_if_the_session_of_the_first_has_ended():
     assert one.conflict(0.6) == ""
 
 
-def test_one_that_spoke_once_takes_over_from_one_behind_a_router_that_is_silent():
+def test_one_message_is_enough_to_replace_a_silent_publisher():
+    """For one behind a router, whose session cannot be observed; a linked one is waited for."""
     one = maps()
     assert one.takes("a", 0.0)
     assert not one.takes("b", 1.0)

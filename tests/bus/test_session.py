@@ -307,8 +307,8 @@ with open_bus(BusSettings("client", ({endpoint!r},))) as bus:
             listener.kill()
 
 
-def test_what_a_frozen_subscriber_missed_last_comes_when_it_goes_on(bus, endpoint):
-    """A link that is full drops maps; who listens asks whether it was the last."""
+def test_a_resumed_subscriber_gets_the_last_sample_it_missed(bus, endpoint):
+    """A full link drops maps; the subscriber asks whether it has the newest."""
     code = f"""
 import time
 from fasaco_edge.bus.session import open_bus

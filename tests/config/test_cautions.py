@@ -70,12 +70,12 @@ def test_what_does_not_go_together_is_named(sections, text):
     assert [text in one for one in found] == ([True] if text else [])
 
 
-def test_the_defaults_and_a_tool_as_wide_as_the_robot_are_in_order():
+def test_the_defaults_and_a_tool_as_wide_as_the_robot_pass():
     assert said() == []
     assert said(robot={"radius_m": 0.3, "tool_width_m": 0.6}) == []
 
 
-def test_what_lines_do_with_a_wide_clearance_is_told_as_they_do_it():
+def test_the_warning_uses_the_clearance_share_of_the_lines():
     assert NEAR_SHARE == line.NEAR_SHARE
 
 

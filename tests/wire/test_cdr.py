@@ -44,7 +44,7 @@ def test_alignment_counts_from_behind_the_header() -> None:
     assert (reader.position, reader.remaining) == (16, 4)
 
 
-def test_a_payload_cut_before_the_alignment_names_the_field_behind_it() -> None:
+def test_a_payload_cut_in_the_padding_names_the_next_field() -> None:
     reader = CdrReader(b"\0\1\0\0" + b"\1\0\0\0\0", "m")
     assert reader.string("s") == ""
     with pytest.raises(MalformedMessage, match="a must be 4 bytes at offset 12"):

@@ -58,7 +58,7 @@ def test_what_the_readme_names_is_there():
     assert all(page.name in readme for page in PAGES if page.name != "README.md")
 
 
-def test_keys_queries_and_quality_of_service_are_those_of_the_table_of_topics():
+def test_keys_queries_and_qos_equal_the_table_of_topics():
     keys = load("keys.yaml")
     assert keys["keys"] == [contract_files.key_entry(topic) for topic in TOPICS]
     assert keys["queries"] == [contract_files.query_entry(query) for query in QUERIES]

@@ -113,7 +113,7 @@ def test_what_lies_beside_the_chain_may_be_anything(tree):
         (0.0, 6),
     ],
 )
-def test_a_link_without_a_place_in_the_plane_is_refused_and_forgotten(tree, place, at):
+def test_a_link_with_an_invalid_place_is_refused_and_dropped(tree, place, at):
     told(tree, link("odom", "base_link", 1.0))
     floats = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]
     floats[at] = place
