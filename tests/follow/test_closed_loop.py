@@ -37,7 +37,7 @@ def driven(loop):
     ],
     ids=str,
 )
-def test_it_stays_on_the_path_and_is_faster_than_a_driver_that_stops_at_corners(conditions, off_m):
+def test_it_stays_on_the_path_and_beats_stopping_at_corners(conditions, off_m):
     loop = ClosedLoop(ROOM, START, **conditions)
     loop.send(LANES)
     seconds = driven(loop)
@@ -85,7 +85,7 @@ def test_a_corner_is_rounded_in_motion_and_hardly_cut(turn_deg, conditions):
     assert loop.now < ideal_seconds(ROOM, Pose2D(1.0, 2.0), path) - 0.8 * stops_s
 
 
-def test_a_path_that_comes_in_a_corner_and_goes_on_alike_does_not_stop_it():
+def test_a_same_path_received_in_a_corner_does_not_stop_it():
     path = [(1, 1), (3, 1), (4, 2), (4, 3)]
     loop = ClosedLoop(ROOM, Pose2D(1.0, 1.0), delay_s=0.05)
     loop.send(path)
@@ -98,7 +98,7 @@ def test_a_path_that_comes_in_a_corner_and_goes_on_alike_does_not_stop_it():
     assert loop.world.distance_m - before[0] > 0.9 * 0.25 * 2.0
 
 
-def test_a_path_that_crosses_and_touches_itself_is_driven_in_its_order():
+def test_a_self_crossing_path_is_driven_in_its_order():
     """Each stretch is driven once, in the order of the path: nowhere is it left for another."""
     path = np.array(
         [(1, 1), (4, 1), (4, 3), (2, 3), (2, 0.6), (2.05, 0.6), (2.05, 3), (4, 3.02), (4, 1.02),
@@ -116,7 +116,7 @@ def test_a_path_that_crosses_and_touches_itself_is_driven_in_its_order():
         at += int(near[0])
 
 
-def test_a_path_that_begins_like_the_one_before_is_joined_without_stopping():
+def test_a_path_with_the_same_beginning_is_joined_without_a_stop():
     loop = ClosedLoop(ROOM, Pose2D(1.0, 1.0), delay_s=0.05)
     loop.send([(1, 1), (5, 1), (5, 4)])
     loop.run(lambda: loop.world.pose.x > 2.0)
@@ -171,7 +171,7 @@ def test_a_path_that_goes_elsewhere_is_joined_from_rest():
     assert np.hypot(*(trail(loop)[-1] - path[-1])) < 0.01
 
 
-def test_a_path_that_begins_further_on_along_the_one_before_is_joined_there():
+def test_a_path_that_starts_ahead_on_the_old_one_is_joined_there():
     loop = ClosedLoop(ROOM, Pose2D(1.0, 1.0), delay_s=0.05)
     loop.send([(1, 1), (5, 1), (5, 4)])
     loop.run(lambda: loop.world.pose.x > 4.0)
@@ -206,8 +206,8 @@ def test_it_stands_once_it_is_off_the_path():
     assert loop.world.activity.value == "idle"
 
 
-def test_off_its_path_it_joins_one_that_begins_further_on_along_that():
-    """It was led along the path that it was off, and stood for good."""
+def test_off_its_path_it_joins_a_path_that_starts_ahead():
+    """It once followed the path it had left, and then stood for good."""
     loop = ClosedLoop(ROOM, Pose2D(1.0, 1.0))
     loop.send([(1, 1), (5, 1)])
     loop.run(lambda: loop.world.pose.x > 2.0)

@@ -81,7 +81,7 @@ def test_a_path_without_a_daemon_is_handed_over_apart(daemons):
     assert daemons.news().unnamed is None
 
 
-def test_a_flood_of_daemons_takes_no_memory_and_not_the_place_of_the_one_that_plans(daemons):
+def test_a_flood_of_daemons_is_bounded_and_keeps_the_planner(daemons):
     daemons.take_path(path(A))
     for number in range(100 * MOST_DAEMONS):
         own = f"1{number:08x}"
@@ -94,14 +94,14 @@ def test_a_flood_of_daemons_takes_no_memory_and_not_the_place_of_the_one_that_pl
 
 
 @pytest.mark.parametrize("own", ["!x", "", "0A", "0a" * 17])
-def test_a_token_that_is_no_id_does_not_take_the_place_of_the_planner(daemons, own):
+def test_a_token_that_is_no_id_does_not_replace_the_planner(daemons, own):
     """The daemons ignore it, too: the one that plans goes on."""
     daemons.take_claim(f"fasaco/@v1/robot/claim/{own}/plans", True)
     daemons.take_status(status_of(A), 1.0)
     assert (daemons.news().planner, daemons.state) == (A, "covering")
 
 
-def test_the_daemon_that_plans_is_still_there_after_a_crowd_has_gone(daemons):
+def test_the_planner_is_still_known_after_a_crowd_of_daemons(daemons):
     for is_there in (True, False):
         for number in range(3 * MOST_DAEMONS):
             claim(daemons, f"00{number:04x}", is_there=is_there)

@@ -60,7 +60,7 @@ def robot():
     return robot
 
 
-def test_it_docks_from_before_the_dock_and_undocks_before_it_drives(robot):
+def test_it_docks_from_the_approach_and_undocks_before_driving(robot):
     robot.arrive()
     start = robot.started()
     assert start.move is Move.DOCK
@@ -87,7 +87,7 @@ def test_a_path_alone_does_not_lead_it_out(robot):
     assert robot.docking.holds == "in its dock"
 
 
-def test_a_robot_that_is_to_drive_though_something_is_wrong_leaves_its_dock(robot):
+def test_a_degraded_robot_that_may_drive_leaves_its_dock(robot):
     robot.arrive()
     robot.here = DOCK
     robot.ends(robot.started(), DONE)
@@ -188,7 +188,7 @@ def test_docking_that_is_not_wanted_any_more_is_cancelled(robot, state):
     assert (robot.docking.holds, robot.docking.trouble) == ("", "")
 
 
-def test_a_lost_result_is_asked_for_again_and_a_goal_without_end_is_given_up(robot):
+def test_a_lost_result_is_requested_again_then_the_goal_given_up(robot):
     robot.arrive()
     start = robot.started()
     assert robot.step(RESULT_EVERY_S + 1.0) == [Ask(Move.DOCK, start.id)]

@@ -170,7 +170,7 @@ def test_a_pose_that_jumps_stops_it_and_is_believed_if_it_stays(told):
     assert told.follower.state is State.OFF_PATH
 
 
-def test_a_pose_that_jumps_by_its_yaw_alone_stops_it_while_it_turns(told):
+def test_a_jump_in_yaw_alone_stops_a_turning_robot(told):
     told.begin_anew([(0.0, 0.0), (0.0, 5.0)])
     yaw = 0.0
     for _ in range(10):
@@ -183,8 +183,8 @@ def test_a_pose_that_jumps_by_its_yaw_alone_stops_it_while_it_turns(told):
     assert told.follower.detail.startswith("by 0.0 m and 14")
 
 
-def test_a_pose_that_jumps_along_the_path_does_not_count_as_driven(told):
-    """On the second leg, say, which is 5 m away: the first one is not driven yet."""
+def test_a_pose_jump_along_the_path_does_not_count_as_driven(told):
+    """A jump to the second leg, 5 m away, does not skip the first leg."""
     for _ in range(10):
         told.pose(x=5.0, y=2.0, yaw=math.pi / 2)
         assert told.step() == STAND
@@ -198,7 +198,7 @@ def test_a_pose_in_another_frame_stops_it(told):
     assert "'odom'" in told.follower.detail
 
 
-def test_without_a_daemon_it_stands_and_goes_on_with_the_same_one(told):
+def test_it_stands_without_a_daemon_and_resumes_with_the_same(told):
     told.follower.take_planner("")
     told.pose()
     assert told.step() == STAND
@@ -276,8 +276,8 @@ def test_a_path_that_comes_again_brings_no_more_tries(told, every_s):
     assert told.follower.state is State.NOT_MOVING
 
 
-def test_a_path_that_leads_elsewhere_has_tries_of_its_own_and_no_more(told):
-    """The robot is stuck: paths to all sides, again and again, are tried three times each."""
+def test_each_new_direction_gets_three_tries_and_no_more(told):
+    """A stuck robot that gets paths to all sides tries each of them three times."""
     ways, pushed = [(5.0, 0.0), (0.0, 5.0), (-5.0, 0.0), (0.0, -5.0)], 0.0
     told.states_where_it_is(30.0)
     assert told.follower.state is State.NOT_MOVING
@@ -314,8 +314,8 @@ def test_a_slow_robot_that_does_not_move_is_seen_too(told, speed, turn_deg_s, xy
     assert State.NOT_MOVING in told.states_where_it_is(3.5)
 
 
-def test_a_robot_that_starts_late_after_a_rest_is_not_one_that_does_not_move(told):
-    """A fast one, whose poses come late: it should have come far before they can show it."""
+def test_a_delayed_start_after_a_rest_is_not_a_stall(told):
+    """A fast robot with delayed poses should have moved far before they can show it."""
     told.begin_anew(AHEAD, replace(LIMITS, speed=2.0, acceleration=4.0))
     told.follower.take_path(path_message([]))
     told.states_where_it_is(30.0)

@@ -15,7 +15,7 @@ def map_with(cells, yaw=0.0, frame="map"):
     return geometry, encode_occupancy_grid(OccupancyGrid(geometry, cells, frame, 1))
 
 
-def test_it_shows_what_is_near_an_occupied_pixel_whatever_the_map_is_turned_by():
+def test_the_map_shows_places_near_occupied_pixels_at_any_yaw():
     cells = np.zeros((40, 60), np.int8)
     cells[20, 30], cells[5, 5], cells[6, 50] = 100, 25, -1
     for yaw in (0.0, 0.7):

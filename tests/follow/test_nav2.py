@@ -121,7 +121,7 @@ def test_the_one_before_may_end_before_the_next_is_accepted():
     assert drive.follower.tally.errors == 0
 
 
-def test_where_the_path_turns_back_the_next_goal_begins_just_before_the_end():
+def test_at_a_reversal_the_next_goal_starts_just_before_the_turn():
     drive = Drive(*BACK)
     goal = drive.begun()
     assert goal.points[-1] == (3.0, 0.0)
@@ -149,7 +149,7 @@ def test_a_goal_ends_with_the_heading_in_which_the_path_leads_on():
     assert back.end_yaw is None
 
 
-def test_where_the_path_returns_to_itself_further_back_the_next_goal_begins_earlier():
+def test_at_a_closing_loop_the_next_goal_starts_earlier():
     # A circle of 1.9 m: the goal ends where it closes; the next one begins on its far side.
     angles = [math.tau * part / 24 for part in range(25)]
     circle = [(3.0 + 0.3 * math.sin(angle), 0.3 - 0.3 * math.cos(angle)) for angle in angles]
@@ -163,7 +163,7 @@ def test_where_the_path_returns_to_itself_further_back_the_next_goal_begins_earl
     assert ahead.points[-1] == (6.0, 0.0)
 
 
-def test_where_the_robot_has_cut_the_last_bend_the_next_goal_is_sent_all_the_same():
+def test_the_next_goal_is_sent_even_if_the_last_bend_was_cut():
     # Nav2 is done by the distance to the end, wherever along the goal the robot is.
     drive = Drive((0.0, 0.0), (3.0, 0.0), (3.1, 0.1), (3.0, 0.2), (3.0, -3.0))
     assert drive.begun().points[-1] == (3.0, 0.2)
@@ -207,7 +207,7 @@ def test_a_goal_that_is_done_too_early_is_not_believed():
 
 
 @pytest.mark.parametrize(("code", "name"), ERRORS.items())
-def test_errors_have_their_names_and_goals_are_sent_anew_later_and_later(code, name):
+def test_errors_are_named_and_goals_retried_with_growing_pauses(code, name):
     drive = Drive(*LONG)
     goal = drive.begun()
     drive.end(goal, ABORTED, code)
@@ -222,7 +222,7 @@ def test_errors_have_their_names_and_goals_are_sent_anew_later_and_later(code, n
     assert isinstance(goal, SendGoal)
 
 
-def test_a_goal_that_ends_without_a_code_may_have_been_replaced_by_somebody_elses():
+def test_an_abort_without_a_code_suggests_another_goal_sender():
     drive = Drive(*LONG)
     drive.end(drive.begun(), ABORTED, 0)
     assert drive.step(0.0) == []
@@ -230,7 +230,7 @@ def test_a_goal_that_ends_without_a_code_may_have_been_replaced_by_somebody_else
 
 
 @pytest.mark.parametrize("goes_on", ["elsewhere", "withdrawn", "moved"])
-def test_what_somebody_else_cancels_stays_canceled_whatever_path_comes(goes_on):
+def test_a_goal_cancelled_by_others_stays_cancelled(goes_on):
     drive = Drive(*LONG)
     drive.end(drive.begun(), CANCELED)
     assert drive.step(0.0, after=100.0) == []
@@ -248,8 +248,8 @@ def test_what_somebody_else_cancels_stays_canceled_whatever_path_comes(goes_on):
     assert isinstance(goal, SendGoal)
 
 
-def test_a_new_path_that_leads_the_same_way_does_not_hasten_the_next_goal():
-    """As with a map that changes: after four errors the pause is 8 s, whatever path comes."""
+def test_a_new_path_the_same_way_does_not_shorten_the_pause():
+    """As with a changing map: after four errors the pause is 8 s, whichever path comes."""
     drive, sent = Drive(*LONG), []
     for number in range(300):
         drive.path((0.0, 0.0), (8.0, 0.001 * number))
@@ -265,8 +265,8 @@ def test_a_new_path_that_leads_the_same_way_does_not_hasten_the_next_goal():
     assert isinstance(goal, SendGoal)
 
 
-def test_goals_that_replace_each_other_do_not_let_a_standing_robot_push_for_ever():
-    """Each path is another one: Nav2 gets it at once, and its own progress checker begins anew."""
+def test_replaced_goals_do_not_let_a_blocked_robot_push_forever():
+    """Each path differs, so that Nav2 gets it at once and restarts its progress checker."""
     drive, canceled_at = Drive(*LONG), None
     while canceled_at is None and drive.now < 3 * GIVE_UP_S:
         drive.path((0.0, 0.0), (8.0, 0.5 * (round(drive.now / 2.0) % 2)))
@@ -307,7 +307,7 @@ def test_no_answer_to_a_goal_is_another_goal():
     assert again.id != goal.id
 
 
-def test_a_goal_that_the_robot_drives_is_accepted_though_the_answer_was_lost():
+def test_a_driven_goal_counts_as_accepted_if_the_answer_was_lost():
     drive = Drive(*LONG)
     (goal,) = drive.step(0.0)
     asked = [drive.step(decimetre / 10) for decimetre in range(1, 30)]
@@ -323,7 +323,7 @@ def test_a_goal_that_the_robot_drives_is_accepted_though_the_answer_was_lost():
     assert again.points[0][0] == pytest.approx(3.0)
 
 
-def test_a_short_goal_that_was_driven_though_the_answer_was_lost_ends_at_once():
+def test_a_driven_short_goal_ends_though_its_answer_was_lost():
     drive = Drive((0.0, 0.0), (0.4, 0.0))
     (goal,) = drive.step(0.0)
     asked = [request for x in (0.1, 0.2, 0.3, 0.4) for request in drive.step(x)]

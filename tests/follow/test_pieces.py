@@ -71,7 +71,7 @@ def test_lanes_beside_each_other_are_one_piece():
     assert pieces_of(line) == [(0.0, pytest.approx(12.552))]
 
 
-def test_the_way_back_over_the_same_lane_is_another_piece_from_the_corner_on():
+def test_the_way_back_over_a_lane_is_a_piece_of_its_own():
     line = line_of((0.0, 0.0), (3.0, 0.0), (0.0, 0.0))
     assert pieces_of(line) == [(0.0, 3.0), (3.0, 6.0)]
 

@@ -14,7 +14,7 @@ from tests.follow.closed_loop import LIMITS
 from tests.follow.seeing import RADIUS_M, Disc, Seeing, plain_map, scan_at
 
 
-def test_it_stops_before_what_stands_on_its_path_and_goes_on_once_that_is_gone():
+def test_it_stops_before_an_obstacle_and_resumes_once_it_is_gone():
     seeing = Seeing([Disc(2.0, 0.05)])
     seeing.send((0.0, 0.0), (4.0, 0.0))
     assert State.OBSTACLE in seeing.run(12.0)
@@ -34,8 +34,8 @@ def test_what_stands_beside_the_path_does_not_stop_it():
     assert seeing.follower.state is State.DRIVEN
 
 
-def test_it_drives_on_beside_what_is_nearer_than_the_margin_already():
-    """Something came to stand 1 cm beside it: it may drive along, but not towards it."""
+def test_it_may_drive_along_an_obstacle_inside_the_margin():
+    """An object 1 cm beside the robot: it may drive along it, but not towards it."""
     seeing = Seeing([Disc(0.0, 0.2 + RADIUS_M + 0.01)])
     seeing.send((0.0, 0.0), (1.0, 0.0))
     seeing.run(STANDS_S + 8.0)

@@ -25,7 +25,7 @@ def reports(seeing, seconds):
     return found
 
 
-def test_something_ahead_is_reported_once_a_second_with_its_place():
+def test_an_obstacle_ahead_is_reported_each_second_with_place():
     seeing = Seeing([Disc(1.0, 0.0)])
     seeing.send((0.0, 0.0), (4.0, 0.0))
     seeing.run(6.0)
@@ -77,7 +77,7 @@ def test_what_goes_away_ends_the_count():
     assert found[0][0] > REASONS[State.OBSTACLE][1]
 
 
-def test_the_floor_ahead_of_a_base_that_does_not_move_lies_before_its_disc():
+def test_the_floor_ahead_of_a_stalled_base_lies_before_its_disc():
     ahead = floor_ahead((1.0, 1.0), 0.0, RADIUS_M)
     assert ahead[0] == pytest.approx((1.0 + RADIUS_M, 1.0))
     assert all(x > 1.0 + 0.7 * RADIUS_M for x, _ in ahead)

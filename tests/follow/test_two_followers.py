@@ -87,8 +87,8 @@ def test_of_three_that_start_at_once_one_drives(base, tmp_path):
     assert sum("INFO fasaco_edge.follow.node: driving" in log.read_text() for log in logs) >= 1
 
 
-def test_one_that_was_frozen_for_long_does_not_drive_beside_its_successor(base, tmp_path):
-    """Its token is gone by then, and it does not know."""
+def test_a_follower_frozen_for_long_yields_to_its_successor(base, tmp_path):
+    """Its token has expired meanwhile, and it does not know."""
     logs = tmp_path / "first", tmp_path / "second"
     with follower_process(base.endpoint, logs[0]) as first:
         base.wait_until_it_moves()
@@ -103,8 +103,8 @@ def test_one_that_was_frozen_for_long_does_not_drive_beside_its_successor(base, 
 
 
 @pytest.mark.parametrize("first_is_cut", [True, False])
-def test_two_that_were_apart_do_not_drive_together_once_they_meet(base, tmp_path, first_is_cut):
-    """Both believe that they drive by then; the id decides which goes on."""
+def test_two_followers_never_drive_together_after_a_partition(base, tmp_path, first_is_cut):
+    """Both believe that they drive; the id decides which of them continues."""
     logs, links = (tmp_path / "first", tmp_path / "second"), [Link(base.endpoint) for _ in "ab"]
     try:
         with follower_process(links[0].endpoint, logs[0]):
