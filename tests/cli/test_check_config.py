@@ -109,7 +109,7 @@ def test_files_that_are_no_configuration(check, text, line, said):
     assert fault["line"] == line
 
 
-def test_a_document_that_grows_as_it_is_read_is_refused_in_a_few_words(check):
+def test_a_document_that_expands_when_parsed_is_refused(check):
     """A billion laughs: each list holds nine times the one before."""
     text = "a0: &a0 [lol]\n" + "".join(
         f"a{n}: &a{n} [{', '.join([f'*a{n - 1}'] * 9)}]\n" for n in range(1, 12)
@@ -159,7 +159,7 @@ def test_people_read_a_line_for_each(tmp_path):
     assert (good.code, good.out) == (0, f"{EXAMPLE}: in order\n")
 
 
-def test_who_starts_a_daemon_with_it_is_told_the_first_and_where_the_others_are(tmp_path):
+def test_the_daemon_names_the_first_fault_and_counts_the_others(tmp_path):
     file = tmp_path / "config.yaml"
     file.write_text(WRONG)
     with pytest.raises(BadConfiguration) as refused:

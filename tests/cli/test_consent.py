@@ -79,7 +79,7 @@ def test_without_a_terminal_it_is_refused_and_says_how_much(robot):
     outsider.wait_status(lambda status: status["coverage"]["covered"] == 1)
 
 
-def test_on_a_terminal_it_is_asked_and_anything_but_yes_changes_nothing(robot):
+def test_a_terminal_asks_and_only_yes_changes_anything(robot):
     running, outsider = robot
     words = "mission", "start", "--passes", "2", "--connect", running.endpoint
     for answer in ("n\n", "\n", "\x04"):
@@ -94,7 +94,7 @@ def test_on_a_terminal_it_is_asked_and_anything_but_yes_changes_nothing(robot):
     outsider.wait_status(lambda status: status["coverage"]["covered"] == 1)
 
 
-def test_cancel_asks_nothing_as_it_stops_the_robot_and_says_how_to_go_on(robot):
+def test_stop_needs_no_consent_and_says_how_to_continue(robot):
     running, outsider = robot
     stopped = mission(running, "stop")
     assert stopped.code == 0

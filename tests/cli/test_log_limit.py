@@ -35,7 +35,7 @@ def storm():
     return Storm()
 
 
-def test_of_a_storm_one_line_is_left_with_the_count_of_the_others(storm):
+def test_a_flood_becomes_one_line_with_a_count_of_the_others(storm):
     for number in range(1001):
         storm.now = 0.02 * number
         storm.fault(f"number {number}")
@@ -56,7 +56,8 @@ def test_kinds_do_not_hide_each_other(storm):
     assert storm.lines == ["one", "another", "a line", "another line"]
 
 
-def test_what_was_left_out_is_told_with_the_next_line_of_any_kind(storm):
+def test_suppressed_lines_are_counted_with_the_next_line(storm):
+    """The next line of any kind flushes them once their interval is over."""
     for text in ("first", "second", "third"):
         storm.fault(text)
     storm.now = 11.0

@@ -199,7 +199,7 @@ def test_a_mistake_ends_a_process_in_order(folder):
     assert "  hint: " in ended.err
 
 
-def test_no_file_gets_the_number_of_a_stream_that_the_caller_closed(folder):
+def test_no_file_reuses_the_descriptor_of_a_closed_stream(folder):
     code = """
 import os, sys
 from fasaco_edge.cli.console.streams import open_missing_streams

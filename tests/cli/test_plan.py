@@ -256,7 +256,7 @@ def test_cells_lie_along_the_walls(plan, tmp_path):
     )
 
 
-def test_where_cells_cannot_lie_along_the_walls_they_lie_along_the_axes(plan, tmp_path, capsys):
+def test_cells_follow_the_axes_if_they_cannot_follow_the_walls(plan, tmp_path, capsys):
     pixels, file = pillared_room(), tmp_path / "far.yaml"
     # Nearly as far from 0 as can be; turned back by as much, its x would be larger by 0.4.
     geometry = GridGeometry(*pixels.shape, 0.05, Pose2D(1.9e7, 1.9e7, 0.7))
@@ -294,7 +294,7 @@ def test_the_centres_of_cells_lie_along_the_axes(capsys, align):
     assert "line over the floor" in capsys.readouterr().err
 
 
-def test_a_map_gets_a_line_over_its_floor_unless_the_paper_s_planners_walk(plan, grid_file):
+def test_a_map_gets_a_floor_line_unless_a_paper_planner_runs(plan, grid_file):
     lines = {
         words: plan(*words)[0]["line"]
         for words in (
@@ -345,7 +345,7 @@ def test_an_overlap_is_a_share_of_the_tool(capsys, overlap):
     assert "--overlap must be in [0, 0.5]" in capsys.readouterr().err
 
 
-def test_an_image_alone_is_planned_on_and_what_is_unknown_may_count_as_free(plan, tmp_path, capsys):
+def test_a_plain_image_is_planned_and_unknown_may_count_as_free(plan, tmp_path, capsys):
     pixels = np.full((60, 80), 254, np.uint8)
     pixels[:, 40:] = 205
     pixels[[0, -1]] = pixels[:, [0, -1]] = 0
@@ -507,7 +507,7 @@ def test_a_budget_ends_the_search_with_a_whole_walk(plan, grid_file):
     assert figures["wall_s"] < 300
 
 
-def test_a_target_gap_ends_the_search_at_the_first_walk_that_is_good_enough(plan, grid_file):
+def test_a_target_gap_ends_the_search_at_the_first_good_walk(plan, grid_file):
     options = ("--start", "0,0", "--seed", 1, "--velocities", 1, "--visibility", "fewest-open")
     options += ("--no-local-search",)
     whole, _ = plan(grid_file, *options, "--ants", 4000)

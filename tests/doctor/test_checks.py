@@ -62,7 +62,7 @@ def test_who_may_read_the_figures_is_told(metrics, where):
     )
 
 
-def test_a_raspberry_pi_without_the_memory_controller_is_told_how_to_have_it(tmp_path):
+def test_a_pi_without_a_memory_controller_gets_instructions(tmp_path):
     files = {
         "sys__fs__cgroup__cgroup.controllers": "cpuset cpu io pids\n",
         "proc__meminfo": MEMINFO.format(3_000_000),

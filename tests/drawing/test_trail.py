@@ -51,7 +51,7 @@ def test_right_on_the_map_is_right_in_the_picture():
     assert down[0][1] < down[1][1], "left above, right below"
 
 
-def test_a_trail_nothing_has_strengthened_leaves_the_map_as_it_is():
+def test_a_uniform_trail_draws_no_arrows():
     free = np.ones((3, 3), bool)
     lattice = CoverageLattice.from_free(free, 1.0)
     tau = ((lattice.steps[..., None] >> np.arange(4)) & 1).astype(np.float32)

@@ -125,7 +125,7 @@ def test_bench_has_it_as_a_row_beside_the_others(mine, capsys):
     assert "its walk leaves 19 of 20 cells" in capsys.readouterr().err
 
 
-def test_what_a_planner_gets_cannot_be_written_and_is_what_it_says():
+def test_an_own_planner_gets_a_read_only_and_correct_problem():
     got = []
 
     def watching(problem):

@@ -196,7 +196,7 @@ def test_what_is_no_map_is_named(source):
         fe.load_map(source)
 
 
-def test_a_picture_that_cannot_be_written_is_told_by_its_own_name(tmp_path):
+def test_a_picture_that_cannot_be_written_is_named_in_the_error(tmp_path):
     planned = fe.plan(fe.load_map(np.ones((3, 3), bool)), search=fe.Search(budget_s=0.05))
     with pytest.raises(FileNotFoundError, match=r"nowhere/walk\.png"):
         planned.plot(tmp_path / "nowhere" / "walk.png")

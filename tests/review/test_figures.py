@@ -54,7 +54,7 @@ def test_milestones_need_whole_cells():
     ],
     ids=["rising", "a loop closure", "a reset"],
 )
-def test_what_stopped_counting_counts_from_when_it_was_covered_again(counted, first_s):
+def test_cells_that_stopped_counting_count_once_covered_again(counted, first_s):
     statuses = (
         StatusSample(at_s, Status(coverage=CoverageReport(covered=covered)))
         for at_s, covered in counted

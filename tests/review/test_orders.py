@@ -118,7 +118,7 @@ def run(**changes):
     return ReviewDocument(**(base | dict.fromkeys(names, 3) | changes))
 
 
-def test_lanes_of_another_width_are_another_problem_in_the_same_building():
+def test_another_lane_width_is_another_problem_in_the_same_map():
     one, other = (
         run(config={"planner.line": "thorough", "robot.overlap": overlap}, coverable_cells=cells)
         for overlap, cells in ((0.0, 400), (0.1, 494))
@@ -151,7 +151,8 @@ OFFICE = MapSize(rows=400, cols=600, resolution_m=0.05)
         (run(orders=[ORDER, ORDER]), ["orders"], False),
     ],
 )
-def test_what_differs_in_set_up_is_said_and_only_what_compares_is_compared(other, what, compares):
+def test_differing_setups_are_listed_and_not_compared(other, what, compares):
+    """Only figures that do not depend on the setup are still compared."""
     both = side_by_side(run(), other)
     assert [difference["what"] for difference in both["setup"]] == what
     assert both["compare"] is compares

@@ -192,7 +192,7 @@ def with_floor(review, *swept_m2):
     return replace(review, data=replace(review.data, statuses=said))
 
 
-def test_what_may_have_been_swept_before_the_recording_is_not_called_left(review):
+def test_floor_swept_before_the_recording_is_not_called_left(review):
     """A recorder that joins later has no poses of it."""
     late = with_floor(review, 2.0, 2.3)
     (spot,) = explain(late, [(0.9, 0.7)])

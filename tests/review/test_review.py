@@ -221,7 +221,7 @@ def test_the_living_trail_s_share_is_of_cells_that_have_a_stand(review, told):
     assert document(replace(review, counts=fewer))["pheromone"] == told["pheromone"]
 
 
-def test_the_trail_is_shown_at_some_moments_and_how_decided_it_was(review):
+def test_the_page_shows_some_trail_fields_and_their_branching(review):
     pictures = draw_fields(review)
     times = [at_s for at_s, _ in pictures]
     # Four, where fields came often enough.

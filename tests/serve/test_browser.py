@@ -193,7 +193,7 @@ def test_a_mission_is_ordered_by_finger(tmp_path):
 
 
 @needs_browser
-def test_a_keep_out_is_applied_in_mid_mission_and_starting_anew_is_asked_for(tmp_path):
+def test_a_keep_out_applies_mid_mission_and_a_restart_asks_first(tmp_path):
     with daemon_process(tmp_path) as daemon, Outsider(daemon.endpoint) as outsider:
         begin(outsider)
         drive(outsider, lanes(12))

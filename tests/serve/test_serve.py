@@ -191,7 +191,7 @@ def test_nonsense_ends_that_viewer_alone(page, said):
 VASE = {"name": "vase", "polygon": [[2.0, 2.0], [2.4, 2.0], [2.4, 2.4], [2.0, 2.4]]}
 
 
-def test_a_keep_out_in_mid_mission_keeps_what_is_covered_and_another_order_asks(tmp_path):
+def test_a_keep_out_keeps_coverage_and_a_new_order_asks_first(tmp_path):
     words = ("--allow-commands",)
     with daemon_process(tmp_path) as daemon, Outsider(daemon.endpoint) as outsider:
         begin(outsider)
@@ -487,7 +487,7 @@ def test_no_status_of_a_peer_ends_the_page_of_others(page, covering):
     assert page.process.poll() is None
 
 
-def test_an_order_beyond_the_limits_is_refused_to_its_sender_alone(covering, tmp_path):
+def test_an_order_beyond_the_limits_fails_for_its_sender_alone(covering, tmp_path):
     with (
         served(tmp_path, covering.endpoint, "--allow-commands") as page,
         looking(page) as looker,

@@ -31,7 +31,7 @@ def heard(view: ServedView, kind: str, now: float) -> Any:
     return json.loads(message) if isinstance(message, str) else message
 
 
-def test_other_robots_of_the_fleet_are_shown_while_they_are_heard():
+def test_other_robots_of_the_fleet_are_shown_until_silent():
     view = ServedView(Keys("one"))
     member = FleetMember(1, "hall", 0.3, "map", "covering", 2.0, 3.0, 1.0, 1, 0, 5, ())
     tell(view, "fleet", member, 1.0, "fasaco/@v1/two/fleet")
@@ -56,7 +56,7 @@ def test_an_order_is_drawn_until_it_is_cancelled():
     assert heard(view, "areas", 2.0)["zones"] == []
 
 
-def test_an_order_is_drawn_with_all_its_corners_and_without_what_is_no_place():
+def test_an_order_is_drawn_with_all_its_valid_corners():
     view = ServedView(Keys())
     many = [[float(index), float(index % 2)] for index in range(300)]
     places = [CORNERS[0], [1e12, 0], [1.0, True], *CORNERS[1:]]
@@ -119,7 +119,8 @@ def test_a_sample_that_cannot_be_read_is_told_and_costs_no_other():
     assert not {"map", "floor", "path"} & set(news)
 
 
-def test_a_path_whose_note_cannot_be_read_is_told_and_costs_no_other():
+def test_an_unreadable_path_attachment_is_an_event_and_no_more():
+    """The other topics of the same update are served as usual."""
     view = ServedView(Keys())
     xy = np.stack([np.arange(5.0), np.zeros(5)], axis=-1)
     tell(view, "status", {"state": "covering"}, 1.0)
@@ -166,7 +167,7 @@ def test_no_number_that_a_status_may_have_ends_the_page():
 
 
 @pytest.mark.parametrize("name", MALFORMED)
-def test_a_malformed_status_leaves_the_last_good_one_and_is_an_event(name):
+def test_a_malformed_status_keeps_the_last_one_and_is_an_event(name):
     view = ServedView(Keys("robot"))
     view.robots.add("robot")
     tell(view, "status", FULL, 1.0)

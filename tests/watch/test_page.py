@@ -71,7 +71,7 @@ def test_a_page_fills_the_terminal_and_no_more(width, height, colours):
     assert {cell_len(plain(line)) for line in lines} == {width}
 
 
-def test_the_robot_drives_east_in_the_lower_half_over_what_is_covered():
+def test_the_robot_points_east_over_the_covered_lower_half():
     lines = page_of(mid_mission()).splitlines()[1:18]
     row = next(number for number, line in enumerate(lines) if "→" in line)
     column = lines[row].index("→")
@@ -143,7 +143,7 @@ def test_it_says_how_far_an_order_is():
         assert said in page, page
 
 
-def test_it_says_how_much_floor_is_swept_and_what_is_left_and_why():
+def test_the_page_shows_swept_floor_and_the_reasons_for_the_rest():
     view = mid_mission()
     left = [{"m2": 1.5, "reason": "too narrow"}, {"m2": 0.5, "reason": "in a keep-out zone"}]
     floor = {"swept_m2": 9.0, "reachable_m2": 10.0, "left": left}

@@ -87,7 +87,8 @@ def test_the_next_metres_of_the_path_stand_out():
     assert np.count_nonzero(kinds) == 11
 
 
-def test_lanes_too_close_to_be_told_apart_end_where_they_are_near():
+def test_lanes_closer_than_a_character_end_near_the_robot():
+    """Lanes that merge on the screen are cut at NEAR_M along the path."""
     kinds = np.zeros((2, 60), np.uint8)
     xy = np.stack([np.arange(0.25, 50.0, 0.5), np.full(100, 0.5)], axis=-1)
     assert not picture.draw_path(kinds, Frame(0.0, 2.0, 1.0, 60, 1), xy)

@@ -89,7 +89,7 @@ def test_updates_are_laid_over_the_map():
     tell(RobotView("robot"), "map_update", encode_map_update(patch))
 
 
-def test_without_poses_of_its_own_the_status_tells_where_the_robot_is():
+def test_without_poses_the_pose_of_the_status_is_used():
     view = RobotView("robot")
     tell(view, "status", status(pose={"x": 1.0, "y": 2.0, "yaw": 0.5}))
     assert view.pose == Pose2D(1.0, 2.0, 0.5)
@@ -177,7 +177,7 @@ def test_a_journal_keeps_the_newest():
     assert events.since(events.count) == []
 
 
-def test_a_recorder_that_gives_no_reason_yet_is_shown_without_one():
+def test_a_recorder_without_a_reason_is_shown_without_one():
     view = mid_mission()
     tell(view, "status", status(recorder={"state": "starting", "restarts": 0}))
     assert texts(view)[-1] == "recorder starting: "

@@ -116,7 +116,7 @@ def test_another_size_is_another_page(covering):
             assert {len(line) for line in terminal.screen()} == {columns}
 
 
-def test_a_page_is_no_larger_than_a_screen_whatever_the_terminal_says():
+def test_a_page_is_limited_whatever_size_the_terminal_reports():
     master, slave = os.openpty()
     with open(master, "rb"), open(slave, "w", encoding="utf-8") as terminal:
         for columns, lines, shown in ((65535, 65535, (800, 400)), (0, 0, (1, 1)), (9, 5, (9, 5))):
@@ -257,7 +257,7 @@ def test_once_is_one_picture(covering):
     assert json.loads(ended.out)["state"] == "covering"
 
 
-def test_a_host_that_takes_calls_and_says_nothing_holds_nobody_up():
+def test_a_host_that_accepts_but_never_answers_blocks_no_command():
     with socket.create_server(("127.0.0.1", 0)) as mute:
         endpoint = f"tcp/127.0.0.1:{mute.getsockname()[1]}"
         began = time.monotonic()
