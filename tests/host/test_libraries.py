@@ -38,7 +38,7 @@ assert numpy.linalg.inv(numpy.diag([2.0, 4.0])).tolist() == [[0.5, 0.0], [0.0, 0
 """
 
 
-def test_a_process_gives_back_what_it_read_of_libraries_and_goes_on():
+def test_a_process_releases_library_pages_and_continues():
     ended = subprocess.run(
         [sys.executable, "-c", GIVE_BACK], capture_output=True, text=True, check=True
     )

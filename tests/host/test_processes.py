@@ -137,7 +137,7 @@ def test_what_is_available_is_no_more_than_the_limit(tmp_path):
     assert available_memory(written(tmp_path / "limited", limited)) == 800_000_000
 
 
-def test_ctrl_c_waits_for_the_end_of_what_must_not_be_interrupted():
+def test_ctrl_c_waits_for_the_end_of_a_protected_block():
     before, reached = signal.signal(signal.SIGINT, signal.default_int_handler), []
 
     def interrupted(error=None):

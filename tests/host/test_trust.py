@@ -42,7 +42,7 @@ def test_a_folder_that_others_may_write_is_not(folder, mode, who):
     assert why_not_trusted(folder) == f"{folder.parent} may be written by {who}"
 
 
-def test_a_sticky_folder_keeps_what_lies_in_it_but_holds_what_anybody_puts_there(folder):
+def test_a_sticky_folder_protects_its_subfolders_but_not_itself(folder):
     folder.parent.chmod(0o1777)
     assert why_not_trusted(folder) == ""
     assert why_not_trusted(folder.parent) == f"{folder.parent} may be written by everybody"
@@ -86,7 +86,7 @@ def test_links_in_a_circle_and_files_in_the_way_are_told(folder):
         assert why_not_trusted(folder / below) == f"{folder / 'file'} is no folder"
 
 
-def test_the_temporary_folder_of_this_computer_holds_what_is_ours():
+def test_our_folder_in_the_real_temporary_folder_is_trusted():
     with tempfile.TemporaryDirectory(dir="/tmp") as made:
         assert why_not_trusted(Path(made)) == ""
 

@@ -87,7 +87,7 @@ def test_a_lane_from_wall_to_wall_leaves_two_patches() -> None:
     assert figures.largest_patch_m2 == pytest.approx(1.3 * 4.0, rel=0.02)
 
 
-def test_swept_is_what_lies_near_the_line_as_compared_pixel_by_pixel() -> None:
+def test_swept_floor_equals_a_comparison_pixel_by_pixel() -> None:
     grid = room(4.0, 3.0)
     rng = np.random.default_rng(3)
     for count in (1, 2, 3, 9):

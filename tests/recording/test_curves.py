@@ -15,7 +15,7 @@ from tests.support.recordings import SCALAR, read_column
 SECOND_NS = 1_000_000_000
 
 
-def test_what_stays_the_same_is_drawn_seldom_and_what_changes_at_once(tmp_path):
+def test_constants_are_drawn_rarely_and_changes_at_once(tmp_path):
     writer = RecordingWriter(tmp_path, "run", DiskBudget(10**9, 0), build_blueprint(None))
     curves = Curves(writer)
     period_s = PERIOD_NS // SECOND_NS

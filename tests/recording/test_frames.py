@@ -146,7 +146,7 @@ def refused_lies(tmp_path_factory):
 
 
 @pytest.mark.parametrize("lie", LIES)
-def test_a_batch_that_claims_too_much_is_refused_in_little_memory(refused_lies, lie):
+def test_a_batch_with_false_sizes_is_refused_in_little_memory(refused_lies, lie):
     assert "UnreadableRecording" in refused_lies[lie]
 
 

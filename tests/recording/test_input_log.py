@@ -136,7 +136,7 @@ def test_a_map_with_too_many_updates_is_not_told_again(tmp_path, monkeypatch):
     assert list(RecordedSamples(files)) == desk.told
 
 
-def test_what_could_not_be_written_is_missed_and_the_rest_is_whole(tmp_path):
+def test_unwritten_samples_are_counted_and_the_rest_is_whole(tmp_path):
     desk = Desk(tmp_path)
     before = [desk.hear("map", noise(1)), desk.hear("pose", b"pose 1", after_s=1.0)]
     desk.writer.state = WriterState.STALLED
@@ -166,7 +166,7 @@ def test_of_a_path_there_is_a_digest_and_of_a_status_what_is_new(tmp_path):
     assert [one.sample for one in statuses] == [desk.told[1].sample, desk.told[3].sample]
 
 
-def test_what_waits_at_the_end_is_an_input_and_drawn_as_far_as_there_is_time(tmp_path, monkeypatch):
+def test_inputs_queued_at_the_end_are_kept_and_drawn_if_in_time(tmp_path, monkeypatch):
     monkeypatch.setattr(recorder, "LAST_DRAWN_NS", 0)
     with bus_on_free_port() as (bus, _):
         one = recorder.Recorder(DaemonConfig(), bus, Output(tmp_path, DiskBudget(10**9, 0)))
@@ -218,7 +218,7 @@ def test_a_recording_without_samples_is_named(tmp_path):
         RecordedSamples([tmp_path / "a.rrd"])
 
 
-def test_a_part_that_had_just_begun_takes_nothing_from_the_others(tmp_path):
+def test_a_part_that_had_just_begun_hides_no_samples_of_others(tmp_path):
     (empty,) = Desk(tmp_path / "killed").close()
     desk = Desk(tmp_path / "before")
     desk.hear("map", noise(0))

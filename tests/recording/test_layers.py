@@ -34,7 +34,7 @@ class Canvas:
         self.layers.draw(layer, size, lambda: self.drawn.append((name, size)), now_ns)
 
 
-def test_a_coarser_map_shows_the_most_occupied_of_each_of_its_pixels():
+def test_a_coarser_map_shows_the_most_occupied_pixel_of_each():
     cells = np.full((5, 7), -1, np.int8)
     cells[0, 0], cells[1, 1], cells[4, 6] = 0, 100, 0
     grid = OccupancyGrid(GridGeometry(5, 7, 0.1, Pose2D(1.0, 2.0)), cells)

@@ -44,8 +44,8 @@ def test_runs_that_begin_in_the_same_second_do_not_meet(tmp_path):
     assert order(tmp_path) == names
 
 
-def test_a_robot_whose_name_ends_in_a_number_keeps_its_old_recordings(tmp_path):
-    """Once a second run within a second was told by a number behind the name."""
+def test_a_robot_name_that_ends_in_a_number_keeps_its_recordings(tmp_path):
+    """File names once marked a second run in the same second by a number after the name."""
     theirs, ours = "20261120T100000Z-maja-2-part1.rrd", "20261120T100005Z-maja-part1.rrd"
     for name in (theirs, ours):
         (tmp_path / name).write_bytes(bytes(10))
@@ -83,7 +83,7 @@ def test_another_robots_recordings_and_links_are_left_alone(tmp_path):
     assert all((tmp_path / name).exists() for name in others)
 
 
-def test_a_folder_that_is_not_there_yet_and_one_that_cannot_be_read(tmp_path, monkeypatch):
+def test_runs_count_from_1_but_an_unreadable_folder_is_an_error(tmp_path, monkeypatch):
     assert next_run(tmp_path / "none", "maja", LAST_WEEK) == "run00001-20261120T100000Z-maja"
     # A number of ten digits would be found by nobody.
     (tmp_path / "run999999999-x.rrd").touch()

@@ -320,7 +320,7 @@ def tiny_disk(tmp_path):
     subprocess.run(["umount", "--lazy", str(disk)], check=True)
 
 
-def test_a_disk_that_is_full_from_the_beginning_is_no_wrong_configuration(tiny_disk):
+def test_a_disk_full_at_the_start_is_no_configuration_error(tiny_disk):
     with (tiny_disk / "ballast").open("wb", buffering=0) as ballast, suppress(OSError):
         while ballast.write(bytes(1024)):
             pass
@@ -350,7 +350,7 @@ def heard(part: Path) -> int:
     return sum(sample.topic == "pose" for sample in RecordedSamples([part]))
 
 
-def test_a_full_disk_is_told_and_recording_goes_on_when_there_is_room(tiny_disk):
+def test_a_full_disk_is_reported_and_recording_resumes_later(tiny_disk):
     ballast = tiny_disk / "ballast"
     with (
         bus_on_free_port() as (bus, endpoint),

@@ -50,10 +50,8 @@ def test_a_cut_leaves_the_frames_before_it(tmp_path_factory, size):
 
 
 @given(st.integers(HEADER_BYTES, len(WHOLE)), st.integers(16, 200_000))
-def test_zeros_in_place_of_what_was_not_written_are_cut_with_the_frame_they_are_in(
-    tmp_path_factory, size, zeros
-):
-    """A loss of power leaves them; read as a frame, zeros would be an empty footer."""
+def test_trailing_zeros_are_cut_with_the_frame_they_are_in(tmp_path_factory, size, zeros):
+    """A power cut leaves zeros; read as a frame, they would be an empty footer."""
     content = WHOLE[:size] + bytes(zeros)
     path = written(tmp_path_factory.mktemp("cut"), content)
     assert repair_recording(path) is not None
@@ -80,7 +78,7 @@ def test_a_footer_that_is_followed_by_zeros_is_cut(tmp_path, kept):
 
 
 @pytest.mark.parametrize("content", [b"", b"RR", b"RRF2", b"RRF2" + bytes(40), bytes(40)])
-def test_a_part_whose_writer_was_killed_before_its_header_is_one_without_frames(tmp_path, content):
+def test_a_part_cut_before_the_end_of_its_header_has_no_frames(tmp_path, content):
     path = written(tmp_path, content)
     with path.open("rb") as recording:
         scan = scan_recording(recording)

@@ -145,9 +145,7 @@ def test_no_part_is_written_below_the_floor(tmp_path):
 
 
 @pytest.mark.parametrize("least_free_bytes", [0, 1000])
-def test_a_part_that_somebody_deletes_is_told_and_followed_by_another(
-    tmp_path, caplog, least_free_bytes
-):
+def test_a_deleted_part_is_reported_and_followed_by_another(tmp_path, caplog, least_free_bytes):
     clock, folder = Clock(), tmp_path / "runs"
     writer = writer_in(folder, least_free_bytes=least_free_bytes)
 

@@ -91,7 +91,7 @@ def test_poses_take_less_than_half():
     assert len(blob) < 0.5 * sum(len(pose.sample.payload) for pose in poses)
 
 
-def test_without_the_batches_before_it_only_a_restart_can_be_read():
+def test_without_earlier_batches_only_a_restart_can_be_read():
     first, second, third = encoded([arrival(b"aaaa")], [arrival(b"aaab")], None, [arrival(b"aaac")])
     with pytest.raises(MalformedMessage, match=r"sample 1 .* sample 0, which is missing"):
         SampleDecoder().samples(second)

@@ -48,7 +48,7 @@ def test_short_of_the_first_waypoint_it_drives_on_to_it():
     assert route(path, track((x - 0.2, y), (x - 0.03, y))) == points((0, 0), (1, 0), (1, 1))
 
 
-def test_a_dead_end_is_not_left_out_because_the_way_back_passes_here():
+def test_a_dead_end_is_not_skipped_because_the_way_back_is_here():
     x, y = at(0, 1)
     into_and_back = centres((0, 1), (0, 0), (0, 1), (0, 2), (1, 2))
     # On the way to the dead end, a little short of the first waypoint.
@@ -67,12 +67,12 @@ def test_only_the_latest_visit_to_the_first_waypoint_counts():
     assert passed_waypoints(path, track(at(0, 1), at(0, 0))) == 1
 
 
-def test_a_path_that_turned_off_behind_is_caught_up_with_directly():
+def test_a_path_that_turned_off_behind_is_joined_directly():
     path = centres((0, 0), (1, 0), (2, 0))
     assert route(path, track(at(0, 0), at(0, 1))) == points((1, 0), (2, 0))
 
 
-def test_where_the_direct_way_is_not_clear_it_returns_to_where_the_path_turned_off():
+def test_without_a_clear_way_it_returns_to_where_the_path_turned():
     path = centres((0, 0), (1, 0), (2, 0))
 
     def along_the_lane_only(start, end):

@@ -27,7 +27,7 @@ def test_nothing_is_known_before_the_first_scan():
 
 
 @pytest.mark.parametrize("yaw", [0.0, 0.3, -2.0])
-def test_one_scan_of_a_closed_room_reveals_its_floor_and_all_wall_faces(yaw):
+def test_one_scan_of_a_closed_room_shows_its_floor_and_walls(yaw):
     truth = building(3, 3)
     mapper = Mapper(truth, SimulationConfig())
     mapper.scan(Pose2D(1.43, 1.56, yaw))
@@ -123,7 +123,7 @@ def test_a_way_is_clear_only_over_known_free_ground():
     assert not mapper.is_clear((2.0, 3.0), (6.0, 3.0))  # out of what is known
 
 
-def test_no_corner_slips_through_between_two_places_on_a_coarse_map():
+def test_no_corner_fits_between_checked_places_on_a_coarse_map():
     # A robot joined its path so, beside a wall in pixels of 0.15 m, and stood for good.
     cells = np.zeros((12, 12), np.int8)
     cells[5, 5] = 100

@@ -94,7 +94,7 @@ def until(condition, timeout_s=120.0):
         time.sleep(0.01)
 
 
-def test_a_robot_in_another_process_maps_and_drives_until_told_to_end(planner):
+def test_a_robot_in_another_process_maps_and_drives_until_ended(planner):
     path = serpentine(range(2, 6), range(2, 10))
     end = path[-1]
     root = Path(__file__).parents[2]
@@ -245,7 +245,7 @@ def test_a_fast_robot_waits_for_what_drives_it(planner):
     assert still.activity is Activity.IDLE
 
 
-def test_it_runs_outside_the_main_thread_and_leaves_signals_alone(planner):
+def test_it_runs_outside_the_main_thread_without_signal_handlers(planner):
     before = signal.getsignal(signal.SIGTERM)
     world = World(building(6.0, 4.0), Pose2D(1.0, 1.0), SimulationConfig())
     results = []

@@ -43,7 +43,7 @@ def mapped(noise, times=1, truth=None):
     return mapper, mapper.snapshot(1), np.array(maps)
 
 
-def test_the_same_seed_makes_the_same_maps_and_poses_and_another_one_others():
+def test_the_seed_determines_maps_and_poses():
     (one, grid, _), (again, same, _), (_, other, _) = (
         mapped(MapperNoise(seed=seed), 4) for seed in (1, 1, 2)
     )
@@ -54,7 +54,7 @@ def test_the_same_seed_makes_the_same_maps_and_poses_and_another_one_others():
     assert (grid.geometry, grid.cells.tobytes()) != (other.geometry, other.cells.tobytes())
 
 
-def test_without_noise_the_world_is_the_one_without_a_noisy_mapper_bit_for_bit():
+def test_zero_noise_equals_no_noisy_mapper_bit_for_bit():
     truth, start = building(3, 3, LEG), Pose2D(0.7, 0.8, 0.2)
     path = np.array([[0.7, 0.8], [2.2, 0.8], [2.2, 2.3]])
     worlds = [World(truth, start, CONFIG), World(truth, start, CONFIG, NONE)]
@@ -69,7 +69,7 @@ def test_without_noise_the_world_is_the_one_without_a_noisy_mapper_bit_for_bit()
     assert worlds[0].track.tobytes() == worlds[1].track.tobytes()
 
 
-def test_a_mapper_that_only_counts_rays_has_the_walls_where_they_are():
+def test_a_mapper_that_only_counts_rays_places_walls_correctly():
     # A ray in ten thousand that goes by nothing: it is a noisy one, but for that.
     noise = replace(NONE, leg_misses=1e-9)
     truth = building(3, 3, LEG)
@@ -189,7 +189,7 @@ def test_late_poses_are_those_of_before_at_their_rate(pose_hz):
     assert late == {tick + 15: pose for tick, pose in punctual.items() if tick + 15 < 500}
 
 
-def test_the_robot_drives_by_its_map_and_ends_where_that_has_the_end():
+def test_the_robot_follows_its_own_map_to_the_end_of_the_path():
     noise = MapperNoise(seed=5, specks=0.0)
     world = World(building(4, 3), Pose2D(0.7, 0.7), CONFIG, noise)
     world.tick()

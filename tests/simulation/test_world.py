@@ -66,7 +66,7 @@ def test_a_robot_stops_before_a_wall_that_its_path_leads_through():
     assert world.pose.x == pytest.approx(1.0, abs=0.01)
 
 
-def test_a_robot_that_stopped_by_a_hair_on_a_way_of_its_own_goes_round():
+def test_a_robot_that_just_missed_a_corner_detours_and_arrives():
     config = SimulationConfig()
     hull_m, corner = config.hull_radius_m, (3.0, 1.0)
     world = started(building(6, 3, (*corner, 3.1, 3.0)), Pose2D(1.0, 0.6), config)
@@ -106,7 +106,7 @@ def test_a_robot_that_is_pushed_along_a_wall_slides():
     assert world.pose.yaw == -0.3
 
 
-def test_a_new_path_under_way_is_joined_without_a_stop_where_it_goes_on_alike():
+def test_a_new_path_along_the_old_one_is_joined_without_a_stop():
     world = started(building(8, 4), Pose2D(1.0, 1.0))
     lane = centres(*[(2, col) for col in range(2, 18)])
     world.follow(lane)
@@ -130,7 +130,7 @@ def test_a_new_path_that_turns_off_behind_is_fetched():
     assert distances_to(world.track, off).max() < 0.03
 
 
-def test_a_path_that_begins_metres_behind_is_taken_up_where_the_robot_is():
+def test_a_path_that_starts_metres_behind_is_joined_at_the_robot():
     world = started(building(8, 4), Pose2D(1.0, 1.0))
     path = np.array([(1.0, 1.0), (3.0, 1.0), (3.0, 2.0), (7.0, 2.0)])
     world.follow(path)
@@ -220,7 +220,7 @@ def test_an_impossible_start_is_an_error():
         World(truth, Pose2D(1.9, 2.2), SimulationConfig())
 
 
-def test_its_battery_drains_while_it_drives_and_charges_where_it_began():
+def test_the_battery_drains_on_the_way_and_charges_at_the_start():
     config = SimulationConfig(battery_min=1.0)
     world = started(building(6, 2), Pose2D(0.6, 1.0), config)
     world.follow(centres((2, 1), (2, 9)))
