@@ -26,7 +26,8 @@ def test_start_beside_a_grid_is_taken(tmp_path):
     assert grid.lattice.coverable.all()
 
 
-def test_without_a_start_the_largest_area_is_entered_nearest_the_origin(tmp_path):
+def test_the_default_start_is_in_the_largest_area_by_the_origin(tmp_path):
+    """In the largest connected area, the cell nearest to the origin."""
     assert read_grid(saved(tmp_path, "##...", "##...", ".#...", ".#.##")).start == (0, 2)
 
 
@@ -48,7 +49,7 @@ def test_builtin_map_starts_where_it_says():
     assert grid.lattice.coverable[grid.lattice.local(grid.start)]
 
 
-def test_every_map_of_the_building_differs_in_reachable_cells_from_the_one_before():
+def test_each_map_of_the_building_changes_its_reachable_cells():
     plain, before = building(), None
     for number in range(14):
         grid = with_crate(plain, number, stamp_ns=number)

@@ -37,7 +37,7 @@ def test_building_is_closed_to_the_outside():
     assert not (free[:, 0] | free[:, -1]).any()
 
 
-def test_same_arguments_give_the_same_building_and_others_another():
+def test_the_arguments_determine_the_building():
     first, again = building(5_000, 3), building(5_000, 3)
     assert np.array_equal(first.lattice.states, again.lattice.states)
     assert first.start == again.start

@@ -101,7 +101,7 @@ def test_thin_wall_between_free_cells_is_no_way_through():
     assert check_walk(without_step(steps, (0, 0), 0), free, walk, (0, 0)).problems == ()
 
 
-def test_uncovered_cell_is_found_and_an_unreachable_or_unwanted_one_forgiven():
+def test_only_reachable_wanted_cells_must_be_covered():
     verdict = judge(LOOP[:-1])
     assert verdict.legal
     assert not verdict.complete

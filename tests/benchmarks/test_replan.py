@@ -6,7 +6,7 @@ from tests.benchmarks.__main__ import main
 from tests.benchmarks.replan import CASES
 
 
-def test_replans_are_timed_part_by_part_and_lead_to_the_same_lines(capsys):
+def test_replans_are_timed_by_part_and_give_the_same_lines(capsys):
     digests = []
     for _ in range(2):
         assert main(["replan", "--cells", "1000", "--replans", "4", "--json"]) == 0

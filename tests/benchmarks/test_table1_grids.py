@@ -32,7 +32,7 @@ def map_file(folder, drawn=DRAWN, origin=(-0.2, -0.2)):
     return folder / "site.yaml"
 
 
-def test_a_cell_is_occupied_if_one_of_its_pixels_is_and_unknown_ones_are_free(tmp_path):
+def test_an_occupied_pixel_fills_its_cell_and_unknown_is_free(tmp_path):
     truth = read_map(map_file(tmp_path, origin=(0.0, 0.0)))
     grid, start = authors_grid(truth, 0.1, (0.05, 0.05))
     assert start == (0, 0)

@@ -3,7 +3,7 @@
 from tests.campaigns.batteries import CHARGES, charge
 
 
-def test_a_mission_that_needs_three_charges_is_never_empty_and_complete():
+def test_a_mission_of_three_charges_completes_and_is_never_empty():
     one = charge(cells=1000, seed=2)
     assert one.is_complete
     assert one.charges >= CHARGES

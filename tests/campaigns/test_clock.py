@@ -12,7 +12,7 @@ from tests.support.secured import needs_openssl
 
 @needs_openssl
 @pytest.mark.skipif(bool(shifted_clock.why_not()), reason=shifted_clock.why_not())
-def test_a_wrong_clock_deletes_nothing_newer_and_shows_no_wrong_age(tmp_path):
+def test_a_wrong_clock_deletes_nothing_newer_and_shows_true_ages(tmp_path):
     campaign = clock.run_campaign(tmp_path, boots=2, seed=0, hold_s=0.5, say=print)
     assert campaign.violations == []
     assert campaign.counted["boots"] == 2

@@ -9,7 +9,8 @@ BUSY_S = 2.0
 WATCH_S = 6.0
 
 
-def test_a_planner_that_hangs_stops_the_robot_though_a_second_daemon_comes_again_and_again():
+def test_a_hung_planner_stops_the_robot_despite_a_second_daemon():
+    """The second daemon restarts again and again."""
     cell = run_cell(Cell((("second daemon", "restarted"), ("planner", "frozen")), STOPS), WATCH_S)
     assert cell.last_s is None or cell.last_s <= LIMIT_S + BUSY_S
     assert cell.together == 0

@@ -12,7 +12,7 @@ from tests.campaigns.trap import Trap
 
 
 @pytest.mark.skipif(bool(hostile_user.why_not()), reason=hostile_user.why_not())
-def test_nothing_that_another_user_has_prepared_is_loaded_or_written_through(tmp_path_factory):
+def test_no_file_of_another_user_is_loaded_or_written_through(tmp_path_factory):
     folder = tmp_path_factory.mktemp("hostile")
     # As /tmp is; pytest makes its folders for its own user alone.
     campaign = hostile_user.run_campaign(folder, print, short=True)
@@ -21,7 +21,7 @@ def test_nothing_that_another_user_has_prepared_is_loaded_or_written_through(tmp
 
 
 @pytest.mark.skipif(bool(hostile_user.why_not()), reason=hostile_user.why_not())
-def test_a_trap_tells_what_was_laid_out_from_what_a_neighbour_of_ours_wrote(tmp_path_factory):
+def test_a_trap_separates_planted_files_from_those_of_neighbours(tmp_path_factory):
     trap = Trap(tmp_path_factory.mktemp("hostile") / "trap", own_folder())
     ours, theirs = trap.state / "run00004.rrd", trap.work / "json.py"
     ours.write_bytes(b"recorded by another process of ours")

@@ -86,7 +86,7 @@ def test_a_fault_is_told_and_nothing_is_lost(fault):
     assert outcome.on, "the call was made"
 
 
-def test_one_recording_that_the_disk_does_not_give_keeps_no_recorder_from_recording(tmp_path):
+def test_an_unreadable_recording_does_not_stop_the_recorder(tmp_path):
     old = tmp_path / "old.rrd"
     old.write_bytes(b"RRF2 and so on")
     script = "import sys; from pathlib import Path; from fasaco_edge.recording.read import repair; "
@@ -112,7 +112,7 @@ def test_a_part_whose_end_the_disk_does_not_take_is_told(tmp_path, at):
 @pytest.mark.parametrize(
     "failure", [f"look:{at}:{error}+" for at in (1, 2, 3) for error in ("EIO", "EACCES")]
 )
-def test_kernels_are_looked_for_in_a_folder_that_the_disk_does_not_show(tmp_path, failure):
+def test_a_failing_kernel_folder_gives_an_error_and_no_traceback(tmp_path, failure):
     with Watch([tmp_path], Failure.of_text(failure)) as watch:
         environment = ENVIRONMENT | {"NUMBA_CACHE_DIR": str(tmp_path)} | watch.environment
         command = [*PROGRAM, "warmup", "--check"]

@@ -29,7 +29,7 @@ def test_the_block_for_a_fleet_holds_every_key_with_its_default():
     assert written == msgspec.json.decode(msgspec.json.encode(FleetConfig("building_7")))
 
 
-def test_the_block_for_ros_holds_every_key_with_its_default_once_it_is_no_comment(tmp_path):
+def test_the_ros_block_has_every_key_with_its_default(tmp_path):
     before, mark, block = EXAMPLE.read_text(encoding="utf-8").partition("#ros2:")
     assert all(line.startswith("#") for line in block.splitlines()[1:])
     with_ros = tmp_path / "ros.yaml"

@@ -60,7 +60,7 @@ def ask(lab: Lab, robot: str) -> dict[str, Any]:
     return answer
 
 
-def test_two_units_share_a_flat_and_one_that_is_killed_joins_again(
+def test_two_units_share_a_flat_and_a_killed_one_rejoins(
     lab: Lab, services: dict[str, Service]
 ) -> None:
     with ExitStack() as stack:

@@ -62,7 +62,7 @@ def robot(
         yield running
 
 
-def test_a_first_version_that_does_not_come_up_leaves_no_service_behind(folders, tmp_path):
+def test_a_failed_first_install_leaves_no_service_behind(folders, tmp_path):
     with bare_robot(tmp_path, folders) as bare:
         installed.warm(bare)
         done = bare.install(DYING, code=5)
@@ -127,7 +127,7 @@ def test_a_dry_run_changes_nothing(robot):
     assert robot.answers(FIRST)
 
 
-def test_an_upgrade_keeps_the_configuration_and_the_version_before(robot):
+def test_an_upgrade_keeps_the_configuration_and_the_old_version(robot):
     robot.write(CONFIG, MINE)
     robot.install(SECOND)
     assert robot.version() == SECOND
@@ -138,7 +138,7 @@ def test_an_upgrade_keeps_the_configuration_and_the_version_before(robot):
     assert FIRST in robot.run("fasaco-edge", "ask", "version", "--robot", "maja").stdout
 
 
-def test_a_configuration_that_is_wrong_is_told_before_anything_is_switched(robot):
+def test_a_wrong_configuration_is_reported_before_any_switch(robot):
     before = robot.run("cat", CONFIG).stdout
     robot.write(CONFIG, "robot: {radius_m: -1}\n")
     assert "radius_m" in robot.install(OTHER, code=4).stderr
@@ -154,7 +154,7 @@ def test_another_build_of_the_same_version_stands_beside_it(robot):
     assert robot.version() == FIRST
 
 
-def test_uninstalled_it_leaves_what_was_written_and_purged_nothing(robot, untouched):
+def test_uninstall_leaves_the_users_data_and_purge_removes_it(robot, untouched):
     robot.write(CONFIG, MINE)
     told = robot.uninstall()
     left = robot.files().keys() - untouched.keys()

@@ -58,7 +58,7 @@ def test_the_container_file_copies_what_is_there():
 
 
 @pytest.mark.parametrize("script", ["install.sh", "uninstall.sh"])
-def test_the_scripts_explain_themselves_and_know_the_manuals_options(script):
+def test_the_scripts_have_help_that_lists_the_manuals_options(script):
     told = subprocess.run([DEPLOY / script, "--help"], capture_output=True, text=True, check=True)
     lines = [shlex.split(command) for command in COMMANDS if script in command]
     assert lines
@@ -66,7 +66,7 @@ def test_the_scripts_explain_themselves_and_know_the_manuals_options(script):
         assert all(word in told.stdout for word in words if word.startswith("--"))
 
 
-def test_the_kernels_are_compiled_to_where_the_service_looks_for_them():
+def test_kernels_are_compiled_into_the_folder_the_service_reads():
     unit = (DEPLOY / "fasaco-edge.service").read_text()
     place = (DEPLOY / "steps/common.sh").read_text()
     assert "\nEnvironment=NUMBA_CACHE_DIR=%C/fasaco-edge/numba\n" in unit

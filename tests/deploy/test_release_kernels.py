@@ -74,7 +74,7 @@ def test_the_same_kernels_make_the_same_wheel(wheel, kernels, tmp_path):
     assert with_kernels(wheel, kernels, HERE).read_bytes() == first
 
 
-def test_the_hash_of_the_sources_is_that_of_the_installed_package(wheel):
+def test_the_source_hash_equals_that_of_the_installed_package(wheel):
     assert sources_digest(wheel) == release.sources_digest()
 
 

@@ -70,7 +70,7 @@ def test_zenoh_finds_interfaces_by_netlink(service: Service):
     assert "Address family not supported" in said
 
 
-def test_the_follower_runs_ahead_of_all_else_and_starts_anew_with_the_planner(service: Service):
+def test_the_follower_has_priority_and_restarts_with_the_daemon(service: Service):
     follower = Service(service.lab, "fasaco-edge-follow")
     try:
         service.start()

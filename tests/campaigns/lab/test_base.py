@@ -29,7 +29,7 @@ def apart(a, b):
     return math.hypot(a.x - b.x, a.y - b.y)
 
 
-def test_an_ideal_base_counts_what_it_drives_and_stands_without_commands():
+def test_an_ideal_base_has_exact_odometry_and_stops_uncommanded():
     _, base = base_in(ideal=True)
     for _ in range(40):
         base.command(Command(0.3, 0.0))

@@ -104,7 +104,7 @@ def test_figures_of_driving_turning_and_contacts():
     assert figures.ending == "at the limit"
 
 
-def test_wheels_that_spin_at_a_wall_are_a_deadlock_and_a_done_mission_is_none():
+def test_spinning_wheels_are_a_deadlock_unlike_a_done_mission():
     spins = figures_of(run_of([*drive(100), *stand(1400, 1.5, wheels=0.3)]))
     assert spins.ending == "deadlock"
     assert spins.longest_stand_s == pytest.approx(70.0, abs=1.0)
@@ -140,7 +140,7 @@ def test_a_path_changes_what_lies_ahead_of_the_robot(before, after, changes):
     assert list(changes_ahead(paths, x, np.zeros(101))) == [changes]
 
 
-def test_people_that_walk_into_a_robot_that_stands_are_not_driven_into():
+def test_people_who_hit_a_standing_robot_are_not_driven_into():
     rows = [*drive(100), *stand(100, 1.5), *drive(100, 1.5)]
     ahead, behind = [*range(20, 25), *range(120, 125), *range(150, 180)], range(260, 262)
     people = dict.fromkeys(ahead, 2) | dict.fromkeys(behind, 1)

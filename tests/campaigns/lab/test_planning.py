@@ -22,7 +22,7 @@ def request_of():
     return Drive((0, 0), MapReceived(building(*ROOM)), pose_at(0, 0), config=config).request
 
 
-def test_a_plan_takes_its_budget_in_simulated_time_and_is_the_same_each_time(request_of):
+def test_a_plan_takes_its_budget_in_simulated_time_and_repeats(request_of):
     found = []
     for _ in range(2):
         planning = LockStepPlanning(PlannerConfig(budget_s=0.05))
@@ -54,7 +54,7 @@ def test_rates_are_whole_ticks_and_impossible_ones_are_refused():
             LabSettings(**wrong)
 
 
-def test_the_product_keeps_a_clearance_beside_the_radius_only_if_it_is_told():
+def test_the_lab_sets_a_clearance_only_if_given_one():
     robot = LabSettings(radius_m=0.2).config.robot
     assert (robot.radius_m, robot.clearance_m) == (0.2, 0.0)
     robot = LabSettings(radius_m=0.2, clearance_m=0.03).config.robot
