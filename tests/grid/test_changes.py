@@ -210,8 +210,8 @@ def test_a_map_that_jumps_tells_only_what_is_otherwise_now():
     assert_follows(LatticeChange.between((before, far), lattice, CELL), lattice, far, CELL)
 
 
-def test_an_obstacle_beyond_the_old_lattice_blocks_a_cell_that_comes_into_it():
-    """The robot is wider than its cells: it was blocked there before the map reached there."""
+def test_an_obstacle_beyond_the_old_lattice_blocks_a_new_cell():
+    """The robot is wider than its cells: the obstacle blocked before the map reached it."""
     wide = Footprint(0.3, 0.5)
     cells = np.zeros((60, 60), np.int8)
     cells[:, -1] = 100

@@ -92,7 +92,7 @@ def test_cells_at_walls_have_stands_beside_their_middles():
     assert np.hypot(*(lattice.centres(np.array([[row, col]]))[0] - (3.0, 2.0))) < 0.2
 
 
-def test_stands_keep_the_clearance_where_their_cells_have_a_place_that_does():
+def test_stands_keep_the_clearance_where_their_cell_allows_it():
     grid = room(3.0, 2.0)
     plain, careful = (RobotDiscs(DISCS.radius_m, DISCS.tool_m, clearance_m=m) for m in (0.0, 0.04))
     floor = Floor.around(grid, plain, (3.0, 2.0))

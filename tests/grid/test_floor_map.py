@@ -178,8 +178,8 @@ def test_what_a_map_shows_no_more_is_not_free():
     assert_touched(floor, pixels)
 
 
-def test_where_a_map_grows_on_two_sides_by_what_is_unknown_little_is_touched():
-    """It was all that a box round the new cells holds: the whole map, each time it grew so."""
+def test_a_map_that_grows_by_unknown_pixels_touches_little():
+    """Growth on two sides once touched a box round all new cells, that is the whole map."""
     whole = room(3.0, 2.0)
     cells = np.pad(whole.cells, 60, constant_values=-1)
     x, y = whole.geometry.to_map(-60, -60)

@@ -55,8 +55,8 @@ def test_a_part_costs_what_is_near_it():
     assert time.thread_time() - started < 0.5
 
 
-def test_where_the_raster_begins_does_not_decide_what_an_edge_touches():
-    """A zone drawn along edges of pixels, on rasters that begin elsewhere."""
+def test_touched_edges_do_not_depend_on_the_raster_origin():
+    """A zone drawn along pixel edges, on rasters with different origins."""
     zone = ((1.1, 0.7), (1.6, 0.7), (1.6, 1.3), (1.1, 1.3))
     shown = []
     for col in range(12):

@@ -151,7 +151,7 @@ def test_a_map_without_pixels_has_nothing_coverable():
     ],
     ids=lambda geometry: f"{geometry.resolution}, {geometry.origin}",
 )
-def test_a_lattice_beyond_the_limit_is_refused_before_any_memory_is_taken(geometry):
+def test_a_lattice_beyond_the_limit_is_refused_before_allocation(geometry):
     cells = np.zeros((geometry.rows, geometry.cols), np.int8)
     occupancy = OccupancyGrid(geometry, cells)
     tracemalloc.start()
@@ -170,7 +170,7 @@ def test_the_limit_is_the_callers():
         CoverageLattice.from_map(occupancy, CELL, max_cells=20)
 
 
-def test_a_lattice_from_a_coverage_grid_steps_between_all_free_neighbours():
+def test_a_coverage_grid_has_steps_between_all_free_neighbours():
     open_floor = np.random.default_rng(0).random((13, 17)) < 0.7
     lattice = CoverageLattice.from_free(open_floor)
     assert np.array_equal(lattice.coverable, open_floor)

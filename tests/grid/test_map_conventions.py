@@ -20,7 +20,7 @@ def cells(path):
 
 @pytest.mark.parametrize("kind", ["L", "RGB", "RGBA"])
 @pytest.mark.parametrize("keys", [{}, {"mode": "scale"}])
-def test_what_map_saver_never_saw_is_unknown_whatever_its_free_thresh(tmp_path, kind, keys, caplog):
+def test_unknown_of_map_saver_stays_unknown_at_any_threshold(tmp_path, kind, keys, caplog):
     path = described(tmp_path, Image.fromarray(SAVED).convert(kind), free_thresh=0.25, **keys)
     assert cells(path) == [100, -1, 0]
     (record,) = caplog.records

@@ -195,7 +195,7 @@ def test_colours_are_averaged_evenly(tmp_path):
 
 
 @pytest.mark.parametrize("mode", ["trinary", "scale"])
-def test_alpha_is_no_brightness_and_what_is_transparent_is_unknown(tmp_path, mode):
+def test_alpha_does_not_count_as_brightness_but_marks_unknown(tmp_path, mode):
     row = [(0, 0, 0, 255), (255, 255, 255, 255), (0, 0, 0, 0), (255, 255, 255, 254)]
     image = Image.fromarray(np.array([row], np.uint8))
     path = described(tmp_path, image, mode=mode, occupied_thresh=0.9)

@@ -42,8 +42,8 @@ def nowhere(floor):
     return ~everywhere(floor)
 
 
-def test_a_map_with_walls_a_pixel_too_thick_holds_the_true_floor_as_possible():
-    """The gap of 0.4 m is 0.3 m on the map, so that the other room is closed off there."""
+def test_possible_floor_allows_for_walls_a_pixel_too_thick():
+    """The 0.4 m gap is 0.3 m on the map, which closes off the other room."""
     start = 1.0, 1.0
     true_m2 = Floor.around(building(8, 0), DISCS, start).reachable_m2
     seen = building(8, 1)
@@ -63,7 +63,7 @@ def test_a_room_behind_a_wall_is_not_possible():
     assert one_m2 < 2.0 * 2.0
 
 
-def test_a_room_that_was_reachable_before_a_wall_came_is_possible():
+def test_a_room_stays_possible_after_a_wall_closes_it_off():
     floor = floor_of(building(0, 0))
     cut_off = nowhere(floor)
     row, col = floor.stands.lattice.local(floor.stands.lattice.cell_at(3.4, 1.2))

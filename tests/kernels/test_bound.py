@@ -147,11 +147,11 @@ def drawn(*rows):
     return bound(ground, letters["S"][0], end, letters["o"])
 
 
-def test_a_walk_that_ends_in_the_island_it_began_in_comes_back_to_it():
+def test_a_walk_that_ends_in_its_first_island_returns_to_it():
     assert drawn("oooS..", ".oE.oo") == 12
 
 
-def test_the_colours_of_start_and_end_say_whether_the_steps_are_even():
+def test_the_colours_of_start_and_end_give_the_parity_of_steps():
     assert drawn("o..oo.", "...oS.", "....oo") == 11
 
 

@@ -165,7 +165,7 @@ def test_twin_finds_no_larger_matching_or_independent_set(drawn, side):
 
 @examples(100)
 @given(drawn=graphs(), side=st.integers(0, 1), data=st.data())
-def test_a_set_is_independent_whatever_was_matched_and_must_be_chosen(drawn, side, data):
+def test_a_chosen_set_is_independent_after_any_matching(drawn, side, data):
     links, cells, graph = drawn
     pairing, chosen = pairing_for(graph.links.size), np.zeros(graph.links.size, np.uint8)
     match(graph, pairing, 0)
@@ -210,7 +210,7 @@ def naive_spanning(links, islands):
 
 @examples(200)
 @given(task=problems(max_side=8), seed=st.integers(0, 2**32), share=st.sampled_from((0.1, 0.5, 1)))
-def test_twin_sees_the_same_islands_and_spans_them_by_the_same_weight(task, seed, share):
+def test_twin_finds_the_same_islands_and_spanning_weight(task, seed, share):
     ground, start = task
     random = np.random.default_rng(seed)
     links = flat_links(ground.steps, naive.distances(ground.steps, ground.local(start)))

@@ -129,7 +129,7 @@ def test_whatever_is_made_is_ours_alone(installed, umask):
     assert (told.missing, told.loaded, told.compiled, told.warnings) == ("", *ALL_LOADED)
 
 
-def test_without_a_folder_that_can_be_made_a_temporary_one_is_taken(installed, tmp):
+def test_without_a_cache_folder_a_temporary_one_is_used(installed, tmp):
     installed.cache.touch()
     told = installed.tell()
     folder = Path(told.folder)
@@ -190,9 +190,8 @@ def test_root_with_the_home_of_another_user_leaves_it_alone(installed, tmp_path,
 
 
 @needs_root
-def test_where_the_temporary_name_is_taken_a_fresh_folder_lasts_as_long_as_its_process(
-    installed, tmp
-):
+def test_a_taken_temporary_name_gives_a_folder_for_one_process(installed, tmp):
+    """The folder is fresh, and lasts as long as its process."""
     installed.cache.touch()
     taken = Path(installed.tell().folder)
     assert taken.parent == tmp
@@ -214,7 +213,7 @@ def test_where_the_temporary_name_is_taken_a_fresh_folder_lasts_as_long_as_its_p
     assert list(tmp.iterdir()) == [taken]
 
 
-def test_where_nothing_can_be_kept_kernels_are_compiled_all_the_same(installed):
+def test_kernels_are_compiled_even_if_none_can_be_kept(installed):
     installed.cache.touch()
     nowhere = "from fasaco_edge.kernels import cache; cache._temporary = lambda: []"
     told = installed.tell(before=nowhere)

@@ -77,7 +77,7 @@ def test_equation_7_pulls_the_trail_of_every_move_towards_tau0():
             assert ground.trail[cell, direction] == (once if (cell, direction) in moved else 4.0)
 
 
-def test_equation_8_strengthens_the_moves_of_the_best_walk_each_time_they_occur():
+def test_equation_8_strengthens_a_move_each_time_it_occurs():
     ground = Ground("...")
     deposit(ground.state(), 2.0, np.array([1, 2, 1, 0, 1, 2], np.int32))
     once = (1 - ALPHA) * TAU0 + ALPHA * 2.0
@@ -110,7 +110,7 @@ def test_a_dead_end_is_left_by_the_shortest_walk():
     assert ground.walk(0) == [0, 1, 2, 5, 2, 1, 0, 3]
 
 
-def test_the_shortest_walk_of_a_group_is_found_the_first_of_equals():
+def test_the_first_of_the_shortest_walks_of_a_group_is_found():
     ground = Ground("...")
     walks = ground.walks(1, ants=40, q0=0.0, seed=1)
     assert {len(walk) for walk in walks} == {4}

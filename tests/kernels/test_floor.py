@@ -169,7 +169,7 @@ def test_a_place_is_where_a_way_of_no_length_is_clear(radius, random):
         assert places[i, j] == is_clear(table, y, x, y, x, radius)
 
 
-def test_places_are_where_the_disc_fits_and_connected_ones_can_be_come_to():
+def test_places_are_where_the_disc_fits_and_connect_if_reachable():
     free = np.zeros((SIDE, SIDE), np.bool_)
     free[3:37, 3:18] = free[3:37, 22:37] = True
     free[10:13, 18:22] = True  # a door, too narrow

@@ -93,7 +93,7 @@ def test_a_lane_is_closed_by_a_pixel_between_two_discs_that_fit(row, is_open):
     assert (lattice.steps != 0).tolist() == [[is_open, is_open]]
 
 
-def test_steps_are_legal_both_ways_and_only_between_coverable_cells():
+def test_steps_are_symmetric_and_join_coverable_cells_only():
     random = np.random.default_rng(5)
     cells = np.where(random.random((60, 70)) < 0.01, 100, 0)
     lattice = CoverageLattice.from_map(grid(cells, 0.05, -1.3, 0.2, 0.4), Footprint(0.2, 0.13))

@@ -35,7 +35,7 @@ def test_every_kernel_source_counts(kernel_copy):
     assert all(len(digest) == 12 for digest in seen)
 
 
-def test_a_caller_in_another_file_never_meets_the_old_code_of_its_callee(tmp_path):
+def test_a_caller_in_another_file_never_gets_old_callee_code(tmp_path):
     package = package_in(tmp_path)
     head = "from fasaco_edge.kernels.jit import kernel\n"
     callee = head + "@kernel\ndef one():\n    return {}\n"
@@ -103,7 +103,7 @@ def test_code_of_another_processor_is_not_run(compiled):
         assert (told.loaded, told.compiled, told.warnings) == ALL_LOADED
 
 
-def test_an_installation_elsewhere_has_the_code_of_the_same_sources(compiled, tmp_path):
+def test_a_moved_installation_loads_the_code_of_the_same_sources(compiled, tmp_path):
     shutil.move(compiled.root, tmp_path / "moved")
     compiled.root = tmp_path / "moved"
     told = compiled.tell()
@@ -140,7 +140,7 @@ def test_a_function_in_a_file_that_is_not_named_is_not_kept(installed):
     assert not list(installed.folder.glob("elsewhere*"))
 
 
-def test_numba_imported_before_us_with_folders_of_its_own_changes_nothing(installed, tmp_path):
+def test_numba_imported_first_with_other_folders_changes_nothing(installed, tmp_path):
     given = {"NUMBA_CACHE_LOCATOR_CLASSES": "InTreeCacheLocator"}
     told = installed.tell(before="import numba", env=given)
     assert told.folder == str(installed.folder)
@@ -194,7 +194,7 @@ print(numba.config.DISABLE_JIT, int(numba.config.OPT))
 """
 
 
-def test_a_file_in_the_working_folder_does_not_set_up_the_compiler(tmp_path: Path):
+def test_a_numba_file_in_the_working_folder_is_ignored(tmp_path: Path):
     (tmp_path / ".numba_config.yaml").write_text("disable_jit: 1\nopt: 0\n")
     words = [sys.executable, "-P", "-c", LOOK]
     done = subprocess.run(
@@ -224,8 +224,8 @@ except KeyboardInterrupt:
 """
 
 
-def test_ctrl_c_while_a_kernel_is_loaded_is_an_interrupt_and_no_crash():
-    """LLVM takes what an interrupted callback did not return for a machine code without bytes."""
+def test_ctrl_c_during_a_kernel_load_interrupts_without_a_crash():
+    """LLVM takes the missing result of an interrupted callback for empty machine code."""
     words = [sys.executable, "-c", INTERRUPTED]
     done = subprocess.run(words, env=ENVIRONMENT, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stdout, done.stderr) == (0, "interrupted\n", "")
@@ -253,8 +253,8 @@ def test_what_was_loaded_is_taken_into_what_is_compiled_after_it(compiled):
     assert compiled.tell().loaded == 1
 
 
-def test_what_was_loaded_is_called_by_what_is_compiled_once_its_file_is_gone(compiled):
-    """As in a folder that was deleted meanwhile; its code is in memory, what calls it not whole."""
+def test_a_loaded_kernel_stays_callable_once_its_file_is_gone(compiled):
+    """As in a deleted folder: callers compiled now work, but are not kept."""
     compiled.tell("assert seven.seven(1) == 7; seven.tell()")
     told = compiled.tell(after_seven("*.kernel"))
     assert (told.loaded, told.compiled) == (1, 1)
@@ -274,10 +274,10 @@ seven.tell(note=False)
 """
 
 
-def test_what_another_process_wrote_meanwhile_is_not_taken_for_what_was_loaded(compiled, tmp_path):
-    """As where two begin with an empty folder: one had called what the other names differently.
+def test_a_kernel_file_replaced_meanwhile_is_not_linked_against(compiled, tmp_path):
+    """As where two processes begin with an empty folder, and name their code differently.
 
-    What was compiled then was kept, and ended each process after it with SIGSEGV.
+    Code compiled against the new file was kept, and crashed each later process (SIGSEGV).
     """
     (file,) = compiled.folder.glob("seven.seven-*.kernel")
     first = file.read_bytes()

@@ -147,7 +147,7 @@ def test_thousands_of_moves_leave_a_sound_walk_in_any_room(task, prices, heats, 
 
 @examples(60)
 @given(task=tasks(9), prices=st.sampled_from(PRICES), seed=st.integers(0, 2**32))
-def test_where_proposals_are_made_in_an_area_the_rest_keeps_its_steps(task, prices, seed):
+def test_proposals_in_an_area_leave_the_rest_unchanged(task, prices, seed):
     ground, random = task.ground(), np.random.default_rng(seed)
     cells = np.flatnonzero(random.random(ground.bound) < 0.2).astype(np.int32)
     area = cells[ground.steps[cells] > 0]
@@ -166,7 +166,7 @@ def test_where_proposals_are_made_in_an_area_the_rest_keeps_its_steps(task, pric
 
 
 @pytest.mark.parametrize("prices", PRICES, ids=str)
-def test_the_same_stream_gives_the_same_walk_and_goes_on_where_it_was(prices):
+def test_the_stream_determines_the_walk_in_any_portions(prices):
     task = task_on(ROOMS["rooms"][0].steps, (0, 0), np.random.default_rng(5))
     ground = task.ground()
     ways = []

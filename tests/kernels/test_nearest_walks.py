@@ -52,7 +52,7 @@ def test_each_walks_over_its_own_cells_alone():
     assert walks(HALL, parts, [(0, 0), (3, 8)]) == [[8, 0], [8, 0]]
 
 
-def test_the_nearest_cell_comes_first_though_another_order_is_shorter():
+def test_the_nearest_cell_comes_first_even_if_the_walk_is_longer():
     assert walks(HALL[:1], [[0, -1, -1, 0, -1, -1, -1, -1, 0]], [(0, 2)]) == [[1 + 3 + 8, 4]]
 
 

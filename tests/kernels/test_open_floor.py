@@ -29,7 +29,7 @@ POINTS = st.lists(st.tuples(*[st.floats(-6.0, SIDE + 6.0)] * 2), min_size=2, max
 
 @given(POINTS, st.floats(0.6, 7.0), st.integers(0, 2**32 - 1))
 @examples(60)
-def test_what_the_line_has_passed_is_no_longer_open_and_not_swept(points, radius, seed):
+def test_floor_passed_by_the_line_is_neither_open_nor_swept(points, radius, seed):
     rng = np.random.default_rng(seed)
     before = rng.random((SIDE, SIDE)) < 0.7
     counts = np.where(before, rng.integers(0, 3, before.shape), NEVER).astype(np.int16)

@@ -91,7 +91,7 @@ def test_an_euler_walk_takes_each_step_as_often_as_it_is_told(task, steady, note
     assert_guards_hold(walk, tally)
 
 
-def test_an_euler_walk_is_another_one_for_another_stream_and_straight_where_it_can_be():
+def test_euler_walks_vary_with_the_stream_and_can_go_straight():
     task = task_on(ROOMS["square"][0].steps, (0, 0), np.random.default_rng(1))
     walks, turns = {True: set(), False: set()}, {True: 0, False: 0}
     for seed, steady in itertools.product(range(20), (True, False)):
@@ -189,7 +189,7 @@ def change_way(ground, tally, way):
 
 @examples(100)
 @given(task=tasks(), seed=st.integers(0, 2**32))
-def test_an_end_moves_where_it_is_told_and_the_walk_grows_as_foreseen(task, seed):
+def test_a_moved_end_lengthens_the_walk_as_predicted(task, seed):
     ground, walk, tally = set_up(task)
     random = stream(seed)
     for _ in range(5):
@@ -218,7 +218,7 @@ def chain_of(ground, cells):
 
 @examples(150)
 @given(task=tasks(), seed=st.integers(0, 2**32))
-def test_an_added_loop_goes_round_a_hole_and_the_walk_grows_as_foreseen(task, seed):
+def test_an_added_loop_rounds_a_hole_and_grows_as_predicted(task, seed):
     ground, walk, tally = set_up(task, FIXED_END)
     links, random = links_of(ground), stream(seed)
     squares = Space(links)
@@ -258,7 +258,7 @@ def test_an_added_loop_goes_round_a_hole_and_the_walk_grows_as_foreseen(task, se
 
 @examples(80)
 @given(task=tasks(), prices=st.sampled_from((PRICES[1], PRICES[3])), seed=st.integers(0, 2**32))
-def test_local_search_never_changes_on_which_side_a_hole_is_passed(task, prices, seed):
+def test_local_search_never_changes_the_side_a_hole_is_passed_on(task, prices, seed):
     ground = task.ground()
     walk, links = walk_on(ground, task.cells(), prices), links_of(ground)
     squares = Space(links)

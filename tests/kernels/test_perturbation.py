@@ -168,7 +168,7 @@ def test_a_perturbation_finds_the_other_way_round_a_pillar():
 
 
 @pytest.mark.parametrize("radius", [0, 1, 3])
-def test_the_surroundings_of_a_spot_are_improved_at_each_temperature(radius):
+def test_a_spots_surroundings_are_improved_at_each_temperature(radius):
     prices, task = PRICES[2], drawn_task(1, 7)
     search = set_up(task, prices)
     memory = search.memory

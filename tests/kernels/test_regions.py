@@ -307,8 +307,8 @@ def test_sections_are_passed_in_either_direction():
 
 
 @pytest.mark.parametrize("prices", PRICES[:4], ids=str)
-def test_region_by_region_a_large_ground_gets_better_and_stays_covered(prices):
-    """Rooms of a lattice of squares, laid anew each time, over a clumsy walk."""
+def test_region_by_region_a_large_ground_improves_and_is_covered(prices):
+    """Rooms of a square lattice, placed anew each time, over a poor walk."""
     task = drawn_task(11, 24)
     cells, random = task.cells(), np.random.default_rng(3)
     rows, cols = np.indices(task.steps.shape)

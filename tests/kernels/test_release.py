@@ -79,7 +79,7 @@ def test_they_are_used_where_nothing_can_be_written(released):
     assert (told.loaded, told.compiled, told.warnings) == ALL_LOADED
 
 
-def test_code_for_other_types_is_compiled_and_kept_in_the_users_folder(released):
+def test_code_for_other_types_is_kept_in_the_users_folder(released):
     for loaded, compiled in ((0, 2), (1, 0)):
         told = released.tell("seven.tell(1.5)")
         assert (told.loaded, told.compiled, told.warnings) == (loaded, compiled, [])

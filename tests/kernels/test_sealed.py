@@ -55,8 +55,8 @@ def test_a_harmed_file_that_nobody_writes_again_is_cleared_away(tmp_path, harm):
     assert not os.path.lexists(file)
 
 
-def test_a_kernel_that_is_lost_while_it_runs_is_not_noted_as_there(installed):
-    """The disk gives a file once, and not again: what the next process compiles is missing."""
+def test_a_kernel_lost_at_run_time_is_not_listed_as_present(installed):
+    """The disk returns a file once only: the next process reports and compiles it."""
     lose = (
         "for file in seven.code_files.kernel_folder().glob('seven.eight-*'): file.write_bytes(b'')"
     )
@@ -69,7 +69,7 @@ def test_a_kernel_that_is_lost_while_it_runs_is_not_noted_as_there(installed):
 
 
 @pytest.mark.skipif(bool(why_not()), reason=why_not())
-def test_a_kernel_that_cannot_be_read_once_more_stays_and_is_not_noted(installed):
+def test_a_kernel_that_fails_to_read_again_stays_unlisted(installed):
     installed.tell("seven.tell(note=False)")
     files = kernel_files(installed.cache)
     with Watch([installed.cache], Failure(Kind.OPEN, 8, "EMFILE")) as watch:
@@ -148,8 +148,8 @@ def test_what_a_killed_process_has_begun_is_cleared_away(tmp_path):
     assert list(note.parent.glob("*.partial-*")) == [living]
 
 
-def test_a_process_compiles_again_what_is_harmed_and_says_so_once(installed):
-    """Each harm to one kernel of many: none is run, nothing ends, the next start finds all."""
+def test_damaged_kernels_are_compiled_again_and_reported_once(installed):
+    """Each damage to one kernel of many: none runs, nothing ends, the next start finds all."""
     more = "\n@jit.kernel\ndef k{0}(x):\n    return x + {0}\n"
     with (installed.package / "seven.py").open("a") as file:
         file.writelines(more.format(number) for number in range(len(POSSIBLE)))
@@ -173,7 +173,7 @@ def test_a_process_compiles_again_what_is_harmed_and_says_so_once(installed):
     assert again.warnings == []
 
 
-def test_a_cache_of_which_nothing_is_left_whole_is_compiled_again(compiled):
+def test_a_cache_of_empty_files_is_compiled_again(compiled):
     for file in kernel_files(compiled.cache):
         cut(0)(file)
     told = compiled.tell()

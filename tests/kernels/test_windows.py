@@ -38,7 +38,7 @@ def assert_sound(problem, framed, search):
     assert verdict.problems == ()
 
 
-def test_a_window_of_the_whole_ground_is_solved_to_the_least_cost():
+def test_a_window_of_the_whole_ground_finds_the_optimum():
     random = np.random.default_rng(11)
     solved = 0
     for trial in range(150):
@@ -58,7 +58,7 @@ def test_a_window_of_the_whole_ground_is_solved_to_the_least_cost():
     assert solved >= 125
 
 
-def test_a_whole_ground_with_few_states_becomes_one_walk_all_the_same():
+def test_a_whole_ground_with_a_narrow_beam_still_gives_one_walk():
     # A beam of 8 over rooms with notches comes apart into rings, which windows join.
     random = np.random.default_rng(2)
     better = 0

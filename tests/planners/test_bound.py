@@ -68,7 +68,7 @@ def test_what_is_covered_needs_no_visit():
 
 
 @pytest.mark.parametrize("name", known_grids())
-def test_known_grids_are_bound_as_closely_as_ever_and_no_walk_beats_that(name):
+def test_bounds_of_known_grids_hold_and_are_as_tight_as_before(name):
     known = known_grids()[name]
     ground, start = reference(name)
     for goal, kind in ((None, "open"), (start, "closed")):

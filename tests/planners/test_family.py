@@ -160,7 +160,7 @@ def test_stc_is_read_the_way_around_that_ends_nearer():
     assert beside[1, 0].cells[1].tolist() == [0, 1]
 
 
-def test_stc_ends_an_open_walk_with_the_last_cell_that_wants_a_visit():
+def test_stc_ends_an_open_walk_at_the_last_uncovered_cell():
     ground = lattice("....", "....")
     covered = np.zeros((2, 4), bool)
     covered[0, 1:] = True

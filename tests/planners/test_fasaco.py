@@ -65,7 +65,7 @@ def plan(problem, stop=never, observe=lambda _: None, **config):
     return Fasaco(config).plan(problem, stop, observe)
 
 
-def test_the_same_seed_gives_the_same_path_and_another_seed_another():
+def test_the_seed_determines_the_path():
     problem = CoverageProblem.of(*ROOMS["rooms"])
     paths = {seed: plan(problem, seed=seed).cells.tobytes() for seed in range(8)}
     assert plan(problem, seed=3).cells.tobytes() == paths[3]
@@ -80,7 +80,7 @@ def test_a_longer_search_is_never_worse():
 
 
 @pytest.mark.parametrize("groups", [1, 2, 5, 15])
-def test_a_path_stopped_anywhere_is_complete_and_repeats_from_its_work(groups):
+def test_a_path_stopped_anywhere_is_complete_and_reproducible(groups):
     problem = CoverageProblem.of(HALL, (3, 5), end=(3, 5))
     assert problem.cells == 1200
     looks = itertools.count(1)
@@ -135,7 +135,7 @@ def test_the_stopping_criterion_hears_how_far_the_search_is():
     assert path.work.ants == 96
 
 
-def test_the_time_to_the_first_walk_is_a_part_of_the_time_to_the_last():
+def test_the_time_to_the_first_walk_is_a_fraction_of_the_total():
     before = time.perf_counter()
     path = plan(CoverageProblem.of(HALL, (0, 0)), ants=400)
     assert 0.0 < path.first_walk_s < (time.perf_counter() - before) / 2
@@ -182,7 +182,7 @@ def test_the_observer_is_offered_one_snapshot_after_each_cohort(room):
 
 
 @pytest.mark.parametrize(("turn_s", "delta_phi"), [(0.0, 1.0), (1.5, 0.4)])
-def test_a_snapshot_shows_the_mean_trail_of_the_moves_into_a_cell(turn_s, delta_phi):
+def test_a_snapshot_has_the_mean_trail_of_the_moves_into_a_cell(turn_s, delta_phi):
     """One ant, q0 = 1: out of the corner it walks east along the row and back west."""
     snapshots = []
     config = {"ants": 1, "velocities": (1,), "q0": 1.0, "alpha": 0.5, "tau0": 0.1}

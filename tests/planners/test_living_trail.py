@@ -259,7 +259,7 @@ def test_the_mean_and_the_strongest_into_each_cell(shape):
     np.testing.assert_array_equal(strongest_into(tau), np.reshape(most, shape))
 
 
-def test_it_points_along_the_strongest_step_and_says_how_decided_that_is():
+def test_directions_are_the_strongest_steps_with_their_shares():
     tau = np.zeros((1, 4, 4), np.float32)
     tau[0, 0] = (0.75, 0.25, 0, 0)
     tau[0, 1] = (0.1, 0.1, 0.1, 0.1)

@@ -80,7 +80,7 @@ def test_on_small_grounds_it_finds_the_optimum_and_never_less(cost, grids, most)
 
 @pytest.mark.parametrize("home", [False, True], ids=["open", "home"])
 @pytest.mark.parametrize("name", [name for name, _ in builtin_maps()])
-def test_the_maps_that_come_along_are_covered_almost_without_revisits(name, home):
+def test_the_bundled_maps_are_covered_almost_without_revisits(name, home):
     grid = read_grid(name)
     end = grid.start if home else None
     problem = CoverageProblem.of(grid.lattice, grid.start, end=end)

@@ -217,7 +217,7 @@ def test_a_walk_far_above_its_bound_is_planned_anew():
     assert path.steps < 180
 
 
-def test_attempts_at_a_better_walk_never_lose_and_each_looks_elsewhere():
+def test_attempts_never_worsen_a_walk_and_each_looks_elsewhere():
     rng = np.random.default_rng(8)
     lattice = CoverageLattice.from_free(rng.random((60, 60)) >= 0.1)
     start = tuple(np.argwhere(lattice.coverable)[0].tolist())
@@ -236,8 +236,8 @@ def test_attempts_at_a_better_walk_never_lose_and_each_looks_elsewhere():
     assert len(found) == 8
 
 
-def test_a_search_of_the_rest_keeps_its_lead_and_finds_what_no_repair_does():
-    """A walk over all of a floor is cut to a half of it, as to a robot's part of a fleet's area."""
+def test_a_search_of_the_rest_keeps_its_start_and_beats_repair():
+    """A walk over a whole floor is cut to half of it, as for a robot's part in a fleet."""
     lattice = CoverageLattice.from_free(ground(3, rows=24, cols=40, blocked=0.05))
     start = tuple(np.argwhere(lattice.coverable)[0].tolist())
     enough = WorkLimit(SearchWork(proposals=1_000_000))

@@ -41,7 +41,7 @@ from tests.support.grids import ENDS, ROOMS, end_of, problems
     looked=st.integers(1, 40),
     seed=st.integers(0, 2**63 - 1),
 )
-def test_wherever_it_is_stopped_the_walk_is_sound_and_repeats_from_its_work(
+def test_a_search_stopped_anywhere_is_valid_and_reproducible(
     ground, end, cost, covered, looked, seed
 ):
     ground, start = ground
@@ -75,7 +75,7 @@ STOPS = {
 
 @pytest.mark.parametrize("cost", [STEPS_ALONE, TURNS], ids=["steps", "turns"])
 @pytest.mark.parametrize("stop", STOPS.values(), ids=STOPS)
-def test_any_number_of_threads_and_any_repetition_find_the_same_path(stop, cost, monkeypatch):
+def test_any_number_of_threads_finds_the_same_path(stop, cost, monkeypatch):
     ask_often(monkeypatch)
     problem = CoverageProblem.of(*ROOMS["rooms"], end=(4, 9), cost=cost)
     config = ColonyConfig(ants=96, velocities=(2, 1), seed=5)
@@ -84,7 +84,7 @@ def test_any_number_of_threads_and_any_repetition_find_the_same_path(stop, cost,
         assert_repeats(problem, path, config, threads)
 
 
-def test_the_same_seed_gives_the_same_path_and_another_seed_another():
+def test_the_seed_determines_the_path():
     problem = CoverageProblem.of(*ROOMS["rooms"], cost=TURNS)
     paths = {
         seed: plan(problem, after(proposals=10_000), ColonyConfig(seed=seed)).cells.tobytes()

@@ -39,8 +39,8 @@ def stopping_at(*questions):
     return StopRecorder(lambda progress: next(asked) in questions)
 
 
-def test_a_repair_that_was_stopped_and_the_search_after_it_are_repeated():
-    """The work of the path says nothing of the repair: by that alone another path comes."""
+def test_a_stopped_repair_and_the_search_after_it_are_repeatable():
+    """The path's work omits the repair: repeated by work alone, another path comes out."""
     problem = poor_problem()
     assert is_poor(problem, repaired(problem, "fasaco", 0, lambda progress: True))
     stop = stopping_at(1, 3)

@@ -59,7 +59,7 @@ def changes(grid: OccupancyGrid) -> Iterator[MapReceived | PatchReceived]:
     ("turn_s", "sweeping"),
     [(0.0, None), (1.5, None), (1.5, Sweeping(0.3, 1_000_000, LINES["thorough"]))],
 )
-def test_a_mission_off_the_bus_compiles_nothing_after_the_warm_up(turn_s, sweeping):
+def test_a_mission_with_decoded_maps_compiles_nothing_new(turn_s, sweeping):
     heard = []
     warm_up(heard.append)
     assert heard == list(STAGES)
@@ -104,6 +104,6 @@ def test_two_processes_meet_where_one_begins_with_the_last_stage():
     assert heard == list(reversed(STAGES))
 
 
-def test_no_kernel_is_compiled_again_for_a_constant_that_it_is_called_with():
+def test_no_kernel_is_compiled_anew_for_a_constant_argument():
     warm_up()
     assert [found for found in sorted(compiled_signatures()) if "iteral" in found] == []
