@@ -78,7 +78,7 @@ class Claim:
         self._decided_at: float | None = None
 
     def is_uncertain(self, now: float) -> bool:
-        """Tell whether another may plan unseen by now: publish nothing until that is known.
+        """Return whether another may plan unseen by now: publish nothing until that is known.
 
         This is so after a pause in which the others may have taken this daemon for dead.
         """

@@ -186,7 +186,7 @@ class Mailbox(Generic[Item]):
         return item
 
     def _has_to_wait(self, kind: str) -> bool:
-        """Tell whether the oldest item of a kind waits for an item of another kind."""
+        """Return whether the oldest item of a kind waits for an item of another kind."""
         return kind in self._waits and self._waits[kind][0] > self._gone[self._bounds[kind].after]
 
     def _held(self, now: float) -> tuple[str, ...]:

@@ -20,11 +20,11 @@ class Sessions(Protocol):
     """What the bus knows of other sessions, by their Zenoh ids."""
 
     def is_linked(self, session: str) -> bool:
-        """Tell whether it is connected to this one directly."""
+        """Return whether it is connected to this one directly."""
         ...
 
     def only_passes_on(self, session: str) -> bool:
-        """Tell whether it is this one or a router of it: they put their ids on samples of others
+        """Return whether it is this one or a router of it: they put their ids on samples of others
         that have none."""
         ...
 
@@ -46,7 +46,7 @@ class OnePublisher:
         self._other, self._refused_at, self._misses = "", float("-inf"), False
 
     def takes(self, sender: str, now: float) -> bool:
-        """Tell whether a sample counts.
+        """Return whether a sample counts.
 
         Args:
             sender: id of its session; "" for unknown.
@@ -76,7 +76,7 @@ class OnePublisher:
         return True
 
     def refuses(self, sender: str) -> bool:
-        """Tell whether a publisher is the one that was refused last."""
+        """Return whether a publisher is the one that was refused last."""
         return bool(sender) and sender == self._other
 
     def conflict(self, now: float) -> str:

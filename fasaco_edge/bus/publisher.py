@@ -63,7 +63,7 @@ class Publisher:
         del self._plain, self._publisher, self._latched
 
     def has_listeners(self) -> bool:
-        """Tell whether any subscriber matches the key."""
+        """Return whether any subscriber matches the key."""
         status: Any = self._plain.matching_status  # a bool by the stubs, an object in fact
         return bool(status.matching)
 

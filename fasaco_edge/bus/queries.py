@@ -195,7 +195,7 @@ def ask_for_answers(
 
 
 def matches(key: str, other: str) -> bool:
-    """Tell whether two key expressions intersect."""
+    """Return whether two key expressions intersect."""
     return bool(zenoh.KeyExpr(key).intersects(zenoh.KeyExpr(other)))
 
 

@@ -220,12 +220,12 @@ def _ticks(sample: zenoh.Sample) -> int:
 
 
 def _is_newer(mark: int, last: int | None) -> bool:
-    """Tell whether a sample comes after the last one; sequence numbers wrap at 2^32."""
+    """Return whether a sample comes after the last one; sequence numbers wrap at 2^32."""
     if last is None or last >= _SEQUENCE_NUMBERS:
         return last is None or mark > last
     return 0 < (mark - last) % _SEQUENCE_NUMBERS < _SEQUENCE_NUMBERS // 2
 
 
 def _leaves_gap(name: str, mark: int, last: int | None) -> bool:
-    """Tell whether samples before this one are missing."""
+    """Return whether samples before this one are missing."""
     return last is not None and not name.endswith("/uhlc") and _is_newer(mark, last + 1)

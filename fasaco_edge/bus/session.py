@@ -243,23 +243,23 @@ class Bus:
         return Roll(self._session, key)
 
     def is_linked(self, session: str) -> bool:
-        """Tell whether another session, by its id, is connected to this one directly."""
+        """Return whether another session, by its id, is connected to this one directly."""
         return any(session == str(each.zid) for each in self._session.info.transports())
 
     def only_passes_on(self, session: str) -> bool:
-        """Tell whether an id is this session's or that of a router it is connected to.
+        """Return whether an id is this session's or that of a router it is connected to.
 
         They put theirs on samples without a timestamp: who published those is unknown.
         """
         return session == self.id or session in map(str, self._session.info.routers_zid())
 
     def is_in_touch(self) -> bool:
-        """Tell whether samples can arrive: a session is connected, or could be at any time."""
+        """Return whether samples can arrive: a session is connected, or could be at any time."""
         info = self._session.info
         return self._listens or bool(info.routers_zid() or info.peers_zid())
 
     def keep_in_touch(self, now: float) -> bool:
-        """Tell whether samples can arrive; replace the listener that was joined if that is gone.
+        """Return whether samples can arrive; replace the listener that was joined if that is gone.
 
         To be polled; ``now`` is monotonic [s]."""
         in_touch = self.is_in_touch()

@@ -43,7 +43,7 @@ def address_of(endpoint: str) -> tuple[str, int] | None:
 
 
 def answers(endpoint: str) -> bool | None:
-    """Tell whether a program listens at an endpoint; None if that is unknown."""
+    """Return whether a program listens at an endpoint; None if that is unknown."""
     address = address_of(endpoint)
     if address is None:
         return None

@@ -93,7 +93,7 @@ class _Shown:
 
 
 def _any_of(times: int, holds: Callable[[], bool]) -> bool:
-    """Tell whether something holds, now or at one of the next looks."""
+    """Return whether something holds, now or at one of the next looks."""
     for _ in range(times):
         if holds():
             return True

@@ -97,7 +97,7 @@ class PathDriven:
         return math.atan2(to_y - y, to_x - x)
 
     def is_near_end(self, here: Point, goal: Goal, within: float) -> bool:
-        """Tell whether the robot is within a distance of the end of its goal [m].
+        """Return whether the robot is within a distance of the end of its goal [m].
 
         Nav2 ends a goal by this distance, also where the robot has cut a bend before the end.
         """

@@ -45,7 +45,7 @@ class Grip:
         return said
 
     def is_lost(self, estimate: PoseEstimate, toward: float, now: float) -> bool:
-        """Tell whether the robot must pause because it did not move.
+        """Return whether the robot must pause because it did not move.
 
         Args:
             estimate: with the newest pose, and the motion commanded until then.

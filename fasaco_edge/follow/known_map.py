@@ -47,7 +47,7 @@ class KnownMap:
             self._grid = with_update(self._grid, payload)
 
     def shows(self, x: float, y: float) -> bool:
-        """Tell whether an obstacle of the map is at most about ``KNOWN_M`` from a place [m]."""
+        """Return whether an obstacle of the map is at most about ``KNOWN_M`` from a place [m]."""
         grid = self._grid
         if grid is None:
             return False

@@ -195,7 +195,7 @@ class FollowerNode:
         self._send(STAND)
 
     def _is_due(self, now: float) -> bool:
-        """Tell whether a cycle is due in simulated time: that may be slower than it should be."""
+        """Return whether a cycle is due in simulated time: that may be slower than it should be."""
         if now < self._due - LEAST_S:
             return False
         due = self._due + 1.0 / RATE_HZ

@@ -89,7 +89,7 @@ class Leg:
         return math.hypot(beyond, aside)
 
     def leads_as(self, other: Leg | None) -> bool:
-        """Tell whether another leg leads in the same direction."""
+        """Return whether another leg leads in the same direction."""
         return other is not None and self.ux * other.ux + self.uy * other.uy >= SAME_DIRECTION
 
     def at(self, along: float) -> Point:

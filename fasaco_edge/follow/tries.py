@@ -76,7 +76,7 @@ class Tries:
         return 0 if direction is None else direction.tries
 
     def may_try(self, toward: float, now: float) -> bool:
-        """Tell whether a try in a direction [rad] is due."""
+        """Return whether a try in a direction [rad] is due."""
         direction = self._like(toward)
         return direction is None or now >= direction.until
 

@@ -132,7 +132,7 @@ def _unwritten(start: int) -> Iterator[tuple[int, int]]:
 
 
 def _relocates_text(start: int, segment: _Segment) -> bool:
-    """Tell whether this says that the loader writes into what is read-only afterwards."""
+    """Return whether this says that the loader writes into what is read-only afterwards."""
     if segment.kind != _DYNAMIC:
         return False
     table = ctypes.cast(start + segment.address, ctypes.POINTER(_Entry))

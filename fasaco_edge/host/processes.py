@@ -113,7 +113,7 @@ def cpu_seconds(pid: int) -> float:
 
 
 def has_loaded(pid: int, package: str) -> bool:
-    """Tell whether a Python package's compiled modules are mapped into a process."""
+    """Return whether a Python package's compiled modules are mapped into a process."""
     maps = Path(f"/proc/{pid}/maps").read_text(encoding="utf-8", errors="replace")
     files = {line.split(maxsplit=5)[5] for line in maps.splitlines() if line.endswith(".so")}
     return any(package in _below_packages(PurePath(file)) for file in files)

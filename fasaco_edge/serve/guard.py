@@ -45,7 +45,7 @@ class Guard:
     role: Role = "viewer"
 
     def is_ours(self, host: str) -> bool:
-        """Tell whether a Host header names this server."""
+        """Return whether a Host header names this server."""
         if "%" in host:  # of an IPv6 address: anything may follow
             return False
         name, _, _ = host.rpartition(":") if re.search(r":\d+$", host) else (host, "", "")
@@ -68,7 +68,7 @@ class Guard:
 
 
 def is_same_origin(origins: list[str], host: str) -> bool:
-    """Tell whether the caller is a page of ``host`` itself; only browsers send an origin."""
+    """Return whether the caller is a page of ``host`` itself; only browsers send an origin."""
     own = (f"{scheme}://{host.lower()}" for scheme in ("http", "https"))
     return not origins or (len(origins) == 1 and origins[0].lower() in own)
 

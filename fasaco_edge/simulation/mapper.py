@@ -83,7 +83,7 @@ class Mapper:
         return changed
 
     def is_clear(self, start: Point, end: Point, margin_m: float = 0.0) -> bool:
-        """Tell whether the hull can move straight between two points [m], by the own map.
+        """Return whether the hull can move straight between two points [m], by the own map.
 
         Unknown is not clear. Checked every half pixel, and every SPACING_M: what could slip through
         between two discs is thinner than the padding, but enough to stop the robot. A margin [m]
@@ -105,7 +105,7 @@ class Mapper:
         )
 
     def is_clear_at(self, point: Point) -> bool:
-        """Tell whether the hull has room at a point [m], by the own map; unknown is no room."""
+        """Return whether the hull has room at a point [m], by the own map; unknown is no room."""
         x, y = self._geometry.to_pixels(*point)
         return bool(disc_is_free(self._known, x, y, self._hull_px, self._free_at_most))
 

@@ -229,7 +229,7 @@ class RobotOnBus:
             self._world.others = here
 
     def _waits(self, now_s: float, patience_s: float) -> bool:
-        """Tell whether time stands still until a velocity comes."""
+        """Return whether time stands still until a velocity comes."""
         is_late = self._world.unanswered_s >= ANSWER_S - 1e-9
         return is_late and now_s - self._took_at < patience_s
 

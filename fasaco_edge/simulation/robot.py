@@ -127,7 +127,7 @@ class DriveState:
 
     @property
     def moving(self) -> bool:
-        """Tell whether any wheel turns."""
+        """Return whether any wheel turns."""
         return self.speed != 0.0 or self.turn_rate != 0.0
 
 

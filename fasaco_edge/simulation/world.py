@@ -263,7 +263,7 @@ class World:
         self.activity = Activity.DRIVING if self._corners else Activity.IDLE
 
     def _may_try_again(self) -> bool:
-        """Tell whether the robot stopped, for the first time on its path, and has come to rest."""
+        """Return whether the robot, stopped for the first time on its path, has come to rest."""
         is_first = self.stops == self._stopped_at + 1
         return self.activity is Activity.STOPPED and is_first and not self._drive.moving
 
@@ -302,7 +302,7 @@ class World:
         return self._mapper.true_place(*self._corners[-1])
 
     def _looks_ahead(self) -> bool:
-        """Tell whether the robot may drive on: it stops before obstacles on its own map.
+        """Return whether the robot may drive on: it stops before obstacles on its own map.
 
         Before other robots it stops until they are gone.
         """
@@ -350,7 +350,7 @@ class World:
         return None
 
     def _meets(self, place: Point, margin_m: float = MEETING_M) -> bool:
-        """Tell whether a place is too near to another robot, and nearer than this robot is."""
+        """Return whether a place is too near to another robot, and nearer than this robot is."""
         here, least_m = (self.pose.x, self.pose.y), 2 * self.config.hull_radius_m + margin_m
         return any(
             math.dist(place, other) < min(least_m, math.dist(here, other) - 1e-9)

@@ -62,10 +62,10 @@ class Watched(Protocol):
         """Do what typed keys say; return whether that is another page."""
 
     def is_known(self) -> bool:
-        """Tell whether there is something to show."""
+        """Return whether there is something to show."""
 
     def is_whole(self) -> bool:
-        """Tell whether all is known that a page shows."""
+        """Return whether all is known that a page shows."""
 
 
 def watch_on_screen(watched: Watched) -> None:

@@ -94,10 +94,10 @@ class RobotWatch:
         return True
 
     def is_known(self) -> bool:
-        """Tell whether the robot's daemon has told its status."""
+        """Return whether the robot's daemon has told its status."""
         return self._view.status is not None and self._view.is_here
 
     def is_whole(self) -> bool:
-        """Tell whether map, coverage and path are known."""
+        """Return whether map, coverage and path are known."""
         view = self._view
         return view.map is not None and view.coverage is not None and view.walk.revision > 0

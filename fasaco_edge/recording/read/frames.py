@@ -210,7 +210,7 @@ def _varint(message: bytes, at: int) -> tuple[int, int]:
 
 
 def is_fleet_recording(path: Path) -> bool:
-    """Tell whether a file is a fleet's recording, by its first frames.
+    """Return whether a file is a fleet's recording, by its first frames.
 
     Raises:
         UnreadableRecording: it is missing, or is no recording.

@@ -111,7 +111,7 @@ def changed_bounds(before: OccupancyGrid, after: OccupancyGrid) -> Bounds | None
 
 
 def is_far_from(framed: Bounds, bounds: Bounds, share: float) -> bool:
-    """Tell whether bounds have moved away from ``framed`` by more than a share of its size."""
+    """Return whether bounds have moved away from ``framed`` by more than a share of its size."""
     size = max(framed[2] - framed[0], framed[3] - framed[1])
     moved = max(abs(a - b) for a, b in zip(framed, bounds, strict=True))
     return moved > share * size

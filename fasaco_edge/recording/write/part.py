@@ -176,7 +176,7 @@ class Part:
                 repair_recording(self.path)
 
     def _has_writer(self) -> bool:
-        """Tell whether rerun still holds the file open: its writer closes it when it dies."""
+        """Return whether rerun still holds the file open: its writer closes it when it dies."""
         file = os.fstat(self._lock)
         others = {int(name) for name in os.listdir("/proc/self/fd")} - {self._lock}
         return any(_is_same_file(descriptor, file) for descriptor in others)

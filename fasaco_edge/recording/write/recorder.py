@@ -248,7 +248,7 @@ class Recorder:
 
 
 def _is_rival(payload: bytes) -> bool:
-    """Tell whether a status is of a second daemon of the robot's name, which does not plan."""
+    """Return whether a status is of a second daemon of the robot's name, which does not plan."""
     try:
         return decode_tolerant(payload, Status).claim.stand != "plans"
     except MalformedMessage:
