@@ -56,7 +56,7 @@ class ActionClient:
             self._roll.ask(LOOK_EVERY_S)
 
     def keys(self) -> dict[Call, str]:
-        """Return the keys of the server's services; of one that is not seen, none."""
+        """Return the keys of the server's services; none if the graph shows no server."""
         if self._roll is None:
             return bridge_keys(self._action)
         return served_keys(self._domain, self._action, self._roll.there(), self._types)

@@ -1,8 +1,8 @@
 """The claim on a robot's base: of several followers of one robot, one drives.
 
 Each shows a token ``driver/<its Zenoh id>/<waits, yields or drives>``. One that waits sends
-nothing, no zeros either. A session sees its own token even where access rules keep it from the
-others: so a second session has to see it before the first command.
+nothing, no zeros either. A session sees its own token even where access rules hide it from others:
+so a second session must see the token before the first command.
 """
 
 from __future__ import annotations
@@ -40,8 +40,8 @@ class BaseClaim(BusClaim):
         settings: the follower's.
     """
 
-    # Another one that drives finds this one's token by its next query: the two must not drive
-    # until then.
+    # Another follower that drives sees this token with its next query: until then this one must not
+    # drive.
     rejoin_s = ASK_PERIOD_S + 2.0 * SETTLE_S
 
     def __init__(self, bus: Bus, settings: FollowSettings) -> None:
@@ -68,7 +68,7 @@ class BaseClaim(BusClaim):
 
 
 class _Shown:
-    """Whether others see a token, as far as a second session can tell; asked until they do."""
+    """Whether others see a token, by the view of a second session; queried until they do."""
 
     def __init__(self, settings: FollowSettings, token: str) -> None:
         self._settings = BusSettings("client", settings.connect, secured=settings.secured)
@@ -93,7 +93,7 @@ class _Shown:
 
 
 def _any_of(times: int, holds: Callable[[], bool]) -> bool:
-    """Return whether something holds, now or at one of the next looks."""
+    """Return whether a condition holds, now or at one of the next looks."""
     for _ in range(times):
         if holds():
             return True

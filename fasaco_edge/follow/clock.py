@@ -1,15 +1,15 @@
 """The robot's time [s]: the computer's, or a simulation's by the stamps of its poses.
 
-A simulation runs at a multiple of the real speed, and slower where the computer cannot keep up. A
-follower that went by the computer's time would then drive by poses that it takes to be old, and
-expect the robot to have gone further than it has.
+A simulation runs at a multiple of the real speed, and slower where the computer cannot keep up. By
+the computer's time, a follower would then consider fresh poses old, and expect the robot to have
+gone further than it has.
 """
 
 from __future__ import annotations
 
 from typing import Protocol
 
-# A simulation's time goes on this far without a pose [s]: poses come ten times a second.
+# A simulation's time advances at most this far without a pose [s]: poses come ten times a second.
 LEAD_S = 0.09
 # After this long without a pose the simulation has stopped, and time goes on [s, real].
 SILENT_S = 2.0

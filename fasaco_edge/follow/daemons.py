@@ -1,7 +1,7 @@
 """The daemons of one robot, as a follower receives them: claims, statuses and paths, by Zenoh id.
 
-Only what the daemon that plans sends counts: a status of another one, waiting or restarted in a
-loop, is no sign of life of this one, and its path is not driven. Samples of one daemon may
+Only samples of the daemon that plans count: the status of another one, which waits or restarts in a
+loop, is no sign of life of the planner, and its path is not driven. Samples of one daemon may
 arrive in any order, a path before the token of its claim, so the newest of each is kept.
 """
 
@@ -16,10 +16,10 @@ from fasaco_edge.bus.arrival import Sample
 from fasaco_edge.bus.claim import ID
 from fasaco_edge.wire.limits import MAX_JSON_BYTES, MAX_JSON_INTEGER
 
-# Most daemons whose samples are kept; beyond that those of the one that came first are dropped.
+# Most daemons whose samples are kept; beyond that the samples of the oldest daemon are dropped.
 MOST_DAEMONS = 16
-# Most claims that are kept; one that comes beyond that does not count. A claim dropped in its place
-# would not come again.
+# Most claims that are kept; further ones are ignored. A claim dropped in their place would not be
+# sent again.
 MOST_CLAIMS = 1_000
 
 PLANS = "plans"
@@ -27,13 +27,13 @@ PLANS = "plans"
 
 @dataclass(slots=True)
 class News:
-    """What arrived from the daemon that plans since the last call.
+    """Samples that arrived from the daemon that plans since the last call.
 
     Attributes:
         planner: its id; "" if none plans.
         status_at: arrival of its newest status [s]; None without a new one.
         path: its newest path; None without a new one.
-        revision: of the newest path that came; 0 where that is not known.
+        revision: of the newest path; 0 if unknown.
         unnamed: newest path that names no daemon; None without a new one.
     """
 
@@ -55,7 +55,7 @@ class _Daemon:
 
 
 class Daemons:
-    """Keeps what each daemon sent, and returns what comes from the one that plans.
+    """Keeps the newest samples of each daemon, and returns those of the one that plans.
 
     Samples come on Zenoh's threads.
     """
@@ -103,7 +103,7 @@ class Daemons:
                 self._unnamed = sample
 
     def news(self) -> News:
-        """Return what arrived from the daemon that plans; each sample once."""
+        """Return the new samples of the daemon that plans; each sample once."""
         with self._lock:
             news = News(min(self._planners, default=""), unnamed=self._unnamed)
             self._unnamed = None
@@ -121,7 +121,7 @@ class Daemons:
             return "" if daemon is None else daemon.state
 
     def _daemon(self, own: str) -> _Daemon:
-        """Return what is kept of a daemon; the caller holds the lock."""
+        """Return the kept samples of a daemon; the caller holds the lock."""
         if own not in self._daemons:
             planner = min(self._planners, default="")
             others = [one for one in self._daemons if one != planner]

@@ -1,7 +1,8 @@
 """Docking and undocking by Nav2's docking server: the daemon's state and poses in, requests out.
 
-The path ends in front of the dock. There the daemon says that the robot charges, and the docking
-server moves it in; before the next path is driven, it moves it out again. No clock, no session.
+The path ends in front of the dock. There the daemon's state says that the robot charges, and the
+docking server moves the robot in; before the next path is driven, it moves the robot out again. No
+clock, no session.
 """
 
 from __future__ import annotations
@@ -16,20 +17,20 @@ from fasaco_edge.grid.geometry import Pose2D
 from fasaco_edge.wire.messages.docking import ERRORS, DockEnding
 from fasaco_edge.wire.messages.follow_path import UNKNOWN
 
-# A robot is in its dock this near to the dock's pose [m].
+# A robot this near to the dock's pose is in its dock [m].
 DOCKED_M = 0.1
 # Pause after an error before the next goal [s], doubled each time up to the maximum.
 RETRY_S, MOST_RETRY_S = 10.0, 300.0
-# Period of querying the result again, as a reply may be lost; after the second a goal is given up.
+# Period of queries for the result, as a reply may be lost; time after which a goal is given up [s].
 RESULT_EVERY_S, GIVE_UP_S = 20.0, 1200.0
-# The daemon's states in which the robot leaves its dock; and those in which it has charged, or is
-# to drive elsewhere: in others it docks on.
+# States of the daemon in which the robot leaves its dock; and those in which it has charged, or is
+# to drive elsewhere: in all others docking continues.
 DRIVES = ("planning", "covering", "returning", "degraded")
 LEAVES = ("planning", "covering", "returning", "paused", "idle", "done")
 
 
 class Move(enum.Enum):
-    """What the docking server does."""
+    """Motions of the docking server."""
 
     DOCK = "docking"
     UNDOCK = "undocking"
@@ -101,7 +102,7 @@ class Docking:
 
         Args:
             now: the time [s].
-            state: of the daemon, "" before one was heard.
+            state: of the daemon, "" before the first status.
             here: the robot's pose; None without one.
             drives: whether there is a path to drive.
         """
@@ -127,7 +128,7 @@ class Docking:
         return requests
 
     def end(self) -> list[DockRequest]:
-        """Return the requests that end all goals; the next pose says anew whether it is docked."""
+        """Return the requests that end all goals; the next pose shows whether it is docked."""
         self._is_docked = None
         if (goal := self._goal) is None:
             return []
@@ -164,7 +165,7 @@ class Docking:
         elif goal.is_cancelled:
             self._goal = None
         elif ending.status == UNKNOWN:
-            self._fail("it knows nothing of its goal: was it started anew?", now)
+            self._fail("it does not know its goal: was it restarted?", now)
         else:
             what = ERRORS.get(ending.code, "no code")
             code = f"{ending.code} " if ending.code else ""

@@ -57,7 +57,7 @@ class DockingNode:
         self._said = ("", "")
 
     def turn(self, inputs: Inputs, follower: Supervision) -> None:
-        """Run a cycle; the follower is held while the robot is the docking server's."""
+        """Run a cycle; the follower is held while the docking server moves the robot."""
         for client in self._clients.values():
             client.look()
         while self._answers:
@@ -124,7 +124,7 @@ class DockingNode:
                 docking.take_accepted(request.id, accepted, why if accepted is None else "", now)
             elif isinstance(request, Ask):
                 read = decode_dock_ending if request.move is Move.DOCK else decode_undock_ending
-                # Without an answer it is asked again.
+                # Without an answer the result is queried again.
                 if payload is not None:
                     docking.take_ending(request.id, read(payload), "", now)
             else:

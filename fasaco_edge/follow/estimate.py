@@ -156,7 +156,7 @@ class PoseEstimate:
                 yield seconds, command
 
     def _measure_delay(self, pose: Pose2D, now: float) -> None:
-        """Compare the motion since the last pose with the commands of each delay earlier."""
+        """Compare the motion since the last pose with the commands sent by each delay earlier."""
         before = self.pose_at
         speeds, turns = [c.speed for _, c in self._sent], [c.turn_rate for _, c in self._sent]
         if before is None or not self._sent:
@@ -175,7 +175,7 @@ class PoseEstimate:
         self.delay = DELAYS_S[self._unlike.index(min(self._unlike))]
 
     def _add_commanded(self, now: float) -> None:
-        """Add what the commands meant since the last pose."""
+        """Add the motion commanded since the last pose."""
         if self.pose_at is None:
             return
         here, turned = self.measured, 0.0

@@ -35,8 +35,8 @@ class Follower(Supervision):
         limits: of the base.
         patience: timeouts of pose and status.
         moves: whether the base executes the commands; in a dry run it does not.
-        sight: by which it keeps clear of what the map does not show; None for the map alone.
-        radius: of the robot's disc [m]; 0 where that is not known.
+        sight: finds obstacles that the map does not show; None to go by the map alone.
+        radius: of the robot's disc [m]; 0 if unknown.
     """
 
     def __init__(

@@ -1,4 +1,4 @@
-"""How far the robot's disc can go along a line between things, and how fast it may then be."""
+"""How far the robot's disc can go along a line between things, and how fast it may go."""
 
 from __future__ import annotations
 
@@ -10,13 +10,14 @@ from typing import NamedTuple
 from fasaco_edge.grid.geometry import Point, Pose2D
 from fasaco_edge.grid.motion import stopping_rate
 
-# Distance that is kept from things [m]. Where one is nearer already, the robot drives on as long as
-# it comes no nearer to any.
+# Distance kept from things [m]. If one is already nearer, the robot drives on as long as it
+# approaches no thing by more than the second [m].
 MARGIN_M, ASIDE_M = 0.03, 0.005
-# The robot stops so far before the margin [m].
+# The robot stops this far before the margin [m].
 STOP_M = 0.03
-# What moves may come nearer at this speed [m/s]; the robot stands by then, from so long after it
-# was seen on [s]. What is behind the robot it does not drive into: within this angle [rad].
+# Moving things may approach at this speed [m/s], and the robot must stand before they arrive; it
+# reacts this long after it has seen them [s]. Things behind the robot do not count: those beyond
+# this angle of its heading [rad].
 WALK_M_S, LATE_S, AHEAD_RAD = 0.5, 0.25, math.radians(120.0)
 
 
@@ -74,19 +75,19 @@ def _way_to(thing: Thing, line: Sequence[Point], radius: float) -> float | None:
 
 
 def speed_before(way: float, acceleration: float, period: float) -> float:
-    """Return the highest speed [m/s] that ends after a way [m] without what is kept free."""
+    """Return the highest speed [m/s] that lets it stop ``STOP_M`` before the end of a way."""
     return stopping_rate(max(way - STOP_M, 0.0), acceleration, period)
 
 
 def speed_beside(
     things: Iterable[Thing], pose: Pose2D, radius: float, acceleration: float
 ) -> tuple[float, Thing | None]:
-    """Return the highest speed at which the robot stands before what moves can touch it [m/s].
+    """Return the highest speed from which the robot stands before a moving thing touches it [m/s].
 
-    And the thing that decides; infinite, and None, without one.
+    And the thing that limits it; infinity and None without one.
 
-    The gap has to hold what the robot drives, while it has not seen it and while it brakes, and how
-    far the other comes meanwhile: v late + v^2 / 2a + walk (late + v / a).
+    The gap must cover the robot's way until it reacts and while it brakes, and the thing's way
+    meanwhile: v late + v^2 / 2a + walk (late + v / a).
     """
     nearest, decides = math.inf, None
     for thing in things:

@@ -13,11 +13,11 @@ GAIN_M = 0.3
 # Where the path returns to itself, the next goal begins this far before the end of the last one
 # [m]: the part skipped there is less than half of a tool.
 TIP_M = 0.1
-# It begins earlier where it can: where the path returns to itself only further back, by one of
-# these shares of the usual distance.
+# If the path returns to itself only further back, the next goal begins earlier: before the end by
+# one of these shares of the usual distance.
 SHARES = (1.0, 0.6, 0.35, 0.2)
-# One that begins early reaches as far beyond the last one as it begins before its end, up to this
-# [m].
+# A goal that begins early extends beyond the last one by as much as it begins before that one's
+# end, up to this [m].
 AMPLE_M = 2.0
 # Two paths nearer than this to each other are the same [m].
 SAME_M = 0.03
@@ -74,7 +74,7 @@ class PathDriven:
             self.way, _ = self.line.nearest(here, self.way, end)
 
     def start_after(self, goal: Goal, ahead: float, near: float) -> float:
-        """Return the earliest begin of a piece that continues a goal; infinite if there is none.
+        """Return the earliest start of a piece that continues a goal; infinite if there is none.
 
         Args:
             goal: the last goal.
@@ -83,7 +83,7 @@ class PathDriven:
         """
         for before_m in (*(share * ahead for share in SHARES), TIP_M, 0.0):
             start = max(goal.end - before_m, goal.start)
-            # One that begins early reaches less far: it has to last while the one after it comes.
+            # A goal that begins early ends sooner: it must last until the next one arrives.
             gain_m = max(min(before_m, AMPLE_M), GAIN_M)
             if end_of_piece(self.line, start, near) >= goal.end + gain_m:
                 return start

@@ -1,9 +1,9 @@
-"""Check that the base moves as commanded: one that pushes against an obstacle must stop.
+"""Check that the base moves as commanded: a base that pushes against an obstacle must stop.
 
-Poses scatter, so no two of them are compared: all poses of a look are fitted to the motion that was
-commanded. The share of it that they show is about 1 for a robot that moves and 0 for one that does
-not, whatever way it drives and turns. Scatter makes it larger as often as smaller: if it is so
-large that nothing can be told, one look in two ends in a pause.
+Poses scatter, so no two of them are compared: all poses of a look are fitted to the commanded
+motion. The measured share of that motion is about 1 for a robot that moves and 0 for one that does
+not, however it drives and turns. Scatter raises the share as often as it lowers it: if scatter
+hides all motion, one look in two ends in a pause.
 """
 
 from __future__ import annotations
@@ -15,12 +15,13 @@ from fasaco_edge.follow.rest import MOVED_M, Place, Rest
 from fasaco_edge.follow.tries import Tries
 from fasaco_edge.grid.geometry import Pose2D
 
-# A look takes this commanded distance [m], of which the robot must have moved this share; a radian
-# of turning counts as the third. For a fast robot it takes this time [s] and these poses.
+# A look takes at least this commanded distance [m], of which the robot must have moved this share;
+# a radian of turning counts as the third value [m]. It also takes at least this time [s] and this
+# number of poses.
 LEAST_WAY_M, LEAST_SHARE, WAY_M_RAD = 0.2, 0.15, 0.2
 LOOK_S, LEAST_POSES = 2.0, 3
 # Pause after the first try [s], doubled after the next, and number of tries in a direction. After
-# the last one it waits until it is moved, or the path leads elsewhere.
+# the last try the robot waits until it is moved, or the path leads elsewhere.
 REST_S = 2.0
 TRIES = 3
 
@@ -114,7 +115,7 @@ class _Look:
             self._squares += meant * meant
 
     def share(self) -> float:
-        """Return how much of the commanded motion the poses show; 0 if none had effect by then."""
+        """Return the share of the commanded motion that the poses show; 0 without an effect yet."""
         went, meant = self._measured, self._commanded
         products = self._products - _product(went, meant) / self.count
         squares = self._squares - _product(meant, meant) / self.count

@@ -1,4 +1,4 @@
-"""The map as the follower needs it: whether it shows something at a place. Without numpy."""
+"""The map as the follower needs it: whether it shows an obstacle at a place. Without numpy."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ import math
 
 from fasaco_edge.wire.messages.grid_octets import GridOctets, read_grid, with_update
 
-# What a scan shows so near to an obstacle of the map is that obstacle [m]: ranges scatter, and the
-# pose is off by some centimetres.
+# A point of a scan this near to an obstacle of the map belongs to that obstacle [m]: ranges
+# scatter, and the pose is off by some centimetres.
 KNOWN_M = 0.15
 UNKNOWN = 255
 
@@ -21,7 +21,7 @@ class KnownMap:
 
     def __init__(self, free_at_most: int) -> None:
         self._grid: GridOctets | None = None
-        # What is no obstacle: free pixels, and those that the map does not know.
+        # Values that are no obstacle: free and unknown pixels.
         self._free = bytes([*range(free_at_most + 1), UNKNOWN])
 
     @property

@@ -33,13 +33,13 @@ from fasaco_edge.wire.messages.path_points import PathPoints
 # The next goal is sent this far before the end of the last one [m], plus the distance driven in
 # this many seconds.
 AHEAD_M, AHEAD_S = 0.5, 3.0
-# It is sent this far before the robot reaches its begin [m].
+# It is sent this far before the robot reaches its start [m].
 EARLY_M = 0.05
-# A path that begins further away is not driven [m]; largest progress of the robot on it by then.
+# A path is driven only if the robot is this near to its beginning, a part of this length [m].
 BEGINNING_M = 1.0
-# A goal without an answer is not driven before the robot has moved by this much on it [m].
+# An unanswered goal counts as driven once the robot has moved this far on it [m].
 DRIVES_M = 0.15
-# A goal that Nav2 reports as done is not done at this distance from its end [m].
+# A goal that Nav2 reports as done is not done if the robot is this far from its end [m].
 DONE_M = 0.5
 # Pause after an error before the next goal [s], doubled each time up to the maximum until the robot
 # has moved this far [m] or the path leads elsewhere, by its direction this far ahead [m].
@@ -50,10 +50,10 @@ PROGRESS_M, LEADS_M = 0.5, 0.5
 # goal is given up [s].
 MOVED_M, STANDS_S, ARRIVED_S, GIVE_UP_S = 0.05, 3.0, 1.0, 20.0
 
-# Time constant of the position by which it stands [s]: poses scatter.
+# Time constant of the filtered position that shows whether it stands [s]: poses scatter.
 STEADY_S = 1.0
 
-# Of a goal that another client's takes the place of Nav2 says no more; Humble has no codes at all.
+# Nav2 gives no code for a goal that another client's goal has replaced; Humble has no codes at all.
 NO_CODE = "without a code; does another program send goals, too?"
 
 
@@ -146,14 +146,15 @@ class Nav2Follower(Supervision):
         self._cancellations.drop(goal_id)
 
     def take_accepted(self, goal_id: bytes, accepted: bool | None, why: str, now: float) -> None:
-        """Take in whether Nav2 accepted a goal; None without an answer: then it must end it."""
+        """Take in whether Nav2 accepted a goal; None without an answer: then Nav2 must end it."""
         self._cancellations.take_accepted(goal_id, accepted)
         if self._pending is None or self._pending.id != goal_id:
             return
         goal, self._pending = self._pending, None
         if accepted:
             if self._active is None:
-                # From goal to goal a robot that stands goes on standing.
+                # Only the first goal restarts the timeout of a standing robot, its successors do
+                # not.
                 self._moved_last = None
             self._active, self._is_canceled = goal, False
             self._trouble_of_nav2 = None
@@ -166,7 +167,7 @@ class Nav2Follower(Supervision):
         self._fail(state, why or "is its controller server active?", now)
 
     def take_ending(self, goal_id: bytes, ending: Ending | None, why: str, now: float) -> None:
-        """Take in how a goal ended; None if Nav2 will not answer: it may still drive it."""
+        """Take in how a goal ended; None if Nav2 will not answer: it may still drive the goal."""
         if ending is not None:
             self._cancellations.drop(goal_id)
         if self._active is None or self._active.id != goal_id:
@@ -176,7 +177,7 @@ class Nav2Follower(Supervision):
             self._cancellations.add(goal_id)
         self._requests_later.clear()
         if self._pending is not None:
-            # It switches to the next one.
+            # Nav2 switches to the next goal.
             return
         if ending is None:
             self._fail(State.NO_NAV2, why, now)
@@ -191,7 +192,7 @@ class Nav2Follower(Supervision):
             self._is_canceled = True
             self._fail(State.CANCELED, "goes on with a path elsewhere", now, for_good=True)
         else:
-            self._fail(State.NO_NAV2, "it knows nothing of its goal: was it started anew?", now)
+            self._fail(State.NO_NAV2, "it does not know its goal: was it restarted?", now)
 
     def take_cancelled(self, goal_id: bytes, code: int | None) -> None:
         """Take in the result of a request to cancel; None without an answer."""
@@ -203,7 +204,7 @@ class Nav2Follower(Supervision):
         if self._path is not None:
             assert self._here is not None
             self._tries.moved_to(self._here)
-            # Also on a goal without an answer: that may be lost, and the robot drives it.
+            # Also on an unanswered goal: the answer may be lost while the robot drives it.
             self._path.advance(self._here, self._active or self._pending)
             self._believe_motion(self._path, now)
         if self._next is not None and self._pending is None and not self._join(self._next, now):
@@ -219,11 +220,11 @@ class Nav2Follower(Supervision):
                 self._send_next(path, goal)
 
     def _believe_motion(self, path: PathDriven, now: float) -> None:
-        """Take a goal for accepted once the robot drives it."""
+        """Treat a goal as accepted once the robot drives it."""
         goal = self._pending
         if goal is None or self._active is not None:
             return
-        # Of a short one half: it may have ended before the robot is further.
+        # Half of a short goal is enough: it may end before the robot gets further.
         least = min(max(0.5 * (goal.end - goal.start), DRIVES_M), COAST_M)
         if path.way - goal.start > least:
             self.take_accepted(goal.id, accepted=True, why="", now=now)
@@ -307,7 +308,7 @@ class Nav2Follower(Supervision):
             return
         far = math.dist(self._here, self._path.line.at(goal.end))
         if far > DONE_M and goal.end - self._path.way > DONE_M:
-            self._fail(State.GIVEN_UP, f"done, it says, {far:.1f} m before the end", now)
+            self._fail(State.GIVEN_UP, f"reported as done {far:.1f} m before the end", now)
             return
         self._path.finish(goal)
 

@@ -157,4 +157,4 @@ class Nav2Node:
             return None, f"no server of {self._action} in domain {self._domain}"
         found = release_of(keys["send_goal"])
         type_hash = keys["send_goal"].rpartition("/")[2]
-        return found, f"its FollowPath is none that is known: {type_hash}"
+        return found, f"its FollowPath type is unknown: {type_hash}"

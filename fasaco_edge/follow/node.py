@@ -87,7 +87,7 @@ def native_node(bus: Bus, settings: FollowSettings, report: Callable[[str], None
 
 
 def docking_of(bus: Bus, settings: FollowSettings) -> DockingNode | None:
-    """Return what has Nav2 dock the robot; None where the base docks by itself, or in a dry run."""
+    """Return the node for docking by Nav2; None if the base docks itself, or in a dry run."""
     if not settings.dock or settings.dry_run:
         return None
     # A follower without a dock does not load it.
@@ -109,7 +109,7 @@ def _take_turns(node: Node, period_s: float, stop: threading.Event) -> None:
 
 
 class Role:
-    """The right to the base, the report to the daemon, and what has Nav2 dock the robot."""
+    """The claim on the base, the report to the daemon, and docking by Nav2."""
 
     def __init__(self, bus: Bus, settings: FollowSettings) -> None:
         self._claim = None if settings.dry_run else BaseClaim(bus, settings)
@@ -120,13 +120,13 @@ class Role:
         self.is_on_standby = self._claim is not None
 
     def report(self, inputs: Inputs, follower: Supervision, now: float) -> None:
-        """Tell the daemon what keeps the robot from driving its path, if anything does."""
+        """Report to the daemon what keeps the robot from driving its path, if anything does."""
         held_s = self._standstill.look(follower, now)
         if held_s is not None and self._blocked is not None and not self.is_on_standby:
             self._blocked.put(report_of(follower, held_s, inputs.planner, inputs.revision))
 
     def turn(self, inputs: Inputs, follower: Supervision) -> None:
-        """Run a cycle: have the follower stand by while another one drives; dock."""
+        """Run a cycle: let the follower stand by while another one drives; dock."""
         why = self._claim.standby(time.monotonic()) if self._claim is not None else None
         self.is_on_standby = why is not None
         follower.stand_by(why)
@@ -137,7 +137,7 @@ class Role:
                 self._docking.turn(inputs, follower)
 
     def end(self) -> None:
-        """End what Nav2 does."""
+        """End docking by Nav2."""
         if self._docking is not None:
             self._docking.end()
 
@@ -195,7 +195,7 @@ class FollowerNode:
         self._send(STAND)
 
     def _is_due(self, now: float) -> bool:
-        """Return whether a cycle is due in simulated time: that may be slower than it should be."""
+        """Return whether a cycle is due in simulated time: it may run slower than its pace."""
         if now < self._due - LEAST_S:
             return False
         due = self._due + 1.0 / RATE_HZ

@@ -23,7 +23,7 @@ CORNER_RAD = math.radians(60.0)
 MOST_M = 20.0
 # Points are read on demand, this many at a time.
 CHUNK = 500
-# Points nearer than this are the same [m].
+# Points nearer to each other than this count as one [m].
 LEAST_M = 1e-3
 
 

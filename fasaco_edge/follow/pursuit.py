@@ -35,9 +35,9 @@ FORGETTING = 0.98
 class Pursuit:
     """Drives along routes, from one command to the next.
 
-    On a busy computer a command comes late, and the robot drives on with the last one. It then
-    brakes by as much as it could have since; and it brakes early by the way that it would drive on
-    in such a delay.
+    On a busy computer a command comes late, and the robot drives on with the last one. The next
+    command then brakes by as much as was possible since the last one. And the robot brakes earlier,
+    by the way that it would drive on in such a delay.
 
     Args:
         limits: of the base.

@@ -1,4 +1,4 @@
-"""A robot that rests: whether something moves it, by means of poses, as a single one scatters."""
+"""Detection that something moves a resting robot, by averaged poses, as single poses scatter."""
 
 from __future__ import annotations
 
@@ -8,12 +8,13 @@ from statistics import fmean, median
 
 # Poses are averaged over this time [s].
 MEAN_S = 1.0
-# It was moved if a mean is this far [m] from that of this many means before: what is slower is a
-# drift of the poses.
+# The robot was moved if an average is this far [m] from the one this many averages earlier; slower
+# motion is drift of the poses.
 MOVED_M, MEANS = 0.1, 5
-# Where poses scatter it is further, by this many times the usual step from mean to mean: the median
-# of the last ones, which a few steps of a robot that is moved do not change. Fewer than the least
-# say nothing. With normal noise one mean in 2^(4^2) is that far off by scatter alone.
+# Where poses scatter, the distance is larger: by this many times the usual step from one average to
+# the next. That is the median of the last steps, which a few steps of a moved robot do not change;
+# fewer than the least number are not enough. With normal noise, scatter alone moves one average in
+# 2^(4^2) that far.
 SCATTERS, STEPS, LEAST_STEPS = 4.0, 30, 6
 
 # Position and turn, as lengths [m].
@@ -21,7 +22,7 @@ Place = tuple[float, float, float]
 
 
 class Rest:
-    """Compares means of poses of a robot that should stand."""
+    """Compares averaged poses of a robot that should stand."""
 
     def __init__(self) -> None:
         self._poses: list[Place] = []
@@ -31,17 +32,17 @@ class Rest:
 
     @property
     def least(self) -> float:
-        """The distance that tells that it was moved [m]."""
+        """The distance from which on it counts as moved [m]."""
         return MOVED_M + SCATTERS * median(self._steps or (0.0,))
 
     def begin(self, now: float) -> None:
-        """Begin a rest; what is known of the poses' scatter is kept."""
+        """Begin a rest; the measured scatter of the poses is kept."""
         self._poses.clear()
         self._means.clear()
         self._ends = now + MEAN_S
 
     def is_moved(self, place: Place, now: float) -> bool:
-        """Take in a pose; tell whether the robot was moved."""
+        """Take in a pose; return whether the robot was moved."""
         self._poses.append(place)
         if now < self._ends:
             return False

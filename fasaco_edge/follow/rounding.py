@@ -1,8 +1,8 @@
 """Rounding of corners: how fast a robot can turn at a corner while it drives on.
 
-It turns as on the spot, up to the limits of the base, and begins so far before the corner that half
-of the turn is done beside it. At any speed that takes the same time, so the way that it cuts is in
-proportion to its speed: the speed follows from how far it may pass the corner.
+It turns as on the spot, up to the limits of the base, and begins so early that half of the turn is
+done beside the corner. The turn takes the same time at any speed, so the distance from the corner
+is proportional to the speed: the allowed distance determines the speed.
 """
 
 from __future__ import annotations
@@ -12,9 +12,10 @@ from functools import lru_cache
 
 from fasaco_edge.follow.estimate import Limits
 
-# A corner is passed within this [m]: less than a map tells, and than poses scatter.
+# A corner is passed within this distance [m]: less than a map resolves, and less than poses
+# scatter.
 ROUNDED_M = 0.02
-# Sharper corners are turned at on the spot [rad].
+# At sharper corners the robot turns on the spot [rad].
 SHARP_RAD = math.radians(135.0)
 # Time steps of half a turn.
 STEPS = 32

@@ -129,9 +129,9 @@ class Route:
         """Go on to the next leg.
 
         A robot ``here``, at rest, that has overshot the corner by more than ``MISSED_M`` returns to
-        it first: the straight line to the next leg may cross a wall. It does so again only where
-        that brought it nearer: one whose pose is beside the point that it turns about, or late,
-        would turn for ever about a corner that it cannot hit.
+        it first: the straight line to the next leg may cross a wall. It tries again only if that
+        brought it nearer: a robot whose pose is late, or not of the point that it turns about,
+        would otherwise circle a corner for ever that it cannot hit.
         """
         self._fill(2)
         corner = self._legs[0].end if self._legs else None
@@ -165,8 +165,8 @@ class Route:
             self.rounds = leg.most
 
     def ends(self, along: float, horizon: float) -> list[tuple[float, float]]:
-        """Return how far it is from ``along`` the leg to where it has to be slow [m], and how slow
-        [m/s]; at least one place, up to the next stop or beyond ``horizon`` [m]."""
+        """Return how far ahead of ``along`` the robot must be slow [m], and its greatest speed
+        there [m/s]; at least one place, up to the next stop or beyond ``horizon`` [m]."""
         found: list[tuple[float, float]] = []
         left, index = -along, 0
         while leg := self._leg(index):

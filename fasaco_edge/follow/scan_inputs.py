@@ -21,16 +21,16 @@ from fasaco_edge.wire.limits import MAX_SCAN_BEAMS
 LOG = logging.getLogger(__name__)
 # Only the newest scans count, and of maps the newest with its updates.
 MOST_SCANS, MOST_UPDATES = 2, 256
-# A scan has a range and an intensity a beam, and some numbers and a name beside.
+# A scan has a range and an intensity for each beam, some numbers and a name.
 MOST_SCAN_BYTES = 8 * MAX_SCAN_BEAMS + 1024
-# A map has a byte a pixel, and so much beside.
+# A map has a byte for each pixel, and this much more.
 HEADER_BYTES = 1024
 
 MAP, UPDATE, SCAN = topics.MAP.name, topics.MAP_UPDATE.name, topics.SCAN.name
 
 
 class ScanInputs:
-    """Subscribes, and passes on what has come since the last cycle.
+    """Subscribes, and passes on the samples since the last cycle.
 
     Attributes:
         sight: takes in maps.
@@ -82,6 +82,6 @@ class ScanInputs:
         if sample.size > self._most_map_bytes:
             return
         if not is_update:
-            # What was before it does not count.
+            # A new map replaces all before it.
             self._maps.clear()
         self._maps.append((is_update, sample.payload))

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 from fasaco_edge.grid.geometry import Point
 from fasaco_edge.wire.messages.scans import LaserScan
 
-# What is further away from the sensor does not matter yet [m].
+# Points further away from the sensor do not matter yet [m].
 REACH_M = 3.0
-# Of the beams in one of so many directions only the shortest counts.
+# Number of sectors; in each only the shortest beam counts.
 SECTORS = 360
-# A sensor of which less than this share of the beams says anything is covered, or broken.
+# A sensor is covered or broken if less than this share of its beams is valid.
 LEAST_SHARE = 0.1
 
 
@@ -33,15 +33,16 @@ class Mount:
 
 
 def points_of(scan: LaserScan, mount: Mount) -> list[Point] | None:
-    """Return what a scan shows within ``REACH_M``, at most ``SECTORS`` points.
+    """Return the points of a scan within ``REACH_M``, at most ``SECTORS``.
 
-    None for a sensor that sees nothing: less than ``LEAST_SHARE`` of its beams say anything.
+    None for a sensor that sees nothing: less than ``LEAST_SHARE`` of its beams is valid.
     """
     shortest: dict[int, tuple[float, float]] = {}
     measured_beams = 0
     turn = -1.0 if mount.upside_down else 1.0
     for index, measured in enumerate(scan.ranges):
-        # NaN, and what the sensor cannot measure, say nothing; minus infinity: too near to measure.
+        # NaN, and ranges beyond the sensor's limits, are invalid; minus infinity: too near to
+        # measure.
         length = scan.least_m if measured == -math.inf else measured
         if not length >= scan.least_m:
             continue

@@ -53,7 +53,7 @@ class FollowSettings:
         scan: if scans are used: where the lidar is (``mount``), ``radius_m`` of the robot,
             ``lost_s``, ``free_at_most``, ``most_pixels`` of a map, and further topics of scans,
             maps and updates: name, key, whether it is latched, depth.
-        radius_m: of the robot's disc; 0 where that is not known.
+        radius_m: of the robot's disc; 0 if unknown.
         pace: simulated seconds in a second.
         dry_run: report commands instead of sending them.
     """

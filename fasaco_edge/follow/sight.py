@@ -1,9 +1,9 @@
-"""Sight: what the lidar sees and the map does not show, and how fast the robot may go by it.
+"""Sight: obstacles that the lidar sees and the map does not show, and the speed that they allow.
 
-Walls of the map are not looked at: the path keeps clear of them, by a centimetre where floor is to
-be swept beside them, which is less than ranges scatter. But people leave marks on a map where they
-walked: what moves counts there, too. What the map does not show is kept clear of
-by a margin. What has stood in its place for a while is taken for a thing; anything else may move.
+Walls of the map are ignored: the path keeps clear of them, by a centimetre where floor beside them
+is swept, which is less than ranges scatter. But people leave marks on a map where they walked:
+moving things count there, too. The robot keeps a margin from things that the map does not show. A
+thing that has stood in its place for a while counts as standing; any other may move.
 """
 
 from __future__ import annotations
@@ -21,16 +21,16 @@ from fasaco_edge.follow.supervision import State
 from fasaco_edge.grid.geometry import Point, Pose2D
 from fasaco_edge.wire.messages.scans import decode_scan
 
-# The path is looked at so far ahead [m].
+# The path is checked this far ahead [m].
 AHEAD_M = 1.5
-# What was seen in its place, a square of this edge [m] or beside it, for so long [s] stands; it is
-# forgotten where it has not been seen for so long [s].
+# A thing stands if it was seen in one place, a square of this edge [m] or one beside it, for this
+# long [s]; it is forgotten after it has not been seen for this long [s].
 PLACE_M, STANDS_S, FORGET_S = 0.1, 1.5, 1.0
-# What is nearer to the robot's middle is the robot itself, as a share of its radius.
+# Points nearer to the robot's middle than this share of its radius are the robot itself.
 OWN_SHARE = 0.7
-# What is reported of a thing: what was seen within this distance of it [m].
+# The report of a thing has the points within this distance of it [m].
 AROUND_M = 0.5
-# A speed below this is none [m/s].
+# A speed below this counts as 0 [m/s].
 LEAST_M_S = 0.02
 
 Trouble = tuple[State, str]
@@ -38,12 +38,12 @@ Trouble = tuple[State, str]
 
 @dataclass(frozen=True, slots=True)
 class SightSettings:
-    """What the follower knows of lidar and robot.
+    """Lidar and robot, as the follower knows them.
 
     Attributes:
         mount: where the lidar is.
         radius: of the robot's disc [m].
-        lost_s: after so long without a scan the robot stands [s].
+        lost_s: the robot stands after this time without a scan [s].
         free_at_most: occupancy up to which a pixel of the map is free [percent].
     """
 
@@ -61,12 +61,12 @@ class SightSettings:
 
 @dataclass(frozen=True, slots=True)
 class Limit:
-    """What the sight allows.
+    """The speed that the sight allows.
 
     Attributes:
         speed: the highest [m/s]; infinite without a limit.
-        why: what limits it, for people.
-        thing: the same; None for none.
+        why: what limits it, in words.
+        thing: the thing that limits it; None for none.
     """
 
     speed: float
@@ -75,7 +75,7 @@ class Limit:
 
 
 class Sight:
-    """Keeps the newest scan, without what the map shows.
+    """Keeps the newest scan, without obstacles of the map.
 
     Attributes:
         things: what it shows, in the map frame.
@@ -89,7 +89,7 @@ class Sight:
         self._stamp_ns = 0
         self._fault: Trouble | None = None
         self._is_first = True
-        # Squares with something in them: since when, and when last [s].
+        # Occupied squares: when they were first and last seen [s].
         self._seen: dict[tuple[int, int], tuple[float, float]] = {}
 
     def take_map(self, payload: bytes, *, is_update: bool = False) -> None:
@@ -163,14 +163,14 @@ class Sight:
         return Limit(speed if speed >= LEAST_M_S else 0.0, f"{why} {far:.2f} m away", thing)
 
     def around(self, thing: Thing | None) -> tuple[Point, ...]:
-        """Return what was seen within ``AROUND_M`` of a thing, places [m], the nearest first."""
+        """Return the points seen within ``AROUND_M`` of a thing [m], the nearest first."""
         if thing is None:
             return ()
         apart = sorted((math.dist(thing[:2], other[:2]), other[:2]) for other in self.things)
         return tuple(place for far, place in apart if far <= AROUND_M)
 
     def _look(self, points: list[Point], pose: Pose2D, now: float) -> None:
-        """Keep what no map shows, and tell what stands from what may move."""
+        """Keep points that no map shows, and separate standing things from those that may move."""
         cos, sin = math.cos(pose.yaw), math.sin(pose.yaw)
         own = OWN_SHARE * self._settings.radius
         places: dict[tuple[int, int], list[Point]] = {}
@@ -181,7 +181,7 @@ class Sight:
             square = math.floor(there[0] / PLACE_M), math.floor(there[1] / PLACE_M)
             places.setdefault(square, []).append(there)
         known = {at: times for at, times in self._seen.items() if now - times[1] <= FORGET_S}
-        # What was there from the beginning is taken to stand.
+        # Things seen from the beginning on count as standing.
         begun = -math.inf if self._is_first else now
         self._is_first = False
         self.things = []
@@ -196,7 +196,7 @@ class Sight:
     def _since(
         known: Mapping[tuple[int, int], tuple[float, float]], square: tuple[int, int], now: float
     ) -> float:
-        """Return since when something was seen in a square, or in one beside it [s]."""
+        """Return when a thing was first seen in a square, or in one beside it [s]."""
         col, row = square
         around = ((col + right, row + up) for right in (-1, 0, 1) for up in (-1, 0, 1))
         return min((known[at][0] for at in around if at in known), default=now)

@@ -1,7 +1,7 @@
 """Standstill: how long something has kept the robot from driving, and the report of that.
 
-A robot that gets by, or another path that leads it away, ends it. What the daemon can do is
-to plan around what is ahead, or anew from where the robot is.
+It ends once the robot gets by, or another path leads it away. The daemon can plan around what is
+ahead, or anew from the robot's position.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from fasaco_edge.wire.limits import MAX_BLOCKED_POINTS, MAX_STRING_BYTES
 
 Reason = Literal["obstacle", "stuck", "elsewhere"]
 
-# What is reported, and after how long [s]. A base that does not move is let rest for 2, then 4 s.
+# Reported reasons, and after how long [s]. A base that does not move rests for 2, then 4 s.
 REASONS: Final[dict[State, tuple[Reason, float]]] = {
     State.OBSTACLE: ("obstacle", 5.0),
     State.NOT_MOVING: ("stuck", 3.0),
@@ -26,11 +26,11 @@ REASONS: Final[dict[State, tuple[Reason, float]]] = {
     State.PATH_ELSEWHERE: ("elsewhere", 2.0),
     State.OFF_PATH: ("elsewhere", 2.0),
 }
-# A robot that has moved so far [m], or had no reason for so long [s], is kept by nothing.
+# A standstill is over once the robot has moved this far [m], or had no reason for this long [s].
 MOVED_M, GONE_S = 0.1, 2.0
-# From one report to the next [s].
+# Period of the reports [s].
 EVERY_S = 1.0
-# Of a base that does not move the floor ahead is blocked: at these angles from where it is to go.
+# If a base does not move, the floor ahead is reported, at these angles to its direction.
 ANGLES_RAD = tuple(math.radians(angle) for angle in (0, -20, 20, -40, 40))
 
 
@@ -44,7 +44,7 @@ class Standstill:
         self._reported_at = -math.inf
 
     def look(self, follower: Supervision, now: float) -> float | None:
-        """Note the follower's state; return how long it has been kept [s] if that is to be said."""
+        """Note the follower's state; return how long it has been kept [s] if a report is due."""
         pose, state = follower.newest_pose, follower.state
         if state not in REASONS or pose is None:
             return None
@@ -66,7 +66,7 @@ def report_of(follower: Supervision, held_s: float, planner: str, revision: int)
     Args:
         follower: with its state, and what is ahead.
         held_s: for how long it is kept [s].
-        planner, revision: whose path it is, and which.
+        planner, revision: of the path.
     """
     pose = follower.newest_pose
     assert pose is not None

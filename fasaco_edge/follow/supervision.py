@@ -33,7 +33,7 @@ class State(enum.Enum):
     NO_SCAN = "no scan"
     BAD_SCAN = "scan refused"
     DOCK = "left to the docking server"
-    NOT_MOVING = "does not move as told"
+    NOT_MOVING = "does not move as commanded"
     NO_POSE = "no pose"
     OLD_POSE = "pose too old"
     BAD_POSE = "pose refused"
@@ -48,7 +48,7 @@ class State(enum.Enum):
     NO_NAV2 = "no answer from Nav2"
     REFUSED = "refused by Nav2"
     GIVEN_UP = "given up by Nav2"
-    CANCELED = "canceled by somebody else"
+    CANCELED = "canceled by another program"
 
 
 @dataclass(frozen=True, slots=True)
@@ -173,7 +173,7 @@ class Supervision:
         return self._has_path
 
     def heard_status(self, now: float) -> None:
-        """Note a heartbeat of the planner: a status, but for the first one, which may be cached."""
+        """Note a heartbeat of the planner: a status, except the first one, which may be cached."""
         self._statuses += 1
         if self._statuses > 1:
             self._status_at = now
@@ -214,7 +214,7 @@ class Supervision:
         if self._standby is not None:
             return self._standby
         if not self._planner:
-            return State.NO_DAEMON, "none plans for this robot"
+            return State.NO_DAEMON, "no daemon plans for this robot"
         if (silent_s := now - self._status_at) > self._patience.status_s:
             sent_any = silent_s < math.inf
             return State.SILENT_DAEMON, f"for {silent_s:.1f} s" if sent_any else "no status yet"
@@ -241,7 +241,7 @@ class Supervision:
     def _age(self, pose_at: float, now: float) -> str:
         """Return the age of pose or link as text if too old; else ""."""
         if (age_s := now - pose_at) > self._patience.pose_s:
-            why = ", and comes again and again by its stamp" if self._repeats else ""
+            why = ", and is repeated with the same stamp" if self._repeats else ""
             return f"{age_s:.2f} s{why}"
         if self._link and (age_s := now - self._link.came_at) > self._patience.link_s:
             transform = self._link.transform

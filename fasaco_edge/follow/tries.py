@@ -1,8 +1,7 @@
 """Failed tries, by place and by the direction in which the path leads; progress alone ends them.
 
-A new path in the same direction leads into the same obstacle: it changes nothing. One in
-another direction has tries of its own. After each try there is a pause, twice as long as the one
-before.
+A new path in the same direction leads into the same obstacle: it changes nothing. A path in another
+direction has tries of its own. After each try there is a pause, twice as long as the one before.
 """
 
 from __future__ import annotations

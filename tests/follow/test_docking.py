@@ -138,7 +138,7 @@ def test_what_was_done_already_is_done(robot):
             DockEnding(ABORTED, success=False, code=904, message="no markers"),
             "904 failed to detect",
         ),
-        (DockEnding(UNKNOWN, success=True), "started anew"),
+        (DockEnding(UNKNOWN, success=True), "restarted"),
         (None, ""),
     ],
 )

@@ -329,7 +329,7 @@ def test_a_pose_whose_stamp_stays_is_no_new_one(told):
         command = told.step()
     assert command in (STAND, None)
     assert told.follower.state is State.OLD_POSE
-    assert "by its stamp" in told.follower.detail
+    assert "with the same stamp" in told.follower.detail
     told.pose(stamp_ns=8)
     assert told.step().speed > 0.0
 

@@ -201,7 +201,7 @@ def test_a_goal_that_is_done_too_early_is_not_believed():
     drive.end(goal, SUCCEEDED)
     assert drive.step(0.2) == []
     assert drive.state is State.GIVEN_UP
-    assert "done, it says, 7.8 m before the end" in drive.follower.detail
+    assert "reported as done 7.8 m before the end" in drive.follower.detail
     (again,) = drive.step(0.2, after=RETRY_S)
     assert again.points[0][0] == pytest.approx(0.2)
 
