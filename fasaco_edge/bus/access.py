@@ -4,7 +4,7 @@ They are configuration of the session that listens (or of a router): Zenoh refus
 messages before they reach this program. A role is named after what the *other* side does, as
 listed in ``protocol/security.md``.
 
-* Whatever is not named is denied. ``**`` does not match a chunk that begins with ``@``, so
+* Everything that is not named is denied. ``**`` does not match a chunk that begins with ``@``, so
   every key is named, and also the key that Zenoh's advanced publishers and subscribers use to serve
   late joiners: ``<key>/@adv/**``.
 * A role that speaks on a key may publish, reply to queries and declare a liveliness token there;
@@ -140,10 +140,10 @@ class Limits(msgspec.Struct, frozen=True):
 
 
 def access_control(grants: Sequence[Grant], attribute: str) -> dict[str, Any]:
-    """Return Zenoh's ``access_control``: whatever is not granted is denied.
+    """Return Zenoh's ``access_control``: everything that is not granted is denied.
 
     Args:
-        grants: the roles granted. A grant without names is skipped: Zenoh reads it as everybody.
+        grants: the roles granted. A grant without names is skipped: Zenoh would grant it to all.
         attribute: kind of the names: "cert_common_names" or "usernames".
     """
     rules: dict[str, dict[str, Any]] = {}
@@ -239,7 +239,7 @@ def user_password(user: str, password: str, dictionary_file: str) -> dict[str, A
 
     Args:
         user, password: of this session.
-        dictionary_file: lines ``user:password`` of those that may connect to it; "" for nobody.
+        dictionary_file: lines ``user:password`` of those that may connect to it; "" for none.
     """
     login: dict[str, str] = {"user": user, "password": password}
     if dictionary_file:

@@ -19,9 +19,9 @@ class Sample:
         key: its key.
         schema: message type in its encoding; "" for none.
         size: of payload and attachment together [bytes].
-        sender: id of the session that published it, as far as the sample says; "" for unknown. It
-        may be the id of the first router on the way, or of this session, if the publisher's own
-        gives samples no timestamps.
+        sender: id of the session that published it, as stated in the sample; "" for unknown. If
+        that session sets no timestamps, it may be the id of the first router on the way, or of this
+        session.
     """
 
     __slots__ = ("_attachment", "_payload", "key", "schema", "sender", "size")

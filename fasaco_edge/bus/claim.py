@@ -16,7 +16,7 @@ from fasaco_edge.bus.session import Bus
 from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.topic_types import Topic
 
-# Time within which two that start together see each other's tokens [s].
+# Time within which two daemons started together see each other's tokens [s].
 SETTLE_S = 0.2
 # Period of token queries while one daemon plans [s]; otherwise every cycle.
 ASK_PERIOD_S = 1.0
@@ -26,7 +26,7 @@ REJOIN_S = 3.0
 # be a quarter of that older than the beginning of a pause.
 LEASE_S = 10.0
 PAUSE_S = 0.75 * LEASE_S
-# Longest wait for one that could plan and does not [s]: its lease and a margin.
+# Longest wait for a daemon that could plan but does not [s]: its lease and a margin.
 PATIENCE_S = 15.0
 
 ID = re.compile(r"[0-9a-f]{1,32}")
@@ -35,7 +35,7 @@ ID = re.compile(r"[0-9a-f]{1,32}")
 class ClaimState(StrEnum):
     """State of a daemon's claim; all but the first are chunks of tokens.
 
-    A daemon that ``yields`` waits now and planned before: it published an empty path to stop the
+    A daemon that ``yields`` planned before and waits now: it published an empty path to stop the
     robot.
     """
 
@@ -57,7 +57,7 @@ class Claim:
     """The decision which daemon of a name plans: a pure function of observations and times.
 
     Attributes:
-        rejoin_s: how long an active one is uncertain after it was out of touch [s].
+        rejoin_s: how long an active daemon stays uncertain after it lost touch with the others [s].
         state: of this daemon.
         rival: id of the daemon it waits for, or last waited for; "" for none.
         rival_yielded: whether this one plans, and another active one has just yielded.
@@ -78,9 +78,9 @@ class Claim:
         self._decided_at: float | None = None
 
     def is_uncertain(self, now: float) -> bool:
-        """Return whether another may plan unseen by now: publish nothing until that is known.
+        """Return whether another daemon may be planning unseen: then publish nothing.
 
-        This is so after a pause in which the others may have taken this daemon for dead.
+        This is so after a pause in which the others may have considered this daemon dead.
         """
         return self.state is ClaimState.PLANS and now < self._uncertain_until
 
@@ -197,7 +197,7 @@ def claims_in(keys: Iterable[str], active: str = "plans") -> dict[str, ClaimStat
         _, own, state = key.rsplit("/", 2)
         state = ClaimState.PLANS if state == active else state
         if ID.fullmatch(own) and state in _SHOWN:
-            # One that changes its state has two tokens for a moment: PLANS comes first.
+            # A daemon that changes its state has two tokens for a moment: PLANS comes first.
             before = claims.get(own, ClaimState.WAITS)
             claims[own] = max(ClaimState(state), before, key=_SHOWN.index)
     return claims

@@ -11,12 +11,12 @@ from fasaco_edge.errors import BusUnavailable
 
 log = logging.getLogger(__name__)
 
-# Retry period while nobody listens at the endpoint [s].
+# Retry period while nothing listens at the endpoint [s].
 RETRY_S = 1.0
 
 
 def join(settings: BusSettings, stop: threading.Event) -> Bus | None:
-    """Open a session once somebody listens there; None if ``stop`` is set before."""
+    """Open a session once a program listens there; None if ``stop`` is set before."""
     told = False
     while not stop.is_set():
         try:

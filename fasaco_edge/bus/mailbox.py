@@ -1,7 +1,7 @@
 """Mailbox and slot between Zenoh's threads and a loop: a post costs O(1) and never blocks.
 
-A newer item replaces the older one of its kind. Kinds of which each item counts are queued in
-order: a map update changes the map before it, each pose adds to the swept floor.
+A newer item replaces the older one of its kind. Kinds whose items all count are queued in order: a
+map update changes the map before it, each pose adds to the swept floor.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
-"""Rule of one publisher: of several that publish an input, the one heard first counts.
+"""Rule of one publisher: of several publishers of an input, the first one received counts.
 
-Another counts once the first has been silent for a stated time (``Topic.one_publisher_s``), or its
-session has ended. So a map, pose or mask does not change to and fro with whoever spoke last, and a
-program that is restarted is heard again.
+Another one takes over once the first has been silent for a stated time (``Topic.one_publisher_s``),
+or its session has ended. So a map, pose or mask does not alternate between publishers, and a
+restarted program is accepted again.
 
 A publisher is known by the Zenoh id of its session, see ``arrival.Sample.sender``. A sample of
 unknown origin always counts.
@@ -17,7 +17,7 @@ SHOWN_S = 10.0
 
 
 class Sessions(Protocol):
-    """What the bus knows of other sessions, by their Zenoh ids."""
+    """The bus's view of other sessions, by their Zenoh ids."""
 
     def is_linked(self, session: str) -> bool:
         """Return whether it is connected to this one directly."""
@@ -40,9 +40,10 @@ class OnePublisher:
 
     def __init__(self, name: str, silent_s: float, sessions: Sessions) -> None:
         self._name, self._silent_s, self._sessions = name, silent_s, sessions
-        # The one that counts, when it was heard [s], and whether it was linked directly.
+        # The publisher that counts, the time of its last sample [s], and whether it was linked
+        # directly.
         self._first, self._heard_at, self._was_linked = "", float("-inf"), False
-        # Another that was refused last, when, and whether its newest sample is still missing.
+        # The publisher refused last, when, and whether its newest sample is still missing.
         self._other, self._refused_at, self._misses = "", float("-inf"), False
 
     def takes(self, sender: str, now: float) -> bool:
@@ -63,9 +64,9 @@ class OnePublisher:
         return True
 
     def takes_over(self, now: float) -> bool:
-        """Tell once that a refused publisher counts from now on: its newest sample is missing.
+        """Return True once when a refused publisher takes over: its newest sample is missing.
 
-        A publisher that is silent and still linked is not over before another one publishes.
+        A silent publisher that is still linked keeps its role until another one publishes.
         """
         if not self._misses or not self._is_over(now):
             return False
@@ -80,7 +81,7 @@ class OnePublisher:
         return bool(sender) and sender == self._other
 
     def conflict(self, now: float) -> str:
-        """Return that there are two; "" if there are not."""
+        """Return the conflict of two publishers in words; "" for none."""
         if not self._other or now - self._refused_at > max(self._silent_s, SHOWN_S):
             return ""
         return (

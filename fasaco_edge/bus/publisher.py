@@ -40,7 +40,7 @@ class Publisher:
             "priority": getattr(zenoh.Priority, qos.priority.upper()),
             "express": qos.express,
         }
-        # An advanced publisher cannot tell whether it has subscribers; a plain one on its key can.
+        # An advanced publisher does not know of its subscribers; a plain one on its key does.
         self._plain = session.declare_publisher(key, **options)
         self._latched = partial(_latched, session, key, options, qos.cache) if qos.latched else None
         self._publisher: Any = self._latched() if self._latched else self._plain

@@ -41,7 +41,7 @@ from fasaco_edge.wire.topics import IN_ORDER
 LOG = logging.getLogger(__name__)
 
 # A port without a listener for this long [s] is taken over: a process that only restarts gets its
-# port back. And the time until the next try, where another process was first [s].
+# port back. Retry period where another process was first [s].
 ABSENT_S, RETRY_S = 2.0, 1.0
 
 # Timeout for closing a session [s]: if a peer no longer reads, Zenoh tries for ten seconds to flush
@@ -186,7 +186,7 @@ class Bus:
         self._served.append(_Served(key, receive, complete, declared))
 
     def let_others_answer(self, yes: bool) -> None:
-        """Reply only to queries for all while another session serves the same keys; or to any."""
+        """If ``yes``, reply only to queries that go to all queryables; otherwise to any."""
         for served in self._served:
             if served.complete:
                 served.declared.undeclare()
@@ -249,7 +249,7 @@ class Bus:
     def only_passes_on(self, session: str) -> bool:
         """Return whether an id is this session's or that of a router it is connected to.
 
-        They put theirs on samples without a timestamp: who published those is unknown.
+        Both put their ids on samples without a timestamp, whose publisher is unknown.
         """
         return session == self.id or session in map(str, self._session.info.routers_zid())
 
@@ -329,11 +329,11 @@ def open_bus(settings: BusSettings) -> Bus:
 
 
 class StandIn:
-    """Listener in place of a process that was joined and is gone.
+    """Listener that replaces a process that this session had joined and that is gone.
 
     A session that finds its port taken connects as a client to the process that holds it. Once that
-    process is gone, nobody could reach this one: so it listens there itself, with a second session
-    that the first one finds.
+    process is gone, no other session could reach this one: so it listens there itself, with a
+    second session that the first one finds.
 
     Args:
         config: of a session that listens there.
@@ -354,7 +354,7 @@ class StandIn:
             self._try_at = now + RETRY_S
             with contextlib.suppress(zenoh.ZError):  # another process listens there by now
                 self._session = zenoh.open(self._config)
-                LOG.info("who listened here is gone: this process listens instead")
+                LOG.info("the listener here is gone: this process listens instead")
 
     def close(self) -> None:
         """End the session."""

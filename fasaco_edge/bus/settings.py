@@ -24,9 +24,9 @@ if TYPE_CHECKING:
 
 # Timeout of the handshake of an incoming connection [ms], and how many may be pending.
 ACCEPT_TIMEOUT_MS, ACCEPT_PENDING = 3000, 1000
-# A map or a path is many packets of 64 kB. By default two of them fill the queue: a computer that
-# is busy for 50 ms drops the map, and the last of the cohorts that come at once. These queues take
-# a megabyte, only while it is needed.
+# A map or a path is many packets of 64 kB. By default two packets fill the queue: a computer that
+# is busy for 50 ms drops the map, and the last of several cohorts sent at once. These queues take a
+# megabyte, only while needed.
 QUEUED_BATCHES = dict.fromkeys(
     ("interactive_high", "data_high", "data", "data_low", "background"), 16
 )
@@ -55,7 +55,7 @@ def check_settings(settings: BusSettings) -> None:
     """Check the configuration of a session without opening it.
 
     Raises:
-        BusUnavailable: Zenoh does not take it.
+        BusUnavailable: Zenoh rejects it.
     """
     # Not needed by a process that only reads a configuration.
     import zenoh  # noqa: PLC0415

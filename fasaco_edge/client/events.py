@@ -25,7 +25,7 @@ class Event:
 
 
 class EventLog:
-    """The newest entries, and the number of all so far."""
+    """The newest entries, and the number of all entries."""
 
     def __init__(self) -> None:
         self.entries: deque[Event] = deque(maxlen=KEPT)

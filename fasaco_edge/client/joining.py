@@ -45,7 +45,7 @@ class Joining(ABC):
 
     @abstractmethod
     def _listen(self, bus: Bus) -> None:
-        """Subscribe to what is to be heard; on the thread that joined, with the lock held."""
+        """Declare the subscriptions; on the thread that joined, with the lock held."""
 
     def _join(self) -> None:
         while not self._ended.is_set():

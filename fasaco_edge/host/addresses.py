@@ -24,13 +24,13 @@ class Address(NamedTuple):
 
     @property
     def shown(self) -> str:
-        """The address as a URL has it."""
+        """The address as in a URL."""
         host = f"[{self.host}]" if ":" in self.host else self.host
         return f"{host}:{self.port}"
 
 
 def read_address(name: str, text: str, example: int) -> Address:
-    """Return the address that ``text``, the value of ``name``, says.
+    """Return the address in ``text``, the value of ``name``.
 
     Args:
         name: of the key or option.

@@ -14,8 +14,8 @@ def write_through(path: Path, payload: bytes, *, mode: int = 0o644) -> None:
 
     Args:
         path: the file.
-        payload: what is to be in it.
-        mode: who may read and write a file that is new, less what the umask takes away.
+        payload: its content.
+        mode: permissions of a new file, restricted by the umask.
 
     Raises:
         OSError: that failed.
@@ -31,7 +31,7 @@ def make_folder(folder: Path, *, mode: int = 0o777) -> None:
 
     Args:
         folder: its path.
-        mode: who may enter and write those that are new, less what the umask takes away.
+        mode: permissions of new folders, restricted by the umask.
 
     Raises:
         OSError: that failed.
@@ -44,7 +44,7 @@ def make_folder(folder: Path, *, mode: int = 0o777) -> None:
 
 
 def sync_folder(folder: Path) -> None:
-    """Have the names in a folder written to the disk.
+    """Write the names in a folder to the disk.
 
     Raises:
         OSError: that failed.
@@ -53,7 +53,7 @@ def sync_folder(folder: Path) -> None:
     try:
         os.fsync(descriptor)
     except OSError as error:
-        # Some network disks know no such thing.
+        # Some network disks do not support that.
         if error.errno not in (errno.EINVAL, errno.ENOTSUP):
             raise
     finally:

@@ -20,10 +20,10 @@ from typing import BinaryIO
 
 
 def open_own(path: str | Path, flags: int, mode: int = 0o644) -> int:
-    """Open a file to write it, made where it was not there; return its descriptor.
+    """Open a file for writing, created if it is missing; return its descriptor.
 
-    A link is not followed, and a plain file of another user is not taken: in a folder that others
-    may write to, either may be a trap.
+    A link is not followed, and a plain file of another user is refused: in a folder that others may
+    write to, either may be a trap.
 
     Raises:
         OSError: that failed, or the file is not ours.
@@ -44,7 +44,7 @@ def open_own(path: str | Path, flags: int, mode: int = 0o644) -> int:
 
 
 class FileTooLongError(OSError):
-    """A file is longer than what reads it allows; the text says how long both are."""
+    """A file is longer than its reader allows; the text gives both sizes."""
 
     def __init__(self, path: str | Path, size: int, most: int) -> None:
         super().__init__(errno.EFBIG, f"{size} bytes, at most {most} are read", str(path))
@@ -66,8 +66,8 @@ def read_own(path: str | Path, most: int) -> bytes:
 
 
 def _open_plain(path: str | Path, check: Callable[[os.stat_result], None]) -> BinaryIO:
-    """Open a plain file to read it, no link; ``check`` looks at what was opened."""
-    # To open anything but a plain file may wait, or have an effect.
+    """Open a plain file, not a link, for reading; ``check`` inspects the opened file."""
+    # Opening anything but a plain file may block, or have an effect.
     descriptor = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC)
     try:
         status = os.fstat(descriptor)
@@ -81,12 +81,12 @@ def _open_plain(path: str | Path, check: Callable[[os.stat_result], None]) -> Bi
 
 
 def check_plain(path: str | Path) -> None:
-    """Check that a file which somebody names to be read is a plain one, or a link to one.
+    """Check that a file named by a user is a plain file, or a link to one.
 
-    To open a pipe waits until somebody writes to it, and a device may never end.
+    Opening a pipe waits until it has a writer, and a device may never end.
 
     Raises:
-        OSError: it is none, or is not there.
+        OSError: it is no such file, or is missing.
     """
     mode = os.stat(path).st_mode
     if stat.S_ISDIR(mode):
@@ -121,12 +121,12 @@ class UntrustedFileError(Exception):
 
 
 def why_not_trusted(folder: Path, user: int | None = None) -> str:
-    """Return why others could change the content of ``folder``; "" if nobody else could.
+    """Return why others could change the content of ``folder``; "" if they could not.
 
     Args:
-        folder: an absolute path. Of one that is not there, what there is of it is looked at: ""
-            if one that is made now is trusted.
-        user: whose the folder may be, beside root; without it this process's.
+        folder: an absolute path. If it is missing, its existing parents are checked: "" if a folder
+            made now would be trusted.
+        user: the user who may own the folder, beside root; by default this process's.
     """
     try:
         _walk(folder, _trusted(user))
@@ -159,12 +159,12 @@ def _trusted(user: int | None) -> frozenset[int]:
 
 
 def _walk(folder: Path, trusted: frozenset[int]) -> None:
-    """Go from the root to ``folder``, and look at each step."""
+    """Go from the root to ``folder``, and check each step."""
     place, links = Path("/"), 0
     ahead = list(reversed(folder.parts[1:]))
     status = os.lstat(place)
     while True:
-        # In a sticky folder nobody takes from us what is ours, and that is looked at next.
+        # In a sticky folder others cannot replace our entries; the next step checks the owner.
         sticky = ahead and status.st_mode & stat.S_ISVTX
         _look_at(place, status, trusted, may_write=bool(sticky))
         if not ahead:

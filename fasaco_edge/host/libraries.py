@@ -1,8 +1,8 @@
 """Shared libraries in memory: the pages of their files that a process does not need at present.
 
-Loading a library maps pages of it that nothing reads again: what is relocated, what runs once. The
-compiler's alone are 70 MB of a daemon with kernels. They belong to the system's cache of files,
-which takes back first what no process has mapped; one that is read again is mapped again, in
+Loading a library maps pages that are never read again: relocations, and code that runs once. The
+compiler's pages alone are 70 MB of a daemon with kernels. They belong to the system's page cache,
+which first reclaims pages that no process has mapped. A page that is read again is mapped again, in
 microseconds while it is in that cache.
 """
 
@@ -64,13 +64,13 @@ class _Entry(ctypes.Structure):
 
 
 def unmap_unread() -> None:
-    """Let go of all pages of libraries that are never written to, where the C library can.
+    """Release all pages of libraries that are never written to, if the C library can.
 
-    Such pages are as in their file, so they can be mapped anew; those of segments that may be
-    written, as by the loader alone before it makes them read-only, are kept.
+    Such pages equal their file, so they can be mapped again. Pages of writable segments are kept,
+    also of those that only the loader writes, before it makes them read-only.
 
-    The loader would tell its libraries, too, but holding its lock while it does (dl_iterate_phdr):
-    a thread that imports meanwhile waits for that lock with the interpreter's, for ever.
+    The loader could list its libraries, too, but holds its lock meanwhile (dl_iterate_phdr): a
+    thread that imports at that time waits for that lock while it holds the interpreter's, for ever.
     """
     c_library = ctypes.CDLL(None)
     madvise = getattr(c_library, "madvise", None)
@@ -84,7 +84,7 @@ def unmap_unread() -> None:
 
 
 def _mapped_programs() -> Iterator[tuple[str, int]]:
-    """Yield name and first address of each file of which something can be executed."""
+    """Yield name and first address of each mapped file with executable pages."""
     try:
         maps = Path("/proc/self/maps").read_text(encoding="utf-8", errors="surrogateescape")
     except OSError:
@@ -98,7 +98,7 @@ def _mapped_programs() -> Iterator[tuple[str, int]]:
 
 
 def _keep_loaded(c_library: ctypes.CDLL, name: str) -> int | None:
-    """Return where a library is, which is not unloaded any more; None where it is none."""
+    """Keep a library loaded, and return its address; None if the file is no library."""
     try:
         handle = ctypes.CDLL(name, mode=os.RTLD_NOLOAD)._handle
     except (OSError, ValueError):
@@ -110,7 +110,7 @@ def _keep_loaded(c_library: ctypes.CDLL, name: str) -> int | None:
 
 
 def _unwritten(start: int) -> Iterator[tuple[int, int]]:
-    """Yield first and last address of whole pages that nothing has written to, nor may.
+    """Yield first and last address of whole pages that were never, and cannot be, written to.
 
     Args:
         start: where a library is, its header first.
@@ -132,7 +132,7 @@ def _unwritten(start: int) -> Iterator[tuple[int, int]]:
 
 
 def _relocates_text(start: int, segment: _Segment) -> bool:
-    """Return whether this says that the loader writes into what is read-only afterwards."""
+    """Return whether the loader writes to pages that it makes read-only afterwards."""
     if segment.kind != _DYNAMIC:
         return False
     table = ctypes.cast(start + segment.address, ctypes.POINTER(_Entry))

@@ -11,13 +11,13 @@ from pathlib import Path
 
 @contextmanager
 def whole(file: Path) -> Iterator[Path]:
-    """Yield the name by which ``file`` is to be written; it is there once the block has ended well.
+    """Yield a name to write to; once the block has succeeded, that file replaces ``file``.
 
-    Where that fails, as on a full disk, what was there before stays as it was. A link is followed;
-    a device or a pipe is written to as it is, and so is a file in a folder that is not.
+    If it fails, as on a full disk, the previous file stays unchanged. A link is followed; a device
+    or a pipe is written to directly, and so is a file in a read-only folder.
 
     Raises:
-        OSError: it cannot be put in its place.
+        OSError: the file cannot be written or replaced.
     """
     target = Path(os.path.realpath(file))
     try:
@@ -27,7 +27,8 @@ def whole(file: Path) -> Iterator[Path]:
     if mode is not None and not (stat.S_ISREG(mode) and os.access(target.parent, os.W_OK)):
         yield file
         return
-    # Nobody else can have put something there; by the ending some formats are told.
+    # No other user can have made this file; the suffix is kept: some writers choose the format by
+    # it.
     new = target.with_name(f".{os.urandom(8).hex()}{target.suffix}")
     try:
         yield new
@@ -36,7 +37,7 @@ def whole(file: Path) -> Iterator[Path]:
         new.replace(target)
     except OSError as error:
         if error.filename == os.fspath(new):
-            error.filename = os.fspath(file)  # what was asked for
+            error.filename = os.fspath(file)  # the requested name
         raise
     finally:
         new.unlink(missing_ok=True)

@@ -18,7 +18,7 @@ MOST_VALUES = 50_000
 MOST_DEPTH = 32
 # Most digits of an integer: Python refuses to show those of 4300 digits.
 MOST_DIGITS = 100
-# So long a pipe may take [s]: a daemon that reads its configuration again does nothing meanwhile.
+# Timeout of a pipe [s]: a daemon that reloads its configuration does nothing meanwhile.
 PIPE_S = 5.0
 
 
@@ -34,13 +34,13 @@ def read_bounded(path: Path) -> str:
         PlainYamlError: it is longer than ``MOST_BYTES``, or no UTF-8.
     """
     content = b""
-    # To open a pipe that nobody writes to would wait for ever, as would to read one.
+    # Opening or reading a pipe without a writer would block for ever.
     descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
     try:
         until = time.monotonic() + PIPE_S
         while len(content) <= MOST_BYTES:
             if not select.select([descriptor], [], [], max(until - time.monotonic(), 0.0))[0]:
-                raise PlainYamlError(f"nobody wrote its end into the pipe within {PIPE_S:g} s")
+                raise PlainYamlError(f"the pipe was not closed within {PIPE_S:g} s")
             piece = os.read(descriptor, MOST_BYTES + 1 - len(content))
             if not piece:
                 break

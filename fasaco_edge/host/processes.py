@@ -26,7 +26,7 @@ def python_program(module: str, *words: str) -> list[str]:
     """Return the command line that runs a module with this interpreter.
 
     ``-m`` alone would search the working folder first, which others may write to. An isolated
-    interpreter starts an isolated one: neither environment nor home say what is imported.
+    interpreter starts an isolated one: environment and home do not affect its imports.
     """
     shut = "-I" if sys.flags.isolated else "-P"
     return [sys.executable, shut, "-m", module, *words]
@@ -53,14 +53,14 @@ def own_mb(pid: int | str = "self") -> float:
 
 
 def peak_mb(pid: int) -> float:
-    """Return the most it was ever resident with [MB]."""
+    """Return its peak resident memory [MB]."""
     return _field_mb(pid, "VmHWM")
 
 
 def memory_limit(root: Path = Path("/")) -> int | None:
-    """Return the limit that control groups set this process [bytes]; None for none, or no telling.
+    """Return this process's memory limit by control groups [bytes]; None for none or unknown.
 
-    That of the group itself and of those above it, as far as they can be seen from inside.
+    It is the lowest limit of its group and the groups above, as far as visible from inside.
     """
     try:
         groups = (root / "proc/self/cgroup").read_text(encoding="utf-8").splitlines()
@@ -151,8 +151,8 @@ def _own_status() -> int:
 def release_unused() -> None:
     """Return unused memory of the startup, or of loading kernels, to the system.
 
-    That is memory which was freed, in the arena of the thread that loaded them, where the C library
-    can (glibc), and pages of libraries (``fasaco_edge.host.libraries``).
+    This returns freed memory of the calling thread's arena, if the C library can (glibc), and pages
+    of libraries (``fasaco_edge.host.libraries``).
     """
     trim = getattr(ctypes.CDLL(None), "malloc_trim", None)
     if trim is not None:
@@ -163,8 +163,8 @@ def release_unused() -> None:
 def return_soon() -> None:
     """Let freed memory return to the system soon, if the C library can (glibc).
 
-    It learns from large blocks to keep them, in an arena for each thread: a recorder of large
-    maps was 15 MB larger by that. Call it before there are threads.
+    By default glibc keeps freed large blocks, in an arena for each thread: a recorder of large maps
+    took 15 MB more. Call this before there are threads.
     """
     mallopt = getattr(ctypes.CDLL(None), "mallopt", None)
     if mallopt is not None:
@@ -176,10 +176,10 @@ PARENT_PERIOD_S = 0.5
 
 
 def call_on(*numbers: int, call: Callable[[], None]) -> Callable[[], None]:
-    """Call ``call`` on each of these signals; return what restores the handlers before.
+    """Call ``call`` on each of these signals; return a function that restores the old handlers.
 
-    It is called on a thread of its own: a handler runs in between any two instructions of the main
-    thread, which may hold the lock that ``call`` needs, as that of an event it waits for.
+    It is called on a thread of its own: a handler runs between any two instructions of the main
+    thread, which may hold a lock that ``call`` needs, such as that of the event it waits for.
     Only the main thread may handle signals: in any other this changes nothing.
     """
     return _handle(numbers, lambda: _call_apart(call))
@@ -251,7 +251,7 @@ def first_signal_calls(number: int, call: Callable[[], None]) -> Iterator[None]:
 def ctrl_c_waits() -> Iterator[None]:
     """Raise a KeyboardInterrupt that comes during the block only after it.
 
-    In a function that C calls back it would be lost, and with it what the function returns.
+    In a callback from C the interrupt would be lost, and the callback's result with it.
     """
     if signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
         yield

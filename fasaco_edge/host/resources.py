@@ -19,8 +19,8 @@ def folder(name: str, package: Path = PACKAGE) -> Path:
     Raises:
         FileNotFoundError: this installation has no such folder.
     """
-    # Beside an installed package lie other packages: a site-packages/maps would be
-    # somebody else's. Only a checkout has the project file there.
+    # Beside an installed package lie other packages: a site-packages/maps would belong to another
+    # package. Only a checkout has the project file there.
     is_checkout = (package.parent / "pyproject.toml").is_file()
     beside, inside = package.parent / name, package / "_share" / name
     for found in [beside, inside] if is_checkout else [inside]:

@@ -78,7 +78,7 @@ def test_a_pipe_is_read_to_its_end_and_not_waited_for_for_ever(tmp_path, monkeyp
     assert read_bounded(pipe) == "a: 1"
     writer.join()
     monkeypatch.setattr(plain_yaml, "PIPE_S", 0.1)
-    with pytest.raises(PlainYamlError, match=r"nobody wrote its end into the pipe within 0\.1 s"):
+    with pytest.raises(PlainYamlError, match=r"the pipe was not closed within 0\.1 s"):
         read_bounded(pipe)
 
 
