@@ -110,7 +110,7 @@ class UntakenSamples:
     def __init__(self, taken: frozenset[tuple[str, int]]) -> None:
         self._taken = taken
         self._samples: dict[tuple[str, int], Arrival] = {}
-        # Those that no cycle took as they are.
+        # Samples that no cycle took in this form.
         self._strange: dict[str, deque[Sample]] = defaultdict(lambda: deque(maxlen=STRANGE))
 
     def add(self, arrival: Arrival) -> None:
@@ -128,9 +128,9 @@ class UntakenSamples:
             del self._samples[oldest]
 
     def find(self, taken: TakenSample) -> tuple[Sample | None, bool]:
-        """Return the sample, and whether it is the one.
+        """Return the sample, and whether it is the recorded one.
 
-        In place of one that is not there comes one that nobody took.
+        If it is missing, a sample that no cycle took is returned instead.
         """
         arrival = self._samples.get((taken.topic, taken.checksum))
         if arrival is not None:
@@ -176,17 +176,17 @@ class Difference:
 
 
 class CycleReplay:
-    """Plays the cycles of a recording to a mission.
+    """Feeds the cycles of a recording to a mission.
 
     Args:
         config: of the recorded daemon.
-        record: what its turn log holds.
+        record: the content of its turn log.
 
     Attributes:
         mission: the mission, to be looked at between steps.
         turns: how many cycles were played and ended as recorded.
         plans: how many plans were made, those in spare time among them.
-        difference: the first decision that is another one; None as long as there is none.
+        difference: the first decision that differs; None without one.
         kernels: name of the compiled kernels in use.
         lacking: samples that are not in the recording, or not as the daemon took them.
     """
@@ -210,7 +210,7 @@ class CycleReplay:
 
     def steps(self, samples: Iterable[Arrival]) -> Iterator[ReplayStep]:
         """Yield each cycle, up to the first that differs from the recording."""
-        # A batch is played when the next has come: its samples are all there by then.
+        # A batch is played when the next one has come: by then all its samples are there.
         batch: TurnBatch | None = None
         for arrival in samples:
             if arrival.topic in EMBEDDED and len(arrival.sample.payload) <= POSE_BYTES:
@@ -256,7 +256,7 @@ class CycleReplay:
         return replace(step, as_recorded=_facts(turn.decided)["path"] == _facts(decided)["path"])
 
     def _received(self, turn: Cycle) -> list[Received]:
-        """Return the samples that the daemon took, as far as they were recorded."""
+        """Return the recorded ones of the samples that the daemon took."""
         found = [(taken, self._find(turn, taken)) for taken in turn.samples]
         return [
             Received(taken.topic, sample, taken.at) for taken, sample in found if sample is not None

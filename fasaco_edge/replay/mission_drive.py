@@ -30,11 +30,11 @@ class ReplayStep:
     Attributes:
         at_s: when, since the first one [s].
         state, reason: of the mission after it; "loading" before there is one.
-        changed: whether the state is another than before.
+        changed: whether the state has changed.
         decision: what was decided.
-        refused: samples in it that were not what they should be.
-        as_recorded: of a path, whether it leads over the very points of the one recorded
-            under its revision; None where none was.
+        refused: errors of its malformed samples.
+        as_recorded: whether its path has exactly the points of the recorded path of the same
+            revision; None if there is no such path.
     """
 
     at_s: float

@@ -1,7 +1,7 @@
 """Replay by time: the samples of a recording through the daemon's inbox and mission.
 
 Time is that of the samples, and planning is counted in work, so that the same samples give the
-same decisions, bit for bit, on any machine. A recording without a turn log does not tell in which
+same decisions, bit for bit, on any machine. A recording without a turn log does not show in which
 cycle the daemon took a sample, nor how much work each plan had time for. So each sample gets its
 own cycle, with cycles of the daemon's clock in between; a plan whose path was recorded gets the
 same work, and arrives at the same time. For an ordinary mission, the decisions are those of the
@@ -63,7 +63,7 @@ class RecordedPath:
         at_ns: when it came to the recorder, see ``Arrival`` [ns].
         revision, reason: from its attachment.
         digest: of its points.
-        work: what was done for the plan; None where no plan was needed.
+        work: search work of the plan; None if no plan was needed.
     """
 
     at_ns: int
@@ -78,12 +78,14 @@ class RecordedRun:
     """The recorded run of a daemon, as far as known.
 
     Attributes:
-        config: its configuration, as its first status gave it.
+        config: its configuration, from its first status.
         version: its release.
-        ready_ns: when its mission had begun, with a map, see ``Arrival``; None if no status tells.
-        restored_cells: covered cells that it took over from before; a recording has them not.
+        ready_ns: when its mission had begun, with a map, see ``Arrival``; None if no status shows
+            that.
+        restored_cells: number of covered cells that it took over from an earlier run; the recording
+            does not have them.
         starts: how often a daemon was started after the first.
-        paths: what it published, by revision; of a second daemon, not.
+        paths: its published paths by revision, without those of a second daemon.
     """
 
     config: Settings = field(default_factory=dict)
@@ -106,7 +108,8 @@ class RecordedRun:
         Raises:
             BadConfiguration: it is of a release whose settings this one does not know.
         """
-        # Before there were lines, cells were driven, and before they turned, along the axes.
+        # Releases without lines drove through cells; those without lattice rotation, along the
+        # axes.
         config = without_removed(self.config)
         planner = config.get("planner", {})
         if isinstance(planner, Mapping):
@@ -121,7 +124,7 @@ class RecordedRun:
 
 
 def read_run(samples: Iterable[Arrival]) -> RecordedRun:
-    """Return what samples, in order, tell of the daemon that ran meanwhile."""
+    """Return the daemon's run, from samples in order."""
     statuses: list[tuple[Arrival, Status]] = []
     paths: dict[int, RecordedPath] = {}
     for arrival in samples:
@@ -166,7 +169,7 @@ class Replay:
     Args:
         config: of the daemon to be.
         run: what is known of the recorded daemon.
-        work: proposals of each plan; None for what was recorded.
+        work: proposals of each plan; None for the recorded work.
 
     Attributes:
         mission: the mission, to be looked at between steps.
@@ -185,9 +188,8 @@ class Replay:
         self._base_ns = 0
 
     def steps(self, samples: Iterable[Arrival]) -> Iterator[ReplayStep]:
-        """Yield each cycle; of samples that are no input of the mission only the time counts.
-
-        Where a daemon loads slowly, its mission begins, and its path comes, after its last input.
+        """Yield each cycle; samples that are no input of the mission only advance the time. If a
+        daemon loads slowly, its mission begins, and its path comes, after its last input.
         """
         together: list[Arrival] = []
         last = 0.0
@@ -261,7 +263,7 @@ class Replay:
                 refused.append(error)
                 continue
             self._commands += 1
-            # It was taken, so nothing was forgotten that should not be.
+            # The daemon accepted it, so it was allowed to forget what was covered.
             commands.append(CommandReceived(self._commands, *asked._replace(discard=True)))
         return commands, refused
 
@@ -281,10 +283,10 @@ class ReplayPlanner:
         planner: the daemon's.
         run: what was recorded.
         budget_s: the time its plans had [s].
-        work: proposals of each plan; None for what was recorded.
+        work: proposals of each plan; None for the recorded work.
 
     Attributes:
-        due: when the plan under way will be there [s]; None where there is none.
+        due: when the plan under way is finished [s]; None without one.
     """
 
     def __init__(
@@ -307,14 +309,14 @@ class ReplayPlanner:
         self.due, self._ready = due, PlanReady(request.number, path, due - now)
 
     def take(self, now: float) -> list[PlanReady]:
-        """Return the plan that is there by ``now``, if any."""
+        """Return the plan that is finished by ``now``, if any."""
         if self._ready is None or self.due is None or self.due > now:
             return []
         ready, self.due, self._ready = self._ready, None, None
         return [ready]
 
     def _recorded(self, request: PlanRequest, revision: int, now: float) -> RecordedPath | None:
-        """Return the recorded path that comes of the same request, as far as one can tell."""
+        """Return the recorded path of probably the same request, by its number, reason and time."""
         path = self._run.paths.get(revision)
         reason = BETTER if request.reason == SPARE else request.reason
         if path is None or path.work is None or path.reason != reason:
@@ -326,6 +328,6 @@ class ReplayPlanner:
         if self._work is not None or recorded is None or recorded.work is None:
             proposals = PROPOSALS if self._work is None else self._work
             return AnyOf(WorkLimit(SearchWork(proposals=proposals)))
-        # On another ground the same counts may never be met.
+        # On another ground the same counts of work may never be reached.
         most = SearchWork(proposals=2 * recorded.work.proposals + PROPOSALS)
         return AnyOf(WorkLimit(recorded.work), WorkLimit(most))

@@ -12,8 +12,8 @@ from fasaco_edge.grid.occupancy import UNKNOWN, OccupancyGrid
 from fasaco_edge.kernels.lattice.raycast import Scanner, cast_rays, disc_is_free, reveal_disc
 from fasaco_edge.simulation.robot import Point, SimulationConfig
 
-# Whether the hull has room on a straight way is looked at as often [m]: between two places a corner
-# may come less than a millimetre into it.
+# Spacing of the checks whether the hull has room on a straight way [m]: between two places a corner
+# may reach less than a millimetre into it.
 SPACING_M = 0.025
 
 
@@ -56,15 +56,15 @@ class Mapper:
         self._angles = np.arange(rays) * (2.0 * math.pi / rays)
 
     def believed(self, pose: Pose2D) -> Pose2D:
-        """Return the pose that it has of a robot at ``pose``: this one."""
+        """Return the estimated pose of a robot at ``pose``: the same."""
         return pose
 
     def true_place(self, x: float, y: float) -> Point:
-        """Return where a place of its map is in truth [m]: there."""
+        """Return the true position of a place on its map [m]: the same."""
         return x, y
 
     def scan(self, pose: Pose2D) -> Window | None:
-        """Take in a scan from ``pose``, and that the ground under the robot is as it is.
+        """Add a scan from ``pose``, and the ground under the robot, to the map.
 
         Returns:
             the window of the own map's pixels that changed, or None.
@@ -85,9 +85,9 @@ class Mapper:
     def is_clear(self, start: Point, end: Point, margin_m: float = 0.0) -> bool:
         """Return whether the hull can move straight between two points [m], by the own map.
 
-        Unknown is not clear. Checked every half pixel, and every SPACING_M: what could slip through
-        between two discs is thinner than the padding, but enough to stop the robot. A margin [m]
-        that the hull is to keep from everything makes sure of that.
+        Unknown is not clear. Checked every half pixel, and every SPACING_M: an obstacle that fits
+        between two discs is thinner than the padding, but can stop the robot. A margin [m] around
+        the hull excludes such obstacles.
         """
         x0, y0 = self._geometry.to_pixels(*start)
         x1, y1 = self._geometry.to_pixels(*end)

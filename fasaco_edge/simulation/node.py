@@ -37,8 +37,8 @@ WAIT_S = 0.004
 # A robot that is silent for this long is no obstacle any more, in real time [s].
 CARRIED_AWAY_S = 10.0
 REPORT_EVERY_S = 0.5
-# A robot that moves faster than in life waits for a new velocity after this long [simulated s], but
-# not longer than that [s]: whatever drives it gets the time that it would have.
+# A robot that is simulated faster than real time waits for a new velocity after this long
+# [simulated s], but at most this long [s]: so its follower has as much time as on a real robot.
 ANSWER_S, PATIENCE_S = 0.1, 0.5
 
 
@@ -114,10 +114,9 @@ def run_simulation(
     """Run the robot of ``world`` on the bus until it has to stop.
 
     It publishes its map (latched) and its pose with simulated time as the stamp, and
-    drives along the newest path, or as it is told. In the main thread, SIGINT and SIGTERM
-    end it too.
-    Its last map and pose are published before it returns its last progress; None if it was stopped
-    before it had joined the bus.
+    drives along the newest path, or by velocities. In the main thread, SIGINT and SIGTERM end it
+    too. Its last map and pose are published before it returns its last progress; None if it was
+    stopped before it had joined the bus.
 
     Args:
         world: the building and the robot.
@@ -127,8 +126,8 @@ def run_simulation(
             runs slower.
         driver: ideal: it follows paths itself; follow: velocities drive it.
         meets_others: whether other robots on the bus are obstacles.
-        waits: whether it waits while nobody listens where it is to connect.
-        should_stop: asked some fifty times a second.
+        waits: whether it waits until a program listens where it is to connect.
+        should_stop: called some fifty times a second.
         report: called about twice a second, and at the end.
 
     Raises:
@@ -210,7 +209,7 @@ class RobotOnBus:
             self._battery.put(encode_battery(state))
 
     def meet(self, sample: Sample) -> None:
-        """Take another robot's pose for its place; on a Zenoh thread."""
+        """Take another robot's pose as its position; on a Zenoh thread."""
         name = self._keys.robot_of(sample.key)
         if name in ("", self._keys.robot):
             return
@@ -222,7 +221,7 @@ class RobotOnBus:
         self._world.others = {**self._world.others, name: (pose.x, pose.y)}
 
     def _part(self, now_s: float) -> None:
-        """Drop other robots that are silent: somebody has carried them away."""
+        """Drop other robots that are silent: they count as carried away."""
         places, met_at = self._world.others, self._met_at
         here = {name: at for name, at in places.items() if now_s - met_at[name] < CARRIED_AWAY_S}
         if len(here) < len(places):
@@ -256,7 +255,7 @@ class RobotOnBus:
         self._world.move(told.speed_m_s, told.turn_rad_s)
 
     def progress(self, now_s: float) -> Progress:
-        """Return the progress, with the speed achieved since it was asked for before."""
+        """Return the progress, with the speed achieved since the last call."""
         world = self._world
         sim_s, elapsed_s = world.stamp_ns * 1e-9, max(now_s - self._reported_s, 1e-9)
         speed = (sim_s - self._reported_sim_s) / elapsed_s

@@ -1,4 +1,4 @@
-"""Noise of the simulated mapper: settings, and the error of the pose that it has."""
+"""Noise of the simulated mapper: settings, and the error of its pose estimate."""
 
 from __future__ import annotations
 
@@ -25,17 +25,16 @@ class MapperNoise:
     Attributes:
         seed: of all of it.
         range_m: standard deviation of the scanner's ranges [m].
-        specks: share of its rays that end at nothing, before they are at a wall.
-        leg_misses: share of its rays that go by thin legs, of a few pixels.
-        shift_m: by how much at most the map's pixels lie beside the building's, along each axis.
-        match_m, match_rad: standard deviation of the pose that a scan is taken in with, along each
+        specks: share of its rays that end in free space, before a wall.
+        leg_misses: share of its rays that miss thin legs, of a few pixels.
+        shift_m: largest offset of the map's pixels from the building's, along each axis.
+        match_m, match_rad: standard deviation of the pose at which a scan is added, along each
             axis.
-        drift_m, drift_rad: standard deviation of the error that the pose and all of the map that is
-            new take on with a metre's way; after n metres it is sqrt(n) times as much.
-        closes_loops: whether that error is taken back, from the map too, where the robot comes to
-            what was mapped long ago.
-        jumps: share of scans that are taken in with a wrong pose, which is right again with the
-            next one.
+        drift_m, drift_rad: standard deviation of the drift of the pose, and of newly mapped parts,
+            after a metre's way; after n metres it is sqrt(n) times as large.
+        closes_loops: whether the drift is corrected, in the map too, when the robot returns to a
+            place mapped long ago.
+        jumps: share of scans that are added at a wrong pose; that of the next scan is right again.
         jump_m: how far off it is [m].
         late_s: age of a pose when it is published [s].
     """
@@ -63,11 +62,11 @@ class MapperNoise:
 
     @classmethod
     def none(cls) -> Self:
-        """Return no noise: maps and poses are as the building and the robot are."""
+        """Return no noise: maps and poses equal building and robot."""
         return cls().times(0.0)
 
     def times(self, level: float) -> Self:
-        """Return it so many times as large: all of it but what is no amount; shares up to 1."""
+        """Return the noise with all amounts multiplied by a factor; shares up to 1."""
         amounts = {
             field.name: level * getattr(self, field.name)
             for field in fields(self)
@@ -86,9 +85,9 @@ class MapperNoise:
 
 
 class PoseError:
-    """The error of the pose that a mapper has.
+    """The error of a mapper's pose estimate.
 
-    One part is the map's, too: where its frame lies, which drifts with the way. The other is of the
+    One part is shared with the map: its frame, which drifts with the way. The other belongs to the
     newest scan alone.
     """
 
@@ -98,18 +97,18 @@ class PoseError:
         self._frame = self._match = NOWHERE
 
     def believed(self, pose: Pose2D) -> Pose2D:
-        """Return the pose that the mapper has of a robot at ``pose``."""
+        """Return the mapper's estimate for a robot at ``pose``."""
         drifted, match = composed(self._frame, pose), self._match
         yaw = math.remainder(drifted.yaw + match.yaw, math.tau)
         return Pose2D(drifted.x + match.x, drifted.y + match.y, yaw)
 
     def true_place(self, x: float, y: float) -> tuple[float, float]:
-        """Return where a place of the map is in truth [m]."""
+        """Return the true position of a place on the map [m]."""
         pose = composed(inverse(self._frame), Pose2D(x - self._match.x, y - self._match.y))
         return pose.x, pose.y
 
     def drift(self, pose: Pose2D, way_m: float) -> None:
-        """Let the frame drift while the robot drives on to ``pose``, about where it is."""
+        """Let the frame drift while the robot drives on to ``pose``; it turns about the robot."""
         x, y, yaw = (math.sqrt(way_m) * self._rng.standard_normal(3)).tolist()
         noise, at = self._noise, composed(self._frame, pose)
         moved = Pose2D(
@@ -118,7 +117,7 @@ class PoseError:
         self._frame = composed(moved, inverse(pose))
 
     def match(self) -> None:
-        """Take in another scan: its pose has another error."""
+        """Draw the pose error of another scan."""
         noise, (x, y, yaw) = self._noise, self._rng.standard_normal(3).tolist()
         chance, towards = self._rng.random(2).tolist()
         self._match = Pose2D(noise.match_m * x, noise.match_m * y, noise.match_rad * yaw)
@@ -131,5 +130,5 @@ class PoseError:
             )
 
     def place(self, pose: Pose2D, there: Pose2D) -> None:
-        """Have the frame lie where a robot at ``pose`` is ``there``, but for the newest scan."""
+        """Move the frame so that ``pose`` lies ``there``, but for the newest scan's error."""
         self._frame = composed(there, inverse(pose))

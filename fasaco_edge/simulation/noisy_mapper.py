@@ -2,7 +2,7 @@
 
 Each pixel is decided by the rays that end in it and those that pass it, as in OpenKarto's grid: so
 walls get thicker and thinner by a pixel, thin legs come and go, and specks appear and are passed.
-The poses of scans are not searched for: they are the true ones with an error.
+The poses of scans are not matched: they are the true ones with an error.
 """
 
 from __future__ import annotations
@@ -25,25 +25,25 @@ from fasaco_edge.simulation.robot import SimulationConfig
 
 # Rays of a scan, as of an LDS-01.
 RAYS = 360
-# A scan is taken in after so much way [m] or turn [rad].
+# A scan is added after this much way [m] or turn [rad].
 TRAVEL_M, TURN_RAD = 0.3, 0.35
-# Pixels are known after so many rays, and occupied if more than a share of them ended there.
+# Pixels are known after this many rays, and occupied if more than this share of them ended there.
 LEAST_PASSES, HITS = 2, 0.1
-# A leg has so many pixels at most.
+# Most pixels of a leg.
 LEG_PX = 4
-# Room around the building for what is mapped beside it [m].
+# Margin around the building for pixels that are mapped beside it [m].
 MARGIN_M = 0.6
-# A wall begins so far behind its face [pixels]: where nothing else is noisy rays end in it.
+# A wall begins this far behind its face [pixels], so that noisy rays still end in it.
 INTO_PX = 1e-3
-# Loops: every so many scans one is looked for, to a scan at least so old and so near; carried out
-# if it moves the robot by so much [m, rad].
+# Loops: after each this many scans, a loop is searched for, to a scan at least this old [scans] and
+# this near [m]; it is closed if it moves the robot by at least this much [m, rad].
 LOOP_EVERY, LOOP_AGE, LOOP_NEAR_M = 3, 40, 1.5
 LOOP_LEAST_M, LOOP_LEAST_RAD = 0.03, 0.01
 
 
 @dataclass(slots=True)
 class _Scan:
-    """A scan taken in: where it was made in truth and on the map, and its rays' ways [pixels]."""
+    """An added scan: its true pose, its pose on the map, and the lengths of its rays [pixels]."""
 
     pose: Pose2D
     there: Pose2D
@@ -68,15 +68,15 @@ class NoisyMapper(Mapper):
         self._at: Pose2D | None = None
 
     def believed(self, pose: Pose2D) -> Pose2D:
-        """Return the pose that it has of a robot at ``pose``."""
+        """Return the estimated pose of a robot at ``pose``."""
         return self._error.believed(pose)
 
     def true_place(self, x: float, y: float) -> tuple[float, float]:
-        """Return where a place of its map is in truth [m]."""
+        """Return the true position of a place on its map [m]."""
         return self._error.true_place(x, y)
 
     def scan(self, pose: Pose2D) -> Window | None:
-        """Take in a scan from ``pose``, if that is away from where the one before it was made.
+        """Add a scan from ``pose``, if that is far enough from the scan before.
 
         Returns:
             the window of the own map's pixels that the scan may have changed, or None.
@@ -98,7 +98,7 @@ class NoisyMapper(Mapper):
         return changed
 
     def _ways(self, pose: Pose2D) -> NDArray[np.float64]:
-        """Return how far the rays of a scan come, float64 (RAYS,) [pixels]; below 0: no return."""
+        """Return the lengths of a scan's rays, float64 (RAYS,) [pixels]; below 0: no return."""
         noise, geometry = self._noise, self._truth.geometry
         goes_by, is_speck, speck = self._rng.random((3, RAYS))
         scatter = self._rng.standard_normal(RAYS)
@@ -115,7 +115,7 @@ class NoisyMapper(Mapper):
         return np.where(is_speck < noise.specks, np.abs(ways) * speck, ways)
 
     def _count(self, scan: _Scan, times: int) -> Window | None:
-        """Add a scan to the counts, or take it out again; return where."""
+        """Add a scan to the counts, or remove it again; return the changed window."""
         x, y = self._geometry.to_pixels(scan.there.x, scan.there.y)
         directions = _directions(scan.there.yaw - self._geometry.origin.yaw)
         ends = (x, y) + np.abs(scan.ways)[:, np.newaxis] * directions
@@ -130,7 +130,7 @@ class NoisyMapper(Mapper):
         self._known[window] = np.where(passes < LEAST_PASSES, UNKNOWN, drawn)
 
     def _close_loop(self) -> Window | None:
-        """Place the newest scan by an old one nearby, and those between accordingly."""
+        """Align the newest scan with an old one nearby, and correct those between accordingly."""
         *older, newest = self._scans
         far = [math.dist((s.pose.x, s.pose.y), (newest.pose.x, newest.pose.y)) for s in older]
         old = min(range(len(far) - LOOP_AGE), key=far.__getitem__, default=-1)

@@ -28,20 +28,20 @@ Point = tuple[float, float]
 # Closer than this the robot is at a corner [m].
 ARRIVED_M = 1e-3
 # A run begins within this heading error, so that it ends within ARRIVED_M of its corner
-# after 10 m; under way a larger one is steered out, and from MISALIGNED on turned out at
-# rest [rad].
+# after 10 m; under way a larger one is steered out, and one above MISALIGNED turned out at rest
+# [rad].
 ALIGNED_RAD = 1e-4
 MISALIGNED_RAD = 0.05
-# A bend below this may be none: it is steered, not stopped for [rad].
+# A bend below this may not count: the robot steers through it and does not stop [rad].
 STRAIGHT_RAD = 0.02
-# It is one where the straight way past it is further off than this [m].
+# It counts if the straight way past it is further off than this [m].
 CUT_M = 0.002
 # A waypoint is driven through if a point of the track is this near; it must not be less
 # than half the track's spacing [m].
 PASSED_WITHIN_M = 0.02
 # As a last resort the path is joined anywhere in this much of its beginning [m].
 JOIN_WITHIN_M = 2.0
-# Ways back along the track turn off at each of its last points, further back at every so many.
+# Ways back along the track turn off at each of this many last points, further back at each n-th.
 BACK_POINTS, BACK_STRIDE = 100, 10
 
 
@@ -57,15 +57,15 @@ class SimulationConfig:
         acceleration_m_s2: of driving, up and down [m/s^2].
         turn_acceleration_rad_s2: of turning, up and down [rad/s^2].
         robot_radius_m: radius that the planner uses [m].
-        padding_m: what that radius has in excess of the hull [m]. The hull is what
-            collides: a robot as wide as its corridor would touch at the first rounding error.
+        padding_m: by how much that radius exceeds the hull's [m]. Only the hull collides: a robot
+            as wide as its corridor would touch at the first rounding error.
         range_m: range of the scanner [m].
         free_at_most: occupancy values up to this are free [percent].
         map_chunk_m: the published map grows by blocks of about this size [m].
         tick_s: the simulation's time step [s].
         scan_hz, map_hz, pose_hz: rates [Hz]; their periods are rounded to whole ticks.
-        battery_min: how long its battery lasts [min]; 0 for one without end. It charges where the
-            robot began.
+        battery_min: how long its battery lasts [min]; 0 for unlimited. It charges where the robot
+            began.
     """
 
     speed_m_s: float = 0.25

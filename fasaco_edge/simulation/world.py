@@ -36,12 +36,12 @@ from fasaco_edge.simulation.robot import (
 
 # Spacing of the recorded track on straight runs [m]; corners are recorded as they are.
 TRACK_SPACING_M = 0.02
-# So many metres of it show which part of a new path is driven already: at twenty times the real
-# speed, a path that took a second begins five metres behind the robot.
+# The last metres of the track that show which part of a new path is driven already [m]: at twenty
+# times the real speed, a path that took a second begins five metres behind the robot.
 RECENT_TRACK_POINTS = 500
 # Timeout of the velocity, after which a base stops by itself [s].
 DEAF_S = 0.5
-# Directions to its heading in which a base slides along a wall that it is driven into [deg].
+# Directions, relative to its heading, in which a base slides along a wall that it hits [deg].
 SLIDES_DEG = (15, -15, 30, -30, 45, -45, 60, -60, 75, -75)
 # Clearance to other robots, all of one size, on stopping [m].
 MEETING_M = 0.05
@@ -59,13 +59,13 @@ class Activity(enum.Enum):
     NO_WAY = "no_way"
     """It sees no clear way to the path's beginning, and looks again after every scan."""
     STOPPED = "stopped"
-    """Its way leads into what its own map shows; it came to rest before that, looked once for
+    """Its way leads into an obstacle of its own map; it stopped before that, looked once for
     another way to its path, and waits for another path."""
     COLLIDED = "collided"
     """The path led into an obstacle; it stops there and waits for another path."""
 
 
-# So near to where it began the robot is in its dock [m].
+# The robot is in its dock if it is this near to its start [m].
 DOCK_M = 0.3
 BATTERY_HZ = 1.0
 
@@ -114,12 +114,12 @@ class World:
         noise = noise or MapperNoise.none()
         is_ideal = not noise.is_in_map
         self._mapper = Mapper(truth, config) if is_ideal else NoisyMapper(truth, config, noise)
-        # Poses that are not yet published, and for how many ticks each is not.
+        # Poses that are not yet published, and for how many ticks each is delayed.
         self._poses: deque[StampedPose] = deque()
         self._late_ticks = round(noise.late_s / config.tick_s)
         self._path: NDArray[np.float64] | None = None
         self._corners: list[Point] = []
-        # Where others drive it: speed [m/s], turn rate [rad/s], and the tick it was told.
+        # The newest velocity, if one drives it: speed [m/s], turn rate [rad/s], and its tick.
         self._told: tuple[float, float, int] | None = None
         self._dock = start.x, start.y
         self.battery = Battery(config.battery_min) if config.battery_min else None
@@ -134,9 +134,9 @@ class World:
         self.others: dict[str, Point] = {}
         self.touches = self.meetings = 0
         self._is_held = False
-        # How often it had stopped when its path came.
+        # Number of its stops when its path came.
         self._stopped_at = 0
-        # For how many ticks the robot stands, once it has moved; and the most of them.
+        # For how many ticks the robot has stood, once it has moved; and the longest such time.
         self._stands = self._longest_stand = 0
 
     @property
@@ -146,7 +146,7 @@ class World:
 
     @property
     def believed(self) -> Pose2D:
-        """The pose that its mapper has; without noise the true one."""
+        """Its mapper's estimate of the pose; without noise the true one."""
         return self._mapper.believed(self._drive.pose)
 
     @property
@@ -206,7 +206,7 @@ class World:
 
     @property
     def unanswered_s(self) -> float:
-        """For how long it has been moving, or is told to, since the newest velocity [s]."""
+        """For how long it has been moving, or commanded to, since the newest velocity [s]."""
         if self._told is None or not (self._drive.moving or any(self._told[:2])):
             return 0.0
         return (self._ticks - self._told[2]) * self.config.tick_s
@@ -229,7 +229,7 @@ class World:
         return replace(now, pose=self._ripe(now.pose)) if self._late_ticks else now
 
     def _ripe(self, pose: StampedPose | None) -> StampedPose | None:
-        """Take in a pose; return one that is as old as those that are published."""
+        """Store a pose; return the delayed one to publish now, if any."""
         if pose is not None:
             self._poses.append(pose)
         oldest_ns = self.stamp_ns - self._late_ticks * self.config.tick_ns
@@ -250,7 +250,7 @@ class World:
         if self._path is None:
             return
         track, is_clear = self._recent_track(), self._mapper.is_clear
-        # Straight on, even within the margin, before back along the track.
+        # Going straight on, even within the margin, has priority over going back.
         for goes_back, margin_m in ((False, MARGIN_M), (False, 0.0), (True, MARGIN_M), (True, 0.0)):
             has_room = partial(is_clear, margin_m=margin_m)
             route = joined(self._path, track, has_room, goes_back=goes_back)
@@ -277,7 +277,7 @@ class World:
         return np.array([self._on_map((x, y)) for x, y in track], np.float64)
 
     def _on_map(self, place: Point) -> Point:
-        """Return where a place is on the robot's map."""
+        """Return the position of a place on the robot's map."""
         pose = self._mapper.believed(Pose2D(*place))
         return pose.x, pose.y
 
@@ -298,7 +298,7 @@ class World:
             self._go_on(driven(self._drive, goal, self.config))
 
     def _goal(self) -> Point:
-        """Return where the next corner is in truth."""
+        """Return the true position of the next corner."""
         return self._mapper.true_place(*self._corners[-1])
 
     def _looks_ahead(self) -> bool:
@@ -337,7 +337,7 @@ class World:
             self._go_on(ahead)
 
     def _slid(self, ahead: DriveState) -> DriveState | None:
-        """Return the state of a base that is pushed on along a wall; None where it cannot be."""
+        """Return the state of a base that slides along a wall; None if it cannot."""
         here, pose = self.pose, ahead.pose
         way = math.dist((here.x, here.y), (pose.x, pose.y))
         for deg in SLIDES_DEG:
@@ -358,7 +358,7 @@ class World:
         )
 
     def _go_on(self, ahead: DriveState) -> None:
-        """Come into a state that may be in a wall, or in another robot."""
+        """Take over a state that may be in a wall, or in another robot."""
         if self._meets((ahead.pose.x, ahead.pose.y), 0.0):
             self.touches += self._drive.moving
             self._drive = DriveState(self.pose)
@@ -371,7 +371,7 @@ class World:
         self._drive = ahead
 
     def _collide(self) -> None:
-        # One that is told to push on stands in the wall, and has run into it once.
+        # A robot that is commanded to push on stands at the wall; this counts as one collision.
         self.collisions += self._told is None or self._drive.moving
         self._drive = DriveState(self.pose)
         self._path, self._corners = None, []
