@@ -106,16 +106,17 @@ class ReviewDocument(msgspec.Struct):
         commands: each command that came: at_s, command (in words).
         complete: of the last order: whether the mission reached `done` with every reachable cell
             (of its zones) covered.
-        covered_cells, coverable_cells: at the end: reachable cells, and covered ones of these.
-        recovered_cells: of these, cells covered more than once.
+        covered_cells, coverable_cells: at the end: covered cells, and all reachable cells.
+        recovered_cells: cells covered more than once.
         unreachable_cells: cells where the robot would fit, but that it cannot get to.
         reachable_m2, swept_m2: floor at the end, by pixels of the last map: all that the tool's
             disc touches wherever the robot's disc can be; the part that the tool passed over along
             the recorded poses [m2].
-        patches_over_4_dm2, largest_patch_m2: connected patches of it that were not swept [m2].
-        swept_before_m2: floor that had been swept when the recording began, about, by the daemon;
-            poses of it are missing, so that it counts as not swept where the robot did not come by
-            again [m2].
+        patches_over_4_dm2, largest_patch_m2: connected patches of this floor that were not swept
+            [m2].
+        swept_before_m2: floor swept before the recording began, approximately, as counted by the
+            daemon; its poses are missing, so it counts as not swept unless the robot swept it again
+            [m2].
         left: the largest patches that were not swept: m2, and a place in the middle (x, y) [m].
         ledger_swept_m2: floor that the daemon counted as swept at the end, reachable or not [m2].
         left_by_reason: reachable floor not swept at the end, by the daemon's reasons [m2].

@@ -95,7 +95,7 @@ def document_of(review: Review) -> ReviewDocument:
 
 
 def _used(counts: Sequence[float]) -> float | None:
-    """Return how much a count has grown, that begins at 0 again with each process; None of none."""
+    """Return the total of a count that restarts at 0 with each process; None without values."""
     grown = (now - before if now >= before else now for before, now in pairwise(counts))
     return sum(grown) if len(counts) > 1 and counts[-1] else None
 
@@ -185,7 +185,7 @@ def _pheromone(review: Review) -> PheromoneFigures:
         float(points[-1, 1]) if (points := plots.get(entity)) is not None else None
         for entity in (entities.TRAIL_CELLS, entities.BRANCHING)
     )
-    # Along the track, cells count in whose centre the robot fits; more have a stand.
+    # Along the track only cells count whose centre fits the robot; more cells have a stand.
     counted = [each.status.coverage for each in review.data.statuses if each.status.coverage]
     stands = counted[-1].coverable + counted[-1].unreachable if counted else 0
     share = spanned / stands if spanned is not None and stands else None
@@ -222,7 +222,7 @@ def _not_recorded(review: Review) -> dict[str, str]:
     elif review.data.restored_cells:
         restored = review.data.restored_cells
         before = (
-            f"{restored} cells were covered before the recording, which does not tell which ones"
+            f"{restored} cells were covered before the recording, which does not show which ones"
         )
         why["reached_s"] = why[FLOOR] = before
     elif review.floor is None:
@@ -233,7 +233,7 @@ def _not_recorded(review: Review) -> dict[str, str]:
         )
     if review.counts is None:
         why["covered_cells, coverable_cells, recovered_cells"] = (
-            "the daemon's last recorded count is outdated, and poses do not tell all"
+            "the daemon's last recorded count is outdated, and the poses are incomplete"
         )
     if not review.replans.later:
         why["replan_ms_p50, replan_ms_p99, replan_ms_max"] = "there was no replan"

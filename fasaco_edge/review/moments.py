@@ -144,7 +144,7 @@ def longest_stand(
 
 
 def longest_gap(what: str, at_s: Sequence[float], during: Span) -> Moment | None:
-    """Return the longest time between two of some samples, the span's ends included."""
+    """Return the longest gap between samples, including the ends of the span."""
     inside = [at for at in at_s if during.begin_s <= at <= during.end_s]
     ends = [during.begin_s, *inside, during.end_s]
     gaps = [(after - before, before) for before, after in pairwise(ends)]
@@ -280,8 +280,8 @@ class Faults:
     """Refused messages and losses.
 
     Attributes:
-        by_code: what the daemon refused; under ``NOT_RECORDED`` what it counted after the last
-            counts by code that were recorded.
+        by_code: messages refused by the daemon; ``NOT_RECORDED``: those that it counted after the
+            last recorded counts by code.
         lost: samples that the recorder could not write; None where that is not recorded.
         torn_bytes: what a crash tore off the files [bytes].
         complaints: warnings in the recorder's log.
@@ -294,14 +294,14 @@ class Faults:
 
     @property
     def total(self) -> int:
-        """All that the daemon refused."""
+        """Number of all messages refused by the daemon."""
         return sum(self.by_code.values())
 
 
 def faults_of(data: RunData, record: RunRecord) -> Faults:
     """Return the faults in a recording."""
     by_code = _over_restarts(each.status.errors.by_code for each in data.statuses)
-    # As curves they are recorded up to the end; of a daemon that was started again not each one.
+    # Curves have them up to the end, but of a restarted daemon not each one.
     by_code |= _plotted(record.plots)
     total = _counted(line for _, line in record.log.get(entities.MISSION_LOG, ()))
     if total > by_code.total():

@@ -31,7 +31,7 @@ from fasaco_edge.wire.messages.maps import decode_map_update, decode_occupancy_g
 from fasaco_edge.wire.messages.poses import PoseDecoder
 from fasaco_edge.wire.schemas import POSE_STAMPED
 
-# Less is in the noise of poses and times [m2].
+# Smaller areas are within the noise of poses and times [m2].
 SURELY_SWEPT_M2 = 0.1
 
 
@@ -153,10 +153,10 @@ class RunData:
 
     @property
     def swept_before_m2(self) -> float:
-        """Floor of the order that had been swept when the recording began [m2], about.
+        """Floor of the order swept before the recording began [m2], approximately.
 
-        What the first report of the floor has beyond what the tool can have passed over since. An
-        order that began later has none.
+        It is the swept floor of the first report, less what the tool can have swept since the
+        beginning; 0 for an order that began later.
         """
         reports = [(each.at_s, each.status.floor) for each in self.statuses]
         swept = [(at_s, floor.swept_m2) for at_s, floor in reports if floor is not None]
@@ -223,8 +223,8 @@ def first_counted(statuses: Iterable[StatusSample]) -> NDArray[np.float64]:
     """Return when the daemon had counted each number of covered cells, float64 (n,) [s], rising.
 
     A recording has a status each quarter of a minute: cells are interpolated evenly between two of
-    them. Cells that stopped counting, as after a reset or a loop closure, count from when they were
-    covered again.
+    them. Cells that stopped counting, as after a reset or a loop closure, count from their next
+    coverage.
     """
     at_s: list[float] = []
     before_s: float | None = None
@@ -331,7 +331,8 @@ class _SampleReader:
     def _path(self, arrival: Arrival) -> None:
         about = decode_tolerant(arrival.sample.attachment, PathAttachment)
         paths = self.data.paths
-        # A path that is published again is the same; the first of a daemon, 0, is no mission's.
+        # A path that is published again is the same; a daemon's first one, 0, belongs to no
+        # mission.
         if not about.revision or (paths and paths[-1].about.revision == about.revision):
             return
         paths.append(PathSample(self._now, about))

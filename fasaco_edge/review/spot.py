@@ -173,7 +173,7 @@ class _Judge:
         return self._within_reach(floor)
 
     def _off_the_floor(self, grid: OccupancyGrid, footprint: Footprint) -> Spot | None:
-        """Return why it is no floor to sweep by map and order; None if it is."""
+        """Return why map or order exclude it; None if they do not."""
         value = _value(grid.cells, grid.geometry, self._x, self._y)
         if value is None:
             return self._spot("never seen", "outside of the map at the end")
@@ -251,7 +251,7 @@ class _Judge:
         over = self._last_path_over()
         seen_s = self._drawn.seen_s[self._number]
         if over is not None and over is self._drawn.paths[-1] and not self._review.complete:
-            words = f"path {over.revision}, the last one, leads over it; it was not driven so far"
+            words = f"the last path, {over.revision}, leads over it; the robot did not get there"
             why = "still to come"
         elif over is not None:
             why, words = self._left_by(over)
@@ -286,7 +286,7 @@ class _Judge:
         led = f"path {over.revision} led over it"
         later = [p.about for p in self._data.paths if p.about.revision > over.revision]
         if not later:
-            return "missed", f"{led}, and the robot did not follow it so far"
+            return "missed", f"{led}, and the robot did not get there"
         words = f"{led}, until path {later[0].revision} took its place ({later[0].reason})"
         # A shorter line leaves floor that is not worth the distance.
         return "not worth it" if later[0].reason in (POLISHED, BETTER) else "missed", words

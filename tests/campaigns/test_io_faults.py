@@ -95,7 +95,7 @@ def test_an_unreadable_recording_does_not_stop_the_recorder(tmp_path):
         command = [sys.executable, "-c", script, str(tmp_path)]
         environment = ENVIRONMENT | watch.environment
         done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
-    assert done.stdout == "old.rrd could not be looked at: Input/output error\n", done.stderr
+    assert done.stdout == "old.rrd could not be checked: Input/output error\n", done.stderr
 
 
 @pytest.mark.parametrize("at", [6, 7, 8, None])  # of the footer, and of what stands behind it
@@ -106,7 +106,7 @@ def test_a_part_whose_end_the_disk_does_not_take_is_told(tmp_path, at):
         environment = ENVIRONMENT | watch.environment
         done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
         assert bool(watch.failed_on()) == (at is not None)
-    assert done.stdout == ("run-part1.rrd: the disk did not take its end\n" if at else "")
+    assert done.stdout == ("run-part1.rrd: its footer could not be written\n" if at else "")
 
 
 @pytest.mark.parametrize(

@@ -77,5 +77,5 @@ def test_a_field_of_another_size_than_told_is_refused():
     rows = rows_of(np.zeros((2, 2), np.uint8))
     wrong = pa.array([[{"width": 3, "height": 2}]])
     broken = rows.set_column(rows.schema.get_field_index("GridMap:format"), "GridMap:format", wrong)
-    with pytest.raises(ValueError, match="a field of 4 cells, 2 x 3 told"):
+    with pytest.raises(ValueError, match="a field of 4 cells, stated 2 x 3"):
         FieldSampler().take(broken, [0])

@@ -178,7 +178,7 @@ def test_inputs_queued_at_the_end_are_kept_and_drawn_if_in_time(tmp_path, monkey
     assert samples.missing == 0
     assert entities.ROBOT not in read_summary(path).rows
     said = [line for (line,) in read_column(path, entities.RECORDER_LOG, TEXT).values]
-    assert "300 messages that came last are not drawn: there was no time" in said
+    assert "the last 300 messages are not drawn: there was no time" in said
 
 
 def test_a_recorder_reports_while_it_catches_up(tmp_path, monkeypatch):

@@ -76,7 +76,7 @@ def fields_in(batch: pa.RecordBatch, times: list[int]) -> Iterator[DrawnField]:
         shape = int(formats[row][0]["height"]), int(formats[row][0]["width"])
         cell_m, (x, y, _) = cells[row].as_py()[0], places[row].as_py()[0]
         if levels.size != shape[0] * shape[1] or not cell_m > 0:
-            raise ValueError(f"a field of {levels.size} cells, {shape[0]} x {shape[1]} told")
+            raise ValueError(f"a field of {levels.size} cells, stated {shape[0]} x {shape[1]}")
         yaw_deg = 0.0
         if turns is not None:
             _, _, sine, cosine = turns[row].as_py()[0]

@@ -70,7 +70,7 @@ class Repair:
 
     def __str__(self) -> str:
         if self.failed:
-            return f"{self.path.name} could not be looked at: {self.failed}"
+            return f"{self.path.name} could not be checked: {self.failed}"
         return f"{self.path.name} was torn: {self.cut_bytes} bytes behind the last frame cut"
 
 

@@ -79,7 +79,7 @@ def _path_line(message: PathMessage, about: PathAttachment) -> str:
     if about.planned_cost_s is not None:
         facts.append(f"{about.planned_cost_s:.0f} s")
     if about.gap is not None and about.planned_steps is not None:
-        # Figures of the plan when it was made; part of the path may be driven since.
+        # Figures of the plan when it was made; part of the path may have been driven since.
         over = f"{100 * about.gap:.0f} % of time over the bound"
         facts.append(f"planned {about.planned_steps} steps, {over}")
     if about.planner:

@@ -27,17 +27,17 @@ MARK_UP = re.compile(r"[\\`\[\]<>!|]")
 LEGEND = """\
 - **Map** white free, black occupied, grey unknown
 - **Tint** blue covered, orange covered more than once
-- **Path** violet, pale the one before; **driven** green
-- **Pink** what of the map led to this path, and how
+- **Path** violet, the previous one pale; **driven** green
+- **Pink** the part of the map that led to this path, and its reason
 - **Cyan** an obstacle came or went
-- **Blue line** a zone of the order, **orange** one to keep out of
+- **Blue line** a zone of the order, **orange** a keep-out zone
 - **Pheromone** dark little, bright much, black none
-- **Arrows** where it points to, bright where that is decided; at the robot, its share there"""
+- **Arrows** direction of the trail, bright if decided; at the robot, its share there"""
 
 # Each field has its own range, so that it is never flat.
 LEVELS = (
-    "level l from 1 to 255 is trail_min * (trail_max / trail_min) ** ((l - 1) / 254), with what "
-    "metrics/trail/min and max are then; level 0 cannot be covered"
+    "level l from 1 to 255 is trail_min * (trail_max / trail_min) ** ((l - 1) / 254), by the "
+    "metrics/trail/min and max of that time; level 0 cannot be covered"
 )
 
 

@@ -34,7 +34,7 @@ class Flush(enum.Enum):
     DONE = "done"
     """It is handed to the disk."""
     STALLED = "stalled"
-    """It takes longer than one was ready to wait."""
+    """It takes longer than the timeout."""
     BROKEN = "broken"
     """Rerun's writer has given up on the file, for good."""
 
@@ -135,7 +135,7 @@ class Part:
         """
         self.stream.disconnect()
         if not self._has_footer():
-            LOG.warning("%s: the disk did not take its end", self.path.name)
+            LOG.warning("%s: its footer could not be written", self.path.name)
         os.close(self._lock)
 
     def _has_footer(self) -> bool:

@@ -2,7 +2,7 @@
 
 A run's name begins with a number above the highest existing one: clocks go backward (without a
 clock battery at each boot), numbers do not. Deletes only parts named by this robot's recorder that
-none is writing; never another file.
+no recorder is writing; never another file.
 """
 
 from __future__ import annotations

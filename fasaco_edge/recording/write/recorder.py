@@ -141,7 +141,7 @@ class Recorder:
         self._writer.at(self._clock.now_ns())
         self._inputs.finish()
         if undrawn:
-            self.note(f"{undrawn} messages that came last are not drawn: there was no time")
+            self.note(f"the last {undrawn} messages are not drawn: there was no time")
         self._report_state("stopping", "asked to end")
         self._scene.finish()
         return self._writer.close()
@@ -175,7 +175,7 @@ class Recorder:
         self._messages += 1
         self._writer.message(arrival.wall_ns)
         if arrival.topic == "status" and _is_rival(arrival.sample.payload):
-            line = "another daemon of this robot's name is there, and waits: it is not recorded"
+            line = "a second daemon of this robot's name waits: it is not recorded"
             self._scene.add_line(entities.BUS_LOG, line, "WARN")
             return
         if arrival.topic == "status":
@@ -218,7 +218,7 @@ class Recorder:
         """Report a planner that was silent for long, up to a time [ns]."""
         last = self._last_status_ns
         if last is not None and heard_ns - last > SILENCE_NS:
-            self._scene.enter(entities.MISSION_STATE, "silent", "the planner says nothing any more")
+            self._scene.enter(entities.MISSION_STATE, "silent", "the planner is silent")
 
     def _report_writing(self) -> None:
         self._report_state(self._writer.state.value, self._writer.reason)

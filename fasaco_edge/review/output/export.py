@@ -20,7 +20,7 @@ FORMULA = re.compile(r"[=@]|[+-](?![\d.]+(e[+-]?\d+)?\Z)")
 CSV, PARQUET = FORMATS = ("csv", "parquet")
 TYPES = {"float": pa.float64(), "int": pa.int64(), "bool": pa.bool_(), "text": pa.string()}
 DESCRIPTION = "columns"
-"""The table that says what is in the others."""
+"""The table that describes the columns of the others."""
 
 
 def export(review: Review, folder: Path, form: str = CSV) -> None:
@@ -92,7 +92,7 @@ def _write_parquet(table: Table, file: Path) -> None:
         writer.write_batch(_batch(rows, schema))
 
 
-# So many are held in memory.
+# Rows held in memory.
 ROWS = 50_000
 
 

@@ -63,7 +63,7 @@ GLOSSARY = {
     "changed on the map": "the rectangle in which cells or their neighbours changed",
     "plans that became no path": "they equalled the current path, or the map had outdated them",
     "better further on": "spare time was used to improve the rest of the path",
-    "p99": "99 of 100 replans took at most so long",
+    "p99": "99 of 100 replans took at most this long",
     "degraded": "poses or maps had stopped, a pose jumped, or the robot stood on its path",
     "blocked": "the robot could not continue",
     "refused": "malformed or implausible messages; each is ignored",

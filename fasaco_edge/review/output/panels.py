@@ -15,7 +15,7 @@ from fasaco_edge.recording import entities
 from fasaco_edge.review.review import Review
 
 Points = tuple[NDArray[np.float64], NDArray[np.float64]]
-"""When [s], and how much from then on; both float64 (n,)."""
+"""Times [s], and the values from then on; both float64 (n,)."""
 
 
 def covered_share(review: Review) -> Points:
