@@ -21,7 +21,7 @@ from fasaco_edge.planners.own.loading import SHAPE, is_place
 
 Sample = TypeVar("Sample")
 
-# Called with what is being measured now, in a few words.
+# Called with the present measurement in a few words.
 Say = Callable[[str], None]
 
 
@@ -102,7 +102,7 @@ class Benchmark(Generic[Sample]):
         description: what is done and how to read the result.
         add_options: declares the options it takes.
         count: how many samples ``measure`` will yield.
-        measure: yields samples; what it opened it closes, also when it is closed early.
+        measure: yields samples; it closes all that it opened, also if it is closed early.
         report: sums up the samples there are, even none.
         epilog: examples.
         write: writes the files that the options ask for, and names them.
@@ -207,7 +207,7 @@ def machine() -> dict[str, object]:
 
 
 def peak_mb() -> float:
-    """Return the most memory this process was ever resident with [MB]."""
+    """Return the peak resident memory of this process [MB]."""
     return round(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024 / 1e6, 1)
 
 

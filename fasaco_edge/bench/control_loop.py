@@ -15,7 +15,7 @@ import time
 
 CLOCK_MONOTONIC, TIMER_ABSTIME = 1, 1
 SECOND_NS = 1_000_000_000
-# What an odometry of two wheels and a regulator for each take, and a scan to look through.
+# Work of a tick: a regulator for each of two wheels, their odometry, and a scan to search.
 BEAMS = 100
 KP, KI, KD = 0.8, 0.2, 0.01
 
@@ -25,7 +25,7 @@ class _Timespec(ctypes.Structure):
 
 
 def run(hz: int, seconds: float) -> list[int]:
-    """Run for so long; return how late each tick began [ns]."""
+    """Run for a time [s]; return how late each tick began [ns]."""
     sleep_until = ctypes.CDLL(None).clock_nanosleep
     period_ns, late_ns = SECOND_NS // hz, []
     robot = _Robot()
@@ -42,14 +42,14 @@ def run(hz: int, seconds: float) -> list[int]:
 
 
 class _Robot:
-    """What the ticks work on."""
+    """State of the controlled robot."""
 
     def __init__(self) -> None:
         self.x = self.y = self.yaw = 0.0
         self._speeds, self._sums, self._errors = [0.0, 0.0], [0.0, 0.0], [0.0, 0.0]
 
     def tick(self, dt_s: float) -> None:
-        """Regulate two wheels, add up where they have led, and look for the nearest beam."""
+        """Regulate two wheels, integrate their odometry, and search the nearest beam."""
         for wheel, wanted in enumerate((0.3, 0.25)):
             error = wanted - self._speeds[wheel]
             self._sums[wheel] += error * dt_s

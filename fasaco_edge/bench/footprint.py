@@ -1,4 +1,4 @@
-"""``bench footprint``: how soon a daemon is there, how much memory it takes, how idle it is."""
+"""``bench footprint``: a daemon's time to start, its memory, and its load when idle."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ GOALS = (
     ("warm_mb", "memory after map and plan", 150.0, "MB"),
     ("mission_percent", "share of a core in a mission", 2.0, "%"),
 )
-# Maps come twice a second in a mission, and something has changed on one of so many.
+# In a mission maps come twice a second, and one in this many shows a change.
 MAP_EVERY_S, MAPS_A_CHANGE = 0.5, 20
 # The compiler and the recorder's library, by what a process has mapped of them.
 PACKAGES = {"numba": ("numba", "llvmlite"), "rerun": ("rerun_sdk", "rerun_bindings")}
@@ -57,12 +57,12 @@ class DaemonStart:
         status_s: from exec to the first status answered [s].
         idle_mb: resident before the first map [MB].
         idle_own_mb: of that without pages of files, as those of libraries [MB].
-        idle_percent: of a core, that it took until then [%].
+        idle_percent: share of a core that it took until then [%].
         warm_mb: resident after a map and a plan [MB].
         warm_own_mb: of that without pages of files [MB].
-        mission_percent: of a core, that it takes while a robot drives its path and sends ten poses
-            and two maps a second [%].
-        peak_mb: the most it was ever resident with [MB].
+        mission_percent: share of a core that it takes while a robot drives its path and sends ten
+            poses and two maps a second [%].
+        peak_mb: its peak resident memory [MB].
         idle, warm: which of ``PACKAGES`` were loaded at these two points.
     """
 

@@ -45,7 +45,7 @@ class Block:
         place: one of ``PLACES``.
         covering: whether the daemon was at work; else it was held.
         late_us: how late each tick began [µs].
-        share: of a core, that the daemon took meanwhile.
+        share: the daemon's share of a core meanwhile.
         paths: how many paths it published meanwhile.
         group: the control group the daemon was in; "" for none.
     """
@@ -97,13 +97,14 @@ def _measure(args: argparse.Namespace, say: Say) -> Generator[Block, None, None]
     given = {} if args.spare_share is None else {"spare_share": args.spare_share}
     with DaemonProcess({"planner": given}) as daemon:
         say("first path")
-        # Weighed only then: where much else is at work, the first one would not come in time.
+        # Its weight is set only then: on a busy computer the first path would come too late.
         with robot_beside(daemon, daemon.join()) as robot, weighed(daemon.pid, WEIGHT) as group:
             try:
                 for name in PLACES:
                     cores = all_cores if name == ANY_CORE else one_core
                     place(daemon.pid, cores, NICENESS)
-                    # The robot's own program is no part of the question: elsewhere, if it can.
+                    # The robot's own program must not affect the result: it runs on other cores if
+                    # possible.
                     os.sched_setaffinity(0, all_cores - cores or all_cores)
                     for number in range(2 * args.rounds):
                         covering = number % 2 == 1
@@ -123,7 +124,7 @@ def _run(
     covering: bool,
     group: str,
 ) -> Block:
-    # Held rather than ended: all else on the computer is the same in both.
+    # Held rather than ended, so that all else on the computer is the same in both.
     os.kill(daemon.pid, signal.SIGCONT if covering else signal.SIGSTOP)
     time.sleep(SETTLE_S)
     paths, began_s = robot.paths, (time.monotonic(), cpu_seconds(daemon.pid))
@@ -196,7 +197,7 @@ JITTER = Benchmark(
     name="jitter",
     summary="a robot's control loop of 100 Hz, with and without a covering daemon beside it",
     description="Run a control loop of 100 Hz at normal priority, in a process of its own, and "
-    "tell how late it wakes. Beside it a real daemon covers a building of 50 m x 50 m in which a "
+    "measure how late it wakes. Beside it a real daemon covers a building of 50 m x 50 m where a "
     "crate moves each second, with the unit's niceness and, where that may be, its CPU weight; in "
     "every other block the daemon is held. First both may run on all cores, then both are pinned "
     "to one: the worst case. Other load on the machine affects both columns.",

@@ -35,9 +35,9 @@ class RoundTrip:
 
     Attributes:
         total_ms: from the put of the map to the path's arrival [ms].
-        plan_ms: what of it was planning, by the daemon's word [ms].
+        plan_ms: the part of it that was planning, as reported by the daemon [ms].
         steps: steps of the path.
-        daemon_peak_mb: the most the daemon was resident with until then [MB].
+        daemon_peak_mb: peak resident memory of the daemon until then [MB].
         recorded: whether a recorder listened.
     """
 
@@ -49,7 +49,7 @@ class RoundTrip:
 
     @property
     def rest_ms(self) -> float:
-        """What was not planning: transport, decoding, lattice, decisions, encoding [ms]."""
+        """Time outside planning: transport, decoding, lattice, decisions, encoding [ms]."""
         return self.total_ms - self.plan_ms
 
 
@@ -98,10 +98,10 @@ def _measure(args: argparse.Namespace, say: Say) -> Generator[RoundTrip, None, N
 
 
 def _turns(args: argparse.Namespace) -> list[tuple[bool, int]]:
-    """Return of each turn whether it is recorded, and its number of maps."""
+    """Return for each round whether it is recorded, and its number of maps."""
     if not args.recorder:
         return [(False, args.samples)]
-    # Alternating: other load on the machine then affects both.
+    # Alternating, so that other load on the machine affects both.
     rounds = min(ROUNDS, args.samples)
     shares = [args.samples // rounds + (turn < args.samples % rounds) for turn in range(rounds)]
     return [(recorded, share) for share in shares for recorded in (False, True)]

@@ -90,13 +90,13 @@ def _count(args: argparse.Namespace) -> int:
 
 
 def _measure(args: argparse.Namespace, say: Say) -> Generator[Run, None, None]:
-    # Here, so that to list the benchmarks does not load the compiler.
+    # Imported here, so that listing the benchmarks does not load the compiler.
     from fasaco_edge.planners.bound import lower_bound_of  # noqa: PLC0415
     from fasaco_edge.planners.grids import read_grid  # noqa: PLC0415
     from fasaco_edge.planners.problem import CoverageProblem  # noqa: PLC0415
     from fasaco_edge.planners.warmup import warm_up  # noqa: PLC0415
 
-    # Read first: a wrong name should not be found out after minutes.
+    # Read first, so that a wrong name fails at once and not after minutes.
     own = [load(place) for place in args.planner]
     colony = ColonyConfig(ants=args.ants, velocities=parse_velocities(args.velocities))
     grids = [read_grid(name) for name in grid_names(args, DEFAULT_MAPS)]

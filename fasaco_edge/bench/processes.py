@@ -21,7 +21,7 @@ from fasaco_edge.host.processes import python_program
 from fasaco_edge.wire import topics
 from fasaco_edge.wire.keys import Keys
 
-# On a computer that is busy with much else.
+# Long enough for a busy computer.
 START_TIMEOUT_S = 180.0
 STOP_TIMEOUT_S = 8.0
 LOOK_EVERY_S = 0.002
@@ -34,7 +34,7 @@ SHARES_OF_WEIGHT = 1024 / 100
 def warm_kernels() -> None:
     """Compile the kernels into the cache, where they are missing, so that no daemon has to.
 
-    In processes of their own: this one stays as small as a client on the bus is.
+    They are compiled in other processes: this one stays as small as a client on the bus.
 
     Raises:
         ProcessEnded: that failed.
@@ -87,7 +87,7 @@ class DaemonProcess:
             BusUnavailable: it does not listen in time.
         """
         host, _, port = self.endpoint.removeprefix("tcp/").partition(":")
-        # To be refused costs the starting process nothing.
+        # A refused connection costs the starting process nothing.
         while not _listens(host, int(port)):
             self._wait("listen at " + self.endpoint)
         return self._ends.enter_context(open_bus(BusSettings("client", (self.endpoint,))))
@@ -173,9 +173,9 @@ def _last_lines(log: Path) -> str:
 
 
 def place(pid: int, cores: Set[int], niceness: int) -> None:
-    """Let all threads of a process run on these cores, and as nicely.
+    """Set cores and niceness of all threads of a process.
 
-    Threads that it starts later do as those that start them.
+    Threads that it starts later inherit both.
     """
     for task in Path(f"/proc/{pid}/task").iterdir():
         with suppress(ProcessLookupError):
@@ -185,7 +185,7 @@ def place(pid: int, cores: Set[int], niceness: int) -> None:
 
 @contextmanager
 def weighed(pid: int, weight: int) -> Iterator[str]:
-    """Put a process into a control group of its own for the block; say which, "" for none.
+    """Put a process into a control group of its own for the block; yield its name, "" for none.
 
     Like ``CPUWeight`` of a unit; only root may, and only where there are control groups.
     """

@@ -81,7 +81,7 @@ def robot_pose(stamp_ns: int) -> StampedPose:
 
 @dataclass(frozen=True, slots=True)
 class PathArrival:
-    """A path as it came in: when [s, monotonic], and what its attachment says of it."""
+    """A received path: its time of arrival [s, monotonic], and its attachment."""
 
     at: float
     about: PathAttachment
@@ -116,7 +116,7 @@ class MapSource:
     def wait_path(self, map_stamp_ns: int) -> PathArrival:
         """Return the first path planned on the map of that stamp.
 
-        Paths without a plan, a walk cut off before a new obstacle, are passed over.
+        Paths without a plan, a walk cut off before a new obstacle, are skipped.
 
         Raises:
             NotYet: none came in time.
@@ -137,7 +137,7 @@ class MapSource:
         )
 
     def forget_paths(self) -> None:
-        """Drop paths that were not waited for."""
+        """Drop paths that arrived earlier."""
         while not self._arrivals.empty():
             self._arrivals.get()
 
@@ -158,7 +158,7 @@ class CoveringRobot:
         maps_a_crate: so many maps show the crate at one place.
 
     Attributes:
-        paths: how many it was given.
+        paths: number of received paths.
     """
 
     def __init__(self, source: MapSource, map_every_s: float, maps_a_crate: int) -> None:
@@ -179,7 +179,7 @@ class CoveringRobot:
             self._ahead = ahead
 
     def tick(self, now: float) -> None:
-        """Drive on for a period, and say where it is; now and then a map."""
+        """Drive on for a period, and publish the pose; now and then a map."""
         with self._lock:
             self._drive(SPEED_M_S / POSES_HZ)
         x, y = self._at
@@ -222,7 +222,7 @@ def robot_beside(
     bus.subscribe(daemon.keys.of(topics.PATH), robot.take_path)
     stamp_ns = time.time_ns()
     source.put_pose(robot_pose(stamp_ns))
-    # Not a map that the daemon may know already: nothing would be planned on that.
+    # A new map: the daemon would plan nothing on one that it knows already.
     source.put_map(with_crate(building(), FIRST_CRATE, stamp_ns))
     source.wait_path(stamp_ns)
     over = threading.Event()

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 DEFAULT_MAPS = ("office", "flat", "basement")
 # For 1,000 ants on the paper's basement, 520 cells; smaller grids are held to it too.
 GOAL_CELLS, GOAL_ANTS, GOAL_WALL_S = 520, 1000, 0.25
-# Threads pay where a group of ants takes its time.
+# Threads pay off where a group of ants takes long.
 GOAL_SPEEDUP, GOAL_SPEEDUP_CELLS = 1.6, 2000
 HEADER = ("grid", "cells", "steps", "wall [ms]", "ants/s", "threads")
 
@@ -83,7 +83,7 @@ def _count(args: argparse.Namespace) -> int:
 
 
 def _measure(args: argparse.Namespace, say: Say) -> Generator[Timing, None, None]:
-    # Here, so that to list the benchmarks does not load the compiler.
+    # Imported here, so that listing the benchmarks does not load the compiler.
     from fasaco_edge.planners.grids import read_grid  # noqa: PLC0415
     from fasaco_edge.planners.paper.colony import ColonyConfig, parse_velocities  # noqa: PLC0415
     from fasaco_edge.planners.paper.fasaco import Fasaco  # noqa: PLC0415
@@ -92,7 +92,7 @@ def _measure(args: argparse.Namespace, say: Say) -> Generator[Timing, None, None
 
     velocities = parse_velocities(args.velocities)
     colony = ColonyConfig(ants=args.ants, velocities=velocities, seed=args.seed)
-    # Read first: a wrong name should not be found out after minutes.
+    # Read first, so that a wrong name fails at once and not after minutes.
     grids = [read_grid(name) for name in grid_names(args, DEFAULT_MAPS)]
     say("loading kernels")
     warm_up()
@@ -137,7 +137,7 @@ def _report(args: argparse.Namespace, timings: Sequence[Timing]) -> Report:
         },
         goals=tuple(goal for figures in grids for goal in _goals(figures)),
         remarks=(
-            "below a time its range; threads: how much faster so many are than one",
+            "below a time its range; threads: their speed-up over one",
             f"peak memory of this process {peak_mb()} MB",
         ),
     )

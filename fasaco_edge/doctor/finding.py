@@ -45,7 +45,7 @@ class Unit:
         return environ
 
     def run_as(self, command: str) -> str:
-        """Return how to run a command as the daemon is run, and into its folders."""
+        """Return how to run a command as the daemon's user, with its folders."""
         dynamic = self.properties.get("DynamicUser") == "yes"
         user = self.properties.get("User") or (NAME.partition(".")[0] if dynamic else "")
         given = {
@@ -147,7 +147,7 @@ def ok(found: str, details: Iterable[str] = ()) -> Finding:
 
 
 def warn(found: str, to_do: str, details: Iterable[str] = ()) -> Finding:
-    """Return a finding to think about: it works."""
+    """Return a finding that deserves attention: it works."""
     return Finding(Level.WARN, found, to_do, tuple(details))
 
 

@@ -26,7 +26,7 @@ STA_UNSYNC = 0x40
 TIME_ERROR = 5
 # Memory above that of a daemon with a plan of a large building.
 WANTED_MB = 350
-# Fewer than a map of 100 m x 100 m has, at 5 cm, deserve a word.
+# The doctor mentions a limit below the pixels of a map of 100 m x 100 m at 5 cm.
 WANTED_PIXELS = 4_000_000
 PI_CMDLINES = ("boot/firmware/cmdline.txt", "boot/cmdline.txt")
 
@@ -118,7 +118,7 @@ def _cpuinfo(root: Path, name: str) -> str:
 
 
 def _field(file: Path, before: str) -> str:
-    """Return what follows in the first line that begins so; "" where there is none."""
+    """Return the rest of the first line with this beginning; "" without one."""
     match = re.search(f"^{before}(.*)$", _read(file), re.MULTILINE)
     return match[1].strip() if match else ""
 

@@ -107,8 +107,8 @@ def _listening(port: int) -> set[str]:
 LISTEN_S = 0.7
 ASK_S = 0.7
 # What to do about two publishers of one thing.
-ONE_ONLY = "stop all but one: the daemon takes the one it hears first, until that is silent"
-# Most maps elsewhere that are named.
+ONE_ONLY = "stop all but one: the daemon uses the first it receives, until that is silent"
+# Most maps under other names that are listed.
 MOST_PLACES = 8
 # Positions of the entity's kind and of its topic's type in a token of rmw_zenoh
 # (``wire.ros_keys``).
@@ -191,7 +191,7 @@ def _seen(context: CheckContext, bus: Bus, listen_s: float) -> Finding:
         found = f"no daemon of robot {keys.robot!r}; {_in_words(heard)}"
         return warn(f"{found}; {several}", ONE_ONLY, details) if several else ok(found, details)
     if status is None:
-        found = "the daemon runs, but does not answer for its status"
+        found = "the daemon runs, but does not answer status queries"
         to_do = "connect under a name with the role viewer (bus.security.roles)"
         return warn(found, to_do, details)
     found = f"the daemon runs: {status.state}, {status.reason}"

@@ -77,7 +77,7 @@ class Axis:
         """Return where a value lies: 0 at the low end, 1 at the high one."""
         if not self.logarithmic:
             return (value - self.low) / (self.high - self.low)
-        # What is too small to be drawn lies on the edge.
+        # Values too small for the axis lie on its edge.
         return math.log(max(value, self.low) / self.low) / math.log(self.high / self.low)
 
 

@@ -79,7 +79,7 @@ def draw_visits(
 
 def _reachable(lattice: CoverageLattice, start: Cell) -> NDArray[np.bool_]:
     if not lattice.contains(start) or lattice.states[lattice.local(start)] != COVERABLE:
-        # Unknown from here: no cell is called unreachable.
+        # Without a start, no cell is called unreachable.
         return np.ones(lattice.states.shape, np.bool_)
     return reachable_from(lattice.steps, *lattice.local(start)).astype(np.bool_)
 
@@ -187,8 +187,8 @@ def draw_walk(
         grid: the map the lattice was made from; None draws the lattice's own states.
         title: heading.
         lines: caption below it.
-        line_xy: float64 (n, 2), n >= 1: what is driven in its place, points (x, y) [m] joined by
-            straight lines; None for the centres of the cells.
+        line_xy: float64 (n, 2), n >= 1: the line driven instead, points (x, y) [m] joined by
+            straight segments; None for the centres of the cells.
         swept: floor that it sweeps, to be drawn in place of the cells; None for these.
         unswept: reachable floor that it leaves; None where that is not known.
     """
@@ -225,7 +225,7 @@ def plot_walk(
 def in_pieces(line: Points, longest: float) -> Points:
     """Return a line (n, 2), n >= 1, with points added so that none are further apart than that.
 
-    A little more is left as it is: what is as long as a cell, rounded, is one piece.
+    A slightly longer piece stays whole: rounding may lengthen a piece of one cell.
     """
     ways = np.diff(line, axis=0)
     counts = np.maximum(np.ceil(np.hypot(*ways.T) / longest - 1e-3), 1).astype(np.int64)
@@ -288,7 +288,7 @@ def draw_mission(
         title: heading.
         lines: caption below it.
         space: the most the map may take (width, height) [px].
-        jump_m: two places further apart than this [m] are no drive, and not joined.
+        jump_m: two places further apart than this [m] are a jump, and are not joined.
         swept: reachable floor that was swept, shown in place of the cells; None to show these.
         unswept: reachable floor that was not swept; None where that is not known.
         zones, keep_out: polygons of the order [m].

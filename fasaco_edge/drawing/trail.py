@@ -81,13 +81,13 @@ def pointed_and_decided(tau: Tau) -> tuple[NDArray[np.int8], NDArray[np.float64]
     ways = np.count_nonzero(tau > 0, axis=2)
     even = 1.0 / np.maximum(ways, 1)
     decided = np.where(ways == 1, 1.0, (share - even) / np.maximum(1.0 - even, 1e-9))
-    # What rounding leaves of an even cell is no direction.
+    # A rounding error in an even cell is no direction.
     decided[(decided < 1e-5) | (ways == 0)] = 0.0
     return pointed, np.minimum(decided, 1.0)
 
 
 def _compared(decided: NDArray[np.float64], tau: Tau) -> NDArray[np.float64]:
-    """Return how decided cells are beside the most decided one that has a choice, 0 to 1."""
+    """Return how decided cells are relative to the most decided one with a choice, 0 to 1."""
     choice = decided[np.count_nonzero(tau > 0, axis=2) > 1]
     most = float(choice.max(initial=0.0))
     return np.minimum(decided / most, 1.0) if most > 0.0 else decided

@@ -131,7 +131,8 @@ def _lattice_deg(align: str | float, grid: OccupancyGrid) -> float:
 
 def _stands(floor: Floor, cell_m: float, lattice_deg: float) -> StandLattice:
     """Return the stands in cells whose rows are at an angle to the map frame's x axis."""
-    # To rotate the lattice over a map is to rotate the map below it. Stands are pixels of it.
+    # Rotating the lattice over a map is the same as rotating the map below it. Stands are pixels of
+    # it.
     below = replace(floor, geometry=rotated_geometry(floor.geometry, -lattice_deg))
     return StandLattice.over(below, cell_m)
 

@@ -100,7 +100,7 @@ def _parts(parts: tuple[FloorLeft, ...] | None) -> list[Digest]:
 
 
 def _to_go_s(view: RobotState, status: Status, way: Way) -> int | None:
-    # A robot that was told to stand has no path: what is left is not known.
+    # A robot that is commanded to stand has no path: the rest of the way is unknown.
     stands = status.path is not None and not status.path.steps
     left_s = way.left_s(view.walk.at, view.settings.robot, status.drive)
     if left_s is None or left_s > MOST_TO_GO_S or stands or status.state not in UNDERWAY:

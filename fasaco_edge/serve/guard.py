@@ -89,13 +89,13 @@ def guard_for(
     """
     if tokens is None and not address.is_loopback:
         raise BadConfiguration(
-            f"--listen: {address.shown} lets other computers in, and nothing says who may",
+            f"--listen: {address.shown} lets other computers in, without any access control",
             hint="give --tokens FILE (a new file gets new tokens), or listen on 127.0.0.1",
         )
     if tokens is not None and allow_commands:
         raise BadConfiguration(
-            "--allow-commands: with --tokens, who has the operator's token may command",
-            hint="leave out one of both",
+            "--allow-commands: with --tokens, the operator's token gives that right",
+            hint="leave out one of the two",
         )
     ours = {"localhost", socket.gethostname().lower(), *(name.lower() for name in names)}
     ours |= {f"{name}.local" for name in ours if "." not in name}
@@ -120,7 +120,7 @@ def read_tokens(file: Path) -> tuple[tuple[Role, str], ...]:
     except FileTooLongError as error:
         raise BadConfiguration(
             f"--tokens: {file}: {error.strerror}",
-            hint="take tokens and remarks out: all who have a role may use the same token",
+            hint="remove tokens and remarks: clients of one role may share a token",
         ) from error
     except (OSError, UnicodeDecodeError) as error:
         why = error.strerror if isinstance(error, OSError) else "not a text"

@@ -17,7 +17,7 @@ from fasaco_edge.wire.messages.grid_octets import GridOctets
 # Marks of a map: unmarked pixels are unknown.
 FREE, WALL = 1, 2
 LEVELS = 7
-# Of what a daemon says it needs of a map; where it does not say, its defaults [percent].
+# Limits of a map by default; a daemon's status may state others [percent].
 FREE_AT_MOST, OCCUPIED_AT_LEAST = 25, 65
 # Values of a coverage grid, as ``wire.messages.maps.CoverageValue`` has them for arrays.
 TO_COVER, COVERED, RECOVERED, BLOCKED = 0, 50, 75, 100
@@ -50,11 +50,11 @@ def level_marks(top: int) -> bytes:
 
 
 COVERAGE_MARKS = _coverage_marks()
-"""Of a coverage grid, where no map is heard."""
+"""For a coverage grid, if no map is received."""
 FLOOR_MARKS = level_marks(100)
-"""Of a floor in percent."""
+"""For a floor in percent."""
 FIELD_MARKS = level_marks(255)
-"""Of a pheromone field."""
+"""For a pheromone field."""
 
 
 def grid_message(kind: str, grid: GridOctets, marks: bytes) -> bytes:

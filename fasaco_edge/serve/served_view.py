@@ -30,7 +30,7 @@ from fasaco_edge.wire.messages.path_points import PathPoints
 
 # Most points shown of a path; reading one takes some 4 us a point.
 MOST_POINTS = 20_000
-# Most other robots, the most recently heard; they publish once a second.
+# Most other robots, the most recently received; they publish once a second.
 MOST_OTHERS, OTHER_LASTS_S = 50, 10.0
 # Least period of each message [s]; unchanged messages are not sent again.
 PERIODS_S = {
@@ -117,7 +117,7 @@ class ServedView(RobotState):
             "floor": self._grids.get("floor"),
             "field": self._grids.get("field"),
         }
-        # The others tell of time, too.
+        # Messages of other kinds depend on the time, too.
         now_too = self.document, self.trouble, len(self.robots), int(now)
         return made_of.get(kind, now_too)
 
@@ -145,7 +145,7 @@ class ServedView(RobotState):
             self._grids["field"] = read_field(sample.payload)
 
     def _read_path(self, sample: Sample, _: float) -> None:
-        # They are many: none is an event of its own.
+        # Paths are frequent, so they are no events.
         self._path = sample
 
     def _read_fleet(self, sample: Sample, now: float) -> None:

@@ -110,7 +110,7 @@ class Viewer:
 
     async def _carry_out(self, order: Order, role: Role) -> str:
         if role != "operator":
-            why = "this page may only look; its server says who may command"
+            why = "this page may only look; its server decides who may command"
             return message_text("answer", id=order.id, ok=False, text=why, hint="")
         asked: dict[str, object] = {"command": order.command}
         if order.command == "start":

@@ -44,13 +44,13 @@ class Watched(Protocol):
         """Why the bus cannot be reached; "" if it can."""
 
     def take(self, timeout_s: float) -> bool:
-        """Take in what arrives within ``timeout_s`` [s]; return whether something has."""
+        """Take in arrivals of ``timeout_s`` [s]; return whether there were any."""
 
     def documents(self) -> list[dict[str, object]]:
         """Return the JSON objects that are due since the last ``take``."""
 
     def document(self) -> dict[str, object]:
-        """Return all that is known now as a JSON object."""
+        """Return the present state as a JSON object."""
 
     def line(self, now: float) -> str:
         """Return the state in a line."""
@@ -59,13 +59,13 @@ class Watched(Protocol):
         """Return a page of lines."""
 
     def press(self, keys: str) -> bool:
-        """Do what typed keys say; return whether that is another page."""
+        """Handle typed keys; return whether the page changes."""
 
     def is_known(self) -> bool:
         """Return whether there is something to show."""
 
     def is_whole(self) -> bool:
-        """Return whether all is known that a page shows."""
+        """Return whether everything that a page shows is known."""
 
 
 def watch_on_screen(watched: Watched) -> None:

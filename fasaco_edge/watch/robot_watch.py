@@ -22,7 +22,7 @@ REST_S = 1.0
 
 
 class RobotWatch:
-    """What is watched of one robot, see ``live.Watched``."""
+    """One watched robot, see ``live.Watched``."""
 
     rest_s = REST_S
 
@@ -94,7 +94,7 @@ class RobotWatch:
         return True
 
     def is_known(self) -> bool:
-        """Return whether the robot's daemon has told its status."""
+        """Return whether a status of the robot's daemon has arrived."""
         return self._view.status is not None and self._view.is_here
 
     def is_whole(self) -> bool:
