@@ -27,7 +27,7 @@ Say = Callable[[str], None]
 
 @dataclass(frozen=True, slots=True)
 class Goal:
-    """A limit and what was measured, in the same ``unit``.
+    """A limit and the measured value, in the same ``unit``.
 
     Attributes:
         what: what is measured.

@@ -27,10 +27,10 @@ MEASURES = (
     ("ready_s", "exec to liveliness token [s]", 3),
     ("status_s", "exec to first status [s]", 3),
     ("idle_mb", "memory before the first map [MB]", 1),
-    ("idle_own_mb", "of it its own, no pages of files [MB]", 1),
+    ("idle_own_mb", "of this without pages of files [MB]", 1),
     ("idle_percent", "share of a core before the first map [%]", 2),
     ("warm_mb", "memory after map and plan [MB]", 1),
-    ("warm_own_mb", "of it its own [MB]", 1),
+    ("warm_own_mb", "of this without pages of files [MB]", 1),
     ("mission_percent", "share of a core in a mission [%]", 2),
     ("peak_mb", "peak memory [MB]", 1),
 )

@@ -1,4 +1,4 @@
-"""A real daemon as a process of its own, where it runs, a session with it, a recorder beside it."""
+"""A real daemon in a process of its own, its cores, a session with it, a recorder beside it."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def warm_kernels() -> None:
     They are compiled in other processes: this one stays as small as a client on the bus.
 
     Raises:
-        ProcessEnded: that failed.
+        ProcessEnded: it failed.
     """
     warmup = [*PROGRAM, "warmup"]
     if subprocess.run([*warmup, "--check"], check=False, capture_output=True).returncode == 0:

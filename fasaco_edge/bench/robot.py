@@ -155,7 +155,7 @@ class CoveringRobot:
     Args:
         source: publishes its poses and maps.
         map_every_s: period of maps [s].
-        maps_a_crate: so many maps show the crate at one place.
+        maps_a_crate: number of successive maps that show the crate at one place.
 
     Attributes:
         paths: number of received paths.

@@ -194,7 +194,7 @@ class Mailbox(Generic[Item]):
         spacing = self._spacing
         if spacing is None or now >= self._free_at:
             return ()
-        # Followers alone are free between two items of the kind.
+        # Without a waiting item of the kind, its followers need not wait.
         if not self._queued[spacing.kind] and self._free_at < math.inf:
             return ()
         return (spacing.kind, *spacing.followers)

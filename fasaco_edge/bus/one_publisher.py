@@ -24,8 +24,8 @@ class Sessions(Protocol):
         ...
 
     def only_passes_on(self, session: str) -> bool:
-        """Return whether it is this one or a router of it: they put their ids on samples of others
-        that have none."""
+        """Return whether it is this session or its router: they put their ids on samples without
+        one."""
         ...
 
 

@@ -81,7 +81,7 @@ def drive(report: DriveReport) -> str:
 
 
 def troubles(status: Status) -> list[tuple[str, str]]:
-    """Return what is wrong and for how long, each with what to do."""
+    """Return the troubles, their durations, and what to do about each."""
     return [
         (f"{one_line(each.text)} (for {age(each.since_s)})", one_line(each.do))
         for each in status.troubles[: len(TROUBLES)]

@@ -59,7 +59,7 @@ def roles(context: CheckContext) -> Finding:
         return ok("no roles: anybody who can connect may do everything")
     names = security.names()
     details = [
-        f"{role} ({', '.join(who) or 'nobody'}): {ROLES[role].description}"
+        f"{role} ({', '.join(who) or 'none'}): {ROLES[role].description}"
         for role, who in names.items()
     ]
     if names["router"] or not context.config.bus.listen:
@@ -69,7 +69,7 @@ def roles(context: CheckContext) -> Finding:
     if missing:
         lacking = " or ".join(missing)
         return warn(
-            f"nobody has the role {lacking}, nor may do what it allows",
+            f"no name has the role {lacking}: its rights are denied to all",
             f"add a name to bus.security.roles.{missing[0]}",
             details,
         )
@@ -165,7 +165,7 @@ def _login(bus: BusConfig) -> Finding:
             return fail(f"{where}: no name:password", "correct the line")
         names.append(name)
     unknown = {name for who in security.names().values() for name in who} - set(names)
-    details = (f"may connect: {', '.join(names) or 'nobody'}", _recording(bus, user.name))
+    details = (f"may connect: {', '.join(names) or 'none'}", _recording(bus, user.name))
     if user.dictionary_file and unknown:
         missing = ", ".join(sorted(unknown))
         found = f"user {user.name!r}; {missing}: a role, but no password"

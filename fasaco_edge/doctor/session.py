@@ -139,7 +139,7 @@ def session(context: CheckContext) -> Finding:
         # A client with credentials ends, as these may be what is wrong; a service starts it again.
         ends = bus.mode == "client" and bus.security.kind != "none"
         make, then = (fail, "does not start") if ends else (warn, "waits for it")
-        found = f"nobody answers at {', '.join(silent)}: the daemon {then}"
+        found = f"no answer at {', '.join(silent)}: the daemon {then}"
         return make(found, "start the router there, or correct bus.connect", details)
     if not is_taken:
         return ok("the endpoints are free", details)

@@ -196,7 +196,7 @@ def _draw_panel(pen: _Pen, panel: Panel, left: float, top: float) -> None:
             upper = [place(x, high) for x, _, high in line.band]
             lower = [place(x, low) for x, low, _ in reversed(line.band)]
             pen.area(upper + lower, _pale(line.colour))
-    # The first line is the one that matters: it lies on top.
+    # The first line matters most, so it lies on top.
     for line in reversed(panel.lines):
         places = [place(x, y) for x, y in line.points]
         if line.joined and len(places) > 1:

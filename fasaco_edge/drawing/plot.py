@@ -171,7 +171,7 @@ class Plot:
         layer = self._spread(lattice, colours, palette.PAPER)
         if lattice.cell_m * self.view.scale >= RULED_CELL_PX:
             self._rule(layer, lattice.cell_m)
-        # Multiplied, so that what is dark on the map stays dark.
+        # Multiplied, so that dark parts of the map stay dark.
         self._image = ImageChops.multiply(self._image, layer)
         self._draw = ImageDraw.Draw(self._image)
 

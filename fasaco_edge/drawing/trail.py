@@ -22,7 +22,7 @@ WAYS = {
     WEST: ("left", palette.ORANGE),
     SOUTH: ("down", palette.PURPLE),
 }
-# Arrows closer together than this cannot be told apart.
+# Arrows closer together than this cannot be distinguished.
 ARROW_EVERY_PX = 16
 SMALLEST, LARGEST = 0.2, 0.5
 """Arrow heads, as a share of the way from one to the next."""

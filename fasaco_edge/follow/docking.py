@@ -181,7 +181,7 @@ class Docking:
         return Start(move, self._goal.id)
 
     def _watch(self, goal: _Goal, now: float, state: str) -> list[DockRequest]:
-        """Query the result again, cancel what is not wanted any more, give up what never ends."""
+        """Query the result again; cancel an unwanted goal; give up a goal that never ends."""
         if goal.move is Move.DOCK and state in LEAVES and not goal.is_cancelled:
             goal.is_cancelled = True
             self._cancellations[goal.move].add(goal.id, is_known=goal.is_accepted)

@@ -22,7 +22,7 @@ from fasaco_edge.wire.messages.path_points import PathPoints
 RATE_HZ = 20.0
 # Zeros are sent for this long after a stop; then another program may drive [s].
 ZEROS_S = 1.0
-# The direction in which the path leads is that of its point so far ahead [m].
+# The path leads in the direction of its point this far ahead [m].
 LEADS_M = 0.5
 # Largest distance of the robot from its leg; beyond it the robot has left the path [m].
 OFF_PATH_M = 0.3

@@ -33,7 +33,7 @@ class KnownMap:
         """Take in a nav_msgs/OccupancyGrid.
 
         Raises:
-            MalformedMessage: it is none.
+            MalformedMessage: it is malformed.
         """
         self._grid = read_grid(payload)
 
@@ -41,7 +41,7 @@ class KnownMap:
         """Take in a map_msgs/OccupancyGridUpdate; without a map it is ignored.
 
         Raises:
-            MalformedMessage: it is none, or no part of the map.
+            MalformedMessage: it is malformed, or no part of the map.
         """
         if self._grid is not None:
             self._grid = with_update(self._grid, payload)

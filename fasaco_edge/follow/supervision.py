@@ -150,7 +150,7 @@ class Supervision:
             self._path_of = ""
 
     def hold(self, why: str) -> None:
-        """Have the robot stand, whatever its path; "" lets it drive."""
+        """Make the robot stand, for a reason; "" lets it drive."""
         self._held = why
 
     def stand_by(self, why: tuple[State, str] | None) -> None:

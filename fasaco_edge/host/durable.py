@@ -18,7 +18,7 @@ def write_through(path: Path, payload: bytes, *, mode: int = 0o644) -> None:
         mode: permissions of a new file, restricted by the umask.
 
     Raises:
-        OSError: that failed.
+        OSError: it failed.
     """
     with open(path, "wb", opener=lambda name, flags: open_own(name, flags, mode)) as file:
         file.write(payload)
@@ -34,7 +34,7 @@ def make_folder(folder: Path, *, mode: int = 0o777) -> None:
         mode: permissions of new folders, restricted by the umask.
 
     Raises:
-        OSError: that failed.
+        OSError: it failed.
     """
     if folder.is_dir():
         return
@@ -47,7 +47,7 @@ def sync_folder(folder: Path) -> None:
     """Write the names in a folder to the disk.
 
     Raises:
-        OSError: that failed.
+        OSError: it failed.
     """
     descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
     try:

@@ -26,7 +26,7 @@ def open_own(path: str | Path, flags: int, mode: int = 0o644) -> int:
     write to, either may be a trap.
 
     Raises:
-        OSError: that failed, or the file is not ours.
+        OSError: it failed, or the file is not ours.
     """
     flags |= os.O_CREAT | os.O_NOFOLLOW | os.O_CLOEXEC
     # An existing file is only truncated once it is known to be ours.
@@ -55,7 +55,7 @@ def read_own(path: str | Path, most: int) -> bytes:
 
     Raises:
         FileTooLongError: it has more than ``most`` bytes.
-        OSError: that failed, or it belongs to another user.
+        OSError: it failed, or it belongs to another user.
     """
     with _open_plain(path, partial(_check_owner, path)) as file:
         content = file.read(most + 1)
@@ -97,10 +97,10 @@ def check_plain(path: str | Path) -> None:
 
 
 def make_own_folder(folder: Path) -> None:
-    """Make a folder, or take an existing one that is ours and no link of another user's.
+    """Make a folder, or accept an existing one that is ours and no link of another user's.
 
     Raises:
-        OSError: that failed, or it belongs to another user.
+        OSError: it failed, or it belongs to another user.
     """
     folder.mkdir(exist_ok=True)
     _check_owner(folder, folder.lstat())

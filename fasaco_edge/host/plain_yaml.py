@@ -23,7 +23,7 @@ PIPE_S = 5.0
 
 
 class PlainYamlError(ValueError):
-    """A file is no plain YAML; the text says where, not in which file."""
+    """A file is no plain YAML; the text names the place, not the file."""
 
 
 def read_bounded(path: Path) -> str:
@@ -59,7 +59,7 @@ def load(text: str) -> object:
     """Return the plain values of a document; None for an empty one.
 
     Raises:
-        PlainYamlError: it is none, or not plain.
+        PlainYamlError: it is no YAML, or not plain.
     """
     return compose(text)[1]
 
@@ -68,7 +68,7 @@ def compose(text: str) -> tuple[yaml.Node | None, object]:
     """Return a document as its nodes, which know their lines, and as plain values.
 
     Raises:
-        PlainYamlError: it is none, or not plain.
+        PlainYamlError: it is no YAML, or not plain.
     """
     try:
         loader = _Loader(text)

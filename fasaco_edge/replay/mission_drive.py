@@ -111,7 +111,7 @@ class MissionDrive:
         Args:
             now: time of the daemon's steady clock [s].
             batch: samples that the loop takes from its mailbox.
-            commands, plans: what comes beside samples.
+            commands, plans: the other inputs of the cycle.
             may_begin: whether the mission may begin, once there is a map.
         """
         self.began = now if self.began is None else self.began

@@ -168,7 +168,7 @@ class Replay:
 
     Args:
         config: of the daemon to be.
-        run: what is known of the recorded daemon.
+        run: the recorded run.
         work: proposals of each plan; None for the recorded work.
 
     Attributes:
@@ -281,7 +281,7 @@ class ReplayPlanner:
 
     Args:
         planner: the daemon's.
-        run: what was recorded.
+        run: the recorded run.
         budget_s: the time its plans had [s].
         work: proposals of each plan; None for the recorded work.
 

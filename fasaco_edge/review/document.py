@@ -103,7 +103,7 @@ class ReviewDocument(msgspec.Struct):
             recording), state, complete, covered_cells, coverable_cells, order (what it asked for;
             null where that is not recorded), replans, paused_s, driven_m, and unreached: areas
             that stayed uncovered at its end, with cells, m2, place (x, y) [m] and reason.
-        commands: each command that came: at_s, command (in words).
+        commands: each received command: at_s, command (in words).
         complete: of the last order: whether the mission reached `done` with every reachable cell
             (of its zones) covered.
         covered_cells, coverable_cells: at the end: covered cells, and all reachable cells.

@@ -177,7 +177,7 @@ class RobotOnBus:
         should_stop: Callable[[], bool],
         report: Callable[[Progress], None] = lambda _progress: None,
     ) -> None:
-        """Let time pass until the robot has to stop; arguments as of ``run_simulation``."""
+        """Let time pass until the robot has to stop; arguments as in ``run_simulation``."""
         world = self._world
         pace = Pace(speed, world.config.tick_s, time.monotonic())
         patience_s = PATIENCE_S if self._is_driven and speed > 1.0 else 0.0

@@ -23,7 +23,7 @@ class MapperNoise:
     The defaults are about those of a scan matcher with a lidar of 12 mm, on pixels of 5 cm.
 
     Attributes:
-        seed: of all of it.
+        seed: of all noise.
         range_m: standard deviation of the scanner's ranges [m].
         specks: share of its rays that end in free space, before a wall.
         leg_misses: share of its rays that miss thin legs, of a few pixels.
@@ -130,5 +130,5 @@ class PoseError:
             )
 
     def place(self, pose: Pose2D, there: Pose2D) -> None:
-        """Move the frame so that ``pose`` lies ``there``, but for the newest scan's error."""
+        """Move the frame so that ``pose`` lies ``there``, without the newest scan's error."""
         self._frame = composed(there, inverse(pose))

@@ -154,7 +154,7 @@ class NoisyMapper(Mapper):
 
 
 def _beside(geometry: GridGeometry, shift_m: NDArray[np.float64]) -> GridGeometry:
-    """Return a raster around a building, whose pixels lie a little beside the building's."""
+    """Return a raster around a building, whose pixels are slightly offset from the building's."""
     margin = math.ceil(MARGIN_M / geometry.resolution)
     right, up = (shift_m / geometry.resolution).tolist()
     origin = Pose2D(*geometry.to_map(right - margin, up - margin), geometry.origin.yaw)

@@ -135,7 +135,7 @@ def driven(state: DriveState, goal: Point | None, config: SimulationConfig) -> D
     """Return the state a tick later, on the way to ``goal`` [m] and to rest there.
 
     Without a goal the robot brakes. It drives only while it points at the goal, and
-    turns only at rest, but for corrections below MISALIGNED_RAD.
+    turns only at rest, except for corrections below MISALIGNED_RAD.
     """
     dt = config.tick_s
     pose = state.pose
@@ -235,7 +235,7 @@ def joined(
         path: waypoints [m], float64 (n, 2).
         track: points [m] the robot came through lately, float64 (m, 2), m >= 1; the last
             is where it is, or can come to rest.
-        is_clear: tells whether the robot can move straight between two points.
+        is_clear: returns whether the robot can move straight between two points.
 
     Returns:
         float64 (k, 2); (0, 2) if nothing is left to drive; None if there is no way now.

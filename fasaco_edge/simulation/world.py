@@ -72,7 +72,7 @@ BATTERY_HZ = 1.0
 
 @dataclass(frozen=True, slots=True)
 class Emission:
-    """What the robot publishes after a tick: its map, its pose, its battery; or none of it."""
+    """Messages that the robot publishes after a tick: map, pose and battery, each or none."""
 
     map: OccupancyGrid | None = None
     pose: StampedPose | None = None

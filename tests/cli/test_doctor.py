@@ -168,7 +168,7 @@ def test_who_can_read_the_key(doctor, ca, mode, level):
 def test_a_role_that_nobody_has(doctor, ca):
     told, _ = doctor(**tls(ca.files("robot"), roles={"viewer": ["eye"]}))
     assert told["roles"]["level"] == "warn"
-    assert told["roles"]["found"].startswith("nobody has the role mapper or operator")
+    assert told["roles"]["found"].startswith("no name has the role mapper or operator")
 
 
 def test_user_and_password(doctor, tmp_path, anywhere):

@@ -161,7 +161,7 @@ def eye_above(bounds: Bounds, margin: float, aspect: float) -> rrb.EyeControls3D
 
 
 def last_seconds(seconds: float) -> rrb.VisibleTimeRanges:
-    """Return the time up to the cursor from so many seconds before."""
+    """Return the range of this many seconds up to the cursor."""
     return rrb.VisibleTimeRanges(
         timeline=entities.WALL_CLOCK,
         start=rrb.TimeRangeBoundary.cursor_relative(seconds=-seconds),

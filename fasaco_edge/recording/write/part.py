@@ -42,7 +42,7 @@ class Flush(enum.Enum):
 class Part:
     """A file being written.
 
-    Rerun's logging calls never fail: only ``flush`` tells whether the data were written.
+    Rerun's logging calls never fail: only ``flush`` shows whether the data were written.
 
     Attributes:
         refused: why the first message was not written; then only ``abandon`` may be called.

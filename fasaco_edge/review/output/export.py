@@ -56,7 +56,7 @@ def export(review: Review, folder: Path, form: str = CSV) -> None:
         Column("unit", "text", "", "of its values"),
         Column("description", "text", "", "what it is"),
     )
-    # Also beside Parquet: to be read by people.
+    # As CSV even with Parquet, for people to read.
     _write_csv(Table(DESCRIPTION, "", columns, described), folder / f"{DESCRIPTION}.csv")
     _write_arrays(review, folder / "end.npz")
 

@@ -87,7 +87,7 @@ def _paths(review: Review) -> Iterator[Table]:
         REVISION,
         Column("steps", "int", "", "steps from point to point of the path"),
         Column("planner", "text", "", 'which planned it; "" where no plan was needed'),
-        Column("plan_ms", "float", "ms", "how long that took"),
+        Column("plan_ms", "float", "ms", "duration of planning"),
         Column("planned_steps", "int", "", "steps of the walk as planned"),
         Column("lower_bound_steps", "int", "", "no walk has fewer"),
         Column("gap", "float", "", "cost_s / lower_bound_cost_s - 1"),
@@ -117,7 +117,7 @@ def _paths(review: Review) -> Iterator[Table]:
     )
     columns = (
         AT,
-        Column("took_ms", "float", "ms", "how long planning took"),
+        Column("took_ms", "float", "ms", "duration of planning"),
         Column("attempt", "bool", "", "whether it was only to make the path better"),
         Column("used", "bool", "", "whether it became a path"),
         REASON,

@@ -1,4 +1,4 @@
-// The link to the server: it comes back by itself; of a page nobody sees it goes.
+// The link to the server: it reconnects by itself, and closes while the page is hidden.
 let socket = null, asked = 0, pause = 500, taking = Promise.resolve();
 const HIDDEN_MS = 30000;
 let token = "";
@@ -17,7 +17,7 @@ function remembered() {
 const send = (message) => socket && socket.readyState === WebSocket.OPEN && socket.send(JSON.stringify(message));
 const wants = () => send({ kind: "wants", field: showsField });
 
-// What to do once a command was taken, or refused, by its number.
+// Callbacks for accepted and refused commands, by their number.
 const awaited = new Map();
 
 function command(name, members, then = {}) {

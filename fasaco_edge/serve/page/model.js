@@ -1,4 +1,4 @@
-// What is known of the robot: the newest message of each kind, grids and path unpacked.
+// The state of the robot: the newest message of each kind, grids and path unpacked.
 const model = {
   state: null, pose: null, areas: null, events: [], others: [],
   map: null, floor: null, field: null, path: null, role: "viewer",
@@ -9,7 +9,7 @@ async function inflate(bytes) {
   return new Uint8Array(await new Response(stream).arrayBuffer());
 }
 
-// Messages are taken one after the other: an old map must not come after a newer one.
+// Messages are handled one after the other: an old map must not replace a newer one.
 async function take(data) {
   if (typeof data === "string") {
     const message = JSON.parse(data);
@@ -31,7 +31,7 @@ async function take(data) {
   return head;
 }
 
-// Where the map ends: [x0, y0, x1, y1] [m] of what is known of it; null without one.
+// The bounds of the known map: [x0, y0, x1, y1] [m]; null without a map.
 function knownBounds() {
   const map = model.map || model.floor;
   if (!map) return null;

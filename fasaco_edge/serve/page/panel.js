@@ -1,4 +1,4 @@
-// The panel: state, progress, commands and what happened, in words. Text is only ever set as text.
+// The panel: state, progress, commands and events, in words. Text is only ever set as text.
 const find = (id) => document.getElementById(id);
 const LOOKS = { covering: "go", returning: "go", planning: "go", charging: "go", done: "go", blocked: "bad", degraded: "bad", paused: "wait" };
 const WORDS = { covering: "sweeping", returning: "driving home", degraded: "in trouble" };
@@ -166,7 +166,7 @@ function order() {
   };
 }
 
-// What cannot be taken back is asked for twice.
+// An irreversible command asks for a second click.
 let sure = null;
 find("order").addEventListener("click", () => find("start").click());
 find("start").addEventListener("click", () => start(order()));
@@ -196,7 +196,7 @@ function calm() {
   sure = null;
 }
 
-// A start that would forget what is covered is refused: then it is asked what to do.
+// A start that would forget what is covered is refused: the page then asks what to do.
 let refused = null;
 function start(what, discard = false) {
   command("start", { order: what, discard }, {
