@@ -73,7 +73,7 @@ class Report:
         header: the table's columns.
         rows: its cells, as many to a row as there are columns.
         figures: the same, and more, as JSON values.
-        goals: what it is judged by.
+        goals: limits that judge the results.
         remarks: sentences below the table.
         further: tables after the first.
     """

@@ -168,8 +168,8 @@ LATENCY = Benchmark(
     summary="from a map on the bus to its path, without the planning",
     description="Start a real daemon, publish a map of 1000 x 1000 pixels (50 m x 50 m) and a "
     "pose; then maps in which a crate moves in the farthest hall, each of which needs a new "
-    "path. Time each from its put to the arrival of its path; what the daemon says that planning "
-    "took is reported apart. The planner has few ants, so that it does not hide the rest.",
+    "path. Time each from its put to the arrival of its path; the planning time, as the daemon "
+    "reports it, is listed apart. The planner has few ants, so that it does not hide the rest.",
     add_options=_add_options,
     count=lambda args: int(args.samples) * (2 if args.recorder else 1),
     measure=_measure,

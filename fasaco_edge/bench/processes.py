@@ -99,7 +99,7 @@ class DaemonProcess:
         return time.monotonic() - self._started
 
     def wait_status(self, bus: Bus) -> float:
-        """Wait until it answers with a status; return the time since its start [s]."""
+        """Wait until it replies with a status; return the time since its start [s]."""
         while not any(not reply.is_error for reply in bus.get(self.keys.rpc("status"))):
             self._wait("answer with a status")
         return time.monotonic() - self._started

@@ -185,7 +185,7 @@ class BusClaim(Claim):
         return self.state is not before
 
     def show(self) -> None:
-        """Have the token of the present state."""
+        """Show the token of the present state."""
         before, self._token = self._token, self._bus.token(self.key)
         self._bus.withdraw(before)
 

@@ -24,8 +24,7 @@ class Sessions(Protocol):
         ...
 
     def only_passes_on(self, session: str) -> bool:
-        """Return whether it is this session or its router: they put their ids on samples without
-        one."""
+        """Return whether it is this session or its router: both mark samples without an id."""
         ...
 
 

@@ -128,7 +128,7 @@ class SampleOrder:
             self._hold(name, mark, sample)
         elif _is_newer(mark, last):
             self._deliver(name, mark, sample)
-            # More earlier samples may be under way; samples of other publishers do not show that.
+            # More earlier samples may be under way; other publishers' samples do not show that.
             if self._gap_until is not None and any(one[0] == name for one in self._held):
                 self._gap_until = time.monotonic() + UNDER_WAY_S
 

@@ -15,7 +15,7 @@ from fasaco_edge.host.files import why_not_trusted
 from fasaco_edge.kernels import release
 from fasaco_edge.kernels.cache import missing_from, outdated, wanted_folder
 
-# The ledger takes some hundred kilobytes, the kernels ten megabytes.
+# The ledger takes a few hundred kilobytes, the kernels ten megabytes.
 LEAST_MB = {"state": 20.0, "kernel cache": 50.0}
 
 

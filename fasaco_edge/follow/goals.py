@@ -54,7 +54,8 @@ class PathDriven:
 
     def __init__(self, line: Line, way: float) -> None:
         self.line, self.way = line, way
-        # End of the last finished goal: the next one begins there, wherever the robot stopped.
+        # End of the last finished goal: the next one begins there, even if the robot stopped
+        # elsewhere.
         self._done = -1.0
 
     def finish(self, goal: Goal) -> None:

@@ -39,7 +39,7 @@ class Grip:
 
     @property
     def detail(self) -> str:
-        """The tries in the present direction in which the robot did not move, for people."""
+        """The failed tries in the present direction, in words."""
         said = f"tried {self._tries.tries(self._toward)} times"
         if (least := self._rest.least) >= 2.0 * MOVED_M:
             said += f"; poses scatter: goes on once moved by {least:.1f} m"

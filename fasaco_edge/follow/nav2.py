@@ -239,7 +239,7 @@ class Nav2Follower(Supervision):
             self._send(path, path.way)
 
     def _send_next(self, path: PathDriven, goal: Goal) -> None:
-        """Send the next goal, once the robot is near enough to its begin."""
+        """Send the next goal, once the robot is near enough to its start."""
         if goal.next_start is None:
             goal.next_start = path.start_after(goal, self._ahead, self._near)
         assert self._here is not None

@@ -51,7 +51,7 @@ class Node(Protocol):
         """Run a cycle: take the inputs, and send commands."""
 
     def end(self) -> None:
-        """Have the robot stand."""
+        """Make the robot stand."""
 
 
 def run_follower(
@@ -190,7 +190,7 @@ class FollowerNode:
         self._say(command)
 
     def end(self) -> None:
-        """Have the robot stand."""
+        """Make the robot stand."""
         self._role.end()
         self._send(STAND)
 

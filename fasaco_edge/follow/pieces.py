@@ -28,7 +28,7 @@ LEAST_M = 1e-3
 
 
 class Line:
-    """A path parametrised by arc length, from 0 at its begin.
+    """A path parametrised by arc length, from 0 at its start.
 
     Args:
         take: returns the next points of the path [m], at most as many as asked for.
@@ -122,7 +122,7 @@ def end_of_piece(line: Line, start: float, near: float) -> float:
 
     Args:
         line: the path.
-        start: begin of the piece [m].
+        start: where the piece begins [m].
         near: least distance of the piece to itself [m].
     """
     stop = line.length(start + MOST_M)

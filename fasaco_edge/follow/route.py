@@ -20,12 +20,12 @@ from fasaco_edge.grid.geometry import Point
 CHUNK = 500
 # Shorter legs have no direction of their own [m].
 LEAST_LEG_M = 1e-3
-# A new path is joined where it passes the robot within this distance from its begin [m]: the
-# stretch that was driven while it was under way.
+# A new path is joined where it passes the robot within this distance of its start [m]: the robot
+# drove that stretch while the path was under way.
 JOIN_WITHIN_M = 0.3
 # It passes the robot if it is within this distance [m] and this angle of its heading [rad]. If
-# further away, the robot comes to rest, and drives to the nearest point, or to the begin, if one of
-# them is this near [m].
+# further away, the robot comes to rest, and drives to the nearest point, or to the path's start, if
+# one of them is this near [m].
 BESIDE_M, ALONG_RAD = 0.02, 0.1
 NEAREST_M, BEGINNING_M = 0.15, 0.6
 # A path that begins on the last one at a distance ahead between these is a continuation [m].
@@ -131,7 +131,7 @@ class Route:
         A robot ``here``, at rest, that has overshot the corner by more than ``MISSED_M`` returns to
         it first: the straight line to the next leg may cross a wall. It tries again only if that
         brought it nearer: a robot whose pose is late, or not of the point that it turns about,
-        would otherwise circle a corner for ever that it cannot hit.
+        would otherwise circle for ever about a corner that it cannot hit.
         """
         self._fill(2)
         corner = self._legs[0].end if self._legs else None

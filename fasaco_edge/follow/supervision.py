@@ -78,7 +78,7 @@ class Supervision:
 
     Attributes:
         state: of the robot.
-        detail: the same in figures, for people.
+        detail: figures of the state, in words.
         ahead: places of what the robot stands before [m], the nearest first; () for none.
     """
 
@@ -154,7 +154,7 @@ class Supervision:
         self._held = why
 
     def stand_by(self, why: tuple[State, str] | None) -> None:
-        """Have the robot left alone, for a reason with figures; None ends that."""
+        """Leave the robot alone, for a reason with figures; None ends that."""
         self._standby = why
 
     @property
@@ -205,7 +205,7 @@ class Supervision:
         return ""
 
     def _have_none(self, state: State, detail: str = "") -> None:
-        """Have no path; the previous one is withdrawn, too."""
+        """Drop the path; the previous one is withdrawn, too."""
         self._withdraw()
         self._path_state, self._path_detail = state, detail
 

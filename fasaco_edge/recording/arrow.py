@@ -18,7 +18,7 @@ try:
 except ImportError as error:
     raise missing_rerun(error) from error
 
-# Arrow's own pool keeps some ten megabytes of freed memory.
+# Arrow's own pool keeps about ten megabytes of freed memory.
 pa.set_memory_pool(pa.system_memory_pool())
 
 __all__ = ["missing_rerun", "pa"]

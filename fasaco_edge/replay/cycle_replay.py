@@ -69,7 +69,7 @@ class CycleRecord:
 
 
 def read_turns(samples: Iterable[Arrival]) -> CycleRecord | None:
-    """Return the content of the turn log; None if it is missing, or its begin is."""
+    """Return the content of the turn log; None if it is missing, or its beginning is."""
     beginning: LogStart | None = None
     kernels, turns, gap = "", 0, ""
     taken: set[tuple[str, int]] = set()

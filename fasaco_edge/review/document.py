@@ -149,7 +149,7 @@ class ReviewDocument(msgspec.Struct):
             not, by the last status), branching (at the end: mean number of directions of a cell
             within reach of its strongest).
         memory_mb_max, recorder_memory_mb_max: most memory of daemon and recorder [MB].
-        processor_s, recorder_processor_s: processor time of daemon and recorder in all [s].
+        processor_s, recorder_processor_s: total processor time of daemon and recorder [s].
         processor_percent_max, threads_max: of the daemon: processor time over half a minute [% of a
             core], threads.
         restored_cells: cells that were covered before a restart.

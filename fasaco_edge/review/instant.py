@@ -234,7 +234,7 @@ def _turn(review: Review, drawn: _Drawn, at_s: float) -> TurnThen | None:
     yaw = np.degrees(np.unwrap(track[:, 2]))
     turned = yaw[None, :] - yaw[:, None]
     seconds = times[None, :] - times[:, None]
-    # Of equally sharp turns the shortest and nearest one; two in a row are two.
+    # Of equally sharp turns the shortest and nearest one counts; two in a row stay apart.
     away = np.abs((times[None, :] + times[:, None]) / 2 - at_s)
     sharp = np.minimum(np.abs(turned), 180.0) - SHORTER_DEG_S * (seconds + away)
     worth = np.where((seconds > 0) & (seconds <= TURN_S), sharp, 0.0)

@@ -30,7 +30,7 @@ TROUBLES = ("degraded", "blocked", "silent")
 # The effect of a command is published at most this long after it [s].
 COMMAND_S = 1.5
 RECORDER_IN_ORDER = ("recording", "stopping")
-# "path blocked at cell (2, 3)" is of the kind "path blocked".
+# "path blocked at cell (2, 3)" has the kind "path blocked".
 _DETAIL = re.compile(r":| at cell|,| \d")
 # As ``mission.map.reachable_area.AreaChange`` says them.
 _MAP = "map: "

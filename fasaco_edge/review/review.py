@@ -52,7 +52,7 @@ from fasaco_edge.wire.documents.settings import known_settings
 REPORT_EVERY = 200
 
 Progress = Callable[[str, int, int], None]
-"""Called with the task, how much of it is done, and how much there is in all."""
+"""Called with the task, the amount done, and the whole amount."""
 Item = TypeVar("Item")
 
 
@@ -183,7 +183,7 @@ class Review:
 
     @property
     def seconds_by_state(self) -> dict[str, float]:
-        """How long each state lasted in all [s]."""
+        """Total duration of each state [s]."""
         total: dict[str, float] = {}
         for span in self.states:
             total[span.name] = total.get(span.name, 0.0) + span.seconds

@@ -124,7 +124,7 @@ class RunData:
         plan_log: plans, by the turn log.
         grid: the map at the end, with all updates.
         ordered_keep_out: polygons of the last order.
-        zones: of the last order; without one, and in one for everything, empty.
+        zones: of the last order; empty without an order, or if it is for everything.
         config, version, robot: of the daemon, by its last status.
         undecodable: samples that could not be read, by topic.
         last_s: when the last sample came.

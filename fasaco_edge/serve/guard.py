@@ -24,7 +24,7 @@ from fasaco_edge.host.files import FileTooLongError, read_own
 from fasaco_edge.host.outputs import whole
 from fasaco_edge.serve.messages import Role
 
-# Of a file with tokens: some forty.
+# Longest file with tokens: it holds about forty.
 MOST_BYTES = 4096
 _TOKEN = re.compile(r"[\w.~-]{16,200}", re.ASCII)
 ROLES: tuple[Role, ...] = get_args(Role)

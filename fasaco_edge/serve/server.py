@@ -33,7 +33,7 @@ MOST_VIEWERS = 20
 # Most connections that are not yet authenticated: beyond that the oldest is closed. A page sends
 # its token at once, so silent ones block no page.
 MOST_STRANGERS = 20
-# The longest order is some hundred kilobytes.
+# The longest order has a few hundred kilobytes.
 MOST_BYTES = 262_144
 # Least period of messages to pages; without any, period of the check for viewers [s].
 FRAME_S, IDLE_S = 0.1, 0.2

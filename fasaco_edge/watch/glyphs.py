@@ -33,7 +33,7 @@ _LOOKS: dict[int, tuple[Colour, str, str]] = {
     picture.NEXT: ((255, 240, 110), "bright_magenta", "*"),
     picture.ROBOT: ((222, 36, 56), "red", "@"),
 } | {
-    # From black over violet and orange to yellow; few terminals' own colours go as far.
+    # From black over violet and orange to yellow; few terminals have such colours of their own.
     kind: ((red, green, blue), ansi, plain)
     for kind, (red, green, blue, ansi, plain) in zip(
         picture.FIELD,

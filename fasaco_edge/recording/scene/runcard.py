@@ -47,7 +47,7 @@ class RunDescription:
 
     Attributes:
         robot: name of the robot.
-        began: begin of the recording, UTC, as text.
+        began: when the recording began, UTC, as text.
         version: of the planner; "" while unknown.
         config: its configuration from its status.
         pheromone_range: least and greatest pheromone of all fields; None while there is none.

@@ -127,6 +127,6 @@ def _write_arrays(review: Review, file: Path) -> None:
             "lattice_corner": np.array((lattice.window.row0, lattice.window.col0)),
             "cell_m": np.array(lattice.cell_m),
         }
-    # As NumPy's own readers take it; its stub takes the first array for an option.
+    # In the form of NumPy's own readers; its stub mistakes the first array for an option.
     with whole(file) as new:
         np.savez_compressed(new, **arrays)  # type: ignore[arg-type]

@@ -112,7 +112,7 @@ def replan_panel(reviews: Sequence[Review], labels: Sequence[str]) -> Panel:
     """Return a chart of the durations of replans, a dot each."""
     time = TimeAxis.over(max(review.duration_s for review in reviews))
     found = [replan_times(review) for review in reviews]
-    # Two have the colours of their curves, one has another than the curve above it.
+    # Two reviews have the colours of their curves; one has another colour than the curve above.
     colours = COLOURS if len(reviews) > 1 else COLOURS[1:]
     lines = [
         Line(label if len(reviews) > 1 else "", colour, _dots(time, at_s, took_ms), joined=False)
