@@ -302,8 +302,8 @@ def test_it_listens_to_others_only_where_it_is_told_who_may(tmp_path):
     long.chmod(0o600)
     for more, said in (
         (("127.0.0.1:8465", "--tokens", long), f"{long}: 4117 bytes, at most 4096 are read"),
-        (("0.0.0.0:8465",), "nothing says who may"),
-        (("[::]:8465",), "nothing says who may"),
+        (("0.0.0.0:8465",), "without any access control"),
+        (("[::]:8465",), "without any access control"),
         (("somewhere:8465",), "must be an address and a port"),
         (("127.0.0.1:8465", "--tokens", tokens), "line 1: must be"),
         (("127.0.0.1:8465", "--tokens", open_), "can be read by others"),
