@@ -19,8 +19,6 @@ from functools import lru_cache
 from pathlib import Path, PurePath
 from types import FrameType
 
-from fasaco_edge.host.libraries import unmap_unread
-
 
 def python_program(module: str, *words: str) -> list[str]:
     """Return the command line that runs a module with this interpreter.
@@ -151,13 +149,11 @@ def _own_status() -> int:
 def release_unused() -> None:
     """Return unused memory of the startup, or of loading kernels, to the system.
 
-    This returns freed memory of the calling thread's arena, if the C library can (glibc), and pages
-    of libraries (``fasaco_edge.host.libraries``).
+    This returns freed memory of the calling thread's arena, if the C library can (glibc).
     """
     trim = getattr(ctypes.CDLL(None), "malloc_trim", None)
     if trim is not None:
         trim(0)
-    unmap_unread()
 
 
 def return_soon() -> None:

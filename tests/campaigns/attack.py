@@ -18,9 +18,10 @@ from typing import Any
 
 import zenoh
 
+from fasaco_edge.host.processes import own_mb
 from tests.campaigns.attacks import AT, GOOD_MAP, attacks, pour
 from tests.support.outsider import Outsider, open_client
-from tests.support.processes import Daemon, daemon_process, resident_mb
+from tests.support.processes import Daemon, daemon_process
 from tests.support.rooms import pose_bytes
 from tests.support.secured import House, authority, secured_daemon, transport
 
@@ -170,7 +171,7 @@ def tried(
     counted = now["errors"]["total"] - before["errors"]["total"]
     if counted:
         outcome += f"; {counted} looked at and refused"
-    unharmed, memory = harm(before, now), resident_mb(daemon.pid)
+    unharmed, memory = harm(before, now), own_mb(daemon.pid)
     after = works(boss, mapper)
     return Row(title, outcome, quiet, during, 1e3 * asking.slowest_s, memory, unharmed, after)
 

@@ -33,6 +33,7 @@ import zenoh
 
 from fasaco_edge.bench.processes import warm_kernels
 from fasaco_edge.bus.claim import ClaimState, claims_in
+from fasaco_edge.host.processes import own_mb
 from tests.campaigns import passing_mappers
 from tests.campaigns.services import show
 from tests.support.outsider import Outsider, open_client
@@ -42,7 +43,6 @@ from tests.support.processes import (
     Daemon,
     daemon_process,
     free_endpoint,
-    resident_mb,
 )
 from tests.support.rooms import map_bytes, pose_bytes, room
 from tests.support.router import router_process
@@ -112,7 +112,7 @@ class Campaign:
                     len(os.listdir(f"/proc/{pid}/task")),
                     len(os.listdir(f"/proc/{pid}/fd")),
                     (_cpu_s(pid) - before[name]) / self.rest_s,
-                    resident_mb(pid),
+                    own_mb(pid),
                 )
                 for name, pid in self.processes.items()
             },

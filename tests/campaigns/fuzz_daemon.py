@@ -14,9 +14,10 @@ from collections import Counter
 from pathlib import Path
 from typing import Any
 
+from fasaco_edge.host.processes import own_mb
 from tests.support.map_mutations import mutant
 from tests.support.outsider import Outsider
-from tests.support.processes import Daemon, daemon_process, resident_mb
+from tests.support.processes import Daemon, daemon_process
 from tests.support.rooms import map_bytes, pillared_room, pose_bytes, two_rooms
 
 # Fewer than the daemon holds between two turns of its loop: updates and poses must all be counted.
@@ -35,7 +36,7 @@ def run_campaign(daemon: Daemon, samples: int, seed: int = 0) -> dict[str, Any]:
     with Outsider(daemon.endpoint) as outsider:
         before = _begin(outsider)
         errors, counted = before["errors"]["total"], Counter[str]()
-        resident = resident_mb(daemon.pid)
+        resident = own_mb(daemon.pid)
         while sent.total() < samples:
             kind = KINDS[sent.total() // BATCH % len(KINDS)]
             batch = min(BATCH, samples - sent.total())
@@ -60,7 +61,7 @@ def run_campaign(daemon: Daemon, samples: int, seed: int = 0) -> dict[str, Any]:
             "by_code": codes,
             "next_map_to_status_ms": round(1e3 * (time.monotonic() - started)),
             "rss_mb_before": round(resident, 1),
-            "rss_mb_after": round(resident_mb(daemon.pid), 1),
+            "rss_mb_after": round(own_mb(daemon.pid), 1),
         }
 
 

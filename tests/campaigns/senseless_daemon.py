@@ -32,7 +32,7 @@ from fasaco_edge.grid.fine_raster import (
     map_to_raster,
 )
 from fasaco_edge.grid.lattice import CoverageLattice, Footprint
-from fasaco_edge.host.processes import peak_mb, resident_mb
+from fasaco_edge.host.processes import own_mb, peak_mb
 from fasaco_edge.mission.map.reachable_area import ReachableArea
 from fasaco_edge.wire import schemas
 from fasaco_edge.wire.messages.maps import decode_occupancy_grid
@@ -565,7 +565,7 @@ class Campaign:
         """Be an honest robot for once; look how soon the daemon is honest, too."""
         self.look()
         self.memory["most_resident_mb"] = max(
-            self.memory["most_resident_mb"], resident_mb(self._daemon.pid)
+            self.memory["most_resident_mb"], own_mb(self._daemon.pid)
         )
         started = time.monotonic()
         self._put_mask(event | {"kind": "free"})

@@ -10,10 +10,10 @@ from pathlib import Path
 
 import pytest
 
+from fasaco_edge.host.processes import own_mb
 from tests.daemon.test_mask_topic import MISSION, put_mask
 from tests.daemon.test_service import rewritten, service
 from tests.support.outsider import TIMEOUT_S, Outsider
-from tests.support.processes import resident_mb
 from tests.support.rooms import FREE, WALL, fill, map_bytes, pose_bytes, room
 
 # Replacements until all caches are full, and those after that which are measured.
@@ -43,7 +43,7 @@ def held_by(pid: int) -> Held:
         len(list(chain.from_iterable(file.read_text().split() for file in children))),
         len(threads),
         len(list((process / "fd").iterdir())),
-        resident_mb(pid),
+        own_mb(pid),
     )
 
 

@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 
 from fasaco_edge.grid.geometry import Pose2D
+from fasaco_edge.host.processes import own_mb
 from tests.daemon.test_idle import IDLE_MB
 from tests.support.outsider import Outsider
-from tests.support.processes import daemon_process, free_endpoint, resident_mb
+from tests.support.processes import daemon_process, free_endpoint
 from tests.support.rooms import map_bytes, pillared_room, pose_bytes, two_rooms, update_bytes
 from tests.support.ros_robot import (
     CLIENT,
@@ -291,7 +292,7 @@ def test_it_is_small_with_ros(tmp_path):
         for _ in range(50):
             robot.put_tf("odom", "base_link", Pose2D(1.0, 1.0))
         time.sleep(0.3)
-        resident = resident_mb(running.pid)
+        resident = own_mb(running.pid)
         print(f"idle with ros2: {resident:.1f} MB")
         assert resident < IDLE_MB
 

@@ -24,6 +24,7 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from fasaco_edge.bus.settings import BusSettings
 from fasaco_edge.client.feed import Feed
 from fasaco_edge.host.addresses import Address
+from fasaco_edge.host.processes import own_mb
 from fasaco_edge.serve.guard import Guard
 from fasaco_edge.serve.served_view import ServedView
 from fasaco_edge.serve.server import MOST_STRANGERS, MOST_VIEWERS, Server
@@ -36,13 +37,12 @@ from tests.support.processes import (
     fasaco_edge,
     free_endpoint,
     mapped_files,
-    resident_mb,
 )
 from tests.support.rooms import HALL, begin, drive, lanes, map_bytes, pose_bytes, update_bytes
 from tests.support.statuses import FULL, MALFORMED, malformed_status
 
-# What it may be resident with [MB]; half of it is Zenoh's and Python's code, shared with a daemon.
-SERVE_MB = 46.0
+# Memory of its own at most, without pages of files [MB].
+SERVE_MB = 24.0
 ROOM = {"name": "by the door", "polygon": [[0.5, 0.5], [3.0, 0.5], [3.0, 3.0], [0.5, 3.0]]}
 
 
@@ -157,7 +157,7 @@ def test_it_stays_small(covering, page):
         looker.wait("map")
         looker.wait("path")
         pid = page.process.pid
-        resident = resident_mb(pid)
+        resident = own_mb(pid)
         print(f"serve: {resident:.1f} MB")
         assert resident < SERVE_MB
         mapped = mapped_files(pid)
@@ -338,14 +338,14 @@ def test_a_taken_address_is_an_error(page):
 def test_fifty_viewers_that_come_and_go_leave_nothing(page):
     with looking(page) as looker:
         looker.wait("path")
-    before, resident = page.descriptors(), resident_mb(page.process.pid)
+    before, resident = page.descriptors(), own_mb(page.process.pid)
     for number in range(50):
         with looking(page) as looker:
             looker.wait("map")
             if number % 2:
                 looker.socket.socket.shutdown(socket.SHUT_RDWR)
     until(lambda: page.descriptors() <= before, page.descriptors)
-    grown = resident_mb(page.process.pid) - resident
+    grown = own_mb(page.process.pid) - resident
     print(f"fifty viewers: {grown:+.1f} MB")
     assert grown < 8.0
 
@@ -403,7 +403,7 @@ def test_a_viewer_that_hangs_is_dropped_and_holds_nobody_up(tmp_path):
         before = page.descriptors()
         with hanging(page) as hung:
             until(lambda: page.descriptors() > before)
-            resident = resident_mb(page.process.pid)
+            resident = own_mb(page.process.pid)
             count, deadline = 0, time.monotonic() + 300.0
             # Maps of noise: some hundred kilobytes each, whatever compresses them.
             while page.descriptors() > before:
@@ -413,7 +413,7 @@ def test_a_viewer_that_hangs_is_dropped_and_holds_nobody_up(tmp_path):
                 looker.wait("map", is_of(noise))
                 count += 1
             print(f"dropped after {count} maps")
-            assert resident_mb(page.process.pid) - resident < 40.0
+            assert own_mb(page.process.pid) - resident < 40.0
             hung.close()
         assert listens(page)
 

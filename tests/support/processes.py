@@ -114,12 +114,6 @@ def daemon_process(
         daemon.kill()
 
 
-def resident_mb(pid: int) -> float:
-    """Return the resident memory of a process [MB]."""
-    pages = int(Path(f"/proc/{pid}/statm").read_text().split()[1])
-    return pages * os.sysconf("SC_PAGE_SIZE") / 1e6
-
-
 def mapped_files(pid: int) -> str:
     """Return the names of all files a process has mapped."""
     return Path(f"/proc/{pid}/maps").read_text()

@@ -15,6 +15,7 @@ import pytest
 
 from fasaco_edge.bus.session import Bus, open_bus
 from fasaco_edge.bus.settings import BusSettings
+from fasaco_edge.host.processes import own_mb
 from fasaco_edge.wire import topics
 from fasaco_edge.wire.keys import Keys
 from tests.fleet.told import Teller
@@ -27,7 +28,6 @@ from tests.support.processes import (
     fasaco_edge,
     free_endpoint,
     mapped_files,
-    resident_mb,
 )
 from tests.support.rooms import map_bytes, pose_bytes, room
 from tests.watch.terminal import Terminal
@@ -86,7 +86,7 @@ def test_it_shows_all_robots(hall):
         screen = terminal.wait(lambda seen: "2 of 2 robots at work" in seen and "% swept" in seen)
         assert "a joined: covering" in screen
         assert "stranger" not in screen
-        resident = resident_mb(terminal.process.pid)
+        resident = own_mb(terminal.process.pid)
         print(f"watch --fleet: {resident:.1f} MB")
         assert resident < WATCH_MB
         mapped = mapped_files(terminal.process.pid)
