@@ -17,7 +17,7 @@ from maps.map_writer import write_map
 from tests.support.rooms import RESOLUTION_M, room
 
 ROOT = Path(__file__).parents[1]
-WINGS = ("bench", "follow", "replay", "review", "serve", "watch")
+WINGS = ("bench", "fleet", "follow", "replay", "review", "serve", "watch")
 
 
 def without(folder, *wings):

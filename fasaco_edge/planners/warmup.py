@@ -9,7 +9,6 @@ from functools import cached_property, partial
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.fleet.mission.division import Robot, divide
 from fasaco_edge.grid.changes import LatticeChange
 from fasaco_edge.grid.fine_raster import RobotDiscs
 from fasaco_edge.grid.floor import Floor, StandLattice
@@ -18,6 +17,7 @@ from fasaco_edge.grid.geometry import GridGeometry, Pose2D, Window
 from fasaco_edge.grid.lattice import CoverageLattice, Footprint, pixels_of, placement_on
 from fasaco_edge.grid.occupancy import OCCUPIED, OccupancyGrid
 from fasaco_edge.kernels.code_files import note_all_compiled
+from fasaco_edge.kernels.fleet.nearest import walk_parts
 from fasaco_edge.kernels.floor.capsule import is_clear
 from fasaco_edge.kernels.floor.certain import TILE, FloorTiles, Whereabouts, certain_floor
 from fasaco_edge.kernels.floor.open_floor import pass_line, set_causes, set_open
@@ -27,6 +27,7 @@ from fasaco_edge.kernels.lattice.areas import cells_beside, find_areas
 from fasaco_edge.kernels.lattice.pixels import count_free_beside
 from fasaco_edge.kernels.lattice.polygons import add_near, count_in, turn_inside
 from fasaco_edge.kernels.lattice.reach import update_reach
+from fasaco_edge.kernels.lattice.ways import ways_from
 from fasaco_edge.planners.bound import lower_bound_of
 from fasaco_edge.planners.cost import CoverageCost
 from fasaco_edge.planners.line import LineConfig, line_over, memory_for_moves
@@ -143,8 +144,10 @@ def _take_windows(room: _TinyRoom) -> None:
 
 
 def _take_shares(room: _TinyRoom) -> None:
-    robots = [Robot("a", (0, 0), 1.0), Robot("b", (3, 3), 1.0)]
-    divide(room.lattice, np.ones((4, 4), np.bool_), robots)
+    steps, cols = room.lattice.steps.ravel().copy(), room.lattice.steps.shape[1]
+    offsets, cells = np.array([1, cols, -1, -cols], np.int64), np.arange(2, dtype=np.int64)
+    walk_parts(steps, offsets, cells, cells, cells)
+    ways_from(room.lattice.steps, 0)
 
 
 def _take_repair(room: _TinyRoom) -> None:

@@ -7,7 +7,7 @@ import numpy as np
 from fasaco_edge.errors import StartBlocked
 from fasaco_edge.grid.geometry import Point, Pose2D
 from fasaco_edge.grid.lattice import CoverageLattice
-from fasaco_edge.kernels.fleet.ways import FAR, ways_from
+from fasaco_edge.kernels.lattice.ways import FAR, ways_from
 from fasaco_edge.mission.map.reachable_area import anchor_cell
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.grid.lattice import Cell, CoverageLattice
-from fasaco_edge.kernels.fleet.ways import FAR, ways_from
+from fasaco_edge.kernels.lattice.ways import FAR, ways_from
 
 # A cell that is not coverable counts as on the nearest one within this distance [cells].
 SNAP = 2

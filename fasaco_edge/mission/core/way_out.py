@@ -32,8 +32,8 @@ SQUEEZE_PX = 1.5
 # A robot that has not come this far [m] on its way out after this time [s] cannot drive it. It
 # tries again after as long, then after twice as long each time, until it has come that far.
 STANDING_M, STANDING_S = 0.1, 15.0
-# A robot that has stood without a way for this long [s], where the map says it cannot be, drives back
-# this far [m] at most whatever the map shows, until it fits: its hull was there, so pose or map errs.
+# A robot that has stood without a way for this long [s], where the map says it cannot be, drives
+# back until it fits, this far [m] at most, whatever the map shows: pose or map errs.
 WITHOUT_WAY_S, BLIND_M = 20.0, 1.5
 # It leads on by so many points of the track once the robot can go on.
 INTO_POINTS = 4
@@ -131,8 +131,8 @@ class WayOut:
 
         Args:
             leads_on: whether the robot can go on in an area.
-            blind_m: where the robot does not fit where it is, how far it may drive back whatever the
-                map shows, until it does [m].
+            blind_m: how far a robot that does not fit where it is may drive back until it does,
+                whatever the map shows [m].
         """
         floor, lattice, stamped = self._map.floor, self._map.lattice, self._map.pose
         if floor is None or lattice is None or stamped is None or self._map.grid is None:
