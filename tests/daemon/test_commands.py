@@ -251,7 +251,7 @@ def test_zones_of_the_configuration(tmp_path):
 
 
 @pytest.mark.parametrize("frame", ["floor_1", "floor_2"])
-def test_a_zone_named_before_there_is_a_map_lies_on_its_own_map_alone(tmp_path, frame):
+def test_a_zone_named_before_a_map_applies_to_its_map_alone(tmp_path, frame):
     mission = {"autostart": False, "map_frame": "floor_1"}
     mission["zones"] = [{"name": "kitchen", "polygon": KITCHEN["polygon"]}]
     with (

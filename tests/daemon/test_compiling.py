@@ -23,7 +23,7 @@ def lose_some(folder: Path) -> None:
         min(folder.glob(pattern), key=lambda file: file.stat().st_size).unlink()
 
 
-def test_it_goes_on_in_a_fresh_process_after_a_kernel_that_made_it_large(tmp_path):
+def test_compiling_continues_in_a_fresh_process_when_it_is_large(tmp_path):
     warm = own_folder()
     assert warm is not None
     folder = shutil.copytree(warm, tmp_path / warm.name)

@@ -29,7 +29,7 @@ def test_a_recorder_that_cannot_be_started_is_tried_again(tmp_path, monkeypatch)
         recorder.close(1.0, 1.0)
 
 
-def test_a_recorder_that_reports_and_dies_is_started_less_and_less_often(tmp_path, monkeypatch):
+def test_a_recorder_that_keeps_dying_starts_less_and_less_often(tmp_path, monkeypatch):
     config, program, born = DaemonConfig(), tmp_path / "program", tmp_path / "born"
     program.write_text(f"#!/bin/sh\necho $$ > {born}\nexec sleep 60\n")
     program.chmod(0o755)

@@ -45,7 +45,7 @@ def test_one_map_in_a_wrong_frame_after_a_restart_costs_nothing(tmp_path):
     assert aside(tmp_path) == []
 
 
-def test_map_and_poses_in_another_frame_for_long_are_another_building(tmp_path):
+def test_map_and_poses_long_in_another_frame_mean_a_new_building(tmp_path):
     with daemon_process(tmp_path) as running, Outsider(running.endpoint) as client:
         begin(client)
         drive(client, lanes(30))
@@ -77,7 +77,7 @@ def test_a_reset_lets_another_frame_count_at_once(tmp_path):
         client.wait_status(lambda status: status["state"] == "covering")
 
 
-def test_a_wrong_map_while_kernels_load_does_not_displace_the_right_one(tmp_path):
+def test_a_wrong_map_while_kernels_load_is_not_used(tmp_path):
     """Each is latched, and comes once."""
     with daemon_process(tmp_path) as running, Outsider(running.endpoint) as client:
         client.put("map", map_bytes(HALL))
@@ -92,7 +92,7 @@ def another_floor() -> Pixels:
     return fill(fill(HALL, 0.0, 1.2, 100.0, 100.0, WALL), 3.0, 0.05, 3.4, 100.0, WALL)
 
 
-def test_another_floor_in_the_same_frame_is_swept_from_its_beginning(tmp_path):
+def test_another_floor_in_the_same_frame_is_swept_from_scratch(tmp_path):
     """By a lift whose place is the same on both floors; the ledger of the first one is kept."""
     with daemon_process(tmp_path) as running, Outsider(running.endpoint) as client:
         begin(client)
@@ -113,7 +113,7 @@ def test_another_floor_in_the_same_frame_is_swept_from_its_beginning(tmp_path):
     assert aside(tmp_path) != []
 
 
-def test_keep_outs_of_another_floor_stop_the_robot_also_after_a_restart(tmp_path):
+def test_keep_outs_of_another_floor_still_block_after_a_restart(tmp_path):
     mission = {"keep_out": [[[1.0, 1.0], [1.5, 1.0], [1.5, 1.5]]]}
 
     def wait_blocked(client):

@@ -85,7 +85,7 @@ def test_a_killed_recorder_is_started_again_and_planning_goes_on(tmp_path):
     assert len(list(tmp_path.glob("*.rrd"))) >= 2
 
 
-def test_a_recorder_that_cannot_write_is_told_and_planning_goes_on(tmp_path):
+def test_a_recorder_that_cannot_write_is_reported(tmp_path):
     """A recorder that ends at once is tried again, ever more rarely."""
     pytest.importorskip("rerun")
     no_folder = tmp_path / "file"
@@ -100,9 +100,7 @@ def test_a_recorder_that_cannot_write_is_told_and_planning_goes_on(tmp_path):
         assert "cannot record into" in running.log_text()
 
 
-def test_a_recorder_that_starts_slowly_is_waited_for_and_one_that_hangs_is_not(
-    tmp_path, monkeypatch
-):
+def test_a_slow_recorder_gets_time_to_start_but_a_hung_one_ends(tmp_path, monkeypatch):
     """On a slow computer its libraries alone take longer than a hang may last."""
     pytest.importorskip("rerun")
     monkeypatch.setattr(supervisor, "SILENT_AFTER_S", 0.05)

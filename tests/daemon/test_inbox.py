@@ -107,7 +107,7 @@ def test_a_battery_is_heard_and_held_until_there_is_a_mission(arrivals):
     assert held.events == events[-1:]
 
 
-def test_a_command_waits_for_the_poses_before_it_and_takes_them_in_no_larger_cycles(arrivals):
+def test_a_command_follows_its_poses_in_cycles_of_usual_size(arrivals):
     for _ in range(70):
         arrivals.post("pose", pose_bytes(1.0, 1.0))
     arrivals.mailbox.post("command", object.__new__(Question))
@@ -202,7 +202,7 @@ def test_updates_lost_before_a_map_matter_no_more(arrivals):
     assert arrivals.decode() == ([MapReceived, PatchReceived], [])
 
 
-def test_an_update_without_its_base_or_after_a_lost_one_asks_for_the_full_map(arrivals):
+def test_an_update_without_its_base_requests_the_full_map(arrivals):
     mission = Mission(MissionConfig(Footprint(TOOL_M, RADIUS_M)))
 
     def asked_for_a_map():

@@ -27,7 +27,7 @@ def keep_out(outsider: Outsider, action: str, area: dict[str, Any]) -> dict[str,
     return ask(outsider, json.dumps(asked).encode())
 
 
-def test_in_mid_mission_what_is_covered_stays_and_no_path_leads_there(tmp_path):
+def test_a_keep_out_in_mid_mission_keeps_coverage_and_is_avoided(tmp_path):
     with daemon_process(tmp_path) as running, Outsider(running.endpoint) as outsider:
         paths, taken = outsider.listen("path"), outsider.listen("command", late=False)
         begin(outsider)
@@ -129,7 +129,7 @@ def test_what_is_covered_is_not_forgotten_without_consent(tmp_path, name):
         assert [heard.json()["command"] for heard in taken.heard] == [name]
 
 
-def test_before_there_is_a_map_what_the_ledger_holds_is_not_forgotten(tmp_path):
+def test_a_keep_out_before_a_map_forgets_nothing_in_the_ledger(tmp_path):
     with daemon_process(tmp_path) as running, Outsider(running.endpoint) as outsider:
         begin(outsider)
         drive(outsider, lanes(12))

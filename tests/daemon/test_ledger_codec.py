@@ -132,7 +132,7 @@ def test_a_trail_larger_than_any_lattice_is_not_read():
         decode_ledger(enveloped(zlib.compress(plain)), CELL_M)
 
 
-def test_a_ledger_of_the_version_before_is_read_with_no_floor_swept():
+def test_a_ledger_of_the_previous_version_has_no_swept_floor():
     tile = np.zeros((64, 64), "<u2")
     tile[63, 5] = 1
     plain = struct.pack("<dQIII", 0.3, 1, 3, 1, 1) + b"map"
@@ -201,7 +201,7 @@ def test_torn_and_scribbled_files_are_found(data):
 
 @examples(200)
 @given(st.one_of(st.binary(max_size=80), st.binary(max_size=80).map(zlib.compress)))
-def test_a_body_that_is_none_is_refused_although_its_checksum_holds(body):
+def test_an_invalid_body_with_a_valid_checksum_is_refused(body):
     with pytest.raises(LedgerFileError):
         decode_ledger(enveloped(body), CELL_M)
 
@@ -271,7 +271,7 @@ def test_what_would_take_too_much_memory_is_not_read(tiles, floor):
         tracemalloc.stop()
 
 
-def test_writing_the_largest_ledger_takes_no_more_memory_than_its_file():
+def test_writing_the_largest_ledger_takes_the_memory_of_its_file():
     ledger = decode_ledger(bomb(MOST_TILES, MOST_FLOOR_TILES), CELL_M)
     tracemalloc.start()
     try:

@@ -123,7 +123,7 @@ def test_a_disk_that_cannot_synchronise_folders_does_without(written, monkeypatc
 
 
 @pytest.mark.parametrize("at", range(4))
-def test_a_crash_while_a_cut_write_is_finished_does_no_harm_either(written, at):
+def test_a_crash_while_finishing_a_cut_write_does_no_harm(written, at):
     (written / "robot.ledger.new").write_bytes(encode_ledger(lane(5)))
     with pytest.MonkeyPatch.context() as patch:
         deaths(patch, at)
@@ -185,7 +185,7 @@ def test_an_error_of_the_disk_loses_nothing(written, monkeypatch, call, nth):
     assert names(written) == list(NAMES)
 
 
-def test_a_whole_new_one_is_not_overwritten_while_it_is_the_newest(written, monkeypatch):
+def test_a_complete_newest_ledger_is_not_overwritten(written, monkeypatch):
     """Its name could not be changed: it is, before the next one takes its place."""
     file, real = LedgerFile(written, "robot"), os.replace
 
@@ -215,7 +215,7 @@ for length in range(1, 100_000):
 """
 
 
-def test_a_writer_that_is_killed_at_any_moment_leaves_what_it_wrote_last(tmp_path):
+def test_a_writer_killed_at_any_moment_leaves_its_last_ledger(tmp_path):
     rng, torn = random.Random(1), 0
     for _ in range(12):
         command = [sys.executable, "-c", WRITES, str(tmp_path)]

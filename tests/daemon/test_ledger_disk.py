@@ -111,7 +111,7 @@ def test_a_folder_that_cannot_be_is_told_and_the_mission_goes_on(tmp_path):
         running.stop()
 
 
-def test_a_disk_that_hangs_holds_neither_the_mission_nor_the_end_up(tmp_path):
+def test_a_hanging_disk_delays_neither_mission_nor_shutdown(tmp_path):
     """Who opens a pipe to write waits for a reader, as for a disk that does not answer."""
     with daemon_process(tmp_path) as running, Outsider(running.endpoint) as outsider:
         os.mkfifo(tmp_path / "state" / "robot.ledger.new")

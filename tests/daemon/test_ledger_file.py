@@ -71,7 +71,7 @@ def test_a_file_cut_at_any_byte_falls_back_to_the_one_before(written):
         (written / aside).unlink()
 
 
-def test_after_a_fall_back_the_one_before_stays_until_there_is_a_newer(written):
+def test_after_a_fall_back_the_old_ledger_stays_until_the_next(written):
     (written / NAMES[0]).write_bytes(b"torn")
     file = LedgerFile(written, "robot")
     file.load(CELL_M)
@@ -207,7 +207,7 @@ def test_what_is_set_aside_is_all_there(written):
     assert contents(load(written).ledger) == contents(lane(4))
 
 
-def test_what_could_not_be_set_aside_is_before_anything_is_written(written, monkeypatch):
+def test_a_failed_set_aside_is_repeated_before_the_next_write(written, monkeypatch):
     file = LedgerFile(written, "robot")
 
     def failing(*_):
@@ -260,7 +260,7 @@ def test_what_appears_after_the_start_is_not_overwritten(tmp_path, written):
     assert file.write(lane(2)) == []
 
 
-def test_a_folder_that_comes_later_is_locked_before_it_is_written(tmp_path):
+def test_a_folder_that_appears_later_is_locked_before_a_write(tmp_path):
     folder = tmp_path / "later"
     folder.write_text("in the way")
     first, second = LedgerFile(folder, "robot"), LedgerFile(folder, "robot")
@@ -296,7 +296,7 @@ def test_a_file_too_large_is_not_read_but_kept(written):
     assert (written / aside).stat().st_size == 10**9
 
 
-def test_of_what_is_kept_aside_the_newest_few_and_the_largest_stay(tmp_path):
+def test_of_ledgers_set_aside_the_newest_and_the_largest_stay(tmp_path):
     """As two hundred resets make them, the first of a whole day's work."""
     file = LedgerFile(tmp_path, "robot")
     for length in [400, *[3 + number % 3 for number in range(30)], 20]:
@@ -328,7 +328,7 @@ def test_an_empty_ledger_is_not_kept(tmp_path):
     assert names(tmp_path) == []
 
 
-def test_what_is_kept_aside_is_as_old_as_its_number_whatever_the_clock(tmp_path, monkeypatch):
+def test_the_number_not_the_clock_gives_the_age_of_a_set_aside(tmp_path, monkeypatch):
     path = tmp_path / "robot.ledger"
     years = iter([2026, 2027, 2026, 1970, 1970, 1970])
     monkeypatch.setattr(time, "gmtime", lambda: (next(years), 1, 1, 0, 0, 0, 3, 1, 0))

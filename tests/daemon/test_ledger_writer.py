@@ -244,7 +244,7 @@ def test_a_ledger_that_somebody_writes_is_refused(tmp_path):
     writer.close(1.0)
 
 
-def test_floor_that_is_swept_between_two_cells_is_written_once_a_second(tmp_path):
+def test_floor_swept_between_two_cells_is_written_once_a_second(tmp_path):
     drive = Drive((0, 0), MapReceived(building("....")), pose_at(0, 0))
     writer = open_ledger(tmp_path, "robot", CELL)
     keeper = LedgerKeeper(writer, CELL, autostart=True)

@@ -61,7 +61,7 @@ def test_by_default_the_path_is_a_line_that_sweeps_the_rims(tmp_path):
         outsider.wait_status(lambda status: status["floor"]["swept_m2"] > 0.3)
 
 
-def test_cells_at_an_angle_are_published_where_they_lie_in_the_map_frame(tmp_path):
+def test_cells_at_an_angle_are_published_in_the_map_frame(tmp_path):
     pixels = pillared_room()
     with (
         daemon_process(tmp_path, planner={"line": "thorough", "align": 30}) as running,

@@ -110,7 +110,7 @@ def test_navs_mask_is_taken_however_early_it_was_published(naming, tmp_path):
         assert not cells & AROUND
 
 
-def test_a_mask_of_another_frame_is_told_and_holds_once_the_map_is_in_that(tmp_path):
+def test_a_mask_in_another_frame_waits_for_a_map_in_that_frame(tmp_path):
     """Published once, it would not come again; one of another map keeps out of other places."""
     with (
         daemon_process(tmp_path, mission=dict(MISSION)) as running,
@@ -156,7 +156,7 @@ def test_a_mask_alone_does_not_read_the_file_again():
     assert not reload.is_wanted
 
 
-def test_a_mask_that_cannot_be_read_costs_a_written_configuration_nothing(caplog):
+def test_an_unreadable_mask_keeps_the_written_configuration(caplog):
     written = msgspec.convert({"robot": {"speed_m_s": 2.0}}, DaemonConfig)
     fault = BadConfiguration("keep_out_mask: rubbish")
     reload = Reload(lambda: written, ServiceManager({}))

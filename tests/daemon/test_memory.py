@@ -45,7 +45,7 @@ LARGE_MAPS = ROOT / "deploy" / "drop-ins" / "large-maps.conf"
 CELLS = DaemonConfig(planner=PlannerConfig(line="cells"))
 
 
-def test_the_drop_in_for_large_maps_has_what_the_daemon_needs_for_them():
+def test_the_drop_in_for_large_maps_allows_the_memory_needed():
     high, most = limits_mib(DEFAULT)
     unit = LARGE_MAPS
     assert (unit_limit("MemoryHigh", unit), unit_limit("MemoryMax", unit)) == (
@@ -56,7 +56,7 @@ def test_the_drop_in_for_large_maps_has_what_the_daemon_needs_for_them():
     assert afforded(DEFAULT, most * MIB) == DEFAULT
 
 
-def test_under_the_units_limit_maps_are_as_large_as_the_guide_says():
+def test_the_units_limit_allows_maps_as_large_as_documented():
     smaller = afforded(DEFAULT, unit_limit())
     assert needed_bytes(smaller) <= unit_limit("MemoryHigh") * 1.02 < unit_limit()
     pixels, cells = smaller.map.max_pixels // 100_000 / 10, smaller.map.max_lattice_cells // 1000

@@ -272,7 +272,7 @@ def test_who_asks_without_end_gets_a_few_answers_a_second():
         assert 1 <= answers <= 25
 
 
-def test_a_port_that_is_taken_or_a_server_that_closes_stops_nothing(caplog):
+def test_a_taken_port_or_a_closed_server_stops_nothing(caplog):
     with socket.create_server(("127.0.0.1", 0)) as taken:
         assert serve_metrics(Address(*taken.getsockname())) is None
     assert "cannot listen on 127.0.0.1" in caplog.text

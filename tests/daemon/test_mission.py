@@ -74,7 +74,7 @@ def path(daemon, pixels):
         return heard
 
 
-def test_before_there_is_a_map_the_path_is_empty_and_coverage_an_error(tmp_path):
+def test_without_a_map_the_path_is_empty_and_coverage_an_error(tmp_path):
     with daemon_process(tmp_path) as running, Outsider(running.endpoint) as outsider:
         begins = outsider.listen("path", begins=True).wait(lambda heard: True)
         assert about(begins)["revision"] == 0

@@ -170,7 +170,7 @@ def test_a_command_reaches_the_one_that_plans(tmp_path, robot_at):
         assert refused["code"] == "not_now"
 
 
-def test_a_frozen_one_is_followed_and_does_not_come_back_beside_it(tmp_path, robot_at):
+def test_a_frozen_daemon_is_replaced_and_then_waits(tmp_path, robot_at):
     endpoint = free_endpoint()
     with router_process(endpoint), two_daemons(tmp_path, endpoint, endpoint) as daemons:
         robot = robot_at(endpoint)

@@ -247,7 +247,7 @@ def test_a_second_daemon_for_the_robot_is_refused(tmp_path):
             second.process.returncode = 0
 
 
-def test_systemd_s_folder_is_used_and_the_configuration_s_before_it(tmp_path):
+def test_the_configured_folder_takes_precedence_over_systemds(tmp_path):
     environment = {"STATE_DIRECTORY": str(tmp_path / "systemd")}
     for folder, sections in (
         ("systemd", {}),

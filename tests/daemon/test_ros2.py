@@ -203,7 +203,7 @@ def test_the_graph_shows_node_publishers_and_subscribers(tmp_path):
 
 
 @pytest.mark.parametrize("naming", [Naming(0, "/robot1"), BRIDGE], ids=["rmw_zenoh", "bridge"])
-def test_the_mission_is_commanded_by_services_and_shown_as_diagnostics(naming, tmp_path):
+def test_services_command_the_mission_and_diagnostics_show_it(naming, tmp_path):
     with ros_graph(tmp_path, naming) as (running, robot):
         shown = robot.listen("diagnostics", DIAGNOSTICS)
         put_map(robot)
@@ -267,7 +267,7 @@ def test_two_robots_on_one_router_do_not_hear_each_other(tmp_path):
                 assert not any(map(is_walk, other_path.heard))
 
 
-def test_nodes_that_are_peers_of_a_router_are_served_by_its_client(tmp_path):
+def test_a_client_of_a_router_serves_nodes_that_are_its_peers(tmp_path):
     """As rmw_zenoh is by default: rmw_zenohd is the router, each node a peer."""
     router = free_endpoint()
     bus = {"listen": [], "connect": [router], "mode": "client"}

@@ -26,7 +26,7 @@ HAS_SDK = subprocess.run([PYTHON, "-c", "import zenoh_ros2_sdk"], capture_output
 
 
 @pytest.mark.skipif(HAS_SDK.returncode != 0, reason="zenoh-ros2-sdk is not installed")
-def test_a_robot_made_with_a_library_of_somebody_else_gets_its_path(tmp_path):
+def test_a_robot_with_a_third_party_library_gets_its_path(tmp_path):
     with (
         daemon_process(tmp_path, ros2={"kind": "rmw_zenoh", "domain": 3}) as running,
         Outsider(running.endpoint) as native,

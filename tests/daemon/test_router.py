@@ -139,14 +139,14 @@ def test_a_client_waits_for_its_router_and_says_so(tmp_path):
     assert "ready" in daemon.log_text()
 
 
-def test_a_client_that_waits_for_its_router_ends_when_it_is_told_to(tmp_path):
+def test_a_client_waiting_for_its_router_can_be_stopped(tmp_path):
     bus = {"mode": "client", "listen": [], "connect": [free_endpoint()]}
     with daemon_process(tmp_path, bus=bus) as daemon:
         until(lambda: "waiting for a router" in daemon.log_text())
         assert daemon.stop() < 10.0
 
 
-def test_commands_know_from_the_configuration_or_the_environment_whom_to_ask(tmp_path, monkeypatch):
+def test_commands_find_robot_and_bus_by_file_or_environment(tmp_path, monkeypatch):
     name = {"name": "maja"}
     with daemon_process(tmp_path, robot=name) as daemon, Outsider(daemon.endpoint, "maja"):
         file = tmp_path / "daemon0.yaml"

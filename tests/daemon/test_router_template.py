@@ -96,7 +96,7 @@ def test_a_robot_does_not_pass_for_another_nor_command_it(office, sender):
     assert status(second)["map"] == before["map"]
 
 
-def test_robots_of_a_fleet_hear_each_other_and_nobody_speaks_for_another(office, sender):
+def test_robots_of_a_fleet_receive_all_but_publish_as_themselves(office, sender):
     for seat, name in zip(office, FLEET, strict=True):
         slam, deadline = sender(f"slam-{name}"), time.monotonic() + 60.0
         # Another session at once: what it says first may come before who listens is known to it.

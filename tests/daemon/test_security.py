@@ -138,7 +138,7 @@ def test_nobody_passes_for_the_robot(house, boss, name):
     assert boss.alive()
 
 
-def test_a_map_beyond_the_limit_is_dropped_before_it_is_looked_at(tmp_path):
+def test_a_map_beyond_the_limit_is_dropped_unread(tmp_path):
     with secured_daemon(
         tmp_path, security={"limits": {"map_bytes": 20_000, "queries_hz": 10_000.0}}
     ) as house:
@@ -186,7 +186,7 @@ def test_questions_without_end_are_thinned(tmp_path):
         assert len(eye.get("@rpc/status")) == 1
 
 
-def test_who_shows_no_certificate_or_a_foreign_one_does_not_get_in(house, tmp_path, unharmed):
+def test_missing_foreign_or_outdated_certificates_are_refused(house, tmp_path, unharmed):
     foreign = authority(tmp_path / "foreign", "boss").files("boss")
     foreign["root_ca"] = house.ca.root
     outdated = house.ca.sign("late", days=-1)

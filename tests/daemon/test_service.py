@@ -37,7 +37,7 @@ def service(folder: Path, *, env=None, **sections) -> Iterator[tuple[Daemon, Man
         manager.close()
 
 
-def test_ready_means_that_the_token_stands_and_a_plan_needs_no_compiler(tmp_path):
+def test_ready_means_a_token_and_compiled_kernels(tmp_path):
     with service(tmp_path) as (running, manager), Outsider(running.endpoint) as outsider:
         assert outsider.alive()
         path = outsider.listen("path")
@@ -129,7 +129,7 @@ def test_a_large_mask_is_read_beside_the_loop(tmp_path):
         assert status["errors"]["total"] == 0
 
 
-def test_other_thresholds_show_another_map_and_nothing_covered_is_lost(tmp_path):
+def test_other_thresholds_change_the_map_but_keep_the_coverage(tmp_path):
     doubtful = fill(two_rooms(door=True), 3.2, 0.2, 5.8, 2.8, DOUBTFUL)
     with service(tmp_path) as (running, manager), Outsider(running.endpoint) as outsider:
         path = outsider.listen("path")
@@ -172,7 +172,7 @@ def test_a_wrong_file_changes_nothing(tmp_path, planning):
         assert "refused" not in manager.wait("STATUS=", 5.0)
 
 
-def test_one_that_waits_for_another_reads_its_configuration_again(tmp_path):
+def test_a_daemon_waiting_for_another_reloads_its_configuration(tmp_path):
     """It had begun to load for a latched map when it saw the other, and never said it was done."""
     with service(tmp_path) as (running, manager), Outsider(running.endpoint) as outsider:
         outsider.put("map", map_bytes(pillared_room()))

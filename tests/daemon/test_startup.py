@@ -29,7 +29,7 @@ def maps(held):
     return {one.grid.frame: one.grid.cells for one in held if isinstance(one, MapReceived)}
 
 
-def test_updates_are_laid_over_their_map_and_take_no_more_than_it():
+def test_updates_merge_into_their_map_and_take_no_more_memory():
     before = HeldEvents()
     before.take([a_map()])
     for place in range(SIDE * SIDE):

@@ -56,7 +56,7 @@ def codes(status):
     return [trouble["code"] for trouble in status["troubles"]]
 
 
-def test_a_dead_dock_is_on_the_bus_in_metrics_on_the_page_and_in_the_terminal(tmp_path):
+def test_all_outputs_report_a_dead_dock(tmp_path):
     figures = free_endpoint().removeprefix("tcp/")
     with (
         daemon_process(
@@ -122,7 +122,7 @@ def test_a_mission_that_cannot_begin_is_a_trouble_until_it_does(tmp_path):
         outsider.wait_status(lambda status: status["state"] == "covering" and not codes(status))
 
 
-def test_a_keep_out_beside_the_map_is_told_and_the_mission_goes_on(tmp_path):
+def test_a_keep_out_beside_the_map_is_reported_without_a_stop(tmp_path):
     far = [[500, 500], [501, 500], [501, 501]]
     with (
         daemon_process(tmp_path, mission={"keep_out": [far]}) as daemon,

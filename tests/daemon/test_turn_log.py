@@ -24,7 +24,7 @@ class Publisher:
         self.sent.append(payload)
 
 
-def test_of_a_long_wait_for_a_map_the_newest_pose_and_charge_are_kept():
+def test_a_long_wait_for_a_map_keeps_the_newest_pose_and_charge():
     log = TurnLog(publisher := Publisher(), DaemonConfig(), None)
 
     def note(number):

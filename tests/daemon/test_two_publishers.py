@@ -51,7 +51,7 @@ def counting(one, other):
     return f"session {one.zid()} counts, session {other.zid()} does not"
 
 
-def test_the_path_does_not_change_with_whoever_published_a_map_last(tmp_path):
+def test_two_publishers_of_maps_do_not_alternate_the_path(tmp_path):
     with (
         daemon_process(tmp_path) as daemon,
         Outsider(daemon.endpoint) as outsider,
@@ -79,7 +79,7 @@ def test_the_path_does_not_change_with_whoever_published_a_map_last(tmp_path):
     assert "maps come from two publishers" in daemon.log_text()
 
 
-def test_maps_that_do_not_say_who_sent_them_are_told_by_their_changing_to_and_fro(tmp_path):
+def test_two_anonymous_publishers_are_found_by_alternating_maps(tmp_path):
     with (
         daemon_process(tmp_path) as daemon,
         Outsider(daemon.endpoint) as outsider,

@@ -115,7 +115,7 @@ def test_a_map_that_breaks_the_mission_is_given_up_for_the_next(breaking):
     assert running.process.poll() is None
 
 
-def test_a_stop_that_cannot_be_sent_before_there_is_a_mission_is_sent_later(tmp_path, monkeypatch):
+def test_a_stop_that_fails_before_a_mission_is_sent_later(tmp_path, monkeypatch):
     """The robot may follow the path of an earlier daemon; without a map there is no mission."""
     program = (sys.executable, "-m", "tests.daemon.breaking", UNSENT)
     monkeypatch.setattr(processes, "PROGRAM", program)

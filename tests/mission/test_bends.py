@@ -45,7 +45,7 @@ def test_it_was_no_farther_away_than_it_can_have_driven():
     assert beside_m(*there_and_back, 0.5) == math.inf, "faster than it drives"
 
 
-def test_where_its_speed_is_not_known_or_places_are_near_it_drove_straight():
+def test_unknown_speed_or_near_poses_mean_a_straight_drive():
     assert beside_m((0, 0), (1, 0), (0, 1), (1, 1), 0.0) == 0.0
     assert beside_m((0, 0), (SHORT_M, 0), (0, 1), (SHORT_M, 1), FAR_M) == 0.0
 

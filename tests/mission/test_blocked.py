@@ -125,7 +125,7 @@ def test_a_door_that_opens_is_driven_through():
     assert "not reached" not in robot.mission.reason
 
 
-def test_a_path_that_cannot_be_joined_is_laid_anew_from_the_robot():
+def test_a_path_that_cannot_be_joined_is_rebuilt_from_the_robot():
     robot = LineRobot(room(), START)
     assert robot.wait(60.0, lambda robot: robot.x > 1.0 or robot.y > 1.0)
     robot.is_stuck = True
@@ -153,7 +153,7 @@ def test_a_report_of_another_path_or_frame_closes_nothing():
     assert not robot.mission.troubles
 
 
-def test_floor_is_closed_longer_each_time_and_never_under_the_robot():
+def test_floor_closes_longer_each_time_never_under_the_robot():
     obstacles = Obstacles(RADIUS_M)
     grid = map_of(np.zeros((60, 80), np.int8))
     here, point = (1.0, 1.0), (1.0 + RADIUS_M + 0.03, 1.0)

@@ -79,7 +79,7 @@ def breaks_with_each_map(drive, seconds):
     return broken
 
 
-def test_a_planner_that_breaks_over_each_map_is_asked_less_and_less_often():
+def test_a_planner_that_fails_on_each_map_runs_less_often():
     drive = started(*ROOM)
     drive.tell(patch("#", at=(2, 2)))
     breaks(drive)

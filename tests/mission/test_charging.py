@@ -13,7 +13,7 @@ from tests.mission.battery import AT_DOCK, WALLED, Battery
 from tests.mission.world import CELL, patch, pose_at
 
 
-def test_below_its_level_it_drives_to_the_dock_charges_and_goes_on_where_it_was():
+def test_a_low_robot_docks_charges_and_continues():
     drive = Battery(0.21)
     drive.run(State.COVERING)
     for _ in range(20):
@@ -84,7 +84,7 @@ def test_what_lies_beyond_the_map_counts_as_rest():
 
 
 @pytest.mark.parametrize(("level", "goes"), [(0.31, True), (0.6, False)])
-def test_it_goes_while_the_dock_is_near_where_its_path_leads_away(level, goes):
+def test_a_robot_docks_before_its_path_leads_far_from_the_dock(level, goes):
     # A corridor with the dock at its near end; the battery would be due at the far one.
     dock = Dock(x_m=0.5 * CELL, y_m=1.5 * CELL, approach_m=0.0)
     drive = Battery(level, rows=("." * 60,) * 2, dock=dock)
@@ -125,7 +125,7 @@ def test_a_charge_that_drains_fast_is_believed_all_the_same():
     assert gauge.level == pytest.approx(0.76)
 
 
-def test_a_battery_that_is_silent_is_told_of_and_not_waited_for_on_the_way():
+def test_a_silent_battery_is_reported_and_does_not_stop_the_way():
     drive = Battery(0.8)
     drive.run(State.COVERING)
     drive.level = None
@@ -356,7 +356,7 @@ def test_in_its_dock_it_need_not_stand_where_paths_lead():
     [(0.0, State.CHARGING), (20.0, State.CHARGING), (-340.0, State.CHARGING),
      (45.0, State.RETURNING), (-90.0, State.RETURNING), (180.0, State.RETURNING)],
 )  # fmt: skip
-def test_at_its_docks_place_it_is_in_its_dock_only_with_the_docks_heading(off_deg, state):
+def test_a_robot_is_docked_only_with_the_heading_of_the_dock(off_deg, state):
     dock = Dock(x_m=0.5 * CELL, y_m=5.5 * CELL, yaw_deg=180.0, approach_m=4 * CELL)
     drive = Battery(0.15, cell=(5, 7), dock=dock)
     drive.run(State.RETURNING)
@@ -365,7 +365,7 @@ def test_at_its_docks_place_it_is_in_its_dock_only_with_the_docks_heading(off_de
     assert drive.mission.state is state
 
 
-def test_out_of_a_dock_where_no_path_leads_it_goes_on_from_before_it():
+def test_a_robot_leaving_an_unreachable_dock_starts_before_it():
     dock = Dock(x_m=-1.5 * CELL, y_m=2.5 * CELL, yaw_deg=180.0, approach_m=2 * CELL)
     drive = Battery(0.15, dock=dock)
     drive.run(State.CHARGING)
@@ -394,7 +394,7 @@ def test_a_battery_that_takes_no_more_is_enough():
     assert drive.mission.state is not State.CHARGING
 
 
-def test_on_its_way_a_battery_that_calls_itself_full_changes_nothing():
+def test_a_battery_reported_full_on_the_way_changes_nothing():
     drive = Battery(0.9)
     drive.run(State.COVERING)
     for _ in range(10):

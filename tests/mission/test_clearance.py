@@ -41,7 +41,7 @@ def near_share(grid, trail):
     return near / len(trail)
 
 
-def test_a_mission_keeps_clear_of_walls_and_still_sweeps_nearly_all():
+def test_a_mission_keeps_its_clearance_and_sweeps_nearly_all():
     (grid, without), (_, kept) = driven(0.0), driven(CLEARANCE_M)
     assert near_share(grid, kept) < 0.3 * near_share(grid, without)
     swept = [judge_floor(grid, trail, ROBOT).figures.swept_share for trail in (without, kept)]

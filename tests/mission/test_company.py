@@ -29,7 +29,7 @@ def test_a_robot_alone_has_no_others():
 
 
 @pytest.mark.parametrize("forgets", ["note_forgotten", "clear", "begin_anew"])
-def test_what_others_swept_is_kept_until_this_robot_forgets_cells(forgets):
+def test_cells_of_others_are_kept_until_this_robot_forgets_cells(forgets):
     ledger = MissionLedger(0.3, 0.3)
     ledger.shared.resume(b"of a fleet")
     assert ledger.snapshot().fleet == b"of a fleet"

@@ -98,7 +98,7 @@ def test_passes_count_from_their_beginning():
         assert cells(0, 0, 6, 2) <= set(drive.driven[here - 1 : there])
 
 
-def test_what_was_covered_before_the_order_is_covered_again_unless_it_says_so():
+def test_an_order_covers_all_again_unless_it_says_otherwise():
     drive = started(*ROOM)
     drive.finish()
     assert drive.command("start").plan.problem.cells == 47
@@ -132,7 +132,7 @@ def test_the_robot_never_drives_into_a_keep_out_zone():
     assert area.cell in cells(1, 3, 4, 5)
 
 
-def test_what_lies_behind_a_keep_out_zone_is_not_blamed_on_obstacles():
+def test_cells_behind_a_keep_out_are_not_blamed_on_obstacles():
     drive = idle("........", "...#....")
     drive.command("start", {"keep_out": [rectangle(0, 4, 2, 5)]})
     follow(drive)
@@ -240,7 +240,7 @@ def test_paused_it_stands_and_still_counts_what_it_passes_over():
     assert drive.visited == cells(0, 0, 6, 8) - {(5, 7)}
 
 
-def test_resumed_where_nothing_changed_it_goes_on_along_the_path_it_had():
+def test_resume_without_a_change_keeps_the_path():
     drive = started(*ROOM)
     for _ in range(5):
         drive.go()
@@ -254,7 +254,7 @@ def test_resumed_where_nothing_changed_it_goes_on_along_the_path_it_had():
     drive.finish()
 
 
-def test_a_robot_that_rolls_on_when_it_is_paused_goes_on_from_there():
+def test_a_robot_that_rolls_on_after_pause_resumes_from_there():
     drive = started(*ROOM)
     for _ in range(5):
         drive.go()
@@ -266,7 +266,7 @@ def test_a_robot_that_rolls_on_when_it_is_paused_goes_on_from_there():
     assert drive.walk == ahead[1:]
 
 
-def test_what_a_map_changed_during_a_pause_is_mended_in_the_path_it_had():
+def test_resume_repairs_the_path_where_the_map_changed():
     drive = started(*ROOM)
     for _ in range(5):
         drive.go()
@@ -318,7 +318,7 @@ def test_a_plan_for_the_order_before_is_not_driven():
     follow(drive)
 
 
-def test_cancelled_it_stops_and_forgets_the_order_and_remembers_what_is_covered():
+def test_cancel_stops_drops_the_order_and_keeps_the_coverage():
     drive = started(*ROOM)
     for _ in range(5):
         drive.go()
@@ -377,7 +377,7 @@ def test_a_command_that_makes_no_sense_is_refused():
     assert drive.refused is None
 
 
-def test_a_started_mission_that_is_done_stays_so_whatever_the_map_shows():
+def test_a_started_mission_stays_done_when_the_map_changes():
     drive = idle(*ROOM[:2])
     drive.command("start")
     follow(drive)

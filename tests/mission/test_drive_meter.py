@@ -56,7 +56,7 @@ def expected(config, degrees):
 
 @pytest.mark.parametrize("config", [SimulationConfig(), SLOW], ids=["quick", "slow"])
 @pytest.mark.parametrize("scatter", [(0.0, 0.0), (0.02, 0.01)], ids=["exact", "scattered"])
-def test_quarter_turns_take_what_the_robots_limits_make_them_take(config, scatter):
+def test_quarter_turns_take_the_time_of_the_robots_limits(config, scatter):
     times = measured(poses(LANES, config), *scatter)
     assert times.speed_m_s == pytest.approx(config.speed_m_s, rel=0.05)
     assert times.quarter_turn_s == pytest.approx(expected(config, 90.0), rel=0.08, abs=0.1)

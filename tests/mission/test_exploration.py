@@ -174,7 +174,7 @@ def test_the_area_of_a_zone_that_was_not_reached_is_said(wall, col0, col1, area)
     assert drive.mission.reason.endswith(f"; not reached: 'there' ({area} m2)")
 
 
-def test_a_zone_that_was_covered_before_its_door_shut_is_not_named():
+def test_a_zone_covered_before_its_door_shut_is_not_named():
     drive = Drive((0, 8), order_state=OrderState.idle("no order yet"))
     drive.tell(MapReceived(building("." * 9)), pose_at(0, 8))
     zones = [

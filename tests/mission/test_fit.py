@@ -176,7 +176,7 @@ def test_another_building_is_said_and_begun_anew():
     assert again.tell(MapReceived(building(*HALL))).faults == ()
 
 
-def test_what_was_covered_since_the_restart_counts_in_the_other_building_too():
+def test_coverage_since_the_restart_counts_in_the_other_building():
     first = started(*HALL, cell=(1, 1))
     first.finish()
     corner = PILLARS[-2:]

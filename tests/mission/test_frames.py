@@ -73,7 +73,7 @@ def test_map_and_pose_decide_not_who_came_first(first):
     assert isinstance(drive.tell(ODOM).faults[0], WrongFrame)
 
 
-def test_a_map_that_another_has_replaced_counts_if_the_poses_are_in_its_frame():
+def test_a_replaced_map_is_used_if_the_poses_are_in_its_frame():
     drive = Drive((1, 1))
     drive.tell(MAP)
     drive.tell(ODOM)
@@ -127,7 +127,7 @@ def test_a_pose_in_the_frame_that_counts_keeps_it(driven):
     driven.finish()
 
 
-def test_a_pose_in_the_frame_of_the_progress_keeps_it_without_a_map(driven):
+def test_a_pose_in_the_frame_of_the_progress_keeps_the_progress(driven):
     again = restarted(driven, ODOM)
     told_for(again, 2.0 * PATIENCE_S, THERE, HERE)
     assert again.mission.snapshot().cells == driven.mission.snapshot().cells
@@ -202,7 +202,7 @@ def test_frames_without_end_are_not_all_held():
     drive.finish()
 
 
-def test_an_order_for_everything_outlives_a_frame_in_which_nothing_was_covered():
+def test_an_order_for_all_survives_a_frame_with_nothing_covered():
     """Only what is bound to places in the frame before means nothing any more."""
     drive = Drive((1, 1), ODOM, pose_at(90, 90, frame="odom"))
     drive.command("reset")

@@ -77,7 +77,7 @@ def test_it_drives_home_stands_there_and_goes_on_where_it_was(policy, there):
     assert len(drive.visited) == 48
 
 
-def test_the_way_home_begins_at_the_robot_wherever_its_line_is_on_its_path():
+def test_the_way_home_begins_at_the_robot_even_off_its_path():
     """A polished line takes short cuts; the robot drove 20 m to a home that was 3 m away."""
     drive = covering(home=HOME)
     assert drive.cell != (5, 7)
@@ -137,7 +137,7 @@ def test_home_told_twice_is_home_told_once():
     assert drive.mission.route.revision <= revision + 3
 
 
-def test_cancelled_on_the_way_it_stops_and_can_still_be_told_to_go_home():
+def test_cancel_on_the_way_stops_and_still_allows_going_home():
     drive = covering(20)
     drive.command("home")
     decision = drive.command("cancel")
@@ -166,7 +166,7 @@ def test_paused_on_the_way_home_it_stops_and_resumed_drives_home():
     drive.finish()
 
 
-def test_paused_on_the_way_home_it_drives_home_after_a_restart_too():
+def test_a_paused_way_home_continues_after_a_restart():
     drive = covering(20)
     drive.command("home")
     drive.go()
@@ -287,13 +287,13 @@ def test_the_errand_survives_a_restart():
     assert again.mission.state is State.RETURNING
 
 
-def test_an_order_without_an_errand_is_kept_as_older_daemons_read_it():
+def test_an_order_without_an_errand_is_readable_by_older_daemons():
     drive = covering()
     assert "errand" not in drive.mission.snapshot().note
 
 
 @pytest.mark.parametrize("how", ["home", "return_home"])
-def test_a_path_that_a_map_cuts_off_behind_it_is_replaced_at_once(how):
+def test_a_path_cut_off_by_a_map_behind_it_is_replaced_at_once(how):
     """Its own cell is blocked, the one beside it is not, and no way leads home from there."""
     drive = Drive((0, 0), MapReceived(building("............")), pose_at(0, 0))
     drive.finish()

@@ -68,7 +68,7 @@ def test_no_path_leads_into_it_from_that_step_on():
     assert drive.driven[-1] == (0, 5)
 
 
-def test_a_robot_inside_stops_at_once_and_goes_on_once_it_is_removed():
+def test_a_robot_inside_a_keep_out_stops_until_its_removal():
     drive = started(*ROOM)
     for _ in range(12):
         drive.go()
@@ -83,7 +83,7 @@ def test_a_robot_inside_stops_at_once_and_goes_on_once_it_is_removed():
     assert covered < drive.visited == ALL
 
 
-def test_a_robot_at_its_border_stops_too_and_is_led_out_by_another_path():
+def test_a_robot_at_a_keep_out_border_stops_and_is_led_out():
     drive = started(*ROOM)
     for _ in range(3):
         drive.go()

@@ -73,7 +73,7 @@ COLUMN = [[4.0, 2.4], [4.4, 2.4], [4.4, 2.8], [4.0, 2.8]]
 
 
 @pytest.mark.parametrize("order", [None, {"zones": [{"name": "a", "polygon": ZONE}]}])
-def test_a_turned_building_is_driven_as_the_same_building_is_that_lies_straight(order):
+def test_a_turned_building_is_driven_like_a_straight_one(order):
     """Map, pose, zones and keep-out zones are turned, and so is the line."""
     straight = Mission(with_policy(CONFIG, keep_out=(tuple(map(tuple, COLUMN)),)))
     around = tuple(rotated_point(x, y, DEG) for x, y in COLUMN)
@@ -96,7 +96,7 @@ def test_a_turned_building_is_driven_as_the_same_building_is_that_lies_straight(
     assert askew.grid.geometry.origin.yaw == pytest.approx(math.radians(DEG))
 
 
-def test_a_keep_out_that_is_added_lies_where_one_of_an_order_lies():
+def test_an_added_keep_out_lies_where_that_of_an_order_lies():
     ordered, added = (Mission(replace(CONFIG, lattice_deg=DEG)) for _ in range(2))
     corners = tuple(rotated_point(x, y, DEG) for x, y in COLUMN)
     grid, start = in_yaw(room(3.0, 2.4), DEG), rotated_point(*START, DEG)
@@ -107,7 +107,7 @@ def test_a_keep_out_that_is_added_lies_where_one_of_an_order_lies():
     assert OrderState.from_json(added.snapshot().note).keep_out[0].polygon == corners
 
 
-def test_a_way_home_ends_at_the_place_and_the_heading_of_the_map_frame():
+def test_a_way_home_ends_at_place_and_heading_in_the_map_frame():
     home = Place(x_m=2.6, y_m=3.0, yaw_deg=80.0)
     mission = Mission(
         with_policy(replace(CONFIG, lattice_deg=25.0), home=home, dock=Dock(x_m=9, y_m=9))
@@ -126,7 +126,7 @@ def test_a_way_home_ends_at_the_place_and_the_heading_of_the_map_frame():
     assert mission.pose == replace(at, pose=mission.pose.pose)
 
 
-def test_a_zone_beyond_the_map_is_refused_in_coordinates_of_the_map_frame():
+def test_the_refusal_of_a_zone_off_the_map_uses_the_map_frame():
     mission = Mission(replace(CONFIG, lattice_deg=DEG))
     moon = {"zones": [{"name": "moon", "polygon": [[20, 20], [22, 20], [22, 22]]}]}
     events = MapReceived(room(3.0, 2.4)), PoseReceived(StampedPose(Pose2D(*START), "map"))
@@ -170,7 +170,7 @@ def seen_around(grid, at, reach_m):
     return OccupancyGrid(grid.geometry, np.where(near, grid.cells, -1).astype(np.int8))
 
 
-def test_cells_are_laid_along_the_walls_once_and_what_was_swept_counts():
+def test_cells_align_with_the_walls_once_and_keep_swept_floor():
     grid = askew_building()
     robot = Robot(Mission(AUTO), at=rotated_point(*START, DEG))
     robot.tell(MapReceived(seen_around(grid, robot.at, 1.2)))
@@ -203,7 +203,7 @@ def test_cells_are_laid_along_the_walls_once_and_what_was_swept_counts():
     assert figures.illegal_share == 0.0
 
 
-def test_a_map_that_has_no_room_for_askew_cells_has_them_along_its_axes():
+def test_a_map_too_small_for_askew_cells_has_them_along_its_axes():
     """A lattice askew over a map spans more cells than one along its axes."""
     grid = turned(room(5.0, 4.0), DEG)
     robot = Robot(Mission(replace(AUTO, max_lattice_cells=2600)), at=rotated_point(*START, DEG))
@@ -259,7 +259,7 @@ def looks(grid, metres=12):
     return [deg for deg in found if deg is not None]
 
 
-def test_walls_are_watched_until_they_are_certain_and_then_no_more():
+def test_walls_are_observed_only_until_they_are_certain():
     (deg,) = looks(turned(room(5.0, 4.0), 20.0))
     assert deg == pytest.approx(20.0, abs=0.6)
     assert looks(room(5.0, 4.0)) == [0.0]

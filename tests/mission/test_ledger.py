@@ -142,7 +142,7 @@ def test_visits_stop_counting_before_they_wrap():
     st.lists(st.tuples(st.floats(-1.2, 1.2), st.floats(-1.2, 1.2)), max_size=12),
     st.sampled_from([0.25, 0.3, 1.0]),
 )
-def test_a_drive_visits_what_its_twin_finds_under_many_small_discs(moves, cell_m):
+def test_a_drive_visits_the_cells_under_many_small_discs(moves, cell_m):
     """The twin walks each leg in tiny steps and asks at every one what lies under the tool."""
     points = np.cumsum([(0.5, 0.5), *moves], axis=0)
     ledger, _ = drive(*points, cell_m=cell_m)
@@ -166,7 +166,7 @@ def test_the_first_pose_sweeps_nothing_but_where_it_is(first):
 
 
 @pytest.mark.parametrize("order", [1, -1])
-def test_where_the_robot_stands_counts_whether_map_or_pose_came_first(order):
+def test_the_robots_cell_counts_in_either_order_of_map_and_pose(order):
     first = MapReceived(building("....")), pose_at(0, 2)
     standing = Drive((0, 2), *first[::order])
     assert standing.visited == {(0, 2)}
@@ -245,7 +245,7 @@ def test_a_robot_that_stood_still_visits_nothing_anew():
     assert restored.total == 1
 
 
-def test_poses_that_jump_all_over_the_world_take_a_bounded_ledger():
+def test_poses_that_jump_over_the_world_keep_the_ledger_bounded():
     """A tile for each pose, as thin maps far away make them; then the robot is at home again."""
     ledger = CoverageLedger(CELL)
     here = Pose2D(0.5 * CELL, 0.5 * CELL)

@@ -203,14 +203,14 @@ def test_the_status_says_what_of_the_floor_is_left_and_why():
     assert told.reachable_m2 == pytest.approx(told.reached_m2 + sum(left.values()), abs=0.002)
 
 
-def test_before_the_first_path_no_floor_is_called_not_worth_the_way():
+def test_no_floor_is_not_worth_the_way_before_the_first_path():
     mission = Mission(CONFIG)
     pose = PoseReceived(StampedPose(Pose2D(*START), "map"))
     mission.step([MapReceived(room(3.0, 2.4)), pose], 0.0)
     assert [left.reason for left in floor_report(mission).left] == ["not planned yet"]
 
 
-def test_what_is_left_of_an_order_is_to_come_while_the_robot_is_at_home():
+def test_the_rest_of_an_order_is_pending_while_the_robot_is_home():
     robot = Robot(Mission(CONFIG))
     robot.tell(MapReceived(room(3.0, 2.4)))
     robot.drive(10)
@@ -255,7 +255,7 @@ def test_the_status_says_what_floor_is_out_of_reach_and_why():
     assert kept.reachable_m2 == pytest.approx(left_m2, abs=0.0015)
 
 
-def test_a_keep_out_in_mid_mission_is_driven_around_by_the_line_at_once():
+def test_the_line_avoids_a_new_keep_out_at_once():
     robot = Robot(Mission(CONFIG))
     robot.tell(MapReceived(room(4.8, 2.4)))
     robot.drive(20)
@@ -272,7 +272,7 @@ def test_a_keep_out_in_mid_mission_is_driven_around_by_the_line_at_once():
     assert robot.mission.coverage().remaining == 0
 
 
-def test_what_is_out_of_reach_follows_a_map_that_grows_and_an_order_for_a_zone():
+def test_unreachable_floor_follows_map_growth_and_zone_orders():
     whole = room(4.8, 2.4)
     cells = whole.cells.copy()
     cells[:, 80] = 100
@@ -297,7 +297,7 @@ def test_what_is_out_of_reach_follows_a_map_that_grows_and_an_order_for_a_zone()
     assert floor_report(robot.mission).out_of_reach == floor_report(last.mission).out_of_reach
 
 
-def test_what_blocks_path_and_line_ahead_leaves_the_line_further_on_as_it_was():
+def test_an_obstacle_ahead_keeps_the_line_beyond_it():
     grid = room(12.0, 3.0)
     robot = Robot(Mission(CONFIG))
     robot.tell(MapReceived(grid))
@@ -373,7 +373,7 @@ def test_maps_that_grow_and_change_on_the_way(chunk, monkeypatch):
     assert judge_floor(truth, np.array(robot.trail), ROBOT).figures.swept_share > 0.95
 
 
-def test_a_robot_a_little_off_its_line_gets_lines_that_begin_where_it_is():
+def test_lines_begin_at_a_robot_slightly_off_its_line():
     """Its disc may touch a wall then, by a pixel; the line begins beside it all the same."""
     whole, off_m = with_obstacle(room(3.6, 3.0), 24, 30), 0.02
     rng = np.random.default_rng(3)
@@ -444,7 +444,7 @@ def test_a_line_keeps_clear_of_a_keep_out_zone():
     assert judge_floor(grid, trail, ROBOT).figures.swept_share > 0.6
 
 
-def test_a_plan_goes_on_from_the_cell_that_the_robot_is_nearest_to():
+def test_a_plan_continues_from_the_cell_nearest_to_the_robot():
     # Behind the robot it would turn back.
     line = replace(LINES["thorough"], price_s_m2=0.0)
     sweeping = replace(CONFIG.sweeping, line=line)
@@ -457,7 +457,7 @@ def test_a_plan_goes_on_from_the_cell_that_the_robot_is_nearest_to():
         assert math.dist(stand, robot.at) < 0.65 * CELL_M
 
 
-def test_the_cell_on_the_path_stays_near_the_robot_where_the_line_is_polished():
+def test_the_current_cell_stays_near_a_robot_on_a_polished_line():
     """It was up to 12 m away: points took the cells of those that they replaced."""
     robot = Robot(Mission(CONFIG))
     robot.tell(MapReceived(room(6.0, 4.8)))
@@ -526,7 +526,7 @@ def test_how_long_a_robot_stands_is_told_by_its_own_clock():
     robot.finish()
 
 
-def test_a_robot_that_stands_beside_its_path_is_led_to_it_at_once():
+def test_a_robot_beside_its_path_is_led_to_it_at_once():
     robot = Robot(Mission(CONFIG))
     robot.tell(MapReceived(room(6.0, 3.0)))
     for _ in range(20):
@@ -619,7 +619,7 @@ def test_a_robot_that_was_carried_away_gets_a_line_from_there():
     [lambda grid: shifted(grid, 0.012), lambda grid: part_of(grid, 0, 0, 40, 50)],
     ids=["on another raster", "of another size"],
 )
-def test_a_map_that_comes_while_the_robot_is_nowhere_is_swept_afterwards(other):
+def test_a_map_received_before_a_pose_is_swept_afterwards(other):
     grid = room(3.0, 2.4)
     robot = Robot(Mission(CONFIG))
     robot.tell(MapReceived(grid))
@@ -637,7 +637,7 @@ def test_a_map_that_comes_while_the_robot_is_nowhere_is_swept_afterwards(other):
     assert judge_floor(grid, np.array(robot.trail), ROBOT).figures.swept_share > 0.95
 
 
-def test_a_map_that_moved_by_part_of_a_pixel_leaves_most_of_the_line():
+def test_a_map_shifted_by_part_of_a_pixel_keeps_most_of_the_line():
     grid = room(3.6, 3.0)
     robot = Robot(Mission(CONFIG))
     robot.tell(MapReceived(grid))
@@ -652,7 +652,7 @@ def test_a_map_that_moved_by_part_of_a_pixel_leaves_most_of_the_line():
     robot.finish()
 
 
-def test_a_robot_that_jumped_ahead_on_its_path_is_not_led_back_through_a_new_wall():
+def test_a_robot_that_jumped_ahead_is_not_led_through_a_new_wall():
     grid = room(6.0, 0.5)
     robot = Robot(Mission(CONFIG), at=(4.0, 1.25))
     robot.tell(MapReceived(grid))
@@ -677,7 +677,7 @@ def cost_s(ahead, line):
     return driving_s + 1.5 * quarters + line.price_s_m2 * ahead.tally.left_m2
 
 
-def test_a_line_on_a_map_that_grows_becomes_better_and_never_worse():
+def test_a_line_on_a_growing_map_never_becomes_worse():
     grid = with_obstacle(with_obstacle(room(6.0, 3.0), 22, 30), 0, 82, 62, UNKNOWN)
     robot = Robot(Mission(CONFIG))
     robot.tell(MapReceived(grid))

@@ -119,7 +119,7 @@ def test_no_joint_leads_where_it_is_not_clear(seed):
     assert (np.diff(found.cells) >= 0).all()
 
 
-def test_a_stand_is_left_out_only_where_the_way_from_beside_it_is_clear():
+def test_a_stand_is_left_out_only_if_the_way_past_it_is_clear():
     walk = cells(*lane(0, range(6)), (1, 5), (2, 5))
     line = polished(walk).part(0, 5)
     # All but where one stands in the last cell.

@@ -116,7 +116,7 @@ def test_a_map_that_turns_by_a_degree_with_each_message():
 
 
 @pytest.mark.parametrize("far_m", [8_000.0, 900_000.0])
-def test_a_map_that_jumps_far_away_and_back_costs_no_more_memory_than_one(far_m):
+def test_a_map_that_jumps_far_and_back_needs_no_more_memory(far_m):
     """As when SLAM begins anew: no line is sought in all that lies between."""
     near = room(2.4, 1.8)
     geometry = near.geometry
@@ -135,7 +135,7 @@ def test_a_map_that_jumps_far_away_and_back_costs_no_more_memory_than_one(far_m)
     robot.finish()
 
 
-def test_a_robot_beside_a_long_straight_line_gets_one_that_turns_off_it():
+def test_a_robot_beside_a_long_line_gets_a_line_that_leaves_it():
     """Of the line that both walks begin with, only its first point was left, and it is passed."""
     grid = grid_of(np.ones((120, 120), bool))
     footprint = Footprint(0.25, 0.12)
@@ -151,7 +151,7 @@ def test_a_robot_beside_a_long_straight_line_gets_one_that_turns_off_it():
     assert ahead.xy()[-1].tolist() == pytest.approx([16.5 * 0.25, 8.5 * 0.25], abs=0.03)
 
 
-def test_a_robot_that_does_not_fit_is_led_out_once_however_many_maps_come():
+def test_a_robot_that_does_not_fit_is_led_out_once_for_all_maps():
     """Each map put one more step before the one before, to and fro."""
     free = np.ones((60, 60), bool)
     free[:, :4] = False

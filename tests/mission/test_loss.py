@@ -52,13 +52,13 @@ def test_a_reset_says_how_much_it_would_forget():
     assert refused(drive, "reset") is None, "there is nothing left to forget"
 
 
-def test_a_keep_out_by_another_order_would_forget_what_one_by_name_keeps():
+def test_a_keep_out_in_a_new_order_forgets_but_a_named_one_keeps():
     drive = covering(12)
     assert "11 covered cells" in refused(drive, "start", {"keep_out": [rectangle(4, 4, 5, 5)]})
 
 
 @pytest.mark.parametrize("order", [None, {"keep_covered": True}, {**OTHER, "keep_covered": True}])
-def test_the_same_order_and_one_that_keeps_what_is_covered_need_no_consent(order):
+def test_an_order_that_forgets_nothing_needs_no_consent(order):
     drive = covering(12)
     covered = drive.visited
     assert refused(drive, "start", order) is None
@@ -71,7 +71,7 @@ def test_a_zone_where_nothing_is_covered_needs_no_consent():
     assert refused(drive, "start", EAST) is None
 
 
-def test_after_a_cancelled_order_what_is_covered_is_not_forgotten_unasked():
+def test_coverage_of_a_cancelled_order_is_forgotten_by_consent():
     drive = covering(12)
     assert refused(drive, "cancel") is None
     assert "11 covered cells" in refused(drive, "start")

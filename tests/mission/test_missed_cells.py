@@ -18,7 +18,7 @@ def test_the_robot_comes_back_to_a_cell_a_few_times_only():
     assert cells.may_come_back((0, 1))
 
 
-def test_a_cell_opened_again_is_not_covered_until_it_is_visited_again():
+def test_a_reopened_cell_is_covered_only_by_another_visit():
     ledger = MissionLedger(CELL, CELL)
     for col in (0, 1, 2):
         ledger.record(pose_at(0, col).pose.pose)

@@ -19,7 +19,7 @@ def test_floor_is_worth_a_way_that_takes_less_than_its_price():
     assert taken({(0, 15): 0.11}) == []
 
 
-def test_a_strip_over_many_cells_is_worth_what_its_floor_is_together():
+def test_a_strip_over_many_cells_is_worth_the_sum_of_its_floor():
     strip = {(0, col): 0.03 for col in range(5, 10)}
     assert taken(strip) == sorted(strip)
     assert taken({(0, 5): 0.03}) == []

@@ -14,14 +14,14 @@ CLAIM = 0.02
 
 
 @pytest.mark.parametrize("left_m", [0.05, 0.12])
-def test_floor_beside_a_base_that_drives_beside_its_line_is_not_called_swept(left_m):
+def test_floor_beside_a_base_off_its_line_is_not_called_swept(left_m):
     outcome = driven(bare_room(), left_m=left_m)
     assert outcome.mission.state is State.DONE
     assert outcome.claimed <= outcome.swept + CLAIM
     assert outcome.claimed <= outcome.known + CLAIM
 
 
-def test_floor_that_the_base_has_left_is_swept_afterwards_and_else_told():
+def test_floor_left_by_the_base_is_swept_later_or_reported():
     outcome = driven(flat(), left_m=0.12)
     assert outcome.mission.state is State.DONE
     # 85 % without; of a twentieth it is only told.
@@ -36,7 +36,7 @@ def test_floor_that_the_base_has_left_is_swept_afterwards_and_else_told():
 
 
 @pytest.mark.parametrize("at", [(0.0, 0.0), (0.013, 0.0088)])
-def test_strips_in_which_only_the_rasters_differ_are_not_driven_to(at):
+def test_strips_due_to_raster_differences_are_not_driven_to(at):
     outcome = driven(bare_room(*at))
     assert outcome.mission.state is State.DONE
     assert outcome.swept > 0.995
@@ -48,9 +48,7 @@ def test_strips_in_which_only_the_rasters_differ_are_not_driven_to(at):
     ("poses_hz", "speed_m_s", "known"),
     [(1.0, 0.3, 0.97), (1.0, 0.7, 0.98), (0.5, 0.3, 0.96), (0.5, 0.7, 0.7)],
 )
-def test_poses_that_come_seldom_are_joined_where_the_robot_can_have_driven(
-    poses_hz, speed_m_s, known
-):
+def test_sparse_poses_are_joined_where_the_robot_can_have_driven(poses_hz, speed_m_s, known):
     outcome = driven(bare_room(), poses_hz=poses_hz, speed_m_s=speed_m_s, most_s=400.0)
     assert outcome.mission.state is State.DONE
     assert not outcome.troubles

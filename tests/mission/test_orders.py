@@ -153,7 +153,7 @@ def added(keep_out):
     return {"command": "keep_out_add", "keep_out": keep_out}
 
 
-def test_commands_recorded_before_they_were_asked_for_consent_had_it():
+def test_recorded_commands_without_a_consent_member_had_consent():
     assert read_recorded({"command": "reset"}).discard
     assert read_recorded({"command": "start"}).discard
     assert not read_recorded({"command": "reset", "discard": False}).discard
@@ -263,7 +263,7 @@ def test_commands_may_come_twice():
     )
 
 
-def test_another_order_replaces_the_one_before_and_the_same_one_begins_again_when_over():
+def test_a_new_order_replaces_the_old_a_finished_one_restarts():
     running = OrderState(TWO, zone=1)
     assert running.commanded(Command("start", EVERYTHING_ONCE)) == OrderState(EVERYTHING_ONCE)
     over = OrderState(TWO, zone=1, stage=Stage.OVER)

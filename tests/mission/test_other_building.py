@@ -126,7 +126,7 @@ def test_a_map_that_comes_in_parts_is_another_one_too():
     assert [type(fault) for fault in faults] == [LedgerMismatchError]
 
 
-def test_a_robot_whose_pose_is_not_repeated_does_not_wait_for_ever():
+def test_a_robot_without_repeated_poses_does_not_wait_for_ever():
     drive = swept(*FLOOR)
     drive.tell(NEW)
     faults = [fault for _ in range(80) for fault in drive.tell().faults]
@@ -175,7 +175,7 @@ def test_moved_furniture_does_not_cost_the_ledger():
     assert drive.mission.state is State.DONE
 
 
-def test_a_mapper_that_begins_again_keeps_the_ledger_until_it_contradicts():
+def test_a_restarted_mapper_keeps_the_ledger_it_agrees_with():
     drive = swept(*FLOOR)
     covered = drive.mission.ledger.snapshot().cells
     corner = [row[:4] for row in FLOOR[-4:]]
@@ -188,7 +188,7 @@ def test_a_mapper_that_begins_again_keeps_the_ledger_until_it_contradicts():
     assert [type(fault) for fault in faults] == [LedgerMismatchError]
 
 
-def test_a_mapper_that_flickers_between_two_floors_decides_nothing():
+def test_a_mapper_flickering_between_two_floors_decides_nothing():
     drive = swept(*FLOOR, ticks=60)
     covered = drive.mission.ledger.snapshot().cells
     paths, faults, states = len(drive.updates), [], set()
@@ -215,7 +215,7 @@ def test_each_change_of_floors_takes_longer_to_be_believed():
     assert len(changes) <= 2
 
 
-def test_what_is_bound_to_places_of_the_floor_before_ends_with_it():
+def test_orders_tied_to_the_previous_floor_end_with_it():
     drive = swept(*FLOOR, ticks=20)
     drive.command("start", {"zones": [{"name": "a", "polygon": [[0.5, 0.5], [1, 0.5], [1, 1]]}]})
     stand(drive, 8.0, NEW)
@@ -224,7 +224,7 @@ def test_what_is_bound_to_places_of_the_floor_before_ends_with_it():
     assert drive.mission.home is None
 
 
-def test_the_home_of_the_floor_before_is_forgotten_without_an_order_too():
+def test_the_previous_floors_home_is_forgotten_without_an_order():
     drive = swept(*FLOOR, ticks=20)
     drive.command("start", {})
     stand(drive, 1.0)

@@ -16,7 +16,7 @@ def test_a_cell_is_kept_until_its_floor_is_swept():
     assert not cells.inside(Window(0, 0, 9, 9)).any()
 
 
-def test_cells_are_looked_at_in_turn_and_no_more_are_kept_than_there_is_room_for():
+def test_passed_cells_are_checked_in_turn_and_bounded():
     cells = PassedCells()
     for col in range(MOST_PASSED + 5):
         cells.note((0, col))

@@ -71,7 +71,7 @@ def test_a_path_decided_on_but_not_sent_is_withdrawn_too():
     assert sent.paths[-1].stops
 
 
-def test_what_another_daemon_or_an_earlier_process_has_published_is_voided():
+def test_a_path_of_another_daemon_or_process_is_voided():
     exit_, sent = PathExit(), Sent()
     exit_.void("this daemon plans from now on", "map")
     exit_.send(sent)
@@ -80,7 +80,7 @@ def test_what_another_daemon_or_an_earlier_process_has_published_is_voided():
     assert (empty.frame, empty.revision) == ("map", 0)
 
 
-def test_another_daemons_path_is_voided_though_the_own_one_is_empty():
+def test_another_daemons_path_is_voided_after_an_own_empty_path():
     _, exit_, sent = driving()
     exit_.withdraw("stop")
     exit_.send(sent)

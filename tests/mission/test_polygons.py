@@ -82,7 +82,7 @@ def test_near_is_what_the_polygon_touches(polygon, reach):
 
 @examples(40)
 @given(polygons, st.sampled_from([0.18, 0.4]))
-def test_a_robot_that_keeps_out_touches_no_keep_out_zone_on_its_way(polygon, radius):
+def test_a_robot_touches_no_keep_out_zone_on_its_way(polygon, radius):
     assume(not polygon_flaw(polygon))
     free = CoverageLattice.from_free(np.ones((WINDOW.rows, WINDOW.cols), bool), CELL_M)
     free = CoverageLattice(WINDOW, CELL_M, free.states.copy(), free.steps.copy())
@@ -102,7 +102,7 @@ def test_a_robot_that_keeps_out_touches_no_keep_out_zone_on_its_way(polygon, rad
                 assert not is_inside((x, y), polygon)
 
 
-def test_a_polygon_along_the_cells_borders_holds_and_touches_just_these():
+def test_a_polygon_along_cell_borders_touches_just_its_cells():
     square = ((0.3, 0.3), (1.5, 0.3), (1.5, 1.2), (0.3, 1.2))
     expected = {(row, col) for row in (1, 2, 3) for col in (1, 2, 3, 4)}
     assert cells(cells_inside(square, WINDOW, CELL_M)) == expected

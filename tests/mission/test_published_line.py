@@ -31,7 +31,7 @@ def test_a_change_waits_until_the_robot_is_near():
     assert due_at == [number for number in range(12) if (11 - number) * EDGE_M <= 2.25]
 
 
-def test_a_near_change_waits_for_the_plan_that_is_under_way_but_not_for_long():
+def test_a_near_change_waits_briefly_for_a_running_plan():
     published = PublishedLine(0.25)
     published.take(ZIGZAG, len(ZIGZAG))
     cut = ZIGZAG[:5]
@@ -48,7 +48,7 @@ def test_what_is_just_ahead_does_not_wait(left):
     assert look(published, ZIGZAG[:left], is_settled=False)
 
 
-def test_where_the_published_line_leads_on_the_plan_is_waited_for():
+def test_a_published_line_that_leads_on_waits_for_the_plan():
     published = PublishedLine(0.25)
     published.take(ZIGZAG, len(ZIGZAG))
     assert not look(published, ZIGZAG[:2], 1.0, is_settled=False, leads_on=True)

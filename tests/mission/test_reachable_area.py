@@ -84,7 +84,7 @@ def reworked(draw, lattice):
 
 @examples(300)
 @given(problems(max_side=24), st.data())
-def test_after_a_change_the_same_is_reachable_as_if_all_were_searched(given_ground, data):
+def test_an_update_of_the_area_equals_a_full_search(given_ground, data):
     lattice, start = given_ground
     before = ReachableArea.around(lattice, start)
     for _ in range(3):
@@ -146,12 +146,12 @@ WITH_DOOR = drawn_over(ROOMS, (30, 40), ".")
         ((30, 59), (".",), True),  # a door to the third room
     ],
 )
-def test_all_is_searched_only_if_something_comes_apart_or_together(at, pieces, searched):
+def test_a_full_search_runs_only_if_areas_split_or_merge(at, pieces, searched):
     before = ground(*WITH_DOOR)
     assert is_searched(before, *drawn_over(WITH_DOOR, at, *pieces)) is searched
 
 
-def test_a_map_that_no_longer_shows_the_way_between_two_rooms_parts_them(monkeypatch):
+def test_a_map_without_the_way_between_two_rooms_parts_them(monkeypatch):
     """The way led through cells that fell out of the map: among those left nothing came apart."""
     before = ground("......##", "........", "#######.", "........", "......##")
     after = lattice("......#", ".......", "#######", ".......", "......#")
@@ -161,7 +161,7 @@ def test_a_map_that_no_longer_shows_the_way_between_two_rooms_parts_them(monkeyp
     assert not here.contains((4, 0))
 
 
-def test_a_robot_that_was_carried_elsewhere_while_the_map_changed():
+def test_a_robot_carried_away_during_a_map_change_gets_its_area():
     before = ground(*ROOMS)
     after = lattice(*drawn_over(ROOMS, (10, 12), "##"))
     there = before.updated(change_to(before.lattice, after), (0, 50))
@@ -235,7 +235,7 @@ def test_the_way_is_in_cells_of_the_map_frame():
         assert room.shortest_path((-2, 10), goal).shape == (0, 2)
 
 
-def test_a_robot_is_in_its_cell_or_next_to_the_nearest_coverable_one():
+def test_a_robot_is_in_or_next_to_the_nearest_coverable_cell():
     room = lattice("...", "###", "...")
     assert anchor_cell(room, Pose2D(1.5, 0.5)) == (0, 1)
     assert anchor_cell(room, Pose2D(1.5, 0.99)) == (0, 1)

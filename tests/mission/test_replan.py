@@ -50,7 +50,7 @@ def test_one_under_way_comes_first():
     assert drive.plan().plan is None
 
 
-def test_what_the_map_shows_meanwhile_does_not_hide_that_it_was_asked_for():
+def test_a_map_change_does_not_hide_a_requested_replan():
     drive = Drive((0, 0), MapReceived(building(*ROOM)), pose_at(0, 0))
     drive.command("replan")
     drive.tell(MapReceived(building(*ROOM, "...#....")))

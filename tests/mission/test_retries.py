@@ -46,7 +46,7 @@ def reasons(drive):
     return [(area.cells, area.reason) for area in drive.mission.unreached().areas]
 
 
-def test_a_room_whose_door_was_shut_is_looked_at_again_after_a_while():
+def test_a_room_with_a_shut_door_is_tried_again_later():
     drive = drives(*ROOMS)
     drive.tell(patch("#", at=DOOR))
     until(drive, State.BLOCKED)
@@ -92,7 +92,7 @@ def test_a_door_that_has_opened_when_it_is_looked_at():
     assert (0, 8) in drive.visited
 
 
-def test_a_door_that_opens_while_the_robot_waits_ends_the_waiting():
+def test_a_door_that_opens_ends_the_wait_for_another_try():
     drive = drives(*ROOMS)
     drive.tell(patch("#", at=DOOR))
     until(drive, State.BLOCKED)
@@ -111,7 +111,7 @@ def test_what_never_could_be_reached_is_named_and_not_waited_for():
     assert area.cell in {(row, col) for row in (0, 1) for col in (4, 5)}
 
 
-def test_rows_of_cells_along_a_wall_are_named_and_not_driven_along_again():
+def test_rows_left_along_a_wall_are_named_and_not_tried_again():
     """A map that refines its walls closes many of them."""
     drive = drives(*["......"] * 5)
     drive.tell(patch("######", at=(4, 0)))
@@ -145,7 +145,7 @@ def stands_short(drive, ticks):
     return plans
 
 
-def test_a_cell_left_over_after_several_tries_is_tried_again_later():
+def test_a_cell_left_after_several_tries_is_tried_again_later():
     drive = drives("...")
     drive.go()
     assert stands_short(drive, 20) == 3
@@ -161,7 +161,7 @@ def test_a_cell_left_over_after_several_tries_is_tried_again_later():
     assert reasons(drive) == [(1, "left over after 6 tries")]
 
 
-def test_a_robot_that_yet_turns_in_its_last_cell_is_not_at_the_end():
+def test_a_robot_still_turning_in_its_last_cell_is_not_done():
     """A try to come to the cell in which it had waited was over within a second."""
     drive = drives("...")
     drive.go()
@@ -182,7 +182,7 @@ def test_a_cell_left_over_can_be_covered_at_a_later_try():
     assert drive.mission.reason == "every reachable cell is covered"
 
 
-def test_cells_left_over_in_one_zone_do_not_keep_the_robot_from_the_next():
+def test_cells_left_in_one_zone_do_not_delay_the_next_zone():
     drive = drives("......")
     zones = [
         {"name": "a", "polygon": rectangle(0, 2, 1, 3)},

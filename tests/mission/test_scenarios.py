@@ -36,7 +36,7 @@ TWO_ROOMS = ("...#...", "...#...", ".......", "...#...")
 CORRIDOR = ("..........",)
 
 
-def test_it_waits_for_a_map_then_for_a_pose_then_asks_for_the_first_plan():
+def test_a_mission_waits_for_map_then_pose_then_requests_a_plan():
     drive = Drive((0, 0))
     assert drive.mission.state is State.WAITING_FOR_MAP
     assert drive.mission.coverage() is None
@@ -108,7 +108,7 @@ def test_a_map_that_touches_no_reachable_cell_changes_nothing():
     assert len(drive.updates) == 1
 
 
-def test_a_grown_map_asks_for_a_plan_from_the_robot_s_cell_without_what_is_covered():
+def test_a_grown_map_requests_a_plan_of_what_is_not_covered():
     drive = started("...", "...", cell=(1, 0))
     for _ in range(2):
         drive.go()
@@ -130,7 +130,7 @@ def test_a_grown_map_asks_for_a_plan_from_the_robot_s_cell_without_what_is_cover
     assert drive.visited == {(row, col) for row in (-1, 0, 1) for col in range(3)}
 
 
-def test_a_wall_across_the_path_cuts_it_off_at_once_at_the_last_legal_cell():
+def test_a_wall_across_the_path_cuts_it_at_the_last_legal_cell():
     drive = started(*CORRIDOR)
     for _ in range(3):
         drive.go()
@@ -198,7 +198,7 @@ def test_a_robot_inside_a_wall_stops_and_says_why_and_recovers():
     assert len(free) == 32
 
 
-def test_a_wall_around_the_robot_blocks_it_and_its_removal_frees_it():
+def test_a_wall_around_the_robot_blocks_it_until_its_removal():
     drive = started(*ROOM)
     assert drive.tell(MapReceived(building(*["######"] * 4))).path.cells.shape == (0, 2)
     assert drive.mission.state is State.BLOCKED
@@ -206,7 +206,7 @@ def test_a_wall_around_the_robot_blocks_it_and_its_removal_frees_it():
     drive.finish()
 
 
-def test_a_robot_that_stops_short_of_its_path_s_end_is_not_sent_there_for_ever():
+def test_a_robot_that_stops_short_is_not_resent_for_ever():
     drive = started("...")
     drive.go()
     x, y = (drive.cell[1] + 1) * 0.25 + 0.01, 0.01  # in the last cell's corner
@@ -262,7 +262,7 @@ def test_a_robot_carried_away_gets_a_new_path():
     assert drive.visited == set(np.ndindex(8, 12))
 
 
-def test_a_robot_carried_to_another_room_while_planning_gets_no_path_from_the_old_one():
+def test_a_robot_carried_away_while_planning_gets_no_old_path():
     rooms = ("...#...", "...#...", "...#...")
     drive = Drive((0, 0), MapReceived(building(*rooms)), pose_at(0, 0))
     drive.cell = (0, 6)
@@ -273,7 +273,7 @@ def test_a_robot_carried_to_another_room_while_planning_gets_no_path_from_the_ol
     assert {(row, col) for row in range(3) for col in (4, 5, 6)} <= drive.visited
 
 
-def test_a_plan_for_a_map_that_has_changed_is_refused_where_it_is_not_legal_any_more():
+def test_a_plan_that_a_map_change_made_illegal_is_refused():
     drive = Drive((0, 0), MapReceived(building(*CORRIDOR)), pose_at(0, 0))
     stale = answer(drive.request)
     # The plan is still being made: no second one is asked for.
@@ -287,7 +287,7 @@ def test_a_plan_for_a_map_that_has_changed_is_refused_where_it_is_not_legal_any_
     assert drive.visited == {(0, col) for col in range(6)}
 
 
-def test_a_plan_for_a_map_that_has_changed_elsewhere_is_driven_until_a_better_one_is_there():
+def test_a_plan_still_legal_after_a_map_change_is_driven():
     drive = Drive((0, 0), MapReceived(building(*CORRIDOR, "##########")), pose_at(1, 0))
     stale = answer(drive.request)
     drive.tell(patch(".", at=(0, 9)))
@@ -414,7 +414,7 @@ def test_one_bad_event_does_not_cost_the_others():
     assert decision.plan.problem.start == (0, 0)
 
 
-def test_a_pose_far_off_the_map_is_no_reason_to_run_out_of_memory():
+def test_a_pose_far_off_the_map_takes_bounded_memory():
     """A localiser gone astray: the wire lets positions up to a thousand kilometres through."""
     drive = started(*ROOM)
     drive.tell(pose_at(4_000_000, -4_000_000))
@@ -423,7 +423,7 @@ def test_a_pose_far_off_the_map_is_no_reason_to_run_out_of_memory():
     drive.finish()
 
 
-def test_a_robot_at_the_end_of_its_path_with_cells_left_over_gets_another():
+def test_a_robot_at_the_end_with_cells_left_gets_another_path():
     drive = started(*CORRIDOR)
     drive.walk = [(0, col) for col in (1, 2, 3)]
     for _ in range(3):
@@ -437,7 +437,7 @@ def test_a_robot_at_the_end_of_its_path_with_cells_left_over_gets_another():
     assert drive.visited == {(0, col) for col in range(10)}
 
 
-def test_a_robot_that_stops_short_of_its_last_cell_is_sent_there_again():
+def test_a_robot_that_stops_short_of_its_last_cell_is_resent():
     drive = started(*CORRIDOR)
     for _ in range(8):
         drive.go()
@@ -474,7 +474,7 @@ def test_a_single_cell_is_covered_by_standing_in_it(cell):
     assert decision == Decision()
 
 
-def test_a_robot_that_missed_a_cell_just_before_its_path_s_end_is_sent_there_again():
+def test_a_robot_is_resent_to_a_cell_missed_before_the_end():
     """It is neither far from where it was last on its path, nor at its end by that count."""
     drive = started("####", "....")
     drive.go()

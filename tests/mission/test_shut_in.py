@@ -66,7 +66,7 @@ def test_where_there_is_no_way_it_waits_and_is_never_done():
     assert robot.wait(900.0, lambda robot: robot.mission.state == "done")
 
 
-def test_one_that_gives_up_its_cells_while_it_is_shut_in_is_not_done():
+def test_a_shut_in_robot_that_gives_up_its_cells_is_not_done():
     """What it could not come to in the niche was given up, and with it all of the room."""
     robot = shut_in(by=5)
     for _ in range(5):
@@ -125,7 +125,7 @@ def test_a_robot_inside_a_wall_of_the_map_backs_out():
     assert robot.wait(60.0, lambda robot: robot.x < 3.8)
 
 
-def test_a_robot_that_cannot_drive_the_way_out_tries_ever_more_seldom():
+def test_a_robot_stuck_on_its_way_out_retries_less_often():
     robot = shut_in()
     assert robot.wait(60.0, lambda robot: "shut_in" in troubles(robot) and robot.path)
     robot.is_stuck = True

@@ -77,7 +77,7 @@ def test_a_poor_path_is_made_better_further_on():
     assert verdict.complete
 
 
-def test_every_other_attempt_is_a_search_of_the_whole_rest_once_for_each_walk():
+def test_one_attempt_for_each_walk_searches_the_whole_rest():
     drive, kinds = driving(), []
     while len(kinds) < 8:
         request, drive.request = drive.request, None
@@ -96,9 +96,7 @@ def test_every_other_attempt_is_a_search_of_the_whole_rest_once_for_each_walk():
     ("times", "after_s", "is_taken"),
     [(4, SETTLED_S, False), (6, SETTLED_S, True), (6, 1.0, False), (30, 1.0, True)],
 )
-def test_another_walk_altogether_has_to_save_a_percent_and_more_of_a_walk_that_changes(
-    times, after_s, is_taken
-):
+def test_a_new_walk_has_to_save_more_while_the_walk_changes(times, after_s, is_taken):
     """Its line is laid and polished anew, and a map that grows soon undoes what it would save."""
     side, cost = 30, CoverageCost()
     best = lanes(side, side, side)
@@ -115,7 +113,7 @@ def test_another_walk_altogether_has_to_save_a_percent_and_more_of_a_walk_that_c
     assert (drive.updates[-1].reason == BETTER) is is_taken
 
 
-def test_another_line_along_the_same_cells_leaves_the_attempt_as_it_is():
+def test_a_new_line_along_the_same_cells_keeps_the_attempt():
     drive = driving()
     poor = drive.updates[-1]
     request, drive.request = drive.request, None
@@ -186,7 +184,7 @@ def test_attempts_take_their_share_of_the_time_and_less_in_vain():
         assert least - 1e-9 <= gap < least + 0.15
 
 
-def test_where_nothing_can_be_attempted_it_is_not_tried_with_each_pose(monkeypatch):
+def test_a_hopeless_attempt_is_not_repeated_with_each_pose(monkeypatch):
     """All is covered, but the path leads on: to find that out takes a look at the whole map."""
     config = replace(CONFIG, spare_share=1.0)
     drive = Drive((0, 0), MapReceived(building(*HALL[:3])), pose_at(0, 0), config=config)
@@ -219,7 +217,7 @@ def test_without_a_share_nothing_is_asked_for():
     assert driving(share=0.0).request is None
 
 
-def test_what_saves_next_to_nothing_is_no_reason_for_another_path():
+def test_a_tiny_saving_does_not_change_the_path():
     drive = driving(gap=10)
     request, drive.request = drive.request, None
     shorter = request.problem.before[:-1]  # the last step led to a cell it had been in
@@ -259,7 +257,7 @@ def test_what_is_needed_comes_next():
     assert not drive.mission.route.wanted
 
 
-def test_a_new_walk_is_attempted_though_attempts_at_the_last_were_in_vain():
+def test_a_new_walk_is_attempted_after_vain_attempts_at_the_last():
     spare = SpareTime(SHARE)
     for attempt in range(4):
         spare.spend(0.05, attempt, walk=1)

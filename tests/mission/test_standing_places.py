@@ -90,7 +90,7 @@ def test_a_frame_of_the_configuration_counts_from_the_start():
     assert drive.request is not None
 
 
-def test_other_places_in_the_configuration_belong_to_the_map_in_use():
+def test_places_changed_in_the_configuration_fit_the_current_map():
     drive, _ = on_another_floor()
     again = restarted(drive, with_policy(WITH_ALL, home=Place(x_m=0.4, y_m=0.4)))
     assert codes(stand(again, "map_2", 2)) == []
@@ -107,7 +107,7 @@ def test_a_reset_takes_the_places_for_those_of_the_map_in_use():
     assert drive.mission.home == (4, 8)
 
 
-def test_after_a_reset_the_next_map_and_pose_decide_whose_they_are():
+def test_after_a_reset_the_next_map_and_pose_own_the_places():
     drive = Drive(HERE, *floor("map_1"), config=WITH_ALL)
     drive.command("reset")
     drive.command("start")
@@ -141,7 +141,7 @@ def test_a_robot_does_not_go_to_the_dock_of_another_floor():
     assert drive.mission.reason.startswith("the robot does not go to charge: mission.dock: given")
 
 
-def test_places_in_the_frame_of_another_building_are_not_used_either():
+def test_places_in_another_buildings_frame_are_not_used():
     """The same frame, and a map that is not the one that they were given for."""
     drive = Drive(HERE, *floor("map"), config=WITH_ALL)
     drive.plan()
@@ -158,7 +158,7 @@ def test_places_in_the_frame_of_another_building_are_not_used_either():
     assert again.mission.state is not State.BLOCKED
 
 
-def test_a_ledger_of_another_building_found_after_a_restart_leaves_them_too():
+def test_places_are_unused_after_a_restart_in_another_building():
     first = Drive(HERE, *floor("map"), config=WITH_ALL)
     first.finish()
     again = restarted(first, WITH_ALL)
@@ -166,7 +166,7 @@ def test_a_ledger_of_another_building_found_after_a_restart_leaves_them_too():
     assert again.mission.state is State.BLOCKED
 
 
-def test_a_mask_that_came_for_the_building_before_is_not_used_in_the_other():
+def test_a_mask_of_the_previous_building_is_not_used():
     """Its frame is that of both maps; one for this building may come, which has the mission begin
     anew, with the mask in its configuration."""
     mask, other = (inline_grid(building("##", at=(row, 2)), 65) for row in (2, 3))
@@ -189,7 +189,7 @@ def test_without_places_nothing_is_said():
 
 
 @pytest.mark.parametrize("command", ["keep-out zones", "zones"])
-def test_an_order_with_nothing_covered_stays_with_its_frame_over_a_restart(command):
+def test_an_order_keeps_its_frame_over_a_restart(command):
     drive = Drive(HERE, *floor("map_1"), config=CONFIG)
     corners = rectangle(3, 3, 5, 5)
     zone = {"zones": [{"name": "a", "polygon": corners}]}

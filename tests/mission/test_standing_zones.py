@@ -165,7 +165,7 @@ def test_masks_that_are_none_are_refused(tmp_path):
             mask_polygons(wrong)
 
 
-def test_a_picture_that_is_no_mask_is_refused_before_it_holds_a_reload_up(tmp_path):
+def test_a_picture_that_is_no_mask_is_refused_without_delay(tmp_path):
     noise = np.indices((1500, 1500)).sum(axis=0) % 2 == 0
     began = time.process_time()
     with pytest.raises(BadConfiguration, match="take more than 2000 rectangles"):
@@ -207,7 +207,7 @@ def test_a_mask_that_takes_long_to_read_is_refused(tmp_path):
         inline_mask(file, 65, 44_000_000)
 
 
-def test_cells_inside_small_polygons_are_those_of_the_whole_window():
+def test_cells_in_small_polygons_equal_those_of_the_whole_window():
     random = np.random.default_rng(3)
     for _ in range(50):
         x, y = random.uniform(-1, 3, 2)

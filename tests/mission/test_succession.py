@@ -64,7 +64,7 @@ def test_a_dead_dock_is_found():
     assert (drive.mission.state, codes(drive)) == (State.CHARGING, ["no_current"])
 
 
-def test_a_robot_that_charges_stays_in_its_dock_and_knows_its_battery():
+def test_a_charging_robot_stays_docked_and_knows_its_battery():
     drive = charging()
     level = drive.mission.charging.gauge.level
     drive.level, drive.power = None, "discharging"

@@ -113,7 +113,7 @@ def test_where_the_way_is_unknown_nothing_is_swept():
 
 @pytest.mark.parametrize("yaw", [0.0, 0.4, math.pi / 2, -2.0])
 @pytest.mark.parametrize("resolution", [0.011, 0.025, 0.3])
-def test_it_is_carried_onto_another_raster_by_the_centres_of_its_pixels(yaw, resolution):
+def test_swept_floor_moves_to_another_raster_by_pixel_centres(yaw, resolution):
     floor = drive((0.0, 0.0), (0.5, 0.2), (0.1, 0.4))
     geometry = GridGeometry(90, 300, resolution, Pose2D(-0.703, -0.311, yaw))
     carried = floor.swept_on(geometry)
@@ -125,7 +125,7 @@ def test_it_is_carried_onto_another_raster_by_the_centres_of_its_pixels(yaw, res
     assert np.array_equal(floor.swept_on(geometry, part), carried[20:61, 30:290])
 
 
-def test_a_centre_between_two_pixels_lies_on_the_same_one_whatever_is_looked_at():
+def test_a_centre_between_two_pixels_always_lies_on_the_same_one():
     """Rounding decided, by where the window began: the count of a line was off by some pixels."""
     floor = drive((0.0, 0.0), (0.5, 0.2), (0.1, 0.4), (0.9, 0.7), (0.3, 1.1))
     geometry = GridGeometry(142, 82, 0.02, Pose2D(-0.22, -0.22))
@@ -145,7 +145,7 @@ def test_far_from_0_it_is_the_same():
     assert np.array_equal(drive((x + 0.1, y), (x + 0.4, y + 0.2)).swept_in(window), near)
 
 
-def test_what_is_inside_is_forgotten_but_not_what_lies_under_the_tool():
+def test_floor_inside_is_forgotten_except_under_the_tool():
     floor = drive((0.0, 0.0), (0.4, 0.0), (0.8, 0.0))
     here = drive((0.8, 0.0)).swept_in(AROUND)
     before = floor.swept_in(AROUND)
@@ -160,7 +160,7 @@ def test_what_is_inside_is_forgotten_but_not_what_lies_under_the_tool():
     assert not floor.snapshot().tiles
 
 
-def test_a_snapshot_stays_as_it_was_and_shares_what_has_not_changed():
+def test_a_snapshot_is_constant_and_shares_unchanged_parts():
     floor = drive((0.1, 0.1), (5.0, 0.1))
     first = floor.snapshot()
     kept = first.swept_in(AROUND)
@@ -288,7 +288,7 @@ def test_places_on_a_steady_track_are_as_right_as_they_say(sigma_m):
 
 
 @pytest.mark.parametrize("seed", range(6))
-def test_after_a_loop_closure_only_what_was_swept_wherever_the_map_lay_counts(seed):
+def test_after_a_loop_closure_only_surely_swept_floor_counts(seed):
     rng = np.random.default_rng(seed)
     floor = drive(*[(0.1 * (n % 12), 0.12 * (n // 12)) for n in range(120)])
     start = Pose2D(0.6, 0.6, 0.3)
@@ -344,7 +344,7 @@ def test_a_second_pass_forgets_the_floor_of_its_zone():
     assert swept[:, 10:].any()
 
 
-def test_the_floor_before_a_restart_counts_until_a_map_contradicts_it():
+def test_floor_before_a_restart_counts_until_a_map_contradicts():
     rooms = ["#" * 30, *("#" + "." * 28 + "#" for _ in range(8)), "#" * 30]
     before = Drive((1, 1), MapReceived(building(*rooms)), pose_at(1, 1))
     for col in range(2, 26):
@@ -395,7 +395,7 @@ def test_it_is_shown_in_pixels_where_these_are_not_too_many():
 
 
 @pytest.mark.parametrize("most", [60_000, 1_000, 300, 70, 20, 5])
-def test_where_pixels_are_too_many_it_is_shown_in_squares_by_the_share_swept(most):
+def test_too_many_pixels_are_shown_as_squares_with_shares(most):
     floor = drive(*[(-1.0 + 0.05 * n, 0.3) for n in range(90)])
     shown = floor.snapshot().shown(most, "map", 0)
     rows, cols = shown.cells.shape
@@ -409,7 +409,7 @@ def test_where_pixels_are_too_many_it_is_shown_in_squares_by_the_share_swept(mos
     assert np.array_equal(shown.cells, np.floor(100 * shares + 1e-9))
 
 
-def test_what_does_not_fit_in_the_widest_squares_is_not_shown_and_nothing_is_a_blank():
+def test_floor_too_large_for_squares_is_not_shown():
     astray = drive((0.0, 0.0), (9000.0, 9000.0))
     assert astray.snapshot().shown(10**6, "map", 0) is None
     blank = NO_FLOOR.shown(10**6, "map", 0)
@@ -417,7 +417,7 @@ def test_what_does_not_fit_in_the_widest_squares_is_not_shown_and_nothing_is_a_b
     assert not blank.cells.any()
 
 
-def test_a_map_that_jumps_by_thousands_of_kilometres_leaves_nothing_sure():
+def test_a_map_that_jumps_thousands_of_km_leaves_no_floor_sure():
     floor = drive(*[(0.1 * n, 0.0) for n in range(20)])
     before = floor.snapshot()
     floor.break_track()

@@ -63,7 +63,7 @@ def growing():
     raise AssertionError("not done")
 
 
-def test_it_has_the_steps_of_every_map_and_comes_again_bit_for_bit():
+def test_a_trail_has_each_maps_steps_and_repeats_bit_for_bit():
     one, other = growing(), growing()
     assert one.mission.lattice.window.cols == 10
     np.testing.assert_array_equal(tau_of(one), tau_of(other))
@@ -150,7 +150,7 @@ def test_a_loop_closure_takes_it_along(together):
     np.testing.assert_array_equal(tau, before)
 
 
-def test_only_a_planner_whose_ants_walk_on_it_is_handed_the_trail():
+def test_only_a_planner_that_uses_the_trail_gets_it():
     first = MapReceived(building(*ROOMS)), pose_at(0, 0)
     assert Drive((0, 0), *first).request.problem.trail is None
     drive = Drive((0, 0), *first, config=replace(CONFIG, plans_on_trail=True))

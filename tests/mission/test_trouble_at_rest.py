@@ -85,7 +85,7 @@ SILENT = {"pose": "no_pose", "map": "no_map", "battery": "no_battery"}
 
 @pytest.mark.parametrize("kind", SILENT)
 @pytest.mark.parametrize("state", AT_REST)
-def test_what_is_silent_is_said_within_a_minute_in_each_state_at_rest(state, kind):
+def test_each_resting_state_reports_silence_within_a_minute(state, kind):
     drive = AT_REST[state]()
     live(drive, 5, rise=0.001)
     assert (drive.mission.state, codes(drive)) == (state, [])
@@ -100,7 +100,7 @@ def test_what_is_silent_is_said_within_a_minute_in_each_state_at_rest(state, kin
 
 @pytest.mark.parametrize("kind", SILENT)
 @pytest.mark.parametrize("state", DRIVING)
-def test_a_robot_that_drives_is_degraded_and_the_trouble_is_listed(state, kind):
+def test_a_driving_robot_is_degraded_and_lists_the_trouble(state, kind):
     drive = DRIVING[state]()
     # It moves to and fro, so that nobody takes it for one that is stuck.
     for second in range(A_MINUTE_S):
@@ -172,7 +172,7 @@ def test_a_dock_without_current_is_said_within_a_minute(power):
 
 
 @pytest.mark.parametrize("power", ["discharging", "not charging", "unknown", "charging", "full"])
-def test_a_level_that_falls_in_the_dock_is_believed_whatever_the_battery_reports(power):
+def test_a_falling_level_in_the_dock_outweighs_reported_states(power):
     drive = charging(power)
     live(drive, A_MINUTE_S, fall=0.0005)
     assert (drive.mission.state, codes(drive)) == (State.CHARGING, ["no_current"])
@@ -192,7 +192,7 @@ def test_a_battery_that_rises_charges_whatever_it_reports(power):
         assert codes(drive) == []
 
 
-def test_a_coarse_gauge_may_take_minutes_for_a_step_while_it_charges():
+def test_a_coarse_gauge_may_charge_for_minutes_per_step():
     drive = charging()
     live(drive, FLAT_S - 30)
     assert codes(drive) == []
@@ -237,7 +237,7 @@ def test_a_robot_without_work_stands_in_a_dead_dock(state):
     assert codes(drive) == ["no_current"]
 
 
-def test_a_contact_that_comes_and_goes_does_not_take_a_robot_at_rest_out_of_its_dock():
+def test_a_loose_contact_does_not_undock_a_resting_robot():
     # Its base has moved it into the dock, some way from the dock's place.
     drive = paused()
     drive.cell = (AT_DOCK[0], AT_DOCK[1] + 1)

@@ -55,7 +55,7 @@ def test_poses_that_stop_are_told_and_the_path_is_kept():
     drive.finish()
 
 
-def test_what_lay_between_two_poses_far_apart_in_time_is_not_claimed():
+def test_cells_between_poses_far_apart_in_time_are_not_claimed():
     for after, claimed in ((1.0, True), (3.0, False)):
         drive = driving("......", steps=1)
         drive.cell = (0, 3)
@@ -96,7 +96,7 @@ def test_after_a_lost_pose_the_robot_may_be_in_another_room():
     assert {(row, col) for row in (0, 1) for col in (4, 5, 6)} <= drive.visited
 
 
-def test_a_robot_at_rest_whose_localiser_says_nothing_gets_its_first_plan():
+def test_a_resting_robot_with_a_silent_localiser_gets_a_plan():
     """Some publish poses only while the robot moves."""
     drive = Drive((0, 0), pose_at(0, 0), config=WATCHFUL)
     drive.tell(MapReceived(building(*ROOM)), after=60.0)
@@ -164,7 +164,7 @@ def test_a_map_that_stops_coming_is_told_and_the_mission_goes_on():
     assert drive.mission.state is State.DONE, "a mission that is done needs no map"
 
 
-def test_a_robot_that_does_not_drive_its_path_is_told_and_gets_it_again():
+def test_a_robot_that_does_not_follow_its_path_gets_it_again():
     # A base may refuse a path for good: such a robot was covering, it said, for ever.
     drive = driving(*ROOM, config=CONFIG)
     got = [drive.tell(pose_at(*drive.cell), after=1.0).path for _ in range(65)]
@@ -177,7 +177,7 @@ def test_a_robot_that_does_not_drive_its_path_is_told_and_gets_it_again():
     drive.finish()
 
 
-def test_a_robot_that_stands_is_reported_though_each_map_leads_to_another_path():
+def test_a_standing_robot_is_reported_though_its_path_changes():
     """As with furniture that flickers far from it: no path makes it drive."""
     drive, far = driving(*ROOM, config=CONFIG), (3, 11)
     for tick in range(70):
@@ -192,7 +192,7 @@ def test_a_robot_that_stands_is_reported_though_each_map_leads_to_another_path()
     assert drive.mission.state is State.COVERING
 
 
-def test_a_robot_that_stands_is_reported_though_the_map_flickers_just_ahead():
+def test_a_standing_robot_is_reported_though_the_map_flickers():
     """Each time the path ends in its own cell, and another one begins there."""
     drive = driving(*ROOM, config=CONFIG)
     empty = 0
@@ -277,7 +277,7 @@ ORDERS = (
 
 @examples(60)
 @given(st.integers(0, 2**32))
-def test_whatever_happens_it_is_a_state_with_a_reason_and_the_same_every_time(seed):
+def test_all_events_give_a_repeatable_state_with_a_reason(seed):
     """Commands, maps, jumps and silence in any order; and all of it once more."""
     random = np.random.default_rng(seed)
     truth = np.zeros((8, 20), np.int8)

@@ -48,7 +48,7 @@ def digest_of(digests):
     return len(digests), hashlib.sha256("".join(digests).encode()).hexdigest()[:16]
 
 
-def test_a_recording_of_another_search_is_repeated_as_far_as_it_is_the_same(recording, capsys):
+def test_a_recording_of_another_search_replays_its_equal_part(recording, capsys):
     """The search has changed since: what differs first is named, and by which code it was made."""
     summary = printed(capsys, "replay", recording, code=1)["summary"]
     assert (summary["equal"], summary["turns"], summary["turns_equal"]) == (False, 559, 69)
@@ -98,9 +98,7 @@ def of_own_planner(tmp_path_factory):
     return report["file"]
 
 
-def test_a_recording_of_a_planner_of_the_user_s_own_is_replayed_with_another(
-    of_own_planner, capsys
-):
+def test_a_recording_of_a_users_planner_replays_with_another(of_own_planner, capsys):
     told = printed(capsys, "replay", of_own_planner)
     assert told["summary"]["own_planner_missing"] == "lab.mine:Deep"
     assert told["summary"]["equal"] is None

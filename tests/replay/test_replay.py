@@ -224,7 +224,7 @@ def test_the_robot_says_only_once_where_it_is(samples, config):
     assert story.visited <= {(2, 2)}
 
 
-def test_a_mission_that_begins_long_after_the_last_input_is_played(samples, config):
+def test_a_mission_that_begins_long_after_the_last_input_replays(samples, config):
     """On a slow machine a daemon still loads what it plans with when its last input comes."""
     statuses = [sample for sample in samples if sample.topic == "status"]
     told = [*places(samples, "status"), *places(samples, PATH_DIGEST)]

@@ -117,7 +117,7 @@ def answering(key, payload):
     return lambda query: query.reply(key, payload)
 
 
-def test_who_would_forget_what_is_covered_is_named_and_forgets_it_only_then(router, capsys):
+def test_robots_that_would_forget_are_named_and_need_consent(router, capsys):
     def words(*more):
         return "start", "--passes", "2", "--fleet", "hall", *more
 

@@ -121,7 +121,7 @@ def test_points_of_a_grid_without_a_frame_are_refused(plan, grid, tmp_path):
     assert not xy.exists()
 
 
-def test_turns_are_no_part_of_the_gap_and_each_figure_is_explained(plan, grid, capsys):
+def test_the_gap_excludes_turns_and_each_figure_is_explained(plan, grid, capsys):
     words = ["--turn-s", 3, "--budget", 0.2, "--json"]
     _, out, _ = plan(grid, "--robots", "0,0", "11,17", *words)
     told = json.loads(out)

@@ -34,7 +34,7 @@ def test_a_robot_that_floods_is_heard_at_its_rate(arrivals):
 
 
 @pytest.mark.parametrize("stranger", [lambda name: from_robot(name, "yard"), garbage])
-def test_however_many_others_are_on_the_bus_those_of_the_own_fleet_are_heard(arrivals, stranger):
+def test_messages_of_the_own_fleet_arrive_on_a_crowded_bus(arrivals, stranger):
     """The 64 places went to whoever was heard first: with a second fleet of 64 to nobody else."""
     heard = 0
     for second in range(100):
@@ -54,7 +54,7 @@ def test_nothing_of_other_fleets_comes_to_the_loop(arrivals):
     assert not any(arrivals.is_due(from_robot("other", "yard"), float(at)) for at in range(9))
 
 
-def test_what_no_fleet_can_be_read_from_is_passed_on_as_a_fault_but_is_no_flood(arrivals):
+def test_an_unreadable_fleet_message_is_a_fault_with_a_limit(arrivals):
     payloads = [b"x", b" " * (MAX_JSON_BYTES + 1), b"[" * 5000, b'{"version": 1}', b"\xff"]
     assert [arrivals.is_due(garbage(f"g{at}", of), at) for at, of in enumerate(payloads)] == (
         [True] * len(payloads)

@@ -31,7 +31,7 @@ def router():
         yield endpoint
 
 
-def test_two_daemons_share_a_room_and_one_takes_over_when_the_other_is_killed(router, tmp_path):
+def test_a_daemon_takes_over_the_room_when_the_other_is_killed(router, tmp_path):
     with contextlib.ExitStack() as stack:
         daemons = {}
         for name in STARTS:

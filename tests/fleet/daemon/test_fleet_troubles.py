@@ -20,7 +20,7 @@ STEP_S, AWAY_S = 0.05, 2.0
 HOUR_S = 3_600.0
 
 
-def test_robots_share_a_room_whatever_their_clocks_say_and_after_a_router_is_back(tmp_path):
+def test_robots_share_a_room_despite_clocks_and_a_router_restart(tmp_path):
     if why := why_not():
         pytest.skip(why)
     endpoint = free_endpoint()

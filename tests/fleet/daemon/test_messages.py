@@ -107,7 +107,7 @@ def test_other_bytes_are_refused(payload):
         decode_member(payload, "hall")
 
 
-def test_a_division_has_a_part_for_this_robot_and_for_each_other_that_it_keeps():
+def test_a_division_has_a_part_for_this_robot_and_each_known_one():
     assert MAX_FLEET_PARTS == 1 + MOST_ROBOTS
 
 
@@ -116,7 +116,7 @@ def test_what_is_too_long_is_not_looked_at():
         decode_member(b" " * (MAX_JSON_BYTES + 1), "hall")
 
 
-def test_another_version_is_told_apart_even_where_nothing_else_can_be_read():
+def test_another_version_is_recognised_in_an_unreadable_message():
     with pytest.raises(FleetError, match="version 2, not 1"):
         decode_member(b'{"version": 2, "fleet": "hall"}', "hall")
     assert heard(said(version=2)).misfit == "its messages are of version 2, not 1"
@@ -160,7 +160,7 @@ class Listener:
         self.heard.append(decode_member(payload, "hall"))
 
 
-def test_a_robot_tells_its_pace_as_it_is_now_and_after_forgetting_all_tiles_at_once():
+def test_a_robot_sends_pace_and_all_tiles_after_it_forgets_cells():
     robot, listener = FleetRobot("r1", (0, 0), ["." * 12] * 4), Listener()
     ledger, sender = robot.mission.ledger, FleetSender(listener, CONFIG)
     for row in range(TILES):
@@ -173,7 +173,7 @@ def test_a_robot_tells_its_pace_as_it_is_now_and_after_forgetting_all_tiles_at_o
     assert [len(said.swept) for said in listener.heard] == [TILES] * 3
 
 
-def test_a_robot_tells_which_of_its_cells_are_from_before_their_epoch_where_it_knows():
+def test_a_robot_sends_which_known_cells_precede_their_epoch():
     robot, listener = FleetRobot("r1", (0, 0), ["." * 12] * 4), Listener()
     ledger, sender = robot.mission.ledger, FleetSender(listener, CONFIG)
     ledger.credit((64, 0))
@@ -192,7 +192,7 @@ def test_a_robot_tells_which_of_its_cells_are_from_before_their_epoch_where_it_k
 
 
 @pytest.mark.parametrize("cell_m", [0.005, 0.028, CELL])
-def test_a_robot_tells_its_next_metres_whatever_the_size_of_its_cells(cell_m, monkeypatch):
+def test_a_robot_sends_its_next_metres_for_any_cell_size(cell_m, monkeypatch):
     monkeypatch.setattr(world, "CELL", cell_m)
     footprint = Footprint(cell_m=cell_m, robot_radius_m=cell_m / 2)
     drive = Drive((0, 0), config=replace(WORLD, company=FleetKind("r1"), footprint=footprint))
@@ -247,7 +247,7 @@ def test_a_robot_whose_cells_lie_at_another_angle_is_left_out():
     assert heard(json.dumps(older).encode()).misfit == ""
 
 
-def test_a_division_comes_with_its_parts_and_one_that_lacks_them_is_read():
+def test_a_division_comes_with_its_parts_or_without():
     heard_now = heard(said())
     assert heard_now.by == "r2"
     assert heard_now.parts[0] == Part("r1", (3, -4), -1.5, 1.2)

@@ -62,7 +62,7 @@ def test_robots_share_what_one_would_do(rows, starts, share):
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_nothing_is_left_out_where_messages_are_lost_and_repeated(seed):
+def test_lost_and_repeated_messages_leave_no_cell_out(seed):
     fleet = FleetDrive(ROOMS, THREE)
     fleet.finish(**flaky(seed))
     assert fleet.left_out() == set()
@@ -141,7 +141,7 @@ def test_an_order_begun_later_counts_no_sweep_from_before():
     assert fleet.seconds - begun < 0.75 * alone(HALL)
 
 
-def test_what_is_reset_elsewhere_is_swept_again_and_a_commanded_order_goes_on():
+def test_a_reset_elsewhere_sweeps_again_and_keeps_the_order():
     fleet = FleetDrive(HALL, TWO)
     fleet.run(60)
     ours, other = fleet.robots["r1"], fleet.robots["r2"]
@@ -206,7 +206,7 @@ def test_what_cannot_be_read_of_what_was_kept_is_heard_anew(kept):
     assert not shared.swept(Window(0, 0, 9, 9)).any()
 
 
-def test_a_cell_that_cannot_be_swept_is_given_up_while_another_robot_works():
+def test_an_unsweepable_cell_is_given_up_while_another_works():
     fleet = FleetDrive(HALL, TWO, with_policy(CONFIG, retries=1, retry_s=30.0))
     ours, other = fleet.robots.values()
     ours.cannot = {(11, 23)}
@@ -244,7 +244,7 @@ def test_after_a_loop_closure_nothing_uncertain_is_given_back():
     assert ledger.shared.cells_of("r2") == 1
 
 
-def test_no_more_is_kept_of_a_robot_that_lies_than_there_is_room_for():
+def test_memory_for_a_robot_with_false_cells_is_bounded():
     fleet = FleetDrive(HALL, TWO)
     ours, other = fleet.robots.values()
     tiles = tuple(((row, 1000), bytes(TILE_BYTES)) for row in range(MOST_TILES + 1))
@@ -257,7 +257,7 @@ def test_no_more_is_kept_of_a_robot_that_lies_than_there_is_room_for():
     assert not ours.tell(replace(other.report(), robot="r3", tiles=tiles[:2])).faults
 
 
-def test_of_many_robots_those_that_are_gone_and_swept_least_make_room():
+def test_absent_robots_that_swept_least_make_room():
     shared, members = SharedProgress(), [f"r{number}" for number in range(MOST_ROBOTS)]
     for number, robot in enumerate(members):
         shared.hear(robot, 1, tiles_of({(number, col) for col in range(9 - number % 8)}))
@@ -268,7 +268,7 @@ def test_of_many_robots_those_that_are_gone_and_swept_least_make_room():
     assert not shared.hear("newer", 1, (), members)
 
 
-def test_a_zone_swept_again_holds_nobody_up_however_many_have_swept_it():
+def test_a_zone_swept_again_by_many_does_not_delay_others():
     ledger, bits = MissionLedger(0.3, 0.3, shared=SharedProgress()), b"\xff" * TILE_BYTES
     angles = np.linspace(0.0, 2.0 * np.pi, 900, endpoint=False)
     ring = tuple((48.0 + 40.0 * math.cos(angle), 48.0 + 40.0 * math.sin(angle)) for angle in angles)
@@ -298,7 +298,7 @@ def everywhere(rows, _cols):
 @pytest.mark.parametrize(
     ("kept", "counted"), [((), 20), (range(3), 17), (None, 0)], ids=["none", "some", "unknown"]
 )
-def test_what_is_swept_anew_counts_although_it_was_disregarded_before(kept, counted):
+def test_disregarded_cells_count_once_swept_again(kept, counted):
     shared, cells = SharedProgress(), {(0, col) for col in range(20)}
     shared.begin(1)
     shared.hear("r2", 1, tiles_of(cells))
@@ -314,7 +314,7 @@ def test_what_is_swept_anew_counts_although_it_was_disregarded_before(kept, coun
     assert shared.cells_of("r2") == 0
 
 
-def test_a_second_order_counts_what_was_swept_for_it_out_of_hearing():
+def test_a_second_order_counts_cells_swept_for_it_out_of_range():
     fleet = FleetDrive(HALL, TWO)
     fleet.finish()
     ours, other = fleet.robots.values()
@@ -328,7 +328,7 @@ def test_a_second_order_counts_what_was_swept_for_it_out_of_hearing():
     assert ours.mission.shared.cells_of("r2") >= other.mission.snapshot().cells - 2 > 35
 
 
-def test_what_is_disregarded_is_dropped_with_the_cells_and_where_it_is_too_much():
+def test_disregarded_cells_are_dropped_with_the_cells_or_if_many():
     shared = SharedProgress()
     for epoch in range(1, 120):
         places = range(100 * epoch, 100 * epoch + 100)
@@ -351,7 +351,7 @@ def test_what_this_robot_has_swept_itself_is_not_taken_from_it():
     assert ours.request is None
 
 
-def test_cells_are_taken_anew_from_this_robot_after_another_has_forgotten_some():
+def test_cells_of_this_robot_are_taken_again_after_a_forget():
     fleet = FleetDrive(HALL, {"r1": (0, 0), "r2": (0, 12)})
     fleet.run(4)
     ours, other = fleet.robots.values()
@@ -387,7 +387,7 @@ def test_what_many_robots_say_in_a_moment_holds_nobody_up():
     assert np.count_nonzero(ours.mission.shared.swept(Window(0, 0, 300, 300))) == 24 * 3
 
 
-def test_more_robots_than_there_is_room_for_do_not_push_each_other_out():
+def test_robots_beyond_the_limit_do_not_replace_each_other():
     fleet = FleetDrive(HALL, TWO)
     ours, other = fleet.robots.values()
     report, names = other.report(), [f"m{number}" for number in range(MOST_ROBOTS + 8)]
@@ -403,7 +403,7 @@ def test_more_robots_than_there_is_room_for_do_not_push_each_other_out():
     assert not ours.tell(*later, after=GONE_S + 1.0).faults
 
 
-def test_one_that_comes_and_goes_does_not_change_the_path_of_others_each_time():
+def test_a_robot_that_comes_and_goes_keeps_the_paths_of_others():
     fleet = FleetDrive(HALL, TWO)
     ours, other = fleet.robots.values()
     report, plans = other.report(), ours.mission.route.plans
@@ -446,7 +446,7 @@ def test_a_number_that_no_count_leads_to_is_nobodys_division(begun):
 
 
 @pytest.mark.parametrize("lead", [MOST_AHEAD - 100, MOST_AHEAD + 100, MOST_FIRST - 100])
-def test_a_robot_far_behind_in_counting_agrees_once_the_other_has_told_it_for_long(lead):
+def test_a_robot_far_behind_adopts_a_number_sent_for_long(lead):
     fleet = FleetDrive(HALL, TWO)
     fleet.run(4)
     ours, other = (robot.mission.company for robot in fleet.robots.values())
@@ -462,7 +462,7 @@ def test_a_robot_far_behind_in_counting_agrees_once_the_other_has_told_it_for_lo
 
 
 @pytest.mark.parametrize("said", [range(3), range(0, 30, 12)], ids=["once", "now and then"])
-def test_a_number_far_ahead_that_one_tells_for_a_moment_is_not_believed(said):
+def test_a_number_far_ahead_sent_for_a_moment_is_not_adopted(said):
     fleet = FleetDrive(HALL, TWO)
     fleet.run(4)
     ours, other = fleet.robots.values()
@@ -475,7 +475,7 @@ def test_a_number_far_ahead_that_one_tells_for_a_moment_is_not_believed(said):
 
 @examples(60)
 @given(st.lists(st.tuples(st.integers(0, 3), st.sets(st.integers(0, 40))), max_size=8), st.data())
-def test_within_an_epoch_order_and_number_of_messages_do_not_count(sweeps, data):
+def test_repeated_or_reordered_messages_of_an_epoch_are_harmless(sweeps, data):
     messages, swept = [], set()
     for column, cells in sweeps:
         swept |= {(cell, column) for cell in cells}
@@ -500,7 +500,7 @@ def tiles_of(cells):
     return Telling().next(ledger.snapshot().tiles, 100)
 
 
-def test_robots_that_meet_in_a_corridor_pass_at_a_niche_and_touch_nobody():
+def test_robots_that_meet_in_a_corridor_pass_at_a_niche():
     rows = (
         ["." * 8 + "#" * 24 + "." * 8] * 4
         + ["." * 40]

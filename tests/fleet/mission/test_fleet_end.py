@@ -44,7 +44,7 @@ class Shared:
             self.ours.tick()
 
 
-def test_a_robot_without_a_part_stands_while_another_sweeps_what_is_left():
+def test_a_robot_without_a_part_stands_while_another_sweeps():
     shared = Shared()
     shared.run(40)
     ours = shared.ours
@@ -67,7 +67,7 @@ def test_what_another_leaves_is_swept_by_a_robot_without_a_part():
     assert shared.ours.walk
 
 
-def test_what_a_robot_has_tried_in_vain_stays_the_others_whatever_maps_come():
+def test_cells_tried_in_vain_stay_the_others_despite_new_maps():
     # With each map it was tried anew, while the others were at work.
     niche = ["#####.##################", *HALL]
     fleet = FleetDrive(niche, {"r1": (0, 0), "r2": (0, 1)})
@@ -111,7 +111,7 @@ def test_others_that_find_as_many_cells_as_they_sweep_go_on():
 @pytest.mark.parametrize(
     "swept", [[50] * 50, [51, 50] * 25, range(51, 100)], ids=["none", "up and down", "later"]
 )
-def test_a_robot_does_not_stand_again_for_others_that_did_not_go_on(swept):
+def test_a_robot_does_not_wait_again_for_others_that_stood(swept):
     remainder = Remainder()
     for second in range(int(STUCK_S) + 2):
         remainder.note(59 + second % 2, 0, 50 - second % 2, float(second))
@@ -124,7 +124,7 @@ def test_a_robot_does_not_stand_again_for_others_that_did_not_go_on(swept):
     assert remainder.others_go_on
 
 
-def test_a_robot_that_is_paused_tells_of_nobody_that_it_waits_for():
+def test_a_paused_robot_sends_that_it_waits_for_none():
     shared = Shared()
     shared.run(40)
     assert shared.ours.mission.waits_for == "r2"
@@ -132,7 +132,7 @@ def test_a_robot_that_is_paused_tells_of_nobody_that_it_waits_for():
     assert (shared.ours.mission.state, shared.ours.mission.waits_for) == ("paused", "")
 
 
-def test_a_robot_that_stands_tells_whom_it_waits_for_in_trouble_too():
+def test_a_standing_robot_in_trouble_sends_which_it_waits_for():
     # Else the others took it for one that hangs, and left it out of the next division.
     shared = Shared(with_policy(CONFIG, stale_map_s=20.0))
     shared.run(40)
@@ -141,7 +141,7 @@ def test_a_robot_that_stands_tells_whom_it_waits_for_in_trouble_too():
     assert (mission.state, mission.waits_for) == ("degraded", "r2")
 
 
-def test_a_robot_whose_part_others_alone_can_see_sweeps_what_it_sees():
+def test_a_robot_whose_part_only_others_see_sweeps_what_it_sees():
     # The east half is still unknown to it, and its part lies there.
     ours = FleetRobot("r1", (0, 0), [row[:12] for row in HALL])
     other = FleetRobot("r2", (6, 12), HALL)
@@ -155,7 +155,7 @@ def test_a_robot_whose_part_others_alone_can_see_sweeps_what_it_sees():
     assert len(set(ours.driven)) > 10
 
 
-def test_a_robot_that_stands_for_want_of_a_part_stays_in_the_fleet():
+def test_a_robot_standing_without_a_part_stays_in_the_fleet():
     shared, other = Shared(), FleetRobot("r2", (6, 12), HALL)
     shared.run(40)
     for _ in range(int(HANGING_S) + 4):
@@ -181,7 +181,7 @@ def heard_from_the_east(other, number, to_r1):
 
 
 @pytest.mark.parametrize("to_r1", [True, False], ids=["a part", "no part"])
-def test_a_robot_that_sees_nothing_left_goes_where_its_part_is_and_without_one_stands(to_r1):
+def test_a_robot_that_sees_nothing_left_drives_to_its_part(to_r1):
     ours = FleetRobot("r1", (6, 0), [row[:12] for row in HALL])
     other = FleetRobot("r2", (6, 16), HALL)
     for second in range(25):
@@ -235,7 +235,7 @@ def between(first, second):
     return max(robot.mission.company.numbers.number for robot in (first, second))
 
 
-def test_robots_of_which_one_sees_no_way_to_the_other_share_by_one_division():
+def test_robots_share_by_one_division_if_one_sees_no_way():
     # Each left the other out that it saw no way to, and was left out in turn: every other second
     # all cells changed hands.
     hall = HALL * 2

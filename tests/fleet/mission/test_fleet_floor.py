@@ -43,7 +43,7 @@ def divided_by(member, number):
     )
 
 
-def test_a_robot_without_a_part_sweeps_the_floor_that_it_drives_to_for_another():
+def test_a_robot_without_a_part_sweeps_missed_floor_of_another():
     grid = room(4.5, 3.5)
     robot = Robot(Mission(replace(CONFIG, company=FleetKind("r1"))))
     robot.mission.shared.begin(1)
@@ -57,7 +57,7 @@ def test_a_robot_without_a_part_sweeps_the_floor_that_it_drives_to_for_another()
     assert figures.swept_share > 0.9
 
 
-def test_a_line_that_is_polished_outlives_the_wait_for_another_robot():
+def test_a_polished_line_survives_the_wait_for_another_robot():
     robot = Robot(Mission(replace(CONFIG, company=FleetKind("r1"))))
     robot.mission.shared.begin(1)
     robot.tell(MapReceived(room(4.5, 3.5)))
@@ -77,7 +77,7 @@ def test_a_line_that_is_polished_outlives_the_wait_for_another_robot():
     robot.drive(20)
 
 
-def test_a_robot_that_makes_way_goes_straight_and_not_over_the_middle_of_its_cell_first():
+def test_a_yielding_robot_does_not_cross_its_cell_centre_first():
     robot = Robot(Mission(replace(CONFIG, company=FleetKind("r1"))))
     robot.mission.shared.begin(1)
     robot.tell(MapReceived(room(4.5, 3.5)))
@@ -99,7 +99,7 @@ def test_a_robot_that_makes_way_goes_straight_and_not_over_the_middle_of_its_cel
     assert math.dist(end, (x, y)) > math.dist(begin, (x, y))
 
 
-def test_the_rest_of_a_line_that_leads_to_nothing_more_is_not_driven():
+def test_a_robot_leaves_the_rest_of_a_line_without_open_floor():
     robot = Robot(Mission(replace(CONFIG, company=FleetKind("r1"))))
     robot.mission.shared.begin(1)
     robot.tell(MapReceived(room(4.5, 3.5)))
@@ -121,7 +121,7 @@ def nearest_to(line, place):
 
 
 @pytest.mark.parametrize("toward", range(12))
-def test_a_robot_that_makes_way_comes_no_nearer_to_one_that_it_all_but_touches(toward):
+def test_a_yielding_robot_comes_no_nearer_to_a_close_one(toward):
     # Both stood in a doorway for good: straight to its refuge meant into the other's side.
     robot = Robot(Mission(replace(CONFIG, company=FleetKind("r1"))))
     robot.mission.shared.begin(1)

@@ -54,7 +54,7 @@ def test_on_the_same_lattice_tiles_stay_as_they_are(cells):
     assert Relaid(Pose2D(0.0, 0.0), CELL).tiles(told) == told
 
 
-def test_by_quarter_turns_and_whole_cells_no_cell_is_lost_or_added():
+def test_quarter_turns_and_whole_cells_lose_and_add_no_cell():
     cells = {(0, 0), (0, 63), (7, 9), (63, 63)}
     relaid = Relaid(Pose2D(5 * CELL, -3 * CELL, math.pi / 2), CELL)
     # A quarter-turn leads from (x, y) to (-y, x).
@@ -133,7 +133,7 @@ def test_places_and_seeds_come_in_this_robots_frames():
 
 
 @pytest.mark.parametrize("sign", [-1, 1])
-def test_a_division_that_could_not_be_told_to_others_is_left_out_and_named(sign):
+def test_a_division_with_seeds_out_of_range_is_dropped_and_named(sign):
     """A follower would repeat its seeds as they lie here, and be refused by all."""
     tile = CellTile(0, 0, bits_of({(3, 4)}))
     config = DaemonConfig(robot=RobotConfig(name="r1"), fleet=FleetConfig("hall", "house"))
@@ -156,7 +156,7 @@ def test_a_division_that_could_not_be_told_to_others_is_left_out_and_named(sign)
     assert receiver.take_faults() == []
 
 
-def test_a_seed_that_the_map_does_not_show_counts_as_on_the_nearest_cell():
+def test_a_seed_off_the_map_counts_as_on_the_nearest_cell():
     free = np.ones((5, 9), np.bool_)
     free[2, :3] = False
     lattice = CoverageLattice.from_free(free)

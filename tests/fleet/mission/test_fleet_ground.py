@@ -37,7 +37,7 @@ def cells_of(area):
     return {(row + window.row0, col + window.col0) for row, col in np.argwhere(area.reachable)}
 
 
-def test_what_another_can_reach_joins_on_where_the_own_map_shows_nothing():
+def test_ground_of_others_joins_where_the_own_map_is_unknown():
     own, other = area_of("....", "...."), area_of("...." + "." * 60, "...#" + "." * 60)
     ground = SharedGround()
     ground.hear("r2", GroundTelling().next(other, 10))
@@ -48,7 +48,7 @@ def test_what_another_can_reach_joins_on_where_the_own_map_shows_nothing():
     assert cells_of(own) == reachable_cells(building("....", "...."), (0, 0))
 
 
-def test_the_own_map_decides_where_it_shows_a_wall_but_it_may_be_a_door_seen_in_part():
+def test_the_own_maps_wall_counts_unless_it_may_be_a_door():
     own, other = area_of("..#", "..#"), area_of("......", "......")
     ground = SharedGround()
     ground.hear("r2", GroundTelling().next(other, 10))
@@ -67,7 +67,7 @@ SHUT = [row[:9] + "#" + row[10:] for row in HALLS]
 
 
 @pytest.mark.parametrize("is_open", [True, False])
-def test_a_robot_goes_to_look_at_a_door_that_its_map_shows_shut_and_others_came_through(is_open):
+def test_a_robot_looks_at_a_shut_door_that_others_came_through(is_open):
     fleet = FleetDrive(HALLS, {"r2": (0, 28)})
     ours = fleet.robots["r1"] = FleetRobot("r1", (0, 0), SHUT)
     fleet.swept.add(ours.cell)
@@ -85,7 +85,7 @@ def test_a_robot_goes_to_look_at_a_door_that_its_map_shows_shut_and_others_came_
 
 
 @pytest.mark.parametrize("told", [5, 8])
-def test_own_cells_beyond_the_ground_of_others_count_only_if_somebody_can_reach_them(told):
+def test_own_cells_beyond_others_ground_count_only_if_reachable(told):
     """Between there may be a wall: nobody came to sweep them, and a robot stood for them."""
     lattice = CoverageLattice.from_free(np.arange(10)[None] != 4)
     states = lattice.states.copy()
@@ -97,7 +97,7 @@ def test_own_cells_beyond_the_ground_of_others_count_only_if_somebody_can_reach_
     assert cells_of(ground.joint(own)) == {(0, col) for col in range(told)}
 
 
-def test_an_opening_that_it_has_not_seen_is_looked_for_before_a_door_that_is_shut():
+def test_a_robot_looks_for_an_unseen_opening_before_a_shut_door():
     side = range(8, -1, -1)
     rows = ["." * 10 + ("." if row in (0, 6) else "#") + "." * 19 for row in side]
     # In row 6 r1 does not fit through; in row 0 it has not looked yet.
@@ -114,7 +114,7 @@ def test_an_opening_that_it_has_not_seen_is_looked_for_before_a_door_that_is_shu
     assert len({cell for cell in ours.driven if cell[1] > 10}) > 20
 
 
-def test_a_robot_too_wide_for_a_door_keeps_to_its_part_of_its_hall():
+def test_a_robot_too_wide_for_a_door_keeps_to_its_part():
     """Else it sweeps what the others are at, as a part beyond the door is none for it."""
     rows = ["." * 24 + ("." if row == 4 else "#") + "." * 12 for row in range(8)]
     fleet = FleetDrive(rows, {"r2": (7, 0), "r3": (0, 23)})
@@ -143,7 +143,7 @@ def members():
     return members
 
 
-def test_ground_of_a_robot_that_no_longer_fits_is_dropped_as_of_one_that_is_forgotten(members):
+def test_ground_of_an_unfitting_or_forgotten_robot_is_dropped(members):
     own = area_of("....")
     assert cells_of(members.ground.joint(own)) > cells_of(own)
     members.hear(replace(LARGER, frame="elsewhere"), 2.0)
@@ -156,7 +156,7 @@ def test_ground_of_a_robot_that_no_longer_fits_is_dropped_as_of_one_that_is_forg
     assert cells_of(members.ground.joint(own)) == cells_of(own)
 
 
-def test_ground_of_a_robot_whose_progress_finds_no_room_is_dropped(members):
+def test_ground_of_a_robot_beyond_the_limit_is_dropped(members):
     own = area_of("....")
     tiles = tuple(((row, 9), b"\xff" * TILE_BYTES) for row in range(MOST_TILES_OF_ONE + 1))
     with pytest.raises(FleetError):
@@ -164,7 +164,7 @@ def test_ground_of_a_robot_whose_progress_finds_no_room_is_dropped(members):
     assert cells_of(members.ground.joint(own)) == cells_of(own)
 
 
-def test_ground_told_in_another_frame_counts_no_longer_once_the_frame_is_left():
+def test_ground_sent_in_a_frame_since_left_does_not_count():
     fleet = FleetDrive(["...."], {"r1": (0, 0)})
     ours = fleet.robots["r1"]
     fleet.tick()
@@ -204,7 +204,7 @@ def test_parts_stay_in_place_while_nothing_ends_much_earlier(moved):
 
 
 @pytest.mark.parametrize(("idle_at", "helps"), [((5, 7), False), ((0, 20), True)])
-def test_a_robot_without_cells_gets_some_only_where_all_end_sooner(idle_at, helps):
+def test_a_robot_gets_its_first_cells_only_if_all_end_sooner(idle_at, helps):
     """From too far its help comes late, and other robots' cells changed hands all the same."""
     lattice = CoverageLattice.from_free(np.ones((6, 40), np.bool_))
     wanted = np.zeros((6, 40), np.bool_)
@@ -239,7 +239,7 @@ def test_a_seed_out_of_reach_is_not_kept(own, step_s, wide):
 
 
 @pytest.mark.parametrize("own", [NARROW, WALLED], ids=["off the map", "behind a wall"])
-def test_cells_that_no_seed_reaches_go_by_handicap_whatever_the_pace(own):
+def test_cells_out_of_reach_of_seeds_go_by_handicap_not_pace(own):
     robots = Robot("r1", (0, 0), 3.0), Robot("r2", (29, 39), 0.6)
     seeds = (15, 50), (20, 50)
     for handicaps_s, owner in (((0.0, 1000.0), 0), ((1000.0, 0.0), 1)):
@@ -280,7 +280,7 @@ def test_robots_that_stand_on_the_last_cells_each_have_their_own():
 
 @pytest.mark.parametrize("step_s", [1.0, 1e-3, 1e3])
 @pytest.mark.parametrize("cell", [(8, 30), (-500, 10**6), (2**29, -(2**29))])
-def test_a_robot_out_of_reach_takes_nothing_from_those_that_divide(cell, step_s):
+def test_a_robot_out_of_reach_takes_no_cells_from_the_others(cell, step_s):
     free = np.ones((9, 60), np.bool_)
     free[6:] = False
     lattice = CoverageLattice.from_free(free)
@@ -301,7 +301,7 @@ def test_a_robot_just_off_the_ground_gets_no_more_than_its_share():
     assert counts.max() - counts.min() < 30
 
 
-def test_a_robot_without_a_part_takes_over_cells_though_it_comes_from_far_away():
+def test_a_distant_robot_without_a_part_takes_over_cells():
     lattice = CoverageLattice.from_free(np.ones((3, 100), np.bool_))
     wanted = np.zeros((3, 100), np.bool_)
     wanted[:, 60:] = True

@@ -51,7 +51,7 @@ def swept_by_others(mission):
     return cells_in(window, mission.shared.swept(window))
 
 
-def test_where_another_robots_map_lies_elsewhere_all_that_it_told_before_is_dropped():
+def test_a_moved_map_of_another_robot_drops_its_earlier_cells():
     """It was restarted with an origin put right, and keeps its epoch."""
     receiver, drive = FleetReceiver(HALL), Drive((3, 3), config=IN_HOUSE)
     drive.mission.shared.begin(1)
@@ -70,7 +70,7 @@ def test_where_another_robots_map_lies_elsewhere_all_that_it_told_before_is_drop
     assert cells_in(ground.window, ground.coverable) == moved
 
 
-def test_cells_of_a_robot_that_moved_count_anew_only_where_none_were_disregarded():
+def test_cells_of_a_moved_robot_count_if_none_were_disregarded():
     shared, tiles = SharedProgress(), (((0, 0), bits_of(BLOCK)),)
     shared.begin(1)
     shared.hear("r2", 1, tiles)
@@ -93,7 +93,7 @@ def test_cells_of_a_robot_that_moved_count_anew_only_where_none_were_disregarded
 @pytest.mark.parametrize(
     "place", [None, MapPlace((0.0, 2.0, 0.0)), MapPlace((1.0, 2.0, 90.0))], ids=str
 )
-def test_cells_kept_from_before_this_robots_map_was_put_right_do_not_count(place):
+def test_cells_from_before_a_correction_of_the_own_map_are_void(place):
     shared, tiles = SharedProgress(MapPlace((1.0, 2.0, 0.0))), (((0, 0), bits_of(BLOCK)),)
     shared.begin(5)
     shared.hear("r2", 1, tiles, lattice=AT)
@@ -148,7 +148,7 @@ class OnFloors(Drive):
         return said["frame"], bool(said["swept"])
 
 
-def test_what_a_robot_tells_from_another_floor_counts_nowhere_until_it_is_back():
+def test_cells_of_a_robot_on_another_floor_do_not_count():
     first, second = FLOORS
     rider, other = OnFloors(), OnFloors()
     other.stay_on(first)
@@ -185,7 +185,7 @@ def test_after_a_reset_nothing_counts_before_the_frame_is_known():
     assert swept_by_others(robot.mission) == set()
 
 
-def test_which_map_has_the_place_is_kept_over_a_restart_unless_the_place_or_the_map_is_given():
+def test_the_map_of_the_place_is_kept_over_a_restart():
     robot = OnFloors()
     robot.stay_on(FLOORS[0])
     kept = robot.mission.snapshot()
@@ -213,7 +213,7 @@ def test_a_daemon_gives_its_mission_the_place_of_the_map():
     assert missions == [FleetKind(name, place), FleetKind(name), ALONE]
 
 
-def test_a_map_frame_that_is_called_as_the_fleets_is_not_taken_for_it():
+def test_a_map_frame_named_as_the_fleets_frame_is_another_frame():
     robot = OnFloors(frame="floor2")
     robot.stay_on(FLOORS[0])
     assert robot.told()[0] == "floor2"

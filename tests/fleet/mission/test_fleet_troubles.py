@@ -63,7 +63,7 @@ def test_a_fleet_of_32_in_one_room_sweeps_it():
 
 
 @pytest.mark.parametrize("again", [True, False], ids=["comes back", "stays"])
-def test_a_robot_whose_frame_changes_is_left_out_by_name_until_it_fits_again(again):
+def test_a_robot_with_a_changed_frame_is_left_out_until_it_fits(again):
     fleet = FleetDrive(HALL, {"r1": (0, 0), "r2": (9, 15)})
     fleet.run(15)
     ours, other = fleet.robots.values()
@@ -87,7 +87,7 @@ def test_a_robot_whose_frame_changes_is_left_out_by_name_until_it_fits_again(aga
 
 
 @pytest.mark.parametrize("dies_at", [20, 60, 100])
-def test_where_a_robot_stood_in_the_way_is_swept_once_it_is_silent(dies_at):
+def test_cells_of_a_robot_in_the_way_are_swept_once_it_is_silent(dies_at):
     fleet = FleetDrive(["." * 9] * 6, {"r1": (0, 0), "r2": (2, 4)})
     ours, other = fleet.robots.values()
     # Its wheels are stuck, and it goes on telling that it will drive.
@@ -100,7 +100,7 @@ def test_where_a_robot_stood_in_the_way_is_swept_once_it_is_silent(dies_at):
     assert fleet.left_out() == set()
 
 
-def test_a_robot_that_is_stuck_but_tells_of_its_path_holds_nobody_up():
+def test_a_stuck_robot_that_sends_a_path_does_not_delay_others():
     fleet = FleetDrive(["." * 9] * 6, {"r1": (0, 0), "r2": (2, 4)})
     ours, other = fleet.robots.values()
     other.hangs = True
@@ -111,7 +111,7 @@ def test_a_robot_that_is_stuck_but_tells_of_its_path_holds_nobody_up():
 
 
 @pytest.mark.parametrize("pairs", [{("b", "c"), ("c", "b")}, {("c", "b")}], ids=["both", "one"])
-def test_two_that_do_not_hear_each_other_leave_the_division_to_one_that_hears_both(pairs):
+def test_a_robot_in_range_of_two_makes_the_division_for_them(pairs):
     # Each divided without the other, the third with it again: 103 times, and 80.
     fleet = FleetDrive(["." * 40] * 16, {"a": (0, 0), "b": (0, 39), "c": (15, 20)})
     fleet.hears = lambda speaker, listener: (speaker, listener) not in pairs
@@ -120,7 +120,7 @@ def test_two_that_do_not_hear_each_other_leave_the_division_to_one_that_hears_bo
     assert max(robot.mission.company.numbers.number for robot in fleet.robots.values()) < 30
 
 
-def test_one_that_is_gone_is_missed_though_another_has_made_the_division():
+def test_a_lost_robot_is_missed_though_another_divided():
     fleet = FleetDrive(["." * 40] * 16, {"a": (0, 0), "b": (0, 39), "c": (15, 20)})
     fleet.run(6)
     made_by = fleet.robots["a"].mission.company.numbers.by

@@ -11,7 +11,7 @@ from tests.mission.test_other_building import HERE, NEW, OLD, stand
 from tests.mission.world import CONFIG, Drive, pose_at
 
 
-def test_what_others_of_a_fleet_swept_on_the_floor_before_does_not_count():
+def test_cells_of_others_on_the_previous_floor_do_not_count():
     """They go on telling of it, in the frame that the map here has, too."""
     everywhere = tile_bits(np.ones((64, 64), np.uint16))
     other = MemberHeard("b", frame="map", state="covering", epoch=1, tiles=(((0, 0), everywhere),))

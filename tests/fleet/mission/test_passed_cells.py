@@ -37,7 +37,7 @@ def begun():
     return robot, next(cell for cell in passed if robot.mission.ledger.has_visited(cell))
 
 
-def test_floor_of_a_passed_cell_stays_this_robots_where_the_cell_becomes_anothers():
+def test_floor_of_a_passed_cell_stays_with_the_robot_that_passed():
     unswept_m2 = []
     for is_left in (False, True):
         robot, cell = begun()
@@ -52,7 +52,7 @@ def test_floor_of_a_passed_cell_stays_this_robots_where_the_cell_becomes_another
     assert unswept_m2[1] - unswept_m2[0] > 0.5 * CELL_M**2
 
 
-def test_floor_that_stays_unswept_in_a_passed_cell_holds_nobody_up():
+def test_unswept_floor_in_a_passed_cell_does_not_delay_others():
     robot, cell = begun()
     for _ in range(2000):
         if robot.mission.state is State.DONE:

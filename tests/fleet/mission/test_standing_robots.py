@@ -43,7 +43,7 @@ def members():
     return Members("r1", MissionLedger(CELL_M, CELL_M, shared=SharedProgress()), CELL_M)
 
 
-def test_cells_within_reach_of_a_robot_that_stands_in_the_way_are_closed(area, members):
+def test_cells_within_reach_of_a_robot_in_the_way_are_closed(area, members):
     members.hear(member(1.125, 1.125), 0.0)
     assert members.closed(area, RADIUS_M) is None
     members.avoid("r2")
@@ -53,7 +53,7 @@ def test_cells_within_reach_of_a_robot_that_stands_in_the_way_are_closed(area, m
 
 
 @pytest.mark.parametrize("x", [-0.1, 10.1, 90.0])
-def test_of_a_robot_at_the_edge_or_off_the_map_only_cells_of_the_map_are_closed(area, members, x):
+def test_a_robot_at_the_edge_closes_only_cells_of_the_map(area, members, x):
     members.hear(member(x, 1.125), 0.0)
     members.avoid("r2")
     assert np.count_nonzero(members.closed(area, RADIUS_M)) == (0 if x == 90.0 else 1)
@@ -67,7 +67,7 @@ def test_no_cells_stay_closed_behind_a_robot_that_drives_on(area, members):
     assert not members.is_avoided("r2")
 
 
-def test_cells_stay_closed_where_the_poses_of_a_robot_that_stands_scatter(area, members):
+def test_scattered_poses_of_a_standing_robot_keep_cells_closed(area, members):
     members.hear(member(1.125, 1.125), 0.0)
     members.avoid("r2")
     closed = members.closed(area, RADIUS_M)
@@ -92,7 +92,7 @@ def test_where_a_silent_robot_is_only_the_map_shows(area, members):
     assert members.closed(area, RADIUS_M) is None
 
 
-def test_one_stopped_beside_another_plans_around_it_though_the_paths_lead_past():
+def test_a_robot_stopped_beside_another_plans_around_it():
     drive = planned()
     row, col = drive.walk[1]
     # Two cells behind it, where its path does not lead.
@@ -106,7 +106,7 @@ def test_one_stopped_beside_another_plans_around_it_though_the_paths_lead_past()
     assert len(drive.mission.route.path.ahead) > 1
 
 
-def test_one_that_has_waited_beside_another_gets_the_time_to_drive_on():
+def test_a_robot_that_waited_beside_another_may_drive_on():
     # Two such stood for minutes: the time of the wait counted as if they could not drive.
     drive = planned()
     row, col = drive.walk[1]
@@ -126,7 +126,7 @@ def test_one_that_has_waited_beside_another_gets_the_time_to_drive_on():
 
 @pytest.mark.parametrize("scatter_m", [0.02, 0.05])
 @pytest.mark.parametrize("state", ["charging", "covering"])
-def test_one_that_stands_in_the_way_is_planned_around_though_its_poses_scatter(state, scatter_m):
+def test_a_plan_avoids_a_standing_robot_with_scattered_poses(state, scatter_m):
     # Each jump of more than 5 cm counted as motion: it was waited for to the end.
     random, drive = np.random.default_rng(1), planned(retries=2, retry_s=30.0)
     for _ in range(400):
@@ -145,7 +145,7 @@ def test_one_that_stands_in_the_way_is_planned_around_though_its_poses_scatter(s
 
 
 @pytest.mark.parametrize("names", [("r2",), ("r2", "r3")], ids=["one", "two in turn"])
-def test_those_that_stand_in_the_way_now_and_then_are_planned_around(names):
+def test_a_plan_avoids_robots_that_stand_in_the_way_repeatedly(names):
     # Where they were told to be scattered about what has to be kept clear: each moment without them
     # began the wait anew, and so did the other one of two.
     drive = planned()
@@ -187,7 +187,7 @@ def test_one_that_is_waited_for_but_is_jammed_is_planned_around():
     assert len(drive.mission.route.path.ahead) > 1
 
 
-def test_who_waits_while_others_sweep_all_that_is_left_is_done_and_leads_nowhere():
+def test_a_waiting_robot_is_done_when_others_sweep_the_rest():
     drive = planned()
     x, y = ((at + 0.5) * CELL_M for at in drive.walk[1][::-1])
     ahead = replace(member(x, y), waits_for="r3")

@@ -76,7 +76,7 @@ def test_who_waits_goes_on_waiting_until_there_is_more_time():
     assert seen("r2", line, other, "r1").reason == "waits for r1"
 
 
-def test_one_that_stops_for_this_robot_is_waited_for_by_the_second_alone():
+def test_of_two_robots_face_to_face_only_the_second_waits():
     # Face to face, each waits for the other: the first by name is blocked, and plans around.
     there = [(0.6, 0.0), (0.6, 2.0)]
     held = seen("r2", EAST, heard("r1", *there, waits_for="r2"), "r1")
@@ -84,7 +84,7 @@ def test_one_that_stops_for_this_robot_is_waited_for_by_the_second_alone():
     assert seen("r1", EAST, heard("r2", *there, waits_for="r1"), "r2").is_blocked
 
 
-def test_one_that_has_no_path_and_cannot_make_way_is_not_waited_for():
+def test_a_robot_without_a_path_that_cannot_yield_is_not_awaited():
     # Each waited for the other for ever: it had no place to go to.
     stands = heard("r1", (0.6, 0.0), waits_for="r2")
     assert seen("r2", EAST, stands, "r1").is_blocked
@@ -123,7 +123,7 @@ def at(cell):
     return (cell[1] + 0.5) * 0.25, (cell[0] + 0.5) * 0.25
 
 
-def test_a_path_planned_around_one_that_stands_is_driven_though_it_passes_near():
+def test_a_path_around_a_standing_robot_is_driven_though_near():
     other = heard("r2", (0.4, 0.45))
     for is_avoided in (False, True):
         near = {"r2": Neighbour(other, 0.0, 9.0, PACE_S_M, is_avoided)}
@@ -143,7 +143,7 @@ def sees_in(area):
     return sees
 
 
-def test_a_refuge_lies_off_discs_and_paths_and_is_reached_past_none_of_them():
+def test_a_refuge_and_its_way_avoid_discs_and_paths():
     free = np.zeros((12, 24), np.bool_)
     free[5], free[6:9, 4] = True, True  # a corridor with a niche
     lattice = CoverageLattice.from_free(free, 0.25)
@@ -190,7 +190,7 @@ def test_the_way_to_a_refuge_leads_round_the_disc_of_the_other():
     assert len(area.shortest_path((0, 2), (2, 4))) < len(way)
 
 
-def test_one_that_is_nearer_to_the_other_than_its_cell_is_gets_away_past_cells_near_it():
+def test_a_robot_close_to_another_escapes_past_cells_near_it():
     free = np.zeros((2, 12), np.bool_)
     free[0, 4], free[1, 4:] = True, True
     lattice = CoverageLattice.from_free(free, 0.25)
@@ -203,7 +203,7 @@ def test_one_that_is_nearer_to_the_other_than_its_cell_is_gets_away_past_cells_n
     assert refuge(area, (0, 4), at((0, 4)), RADIUS_M, near, lattice.centres, sees_in(area)) is None
 
 
-def test_one_that_sees_no_cell_a_step_away_begins_with_one_beside_its_own():
+def test_a_way_out_of_a_doorway_may_begin_beside_the_own_cell():
     # Two stood in a doorway for good: the way through the next cell led round a corner, nearer to
     # the other; the way on which it had come led straight away, from a cell beside its own.
     lattice = CoverageLattice.from_free(np.ones((6, 12), np.bool_), 0.25)
@@ -234,7 +234,7 @@ def test_cells_far_from_one_robot_are_no_way_through_another():
     assert refuge(area, (1, 8), at((1, 8)), RADIUS_M, near, lattice.centres, sees_in(area)) is None
 
 
-def test_a_refuge_is_sought_no_farther_than_the_cells_around_the_robot():
+def test_a_refuge_is_sought_only_among_cells_around_the_robot():
     free = np.zeros((12, 100), np.bool_)
     free[5, 20:91] = free[5:11, 90] = free[10, 8:91] = True
     # At the other edge of these cells lies a room, connected far away only.

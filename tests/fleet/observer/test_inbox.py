@@ -32,7 +32,7 @@ class Box(FleetInbox):
         ]
 
 
-def test_of_a_robot_that_floods_the_newest_count_and_no_other_loses_anything():
+def test_a_flooding_robot_keeps_its_newest_and_costs_others_none():
     box = Box()
     box.put("r2", "fleet", b"quiet")
     for number in range(10_000):

@@ -40,7 +40,7 @@ def test_one_left_alone_has_all_that_is_left(halved):
     assert shares_of(halved, now).cells == {"b": HALL - 30}
 
 
-def test_a_robot_that_comes_and_has_not_divided_yet_changes_nothing(halved):
+def test_a_new_robot_without_a_division_changes_nothing(halved):
     halved.hear("c", member(division=0), SECOND)
     assert shares_of(halved, SECOND).cells.keys() == {"a", "b"}
 

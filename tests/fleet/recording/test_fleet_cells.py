@@ -54,7 +54,7 @@ def test_cells_come_back_out_of_their_tiles(cells):
     assert {tuple(cell) for cell in cells_of(tiles(cells)).tolist()} == cells
 
 
-def test_on_a_lattice_turned_and_shifted_a_cell_stays_where_it_is():
+def test_a_cell_stays_in_place_on_a_turned_and_shifted_lattice():
     here, there = Seat(0.3, 30.0, 1.0, 2.0, 15.0), Seat(0.3, 0.0, -4.0, 0.5, -20.0)
     cells = np.argwhere(np.ones((9, 11), bool)) - (3, 2)
     carried = here.carried(cells, there)

@@ -91,7 +91,7 @@ def log_of(part):
     return [str(line[0]) for line in read_column(part, entities.FLEET_LOG, TEXT).values]
 
 
-def test_each_robot_has_a_tree_of_its_own_also_one_that_comes_later(studio):
+def test_each_robot_even_a_late_one_has_a_tree_of_its_own(studio):
     first = Teller(studio.bus, "r1")
     Teller(studio.bus, "stranger").tell(fleet="yard", cells=[(0, 0)])
     first.tell(cells=[(2, 2), (2, 3)])
@@ -117,7 +117,7 @@ def test_each_robot_has_a_tree_of_its_own_also_one_that_comes_later(studio):
     assert any("late: waiting for r1" in line for line in log_of(part))
 
 
-def test_robots_that_are_there_at_first_have_colours_by_their_names(studio):
+def test_robots_present_at_first_have_colours_by_name(studio):
     # By which was heard first, they differed from one recording to the next, and from pictures.
     for name in ("r2", "r3", "r1"):
         Teller(studio.bus, name).tell(cells=[(2, 2)])
@@ -176,7 +176,7 @@ def test_no_size_of_cells_ends_the_recording_of_the_others(studio, cell_m):
     assert "good" in {robot.name for robot in review_fleet([part]).figures.robots}
 
 
-def test_names_that_send_rubbish_leave_room_for_a_robot_that_comes_later(studio):
+def test_names_that_send_rubbish_leave_room_for_a_late_robot(studio):
     names = [f"x{number}" for number in range(MOST_HEARD)]
     strangers = [studio.bus.advertise(Keys(name), topics.FLEET) for name in names]
     for payload in (b"rubbish", b'{"version": 9, "fleet": "house"}'):
@@ -276,7 +276,7 @@ def test_a_later_part_can_be_read_alone(studio):
     assert review_fleet([first, second]).figures.swept_m2 == alone.swept_m2
 
 
-def test_one_robot_too_many_is_named_and_gets_the_place_of_one_long_gone(monkeypatch):
+def test_a_robot_beyond_the_limit_replaces_one_long_gone(monkeypatch):
     monkeypatch.setattr(members, "MOST_MEMBERS", 2)
     fleet, second = members.Members(members.Member), 1_000_000_000
     for name, at_s in (("a", 1), ("b", 50)):
