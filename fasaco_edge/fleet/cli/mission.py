@@ -29,19 +29,19 @@ if TYPE_CHECKING:
     from fasaco_edge.bus.session import Bus
 
 
-# Whom a robot has heard within this time is asked, too, though it may be silent by now [s].
+# Robots that others received messages from within this time get the command, too [s].
 HEARD_S = 600.0
-# So many are asked at a time: who does not answer holds up none of them.
+# Number of robots asked at a time: one that does not answer delays none of the others.
 AT_ONCE = 64
 
 
 @dataclass(frozen=True, slots=True)
 class _Member:
-    """A robot of the fleet, and the document of its answer, if that is one.
+    """A robot of the fleet, and the document of its answer, if it is a valid one.
 
     Attributes:
-        refused: why it has not taken the command; "" where it has.
-        would_forget: whether that is because it would forget what is covered.
+        refused: why it refused the command; "" if it accepted it.
+        would_forget: whether it refused because it would forget covered cells.
     """
 
     robot: str
@@ -56,9 +56,9 @@ Shown = Callable[[replies.Reply], str]
 def command_fleet(
     args: argparse.Namespace, asked: dict[str, object], shown: Shown | None = None
 ) -> int:
-    """Send a command to each robot of the fleet, and show the answers; 0 if all have taken it.
+    """Send a command to each robot of the fleet, and show the answers; 0 if all accept it.
 
-    Robots that would forget what is covered are asked about together, on a terminal.
+    On a terminal, one question asks for consent for all robots that would forget covered cells.
 
     Args:
         args: of the command line.
@@ -67,7 +67,7 @@ def command_fleet(
 
     Raises:
         NobodyAnswersError: no robot of this fleet answers.
-        BusUnavailable: nobody listens at the endpoint.
+        BusUnavailable: no process listens at the endpoint.
     """
     from fasaco_edge.bus.session import open_bus
 
@@ -103,12 +103,12 @@ def command_fleet(
 def _robots(bus: Bus, keys: Keys, fleet: str, timeout_s: float) -> list[str]:
     """Return the names of the robots of a fleet, in order.
 
-    Those that answer, and those that they have heard of lately: one that is frozen, or that a
-    network has lost, may drive all the same.
+    These are the robots that answer and those that they list as recently received: a robot that is
+    frozen, or has lost its network, may still drive.
     """
     statuses = []
     for reply in bus.get(f"{keys.base}/{VERSION}/*/@rpc/status", timeout_s):
-        # What somebody answers that is no status concerns nobody else.
+        # An answer that is no status must not stop the command to the other robots.
         with suppress(MalformedMessage):
             statuses += [] if reply.is_error else [decode_tolerant(reply.payload, Status)]
     names = set[str]()

@@ -34,11 +34,11 @@ if TYPE_CHECKING:
 
 
 def plan_fleet(args: argparse.Namespace, request: PlanRequest) -> int:
-    """Plan, print the figures, write what was asked for."""
+    """Plan, print the figures, and write the requested files."""
     robot, search = request.robot, request.search
     _check(args, request)
     compile_kernels()
-    # After that, as they import the compiler.
+    # Imported late, as they import the compiler.
     from fasaco_edge.fleet.planning.division import Fleet, divide
     from fasaco_edge.offline.maps import load_map
 

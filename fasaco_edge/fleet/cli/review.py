@@ -30,7 +30,7 @@ def print_fleet(args: argparse.Namespace) -> int:
     """
     for name in ONE_ROBOT:
         value = getattr(args, name)
-        # Not by its truth: 0 is a time.
+        # Compared with None, as 0 is a time.
         if value is not None and value is not False:
             raise BadConfiguration(
                 f"--{name}: this is the recording of a fleet",

@@ -20,14 +20,14 @@ from fasaco_edge.wire.keys import VERSION, Keys
 def fleet_on_bus(
     fleet: str, keys: Keys, bus: BusSettings
 ) -> Iterator[tuple[FleetWatch, Callable[[], FasacoError]]]:
-    """Yield what is watched of a fleet, and what makes the error that no robot of it is there."""
+    """Yield the watch of a fleet, and a function for the error that none of its robots is there."""
     view = FleetView(fleet)
     with FleetFeed(bus, keys) as feed:
         yield FleetWatch(feed, view, out()), lambda: _no_robot(keys, feed, view)
 
 
 def _no_robot(keys: Keys, feed: FleetFeed, view: FleetView) -> NobodyAnswersError:
-    """Return the error that no robot of a fleet is heard."""
+    """Return the error that no robot of a fleet sends messages."""
     robots = len(feed.robots())
     if not robots and not view.others:
         return nobody_answers(f"{keys.base}/{VERSION}/*", ())

@@ -1,1 +1,1 @@
-"""Messages of a fleet in the daemon: what arrives of other robots, and what this one sends."""
+"""Messages of a fleet in the daemon: those of other robots, and those of this robot."""

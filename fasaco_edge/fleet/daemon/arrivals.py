@@ -1,7 +1,7 @@
 """Fleet arrivals: which messages on the fleets' keys the loop gets, and how often.
 
-All fleets under one ``bus.base`` and all who may publish there use such keys. Only robots of this
-robot's fleet keep a place; others never take one from them.
+All fleets under one ``bus.base``, and any other publisher there, use such keys. The number of
+places is limited. Only robots of this robot's fleet keep one; other publishers never displace them.
 """
 
 from __future__ import annotations
@@ -31,17 +31,17 @@ class FleetArrivals:
 
     def __init__(self, keys: Keys, fleet: str) -> None:
         self._keys, self._fleet = keys, fleet
-        # Times of the messages taken of this fleet, by key, and of those looked into of others
-        # [s]; the key heard longest ago is first.
+        # Times of the messages accepted from this fleet, by key, and of those decoded from other
+        # publishers [s]; the key with the oldest message is first.
         self._heard_at: dict[str, float] = {}
         self._strange_at: dict[str, float] = {}
-        # When one that belongs to no fleet was passed on: only its fault counts.
+        # Time of the last message of no fleet that was passed on: only its fault is used.
         self._unreadable_at = float("-inf")
         self._has_refused = False
         self._faults = deque[FasacoError](maxlen=1)
 
     def is_due(self, sample: Sample, now: float) -> bool:
-        """Tell whether a message is for the loop now; ``now`` is monotonic time [s]."""
+        """Return whether a message is for the loop now; ``now`` is monotonic time [s]."""
         key, spaced = sample.key, now - LEAST_SPACING_S
         if self._keys.robot_of(key) in ("", self._keys.robot):
             return False

@@ -40,8 +40,8 @@ if TYPE_CHECKING:
     from fasaco_edge.mission.core.mission import Mission
 
 PERIOD_S, LEAST_PERIOD_S = 1.0, 0.25
-# Tiles of progress, and as many of ground, in a message sent once a second, and in one on change:
-# 20 kB a second in all, and up to 7 more where cells were kept from before an epoch.
+# Number of tiles of progress, and as many of ground, in a periodic message (once a second), and in
+# one on change: 20 kB/s in all, and up to 7 kB/s more for cells from before an epoch.
 TILES, FEW_TILES = 10, 2
 
 
@@ -69,7 +69,7 @@ class FleetReceiver:
             origin = _origin(config.fleet)
             self._frames = FleetFrames(_pose(*origin), self._lattice_deg, self._cell_m)
         self._arrivals = FleetArrivals(self._keys, self._fleet)
-        # Of messages that are taken but for a part.
+        # Faults of messages of which a part was dropped.
         self._faults: list[FasacoError] = []
 
     def listen(self, bus: Bus, post: Callable[[Sample], None]) -> None:
@@ -182,7 +182,7 @@ class FleetSender:
             self._told_at, most = now, TILES
         tiles = mission.ledger.snapshot().tiles
         if others.shared.epoch != self._epoch:
-            # Published changes are forgotten. What was swept before a restart is not known.
+            # Published changes are forgotten. Cells swept before a restart are not known.
             before = tiles if self._epoch else None
             self._epoch, self._telling, most = others.shared.epoch, Telling(before), TILES
         swept = self._telling.next(tiles, most)
@@ -217,11 +217,11 @@ class FleetSender:
         self._publisher.put(encode_json(member))
 
     def _frame_told(self, mission: Mission) -> str:
-        """Return the frame of the fleet; that of the map where the map has no place in it."""
+        """Return the frame of the fleet; the map's own frame if the map has no place in it."""
         frame = mission.ledger.frame
         if not fleet_of(mission).shared.why_misplaced(frame):
             return self._frame or frame
-        # Nobody may take it for the fleet's.
+        # Other robots must not mistake it for the fleet's frame.
         return frame if self._frame not in ("", frame) else f"{frame} of another map"
 
 

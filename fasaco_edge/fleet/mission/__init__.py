@@ -1,1 +1,1 @@
-"""Mission of a robot of a fleet: the others that share the area, and who sweeps what."""
+"""Mission of a robot of a fleet: the other robots, and which robot sweeps which cell."""

@@ -13,10 +13,10 @@ from fasaco_edge.mission.map.reachable_area import ReachableArea, anchor_cell
 
 
 class AtWork:
-    """Tells which of the other robots take part.
+    """Decides which of the other robots take part.
 
-    A robot divides again if one that takes part is left out, so that all have to agree: where two
-    do not hear each other, or one map shows no way from one to the other, a third decides.
+    A robot divides again if a participant is left out, so all robots have to agree. If two robots
+    do not receive each other, or one map shows no way between them, a third robot decides.
     """
 
     def __init__(self, others: Members, numbers: DivisionNumbers) -> None:
@@ -39,15 +39,16 @@ class AtWork:
         divided_at: float,
         now: float,
     ) -> list[Robot]:
-        """Return those of the last division that take part, though this robot does not see how.
+        """Return robots of the last division that take part, but are out of this robot's reach.
 
-        Its map shows no way to them, or it hears them no more, but who made the division does. Left
-        out, they would divide again themselves, and leave out those that they do not see.
+        Its map shows no way to them, or their messages no longer arrive, but the robot that made
+        the division still reaches them. If left out, they would make a division of their own, and
+        leave out the robots that they do not reach.
 
         Args:
             division: the last division.
             lattice: the cells to divide.
-            robots: the robots that this one sees.
+            robots: the robots that this one reaches.
             divided_at: when the last division was made or taken over [s].
             now: time [s].
         """
@@ -61,13 +62,13 @@ class AtWork:
                 found.append(Robot(robot.name, seed, robot.step_s))
                 continue
             row, col = lattice.cell_at(member.newest.x, member.newest.y)
-            # Others could not be told of a seed farther off.
+            # A seed farther away does not fit into a message.
             if max(abs(row), abs(col)) <= MOST_INDEX:
                 found.append(Robot(robot.name, (row, col), member.newest.step_s))
         return found
 
     def is_gone(self, name: str, divided_at: float, now: float) -> bool:
-        """Tell whether a robot of a division made at ``divided_at`` takes no part any more [s]."""
+        """Return whether a robot no longer takes part in a division made at ``divided_at`` [s]."""
         member = self._others.known.get(name)
         if member is None:
             return now - divided_at > GONE_S and not self._is_vouched(now)
@@ -75,9 +76,10 @@ class AtWork:
         return bool(absence) and not (absence == GONE and self._is_vouched(now))
 
     def _is_vouched(self, now: float) -> bool:
-        """Tell whether who made the division is another that is at work, and tells it still.
+        """Return whether the division's author is another robot at work that still sends it.
 
-        It hears robots that this one does not: each would divide again without or with them.
+        It receives robots that this one does not: the two would divide again and again, one with
+        and one without these robots.
         """
         maker = self._others.known.get(self._numbers.by)
         if maker is None or maker.absence(now):

@@ -3,8 +3,8 @@
 A cell belongs to the robot whose seed has the shortest travel time to it, plus the robot's
 handicap. So each part is connected, and cells that a map shows later have an owner, too. Handicaps
 balance the workload of the parts. Seeds start at the robots, or far from one another; then they
-move to the centres of the parts (Lloyd's algorithm, with travel times as distances). Of all these
-divisions the one is taken whose last robot ends first, if each walks from cell to nearest cell.
+move to the centres of the parts (Lloyd's algorithm, with travel times as distances). The division
+chosen has the shortest makespan if each robot always walks to its nearest open cell.
 """
 
 from __future__ import annotations
@@ -20,15 +20,15 @@ from fasaco_edge.grid.lattice import Cell, CoverageLattice
 from fasaco_edge.kernels.fleet.nearest import walk_parts
 from fasaco_edge.mission.core.events import Part
 
-# With more cells every second, third ... is used; on larger lattices there are fewer rounds.
+# Of more cells only every second, third ... is used; larger lattices get fewer rounds.
 MOST_CELLS, MOST_SEARCHED = 2_000, 3_000_000
 # Rounds of moving the seeds; updates of the handicaps, and the factor between successive ones.
 ROUNDS, CHANGES, DAMPING = 3, 30, 0.85
-# How often handicaps are sought for the same seeds: for equal numbers of cells first, then for the
-# times that a cell took each robot.
+# Number of searches for handicaps with the same seeds: first for equal numbers of cells, then for
+# the time that each robot needed per cell.
 EVENED = 3
-# Seeds are kept unless others end before this share of their time. The share of cells that go to
-# another robot with a part, of the mean time, counts as so much time of the last robot.
+# Seeds are kept unless others take less than this share of their time. The share of cells that move
+# to another robot with a part is charged to the makespan, in mean times of a robot.
 STABLE, CHANGED = 0.9, 1.0
 
 
@@ -68,7 +68,7 @@ class Division:
 
     @classmethod
     def of(cls, parts: Iterable[Part]) -> Division:
-        """Return a division as others tell of it."""
+        """Return the division that another robot sent."""
         parts = sorted(parts, key=lambda part: part.robot)
         robots = tuple(Robot(part.robot, part.seed, part.step_s) for part in parts)
         seeds, handicaps_s = (part.seed for part in parts), (part.handicap_s for part in parts)
@@ -76,17 +76,17 @@ class Division:
 
     @property
     def parts(self) -> tuple[Part, ...]:
-        """The division as others are told."""
+        """The division as it is sent to other robots."""
         told = zip(self.robots, self.seeds, self.handicaps_s, strict=True)
         return tuple(Part(robot.name, seed, s, robot.step_s) for robot, seed, s in told)
 
     def is_like(self, other: Division) -> bool:
-        """Tell whether it assigns all cells as another one, wherever the robots are now."""
+        """Return whether it assigns all cells as another one; places of robots do not matter."""
         mine, theirs = ((one.names, one.seeds, one.handicaps_s) for one in (self, other))
         return mine == theirs
 
     def busiest(self, owners: NDArray[np.int8], robot: str) -> str:
-        """Return which robot but ``robot`` owns most of some cells; "" where none owns any.
+        """Return the robot other than ``robot`` that owns most of some cells; "" for none.
 
         Args:
             owners: int8 (n,), the index of each cell's robot.
@@ -100,7 +100,7 @@ class Division:
         """Return the index of each cell's robot, int8 (rows, cols)."""
         first = np.full(lattice.steps.size, np.float32(np.inf))
         owners = np.zeros(lattice.steps.size, np.int8)
-        # One robot at a time: large lattices would take much memory for many robots.
+        # One robot at a time: all at once would take much memory on large lattices.
         for index, (robot, seed) in enumerate(zip(self.robots, self.seeds, strict=True)):
             times_s = times_of(ways(lattice, seed), np.float32(robot.step_s))
             times_s += np.float32(self.handicaps_s[index])
@@ -122,10 +122,10 @@ def divide(
     Args:
         lattice: the cells where robots fit.
         wanted: bool (rows, cols), the cells to divide.
-        robots: at least one. One without a way to any of the cells gets a seed where it is: it has
-            what it alone can reach, on its own map.
-        before: the last division; its seeds are kept unless others end much earlier, and where
-            nothing is gained, cells keep their robot.
+        robots: at least one. A robot without a way to any of the cells gets a seed at its own cell:
+            it owns the cells that it alone can reach, on its own map.
+        before: the last division; its seeds are kept unless others end much earlier, and cells
+            keep their robot if a change gains nothing.
         turn_steps: time of a quarter turn, in steps.
     """
     cells = np.flatnonzero(wanted)
@@ -154,7 +154,7 @@ def _divided(
         kept = dict(
             zip(before.names, zip(before.seeds, before.handicaps_s, strict=True), strict=True)
         )
-        # A seed that others see and this robot cannot reach would take a huge handicap.
+        # A seed that is out of reach on this robot's map would need a huge handicap.
         kept = {name: pair for name, pair in kept.items() if travel.has_ways_from(pair[0])}
         pairs = [kept.get(robot.name, (robot.cell, 0.0)) for robot in robots]
         seeds, old_s = [seed for seed, _ in pairs], np.array([s for _, s in pairs], np.float32)
@@ -193,13 +193,13 @@ class _Choice:
         self.seeds: list[Cell] = []
         self.handicaps_s = np.zeros(0, np.float32)
         self._travel, self._before, self._turn_steps = travel, before, turn_steps
-        # Which robots had cells: one without waits for some, whoever has to give them.
+        # Which robots had cells: giving cells to a robot without any is not charged.
         self._had = np.bincount(before[before >= 0], minlength=len(starts)) > 0
         self._steps_s = steps_s
         lattice, cols = travel.lattice, travel.lattice.steps.shape[1]
         ground = [on_ground(lattice, *lattice.local(start)) for start in starts]
         self._starts = np.array([row * cols + col for row, col in ground], np.int64)
-        # Writable, as for other arrays kernels would be compiled again.
+        # Writable, as kernels would be compiled again for read-only arrays.
         self._steps = lattice.steps.ravel().copy()
         self._offsets = np.array([1, cols, -1, -cols], np.int64)
         self._cost_s = np.inf
@@ -212,7 +212,7 @@ class _Choice:
         Args:
             seeds, handicaps_s: the division.
             times_s: travel times from its seeds, float32 (k, n) [s].
-            factor: on the time of its last robot.
+            factor: applied to the time of its last robot.
 
         Returns:
             the owner of each cell, int64 (n,), and when each robot ends, float64 (k,) [s].
@@ -229,7 +229,7 @@ class _Choice:
     def _ends_s(self, owner: NDArray[np.int64]) -> NDArray[np.float64]:
         """Return when each robot ends, float64 (k,) [s], if it walks from cell to nearest cell.
 
-        Of so many cells that only some are looked at, each takes a step.
+        If only every second, third ... cell is used, each cell of a part counts as one step.
         """
         if self._travel.every > 1:
             steps = self._travel.every * np.bincount(owner, minlength=len(self._starts))
@@ -243,9 +243,9 @@ class _Choice:
 def _cells_s(
     owner: NDArray[np.int64], ends_s: NDArray[np.float64], steps_s: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Return how long a cell takes each robot, float64 (k,) [s]; one without any as on average.
+    """Return each robot's time per cell, float64 (k,) [s]; the average for a robot without cells.
 
-    Not less than a step: one that stands on its only cell would have it for nothing.
+    It is at least one step: a robot that stands on its only cell would have no cost.
     """
     count = np.bincount(owner, minlength=len(ends_s))
     mean_s = ends_s.sum() / len(owner)
@@ -255,7 +255,7 @@ def _cells_s(
 def _owners_before(
     before: Division | None, robots: Sequence[Robot], travel: Travel
 ) -> NDArray[np.int64]:
-    """Return the index of the robot that had each cell, int64 (n,); -1 for one that is gone."""
+    """Return the index of the robot that had each cell, int64 (n,); -1 for an absent robot."""
     if before is None:
         return np.full(len(travel.cells), -1)
     index = {robot.name: number for number, robot in enumerate(robots)}
@@ -271,7 +271,7 @@ def balanced_handicaps_s(
 ) -> Seconds:
     """Return handicaps, float32 (k,), that balance the load, for travel times float32 (k, n).
 
-    They are sought from the first ones on, which are kept unless others balance better.
+    The search starts from the given handicaps, and keeps them unless others balance better.
     """
     handicaps = np.zeros(len(times_s), np.float32) if first_s is None else first_s
     best, least = handicaps, np.inf

@@ -1,7 +1,8 @@
-"""Numbers of divisions: which division is the newest, of those made here and those heard.
+"""Numbers of divisions: which division is the newest, of those made here and those received.
 
-The higher number is newer, among equal ones that by the first name. Numbers too far ahead are
-errors of their sender, unless a robot keeps telling them: it has counted on out of hearing.
+The higher number is newer; between equal numbers the author's name that sorts first wins. Numbers
+too far ahead are errors of their sender, unless it keeps sending them: then it has counted on while
+it was out of range.
 """
 
 from __future__ import annotations
@@ -11,12 +12,12 @@ from fasaco_edge.mission.core.events import MemberHeard
 
 # Limits on a division's number: absolute, ahead of this robot's own, and the first of a newcomer.
 MOST_NUMBER, MOST_AHEAD, MOST_FIRST = 2**31 - 1, 2**10, 2**24
-# How long a number ahead, but below the last limit, is told until it is believed [s].
+# How long a number ahead, but below the last limit, is sent until it is accepted [s].
 BELIEVED_S = 10.0
 
 
 class DivisionNumbers:
-    """Numbers the divisions of one robot and judges those that others tell.
+    """Numbers the divisions of one robot, and checks the numbers that others send.
 
     Attributes:
         number: number of the newest division.
@@ -27,13 +28,13 @@ class DivisionNumbers:
         self.number = 0
         self.by = ""
         self._robot, self._others = robot, others
-        # When robots were heard first whose divisions' numbers are too far ahead [s].
+        # Times of the first message of each robot whose number is too far ahead [s].
         self._too_far: dict[str, float] = {}
 
     def newer(self) -> MemberHeard | None:
-        """Return the newest division heard that is newer than ``number``, with a part for itself.
+        """Return the newest division received above ``number`` that has a part for this robot.
 
-        Newer ones without this robot do not hide it: a robot that takes others for gone makes them.
+        Newer divisions without this robot are skipped: their author takes this robot for absent.
         """
         most = self._most_valid()
         found = [
@@ -48,11 +49,11 @@ class DivisionNumbers:
         return first if first and (-first.division, first.by) < mine else None
 
     def follow(self, newer: MemberHeard) -> None:
-        """Take over the number of a division heard."""
+        """Take over the number of a received division."""
         self.number, self.by = newer.division, newer.by
 
     def count_on(self) -> None:
-        """Number a division that this robot makes: above all valid ones heard."""
+        """Number a division that this robot makes: above all valid numbers received."""
         most = self._most_valid()
         heard = [one for one in self._others.division_numbers().values() if one <= most]
         self.number, self.by = min(max([self.number, *heard]) + 1, MOST_NUMBER), self._robot

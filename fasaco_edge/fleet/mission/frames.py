@@ -1,8 +1,8 @@
-"""Frames of a fleet: what another robot tells of its cells, on this robot's lattice.
+"""Frames of a fleet: the cells that another robot sends, on this robot's lattice.
 
-Robots with maps of their own are given where the origin of each map lies in one frame that they
-share. Their cells then lie askew to each other: a cell takes the value of the other robot's cell in
-which its centre lies.
+If each robot has its own map, its configuration gives the pose of that map in a shared frame. The
+lattices of two robots are then at an angle: a cell takes the value of the other robot's cell that
+contains its centre.
 """
 
 from __future__ import annotations
@@ -19,12 +19,11 @@ from fasaco_edge.grid.geometry import MOST_INDEX, Point, Pose2D
 from fasaco_edge.mission.core.events import MemberHeard
 from fasaco_edge.mission.coverage.ledger import TILE
 
-# Number of robots heard at once. More than can be members: a robot that is refused may become one,
-# and its tiles come in turn.
+# Number of robots tracked at once. It exceeds the number of members: a refused robot may become a
+# member, and its tiles come one after the other.
 MOST_HEARD = 64
 
-# Tiles of another robot that only touch one of this robot's do not count, nor do angles that only
-# rounding makes [cells], [rad].
+# Overlaps of tiles below this are ignored, and so are angles due to rounding [cells], [rad].
 TOUCH, STRAIGHT = 1e-6, 1e-9
 
 
@@ -38,7 +37,7 @@ def seen_from(frame: Pose2D, other: Pose2D) -> Pose2D:
 
 
 def placed_point(frame: Pose2D, x: float, y: float) -> Point:
-    """Return a point of a frame, where the frame has that pose."""
+    """Return a point of a frame in the frame that its pose is given in."""
     cos, sin = math.cos(frame.yaw), math.sin(frame.yaw)
     return frame.x + cos * x - sin * y, frame.y + sin * x + cos * y
 
@@ -56,13 +55,13 @@ class Relaid:
         self._shift = lattice.x / cell_m, lattice.y / cell_m
         self._cos, self._sin = math.cos(lattice.yaw), math.sin(lattice.yaw)
         self._given: dict[tuple[int, int], bytes] = {}
-        # The tiles of this lattice, until one that they are made of changes.
+        # Cached tiles of this lattice, until one of their source tiles changes.
         self._made: dict[tuple[int, int], bytes] = {}
-        # Those that had a cell.
+        # Places of the tiles that had a cell.
         self._shown: set[tuple[int, int]] = set()
 
     def tiles(self, told: Iterable[Placed]) -> tuple[Placed, ...]:
-        """Return all tiles of this robot's lattice that the other's new tiles have to do with."""
+        """Return all tiles of this robot's lattice that overlap the other's new tiles."""
         wanted: set[tuple[int, int]] = set()
         for place, bits in told:
             if place not in self._given and len(self._given) >= MOST_TILES_OF_ONE:
@@ -77,7 +76,7 @@ class Relaid:
             self._made[place] = self._make(place)
             if self._made[place] != EMPTY:
                 self._shown.add(place)
-        # Where nothing ever was nothing need be told.
+        # Tiles that were always empty are left out.
         return tuple((place, self._made[place]) for place in sorted(wanted & self._shown))
 
     def cell(self, row: int, col: int) -> tuple[int, int]:
@@ -119,7 +118,7 @@ class Relaid:
 
 
 class FleetFrames:
-    """What robots with maps of their own tell, in this robot's frames.
+    """Messages of robots with maps of their own, converted to this robot's frames.
 
     Args:
         map_frame: pose of this robot's map frame in the frame of the fleet.
@@ -130,14 +129,14 @@ class FleetFrames:
     def __init__(self, map_frame: Pose2D, lattice_deg: float, cell_m: float) -> None:
         self._map_frame, self._cell_m = map_frame, cell_m
         self._lattice = turned(map_frame, lattice_deg)
-        # For each robot its epoch, its swept cells and those that it can reach; the one heard
-        # longest ago is first.
+        # For each robot its epoch, its swept cells and those that it can reach; the robot with the
+        # oldest message is first.
         self._robots: dict[str, tuple[int, Relaid, Relaid]] = {}
 
     def event(self, heard: MemberHeard, map_frame: Pose2D, lattice_deg: float) -> MemberHeard:
         """Return another robot's message in this robot's frames.
 
-        It has no division where a seed lies farther off than this robot could tell others.
+        Its division is dropped if a seed lies too far away for a message of this robot.
 
         Args:
             heard: the message in the robot's own frames.
@@ -159,7 +158,7 @@ class FleetFrames:
             y=y,
             ahead=tuple(placed_point(frame, *point) for point in heard.ahead),
             tiles=swept.tiles(heard.tiles),
-            # A tile here is made of several of theirs, which come one after the other.
+            # A tile here is made of several of theirs, which arrive one after the other.
             kept=None,
             ground=ground.tiles(heard.ground),
             parts=parts,

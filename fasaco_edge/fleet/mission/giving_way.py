@@ -1,7 +1,7 @@
 """Giving way: the robot waits for others of its fleet, and makes way for them.
 
-Its path is set aside meanwhile, and taken up afterwards; a way home is looked for anew. What keeps
-it from going on is decided in ``fleet.traffic``.
+Meanwhile its path is set aside, and it resumes the path afterwards; a way home is planned again.
+``fleet.traffic`` decides what obstructs the robot.
 """
 
 from __future__ import annotations
@@ -38,18 +38,18 @@ from fasaco_edge.mission.map.map_state import MapState
 from fasaco_edge.mission.map.reachable_area import ReachableArea
 from fasaco_edge.mission.orders.order import Errand
 
-# A robot that stands on its path this near to another one is blocked by it [m]; motion that counts.
+# A robot that stands on its path this near to another is blocked by it; least motion [m].
 BESIDE_M, MOVED_M = 0.4, 0.1
-# It has come to its refuge at this distance from its place there [m].
+# Distance from its place in the refuge at which it has arrived [m].
 ARRIVED_M = 0.05
-# On its way there it looks so far ahead for others that have come in its way [points].
+# Length of the way ahead that is checked for robots in the way [points].
 LOOK_POINTS = int(WAIT_M / 2 / SPACING_M)
-# One has come in its way that is nearer to it by this than when the way was chosen [m].
+# A robot is in the way if it is nearer to it by this than when the way was chosen [m].
 COMES_M = 0.05
-# A robot that has not got farther than this for so long plans around whoever keeps it, and is
-# reported after so long [m], [s], [s]: the poses of the other scatter perhaps, as if it moved.
+# A robot that moves less than this for LONG_S plans around the robot that obstructs it, and is
+# reported after TOO_LONG_S [m], [s], [s]: scattered poses may make the other seem to move.
 STAYS_M, LONG_S, TOO_LONG_S = 0.2, 30.0, 60.0
-# A robot that made way, or waits, looks for another place no sooner than this [s].
+# Least time before a robot that made way, or waits, looks for another refuge [s].
 AGAIN_S = 2.0
 
 
@@ -78,20 +78,20 @@ class GivingWay(Waiting):
         self._map, self._route, self._fleet = map_state, route, fleet
         self._since = self._sought_at = 0.0
         self._refuge: Cell | None = None
-        # How near the way there led to others when it was chosen [m].
+        # Distances of the way from other robots when it was chosen [m].
         self._apart_m: dict[str, float] = {}
         self._has_work = True
-        # The path that it waits to go on with, and the errand that leads along it.
+        # The path to resume after the wait, and the errand of that path.
         self._held, self._errand = NO_CELLS, ""
-        # Its place, and since when it has had a path there and was free to drive.
+        # Its place, and since when it has been free to drive from there on a path.
         self._place, self._free_since = (math.inf, math.inf), 0.0
         # Where it stays, and since when.
         self._stays_at, self._stays_since = (math.inf, math.inf), 0.0
-        # Why it waited last, and when.
+        # Reason and time of its last wait.
         self._waited, self._waited_at = "", -math.inf
 
     def succeed(self, before: Waiting) -> None:
-        """Go on with the count of another one: where the robot stays, and why it waited."""
+        """Take over the state of a predecessor: where the robot stays, and why it waited."""
         if not isinstance(before, GivingWay):
             return
         self._waited, self._waited_at = before._waited, before._waited_at
@@ -119,29 +119,29 @@ class GivingWay(Waiting):
         return self._held if is_held else self._route.path.ahead
 
     def look_around(self, now: float) -> None:
-        """Note whether another robot is near: then all tell more often, also one at rest."""
+        """Note whether another robot is near: then all publish more often, even at rest."""
         pose = self._map.pose
         here = None if pose is None else (pose.pose.x, pose.pose.y)
         self._neighbours = self._fleet.others.neighbours(now)
         self.is_near = here is not None and _is_near(here, self._neighbours)
 
     def why_stuck(self, now: float) -> str:
-        """Return why the robot is thought to be held up for good, or ""."""
+        """Return why the robot seems stuck for good, or ""."""
         is_stuck = now - self._waited_at <= STANDS_S and now - self._stays_since > TOO_LONG_S
         return f"{self._waited} for more than a minute" if is_stuck else ""
 
     def end(self) -> None:
-        """Wait no longer."""
+        """End the wait."""
         self.waits_for = self.reason = ""
         self._refuge = None
 
     def look(self, now: float, *, has_work: bool = True, errand: Errand = "") -> PathUpdate | None:
         """Decide again after ``look_around``; return the path to publish, if any.
 
-        ``waits_for`` tells the result.
+        ``waits_for`` holds the result.
 
-        A robot without work left has no path, but for one to a refuge: it makes way alone. Another
-        errand leads elsewhere, perhaps past nobody: the wait ends.
+        A robot without work left only has paths to a refuge: it makes way, but does not wait.
+        Another errand may lead past no robot, so it ends the wait.
 
         The first case that holds:
 
@@ -157,7 +157,7 @@ class GivingWay(Waiting):
         if errand != self._errand:
             self._errand = errand
             self.end()
-        # A refuge is sought from where the robot is, which on a short cut is far from its path.
+        # The search for a refuge starts at the robot, which on a short cut is far from its path.
         area, cell, pose = self._map.area, self._map.cell_at_pose(), self._map.pose
         neighbours = self._neighbours
         here = (math.inf, math.inf) if pose is None else (pose.pose.x, pose.pose.y)
@@ -179,7 +179,7 @@ class GivingWay(Waiting):
             self._place, self._free_since = here, now
         if self.waits_for:
             self._waited, self._waited_at = self.reason, now
-        # Let go for a moment, it has not got on.
+        # A moment without an obstruction is no progress.
         has_waited = now - self._waited_at <= STANDS_S
         if math.dist(here, self._stays_at) > STAYS_M or not has_waited:
             self._stays_at, self._stays_since = here, now
@@ -187,7 +187,7 @@ class GivingWay(Waiting):
     def _is_underway(
         self, here: tuple[float, float], neighbours: Mapping[str, Neighbour], now: float
     ) -> bool:
-        """Tell whether the robot drives to its refuge, and nobody has come in its way there."""
+        """Return whether the robot drives to its refuge, and no robot has come in its way."""
         ahead = self._route.path.ahead
         is_there = self._refuge is None or self._is_in(self._refuge, here)
         is_stuck = now - self._sought_at > PATIENCE_S
@@ -200,7 +200,7 @@ class GivingWay(Waiting):
         )
 
     def _apart_of(self, line: Points, neighbours: Mapping[str, Neighbour]) -> dict[str, float]:
-        """Return how near a line comes to others, at most what is kept clear of them [m]."""
+        """Return a line's distance from each other robot, at most the required clearance [m]."""
         return {
             name: min(
                 self._clear_m(near),
@@ -213,12 +213,12 @@ class GivingWay(Waiting):
         return least_apart_m(self._radius_m, near.heard)
 
     def _is_in(self, refuge: Cell, here: tuple[float, float]) -> bool:
-        """Tell whether the robot has come to its refuge: at the edge it may be in the way."""
+        """Return whether the robot has arrived in its refuge: at its edge it may be in the way."""
         place = self._map.place_of(refuge)
         return place is None or math.dist(here, place) <= ARRIVED_M
 
     def _sees(self, area: ReachableArea, a: Points, b: Points) -> bool:
-        """Tell whether the robot can drive straight between two points, (2,): x, y [m].
+        """Return whether the robot can drive straight between two points, (2,): x, y [m].
 
         Where cells are counted: between those of one cell, and of two that a step connects.
         """
@@ -236,12 +236,12 @@ class GivingWay(Waiting):
             self._robot, self._radius_m, pace_s_m, spaced(line), neighbours, self.waits_for
         )
         if found is None and self._hangs(now) and len(line) > 1:
-            # It should drive: its line passes nearer than its cells, or it is stopped by a sensor.
+            # It should drive: its line passes nearer than its cells, or a sensor has stopped it.
             return self._beside(here, neighbours)
         return found
 
     def _hangs(self, now: float) -> bool:
-        """Tell whether the robot stands though it has long been free to drive."""
+        """Return whether the robot stands though it has long been free to drive."""
         return now - self._free_since > PATIENCE_S
 
     def _beside(
@@ -265,19 +265,19 @@ class GivingWay(Waiting):
     ) -> PathUpdate | None:
         route = self._route
         if found.robot != self.waits_for:
-            # Not now: let go for a moment, or for another one in turn, it has not got on.
+            # A moment without an obstruction, or another obstructing robot, is no progress.
             self._since = self._stays_since
         was_waiting = bool(self.waits_for)
         self.waits_for, self.reason = found.robot, found.reason
         has_path = len(route.path.cells) > 0
         ahead = route.path.ahead
-        # After a new order the path set aside is another.
+        # A new order has a new path.
         if route.set_aside() or not was_waiting:
             self._held = ahead
         is_long = now - self._since > PATIENCE_S or self._hangs(now)
-        # While it is held it stands for that reason: let go, it has all the time to drive again.
+        # Standing counts only while it is free to drive: a wait starts the time again.
         self._free_since = now
-        # Also one that is to go first: it may be jammed, and the wait for it without end.
+        # Even a robot with right of way: it may be jammed, and the wait for it endless.
         stands = neighbours[found.robot].stands_s > STANDS_S or now - self._stays_since > LONG_S
         if is_long and stands:
             self._fleet.others.avoid(found.robot)

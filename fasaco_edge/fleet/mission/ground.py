@@ -1,8 +1,8 @@
 """Shared ground: the cells that the robots of a fleet can reach, each on its own map.
 
-Cells that only others' maps show take part in the division, so that all robots divide nearly the
-same area. This robot's own map decides where it shows anything; paths are planned on it alone. A
-door that was seen in part is shut on it: ``with_doors`` shows what lies beyond.
+The division includes cells that only maps of other robots show, so that all robots divide nearly
+the same area. Where this robot's own map is known, it decides; paths are planned on it alone. It
+shows a door seen only in part as shut: ``with_doors`` adds the cells beyond.
 """
 
 from __future__ import annotations
@@ -21,12 +21,12 @@ from fasaco_edge.kernels.lattice.ways import FAR, ways_from
 from fasaco_edge.mission.coverage.ledger import TILE
 from fasaco_edge.mission.map.reachable_area import ReachableArea
 
-# Limit on the cells that the ground of others may add to the lattice; beyond it is left out.
+# Largest number of cells that the ground of others may add to the lattice; more are left out.
 MOST_ADDED = 1_000_000
 
 
 class SharedGround:
-    """The cells that other robots can reach; its user drops robots that it keeps no longer.
+    """The cells that other robots can reach; the caller drops robots that it no longer keeps.
 
     Attributes:
         version: counter of changes.
@@ -35,11 +35,11 @@ class SharedGround:
     def __init__(self) -> None:
         self.version = 0
         self._robots: dict[str, dict[Cell, bytes]] = {}
-        # The last joint areas, without and with doors, and what each was made of.
+        # The last joint areas, without and with doors, and the inputs of each.
         self._last: dict[bool, tuple[ReachableArea, int, ReachableArea]] = {}
 
     def hear(self, robot: str, tiles: Iterable[Placed]) -> None:
-        """Take in a robot's tiles, each with TILE_BYTES of bits; the newest of a place counts."""
+        """Take in a robot's tiles, each with TILE_BYTES of bits; a newer tile replaces an older."""
         known = self._robots.setdefault(robot, {})
         for place, bits in tiles:
             has_room = place in known or len(known) < MOST_TILES_OF_ONE
@@ -48,7 +48,7 @@ class SharedGround:
                 self.version += 1
 
     def drop(self, robot: str) -> None:
-        """Forget a robot's ground: it is in another frame, or the robot is kept no longer."""
+        """Forget a robot's ground: it is in another frame, or the robot is no longer kept."""
         if self._robots.pop(robot, None):
             self.version += 1
 
@@ -58,19 +58,19 @@ class SharedGround:
         self.version += 1
 
     def joint(self, area: ReachableArea) -> ReachableArea:
-        """Return an area with the ground of others, where its map shows nothing."""
+        """Return an area with the ground of others added where its map is unknown."""
         return self._with(area, doors=False)
 
     def with_doors(self, area: ReachableArea) -> ReachableArea:
-        """Return what ``joint`` does, also of ground beyond doors that only others show open.
+        """Return the area of ``joint`` with the ground beyond doors that only others show open.
 
-        Those are cells that the area shows blocked and another robot can reach: seen in part, or
-        shut to this robot. They lead on, but are not reachable themselves.
+        A door is a cell that the area shows blocked and another robot can reach: it was seen in
+        part, or is shut to this robot. Ways lead through it, but it is not reachable itself.
         """
         return self._with(area, doors=True)
 
     def _with(self, area: ReachableArea, *, doors: bool) -> ReachableArea:
-        # A robot that looks at a door asks in each step.
+        # A robot on its way to look at a door calls this in each step.
         last = self._last.get(doors)
         if last is None or last[0] is not area or last[1] != self.version:
             joined = _joined(area, self._merged(), doors=doors) if self._robots else area
@@ -89,9 +89,9 @@ class SharedGround:
 def viewpoint(
     area: ReachableArea, joint: ReachableArea, wanted: NDArray[np.bool_], cell: Cell
 ) -> Cell | None:
-    """Return where to look for the nearest wanted cell beyond a robot's own area; None for none.
+    """Return a viewpoint for the nearest wanted cell beyond a robot's own area; None for none.
 
-    That is the last cell (row, col) of its own area on the shortest way there.
+    It is the last cell (row, col) of its own area on the shortest way there.
 
     Args:
         area: what it can reach itself.
@@ -144,12 +144,12 @@ class GroundTelling:
 def _joined(
     area: ReachableArea, tiles: dict[Cell, NDArray[np.uint8]], *, doors: bool
 ) -> ReachableArea:
-    """Return an area with the cells of tiles where its lattice knows nothing.
+    """Return an area with the cells of tiles added where its lattice is unknown.
 
-    With ``doors`` those that it shows blocked lead on.
+    With ``doors``, ways also lead through cells that it shows blocked.
     """
     lattice, window = area.lattice, area.lattice.window
-    # The nearest tiles first: those far away may be of a robot that lies.
+    # The nearest tiles first: those far away may come from a faulty robot.
     row, col = (window.row0 + window.row1) / 2, (window.col0 + window.col1) / 2
     places = sorted(tiles, key=lambda at: (abs(at[0] * TILE - row) + abs(at[1] * TILE - col), at))
     around = window
@@ -174,7 +174,7 @@ def _joined(
         return area
     own = np.zeros_like(ground)
     own[inside] = lattice.coverable
-    # Between two cells of one's own map its own steps hold.
+    # Between two cells of this robot's map, its own steps count.
     free = ground | own | door
     steps = CoverageLattice.from_free(free).steps.copy()
     between = CoverageLattice.from_free(own).steps
@@ -190,7 +190,7 @@ def _joined(
         return ReachableArea(whole_lattice, reached)
     first = int(seeds[0, 0]) + around.row0, int(seeds[0, 1]) + around.col0
     joined = ReachableArea.around(whole_lattice, first).reachable
-    # Own cells beyond the ground of others, which nobody can reach, may lie behind a wall there.
+    # Own cells that no robot can reach through the ground of others may lie behind a wall there.
     return ReachableArea(whole_lattice, joined & (reached | told) & ~door)
 
 

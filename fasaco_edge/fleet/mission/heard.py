@@ -1,4 +1,4 @@
-"""Cells heard of one robot of a fleet, and how they are kept with the ledger."""
+"""Cells received from one robot of a fleet, and how they are stored with the ledger."""
 
 from __future__ import annotations
 
@@ -30,8 +30,8 @@ class Heard:
     Attributes:
         epoch: of the tiles.
         lattice: pose of its lattice in this robot's [m], as they were placed.
-        is_doubtful: whether all that it tells in this epoch is disregarded: something was, before
-            its lattice moved, and where that lies now is not known.
+        is_doubtful: whether all cells that it sends in this epoch are disregarded: some were
+            disregarded before its lattice moved, and their new places are not known.
     """
 
     epoch: int
@@ -41,7 +41,7 @@ class Heard:
     is_doubtful: bool = False
 
     def begin(self, epoch: int) -> None:
-        """Drop the tiles of the epoch before."""
+        """Drop the tiles of the previous epoch."""
         self.epoch, self.tiles, self.is_doubtful = epoch, {}, False
 
     def move(self, epoch: int, lattice: Pose2D) -> None:
@@ -51,7 +51,7 @@ class Heard:
         self.epoch, self.lattice, self.tiles, self.disregarded = epoch, lattice, {}, {}
 
     def drop_gone(self) -> None:
-        """Drop what is disregarded of tiles that were not repeated in this epoch."""
+        """Drop disregarded bits of tiles that were not repeated in this epoch."""
         known = self.disregarded.items()
         self.disregarded = {place: bits for place, bits in known if place in self.tiles}
 
@@ -67,7 +67,7 @@ class Heard:
         return tile if without is None else tile & ~without
 
     def kept(self) -> Kept:
-        """Return everything in the form that is kept."""
+        """Return everything in the stored form."""
         tiles, without, pose = _listed(self.tiles), _listed(self.disregarded), self.lattice
         return Kept(self.epoch, tiles, without, (pose.x, pose.y, pose.yaw), self.is_doubtful)
 
@@ -76,7 +76,7 @@ _Tile = tuple[int, int, Annotated[bytes, Meta(min_length=TILE_BYTES, max_length=
 
 
 class Kept(msgspec.Struct, frozen=True, array_like=True):
-    """What is kept of a robot; as ``Heard``."""
+    """Stored form of ``Heard``."""
 
     epoch: int
     tiles: list[_Tile]
@@ -85,7 +85,7 @@ class Kept(msgspec.Struct, frozen=True, array_like=True):
     is_doubtful: bool = False
 
     def heard(self, *, is_in_place: bool) -> Heard:
-        """Return it as it was; without its tiles if this robot's own lattice has moved since."""
+        """Restore it; without its tiles if this robot's own lattice has moved since."""
         tiles = _placed(self.tiles) if is_in_place else {}
         lattice, without = Pose2D(*self.lattice), _placed(self.disregarded)
         return Heard(self.epoch, lattice, tiles, without, self.is_doubtful)

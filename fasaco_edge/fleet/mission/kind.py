@@ -1,4 +1,4 @@
-"""Kind of company: the parts of a mission that know of the other robots of a fleet."""
+"""Kind of company: the parts of a mission that handle the other robots of a fleet."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class FleetKind(CompanyKind):
     """A robot of a fleet.
 
     Attributes:
-        robot: its name there.
+        robot: its name in the fleet.
         map_place: where its map lies in the frame of the fleet; None without such a frame.
     """
 
@@ -44,7 +44,7 @@ class FleetKind(CompanyKind):
     def waiting(
         self, config: MissionConfig, map_state: MapState, route: Route, company: Company
     ) -> GivingWay:
-        """Return what decides when the robot waits for others."""
+        """Return the part that decides when the robot waits for others."""
         assert isinstance(company, FleetLayer)
         return GivingWay(self.robot, config.footprint, map_state, route, company)
 

@@ -1,9 +1,9 @@
 """Fleet layer: this robot's part of the area that remains for a fleet.
 
-There is no leader. Whoever sees a reason divides the remaining area anew and tells the others, who
-take over the division of the highest number, among those of one number that by the first name.
-While two robots disagree, cells may be swept twice; none is left out, because a robot that finishes
-takes over a part of the remaining area.
+There is no leader. Any robot that finds a reason divides the remaining area again and publishes the
+division. Each robot uses the division with the highest number; between equal numbers, the author's
+name that sorts first wins. While two robots disagree, cells may be swept twice, but none is left
+out: a robot that finishes takes over a part of the remaining area.
 """
 
 from __future__ import annotations
@@ -30,12 +30,13 @@ from fasaco_edge.mission.map.map_state import MapState
 from fasaco_edge.mission.map.reachable_area import ReachableArea
 from fasaco_edge.planners.cost import CoverageCost
 
-# Period of checks; least life of a division while no robot leaves: in general, and for balance [s].
+# Period of checks [s]. Least age of a division, while no robot leaves, before another one: in
+# general, and for balance [s].
 LOOK_S, HOLDS_S, EVEN_S = 1.0, 2.0, 10.0
 # Parts are rebalanced only above this ratio and this difference [s].
 UNEVEN, UNEVEN_S = 1.25, 40.0
-# Number of cells of this robot's part swept by another one that triggers a new plan: more than by
-# merely passing through. In unknown buildings 4 cost 7 % of two robots' time.
+# Number of cells of this robot's part that another robot sweeps before a new plan: more than by
+# merely passing through. In unknown buildings a value of 4 cost 7 % of two robots' time.
 MANY_TAKEN = 30
 LATER = "another robot has a newer division"
 
@@ -68,10 +69,10 @@ class FleetLayer(Company):
         # The owners of the cells of a joint area.
         self._owners: tuple[ReachableArea | None, NDArray[np.int8]]
         self._owners = None, np.zeros((0, 0), np.int8)
-        # The joint area of an area at the last look: others tell of theirs many times a second.
+        # Cached joint area of the last check: others send their ground many times a second.
         self._seen: tuple[ReachableArea, ReachableArea] | None = None
-        # Cells that this robot tried in vain, while others are at work; and those of an area that
-        # it cannot come to: another map may show a way.
+        # Cells that this robot tried in vain while others are at work; and those of an area that
+        # it cannot reach, though another map may show a way.
         self._tried = Window(0, 0, 0, 0), np.zeros((0, 0), np.bool_)
         self._shut: tuple[ReachableArea | None, NDArray[np.bool_]]
         self._shut = None, np.zeros((0, 0), np.bool_)
@@ -85,7 +86,7 @@ class FleetLayer(Company):
         return self.others.hear(event, now)
 
     def forget_ground(self) -> None:
-        """Forget what others have seen: it belongs to another map."""
+        """Forget the ground of others: it belongs to another map."""
         self.others.ground.clear()
 
     def passable(self, area: ReachableArea, cell: Cell, radius_m: float) -> ReachableArea:
@@ -113,7 +114,7 @@ class FleetLayer(Company):
         return self._division is not None
 
     def busiest(self, open_cells: OpenCells) -> str:
-        """Return the name of the other robot with most cells left in its part; "" for none."""
+        """Return the name of the other robot with the most cells left in its part; "" for none."""
         area, division = self._map.area, self._division
         if area is None or division is None:
             return ""
@@ -121,9 +122,9 @@ class FleetLayer(Company):
         return division.busiest(self._owners_on(division, joint)[left], self._robot)
 
     def viewpoints(self, open_cells: OpenCells, cell: Cell) -> Iterator[Cell]:
-        """Yield where to look for work that others alone see.
+        """Yield viewpoints for cells that only maps of others show, beyond a door they show open.
 
-        For this robot's part, then for any cells left, beyond a door that others show open.
+        First for cells of this robot's part, then for any cells left.
         """
         area, division = self._map.area, self._division
         if area is None or not self.members:
@@ -154,14 +155,14 @@ class FleetLayer(Company):
 
     @property
     def others_go_on(self) -> bool:
-        """Whether all that is left is others' to sweep, who are at it."""
+        """Whether only parts of other robots are left, and these make progress."""
         return self._division is not None and self._remainder.others_go_on
 
     def mine(self, cells: NDArray[np.bool_], area: ReachableArea) -> NDArray[np.bool_]:
         """Return which cells are this robot's to sweep.
 
-        All of them if its part has none and the others do not go on. Cells that it has given up
-        are left to the others.
+        These are all cells if none is in its part and the others make no progress. Cells that it
+        has given up are left to the others.
         """
         if self._division is None:
             return cells
@@ -172,10 +173,10 @@ class FleetLayer(Company):
     def mine_to_sweep(
         self, cells: NDArray[np.bool_], unvisited: NDArray[np.bool_], area: ReachableArea
     ) -> NDArray[np.bool_]:
-        """Return on which cells the floor is this robot's to sweep, visited or not.
+        """Return the cells on which this robot sweeps the floor, visited or not.
 
-        Those of its part; all of them if none of its part is unvisited and the others do not go on,
-        as for ``mine``: wherever its path leads to a cell, the floor there is its own, too.
+        These are the cells of its part; or all, if its part is visited and the others make no
+        progress. So wherever ``mine`` leads its path to a cell, it sweeps the floor there, too.
         """
         if self._division is None:
             return cells
@@ -186,11 +187,11 @@ class FleetLayer(Company):
         return cells & own if has_work else cells
 
     def give_up(self, cells: NDArray[np.bool_], area: ReachableArea) -> None:
-        """Leave cells that this robot tried in vain to the others, whatever maps come."""
+        """Leave cells that this robot tried in vain to the others, also after new maps."""
         self._tried = area.lattice.window, cells | self._tried_on(area)
 
     def pass_over(self, cells: NDArray[np.bool_], area: ReachableArea) -> None:
-        """Leave cells that this robot cannot come to to the others, until the next map."""
+        """Leave cells that this robot cannot reach to the others, until the next map."""
         self._shut = area, cells | (self._shut[1] if self._shut[0] is area else np.False_)
 
     def try_again(self) -> None:
@@ -235,7 +236,7 @@ class FleetLayer(Company):
             if not (why := self._why_anew(joint, left, robots, now, at_once=at_once)):
                 return self._why_by_taken()
             robots += self._at_work.unseen(before, joint.lattice, robots, self._divided_at, now)
-            # Others refuse more parts.
+            # Other robots refuse messages with more parts.
             robots = robots[: MOST_ROBOTS + 1]
             divided = divide(joint.lattice, left, robots, before, self._turn_steps)
             if before is None or not divided.is_like(before):
@@ -249,11 +250,11 @@ class FleetLayer(Company):
 
     @property
     def parts(self) -> tuple[Part, ...]:
-        """The newest division, as others are told."""
+        """The newest division, as it is sent to other robots."""
         return () if self._division is None else self._division.parts
 
     def part_cells(self) -> int | None:
-        """Return the number of cells in this robot's part; None if all are."""
+        """Return the number of cells in this robot's part; None if it has all cells."""
         if self._division is None or self._map.area is None:
             return None
         area = self._map.area
@@ -287,7 +288,7 @@ class FleetLayer(Company):
         return "" if division is None else self._why_by_parts(division, joint, left, names, now)
 
     def _is_gone(self, name: str, now: float) -> bool:
-        """Tell whether a robot of the division takes no part any more."""
+        """Return whether a robot of the division takes no part any more."""
         return name != self._robot and self._at_work.is_gone(name, self._divided_at, now)
 
     def _why_by_parts(
@@ -302,11 +303,11 @@ class FleetLayer(Company):
         owners = self._owners_on(division, joint)
         cells = np.bincount(owners[left], minlength=len(division.robots))
         if not cells[division.names.index(self._robot)]:
-            # If there was no part for it, there will be none soon after.
+            # A division that had no part for it would soon be made again without one.
             is_other = self._remainder.had_part or cells.sum() > self._remainder.divided
             is_other |= now - self._divided_at >= EVEN_S
             return "own part is done" if left.any() and is_other else ""
-        # Only who can reach all of them sees all that is left to each.
+        # Only a robot that can reach all of them knows all cells left to each.
         if not names.issuperset(division.names):
             return ""
         steps_s = np.array([robot.step_s for robot in division.robots])
@@ -344,7 +345,7 @@ class FleetLayer(Company):
     def _why_by_taken(self) -> str:
         """Return why a plan is wanted after others swept cells of this robot's part, or "".
 
-        Checked once per batch of messages: a fleet sends many.
+        It is checked once per batch of messages, as a fleet sends many.
         """
         if self._counted == self._ledger.shared.version:
             return ""

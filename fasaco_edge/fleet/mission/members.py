@@ -1,4 +1,4 @@
-"""Members of a fleet: the other robots, what each has told last, and which stand in the way."""
+"""Members of a fleet: the other robots, the last message of each, and which stand in the way."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ from fasaco_edge.mission.core.events import MemberHeard, State
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
 from fasaco_edge.mission.map.reachable_area import ReachableArea
 
-# Timeouts of a silent robot, and of one that should move; motion that counts [s], [s], [m].
+# Timeouts of a silent robot, and of one that should move; least motion [s], [s], [m].
 GONE_S, HANGING_S, STANDING_M = 5.0, 8.0, 0.05
-# A robot that is planned around has driven on once it is this far from there [m]: the poses of one
-# that stands scatter.
+# A robot that plans avoid has driven on once it is this far from its place [m]: the poses of a
+# standing robot scatter.
 LEFT_M = 0.2
 
 # Absence of a robot that is silent.
@@ -36,9 +36,9 @@ class Member:
 
     Attributes:
         newest: its newest message.
-        heard_at: time of that [s].
-        left_out: why it does not belong to this fleet; "" where it does.
-        place: its position, to STANDING_M, x, y [m].
+        heard_at: time of its newest message [s].
+        left_out: why it does not belong to this fleet; "" if it does.
+        place: its position x, y, to within STANDING_M [m].
         moved_at: time of the last motion [s].
         left_at: when it last left a new division [s].
     """
@@ -51,7 +51,7 @@ class Member:
     left_at: float = float("-inf")
 
     def has_moved(self, heard: MemberHeard) -> bool:
-        """Tell whether it has moved, has started to work, or has just ended a wait."""
+        """Return whether it has moved, has started to work, or has just ended a wait."""
         has_begun = self.newest.state not in AT_WORK and heard.state in AT_WORK
         has_begun |= bool(self.newest.waits_for) and not heard.waits_for
         return has_begun or math.dist(self.place, (heard.x, heard.y)) > STANDING_M
@@ -73,7 +73,7 @@ class Members:
 
     Attributes:
         known: the others, by name.
-        ground: the cells that those of them can reach that fit.
+        ground: the cells that the robots with a fitting frame can reach.
     """
 
     def __init__(self, robot: str, ledger: MissionLedger, cell_m: float) -> None:
@@ -84,9 +84,9 @@ class Members:
         self._avoided: dict[str, tuple[float, float]] = {}
 
     def neighbours(self, now: float) -> dict[str, Neighbour]:
-        """Return the other robots in this robot's frame that are heard.
+        """Return the other robots in this robot's frame that are not silent.
 
-        Where a silent one is, only this robot's map may show.
+        The place of a silent robot is not known; at most this robot's map shows it.
         """
         return {
             name: Neighbour(
@@ -113,20 +113,20 @@ class Members:
         self._avoided[robot] = newest.x, newest.y
 
     def is_avoided(self, robot: str) -> bool:
-        """Tell whether paths are planned around a robot."""
+        """Return whether paths are planned around a robot."""
         return robot in self._avoided
 
     def _is_at_avoided(self, robot: str) -> bool:
-        """Tell whether paths are planned around a robot, and it is still there."""
+        """Return whether paths are planned around a robot, and it is still there."""
         place, member = self._avoided.get(robot), self.known.get(robot)
         if place is None or member is None or member.left_out:
             return False
         return math.dist(place, (member.newest.x, member.newest.y)) < LEFT_M
 
     def forget_silent(self, now: float) -> str:
-        """Plan around silent robots no longer; return the name of one, or "".
+        """Stop planning around silent robots; return the name of one, or "".
 
-        They may be gone or not: only this robot's map may show it.
+        They may have left or not: at most this robot's map shows it.
         """
         silent = [
             name
@@ -206,7 +206,7 @@ class Members:
         return f"{event.robot}: cells must be swept again" if is_open_again else ""
 
     def division_numbers(self) -> dict[str, int]:
-        """Return the numbers of the divisions that they have told, by name."""
+        """Return the numbers of the divisions that they have sent, by name."""
         return {name: m.newest.division for name, m in self.known.items() if not m.left_out}
 
     def note_left(self, names: set[str], now: float) -> None:
@@ -215,10 +215,10 @@ class Members:
             self.known[name] = replace(self.known[name], left_at=now)
 
     def _make_room(self, robot: str, now: float) -> None:
-        """Make room for another robot: the longest silent one is removed, if it is gone.
+        """Make room for another robot: remove the robot silent for longest, if it has timed out.
 
-        Otherwise one robot too many would displace another in turn, and each time cause a new
-        division.
+        Without that condition, one robot beyond the limit would displace the others in turn, and
+        cause a new division each time.
         """
         if len(self.known) < MOST_ROBOTS:
             return

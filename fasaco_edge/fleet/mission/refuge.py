@@ -1,7 +1,7 @@
-"""Refuge: where a robot of a fleet goes that makes way for another, and how.
+"""Refuge: where a robot of a fleet goes to make way for another, and its way there.
 
-Two robots may stand all but in touch, in a doorway for instance: whoever makes way must not come
-nearer to the other at first, as the base's sensors, or the other's side, would stop it for good.
+Two robots may stand almost in contact, in a doorway for instance. The robot that makes way must not
+come nearer to the other at first: its sensors, or contact, would stop it for good.
 """
 
 from __future__ import annotations
@@ -42,9 +42,9 @@ def refuge(
 ) -> NDArray[np.int32] | None:
     """Return the way to the nearest cell off the discs and paths of other robots; None for none.
 
-    It leads through none of their discs: cells, int32 (n, 2). The first one is the robot's or one
-    beside it, such that straight there the robot comes no nearer to any, if there is such a way;
-    else its own.
+    It avoids all their discs: cells, int32 (n, 2). It starts at the robot's cell or at one beside
+    it that a straight drive reaches without coming nearer to any robot, if there is such a way;
+    else at the robot's cell.
 
     Args:
         area: the reachable area.
@@ -72,7 +72,7 @@ def refuge(
         theirs = spaced([(heard.x, heard.y), *heard.ahead])
         apart = np.hypot(*(points[:, None] - theirs[None]).transpose(2, 0, 1))
         is_free &= (apart >= clear_m).all(axis=1)
-        # From too near it may go where it is farther from that robot.
+        # A robot that is too near to another may only go where the distance grows.
         is_farther = apart[:, 0] > math.dist(place, (heard.x, heard.y)) + 1e-6
         is_passable &= (apart[:, 0] >= clear_m) | here | is_farther
     closed = np.zeros(area.reachable[rows, cols].shape, np.bool_)
@@ -86,7 +86,7 @@ def refuge(
         if sees(first, point) and not comes_nearer(first, point, beside)
     ]
     way = _nearest(steps, begins, at[is_free], corner)
-    # Where each leads nearer to another robot, it may still be let past.
+    # If each way leads nearer to another robot, that robot may still let it pass.
     return _nearest(steps, [(0.0, local)], at[is_free], corner) if way is None else way
 
 
@@ -96,13 +96,13 @@ def _nearest(
     ends: NDArray[np.int64],
     corner: NDArray[np.int64],
 ) -> NDArray[np.int32] | None:
-    """Return the shortest way from one of some cells to one of others, int32 (n, 2), or None.
+    """Return the shortest way from any of ``begins`` to any of ``ends``, int32 (n, 2), or None.
 
     Args:
         steps: step masks, uint8 (rows, cols).
         begins: cells in these, and how far the robot is from each [steps].
         ends: cells in these, int64 (k, 2).
-        corner: the cell of the first one, int64 (2,).
+        corner: the cell at the origin of ``steps``, int64 (2,).
     """
     best, way = float(FAR), None
     for far, begin in begins:

@@ -1,22 +1,22 @@
 """Remainder: how many cells are left for a fleet, and whether others sweep them all.
 
-A robot without a part stands while the others go on: it would be in their way.
+A robot without a part stands while the others make progress: it would be in their way.
 """
 
 from __future__ import annotations
 
-# Others go on as long as more cells have been swept within this time [s].
+# Others make progress if the number of swept cells has grown within this time [s].
 STUCK_S = 30.0
-# Nobody goes on if for so long all others have waited, perhaps for this robot [s].
+# They make none once all of them have waited for this long, perhaps for this robot [s].
 WAITING_S = 6.0
 
 
 class Remainder:
-    """Follows what is left for a fleet.
+    """Tracks the cells left for a fleet.
 
     Attributes:
-        others_go_on: whether all that is left is others' to sweep, who are at it. Once they have
-            swept nothing for STUCK_S, they count as stuck until this robot has a part again.
+        others_go_on: whether only parts of other robots are left, and these make progress. Once
+            they have swept nothing for STUCK_S, they count as stuck until this robot has a part.
         had_part: whether the last division gave this robot a part.
         divided: number of cells left at that time.
     """
@@ -24,8 +24,8 @@ class Remainder:
     def __init__(self) -> None:
         self.others_go_on = self.had_part = False
         self.divided = 0
-        # Most cells swept since this robot has no part, and when they became so many; None while it
-        # has one. How many are left tells less: what others find adds to them as they sweep.
+        # Largest number of swept cells since this robot has no part, and its time; None while it
+        # has a part. The number of cells left may grow as others sweep, by cells that they find.
         self._most: tuple[int, float] | None = None
         # Since when all others wait; None while one is at work.
         self._waiting_since: float | None = None
@@ -40,7 +40,7 @@ class Remainder:
     def note(self, cells: int, own: int, swept: int, now: float) -> None:
         """Take in the numbers of cells left, in all and in this robot's part, and of cells swept.
 
-        A part that other robots' maps show alone is a part: this robot has to come to see it.
+        Cells of its part that only other robots' maps show count, too: it has to go and see them.
         """
         if own > 0:
             self._most, self.others_go_on = None, False

@@ -3,12 +3,12 @@
 Each report carries an epoch number, changed whenever the sender forgets cells. Within an epoch the
 set only grows, so reports are merged by union: lost, repeated and late messages do no harm, and two
 halves of a split fleet agree once they hear each other again. When the epoch changes, the sender's
-earlier reports are dropped. The progress of a robot that is gone stays.
+earlier reports are dropped. The progress of an absent robot is kept.
 
-Cells that this robot has to sweep again, whoever swept them (a second pass, a reset, a map that
-moved), are disregarded until the robot that swept them has forgotten them itself. It tells which of
-its cells are from before its epoch. Where it does not know, or swept some anew in an epoch that was
-never heard of, they stay disregarded, and are swept once more than needed.
+Cells that this robot has to sweep again (a second pass, a reset, a map that moved) are disregarded
+until the robot that swept them has forgotten them itself. Each robot reports which of its cells are
+from before its epoch. If it does not know, or swept some again in an epoch of which no message
+arrived, they stay disregarded, and are swept once more than needed.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ class MapPlace:
 
     Attributes:
         origin: its origin's x, y [m], and the angle of its x axis [deg].
-        frame: the frame of the map that this is said of; "" for the first map that comes.
+        frame: the frame of the map with this origin; "" for the first map received.
     """
 
     origin: tuple[float, float, float]
@@ -74,9 +74,9 @@ class SharedProgress(OthersCells):
 
     def __init__(self, place: MapPlace | None = None) -> None:
         self._place = place
-        # The frame of the map that has this place; "" while none has come.
+        # The frame of the map that has this place; "" before the first map.
         self._map_frame = "" if place is None else place.frame
-        # The frame whose map has become that of another building; "" for none.
+        # The frame whose map now shows another building; "" for none.
         self._left = ""
         self.epoch = 0
         self.version = 0
@@ -100,26 +100,26 @@ class SharedProgress(OthersCells):
             self.version += 1
 
     def enter(self, frame: str) -> None:
-        """Note the active frame: unless one is given, the first has the place in the fleet's frame.
+        """Note the active frame: by default, the first has the place in the fleet's frame.
 
-        A robot on another floor has another map, and nobody has told where that one lies.
+        A robot on another floor has another map, whose place is not configured.
         """
         if self._place is not None and not self._map_frame:
             self._map_frame = frame
             self.version += 1
 
     def leave_building(self, frame: str) -> None:
-        """Note that the map in a frame shows another building: others do not mean this one."""
+        """Note that the map in a frame shows another building: cells of others lie elsewhere."""
         self._left = frame
         self.version += 1
 
     def begin_anew(self) -> None:
-        """Take the next map for one that the fleet shares."""
+        """Accept the next map as the one that the fleet shares."""
         self._left = ""
         self.version += 1
 
     def why_misplaced(self, frame: str) -> str:
-        """Return why nothing in a map frame has a place in the frame of the fleet; "" if it has."""
+        """Return why a map frame has no place in the frame of the fleet; "" if it has one."""
         if self._left and frame == self._left:
             return (
                 "the map shows another building than before: `mission reset` makes it the fleet's"
@@ -139,16 +139,15 @@ class SharedProgress(OthersCells):
         kept: Iterable[Placed] | None = None,
         lattice: Pose2D = SAME_LATTICE,
     ) -> bool:
-        """Take in a robot's report; tell whether cells need sweeping again because of it.
+        """Take in a robot's report; return whether cells need sweeping again because of it.
 
         Args:
             robot: its name.
             epoch: epoch of its cells.
             tiles: places, with TILE_BYTES of bits each.
             members: names of robots that must not be displaced.
-            kept: as the tiles, their cells swept before the epoch; None where that is not known.
-            lattice: pose of its lattice in this robot's [m]; where it is another one than before,
-                nothing that it has told before counts.
+            kept: as ``tiles``, their cells swept before the epoch; None if not known.
+            lattice: pose of its lattice in this robot's [m]; a change voids all its earlier cells.
 
         Raises:
             FleetError: there is no room for its data.
@@ -216,7 +215,7 @@ class SharedProgress(OthersCells):
         self.version += 1
 
     def disregard(self, inside: Inside) -> None:
-        """Disregard all sweeps so far of some cells.
+        """Disregard all earlier sweeps of some cells.
 
         Args:
             inside: mask function: rows and columns int64 (n,) to bool (n,).
@@ -258,7 +257,7 @@ class SharedProgress(OthersCells):
         return 0 if heard is None else heard.count
 
     def encode(self) -> bytes:
-        """Return everything as bytes, to be kept with the ledger; b"" for nothing."""
+        """Return everything as bytes, to be stored with the ledger; b"" for nothing."""
         if self._encoded[0] != self.version:
             robots = {name: heard.kept() for name, heard in self._robots.items()}
             note = _Note(_VERSION, self.epoch, robots, self._origin, self._map_frame, self._left)
@@ -268,7 +267,7 @@ class SharedProgress(OthersCells):
     def resume(self, kept: bytes) -> None:
         """Restore the bytes of ``encode``; those of another release are ignored.
 
-        So are cells that were placed while this robot's map had another place.
+        Cells from before a change of this robot's map place are ignored, too.
         """
         try:
             if not kept or msgspec.json.decode(kept, type=_Head).version != _VERSION:
@@ -289,7 +288,7 @@ class SharedProgress(OthersCells):
         return None if self._place is None else self._place.origin
 
     def _make_room(self, robot: str, members: Collection[str]) -> bool:
-        """Make room for another robot; tell whether cells need sweeping again because of it."""
+        """Make room for another robot; return whether cells need sweeping again because of it."""
         if len(self._robots) < MOST_ROBOTS:
             return False
         gone = sorted(self._robots.keys() - set(members))
@@ -320,10 +319,10 @@ class _Note(msgspec.Struct, frozen=True):
     version: int
     epoch: int
     robots: dict[str, Kept]
-    # Of this robot's map in the frame of the fleet, and which map that is.
+    # Place of this robot's map in the frame of the fleet, and the frame of that map.
     origin: tuple[float, float, float] | None = None
     map_frame: str = ""
-    # The frame whose map has become that of another building.
+    # The frame whose map now shows another building.
     left: str = ""
 
 
@@ -331,7 +330,7 @@ class Telling:
     """Selects the tiles of the next report: new ones first, then all others in turn.
 
     Args:
-        kept: the ledger's tiles when the epoch began; None where that is not known.
+        kept: the ledger's tiles when the epoch began; None if not known.
     """
 
     def __init__(self, kept: Mapping[Cell, NDArray[np.uint16]] | None = None) -> None:
@@ -352,7 +351,7 @@ class Telling:
         return tuple((place, tile_bits(tiles[place])) for place in chosen)
 
     def kept(self, told: Iterable[Placed]) -> tuple[Placed, ...] | None:
-        """Return which cells of tiles were swept before this epoch; None where not known."""
+        """Return which cells of tiles were swept before this epoch; None if not known."""
         kept = self._kept
         return None if kept is None else tuple((at, kept[at]) for at, _ in told if at in kept)
 

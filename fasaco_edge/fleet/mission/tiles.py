@@ -1,4 +1,4 @@
-"""Tiles of bits: cells of squares of the lattice, as the robots of a fleet tell of them.
+"""Tiles of bits: square parts of the lattice, as the robots of a fleet send them.
 
 A tile has TILE x TILE cells; that of place (row, col) begins at cell (TILE * row, TILE * col).
 """

@@ -1,9 +1,9 @@
 """Traffic rules of a fleet: which robot waits or makes way where two come near each other.
 
-Each robot tells its disc and the next metres of its path. Where two would come too near each other
-at about the same time, the one farther from that place waits; at about equal distance the one with
-the later name. A waiting robot that stands on the other's path makes way for it. So a narrow
-passage is given to one robot at a time.
+Each robot publishes its disc and the next metres of its path. If two robots would come too near
+each other at about the same time, the robot farther from that place waits; at about equal distance,
+the robot whose name sorts last. A waiting robot that stands on the other's path makes way for it.
+So one robot at a time passes a narrow passage.
 """
 
 from __future__ import annotations
@@ -18,25 +18,25 @@ from numpy.typing import NDArray
 
 from fasaco_edge.mission.core.events import MemberHeard
 
-# Length of the path told and checked, spacing of the points checked, and clearance [m].
+# Length of the path published and checked, spacing of the points checked, and clearance [m].
 AHEAD_M, SPACING_M, CLEARANCE_M = 2.0, 0.1, 0.1
 # Two robots conflict if they come too near each other within this time [s].
 SLACK_S = 3.0
-# Distance to a conflict from which on a robot waits; difference of two distances that counts [m].
+# Distance to a conflict at which a robot waits; least difference of two distances [m].
 WAIT_M, NEARER_M = 1.0, 0.5
 # A robot makes way for one whose path leads over it within this length [m].
 OVER_M = 1.5
-# A robot is an obstacle once it has stood for this long; one that is blocked or waits for this long
-# makes way, or plans around the other [s].
+# A robot is an obstacle once it has stood for this long; a robot that is blocked or waits for this
+# long makes way, or plans around the other [s].
 STANDS_S, PATIENCE_S = 5.0, 6.0
-# Robots this near tell each other more often [m]; robots silent for longer do not count [s].
+# Robots this near publish more often [m]; robots silent for longer are ignored [s].
 NEAR_M, OLD_S = 4.0, 5.0
 
 Points = NDArray[np.float64]
 
 
 class Neighbour(NamedTuple):
-    """Another robot, as it was heard last.
+    """Another robot, as of its last message.
 
     Attributes:
         heard: its message.
@@ -69,14 +69,14 @@ class Obstruction:
 
     @property
     def reason(self) -> str:
-        """The obstruction as text."""
+        """Text of the obstruction."""
         if self.is_blocked:
             return f"{self.robot} stands in the way"
         return f"makes way for {self.robot}" if self.is_on_path else f"waits for {self.robot}"
 
 
 def least_apart_m(radius_m: float, other: MemberHeard) -> float:
-    """Return the least distance of two robots' middles [m], for the radius of one [m]."""
+    """Return the least distance of two robots' centres [m], for the radius of one [m]."""
     return radius_m + other.radius_m + CLEARANCE_M
 
 
@@ -99,8 +99,8 @@ def obstruction(
 ) -> Obstruction | None:
     """Return what keeps a robot from going on; None for nothing.
 
-    A robot has stopped that waits, has no path, or has stood on it for STANDS_S. For each other
-    robot the first case that holds:
+    A robot has stopped if it waits, has no path, or has stood on its path for STANDS_S. For each
+    other robot the first case that holds:
 
     | the other robot | this robot | decision |
     |---|---|---|
@@ -134,17 +134,17 @@ NEARER_M farther than the other, or about as far and second by name | waits |
         holds_it = heard.waits_for == name
         is_over = _is_over(apart_m, clear_m)
         is_its_turn = is_held and holds_it and is_first and len(line) > 1
-        # The other cannot go on because of this robot, which waits or has no path.
+        # This robot, which waits or has no path, obstructs the other.
         is_in_its_way = is_over and (holds_it or not heard.waits_for)
         if is_in_its_way and (is_held or len(line) == 1) and not is_its_turn:
             return Obstruction(other, is_on_path=True)
         if heard.waits_for or len(theirs) == 1 or near.stands_s > STANDS_S:
-            # A path around it keeps clear of it at the middles of cells alone, and of its place
-            # when it was last seen to move.
+            # A path around it has clearance only at the centres of cells, and only from the place
+            # of its last motion.
             passes_m = clear_m - CLEARANCE_M if near.is_avoided else clear_m
             if not _comes_to(apart_m, passes_m):
                 continue
-            # One without a path would go if it could: for that nobody waits.
+            # A robot without a path would move if it could: no robot waits for that.
             if is_held and holds_it and not is_first and len(theirs) > 1:
                 return Obstruction(other, is_on_path=is_over)
             blocked = blocked or Obstruction(other, is_blocked=True)
@@ -168,7 +168,7 @@ class _Meeting(NamedTuple):
 
 
 def _is_over(apart_m: Points, clear_m: float) -> bool:
-    """Tell whether the first OVER_M of the other's path lead over this robot.
+    """Return whether the first OVER_M of the other's path lead over this robot.
 
     Args:
         apart_m: distances of the points of this robot's path to those of the other's, (n, m).
@@ -179,7 +179,7 @@ def _is_over(apart_m: Points, clear_m: float) -> bool:
 
 
 def _comes_to(apart_m: Points, clear_m: float) -> bool:
-    """Tell whether this robot soon comes too near to the place of the other one."""
+    """Return whether this robot soon comes too near to the place of the other one."""
     first = np.flatnonzero(apart_m[:, 0] < clear_m)
     comes = len(first) > 0 and first[0] * SPACING_M <= WAIT_M / 2
     return bool(comes and apart_m[:, 0].min() < apart_m[0, 0] - 1e-3)
@@ -194,7 +194,7 @@ def _meeting(
     there_s = np.arange(theirs) * SPACING_M * near.pace_s_m - near.age_s
     is_meeting = (apart_m < clear_m) & (np.abs(at_s[:, None] - there_s[None]) < slack_s)
     is_meeting &= there_s > -1.0
-    # Robots that part from each other are too near only now.
+    # Robots that move apart are too near only now.
     is_parting = is_meeting[0, 0] and apart_m.min() >= apart_m[0, 0] - 1e-3
     if is_parting or not is_meeting.any():
         return None

@@ -28,14 +28,14 @@ def ways(lattice: CoverageLattice, start: Cell) -> Steps:
 
 
 def times_of(steps: Steps, steps_s: NDArray[np.float32] | np.float32) -> Seconds:
-    """Return the times of ways [s], float32 (k, n); UNREACHED_S where unreachable, at any pace."""
+    """Return travel times [s], float32 (k, n); UNREACHED_S where unreachable, at any pace."""
     return np.where(steps < FAR, steps * steps_s, UNREACHED_S)
 
 
 def on_ground(lattice: CoverageLattice, row: int, col: int) -> Cell:
     """Return the coverable cell nearest to one, within SNAP cells; the cell itself for none.
 
-    Seeds that others tell may lie on cells that this robot's map shows otherwise.
+    Seeds that others send may lie on cells that this robot's map does not show as coverable.
     """
     if lattice.coverable[row, col]:
         return row, col
@@ -49,12 +49,12 @@ def on_ground(lattice: CoverageLattice, row: int, col: int) -> Cell:
 
 
 class Travel:
-    """Travel times to some cells of a lattice; a cell that was asked for is not searched again.
+    """Travel times to some cells of a lattice; each start is searched once.
 
     Attributes:
         lattice: the lattice.
         cells: int64 (n,), flat.
-        every: they are every second, third ... of the cells, 1 for all.
+        every: 1 for all of the cells, 2 for every second, and so on.
     """
 
     def __init__(self, lattice: CoverageLattice, cells: NDArray[np.int64], every: int) -> None:
@@ -67,7 +67,7 @@ class Travel:
         return times_of(found, steps_s.astype(np.float32)[:, None])
 
     def has_ways_from(self, start: Cell) -> bool:
-        """Tell whether any of the cells can be reached from a start."""
+        """Return whether any of the cells can be reached from a start."""
         return bool((self._ways_from(start) < FAR).any())
 
     def _ways_from(self, start: Cell) -> Steps:

@@ -1,6 +1,6 @@
-"""Cells that a fleet's robots tell of, in tiles of bits, and travel distances over them.
+"""Cells that a fleet's robots send, in tiles of bits, and travel distances over them.
 
-What a robot tells is bounded here: tiles beyond a number, or so far away that the rectangle around
+The data of a robot is bounded here: tiles beyond a number, or so far away that the rectangle around
 all of them would be huge, are left out and counted.
 """
 
@@ -45,7 +45,7 @@ class Seat:
 
     @classmethod
     def of(cls, member: FleetMember) -> Seat:
-        """Return the seat that a robot tells."""
+        """Return the seat that a robot sends."""
         return cls(member.cell_m, member.lattice_deg, *member.origin)
 
     @property
@@ -102,7 +102,7 @@ class TileSet:
 
         Args:
             told: the tiles.
-            grows: whether cells are only added; else the newest tile of a place counts.
+            grows: whether cells are only added; else a newer tile of a place replaces an older.
         """
         changed = []
         for tile in told:
@@ -154,7 +154,7 @@ def cells_of(tiles: Iterable[CellTile]) -> Cells:
 
 
 def together(parts: Iterable[Cells]) -> Cells:
-    """Return all different cells of parts; a part far away from those before it is left out."""
+    """Return all different cells of parts; a part far away from the earlier ones is left out."""
     joined = np.zeros((0, 2), np.int64)
     for part in parts:
         both = np.concatenate([joined, part])
@@ -164,7 +164,7 @@ def together(parts: Iterable[Cells]) -> Cells:
 
 
 def window_of(cells: Cells) -> Window | None:
-    """Return the window around cells; None if there are none, or it is huge."""
+    """Return the window around cells; None for no cells, or a huge window."""
     if not len(cells):
         return None
     (row0, col0), (row1, col1) = cells.min(axis=0).tolist(), cells.max(axis=0).tolist()

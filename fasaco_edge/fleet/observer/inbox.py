@@ -1,6 +1,6 @@
-"""The queues between Zenoh's threads and an observer of a fleet: one of its own for each robot.
+"""The queues between Zenoh's threads and an observer of a fleet: a set for each robot.
 
-A robot that floods fills its own queues only, and of its messages the newest count.
+A robot that floods fills its own queues only, and its newest messages are kept.
 """
 
 from __future__ import annotations
@@ -14,10 +14,10 @@ from fasaco_edge.bus.arrival import Arrival, Sample
 from fasaco_edge.fleet.mission.frames import MOST_HEARD
 from fasaco_edge.wire.topics import FLEET, POSE
 
-# Samples of a topic that wait, at most; of all others the newest one. A fleet's message is told
-# again within a second; of poses some are needed to see which cells a robot drove through.
+# Largest number of waiting samples of a topic; 1 for topics not named. A fleet's message is sent
+# again within a second; several poses show which cells a robot drove through.
 DEPTHS = {FLEET.name: 4, POSE.name: 256}
-# The least number of robots that share the space.
+# Least number of robots that the space is divided by.
 LEAST_SHARING = 4
 
 
@@ -91,7 +91,7 @@ class FleetInbox:
             return taken
 
     def traffic(self, robot: str) -> Traffic:
-        """Return what was counted of a robot since the last call."""
+        """Return a robot's counts since the last call."""
         with self._changed:
             queues = self._robots.get(robot)
             if queues is None:

@@ -1,4 +1,4 @@
-"""The robots of a fleet as an observer knows them, from what each of them tells."""
+"""The robots of a fleet as an observer knows them, from their messages."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from fasaco_edge.grid.geometry import Pose2D
 from fasaco_edge.wire.documents.fleet import CellTile, FleetMember
 from fasaco_edge.wire.limits import MAX_FLEET_PARTS
 
-# Robots of a fleet that are observed: as many as one may have. A robot silent for this long is
-# gone, and gives its place to another after that [ns].
+# Largest number of observed robots, that of a fleet. Silence after which a robot is gone, and after
+# which its place is free for another [ns].
 MOST_MEMBERS = MAX_FLEET_PARTS
 GONE_NS, REPLACED_NS = 5_000_000_000, 60_000_000_000
 # Messages beyond this rate are counted, not read [ns].
@@ -31,7 +31,7 @@ class Member:
         number: in order of joining, from 0.
         seat: of its cells.
         newest: its newest message.
-        heard_ns: time of that.
+        heard_ns: time of its newest message.
         swept, ground: cells it has swept, and can reach.
         changes: how often these cells have changed, or their seat.
         pose: its newest pose in its map frame.
@@ -48,7 +48,7 @@ class Member:
     pose: Pose2D | None = None
 
     def is_due(self, at_ns: int) -> bool:
-        """Tell whether a message that arrived then is read."""
+        """Return whether a message that arrived then is read."""
         return at_ns - self.heard_ns >= LEAST_SPACING_NS
 
     def hear(self, said: FleetMember, at_ns: int) -> str:
@@ -73,15 +73,15 @@ class Member:
         return moved
 
     def is_moved_by(self, said: FleetMember) -> bool:
-        """Tell whether a message places its cells anew."""
+        """Return whether a message places its cells anew."""
         return Seat.of(said) != self.seat or said.frame != self.newest.frame
 
     def is_gone(self, now_ns: int) -> bool:
-        """Tell whether it is silent."""
+        """Return whether it is silent."""
         return now_ns - self.heard_ns > GONE_NS
 
     def state(self, now_ns: int) -> str:
-        """Return the state of its mission, or that it waits for another, or is gone."""
+        """Return the state of its mission, or that it waits for another robot, or is gone."""
         if self.is_gone(now_ns):
             return GONE
         return WAITING if self.newest.waits_for else self.newest.state
@@ -94,7 +94,7 @@ class Member:
         """Note the tiles that have changed."""
 
     def _forget(self) -> None:
-        """Forget what was noted of its cells: they lie elsewhere."""
+        """Forget the notes of its cells: they lie elsewhere."""
 
 
 M = TypeVar("M", bound=Member)
@@ -111,10 +111,10 @@ class Members(Generic[M]):
         self._by_name: dict[str, M] = {}
 
     def hear(self, robot: str, said: FleetMember, at_ns: int) -> tuple[M, str]:
-        """Take in a message; return its robot, and what is new: JOINED, what moved, or "".
+        """Take in a message; return its robot, and the change: JOINED, what moved, or "".
 
         Raises:
-            FleetError: there are as many robots as are observed.
+            FleetError: the largest number of robots is reached.
         """
         member = self._by_name.get(robot)
         if member is None:
@@ -127,7 +127,7 @@ class Members(Generic[M]):
         return member, member.hear(said, at_ns)
 
     def _number(self, robot: str, at_ns: int) -> int:
-        """Return the number of a robot that joins: the next, or that of one long gone."""
+        """Return the number of a robot that joins: the next, or that of a robot long gone."""
         if len(self) < MOST_MEMBERS:
             return len(self)
         longest = min(self, key=lambda member: member.heard_ns)
@@ -147,10 +147,10 @@ class Members(Generic[M]):
         return len(self._by_name)
 
     def dividing(self, now_ns: int) -> M | None:
-        """Return a robot that tells the division in force; None if none tells one.
+        """Return a robot that sends the division in force; None if none sends one.
 
-        One left alone tells a new number without parts: all that is left is its own. What a robot
-        that is gone told last counts only where all are gone.
+        A single remaining robot sends a new number without parts: all cells left are its own. The
+        last message of an absent robot counts only if all robots are absent.
         """
         dividing = [member for member in self if member.newest.division]
         telling = [member for member in dividing if not member.is_gone(now_ns)] or dividing

@@ -1,7 +1,7 @@
 """Shares of the robots in a division, and the cells that several of them swept.
 
-A cell belongs to the robot whose seed has the shortest travel time to it, plus its handicap, as the
-robots themselves reckon; here over the cells that they tell to be within reach.
+A cell belongs to the robot whose seed has the shortest travel time to it, plus its handicap, as in
+the robots' own division; here over the cells that they report as reachable.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ NOBODY = -1
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Shares:
-    """Owners of the cells that are left.
+    """Owners of the remaining cells.
 
     Attributes:
         geometry: of the cells, in the fleet's frame.
@@ -75,11 +75,11 @@ def owners_of(
     """Return the number of the robot that a division gives each cell to; NOBODY for none.
 
     Args:
-        telling: a robot that tells the division.
+        telling: a robot that sends the division.
         members: the robots.
-        known: cells within reach, bool (rows, cols).
+        known: reachable cells, bool (rows, cols).
         window: of these cells, on the telling robot's lattice.
-        most_steps: how far cells are looked for, all robots together; None for any distance.
+        most_steps: largest number of steps searched, over all robots; None for no limit.
     """
     first = np.full(known.shape, np.float32(np.inf))
     owners = np.full(known.shape, NOBODY, np.int16)

@@ -1,6 +1,6 @@
-"""What an observer of a fleet subscribes to: some topics of each robot, and their maps in turn.
+"""Subscriptions of an observer of a fleet: some topics of each robot, and their maps in turn.
 
-Maps are asked for one at a time, so that a network carries no more than one.
+Maps are requested one at a time, so that a network carries no more than one.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.topic_types import Topic
 from fasaco_edge.wire.topics import FLEET, MAP
 
-# How long a robot is asked for its map before it is the next one's turn.
+# Time for a robot's map before the next robot's turn.
 MAP_TURN_NS = 2_000_000_000
 
 Post = Callable[[str, str, Sample], None]
@@ -27,24 +27,24 @@ class FleetSubscriptions:
     Args:
         bus: the session.
         keys: of any robot on it.
-        topics: heard of each robot that has joined.
+        topics: subscribed to for each robot that has joined.
         post: called with robot, topic and sample, on a thread of Zenoh's.
     """
 
     def __init__(self, bus: Bus, keys: Keys, topics: Sequence[Topic], post: Post) -> None:
         self._bus, self._keys, self._topics, self._post = bus, keys, topics, post
         self._subscriptions: dict[str, list[Subscription]] = {}
-        # Whose turn it is, and until when; its subscription until the map has come.
+        # The robot whose turn it is, the end of its turn, its subscription until the map arrives.
         self._turn, self._turn_until_ns = "", 0
         self._map: Subscription | None = None
 
     @property
     def robots(self) -> set[str]:
-        """Names of the robots that are heard."""
+        """Names of the robots subscribed to."""
         return set(self._subscriptions)
 
     def listen(self) -> None:
-        """Subscribe to what all robots tell their fleets."""
+        """Subscribe to the fleet messages of all robots."""
 
         def post(sample: Sample) -> None:
             self._post(self._keys.robot_of(sample.key), FLEET.name, sample)
@@ -52,11 +52,11 @@ class FleetSubscriptions:
         self._bus.subscribe(self._keys.of_all(FLEET), post)
 
     def hear(self, robot: str) -> None:
-        """Hear a robot that has joined."""
+        """Subscribe to a robot that has joined."""
         self._subscriptions[robot] = [self._listen(robot, topic) for topic in self._topics]
 
     def leave(self, robot: str) -> None:
-        """Hear a robot no more."""
+        """Unsubscribe from a robot."""
         for subscription in self._subscriptions.pop(robot, ()):
             self._bus.unsubscribe(subscription)
         self.end_map_turn(robot)
@@ -76,7 +76,7 @@ class FleetSubscriptions:
         self._map = self._listen(self._turn, MAP)
 
     def end_map_turn(self, robot: str) -> None:
-        """Hear no more maps of a robot until its next turn."""
+        """Unsubscribe from a robot's maps until its next turn."""
         if self._map is not None and self._turn == robot:
             self._bus.unsubscribe(self._map)
             self._map = None

@@ -27,14 +27,14 @@ def longest_bound(
     *,
     returns: bool,
 ) -> int:
-    """Return the bound, whatever the robots' cells are.
+    """Return the bound for any division of the cells among the robots.
 
     Args:
         lattice: the cells where robots fit.
         starts: where they start.
         reached: bool (rows, cols), the cells to cover: connected, with the starts in them.
         away: int64 (n,), from the nearest start to each cell [steps].
-        returns: whether each returns to its start.
+        returns: whether each robot returns to its start.
     """
     cells, robots = int(np.count_nonzero(reached)), len(starts)
     least = (2 if returns else 1) * int(away.max())

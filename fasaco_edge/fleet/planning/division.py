@@ -1,9 +1,9 @@
-"""Division of a known building among robots: the parts of a mission, evened by planned walks.
+"""Division of a known building among robots: the parts of a mission, balanced by planned walks.
 
 Each connected area is divided as a mission divides it (``fleet.mission.division``), and each part
-is planned for by itself. Then it is known what a cell costs in each part: by that the handicaps are
-balanced again, in turn for the same seeds and for those in the middles of the parts, as long as the
-longest walk gets shorter. The rest of the time goes into the search for the longest walk.
+is planned by itself. The plans give the cost of a cell in each part. With these costs the handicaps
+are balanced again, in turn for the same seeds and for seeds at the centres of the parts, as long as
+the longest walk gets shorter. The rest of the time goes into improving the longest walk.
 """
 
 from __future__ import annotations
@@ -29,12 +29,12 @@ from fasaco_edge.planners.planner import SearchProgress, StoppingCriterion
 from fasaco_edge.planners.problem import CoverageProblem
 from fasaco_edge.planners.search.near_optimal import NearOptimal
 
-# Proposals per cell of the search for each part while the parts are evened.
+# Proposals per cell of the search for each part while the parts are balanced.
 QUICK = 40
-# Of each further search for the longest walk: proposals times those of the one before, and per cell
-# at most.
+# Proposals of each further search for the longest walk: factor on those of the previous search, and
+# most per cell.
 MORE, MOST = 3, 40_000
-# What ``next`` returns after the last piece of work.
+# Result of ``next`` after the last piece of work.
 _ENDED = object()
 Owners = NDArray[np.int64]
 
@@ -44,9 +44,9 @@ class Fleet:
     """Robots that share a building.
 
     Attributes:
-        starts: start cell (row, col) of each.
+        starts: start cell (row, col) of each robot.
         cost: prices of steps and turns, the same for all.
-        returns: whether each returns to its start.
+        returns: whether each robot returns to its start.
         seed: seed of the search.
         threads: number of threads; the result is the same for any number.
     """
@@ -125,8 +125,8 @@ def _reached(lattice: CoverageLattice, start: Cell, number: int) -> NDArray[np.b
 def _run(areas: list[_Area], stop: StoppingCriterion) -> None:
     """Divide each area once, then improve them round by round until stopped.
 
-    Every other round is of the area with the longest walk, which decides when all are done; the
-    others are of all areas in turn, whose walks should be short, too.
+    Every other round improves the area with the longest walk, which sets the makespan; the other
+    rounds take all areas in turn, whose walks should be short, too.
     """
     pieces = {id(area): area.pieces() for area in areas}
     for area in areas:
@@ -212,7 +212,7 @@ class _Area:
         )
 
     def _even(self) -> Iterator[None]:
-        """Divide as a mission does, then in other ways as long as one shortens the longest walk."""
+        """Divide as a mission does, then in other ways while that shortens the longest walk."""
         fleet, cost = self._fleet, self._fleet.cost
         robots = [Robot(f"{n:04}", cell, cost.step_s) for n, cell in enumerate(fleet.starts)]
         turn_steps = cost.quarter_turn_s / cost.step_s
@@ -235,7 +235,7 @@ class _Area:
                     break
 
     def _others(self, best: _Seeds) -> Iterator[_Seeds]:
-        """Yield divisions that may even the best walks so far."""
+        """Yield divisions that may balance the best walks so far."""
         count = np.bincount(self._owner, minlength=len(self.robots))
         mean_s = self.costs_s.sum() / self._owner.size
         cells_s = np.where(count > 0, self.costs_s / np.maximum(count, 1), mean_s)
@@ -298,5 +298,5 @@ class _Area:
         return planner.plan(problem, is_over).cells
 
     def _is_stopped(self) -> bool:
-        """Ask the stopping criterion in the middle of a search: the time may be over."""
+        """Check the stopping criterion during a search: the time may be over."""
         return self._stop(_progress([self]))

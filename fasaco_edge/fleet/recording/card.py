@@ -1,4 +1,4 @@
-"""The card of a fleet's recording, shown beside the map: who does what, and the colours."""
+"""The card of a fleet's recording, shown beside the map: each robot's activity and colour."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ LEGEND = """\
 
 @dataclass(frozen=True, slots=True)
 class RobotRow:
-    """What a robot does.
+    """Activity of a robot.
 
     Attributes:
         name, number: of the robot.
         state: of its mission.
         swept_m2: area of the cells it has swept.
-        share_m2: of the cells left to it.
+        share_m2: area of the cells left to it.
         waits_for: name of the robot it waits for.
     """
 

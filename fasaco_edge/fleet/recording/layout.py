@@ -1,4 +1,4 @@
-"""The layout of a fleet's recording: one map of all robots, who does what, curves, states, log."""
+"""The layout of a fleet's recording: one map of all robots, activities, curves, states, log."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The robots of a fleet as its recorder knows them: what each tells, and what is noted of it."""
+"""The robots of a fleet as its recorder knows them: the messages and the notes of each."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from fasaco_edge.grid.geometry import Pose2D
 from fasaco_edge.wire.documents.fleet import CellTile
 from fasaco_edge.wire.documents.status import Status
 
-# Distance between two poses that is driven; cells and plans between two notes.
+# Longest distance between two poses that counts as driven; most cells and plans between two notes.
 MOST_STEP_M = 2.0
 MOST_PASSES, MOST_PLANS = 2_000, 200
 
 
 @dataclass(slots=True)
 class RecordedMember(Member):
-    """A robot of the fleet, and what has happened since its last note."""
+    """A robot of the fleet, and its data since the last note."""
 
     _cell: Place | None = None
     _passes: list[Pass] = field(default_factory=list)
@@ -34,7 +34,7 @@ class RecordedMember(Member):
         """Take in a pose in its map frame."""
         if self.pose is not None:
             step_m = math.dist((pose.x, pose.y), (self.pose.x, self.pose.y))
-            # A correction of its place is no driving.
+            # A correction of its pose does not count as driven.
             self._driven_m += step_m if step_m < MOST_STEP_M else 0.0
         self.pose = pose
         cell = self.seat.cell_at(pose.x, pose.y)
@@ -50,7 +50,7 @@ class RecordedMember(Member):
         self._plans = plans
 
     def note(self, at_ms: int, now_ns: int, traffic: tuple[int, int]) -> Note:
-        """Return what was heard since the last note."""
+        """Return what arrived since the last note."""
         said = self.newest
         pose = self.pose or Pose2D(said.x, said.y)
         is_gone = self.is_gone(now_ns)
@@ -76,7 +76,7 @@ class RecordedMember(Member):
         return note
 
     def in_force(self, at_ms: int) -> Note:
-        """Return all cells told so far."""
+        """Return all cells received up to now."""
         said = self.newest
         return Note(
             self.number, at_ms, said.state, said.x, said.y, said.waits_for, said.division,

@@ -1,8 +1,8 @@
-"""The log of a fleet: what each robot told, second by second, beside the drawings.
+"""The log of a fleet: the messages of each robot, second by second, beside the drawings.
 
 A review reads it. Notes are gathered for some seconds and written as one blob: deflated MessagePack
-with a version in it. The first one of each part also holds all cells told so far, so that the part
-can be read without those before it.
+with a version in it. The first blob of each part also holds all cells received before, so that the
+part can be read without the earlier ones.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ Count = Annotated[int, Meta(ge=0, le=2**62)]
 
 
 class Pass(msgspec.Struct, frozen=True, array_like=True):
-    """A cell that a robot came into, and when, since the recording began [ms]."""
+    """A cell that a robot entered, and the time since the recording began [ms]."""
 
     at_ms: int
     row: int
@@ -41,7 +41,7 @@ class Pass(msgspec.Struct, frozen=True, array_like=True):
 
 
 class Note(msgspec.Struct, array_like=True):
-    """What was heard of a robot since its last note.
+    """Data of a robot since its last note.
 
     Attributes:
         robot: its number in ``NoteBatch.robots``.
@@ -52,11 +52,11 @@ class Note(msgspec.Struct, array_like=True):
         division: number of its division.
         open_cells: cells known to it that are still to sweep.
         messages, bytes: of the fleet, since the last note.
-        driven_m: what it drove since [m].
-        plans_ms: time of each plan heard of since [ms].
-        passes: cells it came into since.
-        swept, ground: tiles that have changed since, whole; of all time in a note of all in force.
-        in_force: whether this repeats what earlier parts have.
+        driven_m: distance driven since [m].
+        plans_ms: time of each plan reported since [ms].
+        passes: cells it entered since.
+        swept, ground: whole tiles that have changed since; all tiles if ``in_force``.
+        in_force: whether this note repeats the content of earlier parts.
     """
 
     robot: Count

@@ -1,9 +1,9 @@
 """The recorder of a whole fleet, a process that records all its robots into one file.
 
-Robots are recorded from the first message that they send to the fleet, also those that come later.
-Of each the newest status, path and pose are heard; maps are asked for in turn, one at a time, so
-that a network carries no more than one. What a robot sends harms no other: each has its own queues,
-its own decoders, and its own share of what is drawn.
+Each robot is recorded from its first message to the fleet, even if it joins late. The recorder
+subscribes to the newest status, path and pose of each robot, and requests maps in turn, one at a
+time, so that a network carries no more than one. A robot's messages cannot harm another's record:
+each has its own queues, its own decoders, and its own share of the drawings.
 """
 
 from __future__ import annotations
@@ -39,12 +39,12 @@ from fasaco_edge.wire.messages.poses import PoseDecoder
 from fasaco_edge.wire.topics import FLEET, MAP, PATH, POSE, STATUS
 
 NOTE_NS, WRITE_NS = 1_000_000_000, 5_000_000_000
-# Robots heard within so long of the first are recorded in the order of their names; of so many
-# messages at most.
+# Robots that send within this time of the first robot are recorded in the order of their names;
+# largest number of messages that wait for it.
 GATHER_NS, MOST_GATHERED = 2_000_000_000, 1_000
-# A robot's rate of messages is plotted over this time.
+# Time over which a robot's rate of messages is averaged for the plot.
 RATE_NOTES = 5
-# Robots and topics whose faults are counted apart, beside those of the robots recorded.
+# Number of robots and topics whose faults are counted apart, besides those of recorded robots.
 MOST_FAULTS = 256
 TOO_LARGE = "what is larger than its share of the memory is left out, its map, say"
 TOO_WIDE = "cells farther apart than are recorded, or more, are left out"
@@ -94,11 +94,11 @@ class FleetRecorder:
         self._faults: Counter[tuple[str, str]] = Counter()
 
     def listen(self) -> None:
-        """Subscribe to what all robots tell their fleets."""
+        """Subscribe to the fleet messages of all robots."""
         self._subscriptions.listen()
 
     def step(self, timeout_s: float) -> None:
-        """Write and draw what arrives within ``timeout_s`` [s], and what is due."""
+        """Write and draw what arrives within ``timeout_s`` [s], and all drawings that are due."""
         for heard in self._gathered(self._inbox.take(timeout_s)):
             self._writer.message(heard.arrival.wall_ns)
             self._attempt(heard)
@@ -116,7 +116,7 @@ class FleetRecorder:
         self._writer.sync(time.monotonic_ns())
 
     def end(self) -> bool:
-        """Write what waits, and the footer; False if the disk fails."""
+        """Write waiting data and the footer; False if the disk fails."""
         self._gathers = False
         for heard in self._gathered(self._inbox.take(0.0)):
             self._attempt(heard)
@@ -128,9 +128,9 @@ class FleetRecorder:
         return self._writer.close()
 
     def _gathered(self, arrived: list[Heard]) -> list[Heard]:
-        """Return what to take in now: of the robots heard at first all at once, by name.
+        """Return the samples to process now; those of the first robots together, sorted by name.
 
-        In the order of names they have the same colours in all recordings and pictures.
+        Sorted by name, robots have the same colours in all recordings and pictures.
         """
         if self._gathers:
             strange = {
@@ -158,26 +158,26 @@ class FleetRecorder:
         self._scene.add_line(line, "WARN")
 
     def _attempt(self, heard: Heard) -> None:
-        """Take in a sample; what cannot be used is logged with its robot's name."""
+        """Take in a sample; an unusable sample is logged with its robot's name."""
         try:
             self._take(heard.robot, heard.arrival)
         except FasacoError as error:
             what = heard.robot, heard.arrival.topic
             if self._members.get(heard.robot) is None:
-                # Any number of names would each keep a queue from others.
+                # A queue for each of any number of names would leave no room for real robots.
                 self._inbox.forget(heard.robot)
                 if what not in self._faults and len(self._faults) >= MOST_FAULTS:
                     what = "other robots", heard.arrival.topic
             self._faults[what] += 1
             count = self._faults[what]
-            # A robot may send nothing else.
+            # A robot may send no other message.
             if is_reported(count):
                 self._scene.add_line(
                     one_line(f"{': '.join(what)}: {count} refused: {error}"), "WARN"
                 )
 
     def _warn_once(self, robot: str, fault: str) -> None:
-        """Log what a robot's recording lacks, once."""
+        """Log once that a robot's recording is incomplete."""
         if (robot, fault) not in self._faults:
             self._scene.add_line(one_line(f"{robot}: {fault}"), "WARN")
         self._faults[robot, fault] += 1
@@ -214,7 +214,7 @@ class FleetRecorder:
             return
         known, before = {member.name for member in self._members}, self._members.get(robot)
         if before is None or before.is_moved_by(said):
-            # Notes are of the robots and frames that their batch names.
+            # A batch has one list of robots and frames for all its notes.
             self._write()
         member, news = self._members.hear(robot, said, arrival.wall_ns)
         if news == JOINED:
@@ -225,7 +225,7 @@ class FleetRecorder:
             self._scene.add_line(one_line(f"{robot}: {news}"), "WARN")
 
     def _join(self, member: RecordedMember) -> None:
-        """Hear a robot from now on."""
+        """Record a robot from now on."""
         self._poses[member.name] = PoseDecoder(self._schema)
         self._subscriptions.hear(member.name)
         self._scene.add_line(f"{member.name}: joined, cells of {member.seat.cell_m:g} m")
@@ -241,7 +241,7 @@ class FleetRecorder:
             del self._faults[fault]
 
     def _note(self, now_ns: int) -> None:
-        """Note what was heard since the last note, and show it."""
+        """Note and show what arrived since the last note."""
         passed_s = max(1e-9 * (now_ns - self._noted_ns), 1e-3)
         self._noted_ns = now_ns
         for member in self._members:
@@ -271,7 +271,7 @@ class FleetRecorder:
             self._scene.describe(self._title)
 
     def _write(self) -> None:
-        """Write the notes gathered; in a new part all that is in force with them."""
+        """Write the gathered notes; in a new part also the notes in force."""
         if self._part != self._writer.part_number:
             self._part = self._writer.part_number
             at_ms = self._notes[0].at_ms if self._notes else self._ms(self._writer.wall_ns)
@@ -282,7 +282,7 @@ class FleetRecorder:
         batch = NoteBatch(NOTES_VERSION, self._began_ns, self._fleet, robots, self._notes)
         self._notes = []
         if not self._writer.write_blob(encode_notes(batch), entities.FLEET_NOTES):
-            # All of it is in the next part, but for what only happens once.
+            # The next part repeats everything except events that happen once.
             self._part = 0
 
     def _ms(self, wall_ns: int) -> int:

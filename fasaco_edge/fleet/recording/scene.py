@@ -1,7 +1,7 @@
-"""The scene of a fleet: what its robots tell, as entities, all in the fleet's frame.
+"""The scene of a fleet: the data of its robots as entities, all in the fleet's frame.
 
 Each robot has a colour, and a tree of entities of its own. All of them together are drawn no faster
-than the scene of one robot: a layer's rate is shared out among the robots.
+than the scene of one robot: the robots share the rate of each layer.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from fasaco_edge.recording.scene.layers import Anchor, Layers, is_far_from, size
 from fasaco_edge.recording.sdk import rr
 from fasaco_edge.recording.write.writer import RecordingWriter
 
-# In the file, of all robots together [bytes/s]; each drawing begins a chunk of about so many bytes.
+# Largest rate of drawings in the file, over all robots [bytes/s]; overhead of a drawing [bytes].
 RATES = {
     "map": 3_000, "swept": 3_000, "path": 2_500, "trail": 2_000, "pose": 2_000, "metrics": 2_000,
 }  # fmt: skip
@@ -57,7 +57,7 @@ STATES = {
 
 @dataclass(slots=True)
 class _Drawn:
-    """What was drawn of a robot."""
+    """Drawings of a robot."""
 
     state: str = ""
     known: Bounds | None = None
@@ -108,7 +108,7 @@ class FleetScene:
         self._show()
 
     def leave(self, robot: str) -> None:
-        """Draw a robot no more: another has its number."""
+        """Stop drawing a robot: another robot has its number."""
         self._drawn.pop(robot, None)
 
     def add_pose(self, member: RecordedMember, pose: Pose2D) -> None:
@@ -127,7 +127,7 @@ class FleetScene:
             return
         drawn.trail.append((x, y))
         if len(drawn.trail) > MOST_TRAIL:
-            # Nothing could be drawn for long: every other point has to do.
+            # After a long time without a drawing, every other point is dropped.
             drawn.trail = drawn.trail[::2]
 
         def draw_trail() -> None:
@@ -139,7 +139,7 @@ class FleetScene:
         self._draw(member, "trail", 24 * len(drawn.trail), draw_trail)
 
     def add_path(self, member: RecordedMember, xy: NDArray[np.float64]) -> None:
-        """Draw the path that a robot has before it."""
+        """Draw the path ahead of a robot."""
         points = np.array([self._here(member, x, y) for x, y in draw.corners(xy).tolist()])
         points = points.reshape(-1, 2)
 
@@ -150,7 +150,7 @@ class FleetScene:
         self._draw(member, "path", 12 * len(points), draw_path)
 
     def add_map(self, member: RecordedMember, grid: OccupancyGrid) -> None:
-        """Draw a robot's map; what it does not know is clear, so that the others' maps show."""
+        """Draw a robot's map; unknown pixels are transparent, so that the others' maps show."""
         grid = coarser(grid, MOST_PIXELS // max(len(self._drawn), LEAST_SHARING))
         x, y = self._here(member, grid.geometry.origin.x, grid.geometry.origin.y)
         yaw = grid.geometry.origin.yaw + member.seat.frame.yaw
@@ -177,15 +177,15 @@ class FleetScene:
         )
 
     def add_division(self) -> None:
-        """Draw who is to sweep what is left, and what two robots swept."""
+        """Draw the shares of the remaining cells, and the cells that two robots swept."""
         layers, now_ns = self._layers, self._writer.wall_ns
-        # Also a measure of the time that it takes.
+        # Its size also limits the time of this.
         size = CHUNK_BYTES + sum(member.ground.count for member in self._members) // 8
         layers.draw(entities.FLEET_SHARES, size, self._draw_shares, now_ns)
         layers.draw(entities.FLEET_TWICE, size, self._draw_twice, now_ns)
 
     def add_figures(self, member: RecordedMember, figures: dict[str, float]) -> None:
-        """Plot figures of a robot, of METRICS, where they have changed."""
+        """Plot changed figures of a robot, of METRICS."""
         drawn = self._drawn[member.name]
         drawn.figures |= figures
 
@@ -216,7 +216,7 @@ class FleetScene:
         self._layers.catch_up(self._writer.wall_ns)
 
     def describe(self, title: str) -> None:
-        """Show the card: who does what."""
+        """Show the card: each robot's activity."""
         cell_m2 = {member.name: member.seat.cell_m**2 for member in self._members}
         rows = [
             RobotRow(
@@ -257,7 +257,7 @@ class FleetScene:
         self._layers.draw(name, CHUNK_BYTES + size, make, self._writer.wall_ns)
 
     def _limit(self) -> None:
-        """Share each layer's rate out among the robots."""
+        """Divide each layer's rate among the robots."""
         each = {
             f"{layer}/{name}": rate / max(len(self._drawn), 1)
             for layer, rate in RATES.items()

@@ -1,4 +1,4 @@
-"""Pictures of a fleet: its plan, and what its robots drove and swept."""
+"""Pictures of a fleet: its plan, and the tracks and swept floor of its robots."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from fasaco_edge.drawing.sheet import KeyEntry, Sheet
 from fasaco_edge.grid.lattice import CoverageLattice
 from fasaco_edge.grid.occupancy import OccupancyGrid
 
-# How much of its colour a robot's cells have; those that two robots pass have none.
+# Opacity of the colour of a robot's cells; cells that two robots pass have none.
 TINT = 0.35
 
 
@@ -65,7 +65,7 @@ def draw_fleet_mission(
     title: str,
     lines: Sequence[str],
 ) -> Image.Image:
-    """Return a picture, RGB, of what several robots drove and swept.
+    """Return a picture, RGB, of the tracks and the swept floor of several robots.
 
     Args:
         grid: the map at the end.

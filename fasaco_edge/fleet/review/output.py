@@ -1,4 +1,4 @@
-"""The picture of a fleet's review: who swept what, what was swept again, and the tracks."""
+"""The picture of a fleet's review: floor swept by each robot, floor swept again, and tracks."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from fasaco_edge.grid.geometry import Window
 from fasaco_edge.review.wording import clock
 
 TRACK_PX = 1.6
-# From this share on a cell counts as swept again.
+# Share from which a cell counts as swept again.
 MOSTLY = 0.5
 
 

@@ -1,8 +1,8 @@
 """The review of a fleet's recording: makespan, balance, floor swept again, waiting, messages.
 
-A cell that two robots passed over is swept again, or only driven through: while a robot is on floor
-that others have swept, it takes a number of steps from where it comes onto it to where it leaves.
-The shortest way between the two is driving through; what it takes beyond that is sweeping again.
+A cell that two robots passed is swept again, or only driven through. While a robot is on floor that
+others have swept, its steps from entry to exit are counted. The shortest way between the two counts
+as driving through; all further steps count as sweeping again.
 """
 
 from __future__ import annotations
@@ -34,13 +34,13 @@ from fasaco_edge.grid.geometry import Window
 AT_WORK = ("planning", "covering", "degraded")
 # Messages are counted over this time for their highest rate [s].
 PEAK_S = 5.0
-# Notes come once a second: more than that apart nothing was heard in between [s].
+# Notes come once a second: a longer interval means that no message arrived [s].
 LONGEST_NOTE_S = 3.0
 NEVER_MS = math.inf
 
 
 class FleetRobotFigures(msgspec.Struct, frozen=True):
-    """What one robot of a fleet did.
+    """Figures of one robot of a fleet.
 
     Attributes:
         name: of the robot.
@@ -54,7 +54,7 @@ class FleetRobotFigures(msgspec.Struct, frozen=True):
         again_m2: of these, swept by another before, and swept again [m2].
         messages_s, kb_s: messages to the fleet, and their size, a second.
         peak_kb_s: the most over five seconds.
-        plans: how many were heard of.
+        plans: number of plans reported.
         plan_ms_p50, plan_ms_p99: time of a plan [ms]; null without one.
     """
 
@@ -77,7 +77,7 @@ class FleetRobotFigures(msgspec.Struct, frozen=True):
 
 
 class FleetFigures(msgspec.Struct, frozen=True):
-    """What a fleet did.
+    """Figures of a fleet.
 
     Attributes:
         fleet: its name.
@@ -87,7 +87,7 @@ class FleetFigures(msgspec.Struct, frozen=True):
         swept_balance: the same of the swept area.
         swept_m2: cells that any robot swept [m2].
         through_m2, again_m2: of these, driven through and swept again by another robot [m2].
-        again_share: the latter as a share of what is swept.
+        again_share: ``again_m2`` as a share of ``swept_m2``.
         waited_s: by all robots [s].
         divisions: number of the last one.
         robots: each.
@@ -109,15 +109,15 @@ class FleetFigures(msgspec.Struct, frozen=True):
 
 @dataclass(slots=True, eq=False)
 class RobotTrack:
-    """What was noted of a robot, its cells on the lattice of the first robot.
+    """Notes of a robot, its cells on the lattice of the first robot.
 
     Attributes:
         name, number: of the robot, the latter in order of joining: its colour.
         notes: in order of time.
-        swept_ms: the cells it swept, and when that was first told [ms].
-        passes: the cells it came into, in order, int64 (n, 3): when [ms], row, col.
-        again: those of ``swept_ms`` that another had swept before: for each the share of the
-            passes around it that was sweeping again.
+        swept_ms: the cells it swept, and the time of the first report [ms].
+        passes: the cells it entered, in order, int64 (n, 3): time [ms], row, col.
+        again: the cells of ``swept_ms`` that another robot had swept before: for each the share of
+            the passes around it that counts as sweeping again.
     """
 
     name: str
@@ -228,7 +228,7 @@ def _find_again_of(
 
 
 def _share_again(way: Sequence[Place], known: NDArray[np.bool_], window: Window) -> float:
-    """Return which share of a way is beyond the shortest one between its ends."""
+    """Return the share of a way in excess of the shortest one between its ends."""
     taken = sum(abs(a[0] - b[0]) + abs(a[1] - b[1]) for a, b in pairwise(way))
     start, end = ((row - window.row0, col - window.col0) for row, col in (way[0], way[-1]))
     away = distances(known, start)

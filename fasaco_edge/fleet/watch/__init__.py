@@ -1,1 +1,1 @@
-"""Table of a fleet in a terminal: what each robot does, as it goes."""
+"""Live table of a fleet in a terminal: the activity of each robot."""

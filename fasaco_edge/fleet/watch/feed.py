@@ -15,7 +15,7 @@ from fasaco_edge.fleet.observer.subscriptions import FleetSubscriptions
 from fasaco_edge.wire.keys import VERSION, Keys
 from fasaco_edge.wire.topics import STATUS
 
-# Of all samples that wait [bytes]; of each robot no more than a quarter.
+# Largest size of all waiting samples; a quarter of it for each robot [bytes].
 CAPACITY_BYTES = 128_000_000
 # Names of robots that are kept.
 MOST_ROBOTS = 256
@@ -24,8 +24,8 @@ MOST_ROBOTS = 256
 class FleetFeed(Joining):
     """The samples of the robots of a fleet; a context manager.
 
-    Which robots these are is decided by the reader: it hears the messages to fleets of all robots,
-    and says by ``attend`` of whom it wants statuses.
+    The reader decides which robots these are: it gets the fleet messages of all robots, and selects
+    by ``attend`` the robots whose statuses it wants.
     """
 
     def __init__(self, settings: BusSettings, keys: Keys) -> None:
@@ -34,7 +34,7 @@ class FleetFeed(Joining):
         self._inbox = FleetInbox(CAPACITY_BYTES, _stamped)
         self._subscriptions: FleetSubscriptions | None = None
         self._here: set[str] = set()
-        # Not that of the session: tokens may come while it listens.
+        # A lock of its own, not the session's: tokens may arrive during ``listen``.
         self._naming = threading.Lock()
 
     def take(self, timeout_s: float) -> list[Heard]:
@@ -42,7 +42,7 @@ class FleetFeed(Joining):
         return self._inbox.take(timeout_s)
 
     def attend(self, robots: Collection[str]) -> None:
-        """Hear the robots of these names, and no others; call it often."""
+        """Subscribe to the robots of these names, and no others; call it often."""
         subscriptions = self._subscriptions
         if subscriptions is None:
             return
@@ -53,11 +53,11 @@ class FleetFeed(Joining):
             subscriptions.hear(robot)
 
     def forget(self, robot: str) -> None:
-        """Drop the queues of a robot of no concern."""
+        """Drop the queues of a robot of another fleet."""
         self._inbox.forget(robot)
 
     def traffic(self, robot: str) -> Traffic:
-        """Return what a robot has told its fleet since the last call."""
+        """Return the traffic of a robot to its fleet since the last call."""
         return self._inbox.traffic(robot)
 
     def robots(self) -> set[str]:

@@ -1,7 +1,7 @@
-"""The floor of a fleet: the cells of all its robots, swept and left, and whose part these are.
+"""The floor of a fleet: the cells of all its robots, swept and left, and the owner of each.
 
-Robots tell of up to two million cells each, on lattices of their own. What is made of them is
-bounded, and made again no more often than a tenth of the time allows.
+Each robot sends up to two million cells, on a lattice of its own. The floor made of them is
+bounded, and its updates take at most a tenth of the time.
 """
 
 from __future__ import annotations
@@ -18,12 +18,12 @@ from fasaco_edge.fleet.observer.shares import NOBODY, owners_of
 from fasaco_edge.grid.geometry import Window
 from fasaco_edge.wire.documents.fleet import TILE
 
-# How far cells are looked for from the places of a division's robots, all together: of a maze as
-# large as can be told some stay nobody's.
+# Largest number of steps searched from the seeds of a division, over all robots: in the largest
+# mazes that messages can hold, some cells get no owner.
 MOST_STEPS = 60_000
-# Of the rectangle around all cells, as of one robot's.
+# Largest edge of the rectangle around all cells, the same as for one robot.
 MOST_CELLS = (MOST_SPAN * TILE) ** 2
-# Between two surveys, at least [s]; and so many times as long as one takes.
+# Least time between two surveys [s]; and as a multiple of the time that one takes.
 LEAST_AGE_S, LEAST_REST = 1.0, 10.0
 
 
@@ -32,7 +32,7 @@ class FleetFloor:
     """The cells of a fleet's robots at a time.
 
     Attributes:
-        robots: names of the robots that it was made of.
+        robots: names of the robots included.
         left: number of cells left to each robot, by name.
         area: number of cells that any robot can reach or has swept.
         swept: number of cells that any has swept.
@@ -58,7 +58,7 @@ class FleetFloor:
 
 
 class FloorSurvey:
-    """Makes the floor of a fleet again where it has changed.
+    """Updates the floor of a fleet after changes.
 
     Attributes:
         floor: the newest.
@@ -83,7 +83,7 @@ class FloorSurvey:
 
 
 def floor_of(members: Members[Member], telling: Member | None) -> FleetFloor:
-    """Return the floor of robots, of which one tells the division in force."""
+    """Return the floor of robots, of which ``telling`` sends the division in force."""
     seats = [member.seat for member in members]
     if not seats:
         return FleetFloor()
@@ -119,7 +119,7 @@ def floor_of(members: Members[Member], telling: Member | None) -> FleetFloor:
 
 
 def _window(seat: Seat, members: Members[Member]) -> Window | None:
-    """Return the window of all cells on a lattice; a robot far from those before is left out."""
+    """Return the window of all cells on a lattice; a robot far from earlier ones is left out."""
     joined = None
     for member in members:
         for tiles in (member.ground, member.swept):

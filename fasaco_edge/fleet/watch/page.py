@@ -56,7 +56,7 @@ class FleetPage:
 
 
 def headline(view: FleetView, robots: Sequence[FleetRobot], now: float) -> Text:
-    """Return the line that sums up what the fleet does."""
+    """Return a line that sums up the fleet's activity."""
     line = Text().append(f" {short(view.fleet)} ", "bold reverse").append("  ")
     present = [robot for robot in robots if robot.silent_s is None]
     if view.trouble:

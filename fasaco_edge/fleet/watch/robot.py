@@ -1,4 +1,4 @@
-"""A robot of a fleet as it is shown: what it does, where it is, and its share of the floor."""
+"""A robot of a fleet as it is shown: its activity, its place, and its share of the floor."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from fasaco_edge.text import one_line
 
 # States of a robot that does something for its mission.
 AT_WORK = ("planning", "covering", "returning", "degraded")
-# Longest text of a robot's that is shown in a line with others [characters].
+# Longest text of a robot that shares a line with other texts [characters].
 LONGEST = 40
 
 
@@ -22,15 +22,15 @@ class FleetRobot:
         name: of the robot.
         state: of its mission, in its last message; one line.
         waits_for: name of the robot it waits for; "" for none.
-        silent_s: time since its last message, where that is so long that it is gone; else None.
-        away: why others give it no part of what is left; "" where they do.
+        silent_s: time since its last message if it counts as gone; else None.
+        away: why others give it no part of the remaining cells; "" if they do.
         x, y: its position in the fleet's frame, in its last message [m].
         swept_cells, swept_m2: cells it has swept, and their area.
         left_cells, left_m2: cells left to it by the division in force, and their area; None without
             a division.
         division: number of its division.
-        revision: number of its path; None where it is not known.
-        kb_s: what it tells its fleet [kB/s].
+        revision: number of its path; None if not known.
+        kb_s: rate of its messages to the fleet [kB/s].
     """
 
     name: str
@@ -55,7 +55,7 @@ class FleetRobot:
 
     @property
     def doing(self) -> str:
-        """What it does, in a few words."""
+        """Its activity in a few words."""
         if self.silent_s is not None:
             return "gone"
         return f"waits for {self.waits_for}" if self.waits_for else self.state or "no state"
@@ -94,6 +94,6 @@ def document_of(
 
 
 def short(text: str) -> str:
-    """Return a text of a robot's as one short line."""
+    """Return a robot's text as one short line."""
     line = one_line(text)
     return line if len(line) <= LONGEST else f"{line[: LONGEST - 3]}..."

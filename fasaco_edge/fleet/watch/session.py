@@ -11,15 +11,15 @@ from fasaco_edge.fleet.watch.page import FleetPage
 from fasaco_edge.fleet.watch.view import FleetView
 from fasaco_edge.text import one_line
 
-# Time to wait for the rest once a robot is heard [s]. Each tells its fleet where it is and what it
-# has swept once a second.
+# Time to wait for the other robots after the first message [s]. Each robot sends its place and its
+# swept cells once a second.
 REST_S, TOLD_S = 4.0, 1.3
-# Rates are counted, and JSON is printed, so often [s].
+# Period of counting rates and of printing JSON [s].
 EVERY_S = 1.0
 
 
 class FleetWatch:
-    """What is watched of a fleet, see ``live.Watched``."""
+    """The watch of a fleet, see ``live.Watched``."""
 
     rest_s = REST_S
 
@@ -48,7 +48,7 @@ class FleetWatch:
         for heard in items:
             view.take(heard)
             if view.members.get(heard.robot) is None:
-                # Any number of names would each keep a queue from others.
+                # A queue for each of any number of names would leave no room for real robots.
                 feed.forget(heard.robot)
         now = phrases.steady_now()
         if not was_known:
@@ -75,7 +75,7 @@ class FleetWatch:
         return self._view.document(phrases.steady_now())
 
     def line(self, now: float) -> str:
-        """Return in a line what the robots do."""
+        """Return the robots' activities in a line."""
         view, robots = self._view, self._view.robots(now)
         if view.trouble:
             return f"waiting for the bus at {one_line(view.trouble)}"
@@ -90,15 +90,15 @@ class FleetWatch:
         return self._page.lines(self._view, now, width, height)
 
     def press(self, keys: str) -> bool:
-        """Do what typed keys say: nothing here."""
+        """Handle typed keys: none has an effect here."""
         return False
 
     def is_known(self) -> bool:
-        """Tell whether a robot has been heard."""
+        """Return whether a message of a robot has arrived."""
         return len(self._view.members) > 0
 
     def is_whole(self) -> bool:
-        """Tell whether all robots have had the time to tell of themselves."""
+        """Return whether all robots have had time for a message."""
         view = self._view
         is_told = phrases.steady_now() - self._known_at > TOLD_S
         return is_told and view.floor.robots >= set(view.names())

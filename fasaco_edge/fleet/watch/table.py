@@ -1,4 +1,4 @@
-"""The table of a fleet: who does what, a row a robot, and what all have done together."""
+"""The table of a fleet: one row per robot with its activity, and the total of all robots."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ from fasaco_edge.watch.blocks import FAINT
 from fasaco_edge.watch.glyphs import GlyphSet
 from fasaco_edge.watch.status_table import LONGEST_BAR, state_colour
 
-# Names have a third of the width, or so much; the width from which units and rates are shown, and
-# the most of it [characters].
+# Largest width of names, beside a third of the table; table width from which units and rates are
+# shown, and largest table width [characters].
 LEAST_NAME, UNITS, RATES, WIDEST = 12, 40, 47, 80
 GONE_COLOUR, WAITING_COLOUR = "red", "yellow"
 
 
 def robot_table(robots: Sequence[FleetRobot], width: int, lines: int) -> Table:
-    """Return a table of robots of a given width, in at most so many lines, at least 1."""
+    """Return a table of robots of a given width, in at most ``lines`` >= 1 lines."""
     table = Table.grid(padding=(0, 1), pad_edge=False)
     table.width = width = min(width, WIDEST)
     longest = max([len(robot.name) for robot in robots], default=5)
-    # Where each has room for a second line, what it does is told whole.
+    # If each robot has room for a second line, its activity is shown in full.
     is_folded = 2 * len(robots) < lines
     name = min(max(longest, 5), max(LEAST_NAME, width // 3))
     table.add_column(width=name, no_wrap=True, overflow="ellipsis")
@@ -68,7 +68,7 @@ def _doing(robot: FleetRobot) -> Text:
 def total_rows(
     floor: FleetFloor, unheard: Sequence[str], width: int, glyphs: GlyphSet
 ) -> list[Text]:
-    """Return what all robots have done together, and the names of those not heard, in lines."""
+    """Return lines with the total of all robots, and the names of silent robots."""
     silent = [Text(f"not heard: {', '.join(unheard)}", GONE_COLOUR)] if unheard else []
     if floor.fraction is None:
         return silent

@@ -1,4 +1,4 @@
-"""The view of a fleet by what its robots tell: who does what, and the latest events."""
+"""The view of a fleet from its robots' messages: their activities, and the latest events."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ from fasaco_edge.wire.documents.json_text import decode_tolerant
 from fasaco_edge.wire.documents.status import FleetReport, Status
 from fasaco_edge.wire.keys import is_chunk
 
-# A robot's changes of state are noted at most so often [s]; its rate is a mean of so many seconds.
+# Least time between two notes of a robot's state [s]; time over which its rate is averaged [s].
 NOTED_EVERY_S, RATE_S = 1.0, 5
-# Robots that others have heard within this time are named, though they may be silent by now [s].
+# Robots that others received messages from within this time are named, even if silent here [s].
 TOLD_S = 600.0
-# Robots and topics whose faults are counted apart; other fleets that are named.
+# Number of robots and topics whose faults are counted apart; of other fleets that are named.
 MOST_FAULTS, MOST_FLEETS = 256, 32
 
 
 @dataclass(slots=True)
 class _Seen:
-    """What is known of a robot beside what it tells its fleet."""
+    """Data of a robot besides its fleet messages."""
 
     status: Status | None = None
     noted: str = ""
@@ -38,14 +38,14 @@ class _Seen:
 
 
 class FleetView:
-    """The newest of all robots of one fleet, and the latest events.
+    """The newest data of all robots of one fleet, and the latest events.
 
     Attributes:
         fleet: name of the fleet.
         members: its robots.
-        events: what happened.
+        events: the latest events.
         trouble: why the bus cannot be reached; "" if it can.
-        others: names of other fleets that were heard of, each one line.
+        others: names of other fleets on the bus, one line each.
     """
 
     def __init__(self, fleet: str) -> None:
@@ -77,7 +77,7 @@ class FleetView:
             self._note_often(robot, arrival.topic, text, 1e-9 * arrival.wall_ns)
 
     def tick(self, now: float) -> None:
-        """Note what has changed by ``now``, since the epoch [s]; call it often."""
+        """Note changes up to ``now``, since the epoch [s]; call it often."""
         now_ns = int(1e9 * now)
         self._survey.update(self.members, now_ns)
         telling = self.members.dividing(now_ns)
@@ -89,7 +89,7 @@ class FleetView:
             self._note_state(robot, now)
 
     def note_rate(self, robot: str, kb_s: float) -> None:
-        """Note what a robot told its fleet in the last second [kB/s]."""
+        """Note a robot's rate of fleet messages in the last second [kB/s]."""
         if robot in self._seen:
             self._seen[robot].rates.append(kb_s)
 
@@ -98,7 +98,7 @@ class FleetView:
         return [member.name for member in self.members]
 
     def unheard(self, now: float) -> list[str]:
-        """Return the names of robots that others have heard lately, and that are not heard here."""
+        """Return the names of robots that others received lately, but this observer did not."""
         told = {
             other.name
             for status in self._reports(int(1e9 * now)).values()
@@ -115,7 +115,7 @@ class FleetView:
         return sorted(found, key=lambda robot: robot.name)
 
     def document(self, now: float) -> dict[str, object]:
-        """Return what ``--json`` prints."""
+        """Return the document that ``--json`` prints."""
         document = document_of(self.fleet, self._division, self.floor, self.robots(now))
         return document | {"unheard": self.unheard(now)}
 
@@ -143,7 +143,7 @@ class FleetView:
         )
 
     def _reports(self, now_ns: int) -> dict[str, FleetReport]:
-        """Return what robots that are there report of their fleet, by their names."""
+        """Return the fleet reports of present robots, by their names."""
         found = {}
         for member in self.members:
             status = self._seen[member.name].status
@@ -152,7 +152,7 @@ class FleetView:
         return found
 
     def _absences(self, now_ns: int) -> dict[str, str]:
-        """Return why robots are given no part by others, by their names."""
+        """Return why others give robots no part, by the names of these robots."""
         return {
             other.name: short(other.away)
             for report in self._reports(now_ns).values()
@@ -168,7 +168,7 @@ class FleetView:
             return
         _, news = self.members.hear(robot, said, at_ns)
         if news == JOINED:
-            # One that is long gone may have had its place.
+            # The place may have belonged to a robot long gone.
             self._seen = {name: self._seen.get(name, _Seen()) for name in self.names()}
         elif news:
             self._note_often(robot, "frame", news, 1e-9 * at_ns)
@@ -180,7 +180,7 @@ class FleetView:
             self._seen[member.name].status = status
 
     def _note_state(self, robot: FleetRobot, now: float) -> None:
-        """Note what a robot does, if that is another than before."""
+        """Note a robot's activity if it has changed."""
         seen, doing = self._seen[robot.name], robot.doing
         if doing == seen.noted or now - seen.noted_at < NOTED_EVERY_S:
             return
@@ -197,12 +197,12 @@ class FleetView:
         self.events.add(now, f"{name}: {doing}{why}", tone)
 
     def _note_often(self, robot: str, what: str, text: str, now: float) -> None:
-        """Note what a robot may do again and again: the 1st, 2nd, 4th, 8th ... time."""
+        """Note the 1st, 2nd, 4th, 8th ... occurrence of an event that may repeat."""
         fault = robot, what
         if fault not in self._faults and (
             robot not in self._seen or len(self._faults) >= MOST_FAULTS
         ):
-            # Of any number of names.
+            # Bounded, as there may be any number of names.
             fault = "other robots", what
         self._faults[fault] += 1
         count = self._faults[fault]
