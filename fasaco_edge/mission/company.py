@@ -1,8 +1,8 @@
-"""Company: what a mission asks about other robots in its building, and the answers of one alone.
+"""Company: the interface of a mission to other robots in its building, here for a single robot.
 
 A robot of a fleet has another ``Company``, that of ``fleet.mission``, which its configuration
-names; the mission knows nothing else of a fleet. The area is divided among robots there, and who
-waits for whom is decided there.
+names; the mission knows nothing else of a fleet. That one divides the area among robots, and
+decides which robot waits for which.
 """
 
 from __future__ import annotations
@@ -35,8 +35,8 @@ Inside = Callable[[Cells, Cells], NDArray[np.bool_]]
 class OthersCells:
     """The cells that others have swept, a part of the ledger: none.
 
-    What the ledger holds of them from a time in a fleet stays in it until this robot forgets cells
-    of its own: a fleet that it joins again would count these as swept.
+    Cells that the ledger holds from a time in a fleet stay in it until this robot forgets cells of
+    its own: a fleet that it joins again would count these as swept.
 
     Attributes:
         version: counter of changes.
@@ -60,7 +60,7 @@ class OthersCells:
         self._kept = b""
 
     def disregard(self, inside: Inside) -> None:
-        """Disregard all sweeps so far of the cells that a mask function chooses."""
+        """Disregard all earlier sweeps of the cells that a mask function selects."""
 
     def clear(self) -> None:
         """Forget all that others reported: it belongs to another frame or building."""
@@ -70,11 +70,11 @@ class OthersCells:
         """Note the active frame."""
 
     def leave_building(self, frame: str) -> None:
-        """Note that the map in a frame shows another building than others mean."""
+        """Note that the map in a frame shows another building: cells of others lie elsewhere."""
         self._kept = b""
 
     def begin_anew(self) -> None:
-        """Take the next map for one that others share."""
+        """Accept the next map as one that others share."""
         self._kept = b""
 
     def snapshot(self, cell_m: float) -> LedgerSnapshot:
@@ -82,7 +82,7 @@ class OthersCells:
         return LedgerSnapshot(cell_m, "", 0, MappingProxyType({}))
 
     def encode(self) -> bytes:
-        """Return everything as bytes, to be kept with the ledger; b"" for nothing."""
+        """Return everything as bytes, to be stored with the ledger; b"" for nothing."""
         return self._kept
 
     def resume(self, kept: bytes) -> None:
@@ -91,7 +91,7 @@ class OthersCells:
 
 
 class Company:
-    """The other robots, and this one's part of the area: none, and all of it."""
+    """The other robots, and this robot's part of the area; here no others, and the whole area."""
 
     @property
     def has_members(self) -> bool:
@@ -105,7 +105,7 @@ class Company:
 
     @property
     def others_go_on(self) -> bool:
-        """Whether all that is left is others' to sweep, who are at it."""
+        """Whether only parts of other robots are left, and these make progress."""
         return False
 
     def hear(self, event: MemberHeard, now: float) -> str:
@@ -113,7 +113,7 @@ class Company:
         return ""
 
     def forget_ground(self) -> None:
-        """Forget what others have seen: it belongs to another map."""
+        """Forget the ground of others: it belongs to another map."""
 
     def share(self, open_cells: OpenCells, cell: Cell, now: float, *, at_once: bool = False) -> str:
         """Divide the remaining area again if worthwhile; return why a plan is wanted, or "".
@@ -133,7 +133,7 @@ class Company:
     def mine_to_sweep(
         self, cells: NDArray[np.bool_], unvisited: NDArray[np.bool_], area: ReachableArea
     ) -> NDArray[np.bool_]:
-        """Return on which cells the floor is this robot's to sweep, visited or not."""
+        """Return the cells on which this robot sweeps the floor, visited or not."""
         return cells
 
     def untried(self, cells: NDArray[np.bool_], area: ReachableArea) -> NDArray[np.bool_]:
@@ -141,10 +141,10 @@ class Company:
         return cells
 
     def give_up(self, cells: NDArray[np.bool_], area: ReachableArea) -> None:
-        """Leave cells that this robot tried in vain to the others, whatever maps come."""
+        """Leave cells that this robot tried in vain to the others, also after new maps."""
 
     def pass_over(self, cells: NDArray[np.bool_], area: ReachableArea) -> None:
-        """Leave cells that this robot cannot come to to the others, until the next map."""
+        """Leave cells that this robot cannot reach to the others, until the next map."""
 
     def try_again(self) -> None:
         """Clear the list of cells given up."""
@@ -154,11 +154,11 @@ class Company:
         return area
 
     def viewpoints(self, open_cells: OpenCells, cell: Cell) -> Iterator[Cell]:
-        """Yield where to look for work that others alone see."""
+        """Yield viewpoints for cells that only maps of others show."""
         return iter(())
 
     def busiest(self, open_cells: OpenCells) -> str:
-        """Return the name of the other robot with most cells left in its part; "" for none."""
+        """Return the name of the other robot with the most cells left in its part; "" for none."""
         return ""
 
 
@@ -175,7 +175,7 @@ class Waiting:
     is_near = False
 
     def succeed(self, before: Waiting) -> None:
-        """Go on with what another one remembers."""
+        """Take over the state of a predecessor."""
 
     def line(self) -> NDArray[np.float64]:
         """Return the next metres, from the robot's place on, points (x, y) [m], float64 (n, 2)."""
@@ -189,15 +189,15 @@ class Waiting:
         return None
 
     def end(self) -> None:
-        """Wait no longer."""
+        """End the wait."""
 
     def why_stuck(self, now: float) -> str:
-        """Return why the robot is thought to be held up for good, or ""."""
+        """Return why the robot seems stuck for good, or ""."""
         return ""
 
 
 class CompanyKind:
-    """What makes the parts of a mission that know of other robots; here, of a robot alone."""
+    """Factory for the parts of a mission that handle other robots; here, for a single robot."""
 
     def cells(self) -> OthersCells:
         """Return the cells that others have swept."""
@@ -210,7 +210,7 @@ class CompanyKind:
     def waiting(
         self, config: MissionConfig, map_state: MapState, route: Route, company: Company
     ) -> Waiting:
-        """Return what decides when the robot waits for others."""
+        """Return the part that decides when the robot waits for others."""
         return Waiting()
 
 

@@ -53,22 +53,22 @@ class Dock(Place, frozen=True):
 
 
 class MissionPolicy(msgspec.Struct, frozen=True, kw_only=True):
-    """Autostart, timeouts, retries, zones and places that hold for every order.
+    """Autostart, timeouts, retries, zones and places that apply to every order.
 
     Attributes:
         autostart: whether a mission without an order covers everything once.
-        retries: how often cells that were blocked or left over are tried again at the end.
+        retries: number of times that cells blocked or left over are tried again at the end.
         retry_s: pause before each retry [s].
         lost_pose_s: the pose is lost after this time without one [s]; 0 for never.
         stale_map_s: the map is stale after this time without a map or an update [s]; 0 for never.
         zones: named zones that orders refer to.
         keep_out: polygons (x, y) [m] in the map frame that the robot never touches.
         keep_out_mask: file of a mask with further keep-out areas, see ``orders.mask``; "" for none.
-        keep_out_topic: whether the mask comes as a message; there is no mission before it has come.
-        home: where the robot returns to; None for the dock, or else where an order began.
-        dock: where it charges; None where it does not.
-        map_frame: frame of the map that zones, keep_out, a mask of a file, home and dock are given
-            for; "" for the first that is in use with them.
+        keep_out_topic: whether the mask comes as a message; no mission starts before it arrives.
+        home: where the robot returns to; None for the dock, or without one the order's start.
+        dock: where it charges; None if it does not.
+        map_frame: frame of the map to which zones, keep_out, a mask of a file, home and dock
+            belong; "" for the first map used with them.
     """
 
     autostart: bool = True
@@ -86,7 +86,7 @@ class MissionPolicy(msgspec.Struct, frozen=True, kw_only=True):
 
     @property
     def waits_for_mask(self) -> bool:
-        """Whether the mask is still to come."""
+        """Whether the mask has not arrived yet."""
         return self.keep_out_topic and not self.keep_out_mask
 
     def place(self, errand: Errand) -> Place | None:
@@ -98,10 +98,10 @@ class BatteryPolicy(msgspec.Struct, frozen=True, kw_only=True):
     """When a robot goes to charge and when it resumes; levels are shares of a full battery.
 
     Attributes:
-        low: level at which it goes to charge; higher where the path back needs more, and where its
-            path leads away from a dock that is near.
-        reserve: level to be left on arrival at the dock.
-        enough: level at which it resumes; lower where the rest of the order needs less.
+        low: level at which it goes to charge; higher if the path back needs more, or if its path
+            leads away from a dock that is near.
+        reserve: least level on arrival at the dock.
+        enough: level at which it resumes; lower if the rest of the order needs less.
         silent_s: timeout for battery messages, after which their absence is reported [s].
     """
 
@@ -116,15 +116,15 @@ NO_PATIENCE = MissionPolicy(retries=0, lost_pose_s=0.0)
 
 @dataclass(frozen=True, slots=True)
 class Sweeping:
-    """How floor is swept, and at what prices.
+    """Sweeping of floor, and its prices.
 
     Attributes:
         tool_m: width of the tool [m]; cells may be narrower, so that lanes overlap.
         most_pixels: limit on the pixels of the fine raster.
         line: prices for polishing the line.
-        ahead_m: from where the robot turns about to the tool's centre, ahead [m]: where it has
-            swept is known by that, lines are planned as if it were 0.
-        clearance_m: what lines keep beside the radius from walls and furniture [m].
+        ahead_m: distance of the tool's centre ahead of the robot's centre of rotation [m]: swept
+            floor is computed with it, lines are planned as if it were 0.
+        clearance_m: distance of lines from walls and furniture in addition to the radius [m].
     """
 
     tool_m: float
@@ -143,17 +143,17 @@ class MissionConfig:
         max_lattice_cells: limit on the cells of the coverage lattice.
         cost: of paths.
         policy: retries and timeouts.
-        spare_share: share of a processor core for improving a path that need not change; 0 for
+        spare_share: share of a processor core for improving a path that is still valid; 0 for
             none.
         sweeping: how floor is swept; None to drive through the centres of cells.
         trail: rules of the living trail.
         plans_on_trail: whether the planner's ants start from the living trail.
         battery: when to charge; None for never.
-        speed_m_s: speed of the robot; 0 where it is not known [m/s].
+        speed_m_s: speed of the robot; 0 if not known [m/s].
         lattice_deg: angle of the cells' rows to the x axis of the map frame [deg]; None to align
             them with the walls, once their direction is certain.
-        company: what it knows of other robots.
-        given: the policy with its places as given, if those in ``policy`` are rotated.
+        company: kind of its interface to other robots.
+        given: the policy with its places as configured, if those in ``policy`` are rotated.
     """
 
     footprint: Footprint

@@ -1,4 +1,4 @@
-"""What a follower says keeps the robot from driving its path. Times are [s]."""
+"""Blocked follower: the follower's report of what keeps the robot from its path. Times are [s]."""
 
 from __future__ import annotations
 
@@ -6,9 +6,9 @@ import math
 
 from fasaco_edge.mission.core.events import FollowerBlocked
 
-# A follower says it once a second; what it has not said for so long is over.
+# A follower repeats its report once a second; a report not repeated for this long is over.
 SHOWN_S = 3.0
-# A path that it cannot join, or drive without anything to plan around, is laid anew this often.
+# Period of new paths for a follower that cannot join its path, or is blocked by no known place.
 AGAIN_S = 5.0
 
 
@@ -29,7 +29,7 @@ class BlockedFollower:
         return f"the robot stands: {report.detail}, for {report.held_s:.0f} s" if report else ""
 
     def asks_again(self, now: float) -> str:
-        """Return why the path is to be laid anew from where the robot is, or "" for now."""
+        """Return why a new path from the robot's place is due, or ""."""
         report = self._report(now)
         if report is None or report.points or now - self._asked_at < AGAIN_S:
             return ""

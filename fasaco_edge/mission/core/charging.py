@@ -1,9 +1,8 @@
 """Charging: the accepted battery level, the drain per second of driving, and when to charge.
 
-A level that jumps is accepted only after it has been reported consistently for ``HOLD_S``: one
-wrong message must not send the robot to its dock, nor away from it. The drain is the median over
-the last stretches of driving, so outliers (a steep first percent, a jump of the gauge) do not
-count.
+A level that jumps is accepted only after consistent reports for ``HOLD_S``: one wrong message must
+not send the robot to its dock, nor away from it. The drain is the median over the last stretches of
+driving, so outliers (a steep first percent, a jump of the gauge) have no effect.
 """
 
 from __future__ import annotations
@@ -35,12 +34,12 @@ DOCK_EVERY_S = 5.0
 # Least difference between the levels of turning back and of resuming; factor on the time planned
 # for the rest, as lines are longer than walks over cells.
 BETWEEN, SPARE = 0.1, 1.2
-# Cells that each cell at the border of the map stands for, in the estimate of the rest.
+# Number of unknown cells assumed per cell at the border of the map, in the estimate of the rest.
 BEYOND_CELLS = 20
-# A robot may go to charge this much above the level of turning back, where the dock is near; number
-# of places on its path ahead that are compared.
+# A robot near its dock may go to charge this much above the level of turning back; number of places
+# on its path ahead that are compared.
 EARLY, PLACES_AHEAD = 0.2, 8
-# Lattices larger than this are not searched for so many ways [cells].
+# On lattices larger than this the comparison would take too long [cells].
 MOST_CELLS = 200_000
 # The battery counts as full once its level has risen by less than RISE for this long [s].
 RISE, ALL_AFTER_S = 0.005, 1800.0
@@ -59,10 +58,10 @@ class BatteryGauge:
         self.level: float | None = None
         self.power = ""
         self.heard_at = float("-inf")
-        # When the last message came, and the last accepted level; before, when one began to be due.
+        # Times of the last message and of the last accepted level; at first, when one became due.
         self._noted_at = float("-inf")
         self._told_at: float | None = None
-        # A level that is not accepted yet, and since when it has been reported.
+        # A level not accepted yet, and the time of its first report.
         self._claim: tuple[float, float] | None = None
         # Time and level where the current stretch of driving began.
         self._since: tuple[float, float] | None = None
@@ -200,7 +199,7 @@ class Charging:
         return f"the robot does not go to charge: {why}" if why else ""
 
     def is_due(self, now: float) -> bool:
-        """Tell whether the robot has to go and charge now.
+        """Return whether the robot has to go and charge now.
 
         A robot that was told to stop, also by a cancelled order, does not drive by itself.
         """
@@ -248,7 +247,7 @@ class Charging:
         return min(policy.enough, max(needed, policy.low + BETWEEN))
 
     def is_enough(self, now: float, *, docked: bool) -> bool:
-        """Tell whether the battery of a robot in its dock, or on its way there, suffices."""
+        """Return whether the battery of a robot in its dock, or on its way there, suffices."""
         level = self.gauge.level
         if self.policy is None:
             return True  # the configuration has changed
@@ -277,7 +276,7 @@ class Charging:
         return f"battery at {self.gauge.level:.0%}{but}, goes on at {self.goes_on_at:.0%}"
 
     def _finds_nothing_better(self) -> bool:
-        """Tell whether the robot, which will have to charge soon, is best placed for it now.
+        """Return whether the robot, which will have to charge soon, is best placed for it now.
 
         It is where the way to the dock is shortest for what is driven between two charges, of all
         places on its path until the level of turning back. A path that ends before shows nothing:

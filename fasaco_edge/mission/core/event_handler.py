@@ -129,13 +129,13 @@ class EventHandler:
             self.route.want(reason)
 
     def _close_floor(self, event: FollowerBlocked) -> None:
-        """Close the floor that a follower has met something on, for a while.
+        """Close floor for a while on which a follower has reported an obstacle.
 
         Raises:
-            WrongFrame: it says where in another frame than the map's.
+            WrongFrame: the report is in another frame than the map's.
         """
         grid = self.map.grid
-        # One that has another path by now will say it again, if need be.
+        # A follower that has a newer path by now repeats the report if it still applies.
         if grid is None or event.revision not in (0, self.route.revision):
             return
         if event.frame != grid.frame:
@@ -146,7 +146,7 @@ class EventHandler:
             self._map_changed(self.monitor.map_at)
 
     def _open_floor(self) -> None:
-        """Open floor again that was closed for long enough, as long as there is work."""
+        """Reopen floor that was closed for long enough, as long as there is work."""
         order = self.orders.order_state
         is_at_work = order.is_open or bool(order.errand)
         if is_at_work and self.map.grid is not None and self.map.obstacles.open_due(self._now):
@@ -176,7 +176,7 @@ class EventHandler:
         self._change_building(self.ledger.check(free, frame) if shows_floor else None)
 
     def _compare_buildings(self) -> Pose2D | None:
-        """Compare the newest map with those before; return the robot's pose on these."""
+        """Compare the newest map with earlier ones; return the robot's pose on these."""
         if self.map.plain is None or self.map.free is None:
             return None
         pose = None if self.map.pose is None else self.map.pose.pose
@@ -188,7 +188,7 @@ class EventHandler:
         return self.map.building.note_map(plain, pose, self._now, contradicts)
 
     def _note_frame(self) -> None:
-        """Bind places that have no map yet to the one in use; leave those of another frame."""
+        """Bind places without a map to the map in use; drop places of another frame."""
         grid, frames = self.map.grid, self.map.frames
         if grid is None or grid.frame != frames.active or not frames.is_settled:
             return
@@ -213,7 +213,7 @@ class EventHandler:
         self._change_building(misfit)
 
     def _change_building(self, misfit: LedgerMismatchError | None) -> None:
-        """Go on with a new map; without the places of the building before where it is another."""
+        """Continue on a new map; without the places of the previous building if it is another."""
         if misfit is not None:
             self.map.building.accept(self._now)
             self.map.places.leave_building(self.ledger.current.frame)
@@ -236,7 +236,7 @@ class EventHandler:
         before = self.ledger.current.frame
         misfit = self.ledger.move_to(frame)
         if before not in ("", frame):
-            # As the ledger forgets what they swept there.
+            # The ledger forgets the cells that they swept there, too.
             self.company.forget_ground()
         if misfit is None and before not in ("", frame):
             why = f"map and poses are in frame {frame!r} now, no longer in {before!r}"
@@ -274,7 +274,7 @@ class EventHandler:
         self.drive.note(stamped)
         self.way_out.note_pose(stamped.pose)
         motion, uncertain = None, 0
-        # On the map of another building neither the pose nor the floor under it says anything.
+        # On the map of another building, the pose and the floor under it mean nothing.
         is_known = self.map.building.note_pose(stamped.pose, self._now)
         if is_known:
             motion = self.ledger.map_motion(stamped.pose)
@@ -302,12 +302,12 @@ class EventHandler:
         self.trail.note_drive()
 
     def _record_again(self) -> None:
-        """Record what is under the tool on another map."""
+        """Record the floor under the tool on another map."""
         if self.map.pose is not None and not self.monitor.driven.holds:
             self._record(Driven(self.map.pose.pose, self.monitor.farthest_m))
 
     def _record(self, driven: Driven) -> None:
-        """Record what was swept on the way to a pose; one far outside the map is ignored."""
+        """Record floor swept on the way to a pose; a pose far outside the map is ignored."""
         lattice, pose = self.map.lattice, driven.pose
         if lattice is None:
             return

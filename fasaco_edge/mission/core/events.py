@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class MapReceived:
-    """A full map; ``at``: when it came [s], where a mission before has had it, else None."""
+    """A full map; ``at``: its time of arrival [s] if an earlier mission received it, else None."""
 
     grid: OccupancyGrid
     at: float | None = None
@@ -52,7 +52,7 @@ class PatchesLost:
 
 @dataclass(frozen=True, slots=True)
 class PoseReceived:
-    """A pose of the robot; ``at``: as that of a map."""
+    """A pose of the robot; ``at``: as for a map."""
 
     pose: StampedPose
     at: float | None = None
@@ -63,9 +63,9 @@ class BatteryReceived:
     """A battery message.
 
     Attributes:
-        level: charge from 0 to 1; None where unknown.
+        level: charge from 0 to 1; None if unknown.
         power: state of the power supply, one of ``wire.messages.battery.POWERS``.
-        stamp_ns: time of measurement [ns]; 0 where unknown.
+        stamp_ns: time of measurement [ns]; 0 if unknown.
     """
 
     level: float | None
@@ -81,7 +81,7 @@ class PlanReady:
         number: of the request.
         path: the plan.
         seconds: planning time [s].
-        stops: where the search was stopped, see ``planners.planner.StopRecorder``.
+        stops: when the search was stopped, see ``planners.planner.StopRecorder``.
     """
 
     number: int
@@ -116,7 +116,7 @@ class CommandReceived:
 
 @dataclass(frozen=True, slots=True)
 class Part:
-    """What a division gives to a robot: the cells that are nearest to a seed.
+    """A robot's part of a division: the cells nearest to a seed.
 
     Attributes:
         robot: its name.
@@ -141,8 +141,8 @@ class MemberHeard:
 
     Attributes:
         robot: its name.
-        misfit: why it cannot belong to this fleet; "" where it can.
-        frame: its map frame; "" where all is given in this robot's frames.
+        misfit: why it cannot belong to this fleet; "" if it can.
+        frame: its map frame; "" if everything is given in this robot's frames.
         state: state of its mission.
         x, y: its position [m].
         step_s: its time to sweep one cell [s].
@@ -150,13 +150,12 @@ class MemberHeard:
         division: number of its newest division.
         tiles: places and bits of the cells it has swept; a subset of its tiles.
         ground: places and bits of the cells it can reach; a subset of its tiles.
-        by: name of the robot that made that division.
-        parts: what that division gives to each robot.
+        by: name of the robot that made ``division``.
+        parts: each robot's part of ``division``.
         radius_m: radius of its disc [m].
         ahead: points (x, y) of its next metres [m].
         waits_for: name of the robot that it waits for; "" for none.
-        kept: as ``tiles``, those of their cells that it swept before this epoch; None where that is
-            not known.
+        kept: as ``tiles``, the cells among them that it swept before this epoch; None if not known.
         lattice: pose of its lattice in this robot's [m], by which its cells were placed.
     """
 
@@ -185,12 +184,12 @@ class FollowerBlocked:
     """A report of the follower: what keeps the robot from driving its path.
 
     Attributes:
-        revision: of the path; 0 where that is not known.
-        detail: what it is, in words.
-        held_s: for how long [s].
+        revision: of the path; 0 if not known.
+        detail: the obstruction, in words.
+        held_s: its duration [s].
         frame: of the places.
-        x, y: where the robot is [m].
-        points: what is ahead: places x, y [m], the nearest first; () where nothing is.
+        x, y: the robot's place [m].
+        points: places x, y of the obstacle ahead [m], the nearest first; () for none.
     """
 
     revision: int
@@ -233,7 +232,7 @@ def in_runs(events: Iterable[Event]) -> Iterator[Event | PatchRun]:
             yield from run
 
 
-# Reason of a request for a better path, and of the path that comes of it.
+# Reason of a request for a better path, and of the resulting path.
 SPARE, BETTER = "spare time", "better further on"
 
 
@@ -243,10 +242,10 @@ class PlanRequest:
 
     Attributes:
         number: counts the requests, from 1; ``PlanReady`` or ``PlanBroken`` returns it.
-        problem: what to plan.
+        problem: the problem to plan for.
         reason: why it is wanted.
-        changed: window of the cells that changed since the previous plan; None where that is not
-            the reason.
+        changed: window of the cells that changed since the previous plan; None if another reason
+            applies.
     """
 
     number: int
@@ -263,12 +262,12 @@ class PathUpdate:
         revision: counts the published paths, from 1.
         cells: int32 (n, 2), the cells (row, col) still to be driven; n = 0 stops the robot.
         reason: why it replaces the previous one.
-        plan: the plan that it comes from; None where none was needed.
+        plan: the plan that it comes from; None if none was needed.
         plan_s: planning time [s].
-        changed: window of the cells whose change is the reason; None where that is not the reason.
+        changed: window of the cells whose change is the reason; None for another reason.
         xy: float64 (m, 2), x, y [m]: the line to drive; None for the centres of the cells.
         end_yaw: heading at the end [rad]; None for the heading of the last segment.
-        may_wait: whether the robot can drive on along the previous one as far as both are the same.
+        may_wait: whether the robot can drive on along the previous path as long as both are equal.
     """
 
     revision: int
@@ -288,7 +287,7 @@ class Answer:
 
     Attributes:
         number: of the command.
-        error: why it was refused; None where it was carried out.
+        error: why it was refused; None if it was carried out.
         plan: for ``replan`` the number of the coming plan.
     """
 
@@ -299,12 +298,12 @@ class Answer:
 
 @dataclass(frozen=True, slots=True)
 class Decision:
-    """The result of a step: what the daemon has to do.
+    """The result of a step, for the daemon to carry out.
 
     Attributes:
         plan: a plan to make; at most one is pending at a time.
         path: a path to publish; the last one of the step.
-        faults: why events were refused, and other faults.
+        faults: reasons for refused events, and other faults.
         answers: answers to the commands among the events, in order.
         forgotten: whether the ledger on disk is to be deleted, too.
     """

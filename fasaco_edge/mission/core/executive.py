@@ -29,7 +29,7 @@ from fasaco_edge.mission.map.map_state import MapState
 from fasaco_edge.mission.orders.order_state import Stage
 from fasaco_edge.mission.orders.sequencer import Sequencer
 
-# States of a robot that is not to drive, as somebody said so, or as its order is over.
+# States of a robot that must not drive: by command, or because its order is over.
 STOPPED = frozenset((State.PAUSED, State.IDLE, State.DONE, State.CHARGING))
 
 
@@ -39,7 +39,7 @@ class Executive:
 
     Attributes:
         mask_frame: the frame of the map that the keep-out mask belongs to; "" for any.
-        troubles: what is wrong meanwhile; read-only.
+        troubles: current troubles; read-only.
     """
 
     map: MapState
@@ -65,7 +65,7 @@ class Executive:
     _shut_in: ShutIn = field(init=False)
     _errands: Errands = field(init=False)
     _work: OrderWork = field(init=False)
-    # Of this step: the time [s], the robot's cell once it is known, the path made so far.
+    # State of this step: the time [s], the robot's cell once known, the path made up to now.
     _now: float = field(default=0.0, init=False)
     _cell: Cell = field(default=(0, 0), init=False)
     _update: PathUpdate | None = field(default=None, init=False)
@@ -93,7 +93,7 @@ class Executive:
         )
 
     def succeed(self, before: Executive) -> None:
-        """Go on where another mission ended; a docked robot stays docked."""
+        """Continue where another mission ended; a docked robot stays docked."""
         self.troubles.succeed(before.troubles)
         if before._state is State.CHARGING:
             self._state, self._reason = before._state, before._reason
@@ -109,12 +109,12 @@ class Executive:
 
     @property
     def doing(self) -> State:
-        """What the mission does, with or without troubles."""
+        """The mission's activity, regardless of troubles."""
         makes_way = bool(self.giving_way.waits_for) and len(self.route.path.cells) > 0
         return State.RETURNING if self._state is State.DONE and makes_way else self._state
 
     def decide(self, now: float) -> Decision:
-        """Return what is to be done at ``now`` [s]: what the first rule says that has an answer."""
+        """Return the decision at ``now`` [s]: that of the first rule that has an answer."""
         self._now, self._update = now, None
         self.way_out.end()
         doing = next(doing for rule in RULES if (doing := rule(self)) is not None)
@@ -129,9 +129,9 @@ class Executive:
         self._errands.consider_charging(self._state, self._now)
 
     def _give_way(self) -> Doing | None:
-        """Wait, or make way, for another robot; a robot whose order is over makes way, too.
+        """Wait or make way for another robot.
 
-        Not one in its dock.
+        A robot whose order is over makes way, too, but not a robot in its dock.
         """
         order, way, resting = self.orders.order_state, self.giving_way, self._resting
         way.look_around(self._now)
@@ -144,7 +144,7 @@ class Executive:
         if not (is_going and self.company.has_members and may_drive) or is_docked:
             way.end()
             return None
-        # Others may have swept meanwhile what this robot waits to drive to.
+        # Meanwhile others may have swept the cells ahead of this waiting robot.
         is_homing = order.stage is Stage.RETURNING
         is_vain = bool(way.waits_for) and not is_homing and not self.orders.cells.left()
         has_work = bool(order.errand) or (order.is_open and not is_vain)
@@ -161,7 +161,7 @@ class Executive:
         return Doing(state, way.reason, update)
 
     def _rest(self) -> Doing | None:
-        """Rest where a person, the battery or a missing input says so."""
+        """Rest if a command, the battery or a missing input requires it."""
         resting = self._resting.why(self._state, self._now)
         if resting is None:
             return None
@@ -170,7 +170,7 @@ class Executive:
         return Doing(*resting)
 
     def _find_place(self) -> Doing | None:
-        """Find the robot's cell; lead a robot that is in none back to one."""
+        """Find the robot's cell; lead a robot outside of all cells back to one."""
         route, cell = self.route, self.map.robot_cell()
         if cell is None or self.map.area is None:
             self.map.forget_area()
@@ -178,19 +178,19 @@ class Executive:
         self._cell = cell
         self._standing.look(cell, self._now)
         if not len(route.path.cells):
-            self.monitor.clear_doubt()  # without a path the robot cannot be off it
+            self.monitor.clear_doubt()  # a robot without a path cannot be off its path
         self._update = route.truncate(self._now)
         return None
 
     def _run_errand(self) -> Doing | None:
-        """Drive home or to the dock; afterwards take up the path again."""
+        """Drive home or to the dock; afterwards resume the path."""
         if self.orders.order_state.errand:
             return self._errands.run(self._cell, self._update, self._state, self._now)
         self._update = self.route.take_up("goes on", self._now) or self._update
         return None
 
     def _judge_path(self) -> None:
-        """Want a plan where the path does not serve the order any more."""
+        """Want a plan if the path no longer serves the order."""
         cell, now = self._cell, self._now
         if self._state in DRIVING:
             self._checks.check_deviation(cell, now)
@@ -202,7 +202,7 @@ class Executive:
             self.route.want(reason)
 
     def _plan(self) -> Doing | None:
-        """Request the plan that is wanted, unless one is being made."""
+        """Request the wanted plan, unless one is being made."""
         route, state = self.route, self._state
         if not route.wanted or route.pending is not None:
             return None
@@ -214,7 +214,7 @@ class Executive:
         return self._work.plan(self._cell, self._update, state, self._now)
 
     def _end_order(self) -> Doing | None:
-        """Stop where the order is over, or the rest of it waits for a retry."""
+        """Stop if the order is over, or its rest waits for a retry."""
         route, orders = self.route, self.orders
         if orders.order_state.stage is Stage.RETURNING and self._cell == orders.goal():
             orders.advance(self._now)
@@ -241,7 +241,7 @@ class Executive:
         return Doing(state, reason, update, route.request_improvement(now) if is_free else None)
 
 
-# The policy. A rule answers with what the mission does, or with nothing: then the next one decides.
+# The policy. A rule returns the mission's activity, or None: then the next rule decides.
 RULES: tuple[Callable[[Executive], Doing | None], ...] = (
     Executive._charge_in_time,
     Executive._give_way,

@@ -10,8 +10,8 @@ from fasaco_edge.mission.map.map_state import MapState
 
 # Tolerances to the dock's pose, and to the pose in front of the dock [m].
 DOCKED_M, NEAR_M = 0.1, 0.5
-# Largest difference between a docked robot's heading and the dock's [rad]: contacts allow less, a
-# localiser errs by some ten degrees; a robot that passes the dock, or still turns, differs by more.
+# Largest difference between a docked robot's heading and the dock's [rad]: contacts allow less, the
+# error of a localiser is about ten degrees; a robot that passes the dock or turns differs by more.
 DOCKED_RAD = math.radians(30.0)
 
 
@@ -23,12 +23,12 @@ class InDock:
     gauge: BatteryGauge
 
     def holds(self, *, is_charging: bool) -> bool:
-        """Tell whether the robot is in its dock, including where its base moved it into the dock.
+        """Return whether the robot is in its dock, also after its base drove it in.
 
         The cell there need not be coverable.
 
         Args:
-            is_charging: whether the mission counts it as docked already.
+            is_charging: whether the mission already counts it as docked.
         """
         place, stamped = self.map.places.place("charge"), self.map.pose
         if place is None or stamped is None:
@@ -40,7 +40,7 @@ class InDock:
         return (is_charging or self.gauge.power == "charging") and self.is_near()
 
     def is_near(self) -> bool:
-        """Tell whether the robot is near enough to the dock to have been moved in by its base."""
+        """Return whether the robot is near enough to the dock for its base to have driven it in."""
         place, stamped = self.map.places.place("charge"), self.map.pose
         if place is None or stamped is None:
             return False

@@ -1,7 +1,7 @@
 """Lattice angle: the angle of the cells' rows to the map frame, and when it changes.
 
 Without a configured angle, rows are parallel to the axes of the map frame at first, and to the
-walls once their direction is certain; to the axes again if a map fits in no other way.
+walls once their direction is certain; to the axes again if a map does not fit otherwise.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ class LatticeAngle:
             self._walls.end()
 
     def resume(self, deg: float) -> bool:
-        """Keep the angle of a ledger from before a restart; return whether it changes by that."""
+        """Keep the angle of a ledger from before a restart; return whether that changes it."""
         if self._is_given or not deg:
             return False
         self.deg = deg
@@ -54,14 +54,14 @@ class LatticeAngle:
     def rotates_to_walls(self, grid: OccupancyGrid, pose: StampedPose) -> bool:
         """Evaluate the walls of the newest map; return whether the angle has changed."""
         deg = self._walls.look(grid, pose.pose)
-        # A rotated lattice spans up to twice the cells; and the map may grow.
+        # A rotated lattice spans up to twice as many cells, and the map may grow.
         if deg is None or deg == self.deg or not self._fits(grid, deg, share=0.5):
             return False
         self.deg = deg
         return True
 
     def rotates_back_for(self, maps: Iterable[OccupancyGrid]) -> bool:
-        """Return whether the angle changes to 0, because one of the maps fits in no other way."""
+        """Return whether the angle changes to 0, because one of the maps does not fit otherwise."""
         if self._is_given or not self.deg:
             return False
         if all(self._fits(grid, self.deg) or not self._fits(grid, 0.0) for grid in maps):
@@ -70,7 +70,7 @@ class LatticeAngle:
         return True
 
     def _fits(self, grid: OccupancyGrid, deg: float, share: float = 1.0) -> bool:
-        """Tell whether a lattice at an angle [deg] takes no more than a share of the cell limit."""
+        """Return whether a lattice at an angle [deg] takes at most a share of the cell limit."""
         geometry = rotated_geometry(grid.geometry, -deg)
         try:
             lattice_window(geometry, self._cell_m, int(share * self._most_cells))

@@ -52,7 +52,7 @@ class LatticeRotation:
     deg: float = 0.0
 
     def config(self, config: MissionConfig) -> MissionConfig:
-        """Return the configuration of a mission on this lattice; standing zones stay as given."""
+        """Return a mission's configuration on this lattice; standing zones stay as configured."""
         policy = config.policy
         if self.deg:
             polygons = policy.keep_out + mask_polygons(policy.keep_out_mask)
@@ -66,7 +66,7 @@ class LatticeRotation:
         return replace(config, policy=policy, lattice_deg=self.deg, given=config.policy)
 
     def event(self, event: Event) -> Event:
-        """Return an event in the mission's frame; an order is rotated once it is located."""
+        """Return an event in the mission's frame; an order is rotated once its map is known."""
         if not self.deg:
             return event
         match event:

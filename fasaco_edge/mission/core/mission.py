@@ -63,14 +63,14 @@ class Mission:
     """Covers everything reachable on a growing map.
 
     Attributes:
-        state, reason: its state, and why.
+        state, reason: its state, and the reason.
         route: the path and the pending plan, with counts; read-only.
         company: the other robots; read-only.
         charging: the battery, and when to charge; read-only.
     """
 
     def __init__(self, config: MissionConfig, order: OrderState | None = None) -> None:
-        """Begin with an order; by default with one for everything reachable."""
+        """Start with an order; by default with one for everything reachable."""
         self._config = config
         self._drive, self._gauge = DriveMeter(), BatteryGauge()
         self._angle = LatticeAngle(config)
@@ -142,8 +142,10 @@ class Mission:
         self.state, self.reason = self._executive.status()
 
     def succeed(self, before: Mission) -> None:
-        """Go on with what another mission knew of robot and inputs, and with its doubt about the
-        building; before the first step, to which the events of its ``held`` belong."""
+        """Take over another mission's state of robot and inputs, and its doubt about the building.
+
+        To be called before the first step, which gets the events of its ``held``.
+        """
         self._executive.succeed(before._executive)
         cell_m, was = self._config.footprint.cell_m, before._config.footprint.cell_m
         if before.rotation != self.rotation or cell_m != was:
@@ -154,7 +156,7 @@ class Mission:
             self._map.watch_on(before._map.building)
 
     def held(self) -> list[Event]:
-        """Return newest map and pose as events for a mission that goes on with them."""
+        """Return the newest map and pose as events for a succeeding mission."""
         monitor = self._executive.monitor
         return [
             *([MapReceived(self.grid, monitor.map_at)] if self.grid is not None else []),
@@ -195,7 +197,7 @@ class Mission:
         """Rotate the lattice to the walls once these are certain; return the combined decision."""
         self._angle.note_faults(happened.faults)
         # A path kept for an errand is given in present cells.
-        # A building that is in doubt may soon be another.
+        # A building in doubt may soon be replaced by another.
         if self._angle.is_settled or self.order_state.errand or self.is_in_doubt:
             return happened
         pose, grid = self.pose, self.grid
@@ -207,7 +209,7 @@ class Mission:
         return replace(happened, path=stop or happened.path)
 
     def _make_room(self, events: Iterable[Event], now: float) -> PathUpdate | None:
-        """Rotate the lattice back to the map frame's axes for a map that fits in no other way."""
+        """Rotate the lattice back to the map frame's axes for a map that does not fit otherwise."""
         maps = (event.grid for event in events if isinstance(event, MapReceived))
         if not self._angle.rotates_back_for(maps):
             return None
@@ -219,7 +221,7 @@ class Mission:
         order = replace(self.order_state, reached=self._orders.reached)
         is_confirmed = self._ledger.is_confirmed and not self._map.building.is_foreign
         executive, held = self._executive, self.held()
-        # No path may be driven that is no longer checked.
+        # The robot must not drive a path that is no longer checked.
         stop = route.stop(why, now)
         self._lay_cells()
         self._resume(before, is_confirmed=is_confirmed)
@@ -233,13 +235,13 @@ class Mission:
 
     @property
     def troubles(self) -> tuple[Trouble, ...]:
-        """What is wrong in the present state, the weightiest first."""
+        """The troubles in the present state, the most serious first."""
         return self._executive.troubles.found
 
     def idle_places(self, now: float) -> str:
         """Return which keep-outs and places have no effect on the map at ``now`` [s]; "" if none.
 
-        It decides nothing: only reports of the mission ask for it.
+        It is used for reports only, not for decisions.
         """
         if self.grid is None:
             return ""
@@ -257,7 +259,7 @@ class Mission:
         )
 
     def floor_to_sweep(self) -> FloorToSweep | None:
-        """Return the areas of floor to sweep; None where cells are counted."""
+        """Return the areas of floor to sweep; None if cells are counted."""
         return self._line.to_sweep
 
     def drive_times(self) -> DriveTimes:
@@ -265,7 +267,7 @@ class Mission:
         return self._drive.times
 
     def unreached(self) -> Unreached:
-        """Return what of the order stays uncovered at present."""
+        """Return the part of the order that stays uncovered at present."""
         return self._orders.unreached()
 
     def zone_progress(self) -> list[ZoneProgress]:
@@ -273,7 +275,7 @@ class Mission:
         return zone_progress(self.order_state, self._map.area, self._ledger)
 
     def snapshot(self) -> LedgerSnapshot:
-        """Return everything that is kept over a restart: coverage, and the order's progress."""
+        """Return the state kept over a restart: coverage, and the order's progress."""
         trail = self._trail.snapshot()
         note = replace(self.order_state, reached=self._orders.reached).to_json()
         ledger, lattice_deg = self._ledger.snapshot(), self._rotation.deg
@@ -345,7 +347,7 @@ class Mission:
 
     @property
     def waits_for(self) -> str:
-        """Name of the robot that this one waits or makes way for, or that sweeps what is left."""
+        """Name of the robot that this one waits or makes way for, or that sweeps the rest."""
         is_covering = self._executive.doing is State.COVERING
         stands = is_covering and len(self.route.path.ahead) < 2
         if self.giving_way.waits_for or not (stands and self._orders.waits_for_others):

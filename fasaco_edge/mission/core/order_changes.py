@@ -22,7 +22,7 @@ from fasaco_edge.mission.orders.sequencer import Sequencer
 
 @dataclass(slots=True, eq=False)
 class OrderChanges:
-    """Changes the order, and what follows from it: keep-outs, reachable area, path."""
+    """Changes the order and its consequences: keep-outs, reachable area, path."""
 
     map: MapState
     ledger: MissionLedger
@@ -32,7 +32,7 @@ class OrderChanges:
     policy: MissionPolicy
     # Angle of the cells' rows to the x axis of the map frame [deg].
     lattice_deg: float = 0.0
-    # Polygons to keep out of under every order.
+    # Keep-out polygons of every order.
     _standing: tuple[Polygon, ...] = field(default=(), init=False)
 
     def __post_init__(self) -> None:
@@ -100,13 +100,13 @@ class OrderChanges:
         return update
 
     def _change_keep_outs(self, order: OrderState, now: float) -> PathUpdate | None:
-        """Follow other keep-outs under the same order; stop a robot that is in one of them."""
+        """Apply other keep-outs under the same order; stop a robot inside one of them."""
         self._keep_out(order)
         self.route.forget_failure()
         self.update_area()
         if not self.map.is_kept_out:
             return None
-        # Its border may be near enough to go on from there, but not by this path.
+        # The border may be near enough to continue from there, but not along this path.
         self.map.follow_path(None)
         return self.route.stop("robot is in a keep-out zone", now)
 

@@ -1,4 +1,4 @@
-"""Order work: the next plan of an order, or its end where nothing is left to plan."""
+"""Order work: the next plan of an order, or its end if nothing is left to plan."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class OrderWork:
         """
         route, orders = self.route, self.orders
         orders.reopen()
-        # One that stands, as others go on or for a map, has no more reason in each step.
+        # A robot that stands while others sweep, or for a map, gets no new reason in each step.
         stands = state is State.COVERING and not len(route.path.cells)
         self.share(cell, now, at_once=not stands)
         while orders.order_state.stage is not Stage.RETURNING:
@@ -66,10 +66,10 @@ class OrderWork:
         return self._return_home(cell, update, now)
 
     def _go_on_elsewhere(self, cell: Cell, update: PathUpdate | None, now: float) -> Doing | None:
-        """Find work for a robot that cannot come to any; None once there may be some.
+        """Find work for a robot that can reach none; None once there may be some.
 
-        In this order: out of where it is shut in, a place to look from, a wait for others, floor
-        that the line has missed, cells that it cannot come to; then the next stage of the order.
+        In this order: a way out if it is shut in, a viewpoint, a wait for others, floor that the
+        line has missed, cells that it cannot reach; then the next stage of the order.
         """
         route, orders, area = self.route, self.orders, self.map.area
         if area is not None and (why := self.shut_in.why(area)):
@@ -87,7 +87,7 @@ class OrderWork:
         return self._next_stage(cell, update, now)
 
     def _next_stage(self, cell: Cell, update: PathUpdate | None, now: float) -> Doing | None:
-        """Advance the order; None where its next stage has something to plan."""
+        """Advance the order; None if its next stage has something to plan."""
         route, orders = self.route, self.orders
         orders.advance(now)
         if orders.is_waiting or orders.order_state.stage is Stage.OVER:
@@ -113,7 +113,7 @@ class OrderWork:
         return self.company.share(self.orders.cells.open_cells, cell, now, at_once=at_once)
 
     def _stand_by(self, reason: str, update: PathUpdate | None, now: float) -> Doing:
-        """Stand in the middle of an order, without a path."""
+        """Stand during an order, without a path."""
         return Doing(State.COVERING, reason, self.route.stop(reason, now) or update)
 
     def _return_home(self, cell: Cell, update: PathUpdate | None, now: float) -> Doing:

@@ -12,15 +12,15 @@ from fasaco_edge.mission.orders.sequencer import Sequencer
 
 # Period of checks whether a path leads to anything [s].
 WORTH_S = 1.0
-# Where poses are too far apart, a path that has covered nothing more for so long is over [s].
+# If poses are too far apart, a path that has covered nothing new for this long is over [s].
 VAIN_S = 60.0
 FAR_APART = "poses are too far apart"
 
 
 class PathChecks:
-    """Wants a new plan where the path no longer serves the driving robot.
+    """Wants a new plan if the path no longer serves the driving robot.
 
-    None is wanted twice: nothing is checked while a plan is wanted or made.
+    Nothing is checked while a plan is wanted or being made.
     """
 
     def __init__(
@@ -35,7 +35,7 @@ class PathChecks:
         self._ledger, self._monitor, self._orders = ledger, monitor, orders
         self._route, self._line, self._standing = route, line, standing
         self._worth_at = float("-inf")
-        # The number of cells covered at a time [s], while poses are too far apart.
+        # Number of covered cells and its time [s], while poses are too far apart.
         self._progress: tuple[int, float] | None = None
 
     def check_deviation(self, cell: Cell, now: float) -> None:
@@ -50,13 +50,13 @@ class PathChecks:
         if monitor.doubt:
             doubted = route.published_at < monitor.doubt_since
             if doubted and list(cell) in path.ahead[:2].tolist():
-                monitor.clear_doubt()  # it only flickered
+                monitor.clear_doubt()  # the pose only flickered
             elif waited and now - monitor.doubt_since >= PATIENCE_S:
                 route.want(monitor.doubt)
             return
         last = tuple(path.cells[-1].tolist()) if len(path.cells) else None
         has_visited = last is not None and self._ledger.current.has_visited(last)
-        # A path may lead no further than the robot's cell: it may yet turn to drive it.
+        # If a path ends in the robot's cell, the robot may still be turning to drive it.
         has_stopped = waited and not self._standing.turns
         at_end = path.finished and (has_visited or has_stopped)
         if at_end or (has_stopped and self._standing.is_at(last)):
@@ -72,7 +72,7 @@ class PathChecks:
             self._route.want("cells left over")
 
     def _drives_in_vain(self, now: float) -> bool:
-        """Tell whether poses are too far apart to cover anything more: no path would end."""
+        """Return whether poses are too far apart to cover new cells: no path would end."""
         if not self._monitor.are_poses_far_apart:
             self._progress = None
             return False
@@ -83,7 +83,7 @@ class PathChecks:
         return before is not None and covered <= before[0]
 
     def check_worth(self, now: float) -> None:
-        """Want a new plan for a fleet's robot where others have swept all that lay ahead."""
+        """Want a new plan for a fleet's robot if others have swept all cells ahead."""
         route = self._route
         is_due = now - self._worth_at >= WORTH_S
         if not is_due or self._has_plan_due or len(route.path.ahead) <= 1:

@@ -1,11 +1,11 @@
-"""The path exit: the one way out for paths, and the owner of the path that is published.
+"""The path exit: the only way for a path to be published, and the owner of the published path.
 
 It outlives the missions of a daemon. A path is in force while the mission that made it drives: when
 that mission comes to rest or ends, the exit replaces the path by an empty one, which stops the
-robot. So two things hold, whatever ends, replaces or fails:
+robot. This gives two invariants, for any end, replacement or failure:
 
-- a mission at rest has published an empty path last;
-- a path that is not empty is of the mission in force.
+- the last path of a mission at rest is empty;
+- a path that is not empty belongs to the mission in force.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ def no_points() -> NDArray[np.float64]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PublishedPath:
-    """A path as it is published, in the map frame.
+    """A path as published, in the map frame.
 
     Attributes:
         frame: the map frame.
@@ -43,10 +43,9 @@ class PublishedPath:
         steps: steps from cell to cell.
         end_yaw: heading at the end [rad]; None for the heading of the last segment.
         map_stamp_ns, map_revision: stamp [ns] and revision of the map it was planned on.
-        plan: the plan that it comes from; None where none was needed.
+        plan: the plan that it comes from; None if none was needed.
         plan_s: planning time [s].
-        changed: bounds of the cells whose change is the reason [m]; None where that is not the
-            reason.
+        changed: bounds of the cells whose change is the reason [m]; None for another reason.
     """
 
     frame: str
@@ -63,7 +62,7 @@ class PublishedPath:
 
     @classmethod
     def of(cls, mission: Mission, update: PathUpdate) -> PublishedPath:
-        """Return the path that a mission has decided on in its last step."""
+        """Return the path that a mission decided on in its last step."""
         grid, lattice = mission.grid, mission.lattice
         assert grid is not None
         assert lattice is not None
@@ -104,7 +103,7 @@ class PathExit:
     """Decides which path is published next, and keeps it until it is sent."""
 
     def __init__(self) -> None:
-        # The path sent last, None if unknown; and the one to send, None for none.
+        # The path sent last, None if unknown; the path to send next, None for none.
         self._sent: PublishedPath | None = None
         self._due: PublishedPath | None = None
 
@@ -127,7 +126,7 @@ class PathExit:
             self._due = newest.withdrawn(reason)
 
     def void(self, reason: str, frame: str) -> None:
-        """Replace any path by an empty one, also one of another daemon or an earlier process."""
+        """Replace any path by an empty one, even one of another daemon or an earlier process."""
         self.withdraw(reason)
         self._due = self._due or PublishedPath(frame, reason)
 

@@ -47,7 +47,7 @@ class Route(PlanRequests):
     def __init__(self, spare_share: float, map_state: MapState, orders: Sequencer) -> None:
         super().__init__()
         self.path = PathProgress(NO_CELLS)
-        # The part of a path that is kept for later: beyond a block, or the whole rest after a stop.
+        # The part of a path kept for later: beyond a block, or the whole rest after a stop.
         self._kept = PathProgress(NO_CELLS)
         # The rest of the path at the start of an errand; None without one.
         self._aside: NDArray[np.int32] | None = None
@@ -57,8 +57,8 @@ class Route(PlanRequests):
         # motion.
         self._before_motion: NDArray[np.int32] | None = None
         self.revision = 0
-        # Count the numberings of cells, and the walks: paths over other cells. Which walk was
-        # searched as a whole last, and when a needed plan last changed it [s].
+        # Counts of cell numberings, and of walks (paths over other cells). The last walk searched
+        # as a whole, and when a needed plan last changed the walk [s].
         self._numberings = self._walks = self._searched = 0
         self._changed_at = 0.0
         self.unchanged = self.outdated = 0
@@ -81,8 +81,8 @@ class Route(PlanRequests):
     def path_to_keep(self) -> NDArray[np.int32]:
         """The part of the path that the next plan should keep, int32 (n, 2).
 
-        It includes what a block cut off, and what was left when the robot was stopped: most of that
-        still holds.
+        It includes the part that a block cut off, and the rest after a stop, as most of these is
+        still valid.
         """
         return np.concatenate((self.path.ahead, self._kept.ahead))
 
@@ -97,7 +97,7 @@ class Route(PlanRequests):
         return self.path if len(self.path.cells) else self._kept
 
     def abandon(self) -> None:
-        """Want no plan, and discard the pending one: it is for another order."""
+        """Cancel the wanted plan, and discard the pending one: it is for another order."""
         super().abandon()
         self._kept, self._before_motion, self._aside = PathProgress(NO_CELLS), None, None
 
@@ -124,9 +124,9 @@ class Route(PlanRequests):
         return update
 
     def _from_nearer_end(self, cells: NDArray[np.int32]) -> NDArray[np.int32]:
-        """Return a kept path, reversed if its end is nearer to the robot than its begin.
+        """Return a kept path, reversed if its end is nearer to the robot than its start.
 
-        Not a path that has to end at home: what it saves at first it drives in the end.
+        A path that has to end at home is not reversed, as the way saved now would be driven later.
         """
         area, cell = self._map.area, self._map.robot_cell()
         if area is None or cell is None or not len(cells) or self._orders.ends_home:
@@ -136,7 +136,7 @@ class Route(PlanRequests):
         return np.ascontiguousarray(cells[::-1]) if is_nearer else cells
 
     def resume(self, now: float) -> PathUpdate | None:
-        """Publish the kept path after a pause; want a plan if it does not hold."""
+        """Publish the kept path after a pause; want a plan if it is no longer valid."""
         area, cell, cells = self._map.area, self._map.robot_cell(), self._kept.ahead
         holds = (
             not self.wanted
@@ -151,7 +151,7 @@ class Route(PlanRequests):
         return None
 
     def note_map_motion(self) -> None:
-        """Note that the newest map has moved; ``note_motion`` tells how."""
+        """Note that the newest map has moved; ``note_motion`` gets the motion."""
         if self._before_motion is None:
             self._before_motion = self.path_to_keep
 
@@ -182,8 +182,8 @@ class Route(PlanRequests):
         if not self._spare.is_available(now, self._walks):
             return None
         number = self.attempts + 1
-        # A walk that grows with the map, or is cut to a part, becomes worse as a whole: it turns up
-        # to a third more often than one that is searched anew. So every other attempt searches the
+        # A walk that grows with the map, or is cut to a part, becomes worse as a whole: it has up
+        # to a third more turns than a new search would find. So every other attempt searches the
         # whole rest, once for each walk.
         is_full = number % 2 == 1 and self._searched != self._walks
         attempt = Attempt.at(self.path, self._numberings, self._orders, number, is_full=is_full)
@@ -200,7 +200,7 @@ class Route(PlanRequests):
         self.outdated += self._close_failed(event, now)
 
     def accept(self, event: PlanReady, now: float) -> PathUpdate | None:
-        """Publish a requested plan, unless it no longer holds."""
+        """Publish a requested plan, unless it is no longer valid."""
         if self.is_improving:
             self._spare.spend(event.seconds, now, self._walks)
         request, attempt, area = self.pending, self._attempt, self._map.area
@@ -223,7 +223,7 @@ class Route(PlanRequests):
                 self.want("the map changed while planning", request.changed)
             return None
         if np.array_equal(cells, self.path.ahead):
-            # The follower has this path already; one that ended at a cut is complete now.
+            # The follower has this path already; a path that ended at a cut is complete now.
             self._kept = PathProgress(NO_CELLS)
             self.unchanged += 1
             self.published_at = now
@@ -249,7 +249,7 @@ class Route(PlanRequests):
         """Return a new plan without the cells that were covered while it was made.
 
         The robot drove on meanwhile, so it joins the plan at the first cell that still needs a
-        visit. Empty if no path leads there: the robot was carried elsewhere.
+        visit. The result is empty if no path leads there, because the robot was carried elsewhere.
         """
         first = self._first_open(cells, area.lattice.window)
         to = int(cells[first, 0]), int(cells[first, 1])
@@ -293,9 +293,9 @@ class Route(PlanRequests):
     def publish_way_out(
         self, way: NDArray[np.float64], reason: str, now: float
     ) -> PathUpdate | None:
-        """Publish a way along no cells, float64 (n, 2): x, y [m], and keep the current path.
+        """Publish a way off the cells, float64 (n, 2): x, y [m], and keep the current path.
 
-        None for an empty way where nothing is driven.
+        Return None for an empty way if there is no path to stop.
         """
         if not len(way):
             return self.stop(reason, now)
@@ -305,7 +305,7 @@ class Route(PlanRequests):
         return replace(update, xy=way)
 
     def publish_anew(self, reason: str, now: float) -> PathUpdate:
-        """Publish the rest of the path once more, with a line that is laid anew."""
+        """Publish the rest of the path once more, with a new line."""
         ahead, end_yaw, beside = self.path.ahead, self._end_yaw, self.beside
         return self.publish(ahead, reason, now, end_yaw=end_yaw, beside=beside)
 
@@ -314,7 +314,7 @@ class Route(PlanRequests):
         self.revision -= 1
 
     def publish_line(self, reason: str, now: float) -> PathUpdate:
-        """Publish a new line along the same cells; a pending attempt still holds."""
+        """Publish a new line along the same cells; a pending attempt stays valid."""
         self.revision += 1
         self.published_at = now
         return PathUpdate(self.revision, self.path.ahead, reason, end_yaw=self._end_yaw)
@@ -336,12 +336,12 @@ class Route(PlanRequests):
             self._kept = held
 
     def stop(self, reason: str, now: float) -> PathUpdate | None:
-        """Publish an empty path and keep the current one; None if there was none to drive."""
+        """Publish an empty path and keep the current one; None without a path to drive."""
         if not len(self.path.cells) and not self.is_way_out:
             return None
         kept = self.path_to_keep
         update = self.publish(NO_CELLS, reason, now)
-        # At its end nothing is left to drive.
+        # At the end of its path nothing is left to drive.
         self._kept = PathProgress(kept if len(kept) > 1 else NO_CELLS)
         return update
 

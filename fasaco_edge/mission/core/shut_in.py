@@ -1,4 +1,4 @@
-"""Shut in: what a robot does that cannot go on from where it is."""
+"""Shut in: the way out for a robot that cannot continue from its place."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from fasaco_edge.mission.orders.sequencer import Sequencer
 
 @dataclass(frozen=True, slots=True)
 class ShutIn:
-    """Leads the robot out, where its track does."""
+    """Leads the robot out, if its track does."""
 
     map: MapState
     orders: Sequencer
@@ -26,17 +26,17 @@ class ShutIn:
     def lead_out(
         self, why: str, update: PathUpdate | None, now: float, goal: Cell | None = None
     ) -> Doing:
-        """Lead the robot back along its track, to where it can go on, or to a goal.
+        """Lead the robot back along its track, to a place where it can continue, or to a goal.
 
-        Not one in a keep-out zone, which a person has drawn. To be called in each step while the
-        robot cannot go on.
+        A robot in a keep-out zone stays, as a person has drawn the zone. To be called in each step
+        while the robot cannot continue.
 
         Args:
             why: what shuts it in.
-            update: the path that this step has made so far: one cut to nothing is not withdrawn
-                again.
+            update: the path that this step has made up to now: a path already cut to nothing is
+                not withdrawn again.
             now: time [s].
-            goal: where it is to get to; None for where there is work.
+            goal: destination; None for the nearest work.
         """
         if self.map.is_kept_out:
             return Doing(State.BLOCKED, why, update)
@@ -54,7 +54,7 @@ class ShutIn:
         return Doing(State.BLOCKED, why, update)
 
     def why(self, area: ReachableArea) -> str:
-        """Return what shuts the robot in; "" where most of what it could reach is in reach."""
+        """Return what shuts the robot in; "" if it can reach most of its former area."""
         if not self.orders.is_shut_in(area):
             return ""
         reached, once = self.orders.reached_m2(area)

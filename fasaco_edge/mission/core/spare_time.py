@@ -14,13 +14,14 @@ from fasaco_edge.planners.cost import CoverageCost
 from fasaco_edge.planners.problem import CoverageProblem
 from fasaco_edge.planners.walk_before import HELD_CELLS
 
-# How long an attempt may take: by repairs, and by a search of the whole rest [s].
+# Longest time of an attempt: by repairs, and by a search of the whole rest [s].
 REPAIR_S, SEARCH_S = 0.05, 0.3
-# A path is replaced only if that saves this many steps and this share of what is left.
+# A path is replaced only if that saves this many steps and this share of the rest.
 LEAST_STEPS, LEAST_SHARE = 2, 0.002
-# The same share for another walk altogether, whose line is laid and polished anew: where no plan
-# was needed for so long [s], and where one was, as the next change of the map may undo what it
-# would save: with 0.01 four robots took 3 % more time in unknown buildings, within the scatter.
+# The same share for a new walk, whose line has to be made and polished again: first the time
+# without a needed plan [s], then the shares after and before that time. Before it, the next change
+# of the map may undo the saving: with 0.01 four robots took 3 % more time in unknown buildings,
+# within the scatter.
 SETTLED_S, SETTLED_SHARE, CHANGING_SHARE = 20.0, 0.01, 0.06
 # The share of time is halved at most this many times.
 MOST_VAIN = 4
@@ -37,19 +38,19 @@ def most_s(problem: CoverageProblem) -> float:
 class SpareTime:
     """Limits attempts at better paths to a share of a processor core; 0 for none.
 
-    The share is halved with each attempt at the same walk that brings nothing.
+    The share is halved with each vain attempt at the same walk.
     """
 
     def __init__(self, share: float) -> None:
         self._share = share
         self._resting_until = 0.0
-        # The walk of the last attempt, how many attempts at it brought nothing, how long the last
-        # one took [s], and when it ended [s].
+        # The walk of the last attempt, the number of vain attempts at it, and the duration [s] and
+        # end [s] of the last one.
         self._walk = self._vain = 0
         self._last = 0.0, 0.0
 
     def is_available(self, now: float, walk: int) -> bool:
-        """Tell whether another attempt, at walk ``walk``, may start at ``now`` [s]."""
+        """Return whether another attempt, at walk ``walk``, may start at ``now`` [s]."""
         if not self._share or now < self._resting_until:
             return False
         seconds, ended_at = self._last
@@ -96,7 +97,7 @@ class Attempt:
         *,
         is_full: bool = False,
     ) -> Attempt | None:
-        """Return attempt ``number`` at a path; None if too little of it is left.
+        """Return attempt ``number`` to improve a path; None if too little of it is left.
 
         ``is_full``: whether to search the whole rest, see ``CoverageProblem``.
         """
@@ -118,9 +119,9 @@ class Attempt:
         """Return the improved cells ahead, int32 (n, 2); None if they save too little.
 
         Args:
-            path: the path now.
-            better: the improved one, int32 (n, 2).
-            settled_s: for how long no plan was needed [s].
+            path: the current path.
+            better: the improved path, int32 (n, 2).
+            settled_s: time since a plan was last needed [s].
         """
         if path.index > self.joint:
             return None

@@ -1,8 +1,8 @@
 """Standing: how long the robot has been in its cell, and in one place with a path to drive.
 
-Another path does not make a robot that stands drive: only a move, or a rest by command or at the
-end of an order, begins the count anew. Time without a path, as where a map flickers ahead of the
-robot, does not count. Times are [s].
+A new path alone does not reset the count of a standing robot: only a motion does, or a rest by
+command or at the end of an order. Time without a path, for instance while the map flickers ahead of
+the robot, does not count. Times are [s].
 """
 
 from __future__ import annotations
@@ -16,14 +16,14 @@ from fasaco_edge.mission.map.map_state import MapState
 # Minimum time between new plans for a robot that left its path or stands still at its end: a
 # flickering pose must not keep the planner busy.
 PATIENCE_S = 1.0
-# A robot that stands for so long on its path gets the path again: the follower may have lost it, or
-# stopped for an obstacle that is gone. Not sooner: it may be waiting for somebody to pass, or be
-# driving out of a corner, which another path would end. By the robot's clock, as a simulation may
-# run at twenty times the real speed.
+# A robot that stands for this long on its path gets the path again: the follower may have lost it,
+# or stopped for an obstacle that is gone. Not sooner: it may be waiting for a person to pass, or
+# driving out of a corner, which another path would interrupt. The robot's clock counts, as a
+# simulation may run at twenty times the real speed.
 STANDING_S, STANDING_M = 30.0, 0.1
-# So often a standing robot gets the path again before its mission is reported as degraded.
+# Number of times that a standing robot gets its path again before its mission is degraded.
 TRIES = 2
-# A robot turns that has turned by so much lately [rad].
+# A robot counts as turning if its heading has changed this much lately [rad].
 TURNS_RAD = 0.1
 # A robot that stands beside its path gets a new one after this time: an obstacle may separate it
 # from the path.
@@ -31,31 +31,31 @@ BESIDE_S = 2.0
 
 
 class Standing:
-    """Measures how long the robot stands; to be told its cell in each step."""
+    """Measures how long the robot stands; gets its cell in each step."""
 
     def __init__(self, map_state: MapState, route: Route) -> None:
         self._map, self._route = map_state, route
         self._now = 0.0
         self._cell: Cell | None = None
         self._entered_at = 0.0
-        # The robot's position, to STANDING_M, and since when it has had a path there, or was last
-        # given it again: by our clock, and by the robot's [ns]; later by the time without one.
+        # The robot's position, to within STANDING_M, and since when it has had a path there, or got
+        # it again: by our clock, and by the robot's [ns]; shifted by any time without a path.
         self._place = math.inf, math.inf
         self._since = 0.0, 0
         # When it was last seen there with a path to drive, by both clocks.
         self._had_path = 0.0, 0
-        # How often it was given its path again in that place.
+        # Number of times that it got its path again in that place.
         self._tries = 0
-        # Its yaw when it was last seen to turn [rad], and when that was.
+        # Its yaw when it last turned [rad], and the time of that.
         self._yaw, self._turned_at = 0.0, -math.inf
 
     def succeed(self, before: Standing) -> None:
-        """Go on with the count of another one, whose path was the last that the robot had."""
+        """Take over the count of a predecessor, whose path was the robot's last one."""
         self._place, self._since, self._tries = before._place, before._since, before._tries
         self._had_path = before._had_path
 
     def begin_anew(self) -> None:
-        """Forget the place: the robot rests, and is not to drive."""
+        """Forget the place: the robot rests, and must not drive."""
         self._place = math.inf, math.inf
 
     def look(self, cell: Cell, now: float) -> None:
@@ -78,11 +78,11 @@ class Standing:
 
     @property
     def turns(self) -> bool:
-        """Whether the robot has turned within a moment, as on the spot to drive its path."""
+        """Whether the robot has just turned, for instance on the spot to drive its path."""
         return self._now - self._turned_at < PATIENCE_S
 
     def is_at(self, last: Cell | None) -> bool:
-        """Tell whether the robot stands in the last cell of a path that it did not complete.
+        """Return whether the robot stands in the last cell of a path that it did not complete.
 
         It missed a cell, so its index on the path is before the last.
         """
@@ -104,14 +104,14 @@ class Standing:
         return self._has_path and self._in_place_s() >= STANDING_S
 
     def note_again(self) -> None:
-        """Note that the robot gets the path that it stands on again."""
+        """Note that the robot gets its path again."""
         assert self._map.pose is not None
         self._tries += 1
         self._since = self._now, self._map.pose.stamp_ns
 
     @property
     def why_stuck(self) -> str:
-        """Why the robot is thought to be unable to drive its path; "" if it is not."""
+        """Why the robot seems unable to drive its path; "" if it drives."""
         stamped = self._map.pose
         if stamped is None or not self._has_path or self._tries < TRIES:
             return ""
@@ -121,7 +121,7 @@ class Standing:
 
     @property
     def _has_path(self) -> bool:
-        """Whether there is something to drive."""
+        """Whether there is a path to drive."""
         return len(self._route.path.ahead) > 1
 
     def _note_place(self) -> None:
@@ -149,7 +149,7 @@ class Standing:
     def _in_place_s(self) -> float:
         """Return how long the robot has stood in one place with a path to drive.
 
-        By our clock or the robot's, whichever says longer: stamps may stand still.
+        This is the longer time of our clock and the robot's, as stamps may stand still.
         """
         assert self._map.pose is not None
         since, since_ns = self._since

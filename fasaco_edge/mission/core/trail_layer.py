@@ -27,7 +27,7 @@ class TrailLayer:
         self._trail = LivingTrail(config.trail)
         # The lattice that the trail lies on.
         self._lattice: CoverageLattice | None = None
-        # The path that the robot was last seen on, and its index there.
+        # The robot's last path, and its index on it.
         self._path, self._index = NO_CELLS, 0
         # The trail before a motion of the map, until the first pose on the moved map shows the
         # motion.
@@ -57,7 +57,7 @@ class TrailLayer:
         self._before_motion = None
 
     def note_map_motion(self) -> None:
-        """Note that the newest map has moved; ``note_motion`` tells how."""
+        """Note that the newest map has moved; ``note_motion`` gets the motion."""
         if self._before_motion is None:
             self._before_motion = self._trail.snapshot()
 
@@ -101,8 +101,8 @@ class TrailLayer:
 
 
 def _distinct(cells: NDArray[np.int32]) -> int:
-    """Return how many distinct cells a path, int32 (n, 2), leads over."""
-    # Column by column: numpy takes several times as long over rows of two.
+    """Return the number of distinct cells of a path, int32 (n, 2)."""
+    # Column by column: numpy takes several times as long for rows of two.
     rows, cols = np.ascontiguousarray(cells.T)
     rows, cols = rows - rows.min(), cols - cols.min()
     width = int(cols.max()) + 1

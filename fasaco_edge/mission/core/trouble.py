@@ -1,6 +1,6 @@
-"""Troubles: what is wrong with robot and inputs, whatever state the mission is in.
+"""Troubles: faults of robot and inputs, in any state of the mission.
 
-The state says what the mission does, troubles say what is wrong meanwhile. A mission that drives
+The state gives the mission's activity, troubles give the faults at that time. A mission that drives
 with a trouble is ``degraded``; a state at rest stays as it is.
 """
 
@@ -23,8 +23,8 @@ from fasaco_edge.mission.line.offset import Offset
 from fasaco_edge.mission.map.inputs import InputMonitor
 from fasaco_edge.mission.map.map_state import MapState
 
-# Poses of a robot at rest may come less often than ``lost_pose_s``; also the time to wait for the
-# first map and pose [s].
+# Longest time between poses of a robot at rest, which may exceed ``lost_pose_s``; also the time to
+# wait for the first map and pose [s].
 REST_S = 30.0
 
 # States of a robot that drives, or soon will.
