@@ -7,7 +7,7 @@ Read in this order:
     core/event_handler   applies each event
     core/order_changes   begins orders, and carries out commands
     core/executive       then decides what the robot does next: a list of rules, in their order
-    core/resting, errands, order_work, shut_in   what the rules say
+    core/resting, errands, order_work, shut_in   the rules' contents
     core/route           owns the path and the pending plan; better paths in spare time
 
     map/map_state        owns the map, the robot's cell and the reachable area
@@ -21,7 +21,7 @@ Read in this order:
     coverage/progress    progress on the path, of the coverage, of each zone
     coverage/unreached   uncovered cells, and the causes
 
-    company              what all of this asks about other robots; the answers of one alone
+    company              the interface to other robots; here, that of a single robot
 
     orders/sequencer     owns the order: zones, passes, retries, return home
     orders/order_state   an order and its progress; kept on disk with the ledger

@@ -75,7 +75,7 @@ class DriveMeter:
 
     @property
     def times(self) -> DriveTimes:
-        """The medians so far."""
+        """The current medians."""
         return DriveTimes(
             _median(self._speeds), _median(self._quarters), _median(self._halves), self._turns
         )
@@ -86,7 +86,7 @@ class DriveMeter:
         self._measured_until = -math.inf
 
     def note(self, stamped: StampedPose) -> None:
-        """Take in the next pose; one that is hardly newer is ignored."""
+        """Take in the next pose; a pose that is hardly newer is ignored."""
         at, pose, seen = stamped.stamp_ns * 1e-9, stamped.pose, self._seen
         if seen and 0.0 <= at - seen[-1].at < LEAST_S:
             return  # the newest pose is repeated with each map
@@ -152,7 +152,7 @@ def _before(seen: list[_Seen], index: int, seconds: float) -> int | None:
 
 
 def _is_even(seen: list[_Seen]) -> bool:
-    """Tell whether poses fit straight driving at constant speed."""
+    """Return whether poses fit straight driving at constant speed."""
     a, b = seen[0], seen[-1]
     most_m, took_s = UNEVEN * _apart(a, b), b.at - a.at
     return all(

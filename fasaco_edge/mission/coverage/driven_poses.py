@@ -1,9 +1,9 @@
-"""Driven poses: those that count for what was swept, as the robot can have driven there.
+"""Driven poses: the poses used for swept floor, because the robot can have driven there.
 
-A localiser errs now and then by more than its noise: a pose lies beside the track, the next one on
-it again. What lies farther than the robot can have driven since the pose before is not counted
-before the next pose: it was an error if that one can be driven to without it. Else the robot is
-there, and its track from the pose before is unknown.
+A localiser sometimes errs by more than its noise: one pose lies beside the track, the next one lies
+on it again. A pose farther away than the robot can have driven since the previous pose is held
+until the next one. If the robot can have driven to the next pose without it, it was an error.
+Otherwise the robot is there, and its track from the previous pose is unknown.
 """
 
 from __future__ import annotations
@@ -13,10 +13,10 @@ from typing import NamedTuple
 
 from fasaco_edge.grid.geometry import Pose2D, StampedPose
 
-# A base may drive by this factor faster than configured. Between two poses farther apart in time
-# nothing is known of its track, whatever the timeout of the pose [s].
+# A base may be faster than configured by this factor. Between two poses farther apart in time its
+# track is unknown, for any timeout of the pose [s].
 SPEED_MARGIN, LONGEST_S = 1.2, 3.0
-# By how much two poses may be farther apart than was driven: noise, and corrections [cells].
+# Largest excess of two poses' distance over the drive, by noise and corrections [cells].
 NOISE_CELLS = 0.5
 
 
@@ -25,7 +25,7 @@ class Driven(NamedTuple):
 
     Attributes:
         pose: the pose.
-        farthest_m: how far the robot can have driven to it from the one before; 0 if not known [m].
+        farthest_m: longest possible drive to it from the previous pose; 0 if not known [m].
         is_joined: whether it has driven from there.
     """
 

@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     # For types only: a daemon reads its ledger before the kernels are loaded.
     from fasaco_edge.grid.lattice import Cell
 
-# Two poses farther apart than this many cells are a jump, unless the robot can have driven it: what
-# was under the tool in between is unknown.
+# Two poses farther apart than this many cells are a jump, unless the robot can have driven it: the
+# floor under the tool in between is unknown.
 JUMP_CELLS = 2.0
 
 TILE = 64
@@ -190,7 +190,7 @@ class CoverageLedger:
         return _visits(self._tiles, window)
 
     def has_visited(self, cell: Cell) -> bool:
-        """Tell whether the tool has passed over ``cell``."""
+        """Return whether the tool has passed over ``cell``."""
         row, col = cell
         tile = self._tiles.get((row // TILE, col // TILE))
         return tile is not None and bool(tile[row % TILE, col % TILE])
@@ -232,7 +232,7 @@ class CoverageLedger:
         return near
 
     def _swept(self, start: Pose2D, end: Pose2D, near: dict[Cell, Point]) -> frozenset[Cell]:
-        """Return those of ``near`` whose point is within half a cell of the segment."""
+        """Return the cells of ``near`` whose point is within half a cell of the segment."""
         half = 0.5 * self._cell_m
         dx, dy = end.x - start.x, end.y - start.y
         length2 = dx * dx + dy * dy

@@ -1,4 +1,4 @@
-"""Loss: how much of what is covered a command would forget."""
+"""Loss: how many covered cells a command would forget."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class Loss:
         """Refuse a command by which this would be lost.
 
         Raises:
-            WouldForget: there is a loss; it says how much.
+            WouldForget: there is a loss; the text gives its size.
         """
         if self.cells:
             raise WouldForget(f"{command} forgets {self}")
@@ -50,7 +50,7 @@ def percents(share: float) -> str:
 
 
 def loss_in(zones: tuple[Zone, ...], ledger: MissionLedger, on: MapState) -> Loss:
-    """Return what is covered in zones; without a map, all that is covered anywhere."""
+    """Return the covered cells in zones; without a map, all covered cells."""
     if not zones:
         return Loss(0, 0.0)
     lattice, own = on.lattice, ledger.current.snapshot()

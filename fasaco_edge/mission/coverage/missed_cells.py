@@ -23,7 +23,7 @@ class MissedCells:
         self._again.clear()
 
     def may_come_back(self, cell: Cell) -> bool:
-        """Tell whether the robot may come back to a cell once more."""
+        """Return whether the robot may come back to a cell once more."""
         return self._again.get(cell, 0) < MOST_AGAIN
 
     def come_back(self, cell: Cell) -> None:

@@ -107,7 +107,7 @@ class MissionLedger:
             tool_m: width of the tool [m].
             ahead_m: from where the robot turns about to the tool's centre, ahead [m].
             shared: cells swept by other robots; None for a robot alone.
-            sight: of a tool that sticks out of the robot; None for one that does not.
+            sight: for a tool that sticks out of the robot; None for one that does not.
         """
         self._sight = sight
         self._cell_m, self._tool_m, self._ahead_m = cell_m, tool_m, ahead_m
@@ -155,7 +155,7 @@ class MissionLedger:
 
     @property
     def is_confirmed(self) -> bool:
-        """Whether no map can contradict it any more."""
+        """Whether no further map can contradict it."""
         return self._resumed is None
 
     def resume(self, before: LedgerSnapshot, *, is_confirmed: bool = False) -> None:
@@ -216,7 +216,7 @@ class MissionLedger:
         return None if start is None else Motion(start, pose)
 
     def forget_uncertain(self, pose: Pose2D) -> int:
-        """Forget what is uncertain after a motion of the map; return the number of such cells."""
+        """Forget cells that a motion of the map makes uncertain; return their number."""
         motion, self._pose_before_motion = self.map_motion(pose), None
         if motion is None or motion.is_still:
             return 0
@@ -290,13 +290,13 @@ class MissionLedger:
     def contradicts(self, lattice: CoverageLattice) -> bool:
         """Return whether a map blocks too many covered cells to be of the same building.
 
-        For a map whose walls are not those before: new furniture alone would block fewer.
+        It is used for a map with other walls: new furniture alone would block fewer cells.
         """
         fit = Fit.of(self.current.snapshot(), lattice)
         return fit.verdict is Verdict.OTHER and fit.blocked >= MANY_AT_ONCE * fit.known
 
     def begin_elsewhere(self, frame: str) -> LedgerMismatchError:
-        """Start over in another building, whose map is in ``frame``; return what to report."""
+        """Start over in another building, whose map is in ``frame``; return the fault to report."""
         cells = self.current.snapshot().cells
         self._resumed = self._pose_before_motion = None
         self._forget_passed()
@@ -313,7 +313,7 @@ class MissionLedger:
         )
 
     def _forget_passed(self) -> None:
-        """Forget what the robot has passed: the floor there has to be swept again."""
+        """Forget passed cells: the floor there has to be swept again."""
         self.passed.clear()
         self.missed.clear()
 

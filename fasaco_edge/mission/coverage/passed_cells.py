@@ -1,7 +1,7 @@
-"""Passed cells: those that the robot has passed while floor in them is unswept.
+"""Passed cells: cells that the robot has passed, but in which floor is unswept.
 
-In a fleet a cell counts as swept once a robot has swept its middle, and nobody drives there for the
-rest. That floor stays this robot's, whoever's part it lies in: its line sweeps it where it passes
+In a fleet a cell counts as swept once a robot has swept its centre, and no robot drives there for
+the rest. That floor stays with this robot, in any robot's part: its line sweeps it when it passes
 near again.
 """
 
@@ -35,7 +35,7 @@ class PassedCells:
             self.drop(next(iter(self._cells)))
 
     def next(self, most: int) -> list[Cell]:
-        """Return the cells to be looked at now: those that were not for longest."""
+        """Return the cells to check now: the ones whose last check is longest ago."""
         cells = list(self._cells)[:most]
         for cell in cells:
             del self._cells[cell]

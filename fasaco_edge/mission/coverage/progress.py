@@ -28,7 +28,7 @@ class Coverage:
 
     Attributes:
         coverable: cells that are reachable, or have been since the order began.
-        covered: those of them that the tool has passed over.
+        covered: number of them that the tool has passed over.
         recovered: those it has passed over at least twice.
         unreachable: coverable cells that the robot never could reach.
         cell_m2: area of a cell [m2].
@@ -63,7 +63,7 @@ class Coverage:
 
     @property
     def remaining(self) -> int:
-        """Cells still to be covered, of those that are reachable or have been."""
+        """Number of cells still to be covered that are reachable or have been."""
         return self.coverable - self.covered
 
     @property
@@ -78,7 +78,7 @@ class Coverage:
 
     @property
     def fraction(self) -> float:
-        """Covered share of the reachable cells, 0 where there are none."""
+        """Covered share of the reachable cells, 0 if there are none."""
         return self.covered / self.coverable if self.coverable else 0.0
 
 
@@ -162,7 +162,7 @@ class PathProgress:
         return replace(self, index=self.index + ahead)
 
     def is_far(self, cell: Cell) -> bool:
-        """Tell whether ``cell`` is too far from the robot's cell on the path."""
+        """Return whether ``cell`` is too far from the robot's cell on the path."""
         if not len(self.cells):
             return False
         row, col = self.cells[self.index]
@@ -178,7 +178,7 @@ class ZoneProgress:
         passes: number of passes ordered.
         begun: number of its newest pass; 0 before the first.
         cells: its reachable cells.
-        covered: those of them that are covered in that pass.
+        covered: number of them covered in that pass.
     """
 
     name: str

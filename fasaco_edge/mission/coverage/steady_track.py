@@ -57,7 +57,7 @@ class PoseScatter:
         self._before = (*self._before[-1:], pose)
 
     def _is_corner(self, first: Pose2D, middle: Pose2D, last: Pose2D) -> bool:
-        """Tell whether the robot turned, as noise would not."""
+        """Return whether the robot turned, as noise would not."""
         ax, ay, bx, by = (
             middle.x - first.x,
             middle.y - first.y,
@@ -86,7 +86,7 @@ class Place(NamedTuple):
     Attributes:
         x, y: the position [m].
         error_m: error bound to each side [m].
-        farthest_m: how far the robot can have driven to it from the one before; 0 if not known [m].
+        farthest_m: longest possible drive to it from the previous pose; 0 if not known [m].
         yaw: heading of the robot there [rad]; NaN if not known.
     """
 

@@ -94,7 +94,7 @@ class SweptFloor:
 
         Args:
             tool_m: width of the tool [m].
-            sight: of a tool that sticks out of the robot; None for one that does not.
+            sight: for a tool that sticks out of the robot; None for one that does not.
         """
         self._sight = sight
         self.changes = 0
@@ -102,8 +102,8 @@ class SweptFloor:
         self.dropped = 0
         self._tool_m = tool_m
         self._track = SteadyTrack(tool_m)
-        # The newest pose. The places before the one up to which sweeps are stored, that one, and
-        # after a long segment the one that waits for the next, which shows if the robot turned.
+        # The newest pose. The last place up to which sweeps are stored, and the place before it.
+        # After a long segment, a place waits for the next, which shows whether the robot turned.
         self._last: Pose2D | None = None
         self._before: Place | None = None
         self._kept_to: Place | None = None
@@ -170,7 +170,7 @@ class SweptFloor:
         most_m = max(JUMP_TOOLS * self._tool_m, farthest_m)
         if last is not None and (apart := _apart(last, pose)) <= most_m:
             if not apart:
-                return  # a pose repeated with each map says nothing about noise
+                return  # a pose repeated with each map gives no measure of noise
         else:
             self._end_track()
         before = self._around_ahead
@@ -271,7 +271,7 @@ class SweptFloor:
     def _segments(
         self, before: Place | None, start: Place, end: Place, after: Place | None
     ) -> list[Segment]:
-        """Return what is swept between two places: the way, or the places alone."""
+        """Return the sweeps between two places: along the way, or at the places alone."""
         away_m = beside_m(
             start.point,
             end.point,
@@ -331,7 +331,7 @@ class SweptFloor:
         return self._ahead
 
     def _segments_ahead(self, places: list[Place]) -> list[Segment]:
-        """Return what is swept beyond what is stored, to places in their order."""
+        """Return the sweeps after the stored ones, to places in their order."""
         if not places:
             return []
         chain = [self._before, self._kept_to or places[0], *places, None]
@@ -359,7 +359,7 @@ class SweptFloor:
         return self._sight.of(under, self._within(segments, window, self._sight.radius_m), window)
 
     def _within(self, segments: Sequence[Segment], window: Window, most_m: float) -> Mask:
-        """Return which pixel centres are within reach of segments, at most so far from them."""
+        """Return which pixel centres are within a distance of segments."""
         values = []
         for start, end, reach_m in segments:
             # Relative to each start: far from the origin rounding would swamp differences.

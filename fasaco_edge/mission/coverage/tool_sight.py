@@ -1,7 +1,7 @@
-"""Tool sight: what a tool that sticks out of the robot touches, and none of it through walls.
+"""Tool sight: the floor that a tool wider than the robot touches, which walls hide.
 
 Side brushes, a wide deck or a lamp reach over the rim of the robot's disc. As in
-``grid.tool_reach`` those pixels count that free ones connect with the disc, about within the tool.
+``grid.tool_reach``, a pixel counts if free pixels connect it with the disc, about within the tool.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from fasaco_edge.mission.coverage.floor_tiles import PIXEL_M, Mask
 
 
 class ToolSight:
-    """Finds what of the tool's disc the tool touches, on the newest map.
+    """Finds the part of the tool's disc that the tool touches, on the newest map.
 
     Attributes:
         radius_m: of the robot's disc [m].
@@ -43,11 +43,11 @@ class ToolSight:
         self._free_at_most, self._grid = free_at_most, grid
 
     def of(self, under: Mask, inner: Mask, window: Window) -> Mask:
-        """Return what of a window of floor the tool touches, bool (rows, cols).
+        """Return the pixels of a window of floor that the tool touches, bool (rows, cols).
 
         Args:
-            under: bool (rows, cols), what lies within the tool's disc.
-            inner: bool (rows, cols), what of it lies within the robot's.
+            under: bool (rows, cols), the pixels within the tool's disc.
+            inner: bool (rows, cols), the pixels within the robot's disc.
             window: their window.
         """
         grid = self._grid()

@@ -112,7 +112,7 @@ class UnreachedFinder:
         # Why the last one did; "" if that is not known.
         self._why_left = ""
         self._newest: ReachableArea | None = None
-        # Which cells of a window around all maps so far have ever been reachable.
+        # Which cells of a window around all maps received have ever been reachable.
         self._once: tuple[Window, NDArray[np.bool_]] | None = None
         # The same before the map moved, and whether cells have moved since the newest area.
         self._before_motion: tuple[Window, NDArray[np.bool_]] | None = None
@@ -120,7 +120,7 @@ class UnreachedFinder:
         self._found: tuple[object, Unreached] = (None, Unreached())
 
     def restart(self, reached: ReachedCells | None) -> None:
-        """Begin another order, or go on with one that had reached some cells before a restart."""
+        """Start another order, or continue one that had reached some cells before a restart."""
         self._failures, self._why_left, self._newest = 0, "", None
         self._once = None if reached is None else (reached.window, reached.mask)
         self._before_motion = None
@@ -128,7 +128,7 @@ class UnreachedFinder:
         self.note_area()
 
     def succeed(self, before: UnreachedFinder) -> None:
-        """Go on with what another one remembers of the same cells."""
+        """Take over a predecessor's state of the same cells."""
         self._failures, self._newest, self._once = before._failures, before._newest, before._once
         self._why_left = before._why_left
 
@@ -147,13 +147,13 @@ class UnreachedFinder:
             once = self._once_on(window)
             here = once[area.lattice.window.slices_in(window)]
             if self._have_moved:
-                # Beside what is reachable, cells that have moved by parts of a cell are walls.
+                # Beside reachable cells, a cell that moved by part of a cell is a wall.
                 here &= area.lattice.coverable | ~_widened(area.reachable)
             here |= reachable
             self._once, self._newest, self._have_moved = (window, once), area, False
 
     def note_map_motion(self) -> None:
-        """Note that the newest map has moved; ``move`` tells how."""
+        """Note that the newest map has moved; ``move`` gets the motion."""
         self._before_motion = self._before_motion or self._once
 
     def move(self, motion: Motion) -> None:
@@ -198,7 +198,7 @@ class UnreachedFinder:
         self._failures, self._why_left = self._failures + 1, why
 
     def unreached(self, state: OrderState) -> Unreached:
-        """Return what stays uncovered; the last result while the robot is on no coverable cell."""
+        """Return uncovered cells; the last result while the robot is on no coverable cell."""
         area = self._map.area
         if state.order is None:
             return Unreached()
@@ -208,10 +208,10 @@ class UnreachedFinder:
         return self._found[1]
 
     def reached_m2(self, area: ReachableArea) -> tuple[float, float]:
-        """Return how large an area is, and all that was ever reachable [m2].
+        """Return the size of an area, and of all cells that were ever reachable [m2].
 
-        Covered cells are: after a restart they alone are remembered. Without what the map no longer
-        knows, as that of a mapper that has begun anew.
+        Covered cells count as reachable: after a restart only they are known. Cells that are now
+        unknown on the map, for instance of a restarted mapper, do not count.
         """
         once = self.known(area.lattice) | (self._ledger.visits(area.lattice.window) > 0)
         once &= area.lattice.states != UNKNOWN
@@ -249,7 +249,7 @@ class UnreachedFinder:
         return f"{ending}: {', '.join(why)}" if why else ending
 
     def is_any_left(self, order: MissionOrder) -> bool:
-        """Tell whether any cell that was ever reachable, and is asked for, is not covered."""
+        """Return whether any cell that was ever reachable, and is asked for, is not covered."""
         lattice = self._map.lattice
         assert lattice is not None
         whole = self._around(lattice.window)
@@ -259,9 +259,9 @@ class UnreachedFinder:
     def _asked(
         self, order: MissionOrder, lattice: CoverageLattice, whole: Window
     ) -> NDArray[np.bool_]:
-        """Return what is asked for of what was ever reachable, bool (rows, cols) of a window.
+        """Return the ordered cells that were ever reachable, bool (rows, cols) of a window.
 
-        Of a map that was cut, what lay beyond counts, too.
+        If the map was cut, the cells cut off count, too.
         """
         asked = self._once_on(whole)
         asked[lattice.window.slices_in(whole)] = self.known(lattice)

@@ -1,7 +1,7 @@
-"""Alignment of a line with its walk: which cell of the walk each point stands for.
+"""Alignment of a line with its walk: the cell of the walk that each point stands for.
 
-The polisher moves points, leaves them out and puts others in, and its lanes need not be those of
-the walk; so the cells are found again by place (dynamic time warping, Sakoe and Chiba 1978).
+The polisher moves, removes and inserts points, and its lanes may differ from those of the walk; so
+the cells are found again by place (dynamic time warping, Sakoe and Chiba 1978).
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ def aligned(points: Points, stands: Points) -> Numbers:
     """
     apart = (points[:, :1] - stands[:, 0]) ** 2 + (points[:, 1:] - stands[:, 1]) ** 2
     apart[np.isnan(apart)] = NOWHERE_PX2
-    # Least sums of the points so far, by the last one's stand.
+    # Least sums of the points up to now, by the last point's stand.
     sums = np.empty_like(apart)
     sums[0] = np.inf
     sums[0, 0] = 0.0
@@ -44,6 +44,6 @@ def aligned(points: Points, stands: Points) -> Numbers:
 
 
 def by_distance(place: Points, stands: Points) -> NDArray[np.intp]:
-    """Return the indices of stands by their distance to a place, (2,); those that are NaN last."""
+    """Return the indices of stands by their distance to a place, (2,); NaN stands last."""
     apart: NDArray[np.float64] = ((stands - place) ** 2).sum(axis=1)
     return np.argsort(apart, kind="stable")

@@ -42,7 +42,7 @@ WORTH_S, RIM_M, LOOKED_AT = 4.0, 0.1, 24
 # matcher that took an eighth more time, for 0.3 % of the floor. A base that drives beside its line
 # misses more, and poses that come seldom leave more unknown.
 LEAST_MISSED = 0.05
-# Less unswept floor is not reported at the end: rounded to a tenth it is none [m2].
+# Less unswept floor is not reported at the end: rounded to a tenth it is 0 [m2].
 LEAST_TOLD_M2 = 0.05
 
 
@@ -203,7 +203,7 @@ class LineLayer:
         ahead.lay(cells, pose, is_cut=is_cut, keeps=not self._is_way, beside=beside)
 
     def _set_aside(self, ahead: LineAhead, is_driven: bool) -> None:
-        """Set the line aside with the path, and take it up with the next one that is driven."""
+        """Set the line aside with the path, and resume it with the next path that is driven."""
         if self._route.aside is not None:
             ahead.set_aside()
         elif is_driven:
@@ -287,7 +287,7 @@ class LineLayer:
                 self._ledger.credit(cell)
 
     def open_missed(self) -> bool:
-        """Open cells again in which floor is left that is worth the way; tell whether any is.
+        """Open cells again in which floor is left that is worth the way; return whether any is.
 
         To be called at the end of a path: the robot may have driven beside its line.
         """

@@ -1,7 +1,7 @@
 """Lead-out: the first step of a robot whose disc does not fit where it stands.
 
-A robot is a little off its line, poses are noisy, and walls get thicker from map to map. It comes
-no nearer to anything than it is, so the step leads away from what it is too near to.
+A robot is a little off its line, poses are noisy, and walls get thicker from map to map. The step
+leads away from obstacles that are too near, and comes nearer to none.
 """
 
 from __future__ import annotations
@@ -16,9 +16,9 @@ from fasaco_edge.kernels.floor.bits import unpacked
 from fasaco_edge.mission.line.polyline import Points
 from fasaco_edge.mission.line.way import is_clear_between
 
-# A robot nearer to something than this share of its radius is not where its pose says.
+# A robot nearer to an obstacle than this share of its radius has a wrong pose.
 LEAST_SHARE = 0.5
-# So many of the nearest places are tried for one that is led to straight.
+# Number of nearest places tried for one with a straight, free way.
 TRIED = 64
 # Precision of a radius [pixels].
 RADIUS_PX = 0.125
@@ -45,7 +45,7 @@ def fitting_radius(floor: FloorMap, here: Points) -> float:
 
 
 def leads_out(floor: FloorMap, here: Points, to: Points) -> bool:
-    """Tell whether a robot whose disc does not fit is led straight to a point, as by ``lead_out``.
+    """Return whether ``lead_out`` leads a robot whose disc does not fit straight to a point.
 
     Args:
         floor: the floor.
@@ -60,8 +60,8 @@ def leads_out(floor: FloorMap, here: Points, to: Points) -> bool:
 def lead_out(floor: FloorMap, here: Points) -> Points:
     """Return the place where the robot's disc fits again, float64 (1, 2): y, x [pixels].
 
-    Empty, (0, 2), if it fits where it is, or if no place is led to straight, within the robot's
-    diameter, without coming nearer to anything.
+    The result is empty, (0, 2), if the disc fits at ``here``, or if no straight way within the
+    robot's diameter leads to such a place without coming nearer to an obstacle.
 
     Args:
         floor: the floor.

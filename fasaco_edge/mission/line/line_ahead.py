@@ -39,7 +39,7 @@ from fasaco_edge.mission.line.tally import SweepTally
 from fasaco_edge.mission.line.way import corners_between, is_clear_between, shortened
 from fasaco_edge.planners.path import common_beginning
 
-# So many of the nearest cells are tried for one that the robot can drive to straight.
+# Number of nearest cells tried for one that the robot can drive to straight.
 TRIED = 8
 
 
@@ -70,7 +70,7 @@ class LineAhead:
     def follow_floor(self, floor: FloorMap) -> bool:
         """Follow the floor to another raster; return whether the line had to be dropped.
 
-        It stays where it is on the map, to be checked there, unless the raster is turned.
+        The line keeps its place on the map, to be checked there, unless the raster is turned.
         """
         is_same, before = floor is self._floor, self._geometry
         self._floor, self._geometry = floor, floor.geometry
@@ -89,9 +89,9 @@ class LineAhead:
         return dropped
 
     def _carry(self, before: GridGeometry) -> None:
-        """Carry what lies on a raster over to the floor's, of another size or by part of a pixel.
+        """Convert everything on a raster to the floor's, of another size or shifted by a sub-pixel.
 
-        A mapper whose map begins at the farthest point seen moves all its pixels with that point.
+        If a mapper's map begins at the farthest point seen, all its pixels move with that point.
         """
         carried = partial(raster_to_raster, before, self._geometry)
         whole = Window(0, 0, self._geometry.rows, self._geometry.cols)
@@ -161,7 +161,7 @@ class LineAhead:
         self._see(pose)
         # A plan's cells are read-only; for those kernels would be compiled again, in the loop.
         walk = walk.copy()
-        # A line ends before a cell that is off the lattice, whatever published it.
+        # Any line ends before a cell that is off the lattice.
         is_off = np.isnan(self._floor.stands.stands_of(walk)[:, 0])
         if is_off.any():
             walk = walk[: int(np.argmax(is_off))]
@@ -177,7 +177,7 @@ class LineAhead:
         else:
             pieces = kept_pieces(line, ahead, walk) if keeps and len(line) and len(walk) else []
             if pieces and pieces[0].begin == 0 and not self.is_followed:
-                # The robot is not behind its first point any more.
+                # The robot is no longer behind its first point.
                 rest = pieces[0].without_first()
                 pieces[:1] = [rest] if len(rest.line) else []
             self._walk, self.cell, self._cut = walk, 0, None
@@ -305,7 +305,7 @@ class LineAhead:
 
     @property
     def beside(self) -> Beside | None:
-        """Where the robot is beside the line; None where it does not follow one."""
+        """The robot's place beside the line; None if it does not follow one."""
         return self._place.beside(self.line.points, self.tally.unit_m) if self.is_followed else None
 
     @property
@@ -318,7 +318,7 @@ class LineAhead:
     def xy(self) -> Points:
         """Return the line from the robot on, float64 (n, 2): x, y in the map frame [m].
 
-        A robot beside its line begins at its place on it, unless its disc does not fit where it is.
+        A robot beside its line begins at its place on it, unless its disc does not fit at its pose.
         """
         points, here = self._from_place(), self._place.here
         if len(points) > 1:
@@ -331,7 +331,7 @@ class LineAhead:
         return raster_to_map(self._floor.geometry, points)
 
     def leads_on(self, xy: Points) -> bool:
-        """Tell whether the robot, on a line that is cut off, can drive along points for a while.
+        """Return whether the robot, on a line that is cut off, can drive along points for a while.
 
         Args:
             xy: float64 (n, 2): x, y [m]; the robot is between the first two.
@@ -383,9 +383,9 @@ class LineAhead:
         self.line = line.part(0, first).joined(part, line.part(end))
 
     def _nearest(self, begin: int, end: int) -> int:
-        """Return which cell of the walk from ``begin`` to ``end`` is nearest to the robot.
+        """Return the nearest cell of the walk from ``begin`` to ``end``.
 
-        The nearest whose stand it can drive to straight, as the next walk begins there.
+        It has to have a stand that the robot can drive to straight, as the next walk begins there.
         """
         stands, here = self._stands(begin, end), self._place.here
         nearest: list[int] = by_distance(here, stands)[:TRIED].tolist()
@@ -409,7 +409,7 @@ class LineAhead:
         return lengths(self.line.points, within_m / unit_m, self._place.along) * unit_m
 
     def _take(self, pieces: list[Piece]) -> None:
-        """Replace the line; what differs is counted and polished again.
+        """Replace the line; changed parts are counted and polished again.
 
         Args:
             pieces: their ``begin`` is 0 or more if they are part of the previous line.

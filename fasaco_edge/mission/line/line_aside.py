@@ -12,7 +12,7 @@ from fasaco_edge.mission.line.polyline import Line, Points, Walk
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LineAside:
-    """A line on the raster that it will be taken up on; empty where there was none, or no more.
+    """A line on the raster that it will be resumed on; empty if there is none.
 
     Attributes:
         walk: int32 (n, 2), its cells.

@@ -13,12 +13,12 @@ from fasaco_edge.planners.line import LineConfig
 
 @dataclass(frozen=True, slots=True)
 class MissedFloor:
-    """What it takes to come back to cells, and what their floor is worth.
+    """Cost of driving back to cells, and worth of their floor.
 
     Attributes:
         speed_m_s: speed of the robot [m/s].
         price_s_m2: worth of floor [s/m2].
-        least_s: least worth of what is come back for, without the way there [s].
+        least_s: least worth of floor to drive back for, without the way there [s].
     """
 
     speed_m_s: float
@@ -39,8 +39,8 @@ class MissedFloor:
     ) -> list[Cell]:
         """Return the cells whose floor is worth driving to, and through them.
 
-        Cells side by side are taken together or not at all, the nearest first, each from the ones
-        before.
+        Cells side by side are taken together or not at all. The nearest come first, and each way
+        starts at the cells taken before.
 
         Args:
             areas_m2: floor left in each cell [m2].

@@ -19,7 +19,7 @@ from fasaco_edge.grid.geometry import Point
 STEP_M, CORNER_M, JUMP_M = 0.05, 0.25, 1.0
 # A bend of more than this is a corner [rad].
 BEND_RAD = math.radians(10.0)
-# Judged by the last so many: of 10 m; at least 5 m.
+# Number of samples used, of the last 10 m; and least number, of 5 m.
 MOST, LEAST = 200, 100
 # The least offset that counts: a share of the tool's width, and a distance that no follower is more
 # exact than [m].
@@ -55,7 +55,7 @@ class Offset:
         self._straight_m = self._since_m = 0.0
 
     def succeed(self, before: Offset) -> None:
-        """Go on with what another one has collected."""
+        """Take over the samples of a predecessor."""
         self._left_m = before._left_m
 
     def note(self, at: Point, beside: Beside | None) -> None:

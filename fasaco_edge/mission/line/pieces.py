@@ -16,8 +16,8 @@ from fasaco_edge.kernels.floor.runs import AFTER, BACKWARD, BEFORE, STEPS, commo
 from fasaco_edge.mission.line.polyline import RAW, Edges, Line, Numbers, Points, Walk, edges_between
 from fasaco_edge.planners.path import common_beginning
 
-# Least steps of a reused piece: shorter ones would consist mostly of joints. That at the robot has
-# one joint only, and may be shorter: what is just ahead stays as it is.
+# Least steps of a reused piece: shorter ones would consist mostly of joints. The piece at the robot
+# has one joint only, and may be shorter, so that the line just ahead stays as it is.
 LEAST_STEPS = 8
 
 
@@ -75,10 +75,10 @@ def exchanged(line: Line, pieces: list[Piece]) -> tuple[Line, Edges, Edges]:
 
     Args:
         line: the previous line.
-        pieces: in order; ``begin`` is -1 for those that are no part of the previous line.
+        pieces: in order; ``begin`` is -1 for pieces that are no part of the previous line.
 
     Returns:
-        the new line, the edges of the previous one that go, and those that come: float64 (n, 4).
+        the new line, the removed edges of the previous line, the added edges: float64 (n, 4).
     """
     new = pieces[0].line.joined(*(piece.line for piece in pieces[1:])) if pieces else Line()
     goes, comes = np.ones(max(len(line) - 1, 0), bool), np.ones(max(len(new) - 1, 0), bool)
@@ -105,9 +105,9 @@ class Joiner:
         begin: index of the robot's cell in the walk.
         stand: returns the stand of a cell, float64 (2,).
         raw: returns the line over the stands of a walk, points and cells from 0.
-        is_clear: tells whether the robot can drive straight between two points.
-        is_swept: tells whether a cell's stand needs no sweep.
-        way: returns the corners of a way round what is between two points, float64 (n, 2); none
+        is_clear: returns whether the robot can drive straight between two points.
+        is_swept: returns whether a cell's stand needs no sweep.
+        way: returns the corners of a way round obstacles between two points, float64 (n, 2); none
             if there is no way.
     """
 
@@ -124,7 +124,7 @@ class Joiner:
     def joined(self, pieces: list[Piece]) -> list[Piece]:
         """Return the line as pieces; new ones have ``begin`` -1."""
         self._done = [Piece(self.here, -1)]
-        # The point behind the robot needs the one after it; both are kept or dropped.
+        # The point behind the robot needs the next one; both are kept or dropped.
         if pieces and pieces[0].begin == 0:
             if len(pieces[0].line) > 1:
                 self._done = pieces[:1]
@@ -174,7 +174,7 @@ class Joiner:
     def _lead_in(self, at: int) -> bool:
         """Lead from the robot's position to a cell whose stand it does not see, if there is a way.
 
-        A polished line passes where no stand can be seen from.
+        A polished line passes places from which no stand can be seen.
         """
         stand = self.stand(self.walk[at])
         corners = self.way(self.here.points[-1], stand)

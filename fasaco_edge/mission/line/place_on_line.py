@@ -16,7 +16,7 @@ from fasaco_edge.mission.line.polyline import Points
 # on, the next lane may be as near.
 LOOK_AHEAD_M = 0.8
 # Distance to the end of its line at which a robot has arrived [m]; it has also arrived if the tool
-# covers the end, and so many poses come no nearer: it may drive beside its line.
+# covers the end, and this many poses come no nearer: it may drive beside its line.
 ARRIVED_M, STANDING_POSES = 0.05, 10
 
 
@@ -31,7 +31,7 @@ class PlaceOnLine:
     def __init__(self) -> None:
         self.here = np.zeros(2)
         self.along = 0.0
-        # Least distance to the end of the line so far, and number of poses that came no nearer.
+        # Least distance to the end of the line, and number of later poses that came no nearer.
         self._nearest, self._poses_there = math.inf, 0
 
     def on(self, points: Points) -> Points:
@@ -41,7 +41,7 @@ class PlaceOnLine:
         return place
 
     def is_on(self, points: Points, tool: float) -> bool:
-        """Tell whether the robot is on the line, within half the tool."""
+        """Return whether the robot is on the line, within half the tool."""
         return len(points) > 1 and math.hypot(*(self.on(points) - self.here)) <= tool
 
     def beside(self, points: Points, unit_m: float) -> Beside | None:
@@ -99,7 +99,7 @@ class PlaceOnLine:
         return at[0]
 
     def has_arrived(self, points: Points, left_m: float, tool: float, unit_m: float) -> bool:
-        """Tell whether the robot is at the end of its line; to be called once for each pose.
+        """Return whether the robot is at the end of its line; to be called once for each pose.
 
         Args:
             points, tool: as for ``find``.

@@ -32,13 +32,13 @@ MOVED_M = 6.0
 # at most AHEAD_M ahead, in pieces of PIECE_M [m]. Farther ahead the map of an exploring robot may
 # still grow.
 NEAR_M, AHEAD_M, PIECE_M = 5.0, 8.0, 4.0
-# Third pass: annealing, from this distance ahead, or from where the line is held, in so many pieces
-# of this length, in turn [m].
+# Third pass: annealing, from this distance ahead, or from the end of the held line; length of a
+# piece [m], and number of pieces, taken in turn.
 ANNEALED_M, ANNEALED_PIECE_M, ANNEALED_PIECES = 2.0, 4.0, 2
 # Moves for each of them; and, on a complete map, the temperature of the farthest piece, as a share
 # of the full one.
 ANNEAL_MOVES, HOTTEST = 300, 0.3
-# The second and third pass look so far ahead [m].
+# Length of the line ahead that the second and third pass include [m].
 SEEN_M = 20.0
 # Limit on the moves per call, which bounds a cycle of the loop.
 MOST_MOVES = 3000

@@ -14,12 +14,12 @@ from fasaco_edge.mission.line.line_ahead import LineAhead
 from fasaco_edge.mission.line.polyline import POLISHED
 from fasaco_edge.mission.line.published_line import HELD_M, SEEN_POINTS, PublishedLine
 
-# A robot stands that has not come this far for so long [m], [s]; turns on the spot take less.
+# A robot stands if it has moved less than this in this time [m], [s]; a turn on the spot is faster.
 STANDING_M, STANDING_S = 0.05, 3.0
 
 
 class Publication:
-    """Keeps back what may wait.
+    """Keeps back paths that may wait.
 
     Args:
         route: numbers the paths.
@@ -83,7 +83,7 @@ class Publication:
         return replace(update, xy=ahead.xy())
 
     def _stands(self, ahead: LineAhead, now: float) -> bool:
-        """Note where the robot is; tell whether it stands."""
+        """Note the robot's place; return whether it stands."""
         here = ahead.here
         if math.dist(here, self._at) > STANDING_M:
             self._at, self._moved_at = here, now

@@ -1,4 +1,4 @@
-"""Published line: what the robot has of its line, and when it needs the line as it is now.
+"""Published line: the part of the line that the robot has, and when it needs the newest line.
 
 Maps, plans and polish change the line all the time, mostly far ahead of the robot. A change waits
 until the robot comes near it; so it may yet be taken back, and is published with others. What is
@@ -21,7 +21,7 @@ NEAR_M, NEAR_S = 1.0, 1.0
 # there, or after the patience [m], [s]. So is a line that is cut off nearer than that, if the robot
 # can drive on along the published one: a cell was lost, and a plan is there within that time.
 DUE_M, DUE_S, PATIENCE_S = 2.0, 1.0, 1.0
-# So far ahead a published line is not polished any more [m].
+# Length of a published line ahead of the robot that is no longer polished [m].
 HELD_M = 4.0
 # Points that are looked at: they reach farther than that.
 SEEN_POINTS = 128
@@ -77,7 +77,7 @@ class PublishedLine:
         return min(self._last_held - self._next + 2, self._common + 1)
 
     def is_due(self, now: float, is_settled: bool, leads_on: Callable[[Points], bool]) -> bool:
-        """Tell whether the line has to be published, as it was at the last look.
+        """Return whether the line has to be published, as it was at the last look.
 
         Args:
             now: [s].
@@ -100,7 +100,7 @@ class PublishedLine:
         return rest[: int(np.searchsorted(np.cumsum(ways), self._near_m)) + 3]
 
     def take(self, xy: Points, polished: int) -> None:
-        """Note that a line is published, of which so many points are polished."""
+        """Note that a line is published, and the number of its polished points."""
         self._xy, self._next, self._due_since = xy, 1, math.inf
         ways = np.hypot(*np.diff(xy[:SEEN_POINTS], axis=0).T) if len(xy) > 1 else np.empty(0)
         held = int(np.searchsorted(np.cumsum(ways), HELD_M)) + 1

@@ -46,7 +46,7 @@ class SweepTally:
         # Flags of each pixel, WANTED, OPEN, SWEPT and PASSED, and its cause of being out of reach.
         self._state = np.zeros(shape, np.uint8)
         self.sweeps = Sweeps(np.full(shape, NEVER, np.int16), np.zeros(blocks_of(shape), np.int32))
-        # Number of wanted pixels, of those that are swept, and of open ones.
+        # Numbers of wanted pixels, of swept ones among them, and of open ones.
         self._wanted_pixels = self._swept_pixels = self._open_pixels = 0
         # Number of pixels out of reach by cause; the first element is unused.
         self._beyond_pixels = np.zeros(len(Cause) + 1, np.int64)
@@ -109,9 +109,9 @@ class SweepTally:
     def pass_line(self, points: NDArray[np.float64]) -> None:
         """Note that the robot has passed a part of its line, float64 (n, 2), y, x [pixels].
 
-        Whether it swept the floor there, poses alone tell, later and more strictly. Until the end
-        of its path nothing is gone back to: what poses do not tell for certain the first time,
-        they seldom tell on a detour.
+        Only poses show whether it swept the floor there, later and more strictly. The robot does
+        not go back before the end of its path: floor that poses do not show as swept the first
+        time is seldom shown as swept by a detour.
         """
         self._open_pixels -= pass_line(self.sweeps, self._state, points, self._tool, self._scratch)
         (row0, col0), (row1, col1) = points.min(axis=0), points.max(axis=0)
@@ -125,7 +125,7 @@ class SweepTally:
         self._passed = Window.around(self._passed, part)
 
     def forget_passed(self) -> Window | None:
-        """Have what was passed and is not swept open at the next ``set_open``; return where."""
+        """Reopen passed, unswept floor at the next ``set_open``; return its window."""
         part, self._passed = self._passed, None
         if part is not None:
             self._state[part.slices_in(Window(0, 0, *self.shape))] &= ~np.uint8(PASSED)
@@ -177,7 +177,7 @@ class SweepTally:
         return {cause: int(self._beyond_pixels[cause]) * self.unit_m**2 for cause in Cause}
 
     def is_open(self, point: NDArray[np.float64]) -> bool:
-        """Tell whether a point, y, x [pixels], is still to be swept."""
+        """Return whether a point, y, x [pixels], is still to be swept."""
         row, col = np.rint(point).astype(int).tolist()
         return bool(self._state[row, col] & OPEN)
 

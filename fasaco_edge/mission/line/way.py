@@ -23,15 +23,15 @@ from fasaco_edge.kernels.lattice.reach import shortest_walk
 from fasaco_edge.mission.config import Sweeping
 from fasaco_edge.mission.line.polyline import Points
 
-# A point is connected straight to one of so many next ones, the farthest possible: each is a corner
-# of the walk, so this spans a hall.
+# Number of next points tried for the farthest straight connection of a point: each point is a
+# corner of the walk, so this spans a hall.
 MOST_SKIPPED = 40
 # How far a detour may lead away [m], and how far from a point it may begin at a place [pixels].
 DETOUR_M, BESIDE_PX = 2.0, 2.0
 
 
 def is_clear_between(floor: FloorMap, a: Points, b: Points, radius: float | None = None) -> bool:
-    """Tell whether the robot can drive straight between two points, (2,): y, x [pixels].
+    """Return whether the robot can drive straight between two points, (2,): y, x [pixels].
 
     ``radius``: of a smaller disc than the robot's [pixels]; None for the robot's.
     """
@@ -43,13 +43,13 @@ def is_clear_between(floor: FloorMap, a: Points, b: Points, radius: float | None
 
 
 def sees_on(floor: FloorMap, a: Points, b: Points) -> bool:
-    """Tell whether the robot can drive straight between two points, (2,): x, y [m]."""
+    """Return whether the robot can drive straight between two points, (2,): x, y [m]."""
     ends = [np.array(map_to_raster(floor.geometry, *point.tolist())) for point in (a, b)]
     return is_clear_between(floor, ends[0], ends[1])
 
 
 def comes_nearer(a: Points, b: Points, beside: Points) -> bool:
-    """Tell whether a straight way enters one of some discs, or goes farther into one.
+    """Return whether a straight way enters one of some discs, or goes farther into one.
 
     Args:
         a, b: its ends, (2,).
@@ -69,7 +69,7 @@ def shortened(
     Args:
         points: float64 (n, 2), n >= 1: y, x [pixels]; from each to the next one it is clear.
         floor: the floor.
-        beside: what no straight part comes too near to, as ``Route.beside``.
+        beside: discs that no straight part comes too near to, as ``Route.beside``.
     """
     geometry = floor.geometry
     near = () if beside is None else beside.tolist()
@@ -90,7 +90,7 @@ def shortened(
 
 
 def corners_between(floor: FloorMap, a: Points, b: Points) -> Points:
-    """Return the corners of a short way between two points round what is between them.
+    """Return the corners of a short way between two points, round the obstacles between them.
 
     Args:
         floor: the floor.

@@ -1,19 +1,19 @@
-"""Building watch: whether the newest map still shows the building that the ledger was swept in.
+"""Building watch: whether the newest map still shows the building of the ledger.
 
-Another floor, a saved map of another building or a map laid the other way round may come in the
-frame of the map before. Then walls and floor of the cells that both maps know agree no better than
-by chance: Cohen's kappa of blocked and free, 1 for equal maps, is about 0. After a loop closure
-they agree once the map before is moved as the robot's pose has moved. Where neither is so, the
-robot stands, and a map that stays like that for a while is another building's. A mapper that shows
-two buildings in turn decides nothing: the robot stands until one of them stays.
+Another floor, a saved map of another building or a map turned round may arrive in the frame of the
+previous map. Then walls and floor of the cells that both maps know agree no better than by chance:
+Cohen's kappa of blocked and free, 1 for equal maps, is about 0. After a loop closure the maps agree
+once the previous map is moved as the robot's pose has moved. If they agree in neither way, the
+robot stands, and a map that stays like that for a while is another building's. While a mapper shows
+two buildings in turn, nothing is decided: the robot stands until one of them stays.
 
-A map is compared with one of some seconds before (the reference), not with the last: a map sent in
-parts, or one of a mapper that begins anew and shows next to nothing at first, is another one, too.
+A map is compared with a map of some seconds before (the reference), not with the last one: a map
+sent in parts, or that of a restarted mapper, which is almost empty at first, differs from it, too.
 
 Measured on 5 buildings, cells of 0.3 m: the highest kappa of two buildings is 0.22, of the first
 2 m that a scanner sees in another one 0.35; the lowest in one building 0.59 for maps 0.3 m apart,
 0.32 for 0.6 m, 0.67 and 0.34 with furniture moved from and to 10 and 30 % of the coverable cells.
-Floors whose walls are alike are one building to this watch: they need frames of their own.
+Floors with the same walls are one building to this watch: they need frames of their own.
 """
 
 from __future__ import annotations
@@ -28,19 +28,19 @@ from fasaco_edge.grid.geometry import Pose2D
 from fasaco_edge.grid.lattice import BLOCKED, UNKNOWN, CoverageLattice
 from fasaco_edge.mission.map.loop_closure import LEAST_CELLS, Motion
 
-# Share of the cells known to both maps that differ: below, maps are taken for alike.
+# Share of differing cells, of those known to both maps, below which maps are alike.
 LEAST_SHARE = 0.05
-# Kappa below which two maps show different buildings; above ALIKE they show the same one, whatever
-# covered cells are blocked.
+# Kappa below which two maps show different buildings; above ALIKE they show the same building, even
+# if covered cells are blocked.
 FOREIGN, ALIKE = 0.3, 0.7
-# By how much the kappa of maps has to rise with a motion of the map that explains their difference.
+# Least rise of kappa by a motion of the map that explains the difference of two maps.
 BETTER = 0.1
 # Most cells compared under a motion.
 MOST_CELLS = 20_000
-# How long after the map the pose that shows its motion may come, before the robot stops [s].
+# Longest time from a map to the pose that shows its motion, before the robot stops [s].
 GRACE_S = 0.5
-# How long a map has to show another building, or again the one before, to be believed [s]; the
-# first doubles with each change of building within SOON_S, at most LONGEST-fold.
+# Time for which a map has to show another building, or again the previous one, to be accepted [s];
+# the first time doubles with each change of building within SOON_S, at most LONGEST-fold.
 PATIENCE_S, SETTLED_S, SOON_S, LONGEST = 5.0, 5.0, 600.0, 16
 # Age at which the reference is replaced [s], by a map that knows at least this share of its cells.
 AGE_S, KNOWN_SHARE = 5.0, 0.5
@@ -54,8 +54,8 @@ class Agreement:
 
     Attributes:
         known: number of cells known to both.
-        blocked: number of those that are blocked on the first and on the second.
-        both: number of those that are blocked on both.
+        blocked: number of them blocked on the first map, and on the second.
+        both: number of them blocked on both.
     """
 
     known: int
@@ -152,7 +152,7 @@ class BuildingWatch:
 
     @property
     def is_foreign(self) -> bool:
-        """Whether the newest map shows another building, as far as the pose has said."""
+        """Whether the newest map shows another building, by the poses received."""
         return self._foreign is not None
 
     def begin_anew(self) -> None:
@@ -162,7 +162,7 @@ class BuildingWatch:
         self._has_closed = self._is_blind = False
 
     def accept(self, now: float) -> None:
-        """Take the newest map's building for the one that the robot is in from now on."""
+        """Accept the newest map's building as the robot's from now on."""
         self._changes = 1 + (self._changes if now - self._changed_at < SOON_S else 0)
         self._changed_at = now
         self._end(now)
@@ -259,7 +259,7 @@ class BuildingWatch:
         return for_s >= patience_s
 
     def _explains(self, motion: Motion, seen: Agreement) -> bool:
-        """Tell whether the newest map is that of the building before, moved like this."""
+        """Return whether the newest map is that of the building before, moved like this."""
         if motion.is_still or self._reference is None or self._newest is None:
             return False
         moved = Agreement.moved(self._reference, self._newest, motion)

@@ -131,7 +131,7 @@ class _Pixels:
         return cls(corners, reach, Window(row0, col0, row1, col1))
 
     def touch_free(self, grid: OccupancyGrid, free_at_most: int) -> bool:
-        """Tell whether one of them is free."""
+        """Return whether one of them is free."""
         window = self.window
         values = grid.cells[window.row0 : window.row1, window.col0 : window.col1]
         free = (values >= 0) & (values <= free_at_most)

@@ -26,7 +26,7 @@ PATIENCE_S = 10.0
 GAP_S = 3.0
 
 
-# Poses are too far apart where the track to half of the last so many is unknown.
+# Poses are too far apart if the track to half of this many last poses is unknown.
 LOOKED_BACK = 10
 
 
@@ -170,12 +170,12 @@ class InputMonitor:
     """Timeouts of maps and poses, and jumps between poses. All times are [s].
 
     Attributes:
-        doubt: why the robot may not be where its path says; "" for none. It is cleared when a plan
-            from the new position arrives, or the robot is on its path after all.
-        doubt_since: when that began.
-        farthest_m: how far the robot can have driven between the last two poses, by their stamps
-            and its speed; 0 where that is not known [m].
-        driven: which poses count for what was swept.
+        doubt: why the robot may be off its path; "" for none. It is cleared when a plan from the
+            new position arrives, or the robot is on its path after all.
+        doubt_since: start of the doubt.
+        farthest_m: longest possible drive between the last two poses, by their stamps and the
+            robot's speed; 0 if not known [m].
+        driven: selects the poses used for swept floor.
     """
 
     def __init__(self, config: MissionConfig) -> None:
@@ -186,7 +186,7 @@ class InputMonitor:
         # Whether the track to each of the newest poses is unknown.
         self._gaps: deque[bool] = deque(maxlen=LOOKED_BACK)
         self._pose: StampedPose | None = None
-        # Whether a pose has come, in whatever frame.
+        # Whether a pose has arrived, in any frame.
         self._has_pose = False
         # When the last ones came; before that, when they began to be due.
         self._pose_at: float | None = None
@@ -244,7 +244,7 @@ class InputMonitor:
 
     @property
     def are_poses_far_apart(self) -> bool:
-        """Whether most of what is driven lies between poses, and does not count."""
+        """Whether most of the drive lies between poses, and does not count."""
         return 2 * sum(self._gaps) >= LOOKED_BACK
 
     def forget_pose(self, now: float) -> None:
@@ -274,14 +274,14 @@ class InputMonitor:
         return 0.0 if self._map_at is None else now - self._map_at
 
     def is_pose_lost(self, now: float) -> bool:
-        """Tell whether poses have timed out."""
+        """Return whether poses have timed out."""
         limit = self._config.policy.lost_pose_s
         return self._has_pose and 0 < limit < self.pose_silent_s(now)
 
     def is_map_stale(self, now: float) -> bool:
-        """Tell whether maps and updates have timed out."""
+        """Return whether maps and updates have timed out."""
         return 0 < self._config.policy.stale_map_s < self.map_silent_s(now)
 
     def is_sound(self, now: float) -> bool:
-        """Tell whether pose and map can be relied on."""
+        """Return whether pose and map can be relied on."""
         return not (self.is_pose_lost(now) or self.doubt or self.is_map_stale(now))

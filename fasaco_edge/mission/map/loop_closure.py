@@ -35,7 +35,7 @@ from fasaco_edge.mission.coverage.ledger import Cells, LedgerSnapshot
 # Threshold on the cells that change between free and blocked with one map: number, and share of
 # those known before. Doors and passers-by change fewer.
 LEAST_CELLS, LEAST_SHARE = 20, 0.1
-# A map with fewer cells to drive on shows no floor: it says nothing of walls, or of the building.
+# A map with fewer drivable cells shows no floor: it gives no evidence of walls, or of the building.
 LEAST_FLOOR = LEAST_CELLS
 # Smaller motions are ignored: [m], [rad].
 STILL_M, STILL_RAD = 0.02, math.radians(0.2)
@@ -50,12 +50,12 @@ MOST_BETWEEN = 16
 
 
 def shows_floor(lattice: CoverageLattice) -> bool:
-    """Tell whether a map shows floor, and so says where walls are."""
+    """Return whether a map shows floor, and so gives evidence of walls."""
     return int(np.count_nonzero(lattice.coverable)) >= LEAST_FLOOR
 
 
 def has_moved(change: LatticeChange) -> bool:
-    """Tell whether a map shows the walls at other places all over."""
+    """Return whether a map shows the walls at other places all over."""
     if change.before is None or len(change.cells) < LEAST_CELLS:
         return False
     then, now = (

@@ -46,13 +46,13 @@ class MapState:
     Attributes:
         grid: the newest map, with all updates and obstacles; None before there is one.
         given: the same without obstacles, as it came.
-        obstacles: what the map does not show.
+        obstacles: obstacles that the map does not show.
         map_revision: counter of map states: full maps, batches of updates, changes of frame; 0
             before the first.
         pose: the newest pose in the map's frame; before the first map, in any frame.
         has_moved: whether the newest map shows the walls at other places: a loop closure.
-        shift: a small shift of the newest map against the one before; None for none.
-        shows_floor: whether the newest map shows floor; one that shows none says nothing of walls.
+        shift: a small shift of the newest map against the previous one; None for none.
+        shows_floor: whether the newest map shows floor; else it gives no evidence of walls.
         area: the reachable area as of the last ``update_area``; None while the robot's pose is on
             no coverable cell.
         frames: selects the active frame; keeps the inputs of another.
@@ -140,7 +140,7 @@ class MapState:
         raise PatchWithoutBase(f"{count} map updates were lost")
 
     def draw_obstacles(self) -> None:
-        """Draw the newest map anew: what is closed on it has changed."""
+        """Draw the newest map again: the closed floor on it has changed."""
         if self.given is not None:
             self._take_map(self.given)
             self.has_moved = False  # its walls are where they were
@@ -148,7 +148,7 @@ class MapState:
     def without_obstacles(self, lattice: CoverageLattice) -> CoverageLattice:
         """Return a lattice over the newest map on which cells near obstacles are unknown.
 
-        For what the map alone says: of the building, not of who stands in it.
+        It shows the map alone: the building without robots that stand in it.
         """
         if self.grid is None or self.given is None or self.grid is self.given:
             return lattice
@@ -295,7 +295,7 @@ class MapState:
         return anchor_cell(lattice, dock.stand) if is_docked else None
 
     def cell_at_pose(self) -> Cell | None:
-        """Return the coverable cell at the robot's pose; where there is none, ``robot_cell``.
+        """Return the coverable cell at the robot's pose; ``robot_cell`` if there is none.
 
         A polished line takes short cuts: the cell of its path may be metres from the robot.
         """
@@ -325,7 +325,7 @@ class MapState:
 
     @property
     def is_kept_out(self) -> bool:
-        """Whether the robot fits where it is, but for a keep-out zone."""
+        """Whether the robot fits at its place, apart from a keep-out zone."""
         if self.lattice is None or self.free is None or self.pose is None:
             return False
         cell = self.lattice.cell_at(self.pose.pose.x, self.pose.pose.y)
@@ -335,7 +335,7 @@ class MapState:
         return bool(self.free.states[place] == COVERABLE != self.lattice.states[place])
 
     def why_misplaced(self) -> str:
-        """Return why the robot's position is unusable, and what it waits for."""
+        """Return why the robot's position is unusable, and which input it waits for."""
         assert self.free is not None
         assert self.lattice is not None
         assert self.pose is not None

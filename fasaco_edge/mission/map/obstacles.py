@@ -1,8 +1,8 @@
-"""Obstacles that the map does not show: a follower met them, their floor is closed for a while.
+"""Obstacles that the map does not show: a follower reports them, their floor closes for a while.
 
-People go on and doors open, so such floor is tried again: after 20 s, and after twice as long each
-time something is met there again. Until then it is occupied on the mission's map, so all that a
-plan keeps clear of walls by keeps it clear of this, too. Where the robot stands it fits.
+People walk away and doors open, so such floor is tried again: after 20 s, and after twice as long
+each time an obstacle is reported there again. Until then it is occupied on the mission's map, so
+plans keep the same clearance from it as from walls. The robot's own place stays free.
 """
 
 from __future__ import annotations
@@ -17,15 +17,15 @@ from numpy.typing import NDArray
 from fasaco_edge.grid.geometry import Point
 from fasaco_edge.grid.occupancy import OCCUPIED, OccupancyGrid
 
-# Floor is closed for so long [s], twice as long each time it is closed again, up to a limit.
+# Time for which floor is closed [s], doubled each time it is closed again, up to a limit.
 CLOSED_S, MOST_CLOSED_S = 20.0, 320.0
-# It is the same floor within this distance [m]; it is forgotten after so long [s].
+# Distance within which it is the same floor [m]; time after which it is forgotten [s].
 SAME_M, FORGET_S = 0.5, 600.0
-# A follower that still stands there after so long [s] cannot drive the new path either: the floor
-# is closed wider, by this much each time [m], so often at most.
+# A follower that still stands there after this time [s] cannot drive the new path either: the floor
+# is closed wider by this much each time [m], up to this number of times.
 AGAIN_S, WIDER_M, MOST_WIDER = 3.0, 0.05, 4
-# Something is as deep as this, away from the robot, as points so far apart [m]; the follower keeps
-# so far from it [m]; and pixels so near to the robot's disc [m] stay free.
+# Assumed depth of an obstacle away from the robot, spacing of its points, the follower's clearance
+# from it, and width around the robot's disc that stays free [m].
 DEEP_M, SPACING_M, MARGIN_M, FREE_M = 0.3, 0.05, 0.06, 0.01
 # Largest map on which they are drawn [pixels]: it is kept twice then, see ``daemon.memory``.
 MOST_PIXELS = 6_000_000
@@ -38,7 +38,7 @@ class _Obstacle:
     """An obstacle.
 
     Attributes:
-        points: what was seen of it, the nearest first [m].
+        points: points seen of it, the nearest first [m].
         here: where the robot was [m].
         at, until: from when until when its floor is closed [s].
         times: how often it was closed, opened in between.
@@ -74,7 +74,7 @@ class Obstacles:
         """Close the floor at some points; return whether that changes anything.
 
         Args:
-            points: what was seen, the nearest first [m].
+            points: points seen, the nearest first [m].
             here: where the robot is [m].
             now: the time [s].
         """

@@ -89,7 +89,7 @@ class ReachableArea:
         return ReachableArea.around(lattice, cell)
 
     def contains(self, cell: Cell) -> bool:
-        """Tell whether ``cell`` is reachable."""
+        """Return whether ``cell`` is reachable."""
         return self.lattice.contains(cell) and bool(self.reachable[self.lattice.local(cell)])
 
     def change_since(self, before: ReachableArea) -> AreaChange:
@@ -114,7 +114,7 @@ class ReachableArea:
         )
         if not change:
             return change
-        # Reachable in exactly one of the two, also where only one of them has cells.
+        # Reachable in exactly one of the two, even if only one of them has cells there.
         came, went = self.reachable.copy(), before.reachable.copy()
         came[here] &= ~then
         went[there] &= ~now

@@ -23,14 +23,14 @@ from fasaco_edge.mission.map.loop_closure import Motion
 LEAST_CLOSED = 3
 # Largest shift along each axis [pixels], and number of pixels compared.
 FARTHEST_PX, MOST_PIXELS = 4, 2000
-# A shift puts this share of these pixels into the walls before, and so many more than none does.
+# Least share of these pixels that a shift moves into the previous walls; least gain over no shift.
 LEAST_ALIKE, BETTER = 0.5, 0.2
 # Of shifts that differ by less, the smallest is taken: along a corridor all are alike.
 ALIKE = 0.03
 
 
 def closes_cells(change: LatticeChange | None) -> bool:
-    """Tell whether a change of the lattice closes cells, as a shift of the map does."""
+    """Return whether a change of the lattice closes cells, as a shift of the map does."""
     if change is None or change.before is None:
         return False
     then, now = (
@@ -42,7 +42,7 @@ def closes_cells(change: LatticeChange | None) -> bool:
 
 
 def small_shift(before: OccupancyGrid, after: OccupancyGrid, footprint: Footprint) -> Motion | None:
-    """Return by how much a map has been shifted since the one before; None for not at all."""
+    """Return the shift of a map since the previous one; None for none."""
     rows, cols = np.nonzero(_wall_faces(after.cells, footprint))
     stride = 1 + len(rows) // MOST_PIXELS
     rows, cols = rows[::stride], cols[::stride]

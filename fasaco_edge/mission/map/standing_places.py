@@ -1,10 +1,10 @@
 """Standing places: zones, keep-out zones, home and dock of the configuration, on their map alone.
 
-Their coordinates mean something on the map that they were given for: that in the frame
-``map_frame`` of the configuration, or without one in the first frame in use with these places,
-which is kept with the ledger. On a map in another frame, and on one in this frame that shows
-another building, they are not used, and where there are keep-out zones nothing is driven: those of
-this map are not known. After a command ``reset`` they belong to the map that is in use then.
+Their coordinates are valid only on the map that they were given for. It is the map in the frame
+``map_frame`` of the configuration, or without one in the first frame used with these places, which
+is kept with the ledger. They are not used on a map in another frame, or of another building in this
+frame. With keep-out zones configured, the robot does not drive there, as the zones of that map are
+not known. After a command ``reset`` they belong to the map in use at that time.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ class StandingPlaces:
         values = {name: getattr(given, name) for name in self._names}
         of = msgspec.json.encode((values, given.map_frame))
         self._of = f"{zlib.crc32(of):08x}"
-        # The frame in use, "" before there is one; and what was last said of it.
+        # The frame in use, "" before there is one; and the last report on it.
         self._here = self._said = ""
 
     def enter(self, frame: str) -> PlacesElsewhere | None:

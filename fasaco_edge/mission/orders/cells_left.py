@@ -22,7 +22,7 @@ class CellsLeft:
     """Derives the cells left from map, ledger and company; owns nothing.
 
     Args:
-        config, map_state, ledger, company: what they are derived from.
+        config, map_state, ledger, company: the sources of the cells.
         zones: the zones of the order that are due; None without an order.
         exploration: the viewpoints.
     """
@@ -72,7 +72,7 @@ class CellsLeft:
 
     @property
     def frontier_cells(self) -> int:
-        """Number of reachable cells asked for that border on what the map does not show yet."""
+        """Number of reachable ordered cells that border on unknown cells of the map."""
         area = self._map.area
         if area is None:
             return 0
@@ -86,7 +86,7 @@ class CellsLeft:
 
     @property
     def keeps_passed(self) -> bool:
-        """Whether floor of cells that it has passed stays this robot's, whoever's part they are."""
+        """Whether floor of cells that this robot has passed stays with it, in any robot's part."""
         return self._company.has_members
 
     def asked_of_me(self, area: ReachableArea) -> NDArray[np.bool_]:
@@ -106,6 +106,6 @@ class CellsLeft:
         return int(np.count_nonzero(self.open_cells(area.lattice.window) & area.reachable))
 
     def left_to_me(self) -> int:
-        """Return the number of those that this robot has to visit."""
+        """Return the number of cells that this robot has to visit."""
         area = self._map.area
         return 0 if area is None else int(np.count_nonzero(self.open_to_me(area) & area.reachable))

@@ -18,7 +18,7 @@ from fasaco_edge.mission.orders.zones import in_zones
 SEEN_AROUND = 1
 # Period of looking again for a way past robots that stand in it [s].
 AGAIN_S = 1.0
-# A robot looks so long at ground that others see: its map may come late [s].
+# Time for which a robot looks at ground that others see: its map may come late [s].
 LOOKS_S = 6.0
 
 
@@ -101,7 +101,7 @@ class Exploration:
         Args:
             zone: the zone.
             area: the reachable area.
-            free: what of it can be reached around the robots that stand in the way now.
+            free: the part reachable around the robots that now stand in the way.
             cell: the robot's cell.
         """
         self.is_shut = False
@@ -118,7 +118,7 @@ class Exploration:
         return f"looking for a way to zone {zone.name!r}"
 
     def waits_for_way(self, now: float, patience_s: float) -> bool:
-        """Tell whether the robot waits, ``patience_s`` at most, for others to clear the way."""
+        """Return whether the robot waits, ``patience_s`` at most, for others to clear the way."""
         if not self.is_shut:
             self._shut_since = None
             return False
@@ -128,13 +128,13 @@ class Exploration:
         return now - self._shut_since <= patience_s
 
     def is_shut_still(self, now: float) -> bool:
-        """Tell whether it is too soon to look again for a way past others."""
+        """Return whether it is too soon to look again for a way past others."""
         return self._shut_since is not None and now - self._shut_looked < AGAIN_S
 
     def look_beyond(self, viewpoint: Cell, cell: Cell) -> str:
-        """Look from where ground begins that others see; return why a plan is wanted, or "".
+        """Look from the edge of ground that others see; return why a plan is wanted, or "".
 
-        Each place is looked from once: what others tell may be wrong, or closed to this robot.
+        Each viewpoint is used once: data of others may be wrong, or the way closed to this robot.
         """
         if any(_is_beside(viewpoint, at) for at in (cell, *self.looked)):
             return ""
@@ -144,7 +144,7 @@ class Exploration:
         return "looks for its part, which others see"
 
     def is_looking(self, cell: Cell, now: float) -> bool:
-        """Tell whether the robot stands and looks at ground that others see."""
+        """Return whether the robot stands and looks at ground that others see."""
         if self._beyond is None or not _is_beside(self._beyond, cell):
             return False
         if self._there_since is None:
@@ -161,7 +161,7 @@ class Exploration:
             self.viewpoints.clear()
 
     def skip_viewpoint(self) -> bool:
-        """Skip an unreached viewpoint; tell whether others may show the zone."""
+        """Skip an unreached viewpoint; return whether others may show the zone."""
         another = bool(self.looked and self.viewpoints)
         if another:
             self.viewpoints.clear()
@@ -174,11 +174,11 @@ class Exploration:
 
 
 def _is_beside(cell: Cell, other: Cell) -> bool:
-    """Tell whether from a cell no more is seen than from another."""
+    """Return whether a cell gives no better view than another."""
     return max(abs(cell[0] - other[0]), abs(cell[1] - other[1])) <= SEEN_AROUND
 
 
 def is_in_reach(zone: Zone, area: ReachableArea) -> bool:
-    """Tell whether any cell of a zone is reachable."""
+    """Return whether any cell of a zone is reachable."""
     inside = in_zones((zone,), area.lattice.window, area.lattice.cell_m)
     return bool((inside & area.reachable).any())

@@ -1,6 +1,7 @@
 """Keep-outs of the operator: named areas that hold under every order until they are removed.
 
-They are part of the order's state, so they are kept with the ledger; those of an order end with it.
+They are part of the order's state, so they are kept with the ledger. Keep-outs of an order end with
+the order.
 """
 
 from __future__ import annotations
@@ -72,7 +73,7 @@ def keep_out_document(keep_out: KeepOut) -> dict[str, object]:
 
 
 def added(keep_outs: KeepOuts, new: KeepOut) -> KeepOuts:
-    """Return keep-outs with another one; unchanged with one that is there already.
+    """Return keep-outs with another one added; unchanged if it is there already.
 
     Raises:
         OrderError: another one has that name, or there are too many, or too many corners.
@@ -102,7 +103,7 @@ def removed(keep_outs: KeepOuts, unwanted: KeepOut) -> KeepOuts:
     """Return keep-outs without the one of a name.
 
     Raises:
-        OrderError: there is none.
+        OrderError: there is no keep-out of this name.
     """
     rest = tuple(known for known in keep_outs if known.name != unwanted.name)
     if rest == keep_outs:

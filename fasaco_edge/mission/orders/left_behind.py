@@ -1,4 +1,4 @@
-"""Floor left behind: what was out of reach when the robot set out for home, and is in reach now."""
+"""Floor left behind: floor unreachable when the robot set out for home, and reachable now."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ class LeftBehind:
     _area: ReachableArea | None = None
 
     def set_out(self, area: ReachableArea | None) -> None:
-        """Note that the robot sets out for home; ``area``: what is reachable then."""
+        """Note that the robot sets out for home; ``area``: the reachable area at that time."""
         self._area = area
 
     def is_open(self, unswept: NDArray[np.bool_], area: ReachableArea) -> bool:
-        """Tell whether floor has opened since: a square of two by two cells at least.
+        """Return whether floor has opened since: a square of two by two cells at least.
 
         Rows of cells along walls come and go with the map's noise. ``unswept``: bool (rows, cols)
         of the area.

@@ -90,7 +90,7 @@ CommandName = Literal[
     "keep_out_remove",
 ]
 FORGETFUL = ("start", "reset")
-"""The commands that may forget what is covered."""
+"""The commands that may forget covered cells."""
 # Why a robot drives somewhere outside of its order; "" for none.
 Errand = Literal["", "home", "charge"]
 
@@ -102,7 +102,7 @@ class Command(NamedTuple):
         name: which.
         order: what to cover, for ``start``.
         keep_out: what to add or remove, for ``keep_out_add`` and ``keep_out_remove``.
-        discard: whether ``start`` and ``reset`` may forget what is covered.
+        discard: whether ``start`` and ``reset`` may forget covered cells.
     """
 
     name: CommandName
@@ -223,7 +223,7 @@ def order_document(order: MissionOrder) -> dict[str, object]:
 
 
 def is_named(order: MissionOrder) -> bool:
-    """Tell whether an order has zones that are given by name alone."""
+    """Return whether an order has zones that are given by name alone."""
     return any(zone.polygon == () for zone in order.zones)
 
 
@@ -250,7 +250,7 @@ def located(order: MissionOrder, standing: tuple[StandingZone, ...]) -> MissionO
 
 
 def rotated_order(order: MissionOrder, by_deg: float) -> MissionOrder:
-    """Return an order whose polygons are the given ones rotated by ``by_deg`` [deg]."""
+    """Return an order with its polygons rotated by ``by_deg`` [deg]."""
     given = order.as_given
     if not by_deg:
         return given

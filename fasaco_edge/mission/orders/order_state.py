@@ -76,8 +76,7 @@ class OrderState:
     Attributes:
         order: what to cover; None for none.
         automatic: whether it began without a command, and continues whenever the map shows more.
-        stage: phase: covering zones pass by pass, then retrying what was left over, then driving
-            home.
+        stage: phase: covering zones pass by pass, then retrying cells left over, then driving home.
         zone: index of the zone.
         pass_number: number of the pass over it, from 1.
         begun: whether that pass has begun.
@@ -208,7 +207,7 @@ class OrderState:
         return self
 
     def forgets(self, command: Command, after: OrderState) -> tuple[Zone, ...]:
-        """Return the zones whose coverage a command forgets, though their order is not over."""
+        """Return the zones of an unfinished order whose coverage a command forgets."""
         if command.name == "reset":
             return EVERYTHING_ONCE.zones
         order = after.order
@@ -243,7 +242,7 @@ class OrderState:
         return OrderState(self.order, paused=self.paused or self.errand == "home")
 
     def _interrupted(self, *, is_paused: bool) -> OrderState:
-        """Return the state after ``pause`` or ``resume``: what was interrupted goes on later."""
+        """Return the state after ``pause`` or ``resume``: interrupted work continues later."""
         if not (self.is_open or self.errand):
             name = "pause" if is_paused else "resume"
             raise CommandError(f"there is no mission to {name}")

@@ -30,8 +30,9 @@ from fasaco_edge.planners.problem import CoverageProblem
 # After this many paths in a row that cover no further cell, those left wait for the retry: the
 # robot may stop short of its path's end, with the last cell out of the tool's reach.
 MAX_IN_VAIN = 3
-# A robot is shut in if the area in its reach is less than this share of what ever was: if home is
-# in it, or if not. A robot at home is not shut in by a closed door to another room.
+# A robot is shut in if its reachable area is less than this share of all area ever reachable: the
+# first if home is in it, else the second. A closed door to another room does not shut in a robot at
+# home.
 HOME_SHARE, MOST_SHARE = 0.1, 0.5
 
 
@@ -104,7 +105,7 @@ class Sequencer:
 
     @property
     def waits_for_others(self) -> bool:
-        """Whether all that is left is others' to sweep, who go on with it."""
+        """Whether only parts of other robots are left, and these make progress."""
         return self._company.others_go_on and not self.cells.left_to_me()
 
     @property
@@ -147,22 +148,22 @@ class Sequencer:
         self._unreached.succeed(before._unreached)
 
     def move_home(self, motion: Motion) -> None:
-        """Move home, where it is a cell, with the map."""
+        """Move home with the map, if it is a cell."""
         if (home := self.order_state.home) is not None:
             cells = np.array([home], np.int32)
             ((row, col),) = moved_cells(cells, motion, self._config.footprint.cell_m).tolist()
             self.order_state = replace(self.order_state, home=(row, col))
 
     def note_map_motion(self) -> None:
-        """Note that the newest map has moved; ``move_reached`` tells how."""
+        """Note that the newest map has moved; ``move_reached`` gets the motion."""
         self._unreached.note_map_motion()
 
     def move_reached(self, motion: Motion) -> None:
-        """Move what was reachable with the map."""
+        """Move the reached cells with the map."""
         self._unreached.move(motion)
 
     def shift_reached(self, motion: Motion) -> None:
-        """Move what was reachable with the newest map, whose area is not known yet."""
+        """Move the reached cells with the newest map, whose area is not known yet."""
         self._unreached.shift(motion)
 
     def note_area(self) -> None:
@@ -183,7 +184,7 @@ class Sequencer:
         return self._unreached.reached_m2(area)
 
     def is_shut_in(self, area: ReachableArea) -> bool:
-        """Tell whether most of the floor and home are out of reach from an area, or nearly all.
+        """Return whether most of the floor and home are out of reach from an area, or nearly all.
 
         Not where all is covered: then nothing keeps the order from its end.
         """
@@ -192,7 +193,7 @@ class Sequencer:
         return reached < share * once and self._is_any_left()
 
     def _is_any_left(self) -> bool:
-        """Tell whether anything of the order is left that was ever reachable."""
+        """Return whether anything of the order is left that was ever reachable."""
         state = self.order_state
         if state.order is None or state.next_pass() is not state:
             return True
@@ -203,7 +204,7 @@ class Sequencer:
         self._run.exploration.note_cell(cell)
 
     def begin(self, cell: Cell, now: float) -> str:
-        """Begin what is due, from ``cell``; return why a plan is wanted, or ""."""
+        """Start the stage that is due, from ``cell``; return why a plan is wanted, or ""."""
         run = self._run
         if run.retry_at is not None and not self._is_worth_trying():
             self.advance(now)
@@ -317,7 +318,7 @@ class Sequencer:
         return self._ledger.current.snapshot().cells + self._run.exploration.reached
 
     def _leave_to_others(self) -> bool:
-        """Give up what this robot has tried in vain; tell whether nothing untried is left."""
+        """Give up what this robot has tried in vain; return whether nothing untried is left."""
         area = self._map.area
         assert area is not None
         unswept = self.cells.unswept(area.lattice.window) & area.reachable
@@ -325,7 +326,7 @@ class Sequencer:
         return not self._company.untried(unswept, area).any()
 
     def pass_over_unreachable(self) -> bool:
-        """Pass over what this robot cannot come to now, in a fleet; tell whether there was any.
+        """Pass over what this robot cannot come to now, in a fleet; return whether there was any.
 
         What it can come to of the others' parts comes before a retry.
         """
@@ -384,7 +385,7 @@ class Sequencer:
             self._company.try_again()
 
     def waiting_reason(self) -> str:
-        """Return as text what the robot waits for before a retry."""
+        """Return the reason of a wait before a retry as text."""
         cells, policy = self.unreached().cells, self._config.policy
         return (
             f"{cells} {'cell' if cells == 1 else 'cells'} not reached: tried again after "
@@ -392,7 +393,7 @@ class Sequencer:
         )
 
     def unreached(self) -> Unreached:
-        """Return what of the order stays uncovered on the present map."""
+        """Return the part of the order that stays uncovered on the present map."""
         return self._unreached.unreached(self.order_state)
 
     def _begin_retry(self, cell: Cell) -> str:
@@ -415,7 +416,7 @@ class Sequencer:
         self.order_state = replace(state, why=run.ending)
 
     def _is_worth_trying(self) -> bool:
-        """Tell whether a retry is worthwhile; recomputed if anything changed.
+        """Return whether a retry is worthwhile; recomputed if anything changed.
 
         It is while floor is closed for a while, by something that may be gone then.
         """

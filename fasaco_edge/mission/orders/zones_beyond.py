@@ -1,4 +1,4 @@
-"""Zones beyond reach: those of an order that the robot can come to no cell of, and their area."""
+"""Zones beyond reach: zones of an order in which the robot can reach no cell, and their area."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ def zones_beyond(
 ) -> str:
     """Return zones with their areas as text that follows another; "" for none.
 
-    A zone that was covered before its way was closed is none of them.
+    A zone that was covered before its way was closed does not count.
 
     Args:
         order: the order.
-        area: what is reachable.
+        area: the reachable area.
         free: the lattice without keep-out zones.
         visits: of its cells, uint16 (rows, cols).
     """
@@ -43,7 +43,7 @@ def zones_beyond(
 
 
 def _sticks_out(polygon: Polygon, lattice: CoverageLattice) -> bool:
-    """Tell whether part of a polygon lies beyond the map."""
+    """Return whether part of a polygon lies beyond the map."""
     x0, y0, x1, y1 = (edge / lattice.cell_m for edge in polygon_bounds(polygon))
     window = lattice.window
     return x0 < window.col0 or y0 < window.row0 or x1 > window.col1 or y1 > window.row1
