@@ -1,4 +1,4 @@
-"""Door to the wing of fleets: what a daemon needs of it, loaded where a fleet is configured."""
+"""Door to the wing of fleets: the parts a daemon needs, loaded only if a fleet is configured."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class MessageToOthers(Protocol):
 
 
 def company_of(config: DaemonConfig) -> CompanyKind:
-    """Return what the mission knows of other robots."""
+    """Return the mission's kind of interface to other robots."""
     if not config.fleet:
         return ALONE
     from fasaco_edge.fleet.daemon.exchange import kind_of  # noqa: PLC0415
@@ -70,7 +70,7 @@ def sender_of(config: DaemonConfig, bus: Bus) -> MessageToOthers | None:
 
 
 def report_of(config: DaemonConfig, mission: Mission | None, now: float) -> FleetReport | None:
-    """Return what the status says of the fleet at ``now`` [s]; None without a fleet."""
+    """Return the fleet's part of the status at ``now`` [s]; None without a fleet."""
     if not config.fleet:
         return None
     from fasaco_edge.fleet.daemon.report import report  # noqa: PLC0415

@@ -1,4 +1,4 @@
-"""A keep-out mask that comes as a message: Nav2's, or of whatever draws one.
+"""A keep-out mask that comes as a message, from Nav2 or another program.
 
 It takes the place of the file ``mission.keep_out_mask`` in the configuration in force, as a reload
 does: recordings and replays know it from there. Reading one takes as much memory as a map; maps
@@ -112,7 +112,7 @@ class MaskTopic:
                     hint = "publish map and mask in the same frame"
                     faults.append(BadConfiguration(text, hint=hint))
         self._in_force = self._masks.get(frame, self._in_force)
-        # Whether the mask comes as a message changes with a restart alone, whatever is written.
+        # Only a restart changes whether the mask comes as a message, even if the file changes.
         mission = structs.replace(config.mission, keep_out_mask=self._in_force)
         return structs.replace(config, mission=mission), faults
 

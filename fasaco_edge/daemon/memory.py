@@ -4,12 +4,12 @@ A daemon whose maps have at most P pixels, on a lattice of at most C cells, take
 
     BASE_BYTES + MAPS * P + CELL_BYTES * C
 
-and, where it lays a line over the floor, ``FLOOR_BYTES * P + STAND_BYTES * C`` more: its fine
-raster has no more pixels than a map may have (``grid.fine_raster``). This holds for any input at
-any rate and resolution. A limit on the memory, ``MemoryMax=`` of the unit, limits the maps: the
-sum is at most that limit without its last tenth, from where on the system throttles the service
-(``afforded``). Without a limit maps may be as large as the configuration says. One test checks the
-systemd units against these constants, another measures memory.
+and, if it plans lines over the floor, ``FLOOR_BYTES * P + STAND_BYTES * C`` more: its fine raster
+has no more pixels than a map may have (``grid.fine_raster``). This holds for any input at any rate
+and resolution. A limit on the memory, ``MemoryMax=`` of the unit, limits the maps: the sum is at
+most 90 % of that limit, above which the system throttles the service (``afforded``). Without a
+limit, the configuration gives the largest map. One test checks the systemd units against these
+constants, another measures memory.
 
 A pixel is a byte, held in up to ten copies if updates are as large as the map:
 

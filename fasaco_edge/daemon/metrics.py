@@ -155,7 +155,7 @@ class _Request:
         return b"\r\n\r\n" in self._head or len(self._head) >= MOST_BYTES
 
     def is_over(self, now: float) -> bool:
-        """Tell whether it has expired, its answer is delivered, or the client is gone."""
+        """Return whether it has expired, its answer is delivered, or the client is gone."""
         if now > self.until:
             return True
         return not self._unsent() if self.is_answered else self._is_gone

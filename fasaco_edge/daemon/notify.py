@@ -29,7 +29,7 @@ SHARE = 0.25
 
 
 class ServiceManager:
-    """The manager that started this process; outside of a service there is none.
+    """The manager that started this process; without effect outside of a service.
 
     Each notification is one datagram.
 
@@ -80,7 +80,7 @@ class ServiceManager:
         self._send("STOPPING=1")
 
     def _send(self, text: str, patience_s: float = 0.0) -> bool:
-        """Send a datagram; tell whether it was accepted."""
+        """Send a datagram; return whether it was accepted."""
         if self._out is None:
             return True
         try:
@@ -96,7 +96,7 @@ class ServiceManager:
 class Watchdog:
     """Feeds the service manager's watchdog, from the loop and only while planning progresses.
 
-    A thread of its own would go on feeding it while the loop hangs.
+    A separate thread would still feed it while the loop hangs.
 
     Attributes:
         remark: added to the status line of the service; "" for nothing.

@@ -97,7 +97,7 @@ class Reload:
     def begin(self, running: DaemonConfig, ended: Callable[[], None]) -> None:
         """Begin to read; ``ended`` is called afterwards, on the reading thread.
 
-        A mask alone changes the running configuration, whatever the file says by now.
+        A mask changes only the running configuration, even if the file has changed since.
         """
         read = self._read if self.asked.is_set() else lambda: running
         self.asked.clear()
@@ -149,7 +149,7 @@ class Reload:
 
 
 def is_changeable(key: str) -> bool:
-    """Tell whether the value can change in a running daemon."""
+    """Return whether the value can change in a running daemon."""
     if key in FIXED:
         return False
     return key in CHANGEABLE or key.partition(".")[0] in CHANGEABLE

@@ -1,6 +1,6 @@
 """The ROS 2 bridge: the daemon's samples under the keys of a ROS 2 graph, without ROS.
 
-Incoming samples go into the mailbox with those of the native keys, and are decoded there;
+Incoming samples go into the mailbox with samples of the native keys, and are decoded there;
 outgoing samples are encoded once. rmw_zenoh and zenoh-bridge-ros2dds differ only in keys,
 attachments and tokens.
 """

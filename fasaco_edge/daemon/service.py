@@ -49,8 +49,8 @@ WORKER_STOP_S = 0.4
 # The ledger is written meanwhile: timeout for its disk in all, and the least time after the other
 # processes have ended.
 LEDGER_STOP_S, LEDGER_LEAST_S = 0.5, 0.2
-# Then the process exits whatever still blocks it [s]: the unit's ``TimeoutStopSec=`` is 10, and
-# its SIGKILL would leave no trace of the cause.
+# Time after which the process exits even if it is blocked [s]: the unit's ``TimeoutStopSec=`` is
+# 10, and its SIGKILL would leave no trace of the cause.
 END_S = 9.0
 # Thread switch interval of the interpreter [s]. Zenoh's threads call back with each sample; at
 # Python's default of 5 ms the loop waits for them several times a cycle.
@@ -152,7 +152,7 @@ def _afforded(config: DaemonConfig) -> DaemonConfig:
     limit = memory_limit()
     smaller = afforded(config, limit)
     if limit is not None and smaller is not config:
-        # Without sizes in the configuration, nobody expects more than the memory is enough for.
+        # If the configuration gives no sizes, maps may be as large as the memory allows.
         LOG.log(
             logging.INFO if has_default_sizes(config) else logging.WARNING,
             "memory is limited to %.0f MB, maps of map.max_pixels %d and map.max_lattice_cells %d "

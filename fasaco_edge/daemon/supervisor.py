@@ -1,4 +1,4 @@
-"""The recorder's supervisor: starts it beside the daemon; its failures cost only the recording."""
+"""The recorder's supervisor: starts it beside the daemon; its faults affect only the recording."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ LOG = logging.getLogger(__name__)
 
 FIRST_PAUSE_S = 1.0
 LONGEST_PAUSE_S = 30.0
-# Timeout after which a running recorder without a report counts as hung; one that is only slow does
-# not.
+# Timeout after which a running recorder without a report counts as hung; a recorder that is only
+# slow does not.
 SILENT_AFTER_S = 30.0
 # Timeout of its first report: slow computers load its libraries for half a minute.
 START_WITHIN_S = 120.0
@@ -117,7 +117,7 @@ class RecorderSupervisor:
             return
         if self._process is not None and report.pid == self._process.pid:
             self._report, self._reported_at = report, now
-            # One that dies of what it records has reported before.
+            # A recorder that dies of its data has reported before.
             if now - self._began_at >= LONGEST_PAUSE_S:
                 self._pause_s = FIRST_PAUSE_S
 

@@ -1,6 +1,6 @@
 """A ledger as bytes: checksummed as a whole, versioned, the same on every machine.
 
-All versions share the envelope, so that a file of another version can be told from a broken one.
+All versions share the envelope, to distinguish a file of another version from a broken one.
 Little endian:
 
     magic      8 bytes
@@ -24,7 +24,7 @@ Little endian:
     corner     int64 (row, col) where the trail begins
     trail      uint8 (2, rows, cols, 4): the high bytes of the pheromone, then the low ones, of its
                first 16 bits as float32, rounded
-    fleet      what other robots have swept, JSON (``mission.fleet.shared``)
+    fleet      cells swept by other robots, JSON (``fleet.mission.shared``)
     note       UTF-8, up to the end: JSON of the order, with a version of its own; may be empty
 
 Earlier versions are read, too. Version 4, written if the cells lie along the axes of the map

@@ -3,7 +3,7 @@
 ``<robot>.ledger`` is the newest, ``<robot>.ledger.previous`` the one before. A new one is
 written to ``<robot>.ledger.new``, fsynced, and then the files are renamed: at every moment one of
 them is a complete ledger, and ``load`` finds the newest. Unusable files are set aside under a name
-that tells the reason: the newest few and the largest of each kind are kept, unless they have no
+that contains the reason: the newest few and the largest of each kind are kept, unless they have no
 covered cell and no swept floor.
 """
 
@@ -69,7 +69,7 @@ class LedgerFile:
         self._generations = (self._new, self.path, self._previous)
         self._lock: int | None = None
         self._exclusive = False
-        # Files to rename before the next write; the new names tell the reason.
+        # Files to rename before the next write; the new names contain the reason.
         self._unwanted: list[tuple[Path, str]] = []
         # Whether the new generation is complete, but not yet renamed.
         self._moving = False
@@ -253,14 +253,14 @@ def _read(path: Path) -> bytes:
 
 
 def _note_of(path: Path) -> str:
-    """Return the note of a ledger, whatever its cells; "" where it cannot be read."""
+    """Return the note of a ledger, regardless of its cells; "" if it cannot be read."""
     with contextlib.suppress(OSError, FasacoError):
         return decode_ledger(_read(path), None).note
     return ""
 
 
 def _is_empty(path: Path) -> bool:
-    """Tell whether a ledger is readable, and has nothing covered or swept."""
+    """Return whether a ledger is readable, and has nothing covered or swept."""
     with contextlib.suppress(OSError, FasacoError):
         return decode_ledger(_read(path), None).is_empty
     return False
@@ -276,7 +276,7 @@ def _prune(path: Path, why: str, newest: Path) -> None:
 
 
 def _free_name(path: Path, why: str) -> Path:
-    """Return a name with the time, and a number that gives the order whatever the clock."""
+    """Return a name with the time, and a number that gives the order even if the clock jumps."""
     moment = time.strftime("%Y%m%dT%H%M%SZ", time.gmtime())
     number = max((number for number, _, _ in _aside(path, why)), default=0) + 1
     return path.with_name(f"{path.name}.{why}-{moment}" + (f"-{number}" if number > 1 else ""))

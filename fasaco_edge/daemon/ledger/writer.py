@@ -1,6 +1,6 @@
 """The ledger's writer: a thread, so that a slow or full disk does not delay the mission.
 
-A ledger that cannot be written stays in memory and is retried; meanwhile the status says so.
+A ledger that cannot be written stays in memory and is retried; meanwhile the status reports it.
 """
 
 from __future__ import annotations
@@ -67,7 +67,7 @@ class LedgerKeeper:
     """Keeps coverage and order in the ledger; also before there is a mission.
 
     Attributes:
-        order_state: the initial order: the one that was under way, if any.
+        order_state: the initial order: the order in progress before, if any.
     """
 
     def __init__(self, writer: LedgerWriter, cell_m: float, *, autostart: bool) -> None:
@@ -85,7 +85,7 @@ class LedgerKeeper:
         mission.restore_order(self.order_state)
 
     def take_back(self, mission: Mission) -> None:
-        """Take over a mission's progress for the one that replaces it."""
+        """Take over a mission's progress for the mission that replaces it."""
         self._before, self.order_state = mission.snapshot(), mission.order_state
 
     def keep(self, mission: Mission | None, now: float) -> None:
@@ -105,7 +105,7 @@ class LedgerKeeper:
             self._writer.put(self._before)
 
     def is_kept(self, now: float) -> bool:
-        """Tell whether the changes are on disk, or the timeout is over."""
+        """Return whether the changes are on disk, or the timeout is over."""
         return not self._writer.is_behind() or now - self._kept_at > MOST_WAIT_S
 
     def report(self, now: float) -> LedgerReport:
@@ -127,7 +127,7 @@ class LedgerKeeper:
         """Check that there is nothing to forget; which zone it lies in is not known yet.
 
         Raises:
-            WouldForget: there is; it says how much.
+            WouldForget: there is a loss; the text gives its size.
         """
         before = self._before
         if cells := max(before.cells - len(before.under_tool), 0):
@@ -188,7 +188,7 @@ def open_ledger(folder: Path, robot: str, cell_m: float, *, fresh: bool = False)
 
 
 def _writing_on(file: LedgerFile, found: LoadedLedger, cell_m: float) -> LedgerWriter:
-    """Continue a ledger; where that is left, begin one with the operator's keep-outs alone."""
+    """Continue a ledger; if it is set aside, start one with the operator's keep-outs alone."""
     keep_outs: KeepOuts = ()
     with suppress(OrderError):
         keep_outs = OrderState.from_json(found.note).keep_out if found.note else ()
@@ -238,7 +238,7 @@ class LedgerWriter:
             self._changed.notify()
 
     def is_behind(self) -> bool:
-        """Tell whether a write is still due and not prevented."""
+        """Return whether a write is still due and not prevented."""
         with self._changed:
             return self._has_work() and not self._trouble
 
@@ -311,7 +311,7 @@ class LedgerWriter:
         return self._waiting is not None or bool(self._unwanted)
 
     def _work(self, ledger: LedgerSnapshot | None, unwanted: list[str]) -> bool:
-        """Write a ledger, and set files aside; tell whether that succeeded."""
+        """Write a ledger, and set files aside; return whether that succeeded."""
         try:
             kept = [name for why in unwanted for name in self._file.set_aside(why)]
             if ledger is not None:

@@ -62,7 +62,7 @@ class HeldEvents:
         return faults
 
     def _hold(self, event: Event) -> None:
-        """Hold an event; it replaces those of its type, except the newest in another frame."""
+        """Hold an event; it replaces events of its type, except the newest in another frame."""
         frame = _frame(event)
         before = [other for kind, other in self._held if kind is type(event)]
         kept = [other for other in before if other not in ("", frame)][-1:]
@@ -72,7 +72,7 @@ class HeldEvents:
         self._held[type(event), frame] = event
 
     def _apply(self, patches: Sequence[MapPatch]) -> list[FasacoError]:
-        """Apply updates to the held maps; return the faults of those that cannot be applied."""
+        """Apply updates to the held maps; return the faults of updates that cannot be applied."""
         maps = {
             held.grid.frame: held.grid
             for held in self._held.values()

@@ -317,7 +317,7 @@ def blocked_of(payload: bytes) -> FollowerBlocked:
     """Return the event in a follower's report.
 
     Raises:
-        MalformedMessage: it is none.
+        MalformedMessage: it is not valid.
     """
     said = decode_blocked(payload)
     return FollowerBlocked(

@@ -45,11 +45,11 @@ if TYPE_CHECKING:
 
 LOG = logging.getLogger(__name__)
 
-# How long a cycle waits for samples [s]: with a mission, and before the first map.
+# Longest wait of a cycle for samples [s]: with a mission, and before the first map.
 TICK_S, IDLE_TICK_S = 0.1, 0.5
-# The frame of what is published before the first map.
+# The frame of messages published before the first map.
 DEFAULT_FRAME = "map"
-# A mission that fails again within this time [s] failed on the map it has.
+# A mission that fails again within this time [s] failed because of its map.
 SOON_S = 60.0
 
 
@@ -151,7 +151,7 @@ class Loop:
     # Before the step: claim, configuration, and samples that are only noted.
 
     def _follow_claim(self, now: float) -> bool:
-        """Wait while another daemon of this name plans; tell whether to run a cycle."""
+        """Wait while another daemon of this name plans; return whether to run a cycle."""
         claim, mission = self._bus.claim, self._runner.mission
         if claim.update(now):
             self._status.yield_reason = claim.reason if claim.state.is_waiting else ""
@@ -232,7 +232,7 @@ class Loop:
         return self._bus.inbox.conflicts(now) + (mask.conflicts(now) if mask else [])
 
     def _note(self, batch: Batch) -> None:
-        """Take data that is not the mission's: snapshots of the search, and times."""
+        """Take data besides the mission's: snapshots of the search, and times."""
         mission = self._runner.mission
         frame = self._runner.map_frame or DEFAULT_FRAME
         for seen in batch.snapshots:
@@ -243,7 +243,7 @@ class Loop:
         maps = [received.at for received in batch.samples if received.kind in MAPS]
         self._latency.arrived = maps[-1] if maps else None
 
-    # The step, and what follows from it.
+    # The step, and its consequences.
 
     def _step(
         self, events: list[Event], commands: list[CommandReceived], batch: Batch, now: float
@@ -272,7 +272,7 @@ class Loop:
             if decision.plan is not None or mission.route.wanted:
                 self._latency.call_for_plan()
         if mission.route.wanted and mission.route.is_improving:
-            self._runner.interrupt()  # a needed plan comes before one that only improves
+            self._runner.interrupt()  # a needed plan comes before an improvement
         self._perform(decision)
         self._guard.attempt("coverage", partial(self._coverage.publish, mission, now))
         self._guard.attempt("floor", partial(self._floor.publish, mission, now))

@@ -131,7 +131,7 @@ def plan_counts(mission: Mission | None) -> PlanCounts:
 
 
 def trouble_reports(mission: Mission, now: float) -> tuple[TroubleReport, ...]:
-    """Return what is wrong with a mission at ``now`` [s]."""
+    """Return the troubles of a mission at ``now`` [s]."""
     return tuple(
         TroubleReport(each.code, each.text, each.do, round(max(now - each.since, 0.0), 1))
         for each in mission.troubles

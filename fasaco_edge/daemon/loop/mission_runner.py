@@ -37,11 +37,11 @@ if TYPE_CHECKING:
 
 
 class MissionRunner:
-    """Starts a mission once there is a map, and replaces it by one that continues from the ledger.
+    """Starts a mission once there is a map, and replaces it by another that continues its ledger.
 
     Attributes:
         config: the configuration in force.
-        paths: what is published of the paths of its missions.
+        paths: the exit for the paths of its missions.
         mission: the mission; None during startup.
         worker: its planning thread; None during startup.
     """

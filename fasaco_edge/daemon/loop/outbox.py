@@ -188,7 +188,7 @@ class PublishGuard:
         self._logged_at: dict[str, float] = {}
 
     def attempt(self, topic: str, publish: Callable[[], None]) -> bool:
-        """Make and send a message; tell whether that succeeded."""
+        """Make and send a message; return whether that succeeded."""
         try:
             publish()
         except Exception as error:

@@ -1,4 +1,4 @@
-"""Maps that change to and fro: a sign of two publishers where samples do not say who sent them."""
+"""Maps that alternate: a sign of two publishers if samples do not identify their sender."""
 
 from __future__ import annotations
 
@@ -9,9 +9,10 @@ import numpy as np
 
 from fasaco_edge.grid.occupancy import OccupancyGrid
 
-# So many maps in so long [s] that are, byte for byte, the one before the last: doors are slower.
+# Number of maps, and their time [s], that each equal the last but one, byte for byte. A door that
+# opens and shuts is slower.
 RETURNS, PERIOD_S = 3, 10.0
-# Pixels flicker: the two maps differ by as many free pixels as are in a wall of this length [m].
+# Least difference of the two maps, as pixels flicker: the free pixels in a wall of this length [m].
 LEAST_WALL_M = 0.5
 
 # Frame, geometry and sum of the pixels; and how many of them are free.

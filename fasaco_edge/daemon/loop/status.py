@@ -168,13 +168,13 @@ class StatusBoard:
         return ("loading", loading) if loading else ("waiting for map", self.waits)
 
     def _troubles(self, runner: MissionRunner, now: float) -> tuple[TroubleReport, ...]:
-        """Return what is wrong; the mission's own troubles alone make it degraded."""
+        """Return all troubles; only the mission's own troubles make it degraded."""
         own = self._of_mission(runner, now)
         if self.yield_reason:
             return own
         idle = runner.mission.idle_places(now) if runner.mission else ""
         texts = {"two_publishers": "; ".join(self.conflicts), "no_effect": idle}
-        # Since when each has been reported [s].
+        # Start of the report of each [s].
         self._since = {code: self._since.get(code, now) for code, text in texts.items() if text}
         return own + tuple(
             TroubleReport(code, texts[code], TO_DO[code], round(now - since, 1))

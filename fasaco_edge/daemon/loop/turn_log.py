@@ -113,7 +113,7 @@ class TurnLog:
         if any(isinstance(plan, PlanBroken) for plan in batch.plans):
             self.end("a plan broke, which no replay repeats")
             return
-        # Fleet messages before there is a mission are not heard.
+        # Fleet messages before the first mission are dropped.
         samples = [
             self._taken(received)
             for received in batch.samples
