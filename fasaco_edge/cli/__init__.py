@@ -83,7 +83,7 @@ def program() -> NoReturn:
 
 def run_command(parser: argparse.ArgumentParser, words: Sequence[str]) -> int:
     """Run the command that ``parser`` finds in ``words``; report errors; return the exit code."""
-    # Whatever the caller's mask is: what is written here, no other user may change.
+    # For any mask of the caller, no other user may change the files written here.
     os.umask(os.umask(0o022) | 0o022)
     open_missing_streams()
     clean_streams()
@@ -144,7 +144,7 @@ def _describe(parser: argparse.ArgumentParser, command: Command) -> None:
 
 
 def _may_pass(error: BaseException | None) -> bool:
-    """Tell whether an error is transient: nobody's mistake, and perhaps over soon."""
+    """Return whether an error is transient: not a mistake of the user, and perhaps over soon."""
     # What a user's own planner raised is his to mend.
     while error is not None and not isinstance(error, PlannerFailed):
         if isinstance(error, OSError) and error.errno in _PASSING:

@@ -111,7 +111,7 @@ class RefusedError(FasacoError):
 
 
 def add_question(parser: argparse.ArgumentParser) -> None:
-    """Add whom to ask, how long to wait, and how to show the answer."""
+    """Add options for the robot to ask, the time to wait, and the form of the answer."""
     add_json(parser, "the answer")
     parser.add_argument(
         "--timeout",
@@ -129,7 +129,7 @@ def ask(args: argparse.Namespace, name: str, parameters: str = "", payload: byte
     Raises:
         RefusedError: the answer is an error; with ``--json`` it is printed as it came.
         NobodyAnswersError: there is no answer in time.
-        BusUnavailable: nobody listens at the endpoint.
+        BusUnavailable: no process listens at the endpoint.
     """
     from fasaco_edge.bus.session import open_bus
 
@@ -197,7 +197,7 @@ def _unreached(unreached: replies.UnreachedReport) -> Table:
 
 
 def print_answer(reply: Reply) -> None:
-    """Print what came if it is JSON, escapes and all, else the figures of the message."""
+    """Print the payload if it is JSON, with its escapes, else the figures of the message."""
     print_json(_figures(reply) if reply.schema else decode_json(reply.payload))
 
 

@@ -48,7 +48,7 @@ def _shown(config: DaemonConfig) -> dict[str, object]:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Check, and tell."""
+    """Check the configuration, and print the result."""
     from fasaco_edge.daemon.memory import mask_bytes
 
     config, found = inspect_config(args.file)

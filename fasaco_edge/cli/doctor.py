@@ -1,4 +1,4 @@
-"""``fasaco-edge doctor``: checks of host, bus and configuration, each with what to do."""
+"""``fasaco-edge doctor``: checks of host, bus and configuration, each with its remedy."""
 
 from __future__ import annotations
 

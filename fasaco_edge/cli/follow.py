@@ -114,7 +114,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _become_small(args: argparse.Namespace) -> NoReturn:
-    """Read the settings, and go on as a process that has never read a configuration."""
+    """Read the settings, and continue as a process that has never read a configuration."""
     if not 0.0 < args.speed <= 100.0:
         raise BadConfiguration(f"--speed must be above 0 and at most 100, got {args.speed}")
     document = settings_of(args).encode()

@@ -135,7 +135,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def document_of(args: argparse.Namespace) -> dict[str, object]:
-    """Return what differs from the defaults."""
+    """Return the settings that differ from the defaults."""
     robot = {
         "name": args.name,
         "radius_m": args.robot_radius,
@@ -170,7 +170,7 @@ def _ask(args: argparse.Namespace) -> None:
     """Ask for missing values if the terminal is interactive.
 
     Raises:
-        BadConfiguration: there is nobody, an answer is no number, or there is none.
+        BadConfiguration: no person can answer, an answer is no number, or there is no answer.
     """
     needed = ("robot_radius", "tool_width", "map_by")
     missing = [name for name in needed if getattr(args, name) is None]
@@ -204,10 +204,10 @@ def _number(question: str, default: float) -> float:
 
 
 def _answer(question: str, default: str) -> str:
-    # Past standard output, which may be JSON for somebody else.
+    # Not to standard output, which may be JSON for another program.
     err().print(f"{question} [{default or 'none'}]: ", end="", markup=False, soft_wrap=True)
     line = sys.stdin.readline()
-    if not line:  # Ctrl-D: what nobody has answered is not written
+    if not line:  # Ctrl-D: without an answer nothing is written
         raise BadConfiguration(f"no answer to: {question}", hint="give the options, see --help")
     return line.strip() or default
 

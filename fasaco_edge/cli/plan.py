@@ -36,7 +36,7 @@ WITH_PHEROMONE = ("fasaco", "aco")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Plan, print the figures, write what was asked for."""
+    """Plan, print the figures, and write the requested files."""
     request = read_request(args)
     robot, search = request.robot, request.search
     search.colony()  # its faults are reported before kernels are compiled

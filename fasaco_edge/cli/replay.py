@@ -235,7 +235,7 @@ NAMED = 5
 
 
 class Versions(msgspec.Struct):
-    """What decided then, and what decides now."""
+    """The software that decided then, and the software that decides now."""
 
     recorded: str
     replayed: str

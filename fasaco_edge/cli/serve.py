@@ -97,7 +97,7 @@ def run(args: argparse.Namespace) -> int:
     secured = _tls(args)
     here = robot_on_bus(args)
     return_soon()
-    # It tells of each connection.
+    # It logs each connection.
     logging.getLogger("websockets").setLevel(logging.WARNING)
     with Feed(here.bus, here.keys, hears_fleet=True) as feed:
         server = Server(feed, ServedView(here.keys), guard)

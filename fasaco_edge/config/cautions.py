@@ -1,6 +1,6 @@
 """Cautions: settings that are in order each, but together have no effect, or one not expected.
 
-The daemon starts with them; what it cannot work with is a fault of ``loading``.
+The daemon starts with them; values that it cannot work with are faults of ``loading``.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Endpoints of the bus: their faults, and who can reach them.
+"""Endpoints of the bus: their faults, and the computers that can reach them.
 
 An endpoint is ``<protocol>/<address>[?<metadata>][#<configuration>]``.
 """
@@ -11,13 +11,13 @@ from collections.abc import Iterator, Sequence
 
 from fasaco_edge.errors import BadConfiguration
 
-# Sockets in the file system: who may write there, may connect.
+# Sockets in the file system: a user with write permission there may connect.
 UNIX = ("unixsock-stream", "unixpipe")
 IP = ("tcp", "udp", "tls", "quic", "ws")
 
 
 def protocol_of(endpoint: str) -> str:
-    """Return the protocol, "" where there is none."""
+    """Return the protocol, "" if there is none."""
     return endpoint.partition("/")[0] if "/" in endpoint else ""
 
 
@@ -29,7 +29,7 @@ def host_of(endpoint: str) -> str:
 
 
 def is_local(endpoint: str) -> bool:
-    """Tell whether only this computer can reach an endpoint; False if uncertain.
+    """Return whether only this computer can reach an endpoint; False if uncertain.
 
     Names are not resolved: any but ``localhost`` may stand for any address.
     """
@@ -48,7 +48,7 @@ def is_local(endpoint: str) -> bool:
 
 
 def from_here(endpoint: str) -> str:
-    """Return the endpoint at which this computer reaches what listens at ``endpoint``."""
+    """Return the endpoint at which this computer reaches a listener at ``endpoint``."""
     host = host_of(endpoint)
     try:
         anywhere = ipaddress.ip_address(host).is_unspecified
@@ -61,7 +61,7 @@ def from_here(endpoint: str) -> str:
     return endpoint.replace(f"/{shown}:", "/localhost:", 1)
 
 
-# What Zenoh knows beside these; who builds it with them may use them.
+# Further protocols of Zenoh, for users who build it with them.
 DEVICES = ("serial", "vsock")
 # Zenoh takes no longer one [bytes].
 MOST_BYTES = 255

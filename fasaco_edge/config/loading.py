@@ -25,7 +25,7 @@ def load_config(path: Path | None) -> DaemonConfig:
 
     Raises:
         BadConfiguration: the file is missing, is no YAML, has unknown keys or
-            impossible values; the text names key, value and what is allowed.
+            impossible values; the text names key, value and allowed values.
     """
     config, faults = inspect_config(path)
     if config is not None:

@@ -19,7 +19,7 @@ from fasaco_edge.host.plain_yaml import PlainYamlError, compose, read_bounded
 from fasaco_edge.text import shown
 
 FOLDER = "CREDENTIALS_DIRECTORY"
-# Keys of earlier releases: why each was removed, and what to do without it.
+# Keys of earlier releases: why each was removed, and its replacement.
 REMOVED = {
     "planner.own": (
         "was removed in this version, the daemon plans with its own planners only",
@@ -38,8 +38,8 @@ class Fault:
 
     Attributes:
         key: its place, like ``bus.listen[0]``; "" for the file.
-        error: the fault, and what is allowed; without the name of the file.
-        line: of the file, from 1 on; None where it has none.
+        error: the fault, and the allowed values; without the name of the file.
+        line: of the file, from 1; None if there is none.
     """
 
     key: str
@@ -54,7 +54,7 @@ def section_faults(
 
     Args:
         kind: the section.
-        document: what YAML makes of its text.
+        document: result of parsing its text as YAML.
         key: of the section, "" for the whole.
         root: the whole, where a key that is unknown here may belong elsewhere.
     """
@@ -123,7 +123,7 @@ def _value_fault(kind: object, value: object, key: str) -> Fault | None:
 
 
 def _choices(kind: object) -> str:
-    """Return the names allowed for a key; "" where it does not take names."""
+    """Return the names allowed for a key; "" if it does not take names."""
     if get_origin(kind) is not Literal:
         return ""
     *others, last = get_args(kind)
@@ -169,7 +169,7 @@ class ConfigText:
     twice: tuple[Fault, ...] = ()
 
     def line_of(self, key: str) -> int | None:
-        """Return the line of a key, or of the part it belongs in; None where there is neither."""
+        """Return the line of a key, or of the section it belongs in; None if there is neither."""
         while key:
             if key in self.lines:
                 return self.lines[key]

@@ -22,7 +22,7 @@ from fasaco_edge.wire.topics import FLEET
 LOG = logging.getLogger(__name__)
 
 ATTRIBUTES = {"tls": "cert_common_names", "user": "usernames"}
-# The protocols over which a session shows who it is.
+# The protocols over which a session proves its identity.
 CARRIERS = {
     "tls": (("tls",), "only tls/<host>:<port> carries certificates"),
     "user": (("tcp", "ws", *UNIX), "user and password are shown over tcp, ws or a unix socket"),
@@ -67,7 +67,7 @@ class LimitsConfig(Section, access.Limits, frozen=True):
 
 
 class SecurityConfig(Section, frozen=True):
-    """How participants authenticate, and what they may do then."""
+    """Authentication of participants, and their permissions."""
 
     kind: Literal["none", "tls", "user"] = "none"
     tls: TlsConfig = TlsConfig()
@@ -91,7 +91,7 @@ class SecurityConfig(Section, frozen=True):
             written = [os.stat(path).st_mtime for _, path in files(self)]
             if time.time() >= max(*written, Path(__file__).stat().st_mtime):
                 return
-            # It imports ssl: a daemon whose clock is right does without.
+            # It imports ssl, which a daemon whose clock is right does not need.
             from fasaco_edge.config.certificates import read_certificate  # noqa: PLC0415
 
             read_certificate(self.tls)
@@ -127,7 +127,7 @@ class SecurityConfig(Section, frozen=True):
                 transport = access.user_password(user.name, password, dictionary_file)
             case _:
                 return {}
-        # Gossip would tell every peer where the others are, and let them make us connect there.
+        # Gossip would send every peer the others' endpoints, and let them make us connect there.
         return {"transport": transport, "scouting": {"gossip": {"enabled": False}}}
 
     def of_daemon(

@@ -52,7 +52,7 @@ class LatticeChange:
         self.cells.flags.writeable = False
 
     def __bool__(self) -> bool:
-        """Tell whether any cell has changed."""
+        """Return whether any cell has changed."""
         return len(self.cells) > 0
 
     @property

@@ -1,4 +1,4 @@
-"""Floor: the places of the robot on a fine raster of a map, and what its tool reaches from them.
+"""Floor: the places of the robot on a fine raster of a map, and the floor its tool reaches there.
 
 The reachable floor is everything that the tool's disc touches while the robot's disc is at places
 connected to its start. The lattice over the floor has a cell wherever the robot has a place: its

@@ -44,9 +44,9 @@ from fasaco_edge.kernels.floor.places import (
 )
 from fasaco_edge.kernels.lattice.footprint import Placement
 
-# The raster spans whole chunks of so many pixels of the map: for a map of 5 cm pixels 3.2 m.
+# The raster spans whole chunks of this many pixels of the map: for a map of 5 cm pixels 3.2 m.
 CHUNK = WORD
-# All bits of a word: what lies beyond a raster is blocked.
+# All bits of a word: pixels beyond a raster are blocked.
 BLOCKED_WORD = (1 << WORD) - 1
 
 
@@ -87,7 +87,7 @@ class FloorMap:
 
         Args:
             grid: the map.
-            plain: the lattice of cell centres over it, which tells the unknown cells.
+            plain: the lattice of cell centres over it, which gives the unknown cells.
             footprint, discs: of the robot.
             most_pixels: limit on the pixels of the raster.
             keep_out: polygons that the robot must not touch.

@@ -112,7 +112,7 @@ class Window:
         )
 
     def contains(self, other: Window) -> bool:
-        """Tell whether another rectangle, not empty, lies inside."""
+        """Return whether another rectangle, not empty, lies inside."""
         return self.intersection(other) == other
 
     def moved(self, rows: int, cols: int) -> Window:

@@ -128,7 +128,7 @@ class CoverageLattice:
         return mask
 
     def contains(self, cell: Cell) -> bool:
-        """Tell whether the arrays span ``cell``."""
+        """Return whether the arrays span ``cell``."""
         row, col = cell
         window = self.window
         return window.row0 <= row < window.row1 and window.col0 <= col < window.col1

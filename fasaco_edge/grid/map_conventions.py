@@ -1,4 +1,4 @@
-"""Conventions of map files that contradict each other: what keys say, and what an image shows.
+"""Conventions of map files that contradict each other: values of keys, and content of an image.
 
 ROS 2's map_saver writes three greys in trinary mode: black, 254, and 205 for never seen. Until
 2025 it wrote ``free_thresh: 0.25`` beside them, by which map_server takes 205, 19.6 % occupied, for
@@ -36,7 +36,7 @@ UNSEEN = (
 def settle(
     image: MapImage, values: NDArray[np.int8], mode: str, *, negate: bool, is_mask: bool
 ) -> str:
-    """Return what keys and image say that does not go together, and what to do; "" for nothing.
+    """Return a contradiction of keys and image, with its remedy; "" for none.
 
     Args:
         image, mode, negate: of the map file.

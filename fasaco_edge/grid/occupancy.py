@@ -106,7 +106,7 @@ class UpdatedGrid:
 
 
 def coarser(grid: OccupancyGrid, most_pixels: int) -> OccupancyGrid:
-    """Return a map of at most about so many pixels: larger ones, of the most occupied in each."""
+    """Return a map of at most about this many pixels: larger ones, each as its most occupied."""
     factor = math.ceil(math.sqrt(grid.cells.size / most_pixels))
     if factor <= 1:
         return grid

@@ -37,7 +37,7 @@ def polygon_flaw(polygon: Polygon) -> str:
 
 
 def is_near(polygon: Polygon, point: Point, reach_m: float) -> bool:
-    """Tell whether a point (x, y) [m] lies in a polygon, or nearer to it than ``reach_m`` [m]."""
+    """Return whether a point (x, y) [m] lies in a polygon, or nearer to it than ``reach_m`` [m]."""
     x, y = point
     is_inside = False
     for (ax, ay), (bx, by) in _edges(polygon):
@@ -119,7 +119,7 @@ def _side(
 def _turns_back(
     a: NDArray[np.float64], b: NDArray[np.float64], c: NDArray[np.float64]
 ) -> NDArray[np.bool_]:
-    """Tell whether the path a-b-c turns back onto itself at b."""
+    """Return whether the path a-b-c turns back onto itself at b."""
     ahead, on = b - a, c - b
     back: NDArray[np.bool_] = (_side(a, b, c) == 0) & ((ahead * on).sum(axis=-1) < 0)
     return back

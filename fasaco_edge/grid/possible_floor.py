@@ -1,4 +1,4 @@
-"""Possible floor: what the tool would reach if walls were thinner than the map shows them.
+"""Possible floor: the floor that the tool would reach if walls were thinner than on the map.
 
 A pixel of a map is occupied if a wall passes through it, or if the noise of scans and poses put one
 there. So walls and furniture are thicker on a map than in the building: by about a pixel on the

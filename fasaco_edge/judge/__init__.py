@@ -1,1 +1,1 @@
-"""Judge of a driven line, by map and line alone: the floor it swept, and what it touched."""
+"""Judge of a driven line, by map and line alone: the floor it swept, and its contacts."""

@@ -58,7 +58,7 @@ class SweepingRobot:
         tool_m: width of its tool, a disc [m].
         radius_m: radius of its own disc [m].
         speed_m_s: how fast it drives [m/s].
-        turn_s: what a quarter-turn takes [s], where ``limits`` are not known.
+        turn_s: time of a quarter-turn [s], if ``limits`` are not known.
         free_at_most: occupancy values up to this are known free [percent].
         limits: its other limits; None to count turns by their angle alone.
     """
@@ -77,9 +77,9 @@ class FloorFigures:
 
     Attributes:
         reachable_m2: reachable floor [m2].
-        swept_m2: what of it was swept [m2].
-        swept_share: that as a share; None where no floor is reachable.
-        illegal_share: part of the line on which the robot touches what is not known free.
+        swept_m2: area of it that was swept [m2].
+        swept_share: that as a share; None if no floor is reachable.
+        illegal_share: part of the line on which the robot touches floor not known to be free.
         length_m: length of the line [m].
         quarter_turns: angle turned on the line, in quarter-turns.
         seconds: driving and turning [s].
@@ -148,7 +148,7 @@ def judge_floor(
         grid: the map, also one that lies askew in its frame.
         line_xy: float64 (n, 2), n >= 1: points (x, y) [m] in the map frame, driven straight from
             one to the next.
-        robot: what drives.
+        robot: the driving robot.
         driven: bool (n - 1,), which of the ways from point to point it drove; on the others it
             swept nothing, as when a pose jumped. None for all.
         stands_at: where (x, y) [m] it could come to all that is reachable from; None for the
@@ -212,7 +212,7 @@ class _Floor:
         return self.under_tool(lambda radius_px: within(stands, radius_px + TOUCH_TOLERANCE_PX))
 
     def under_tool(self, near: Callable[[float], Mask]) -> Mask:
-        """Return what the tool touches, nothing through walls.
+        """Return the floor that the tool touches, none of it through walls.
 
         Args:
             near: returns the pixels within a radius [pixels] of where the robot is.
@@ -226,7 +226,7 @@ class _Floor:
 
     def illegal_share(self, line: DrivenLine) -> float:
         touched = within(~self.free, self.radius_px - TOUCH_SLACK_PX - TOUCH_TOLERANCE_PX)
-        # A robot smaller than that may still not stand outside what is free.
+        # A robot smaller than that may still not stand outside free floor.
         touched |= ~self.free
         rows, cols = self.free.shape
         illegal = length = 0.0

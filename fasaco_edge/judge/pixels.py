@@ -46,7 +46,7 @@ def within(mask: Mask, distance: float) -> Mask:
 
 
 def through(free: Mask, mask: Mask, steps: int) -> Mask:
-    """Return which free pixels so many steps over edges lead to from marked ones, through free.
+    """Return the free pixels within some steps over edges, through free ones, from marked ones.
 
     Args:
         free, mask: bool (rows, cols).

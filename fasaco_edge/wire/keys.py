@@ -68,7 +68,7 @@ class Keys:
 
 
 def is_chunk(text: str) -> bool:
-    """Tell whether a text can be the name of a robot."""
+    """Return whether a text can be the name of a robot."""
     return bool(_CHUNK.fullmatch(text))
 
 

@@ -29,7 +29,7 @@ DEFAULT_RADIUS_M = 0.18
 # Options with a value as ``-1,2``, and with several of these.
 WITH_PAIR = ("--start", "--start-xy", "--end", "--keep-out", "--point")
 WITH_PAIRS = ("--robots", "--robots-xy")
-# Of the environment, for who gives the same options all day.
+# Environment variables in place of options that are always the same.
 ROBOT, CONNECT = "FASACO_ROBOT", "FASACO_CONNECT"
 
 
@@ -39,7 +39,7 @@ class Exit(IntEnum):
     OK = 0
     ERROR = 1
     CONFIG = 78  # EX_CONFIG of sysexits.h: a service must not be started again
-    INTERRUPTED = 130  # 128 + SIGINT, as a shell tells it
+    INTERRUPTED = 130  # 128 + SIGINT, as in a shell
 
 
 def add_nothing(parser: argparse.ArgumentParser) -> None:
@@ -51,10 +51,10 @@ class Command:
     """One command of ``fasaco-edge``.
 
     Attributes:
-        description: what ``--help`` begins with.
+        description: text at the start of ``--help``.
         run: carries it out, and returns the exit code.
         add_options: declares the options it takes.
-        epilog: what ``--help`` ends with, printed as it stands.
+        epilog: text at the end of ``--help``, printed unchanged.
         is_group: whether it has commands of its own, which take the common options in its place.
     """
 

@@ -105,7 +105,7 @@ EXTRA = ("event", "code", "state", "suppressed")
 
 
 def is_journal(environ: Mapping[str, str] = os.environ) -> bool:
-    """Tell whether standard error leads to the journal, and was not redirected."""
+    """Return whether standard error leads to the journal, and was not redirected."""
     try:
         there = os.fstat(sys.stderr.fileno())
     except (OSError, ValueError):
@@ -114,7 +114,7 @@ def is_journal(environ: Mapping[str, str] = os.environ) -> bool:
 
 
 class JournalHandler(logging.Handler):
-    """Sends each line to the journal; where that is not there, to standard error."""
+    """Sends each line to the journal; without a journal, to standard error."""
 
     def __init__(self, address: str = SOCKET) -> None:
         super().__init__()
@@ -190,7 +190,7 @@ PLAIN, JOURNAL = "%(levelname)s %(name)s: %(message)s", "%(message)s"
 
 
 class OneLine(logging.Formatter):
-    """Writes an entry as one line, whatever its text holds; a traceback follows, indented."""
+    """Writes an entry as one line, for any text; a traceback follows, indented."""
 
     def formatMessage(self, record: logging.LogRecord) -> str:  # noqa: N802 - logging's name
         """Return the line."""
@@ -207,7 +207,7 @@ def begin_logging(level: str) -> None:
         target: logging.Handler = JournalHandler()
         target.setFormatter(OneLine(JOURNAL))
         sys.excepthook = _log_uncaught
-        # Where the watchdog ends a service that hangs (SIGABRT), the log shows where it hung.
+        # If the watchdog ends a service that hangs (SIGABRT), the log shows the place.
         faulthandler.enable()
     else:
         target = logging.StreamHandler()

@@ -8,7 +8,7 @@ from fasaco_edge.cli.console.terminal import err
 
 
 def may_ask() -> bool:
-    """Tell whether a person can read a question, and answer it."""
+    """Return whether a person can read a question, and answer it."""
     return sys.stdin.isatty() and sys.stderr.isatty()
 
 

@@ -44,7 +44,7 @@ class CleanStream:
 
     @contextmanager
     def printed_by(self, print_lines: Callable[[str], None]) -> Iterator[None]:
-        """Pass whole lines to ``print_lines`` meanwhile; what has no line end waits for the end."""
+        """Pass whole lines to ``print_lines`` at once; an unfinished line waits for the end."""
         with self._lock:
             self._print = print_lines
         try:
@@ -83,7 +83,7 @@ def clean_streams() -> None:
     for name in ("stdout", "stderr"):
         stream = getattr(sys, name)
         if stream is not None and not isinstance(stream, CleanStream):
-            # What the locale has no character for is shown as an escape: names are anybody's.
+            # Characters that the locale lacks are shown as escapes: names may hold any text.
             if isinstance(stream, TextIOWrapper):
                 stream.reconfigure(errors="backslashreplace")
             setattr(sys, name, cast("TextIO", CleanStream(stream)))
@@ -100,5 +100,5 @@ def printed_by(print_lines: Callable[[str], None]) -> Iterator[None]:
 
 
 def print_json(document: object) -> None:
-    """Print a document as one line of JSON, whose own escapes are all that is needed."""
+    """Print a document as one line of JSON, which needs no escapes but its own."""
     print(json_line(document))

@@ -75,7 +75,7 @@ class ProgressLines(Progress):
             # Rich would put a stream of its own before ours, and then write escapes into ours.
             redirect_stdout=False,
             redirect_stderr=False,
-            # Rich also takes for a terminal what is none, if the environment asks for colour.
+            # If the environment asks for colour, Rich treats any stream as a terminal.
             disable=not (console.is_interactive and console.file.isatty()),
         )
         self._while_shown = ExitStack()
@@ -97,7 +97,7 @@ class ProgressLines(Progress):
             self._while_shown.close()
 
     def get_renderable(self) -> RenderableType:
-        """Return what is shown, with room beside it for the ``^C`` that a terminal adds."""
+        """Return the text shown, with room beside it for the ``^C`` that a terminal adds."""
         return Constrain(super().get_renderable(), max(err().width - 2, 1))
 
     def _print_above(self, text: str) -> None:

@@ -116,7 +116,7 @@ def run(args: argparse.Namespace) -> int:
     out: Path = args.out or RUNS / f"{datetime.now():%Y-%m-%dT%H-%M-%S}"
     with naming(out):
         if args.out is None:
-            # Its name was not given, and anybody may have made it.
+            # Its name was not given, and another user may have created it.
             make_own_folder(RUNS)
             make_own_folder(out)
         out.mkdir(parents=True, exist_ok=True)

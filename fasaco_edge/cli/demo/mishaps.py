@@ -23,7 +23,7 @@ class Mishaps:
     Args:
         kill_after_s, split_after_s: simulated time until then [s]; None for never.
         ends: endpoints of the two routers.
-        say: shows what happens.
+        say: prints the events.
     """
 
     def __init__(
@@ -50,7 +50,7 @@ class Mishaps:
         self._between.enter_context(open_bus(BusSettings("router", self._ends, ())))
 
     def step(self, now: float, sim_s: float, victim: Sequence[subprocess.Popen[bytes]]) -> bool:
-        """Let happen what is due; tell whether the victim is killed now.
+        """Carry out the mishaps that are due; return whether the victim is killed now.
 
         Args:
             now: monotonic time [s].
@@ -71,6 +71,6 @@ class Mishaps:
         daemon, *others = victim
         daemon.kill()
         for process in others:
-            # A base that hears no daemon stands; its program writes what it drove.
+            # A base without messages of a daemon stands; its program writes its drive.
             process.send_signal(signal.SIGTERM)
         return True

@@ -38,7 +38,7 @@ STOP_TIMEOUT_S = 8.0
 RECORDERS_WITHIN_S = 60.0
 # "Done" has to hold for some maps [simulated s]: the last one may still be on its way.
 SETTLE_SIM_S = 3.0
-# Programs that hear the robots, by the names of their logs.
+# Programs that subscribe to the robots, by the names of their logs.
 LAST = ("daemon", "fleet")
 AT_WORK = ("planning", "covering", "degraded")
 
@@ -92,7 +92,7 @@ class Ending:
     Attributes:
         statuses: the last status of each daemon.
         wall_s: how long it took [s].
-        replan_ms: time of every plan heard of [ms].
+        replan_ms: time of every plan reported [ms].
         timed_out: whether time ran out first.
         makespan_s: from when the first robot worked until the last was done, in simulated time.
         killed: name of the robot that was killed; "" for none.

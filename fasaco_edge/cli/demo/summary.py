@@ -204,7 +204,7 @@ def _truth(args: argparse.Namespace, robots: Sequence[DemoRobot]) -> _Truth:
     floors = [judge_floor(grid, trail, sweeper, stands_at=first) for trail in trails]
     floor = floors[0]
     if len(trails) > 1:
-        # From the end of one trail to the beginning of the next nobody drives.
+        # No robot drives from the end of one trail to the start of the next.
         driven = np.ones(sum(map(len, trails)) - 1, np.bool_)
         driven[np.cumsum([len(trail) for trail in trails])[:-1] - 1] = False
         floor = judge_floor(grid, np.vstack(trails), sweeper, driven=driven, stands_at=first)

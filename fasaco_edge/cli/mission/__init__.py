@@ -175,7 +175,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _answer(args: argparse.Namespace, asked: dict[str, object]) -> Answer | None:
-    """Return the answer to a command; None if it would lose something, and is not to go on."""
+    """Return the answer to a command; None if it would forget cells and has no consent."""
     try:
         return ask(args, "mission", payload=encode_json(asked))
     except RefusedError as error:

@@ -89,7 +89,7 @@ def asked_by(args: argparse.Namespace) -> dict[str, object]:
     """Return the command as a document, checked: faults are reported without a daemon.
 
     Raises:
-        OrderError: the area or its name is none.
+        OrderError: the area or its name is not valid.
     """
     if args.keep_out_action == "list":
         return {"command": "status"}

@@ -331,7 +331,7 @@ def _end(text: str) -> str | tuple[int, int]:
 
 
 def _alignment(text: str) -> str | float:
-    """Read what cells lie along."""
+    """Read the alignment of cells."""
     if text in (WALLS, AXES):
         return text
     try:

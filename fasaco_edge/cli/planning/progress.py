@@ -17,7 +17,7 @@ LEAST_INTERVAL_S = 0.05
 def watching(
     total: float | None, *, counted: bool = False
 ) -> Iterator[Callable[[SearchProgress], None]]:
-    """Yield what shows how far a search is.
+    """Yield a display of the progress of a search.
 
     Args:
         total: of its budget [s], or with ``counted`` of its ants.

@@ -41,7 +41,7 @@ class PlanRequest:
     """What the options ask for.
 
     Attributes:
-        robot: its size, and what driving takes.
+        robot: its size, and its driving times.
         search: how to search.
         line: which line is made.
         own: the user's planner in place of the search; None for none.

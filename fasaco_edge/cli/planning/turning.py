@@ -1,4 +1,4 @@
-"""The options of ``fasaco-edge plan`` that say what turns on the spot take."""
+"""The options of ``fasaco-edge plan`` for the time of turns on the spot."""
 
 from __future__ import annotations
 

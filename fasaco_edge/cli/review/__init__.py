@@ -131,7 +131,7 @@ def run(args: argparse.Namespace) -> int:
     recordings = [*args.recordings, *(args.against or ())]
     check_outputs((args.png, args.html), recordings)
     for file in recordings:
-        with open_part(file):  # what is none is told before all else is loaded
+        with open_part(file):  # reports a file that is no recording before loading the rest
             pass
     from fasaco_edge.recording.read.frames import is_fleet_recording
 
@@ -233,7 +233,7 @@ def _read(paths: Sequence[Path], name: str) -> Review:
 
 
 def _epilog() -> str:
-    """Return what the JSON document holds: one way to say it, for help and for readers."""
+    """Return a description of the JSON document: the same text for help and for readers."""
     lines = [EXAMPLES, "the JSON document holds, with times in seconds since the recording began:"]
     for line in explanations():
         lines += textwrap.wrap(line, 96, initial_indent="  ", subsequent_indent="      ")

@@ -31,7 +31,7 @@ MOST_VERDICTS = 4
 
 
 def print_review(review: Review, document: ReviewDocument, *, full: bool) -> None:
-    """Print a review, whose document is given, too: in ``full``, or what fits on a screen."""
+    """Print a review, whose document is given, too: in ``full``, or as much as a screen holds."""
     console = terminal.out()
     colours = {True: "green", False: "red", None: "yellow"}
     verdicts = rows.verdicts(document)
@@ -66,7 +66,7 @@ def print_review(review: Review, document: ReviewDocument, *, full: bool) -> Non
 
 
 def _print_screen(console: Console, review: Review, document: ReviewDocument, *, more: int) -> None:
-    """Print what matters most; with up to ``MOST_VERDICTS`` verdicts it takes 24 lines."""
+    """Print the main results; with up to ``MOST_VERDICTS`` verdicts they take 24 lines."""
     if more > 0:
         console.print(f"and {more} more orders")
     _print_curve(console, review, SCREEN_PLOT_HEIGHT)

@@ -51,7 +51,7 @@ class BatteryGauge:
     Attributes:
         level: accepted charge from 0 to 1; None before one is accepted.
         power: state of the power supply, as in the message; "" before the first one.
-        heard_at: when the last level arrived, accepted or not [s].
+        heard_at: arrival time of the last level, accepted or not [s].
     """
 
     def __init__(self) -> None:
@@ -68,7 +68,7 @@ class BatteryGauge:
         self._drains: deque[float] = deque(maxlen=NEWEST)
 
     def succeed(self, before: BatteryGauge) -> None:
-        """Go on with what another gauge has received."""
+        """Take over the state of a predecessor."""
         vars(self).update(vars(before))
 
     @property
@@ -138,17 +138,17 @@ class Charging:
     _looked_at: float | None = field(default=None, init=False)
     # Stamp of the pose by then [ns].
     _looked_at_ns: int = field(default=0, init=False)
-    # Whether no place ahead is better to go and charge from than this one.
+    # Whether this is the best place on the path to leave for the dock.
     _is_best_here: bool = field(default=False, init=False)
-    # The highest level since the robot is in its dock, and since when; None elsewhere.
+    # The highest level since the robot is in its dock, and its time; None elsewhere.
     _best: tuple[float, float] | None = field(default=None, init=False)
-    # The level of turning back when the robot went to charge, and the level at which the battery
-    # last took no more, where that is less than it has to go on with; None for none.
+    # The level of turning back when the robot went to charge. The level at which the battery last
+    # stopped charging, if below the level at which to resume; None for none.
     _turned_at: float = field(default=0.0, init=False)
     _most: float | None = field(default=None, init=False)
 
     def succeed(self, before: Charging) -> None:
-        """Go on with the gauge of another one, and with what it knows of this battery."""
+        """Take over a predecessor's gauge, and its state of this battery."""
         self.gauge.succeed(before.gauge)
         self._best, self._turned_at, self._most = before._best, before._turned_at, before._most
 
@@ -176,15 +176,15 @@ class Charging:
         return self.map.pose.stamp_ns if self.map.pose is not None else 0
 
     def _since_look_s(self, now: float) -> float:
-        """Return how long ago the time to the dock was computed [s].
+        """Return the age of the computed time to the dock [s].
 
-        By our clock or the robot's, whichever says longer, as simulated time may run faster.
+        This is the longer age by our clock and the robot's, as simulated time may run faster.
         """
         assert self._looked_at is not None
         return max(now - self._looked_at, 1e-9 * (self._stamp_ns - self._looked_at_ns))
 
     def silence(self, now: float) -> str:
-        """Return why the battery level is unknown; "" where it is known or not needed."""
+        """Return why the battery level is unknown; "" if it is known or not needed."""
         if self.policy is None:
             return ""
         if self.gauge.silent_s(now) <= self.policy.silent_s:
@@ -194,14 +194,14 @@ class Charging:
         return f"no charge of the battery for {silent_s:g} s{why}"
 
     def why_no_dock(self) -> str:
-        """Return why the robot has nowhere to charge on this map; "" where it has."""
+        """Return why the robot has no place to charge on this map; "" if it has one."""
         why = self.map.places.why_no_dock if self.policy is not None else ""
         return f"the robot does not go to charge: {why}" if why else ""
 
     def is_due(self, now: float) -> bool:
         """Return whether the robot has to go and charge now.
 
-        A robot that was told to stop, also by a cancelled order, does not drive by itself.
+        A robot stopped by a command, or by a cancelled order, does not start to drive by itself.
         """
         order, level = self.orders.order_state, self.gauge.level
         if self.policy is None or level is None or self.silence(now):
@@ -260,13 +260,13 @@ class Charging:
         power, waited_s = self.gauge.power, now - self._best[1]
         is_all = power == "full" or (power != "discharging" and waited_s >= ALL_AFTER_S)
         is_charged = level >= self.goes_on_at
-        # With less it would soon be back.
+        # With a lower level it would soon return.
         least = max(self.policy.low, self._turned_at) + BETWEEN
         self._most = level if is_all and not is_charged else None
         return is_charged or (is_all and level >= least)
 
     def why(self, now: float) -> str:
-        """Return what a robot in its dock waits for."""
+        """Return why a robot waits in its dock."""
         if why := self.silence(now):
             return f"{why}: waits for one"
         if self.gauge.level is None:
@@ -278,9 +278,9 @@ class Charging:
     def _finds_nothing_better(self) -> bool:
         """Return whether the robot, which will have to charge soon, is best placed for it now.
 
-        It is where the way to the dock is shortest for what is driven between two charges, of all
-        places on its path until the level of turning back. A path that ends before shows nothing:
-        it may be the last.
+        The best place on its path, up to the level of turning back, has the shortest way to the
+        dock relative to the drive between two charges. A path that ends before that level gives no
+        answer: it may be the last one.
         """
         level, drain, area = self.gauge.level, self.gauge.drain_per_s, self.map.area
         goal = self.orders.goal("charge")
@@ -309,7 +309,7 @@ class Charging:
         return rates[0] <= min(rates)
 
     def _seconds_to_dock(self) -> float:
-        """Return how long the way to the dock takes as it would be driven [s]."""
+        """Return the driving time of the way to the dock [s]."""
         cell, goal, area = self.map.cell_at_pose(), self.orders.goal("charge"), self.map.area
         if cell is None or goal is None or area is None:
             return 0.0

@@ -1,15 +1,15 @@
-"""Dock current: whether the battery of a docked robot is charged, by its level and its messages.
+"""Dock current: whether the battery of a docked robot charges, by its level and its messages.
 
-Batteries rise slowly and report in coarse steps, some report the wrong power supply status, and a
-bad contact comes and goes: no single message decides.
+Levels rise slowly and in coarse steps, some batteries report the wrong power supply status, and a
+bad contact is intermittent: no single message decides.
 """
 
 from __future__ import annotations
 
 from fasaco_edge.mission.core.charging import RISE, BatteryGauge
 
-# A battery that does not report that it charges has to show a rise within this time [s]; any other
-# within FLAT_S: at 1 % a step, most charge faster than a step in ten minutes.
+# The level of a battery that does not report charging has to rise within this time [s], that of any
+# other within FLAT_S: in steps of 1 %, most charge faster than a step in ten minutes.
 PATIENCE_S, FLAT_S = 45.0, 600.0
 # A level that falls by more than this is not charged: one step of a coarse gauge is noise.
 FALL = 0.0125
@@ -17,11 +17,11 @@ CHARGES = ("charging", "full")
 
 
 class DockCurrent:
-    """Follows the battery level of a docked robot; all times are [s]."""
+    """Tracks the battery level of a docked robot; all times are [s]."""
 
     def __init__(self, gauge: BatteryGauge) -> None:
         self._gauge = gauge
-        # Since when the robot is docked, and since when no message says that it charges.
+        # Start of docking, and start of the time without a message that it charges.
         self._docked_at: float | None = None
         self._unclaimed_at: float | None = None
         # The level where it last turned: the highest while it rises, the lowest while it falls.
@@ -36,7 +36,7 @@ class DockCurrent:
         return self._docked_at is not None
 
     def succeed(self, before: DockCurrent) -> None:
-        """Go on with what another one has followed."""
+        """Take over the state of a predecessor."""
         vars(self).update(vars(before) | {"_gauge": self._gauge})
 
     def look(self, now: float, *, is_docked: bool) -> None:
@@ -65,7 +65,7 @@ class DockCurrent:
             self._turn, self._falls, self._from = level, True, turn
 
     def why_none(self, now: float) -> str:
-        """Return what shows that the battery is not charged; "" if it is, or is not docked."""
+        """Return the evidence that the battery does not charge; "" if it does, or is not docked."""
         docked_at, level = self._docked_at, self._gauge.level
         if docked_at is None or level is None:
             return ""

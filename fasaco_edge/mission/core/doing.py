@@ -1,4 +1,4 @@
-"""Doing: what the mission does in a step, and why."""
+"""Doing: the mission's activity in a step, and its reason."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from fasaco_edge.mission.core.events import PathUpdate, PlanRequest, State
 
 
 class Doing(NamedTuple):
-    """What the mission does.
+    """The mission's activity.
 
     Attributes:
         state: of the mission.

@@ -57,8 +57,8 @@ class Errands:
 
         Args:
             cell: the robot's cell.
-            update: the path that this step has made so far.
-            state: of the mission so far.
+            update: the path that this step has made up to now.
+            state: of the mission up to now.
             now: time [s].
         """
         route, orders, area, path = self.route, self.orders, self.map.area, self.route.path
@@ -88,7 +88,7 @@ class Errands:
         return Doing(State.RETURNING, f"on the way {to}", update)
 
     def way(self, area: ReachableArea, cell: Cell, goal: Cell) -> NDArray[np.int32]:
-        """Return the shortest path, around robots that stand in the way where that is possible."""
+        """Return the shortest path, if possible around robots that stand in the way."""
         around = self.orders.passable(area, cell)
         path = around.shortest_path(cell, goal) if around.contains(goal) else NO_CELLS
         return path if len(path) else area.shortest_path(cell, goal)

@@ -41,7 +41,7 @@ class UserCode:
 
 
 def is_place(text: str) -> bool:
-    """Tell whether a text has the shape of a place."""
+    """Return whether a text has the shape of a place."""
     source, _, name = text.rpartition(":")
     is_module = all(part.isidentifier() for part in source.split("."))
     return name.isidentifier() and (source.endswith(".py") or is_module)

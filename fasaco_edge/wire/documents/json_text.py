@@ -132,7 +132,7 @@ def _is_within_bounds(value: object) -> bool:
 
 
 def _is_in_range(value: object) -> bool:
-    """Tell whether a value is none of the numbers beyond the limits; NaN is beyond them."""
+    """Return whether a value is none of the numbers beyond the limits; NaN is beyond them."""
     if not isinstance(value, int | float):
         return True
     return abs(value) <= (MAX_JSON_INTEGER if isinstance(value, int) else MAX_JSON_NUMBER)
