@@ -159,7 +159,7 @@ class MissionSettings(Section, MissionPolicy, frozen=True, kw_only=True):
         """Check the standing zones as those of an order.
 
         Raises:
-            BadConfiguration: one is wrong, two have one name, or a mask that is inline is none.
+            BadConfiguration: a zone is wrong, two have one name, or an inline mask is not valid.
         """
         if self.keep_out_mask.startswith(INLINE):
             mask_polygons(self.keep_out_mask)
@@ -174,7 +174,7 @@ class MissionSettings(Section, MissionPolicy, frozen=True, kw_only=True):
         """Return the folder of the coverage ledger.
 
         By default systemd's $STATE_DIRECTORY, else fasaco-edge in an absolute $XDG_STATE_HOME,
-        else in ~/.local/state; BadConfiguration where there is no such home.
+        else in ~/.local/state; BadConfiguration if there is no such home.
         """
         if self.state_dir:
             return _home(Path(self.state_dir))

@@ -94,14 +94,14 @@ class RobotConfig(Section, frozen=True):
     tool_ahead_m: Annotated[float, Meta(ge=-5, le=5)] = 0.0
 
     def __post_init__(self) -> None:
-        """Have the radius of the disc around the footprint, where there is one."""
+        """Set the radius to that of the disc around the footprint, if there is one."""
         if self.footprint and self.radius_m == DEFAULT_RADIUS_M:
             radius_m = self.footprint.radius() or DEFAULT_RADIUS_M
             msgspec.structs.force_setattr(self, "radius_m", radius_m)
 
     @property
     def assumed(self) -> str:
-        """What is assumed of the robot's shape; "" where it is the disc that was given."""
+        """Assumptions on the robot's shape; "" if it is the configured disc."""
         if not self.footprint:
             return ""
         tool = (
@@ -117,7 +117,7 @@ class RobotConfig(Section, frozen=True):
         )
 
     def cost(self, cell_m: float | None = None) -> CoverageCost:
-        """Return what a step over a cell, by default one as wide as the tool, and a turn cost.
+        """Return the costs of a turn and of a step over a cell, by default one as wide as the tool.
 
         Raises:
             BadConfiguration: a step would take less than a millisecond or more than an hour.

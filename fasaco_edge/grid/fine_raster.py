@@ -36,8 +36,8 @@ class RobotDiscs:
         radius_m: radius of the robot [m].
         tool_m: width of the tool [m].
         free_at_most: occupancy values up to this are free [percent].
-        clearance_m: what lines keep beside the radius from all that is not free, where they can
-            [m].
+        clearance_m: distance of lines from all that is not free in addition to the radius, where
+            possible [m].
     """
 
     radius_m: float

@@ -54,8 +54,8 @@ def read_map(path: str | Path) -> OccupancyGrid:
             ``FREE_THRESH`` and ``OCCUPIED_THRESH``.
 
     Raises:
-        MapFileError: a file is missing, is not what it should be or too large; a key is
-            missing or its value impossible.
+        MapFileError: a file is missing, of another format or too large; a key is missing or its
+            value impossible.
     """
     return _grid(*read_map_rows(path))
 
@@ -68,7 +68,7 @@ def read_map_rows(
     Args:
         path: the YAML file.
         most_bytes: memory limit for reading the image [bytes]; None for no limit.
-        is_mask: whether only occupied pixels count: what is unknown is the same as free.
+        is_mask: whether only occupied pixels count, and unknown ones are free.
 
     Returns:
         The geometry, and stripes of the map, int8 (some, cols): each but the last has a multiple

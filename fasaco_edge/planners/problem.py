@@ -47,7 +47,7 @@ class CoverageProblem:
         is_full: whether to search everything, starting from ``before``, not only to repair.
         attempt: number of an attempt to improve a valid ``before``, from 1: each looks at other
             places. 0 for a needed plan.
-        trail: the mission's living trail, for a planner whose ants start from it; None for none.
+        trail: the mission's living trail, for planners whose ants start from it; None for none.
         whole: the problem that this one is the end of, see ``after``: a path that solves this
             one begins with the lead, and its figures are those of the whole. None for a problem
             that is whole itself.

@@ -45,7 +45,7 @@ def completed(
 def completed_from(
     problem: CoverageProblem, framed: FramedGround, before: NDArray[np.int32], held: int
 ) -> NDArray[np.int32]:
-    """Return what ``completed`` does, of ``framed_cells`` of the walk from before, int32 (n,)."""
+    """Return ``completed`` for the ``framed_cells`` of the previous walk, int32 (n,)."""
     start = int(framed.framed(np.array([problem.flat_start], np.int32))[0])
     kept = np.empty(before.size + 2 * framed.ground.bound, np.int32)
     length = keep_legal(framed.ground, before, start, kept)

@@ -53,8 +53,10 @@ class Keys:
         return robot if is_chunk(robot) else ""
 
     def claim(self, own: str, stand: str, topic: Topic = CLAIM) -> str:
-        """Return the token of the daemon with the Zenoh id ``own``, which "plans" or "waits"; or
-        that of another topic whose key ends so."""
+        """Return the token of the daemon with the Zenoh id ``own``, which "plans" or "waits".
+
+        ``topic`` may be another topic whose key has the same ending.
+        """
         return self.of(topic).replace("*/*", f"{own}/{stand}")
 
     def rpc(self, name: str) -> str:

@@ -135,7 +135,7 @@ def graph_key(domain: int) -> str:
 def gid_of(token: str) -> bytes:
     """Return ``GID_BYTES`` bytes that are unique to a publisher's token.
 
-    rmw_zenoh uses XXH3 for that, and tells samples apart by it. A lookup of a sample's publisher
+    rmw_zenoh uses XXH3 for that, and identifies publishers by it. A lookup of a sample's publisher
     in the graph by gid does not find ours.
     """
     # Loads OpenSSL, three megabytes of no use to a follower without ROS.

@@ -89,8 +89,8 @@ class Topic:
         is_input: whether a replay feeds it to the mission, so that recordings hold it byte for
             byte; topics for the recorder alone are no inputs.
         limits: names of its limits in ``protocol/limits.yaml``.
-        one_publisher_s: of several publishers one counts, the one heard first, until it is silent
-            for so long [s], see ``bus.one_publisher``; 0: all count.
+        one_publisher_s: of several publishers only the first counts, until it is silent for this
+            long [s], see ``bus.one_publisher``; 0: all count.
     """
 
     name: str

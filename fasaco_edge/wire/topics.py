@@ -372,7 +372,7 @@ def _queue_lengths() -> dict[str, int]:
 
 
 QUEUE_LENGTHS = _queue_lengths()
-"""How many samples wait for the daemon's loop where it queues them, in the order in which it takes
-them; commands come as queries."""
+"""Lengths of the daemon's queues of samples, in the order in which its loop takes these; commands
+come as queries."""
 
 RECORDED_INPUTS = (*(topic.name for topic in TOPICS if topic.is_input), TF_STATIC)

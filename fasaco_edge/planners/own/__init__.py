@@ -1,1 +1,1 @@
-"""Planners of the user's own: how one is loaded, what it is given, how its walk is checked."""
+"""Planners of the user's own: loading, input, and the check of the walk."""

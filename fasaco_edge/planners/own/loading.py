@@ -51,10 +51,10 @@ def load(place: str) -> UserCode:
     """Return the planner at a place; its file is executed.
 
     Args:
-        place: where it is.
+        place: ``FILE.py:NAME`` or ``MODULE:NAME``.
 
     Raises:
-        BadConfiguration: there is none, or it is no planner.
+        BadConfiguration: there is nothing at this place, or it is no planner.
         PlannerFailed: the file raised.
     """
     source, _, member = place.rpartition(":")
@@ -84,9 +84,9 @@ def user_code(planner: object, name: str = "", said: str = "planner", file: str 
     """Return a function, an object with ``plan(problem)``, or an object of such a class.
 
     Args:
-        planner: it.
+        planner: the object to check.
         name: its name in figures; "" for file and name.
-        said: what names it, for messages.
+        said: its name in messages.
         file: its file; "" to look it up.
 
     Raises:

@@ -76,7 +76,7 @@ def parse_velocities(text: str) -> tuple[int, ...]:
     """Return the cohorts' velocities from ``8:1`` (falling), ``1:8`` (rising), ``4`` or ``8,4,1``.
 
     Raises:
-        BadConfiguration: the text is none of these.
+        BadConfiguration: the text has another form.
     """
     try:
         named = tuple(int(part) for part in text.replace(":", ",", 1).split(","))

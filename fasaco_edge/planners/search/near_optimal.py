@@ -31,7 +31,8 @@ from fasaco_edge.planners.walk_before import can_repair
 # Optimality gap in steps above which a repaired walk is kept only if a search finds none better.
 POOR_GAP = 0.25
 # Proposals of the search that follows a poor repair: in all, and per cell. On 103 problems of
-# fleets they save 83 % of what a million do in ten times the time; attempts in spare time continue.
+# fleets they save 83 % of what a million proposals save in ten times the time; attempts in spare
+# time continue.
 SHORT_SEARCH, SHORT_SEARCH_PER_CELL = 50_000, 300
 
 

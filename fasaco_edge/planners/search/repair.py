@@ -83,10 +83,10 @@ def _steady(
 ) -> CoveragePath:
     """Return a path that begins with ``held`` steps of the walk from before, if similarly good.
 
-    A gain is accepted wherever it is, though another one farther on may gain as much. So where a
-    repair has changed the path ahead unnecessarily, the rest of the walk is repaired alone, with
-    few perturbations: more keep no more, and dominate the time. The result costs no more than the
-    completed walk.
+    A repair accepts a gain anywhere, though a change farther ahead may gain as much. So if it has
+    changed the path ahead unnecessarily, the rest of the walk is repaired alone, with few
+    perturbations: more of them do not keep more steps, and dominate the time. The result costs no
+    more than the completed walk.
     """
     assert problem.before is not None
     try:

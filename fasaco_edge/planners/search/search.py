@@ -192,7 +192,7 @@ class Search:
         self._tighten(GLANCE)
 
     def _offer_walk_before(self) -> None:
-        """Start from the walk from before, if it costs no more than the first."""
+        """Start from the previous walk, if it costs no more than the first."""
         problem, before = self._problem, self._problem.before
         if before is None or not has_walk(problem):
             return

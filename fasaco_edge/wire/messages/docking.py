@@ -1,9 +1,9 @@
 """Goals for Nav2's docking server: the actions nav2_msgs/action/DockRobot and UndockRobot.
 
 Sources: nav2_msgs of Jazzy and Lyrical, opennav_docking_msgs of Humble, whose members are the same;
-results end with a message only from Jazzy's later releases on. ``docking_server.cpp``: a goal for a
-robot that is in its dock already, or not in it any more, ends as aborted, with success and without
-a code.
+results end with a message only in Jazzy's later releases and after. ``docking_server.cpp``: a goal
+to dock a docked robot, or to undock an undocked one, ends as aborted, with success and without a
+code.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ class DockEnding:
 
     Attributes:
         status: as in ``follow_path.Ending``.
-        success: what the server says of it.
+        success: the server's value.
         code: one of ``ERRORS``, or 0.
         message: of the server, "" for none.
     """

@@ -311,7 +311,7 @@ class PoseDecoder:
             came_at: time of arrival [s], for ``oldest_link``.
 
         Raises:
-            MalformedMessage: it is none of these.
+            MalformedMessage: it is of no such type.
             TransformLoop: the frames form a loop.
         """
         schema = schema or self.schema
