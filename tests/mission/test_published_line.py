@@ -64,6 +64,15 @@ def test_a_robot_without_a_line_gets_one():
     assert look(published, ZIGZAG, is_settled=False)
 
 
+def test_a_line_that_ends_at_the_robot_is_published_once():
+    """It was published in each step, and the robot never counted as one that has waited."""
+    published, here = PublishedLine(0.25), ZIGZAG[:1]
+    assert look(published, here)
+    published.take(here, 1)
+    assert not look(published, here, 1.0)
+    assert look(published, ZIGZAG, 2.0)
+
+
 def test_the_published_line_is_held_as_far_as_it_is_polished():
     published = PublishedLine(0.25)
     published.take(ZIGZAG, len(ZIGZAG))

@@ -54,6 +54,8 @@ class PublishedLine:
         enough; it begins at the robot."""
         ahead, known = xy[1:SEEN_POINTS], self._xy[self._next :]
         self._common, self.differs_m = 0, 0.0
+        if len(xy) and len(self._xy) and not len(ahead) and not len(known):
+            self.differs_m = math.inf  # both end where the robot is
         if not len(ahead) or not len(known):
             return
         at = np.flatnonzero(_are_same(known[:SEEN_POINTS], ahead[0]))
