@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import signal
@@ -213,14 +214,13 @@ def test_lines_where_there_is_no_terminal(covering):
 
 
 def test_a_broken_pipe_is_no_traceback(covering):
-    process = _piped("--connect", covering.endpoint, "--json")
-    assert process.stdout is not None
-    assert process.stderr is not None
-    process.stdout.readline()
-    process.stdout.close()
-    process.wait(60.0)
-    with process.stderr as said:
-        assert said.read() == ""
+    with _piped("--connect", covering.endpoint, "--json") as process:
+        assert process.stdout is not None
+        assert process.stderr is not None
+        process.stdout.readline()
+        process.stdout.close()
+        process.wait(60.0)
+        assert process.stderr.read() == ""
 
 
 def test_json_is_a_status_a_line(covering):
@@ -284,14 +284,19 @@ def test_once_without_a_daemon_is_an_error(covering):
         assert ended.out == ""
 
 
-def _piped(*words: str) -> subprocess.Popen[str]:
-    return subprocess.Popen(
+@contextlib.contextmanager
+def _piped(*words: str) -> Iterator[subprocess.Popen[str]]:
+    with subprocess.Popen(
         [*PROGRAM, "watch", *words],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
         env=ENVIRONMENT | {"PYTHONUNBUFFERED": "1"},
-    )
+    ) as process:
+        try:
+            yield process
+        finally:
+            process.kill()  # of one that goes on, the end would be waited for
 
 
 def test_no_status_of_a_peer_ends_it(covering):

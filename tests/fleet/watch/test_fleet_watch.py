@@ -120,7 +120,7 @@ def test_once_is_one_page(hall):
 
 
 def test_lines_and_json_where_there_is_no_terminal(hall):
-    _, endpoint = hall
+    robots, endpoint = hall
     with _piped("--fleet", "house", "--connect", endpoint) as process:
         said = [process.stdout.readline()]
         while "of cells  a: covering, b: " not in said[-1]:
@@ -131,7 +131,11 @@ def test_lines_and_json_where_there_is_no_terminal(hall):
     assert any("a joined: covering" in line for line in said), said
     assert not any("\x1b" in line for line in said)
     with _piped("--fleet", "house", "--json", "--connect", endpoint) as process:
-        documents = [json.loads(process.stdout.readline()) for _ in range(2)]
+        documents = [json.loads(process.stdout.readline())]
+        # The first may hold all there is to say, and what has not changed is not printed again.
+        robots.said["b"] |= {"state": "planning"}
+        documents.append(json.loads(process.stdout.readline()))
+        robots.said["b"] |= {"state": "covering"}
         process.send_signal(signal.SIGINT)
         assert process.wait(60.0) == 0
     assert documents[0] != documents[1]
@@ -199,11 +203,16 @@ def test_daemons_of_a_fleet_are_shown(tmp_path):
     assert abs(parts[0] - parts[1]) < 0.2 * document["cells"]
 
 
-def _piped(*words: str) -> subprocess.Popen[str]:
-    return subprocess.Popen(
+@contextlib.contextmanager
+def _piped(*words: str) -> Iterator[subprocess.Popen[str]]:
+    with subprocess.Popen(
         [*PROGRAM, "watch", *words],
         stdout=subprocess.PIPE,
         stderr=subprocess.DEVNULL,
         text=True,
         env=ENVIRONMENT | {"PYTHONUNBUFFERED": "1"},
-    )
+    ) as process:
+        try:
+            yield process
+        finally:
+            process.kill()  # of one that goes on, the end would be waited for
