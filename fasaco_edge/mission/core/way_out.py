@@ -60,8 +60,10 @@ class WayOut:
         self._place: Point = math.inf, math.inf
         self._since = -math.inf
         self._tries = 0
-        # Since when it has stood there, or when a way was last looked for without the map's leave.
+        # Since when it has stood there without a way, and where it began to drive whatever the map
+        # shows; None where it does not.
         self._stands_since = math.inf
+        self._blind_from: Point | None = None
 
     def note_pose(self, pose: Pose2D) -> None:
         """Note where the robot is."""
@@ -109,13 +111,16 @@ class WayOut:
             return None
         is_same_floor = seen[0] is floor and seen[1] == self._seen[1]
         knows_none = self._to is None and not (has_moved or self._tries)
-        is_blind = not drives and now - self._stands_since > WITHOUT_WAY_S
-        if is_same_floor and (drives or knows_none) and not is_blind:
+        stands_long = not drives and now - self._stands_since > WITHOUT_WAY_S
+        if is_same_floor and (drives or knows_none) and not stands_long:
             return None
         way = self.find(leads_on)
-        if is_blind and not len(way):
-            self._stands_since = now
-            way = self.find(leads_on, blind_m=BLIND_M)
+        if len(way) or not (drives or stands_long):
+            self._blind_from = None
+        elif stands_long:
+            self._stands_since, self._blind_from = now, here
+        if not len(way) and self._blind_from is not None:
+            way = self.find(leads_on, BLIND_M - math.dist(here, self._blind_from))
         to, self._to = self._to, tuple(way[-1].tolist()) if len(way) else None
         if drives:
             return None if to == self._to else way
@@ -146,7 +151,7 @@ class WayOut:
         radius = min(radius, fitting_radius(floor, raster[0]))
         least = LEAST_SHARE * full_px
         blind_px = blind_m / floor.geometry.resolution if radius < least else 0.0
-        if radius < least and not blind_px:
+        if radius < least and blind_px <= 0.0:
             return NO_WAY
         radius = max(radius, least)
         # Areas that the robot cannot go on in, its own among them.
