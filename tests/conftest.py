@@ -60,7 +60,8 @@ def terminal_width(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[int], 
 def pytest_exception_interact(node: pytest.Item | pytest.Collector) -> None:
     """Limit what comes after a failure, too: pytest stops its own watch over hangs there."""
     limit_s = float(node.config.getini("faulthandler_timeout"))
-    faulthandler.dump_traceback_later(limit_s, file=STDERR, exit=True)
+    if limit_s > 0.0 and not node.config.getoption("usepdb"):
+        faulthandler.dump_traceback_later(limit_s, file=STDERR, exit=True)
 
 
 FAILED = pytest.StashKey[bool]()

@@ -113,26 +113,6 @@ def test_no_way_leads_through_a_keep_out_zone():
     assert not robot.path
 
 
-def test_a_robot_inside_a_wall_of_the_map_backs_out():
-    """The map, or the pose, was off by more than its radius: it waited for another for good."""
-    pixels = room_with_niche()
-    pixels[22:38, 84:103] = 100  # most of the niche, where it stands
-    robot = LineRobot(room_with_niche(), START)
-    assert robot.wait(600.0, lambda robot: robot.x > 4.7)
-    robot.show(pixels)
-    assert not robot.wait(10.0, lambda robot: robot.path)
-    assert "occupied cell" in robot.mission.reason
-    assert robot.wait(20.0, lambda robot: robot.path)
-    for flickers in range(200):
-        # Maps that show no way either do not stop it again.
-        pixels[30, 102] = 100 * (flickers % 2)
-        robot.show(pixels)
-        assert robot.path
-        if robot.x < 3.8:
-            break
-    assert robot.x < 3.8
-
-
 def test_a_robot_stuck_on_its_way_out_retries_less_often():
     robot = shut_in()
     assert robot.wait(60.0, lambda robot: "shut_in" in troubles(robot) and robot.path)

@@ -76,7 +76,11 @@ class PathChecks:
         if not self._monitor.are_poses_far_apart:
             self._progress = None
             return False
-        if self._progress is not None and now - self._progress[1] < VAIN_S:
+        # Time at rest, as after a pause, is no drive.
+        if (
+            self._progress is not None
+            and now - max(self._progress[1], self._route.begun_at) < VAIN_S
+        ):
             return False
         before, covered = self._progress, self._orders.done
         self._progress = covered, now

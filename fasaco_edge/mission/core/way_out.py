@@ -32,9 +32,6 @@ SQUEEZE_PX = 1.5
 # A robot that has not come this far [m] on its way out after this time [s] cannot drive it. It
 # tries again after as long, then after twice as long each time, until it has come that far.
 STANDING_M, STANDING_S = 0.1, 15.0
-# A robot that has stood without a way for this long [s], where the map says it cannot be, drives
-# back until it fits, this far [m] at most, whatever the map shows: pose or map errs.
-WITHOUT_WAY_S, BLIND_M = 20.0, 1.5
 # It leads on by so many points of the track once the robot can go on.
 INTO_POINTS = 4
 # Longest loops that are left out first, in points of the track.
@@ -60,10 +57,6 @@ class WayOut:
         self._place: Point = math.inf, math.inf
         self._since = -math.inf
         self._tries = 0
-        # Since when it has stood there without a way, and where it began to drive whatever the map
-        # shows; None where it does not.
-        self._stands_since = math.inf
-        self._blind_from: Point | None = None
 
     def note_pose(self, pose: Pose2D) -> None:
         """Note where the robot is."""
@@ -101,7 +94,7 @@ class WayOut:
         here = stamped.pose.x, stamped.pose.y
         has_moved = math.dist(here, self._place) > STANDING_M
         if has_moved:
-            self._place, self._since, self._tries, self._stands_since = here, now, 0, now
+            self._place, self._since, self._tries = here, now, 0
         waits_s = now - self._since
         seen, self._seen = self._seen, (floor, floor.revision if floor else 0)
         if drives and waits_s > STANDING_S:
@@ -111,33 +104,22 @@ class WayOut:
             return None
         is_same_floor = seen[0] is floor and seen[1] == self._seen[1]
         knows_none = self._to is None and not (has_moved or self._tries)
-        stands_long = not drives and now - self._stands_since > WITHOUT_WAY_S
-        if is_same_floor and (drives or knows_none) and not stands_long:
+        if is_same_floor and (drives or knows_none):
             return None
         way = self.find(leads_on)
-        if len(way) or not (drives or stands_long):
-            self._blind_from = None
-        elif stands_long:
-            self._stands_since, self._blind_from = now, here
-        if not len(way) and self._blind_from is not None:
-            way = self.find(leads_on, BLIND_M - math.dist(here, self._blind_from))
         to, self._to = self._to, tuple(way[-1].tolist()) if len(way) else None
         if drives:
             return None if to == self._to else way
         self._since = now
         return way
 
-    def find(
-        self, leads_on: Callable[[ReachableArea], bool], blind_m: float = 0.0
-    ) -> NDArray[np.float64]:
+    def find(self, leads_on: Callable[[ReachableArea], bool]) -> NDArray[np.float64]:
         """Return the way back to where the robot can go on from, float64 (n, 2): x, y [m].
 
         It begins at the robot. (0, 2) if there is none, or cells are counted.
 
         Args:
             leads_on: whether the robot can go on in an area.
-            blind_m: how far a robot that does not fit where it is may drive back until it does,
-                whatever the map shows [m].
         """
         floor, lattice, stamped = self._map.floor, self._map.lattice, self._map.pose
         if floor is None or lattice is None or stamped is None or self._map.grid is None:
@@ -149,18 +131,12 @@ class WayOut:
         squeeze_px = SQUEEZE_PX * self._map.grid.geometry.resolution / floor.geometry.resolution
         radius = max(full_px - squeeze_px, LEAST_SHARE * full_px)
         radius = min(radius, fitting_radius(floor, raster[0]))
-        least = LEAST_SHARE * full_px
-        blind_px = blind_m / floor.geometry.resolution if radius < least else 0.0
-        if radius < least and blind_px <= 0.0:
+        if radius < LEAST_SHARE * full_px:
             return NO_WAY
-        radius = max(radius, least)
         # Areas that the robot cannot go on in, its own among them.
         seen = np.zeros(lattice.states.shape, bool)
         for index, (a, b) in enumerate(pairwise(raster), start=1):
-            if blind_px > 0.0:
-                blind_px -= math.dist(a, b)
-                blind_px *= not is_clear_between(floor, b, b, radius)
-            elif not is_clear_between(floor, a, b, radius):
+            if not is_clear_between(floor, a, b, radius):
                 break
             cell = lattice.cell_at(*way[index])
             is_coverable = lattice.contains(cell) and lattice.coverable[lattice.local(cell)]

@@ -161,10 +161,13 @@ class Sequencer:
     def move_reached(self, motion: Motion) -> None:
         """Move the reached cells with the map."""
         self._unreached.move(motion)
+        # What was reachable before lies elsewhere on the map now.
+        self._run.left_behind.set_out(None)
 
     def shift_reached(self, motion: Motion) -> None:
         """Move the reached cells with the newest map, whose area is not known yet."""
         self._unreached.shift(motion)
+        self._run.left_behind.set_out(None)
 
     def note_area(self) -> None:
         """Remember the cells that are reachable now."""
