@@ -76,8 +76,8 @@ def run(args: argparse.Namespace) -> int:
         else:
             from fasaco_edge.fleet.cli.watch import fleet_on_bus
 
-            with fleet_on_bus(args.fleet, keys, bus) as (watched, nobody):
-                _watch(args, watched, nobody)
+            with fleet_on_bus(args.fleet, keys, bus) as (watched, no_answer):
+                _watch(args, watched, no_answer)
         sys.stdout.flush()
         code = Exit.OK
     except FasacoError as error:
@@ -111,10 +111,12 @@ def _watch_robot(args: argparse.Namespace, keys: Keys, bus: BusSettings) -> None
         )
 
 
-def _watch(args: argparse.Namespace, watched: Watched, nobody: Callable[[], FasacoError]) -> None:
-    """Watch in the form that the options ask for; ``nobody``: the error if nothing is heard."""
+def _watch(
+    args: argparse.Namespace, watched: Watched, no_answer: Callable[[], FasacoError]
+) -> None:
+    """Watch in the form that the options ask for; ``no_answer``: the error if no robot answers."""
     if args.once:
-        _once(args, watched, nobody)
+        _once(args, watched, no_answer)
     elif args.json:
         live.watch_as_json(watched)
     elif sys.stdout.isatty() and os.environ.get("TERM", "dumb") not in ("dumb", "unknown"):
@@ -123,9 +125,9 @@ def _watch(args: argparse.Namespace, watched: Watched, nobody: Callable[[], Fasa
         live.watch_in_lines(watched)
 
 
-def _once(args: argparse.Namespace, watched: Watched, nobody: Callable[[], FasacoError]) -> None:
+def _once(args: argparse.Namespace, watched: Watched, no_answer: Callable[[], FasacoError]) -> None:
     if not live.look_once(watched, args.timeout):
-        raise BusUnavailable(watched.trouble) if watched.trouble else nobody()
+        raise BusUnavailable(watched.trouble) if watched.trouble else no_answer()
     if args.json:
         live.print_json(watched.document())
         return

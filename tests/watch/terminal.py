@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 import re
+import subprocess
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 from fasaco_edge.watch.live import END_PAGE
 from tests.support import terminal
+from tests.support.processes import ENVIRONMENT, PROGRAM
 from tests.watch.grids import plain
 
 _LINE = re.compile(r"\x1b\[(\d+);1H")
@@ -33,3 +37,19 @@ class Terminal(terminal.Terminal):
         left, entered = self.written.rfind("\x1b[?1049l"), self.written.rfind("\x1b[?1049h")
         hidden = self.written.rfind("\x1b[?25l")
         return 0 <= entered < left and hidden >= 0 and super().is_clean()
+
+
+@contextmanager
+def piped(*words: str) -> Iterator[subprocess.Popen[str]]:
+    """Run ``watch`` into pipes; whatever happens meanwhile, it is over afterwards."""
+    with subprocess.Popen(
+        [*PROGRAM, "watch", *words],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env=ENVIRONMENT | {"PYTHONUNBUFFERED": "1"},
+    ) as process:
+        try:
+            yield process
+        finally:
+            process.kill()

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import contextlib
 import json
 import os
 import signal
 import socket
-import subprocess
 import termios
 import time
 from collections.abc import Iterator
@@ -18,8 +16,6 @@ from fasaco_edge.host.processes import own_mb
 from fasaco_edge.watch.live import Screen
 from tests.support.outsider import Outsider
 from tests.support.processes import (
-    ENVIRONMENT,
-    PROGRAM,
     Daemon,
     daemon_process,
     fasaco_edge,
@@ -28,7 +24,7 @@ from tests.support.processes import (
 )
 from tests.support.rooms import HALL, begin, lanes, map_bytes, pose_bytes
 from tests.support.statuses import MALFORMED, malformed_status
-from tests.watch.terminal import Terminal
+from tests.watch.terminal import Terminal, piped
 
 # Memory of its own at most, without pages of files [MB].
 WATCH_MB = 30.0
@@ -203,7 +199,7 @@ def test_it_draws_no_more_often_than_ten_times_a_second(covering):
 
 
 def test_lines_where_there_is_no_terminal(covering):
-    with _piped("--connect", covering.endpoint) as process:
+    with piped("--connect", covering.endpoint) as process:
         assert process.stdout is not None
         said = [process.stdout.readline() for _ in range(4)]
         process.send_signal(signal.SIGTERM)
@@ -214,7 +210,7 @@ def test_lines_where_there_is_no_terminal(covering):
 
 
 def test_a_broken_pipe_is_no_traceback(covering):
-    with _piped("--connect", covering.endpoint, "--json") as process:
+    with piped("--connect", covering.endpoint, "--json") as process:
         assert process.stdout is not None
         assert process.stderr is not None
         process.stdout.readline()
@@ -224,7 +220,7 @@ def test_a_broken_pipe_is_no_traceback(covering):
 
 
 def test_json_is_a_status_a_line(covering):
-    with _piped("--connect", covering.endpoint, "--json") as process:
+    with piped("--connect", covering.endpoint, "--json") as process:
         assert process.stdout is not None
         documents = [json.loads(process.stdout.readline()) for _ in range(2)]
         process.send_signal(signal.SIGINT)
@@ -236,7 +232,7 @@ def test_json_is_a_status_a_line(covering):
 def test_json_goes_on_after_a_status_that_cannot_be_read(covering):
     with (
         Outsider(covering.endpoint) as outsider,
-        _piped("--connect", covering.endpoint, "--json") as process,
+        piped("--connect", covering.endpoint, "--json") as process,
     ):
         assert process.stdout is not None
         process.stdout.readline()
@@ -282,21 +278,6 @@ def test_once_without_a_daemon_is_an_error(covering):
         assert said in ended.err
         assert hint in ended.err
         assert ended.out == ""
-
-
-@contextlib.contextmanager
-def _piped(*words: str) -> Iterator[subprocess.Popen[str]]:
-    with subprocess.Popen(
-        [*PROGRAM, "watch", *words],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        env=ENVIRONMENT | {"PYTHONUNBUFFERED": "1"},
-    ) as process:
-        try:
-            yield process
-        finally:
-            process.kill()  # of one that goes on, the end would be waited for
 
 
 def test_no_status_of_a_peer_ends_it(covering):

@@ -33,7 +33,7 @@ def _no_robot(keys: Keys, feed: FleetFeed, view: FleetView) -> NobodyAnswersErro
         return nobody_answers(f"{keys.base}/{VERSION}/*", ())
     fleets = ", ".join(sorted(view.others)) or "none"
     return NobodyAnswersError(
-        f"no robot of a fleet {one_line(view.fleet)!r} is heard",
+        f"no robot of a fleet {one_line(view.fleet)!r} answers",
         hint=f"{robots} robots are on this bus, of these fleets: {fleets}; "
         "`fleet: {name: ...}` in its configuration makes a robot one of a fleet",
     )

@@ -9,7 +9,7 @@ the longest walk gets shorter. The rest of the time goes into improving the long
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from typing import NamedTuple
@@ -93,15 +93,20 @@ def divide(lattice: CoverageLattice, fleet: Fleet, stop: StoppingCriterion) -> D
     """
     reached = [_reached(lattice, start, number) for number, start in enumerate(fleet.starts, 1)]
     areas: list[_Area] = []
+
+    def is_over() -> bool:
+        # Each area is divided once, whatever the time.
+        return all(area.walks for area in areas) and stop(_progress(areas))
+
     left = list(range(len(fleet.starts)))
     with ThreadPoolExecutor(fleet.threads) as pool:
         while left:
             ground = reached[left[0]]
             robots = [robot for robot in left if ground[lattice.local(fleet.starts[robot])]]
             group = replace(fleet, starts=[fleet.starts[robot] for robot in robots])
-            areas.append(_Area(lattice, group, ground, robots, pool, stop))
+            areas.append(_Area(lattice, group, ground, robots, pool, is_over))
             left = [robot for robot in left if robot not in robots]
-        _run(areas, stop)
+        _run(areas, is_over)
     walks: list[NDArray[np.int32]] = [np.empty((0, 2), np.int32)] * len(fleet.starts)
     for area in areas:
         for robot, walk in zip(area.robots, area.walks, strict=True):
@@ -122,7 +127,7 @@ def _reached(lattice: CoverageLattice, start: Cell, number: int) -> NDArray[np.b
         raise type(error)(f"robot {number}: {error}") from error
 
 
-def _run(areas: list[_Area], stop: StoppingCriterion) -> None:
+def _run(areas: list[_Area], is_over: Callable[[], bool]) -> None:
     """Divide each area once, then improve them round by round until stopped.
 
     Every other round improves the area with the longest walk, which sets the makespan; the other
@@ -132,7 +137,7 @@ def _run(areas: list[_Area], stop: StoppingCriterion) -> None:
     for area in areas:
         next(pieces[id(area)])
     running, is_in_turn = deque(areas), False
-    while running and not stop(_progress(areas)):
+    while running and not is_over():
         if is_in_turn:
             running.rotate(-1)
             area = running[-1]
@@ -187,14 +192,14 @@ class _Area:
         ground: NDArray[np.bool_],
         robots: list[int],
         pool: ThreadPoolExecutor,
-        stop: StoppingCriterion,
+        is_over: Callable[[], bool],
     ) -> None:
         self.robots, self.rounds = robots, 0
         self.walks: list[NDArray[np.int32]] = []
         self.costs_s = np.full(len(robots), np.inf)
         self.travel = Travel(lattice, np.flatnonzero(ground), 1)
         self._lattice, self._fleet, self._ground = lattice, fleet, ground
-        self._pool, self._stop = pool, stop
+        self._pool, self._is_over = pool, is_over
         self._steps_s = np.full(len(robots), fleet.cost.step_s)
         self._owner: Owners = np.zeros(0, np.int64)
 
@@ -251,9 +256,9 @@ class _Area:
 
     def _offer(self, owner: Owners) -> bool:
         """Plan for each part of a division; return whether the longest walk is shorter."""
-        self.rounds += 1
         robots = range(len(self.robots))
         walks = list(self._pool.map(lambda robot: self._walk(owner, robot, QUICK), robots))
+        self.rounds += 1
         costs_s = np.array([self._fleet.cost.of_walk(walk) for walk in walks])
         if costs_s.max() >= self.costs_s.max():
             return False
@@ -292,11 +297,7 @@ class _Area:
         most = per_cell * problem.cells
 
         def is_over(progress: SearchProgress) -> bool:
-            return progress.work.proposals >= most or (bool(self.walks) and self._is_stopped())
+            return progress.work.proposals >= most or self._is_over()
 
         planner = NearOptimal(ColonyConfig(seed=self._fleet.seed))
         return planner.plan(problem, is_over).cells
-
-    def _is_stopped(self) -> bool:
-        """Check the stopping criterion during a search: the time may be over."""
-        return self._stop(_progress([self]))

@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import json
 import signal
-import subprocess
 import threading
 import time
 from collections.abc import Iterator
@@ -22,15 +21,13 @@ from tests.fleet.told import Teller
 from tests.fleet.watch.fleets import AHEAD, PARTS
 from tests.support.outsider import Outsider
 from tests.support.processes import (
-    ENVIRONMENT,
-    PROGRAM,
     daemon_process,
     fasaco_edge,
     free_endpoint,
     mapped_files,
 )
 from tests.support.rooms import map_bytes, pose_bytes, room
-from tests.watch.terminal import Terminal
+from tests.watch.terminal import Terminal, piped
 from tests.watch.test_watch import WATCH_MB
 
 EVERY_S = 0.3
@@ -121,7 +118,7 @@ def test_once_is_one_page(hall):
 
 def test_lines_and_json_where_there_is_no_terminal(hall):
     robots, endpoint = hall
-    with _piped("--fleet", "house", "--connect", endpoint) as process:
+    with piped("--fleet", "house", "--connect", endpoint) as process:
         said = [process.stdout.readline()]
         while "of cells  a: covering, b: " not in said[-1]:
             said.append(process.stdout.readline())
@@ -130,7 +127,7 @@ def test_lines_and_json_where_there_is_no_terminal(hall):
         assert process.wait(60.0) == 0
     assert any("a joined: covering" in line for line in said), said
     assert not any("\x1b" in line for line in said)
-    with _piped("--fleet", "house", "--json", "--connect", endpoint) as process:
+    with piped("--fleet", "house", "--json", "--connect", endpoint) as process:
         documents = [json.loads(process.stdout.readline())]
         # The first may hold all there is to say, and what has not changed is not printed again.
         robots.said["b"] |= {"state": "planning"}
@@ -147,7 +144,7 @@ def test_once_without_a_robot_of_the_fleet_names_the_fleets(hall):
     words = ("watch", "--once", "--timeout", "1", "--fleet")
     ended = fasaco_edge(*words, "hose", "--connect", endpoint)
     assert ended.code == 1
-    assert "no robot of a fleet 'hose' is heard" in ended.err
+    assert "no robot of a fleet 'hose' answers" in ended.err
     assert "of these fleets: house, yard" in ended.err
     assert ended.out == ""
     nowhere = free_endpoint()
@@ -201,18 +198,3 @@ def test_daemons_of_a_fleet_are_shown(tmp_path):
     parts = [robot["part_cells"] for robot in document["robots"]]
     assert sum(parts) == document["cells"] - document["swept_cells"]
     assert abs(parts[0] - parts[1]) < 0.2 * document["cells"]
-
-
-@contextlib.contextmanager
-def _piped(*words: str) -> Iterator[subprocess.Popen[str]]:
-    with subprocess.Popen(
-        [*PROGRAM, "watch", *words],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.DEVNULL,
-        text=True,
-        env=ENVIRONMENT | {"PYTHONUNBUFFERED": "1"},
-    ) as process:
-        try:
-            yield process
-        finally:
-            process.kill()  # of one that goes on, the end would be waited for
