@@ -20,7 +20,7 @@ from typing import Any
 
 import zenoh
 
-from fasaco_edge.bus.asked_publishers import ASK_PERIOD_S, AskedPublisher, AskedPublishers
+from fasaco_edge.bus.one_publisher import ASK_PERIOD_S, AskedPublisher, AskedPublishers
 from fasaco_edge.bus.queries import ask_for_tokens
 from fasaco_edge.bus.sample_order import SampleOrder
 

@@ -13,7 +13,7 @@ from collections.abc import Callable
 
 import zenoh
 
-from fasaco_edge.bus.asked_publishers import MOST_PUBLISHERS, AskedPublishers
+from fasaco_edge.bus.one_publisher import MOST_PUBLISHERS, AskedPublishers
 
 # Time that a reply with a gap before it waits [s]; where several samples count, since the last.
 UNDER_WAY_S = 0.5

@@ -17,8 +17,7 @@ from fasaco_edge.cli.console import terminal
 from fasaco_edge.cli.console.arguments import Command, Exit, check_outputs, writing
 from fasaco_edge.cli.console.streams import print_json
 from fasaco_edge.cli.planning.options import EPILOG, add_options
-from fasaco_edge.cli.planning.progress import watching
-from fasaco_edge.cli.planning.request import read_request, require_frame
+from fasaco_edge.cli.planning.request import read_request, require_frame, watching
 from fasaco_edge.cli.warmup import compile_kernels
 from fasaco_edge.config.cautions import tool_caution
 from fasaco_edge.errors import BadConfiguration

@@ -73,6 +73,6 @@ def report_of(config: DaemonConfig, mission: Mission | None, now: float) -> Flee
     """Return the fleet's part of the status at ``now`` [s]; None without a fleet."""
     if not config.fleet:
         return None
-    from fasaco_edge.fleet.daemon.report import report  # noqa: PLC0415
+    from fasaco_edge.fleet.daemon.exchange import report  # noqa: PLC0415
 
     return report(config.fleet.name, mission, now)

@@ -11,8 +11,15 @@ from typing import Any
 
 from fasaco_edge.bus.queries import Reply
 from fasaco_edge.bus.session import Bus
-from fasaco_edge.wire.ros_actions import Call, bridge_keys, served_keys, server_tokens
-from fasaco_edge.wire.ros_keys import RosNode, attachment, gid_of
+from fasaco_edge.wire.ros_keys import (
+    Call,
+    RosNode,
+    attachment,
+    bridge_keys,
+    gid_of,
+    served_keys,
+    server_tokens,
+)
 
 # Timeout of a reply [s]; of a result, as long as driving to the end of a goal. After it the query
 # is repeated.

@@ -1,4 +1,9 @@
-"""A follower's inputs from the bus: poses, paths and heartbeats of the daemon, by cycle."""
+"""A follower's inputs by cycle: poses, paths and heartbeats of the daemon, scans, maps, and time.
+
+The time is the computer's, or a simulation's by the stamps of its poses. A simulation runs at a
+multiple of the real speed, and slower where the computer cannot keep up. By the computer's time, a
+follower would then consider fresh poses old, and expect the robot to have gone further than it has.
+"""
 
 from __future__ import annotations
 
@@ -6,19 +11,85 @@ import logging
 import time
 from collections import deque
 from collections.abc import Callable
+from functools import partial
+from typing import Protocol
 
 from fasaco_edge.bus.arrival import Sample
 from fasaco_edge.bus.one_publisher import OnePublisher
 from fasaco_edge.bus.session import Bus
 from fasaco_edge.errors import FasacoError
-from fasaco_edge.follow.clock import Clock, RealClock, SimulatedClock
 from fasaco_edge.follow.daemons import Daemons
+from fasaco_edge.follow.follower import Follower
 from fasaco_edge.follow.settings import FollowSettings, PoseSource
+from fasaco_edge.follow.sight import Sight, SightSettings
 from fasaco_edge.follow.supervision import LINK_S, Patience, Supervision
 from fasaco_edge.wire import topics
 from fasaco_edge.wire.keys import Keys
+from fasaco_edge.wire.limits import MAX_SCAN_BEAMS
 from fasaco_edge.wire.messages.poses import PoseDecoder
 from fasaco_edge.wire.schemas import TF_MESSAGE
+
+# A simulation's time advances at most this far without a pose [s]: poses come ten times a second.
+LEAD_S = 0.09
+# After this long without a pose the simulation has stopped, and time goes on [s, real].
+SILENT_S = 2.0
+# Stamps that go back, or forward by more than this, are those of another simulation [s].
+JUMP_S = 5.0
+
+
+class Clock(Protocol):
+    """The robot's time."""
+
+    def at(self, now: float) -> float:
+        """Return the robot's time at a monotonic time of the computer."""
+
+    def hear(self, stamp_ns: int, now: float) -> float:
+        """Take in the stamp of a pose that arrived then; return the robot's time of its arrival."""
+
+
+class RealClock:
+    """The computer's time."""
+
+    def at(self, now: float) -> float:
+        """Return the time unchanged."""
+        return now
+
+    def hear(self, _stamp_ns: int, now: float) -> float:
+        """Return the time unchanged."""
+        return now
+
+
+class SimulatedClock:
+    """A simulation's time; it never goes back.
+
+    Args:
+        pace: simulated seconds in a second.
+    """
+
+    def __init__(self, pace: float) -> None:
+        self._pace = pace
+        self._stamp_ns: int | None = None
+        # Its time at the newest pose, and when that arrived.
+        self._time = self._heard_at = 0.0
+
+    def at(self, now: float) -> float:
+        """Return the simulated time at a monotonic time of the computer."""
+        if self._stamp_ns is None:
+            return now * self._pace
+        since = max(now - self._heard_at, 0.0)
+        lead = min(since * self._pace, LEAD_S)
+        return self._time + lead + max(since - SILENT_S, 0.0) * self._pace
+
+    def hear(self, stamp_ns: int, now: float) -> float:
+        """Take in the stamp of a pose; it arrives at the time that it says."""
+        time = self.at(now)
+        if self._stamp_ns is not None:
+            step = (stamp_ns - self._stamp_ns) * 1e-9
+            if 0.0 <= step <= JUMP_S:
+                time = max(time, self._time + step)
+        self._stamp_ns, self._time, self._heard_at = stamp_ns, time, now
+        return time
+
 
 LOG = logging.getLogger(__name__)
 # Most poses that wait for the next cycle; beyond that the oldest are dropped.
@@ -118,3 +189,71 @@ class Inputs:
 
     def _take_status(self, sample: Sample) -> None:
         self._daemons.take_status(sample.payload, self.now())
+
+
+# Only the newest scans count, and of maps the newest with its updates.
+MOST_SCANS, MOST_UPDATES = 2, 256
+# A scan has a range and an intensity for each beam, some numbers and a name.
+MOST_SCAN_BYTES = 8 * MAX_SCAN_BEAMS + 1024
+# A map has a byte for each pixel, and this much more.
+HEADER_BYTES = 1024
+
+MAP, UPDATE, SCAN = topics.MAP.name, topics.MAP_UPDATE.name, topics.SCAN.name
+
+
+class ScanInputs:
+    """Subscribes, and passes on the samples since the last cycle.
+
+    Attributes:
+        sight: takes in maps.
+    """
+
+    def __init__(self, settings: FollowSettings, bus: Bus) -> None:
+        self.sight = Sight(SightSettings.of(settings.scan))
+        self._most_map_bytes: int = settings.scan["most_pixels"] + HEADER_BYTES
+        self._scans = deque[tuple[Sample, float]](maxlen=MOST_SCANS)
+        self._maps = deque[tuple[bool, bytes]](maxlen=MOST_UPDATES)
+        self._publisher = OnePublisher("scans", topics.SCAN.one_publisher_s, bus)
+        self._conflict = ""
+        keys = Keys(settings.robot, settings.base)
+        takers: dict[str, Callable[[Sample], None]] = {
+            MAP: partial(self._take_map, is_update=False),
+            UPDATE: partial(self._take_map, is_update=True),
+            SCAN: self._take_scan,
+        }
+        for topic in (topics.MAP, topics.MAP_UPDATE, topics.SCAN):
+            bus.listen(keys, topic, takers[topic.name])
+        for name, key, latched, depth in settings.scan["topics"]:
+            in_order = name in topics.IN_ORDER
+            bus.subscribe(key, takers[name], latched, depth, in_order=in_order)
+
+    def feed(self, follower: Follower, time_of: Callable[[float], float]) -> None:
+        """Pass on maps and scans.
+
+        Args:
+            follower: to whom.
+            time_of: gives the time for an arrival by the computer's monotonic clock [s].
+        """
+        while self._maps:
+            is_update, payload = self._maps.popleft()
+            self.sight.take_map(payload, is_update=is_update)
+        while self._scans:
+            sample, came_at = self._scans.popleft()
+            if self._publisher.takes(sample.sender, came_at):
+                follower.take_scan(sample.payload, time_of(came_at))
+        conflict = self._publisher.conflict(time.monotonic())
+        if conflict and not self._conflict:
+            LOG.warning("%s", conflict, extra={"event": "two_publishers"})
+        self._conflict = conflict
+
+    def _take_scan(self, sample: Sample) -> None:
+        if sample.size <= MOST_SCAN_BYTES:
+            self._scans.append((sample, time.monotonic()))
+
+    def _take_map(self, sample: Sample, *, is_update: bool) -> None:
+        if sample.size > self._most_map_bytes:
+            return
+        if not is_update:
+            # A new map replaces all before it.
+            self._maps.clear()
+        self._maps.append((is_update, sample.payload))

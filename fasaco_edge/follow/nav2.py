@@ -17,9 +17,8 @@ from fasaco_edge.errors import MalformedMessage
 from fasaco_edge.follow.goals import COAST_M, TIP_M, Goal, PathDriven
 from fasaco_edge.follow.nav2_requests import AskResult, Cancellations, Request, SendGoal
 from fasaco_edge.follow.pieces import STEP_M, Line, end_of_piece
-from fasaco_edge.follow.standstill import floor_ahead
+from fasaco_edge.follow.standstill import Tries, floor_ahead
 from fasaco_edge.follow.supervision import Patience, State, Supervision
-from fasaco_edge.follow.tries import Tries
 from fasaco_edge.grid.geometry import Point, Pose2D
 from fasaco_edge.wire.messages.follow_path import (
     ABORTED,

@@ -26,8 +26,7 @@ from fasaco_edge.wire.messages.follow_path import (
     encode_goal,
     encode_goal_id,
 )
-from fasaco_edge.wire.ros_actions import FOLLOW_PATH, RELEASES, Call, Release, release_of
-from fasaco_edge.wire.ros_keys import RosNode
+from fasaco_edge.wire.ros_keys import FOLLOW_PATH, RELEASES, Call, Release, RosNode, release_of
 
 # A server that ends a query for a result sooner, without a reply, is gone [s].
 GONE_S = 290.0

@@ -12,11 +12,10 @@ from typing import TYPE_CHECKING, Protocol
 from fasaco_edge.bus.joining import join
 from fasaco_edge.bus.session import Bus
 from fasaco_edge.bus.settings import BusSettings
-from fasaco_edge.follow.base_claim import BaseClaim
+from fasaco_edge.follow.daemons import BaseClaim
 from fasaco_edge.follow.estimate import STAND, Command, Limits
 from fasaco_edge.follow.follower import RATE_HZ, Follower
-from fasaco_edge.follow.inputs import Inputs, patience_of
-from fasaco_edge.follow.scan_inputs import ScanInputs
+from fasaco_edge.follow.inputs import Inputs, ScanInputs, patience_of
 from fasaco_edge.follow.settings import FollowSettings
 from fasaco_edge.follow.standstill import Standstill, report_of
 from fasaco_edge.follow.supervision import State, Supervision
@@ -28,7 +27,7 @@ from fasaco_edge.wire.schemas import TWIST_STAMPED
 from fasaco_edge.wire.topic_types import VOLATILE
 
 if TYPE_CHECKING:
-    from fasaco_edge.follow.docking_node import DockingNode
+    from fasaco_edge.follow.docking import DockingNode
 
 log = logging.getLogger(__name__)
 
@@ -91,7 +90,7 @@ def docking_of(bus: Bus, settings: FollowSettings) -> DockingNode | None:
     if not settings.dock or settings.dry_run:
         return None
     # A follower without a dock does not load it.
-    from fasaco_edge.follow.docking_node import DockingNode  # noqa: PLC0415
+    from fasaco_edge.follow.docking import DockingNode  # noqa: PLC0415
 
     return DockingNode(bus, settings)
 

@@ -14,9 +14,15 @@ from dataclasses import dataclass
 from typing import Any
 
 from fasaco_edge.errors import MalformedMessage
-from fasaco_edge.follow.free_way import Thing, first_met, speed_before, speed_beside
-from fasaco_edge.follow.known_map import KnownMap
-from fasaco_edge.follow.scanner import Mount, points_of
+from fasaco_edge.follow.scanner import (
+    KnownMap,
+    Mount,
+    Thing,
+    first_met,
+    points_of,
+    speed_before,
+    speed_beside,
+)
 from fasaco_edge.follow.supervision import State
 from fasaco_edge.grid.geometry import Point, Pose2D
 from fasaco_edge.wire.messages.scans import decode_scan

@@ -19,12 +19,12 @@ from fasaco_edge.errors import StartBlocked, StartOutsideMap
 from fasaco_edge.grid.geometry import Pose2D, StampedPose
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.kernels.lattice.raycast import disc_is_free
-from fasaco_edge.simulation.battery import Battery
 from fasaco_edge.simulation.mapper import Mapper
 from fasaco_edge.simulation.noise import MapperNoise
 from fasaco_edge.simulation.noisy_mapper import NoisyMapper
 from fasaco_edge.simulation.robot import (
     ARRIVED_M,
+    Battery,
     DriveState,
     Point,
     SimulationConfig,

@@ -14,7 +14,7 @@ from PIL import Image
 
 from fasaco_edge.cli import main
 from fasaco_edge.cli.console.arguments import Exit
-from fasaco_edge.cli.planning.turning import LIMITS
+from fasaco_edge.cli.planning.request import LIMITS
 from fasaco_edge.config.robot import RobotConfig
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D
 from fasaco_edge.grid.occupancy import OccupancyGrid

@@ -47,7 +47,7 @@ def test_it_docks_and_comes_out_again(base, tmp_path, domain, wanted, nav2, dock
         # As the daemon does it: the path ends, and it says that the robot charges.
         base.send_path()
         base.state = "charging"
-        tries, line = docking.count("Dock"), "INFO fasaco_edge.follow.docking_node: dock: docking\n"
+        tries, line = docking.count("Dock"), "INFO fasaco_edge.follow.docking: dock: docking\n"
         wait(lambda: log.read_text().count(line) == tries, log)
         base.send_path(*OUT)
         until(log, "dock: in its dock")

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from fasaco_edge.follow.known_map import KNOWN_M, KnownMap
+from fasaco_edge.follow.scanner import KNOWN_M, KnownMap
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D, Window
 from fasaco_edge.grid.occupancy import MapPatch, OccupancyGrid
 from fasaco_edge.wire.messages.maps import encode_map_update, encode_occupancy_grid

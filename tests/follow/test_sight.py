@@ -4,8 +4,7 @@ import math
 
 import pytest
 
-from fasaco_edge.follow.free_way import MARGIN_M, STOP_M, Thing, first_met
-from fasaco_edge.follow.scanner import Mount, points_of
+from fasaco_edge.follow.scanner import MARGIN_M, STOP_M, Mount, Thing, first_met, points_of
 from fasaco_edge.follow.sight import STANDS_S
 from fasaco_edge.follow.supervision import State
 from fasaco_edge.grid.geometry import Pose2D

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from fasaco_edge.follow.tries import Tries
+from fasaco_edge.follow.standstill import Tries
 
 HERE = (1.0, 2.0)
 

@@ -8,7 +8,7 @@ import time
 import pytest
 
 from fasaco_edge.bus import access
-from fasaco_edge.follow.base_claim import NO_RIGHT
+from fasaco_edge.follow.daemons import NO_RIGHT
 from fasaco_edge.follow.estimate import Command
 from fasaco_edge.wire import topics
 from tests.campaigns.fault_links import Link

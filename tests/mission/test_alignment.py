@@ -5,7 +5,7 @@ import itertools
 import numpy as np
 import pytest
 
-from fasaco_edge.mission.line.alignment import aligned, by_distance
+from fasaco_edge.mission.line.place_on_line import aligned, by_distance
 
 
 def stands(*places):

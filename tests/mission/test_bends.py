@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from fasaco_edge.mission.coverage.bends import SHORT_M, beside_m, corner_between
+from fasaco_edge.mission.coverage.steady_track import SHORT_M, beside_m, corner_between
 
 FAR_M = 100.0
 

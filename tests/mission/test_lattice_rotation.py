@@ -20,9 +20,9 @@ from fasaco_edge.mission.core.events import (
     PlanReady,
     PoseReceived,
 )
+from fasaco_edge.mission.core.lattice_angle import WallWatch
 from fasaco_edge.mission.core.mission import Mission
 from fasaco_edge.mission.coverage.rotated_ledger import rotated_ledger
-from fasaco_edge.mission.map.wall_watch import WallWatch
 from fasaco_edge.mission.orders.keep_outs import KeepOut
 from fasaco_edge.mission.orders.order import read_order
 from fasaco_edge.mission.orders.order_state import OrderState

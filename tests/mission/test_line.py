@@ -29,7 +29,7 @@ from fasaco_edge.mission.core.events import (
 )
 from fasaco_edge.mission.core.mission import Mission
 from fasaco_edge.mission.coverage.floor_tiles import PIXEL_M
-from fasaco_edge.mission.line.out_of_reach import Cause
+from fasaco_edge.mission.line.missed_floor import Cause
 from fasaco_edge.mission.line.polisher import AHEAD_M
 from fasaco_edge.mission.line.polyline import POLISHED
 from fasaco_edge.mission.line.tally import SweepTally

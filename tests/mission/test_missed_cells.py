@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from fasaco_edge.mission.coverage.missed_cells import MOST_AGAIN, MissedCells
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
+from fasaco_edge.mission.coverage.passed_cells import MOST_AGAIN, MissedCells
 from tests.mission.world import CELL, pose_at
 
 

@@ -2,8 +2,8 @@
 
 import pytest
 
-from fasaco_edge.mission.core.dock_current import FLAT_S
 from fasaco_edge.mission.core.events import BatteryReceived, MapReceived, State
+from fasaco_edge.mission.core.in_dock import FLAT_S
 from fasaco_edge.mission.core.trouble import RULES
 from fasaco_edge.wire.documents.status import TROUBLES
 from tests.mission.battery import AT_DOCK, Battery

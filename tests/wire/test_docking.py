@@ -14,7 +14,7 @@ from fasaco_edge.wire.messages.docking import (
     encode_undock,
 )
 from fasaco_edge.wire.messages.follow_path import ABORTED, CANCELED, SUCCEEDED
-from fasaco_edge.wire.ros_actions import CALLS, DOCK_ROBOT, UNDOCK_ROBOT, served_keys
+from fasaco_edge.wire.ros_keys import CALLS, DOCK_ROBOT, UNDOCK_ROBOT, served_keys
 from tests.support.dock_server import CANCEL_HASH, HASHES, dock_store
 from tests.wire.test_ros_actions import GOAL, Definitions, base, named
 

@@ -21,7 +21,7 @@ from fasaco_edge.wire.messages.follow_path import (
     encode_goal,
     encode_goal_id,
 )
-from fasaco_edge.wire.ros_actions import (
+from fasaco_edge.wire.ros_keys import (
     CALLS,
     RELEASES,
     bridge_keys,

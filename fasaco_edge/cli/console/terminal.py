@@ -1,9 +1,10 @@
-"""Terminal output: tables on standard output, progress bars on standard error."""
+"""The terminal: tables on standard output, progress bars and questions on standard error."""
 
 from __future__ import annotations
 
 import os
 import signal
+import sys
 from collections.abc import Iterable
 from contextlib import ExitStack
 from functools import cache
@@ -127,3 +128,17 @@ def figures(rows: Iterable[tuple[str, str]]) -> Table:
     for name, value in rows:
         table.add_row(name, value)
     return table
+
+
+def may_ask() -> bool:
+    """Return whether a person can read a question, and answer it."""
+    return sys.stdin.isatty() and sys.stderr.isatty()
+
+
+def agrees(*facts: str) -> bool:
+    """Show facts, and ask whether to go on; all answers but yes mean no."""
+    console = err()
+    for fact in facts:
+        console.print(fact)
+    console.print("Go on? [y/N] ", end="")
+    return sys.stdin.readline().strip().lower() in ("y", "yes")

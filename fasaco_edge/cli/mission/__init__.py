@@ -11,9 +11,8 @@ import msgspec
 
 from fasaco_edge.cli.ask import RefusedError, add_question, ask, show_mission
 from fasaco_edge.cli.console.arguments import Command, Exit, add_common
-from fasaco_edge.cli.console.question import agrees, may_ask
 from fasaco_edge.cli.console.streams import print_json
-from fasaco_edge.cli.console.terminal import err
+from fasaco_edge.cli.console.terminal import agrees, err, may_ask
 from fasaco_edge.cli.mission.keep_outs import add_actions, asked_by, names_of, show_keep_outs
 from fasaco_edge.errors import OrderError, WouldForget
 from fasaco_edge.host.plain_yaml import load, read_bounded

@@ -7,7 +7,7 @@ import math
 from pathlib import Path
 
 from fasaco_edge.cli.console.arguments import add_json, pair_of_floats, pair_of_ints
-from fasaco_edge.cli.planning.turning import add_turning
+from fasaco_edge.cli.planning.request import add_turning
 from fasaco_edge.config.robot import RobotConfig
 from fasaco_edge.offline.settings import (
     ANYWHERE,

@@ -17,14 +17,14 @@ from fasaco_edge.daemon.claim import NameClaim
 from fasaco_edge.daemon.figures import MapLatency
 from fasaco_edge.daemon.ledger.writer import LedgerKeeper
 from fasaco_edge.daemon.loop.answers import Commands
-from fasaco_edge.daemon.loop.grid_publishers import (
-    CoveragePublisher,
-    FloorPublisher,
-    TrailPublisher,
-)
 from fasaco_edge.daemon.loop.inbox import MAPS, Batch, Inbox, take_batch
 from fasaco_edge.daemon.loop.mission_runner import MissionRunner
-from fasaco_edge.daemon.loop.outbox import Outbox
+from fasaco_edge.daemon.loop.outbox import (
+    CoveragePublisher,
+    FloorPublisher,
+    Outbox,
+    TrailPublisher,
+)
 from fasaco_edge.daemon.loop.status import StatusBoard
 from fasaco_edge.daemon.loop.turn_log import TurnLog, TurnNote
 from fasaco_edge.daemon.notify import Watchdog

@@ -13,9 +13,8 @@ from rich.table import Table
 
 from fasaco_edge.cli.ask import nobody_answers
 from fasaco_edge.cli.console.arguments import Exit, robot_on_bus
-from fasaco_edge.cli.console.question import agrees, may_ask
 from fasaco_edge.cli.console.streams import print_json
-from fasaco_edge.cli.console.terminal import out
+from fasaco_edge.cli.console.terminal import agrees, may_ask, out
 from fasaco_edge.client import phrases
 from fasaco_edge.errors import MalformedMessage, NobodyAnswersError, WouldForget
 from fasaco_edge.text import one_line

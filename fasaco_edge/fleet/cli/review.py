@@ -42,7 +42,7 @@ def print_fleet(args: argparse.Namespace) -> int:
     else:
         _print(review.figures)
     if args.png:
-        from fasaco_edge.fleet.review.output import draw_fleet_review
+        from fasaco_edge.fleet.review.drawing import draw_fleet_review
 
         with writing(args.png) as file:
             draw_fleet_review(review).save(file, "PNG")

@@ -10,7 +10,7 @@ from fasaco_edge.cli.ask import nobody_answers
 from fasaco_edge.cli.console.terminal import out
 from fasaco_edge.errors import FasacoError, NobodyAnswersError
 from fasaco_edge.fleet.watch.feed import FleetFeed
-from fasaco_edge.fleet.watch.session import FleetWatch
+from fasaco_edge.fleet.watch.page import FleetWatch
 from fasaco_edge.fleet.watch.view import FleetView
 from fasaco_edge.text import one_line
 from fasaco_edge.wire.keys import VERSION, Keys

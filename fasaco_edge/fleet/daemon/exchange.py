@@ -1,4 +1,4 @@
-"""Fleet messages: this robot's message to the others, and theirs as events.
+"""Fleet messages: this robot's message to the others, theirs as events, and the status of both.
 
 Unused without a block ``fleet`` in the configuration.
 """
@@ -32,12 +32,14 @@ from fasaco_edge.wire.documents.fleet import (
     decode_member,
 )
 from fasaco_edge.wire.documents.json_text import encode_json
+from fasaco_edge.wire.documents.status import FleetReport, MemberReport
 from fasaco_edge.wire.limits import MAX_FLEET_POINTS
 from fasaco_edge.wire.topics import FLEET
 
 if TYPE_CHECKING:
     from fasaco_edge.fleet.mission.traffic import Points
     from fasaco_edge.mission.core.mission import Mission
+
 
 PERIOD_S, LEAST_PERIOD_S = 1.0, 0.25
 # Number of tiles of progress, and as many of ground, in a periodic message (once a second), and in
@@ -247,3 +249,21 @@ def _pose(x: float, y: float, deg: float) -> Pose2D:
 
 def _placed(tiles: tuple[CellTile, ...]) -> tuple[tuple[tuple[int, int], bytes], ...]:
     return tuple(((tile.row, tile.col), tile.cells) for tile in tiles)
+
+
+def report(fleet: str, mission: Mission | None, now: float) -> FleetReport:
+    """Return the report of the fleet of this name at ``now`` [s]."""
+    if mission is None:
+        return FleetReport(fleet)
+    others = fleet_of(mission)
+    members = tuple(
+        MemberReport(
+            name,
+            member.newest.state,
+            round(max(now - member.heard_at, 0.0), 1),
+            member.absence(now) or None,
+            others.shared.cells_of(name),
+        )
+        for name, member in sorted(others.members.items())
+    )
+    return FleetReport(fleet, others.numbers.number, others.part_cells(), members)

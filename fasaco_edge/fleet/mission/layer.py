@@ -13,13 +13,11 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.fleet.mission.at_work import AtWork
 from fasaco_edge.fleet.mission.division import Division, Robot, divide
-from fasaco_edge.fleet.mission.division_numbers import DivisionNumbers
 from fasaco_edge.fleet.mission.ground import viewpoint
 from fasaco_edge.fleet.mission.members import Member, Members
-from fasaco_edge.fleet.mission.remainder import Remainder
 from fasaco_edge.fleet.mission.shared import MOST_ROBOTS, SharedProgress
+from fasaco_edge.fleet.mission.shared_work import AtWork, DivisionNumbers, Remainder
 from fasaco_edge.grid.changes import carried
 from fasaco_edge.grid.geometry import Window
 from fasaco_edge.grid.lattice import Cell

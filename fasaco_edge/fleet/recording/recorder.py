@@ -17,9 +17,8 @@ from fasaco_edge.bus.session import Bus
 from fasaco_edge.bus.settings import BusSettings
 from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.errors import FasacoError
-from fasaco_edge.fleet.observer.inbox import FleetInbox, Heard
+from fasaco_edge.fleet.observer.inbox import FleetInbox, FleetSubscriptions, Heard
 from fasaco_edge.fleet.observer.members import JOINED
-from fasaco_edge.fleet.observer.subscriptions import FleetSubscriptions
 from fasaco_edge.fleet.recording.layout import build_layout
 from fasaco_edge.fleet.recording.members import RecordedMember, RecordedMembers
 from fasaco_edge.fleet.recording.notes import NOTES_VERSION, Note, NoteBatch, encode_notes

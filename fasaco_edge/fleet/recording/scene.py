@@ -15,10 +15,14 @@ from numpy.typing import NDArray
 
 from fasaco_edge.fleet.observer.cells import mask_of, window_of
 from fasaco_edge.fleet.observer.inbox import LEAST_SHARING
-from fasaco_edge.fleet.observer.members import GONE
-from fasaco_edge.fleet.observer.shares import shares_of, swept_twice
-from fasaco_edge.fleet.recording.card import RobotRow, card_of, colour_of
-from fasaco_edge.fleet.recording.layout import build_layout, robot_entity
+from fasaco_edge.fleet.observer.members import GONE, shares_of, swept_twice
+from fasaco_edge.fleet.recording.layout import (
+    RobotRow,
+    build_layout,
+    card_of,
+    colour_of,
+    robot_entity,
+)
 from fasaco_edge.fleet.recording.members import RecordedMember, RecordedMembers
 from fasaco_edge.grid.geometry import Bounds, GridGeometry, Pose2D, union_bounds
 from fasaco_edge.grid.occupancy import OccupancyGrid, coarser, known_bounds

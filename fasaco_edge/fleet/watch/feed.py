@@ -8,10 +8,9 @@ from collections.abc import Collection
 from fasaco_edge.bus.arrival import Arrival, Sample
 from fasaco_edge.bus.session import Bus
 from fasaco_edge.bus.settings import BusSettings
-from fasaco_edge.client.joining import Joining
+from fasaco_edge.client.feed import Joining
 from fasaco_edge.client.phrases import steady_now
-from fasaco_edge.fleet.observer.inbox import FleetInbox, Heard, Traffic
-from fasaco_edge.fleet.observer.subscriptions import FleetSubscriptions
+from fasaco_edge.fleet.observer.inbox import FleetInbox, FleetSubscriptions, Heard, Traffic
 from fasaco_edge.wire.keys import VERSION, Keys
 from fasaco_edge.wire.topics import STATUS
 

@@ -13,8 +13,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from fasaco_edge.fleet.observer.cells import MOST_SPAN, Seat, mask_of, window_of
-from fasaco_edge.fleet.observer.members import MOST_MEMBERS, Member, Members
-from fasaco_edge.fleet.observer.shares import NOBODY, owners_of
+from fasaco_edge.fleet.observer.members import MOST_MEMBERS, NOBODY, Member, Members, owners_of
 from fasaco_edge.grid.geometry import Window
 from fasaco_edge.wire.documents.fleet import TILE
 

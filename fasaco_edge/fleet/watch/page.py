@@ -1,19 +1,97 @@
-"""The whole screen of a fleet: table of its robots, and the latest events."""
+"""The screen of a fleet that is watched: a table of its robots, and the latest events.
+
+The table has one row per robot with its activity, and the total of all robots.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
 from rich.console import Console, Group
+from rich.table import Table
 from rich.text import Text
 
+from fasaco_edge.client import phrases
+from fasaco_edge.client.events import EventLog
 from fasaco_edge.client.phrases import clock, percent
+from fasaco_edge.fleet.watch.feed import FleetFeed
+from fasaco_edge.fleet.watch.floor import FleetFloor
 from fasaco_edge.fleet.watch.robot import FleetRobot, short
-from fasaco_edge.fleet.watch.table import robot_table, total_rows
 from fasaco_edge.fleet.watch.view import FleetView
 from fasaco_edge.text import one_line
 from fasaco_edge.watch.blocks import FAINT, Blocks, on_a_line
+from fasaco_edge.watch.glyphs import GlyphSet
 from fasaco_edge.watch.page import Layout
+from fasaco_edge.watch.status_table import LONGEST_BAR, state_colour
+
+# Largest width of names, beside a third of the table; table width from which units and rates are
+# shown, and largest table width [characters].
+LEAST_NAME, UNITS, RATES, WIDEST = 12, 40, 47, 80
+GONE_COLOUR, WAITING_COLOUR = "red", "yellow"
+
+
+def robot_table(robots: Sequence[FleetRobot], width: int, lines: int) -> Table:
+    """Return a table of robots of a given width, in at most ``lines`` >= 1 lines."""
+    table = Table.grid(padding=(0, 1), pad_edge=False)
+    table.width = width = min(width, WIDEST)
+    longest = max([len(robot.name) for robot in robots], default=5)
+    # If each robot has room for a second line, its activity is shown in full.
+    is_folded = 2 * len(robots) < lines
+    name = min(max(longest, 5), max(LEAST_NAME, width // 3))
+    table.add_column(width=name, no_wrap=True, overflow="ellipsis")
+    table.add_column(ratio=1, no_wrap=not is_folded, overflow="fold" if is_folded else "ellipsis")
+    unit = " m2" if width >= UNITS else ""
+    heads = [f"swept{unit}", f"left{unit}", *(["kB/s"] if width >= RATES else [])]
+    for head in heads:
+        table.add_column(width=max(len(head), 6 if unit else 5), justify="right", no_wrap=True)
+    table.add_row(*(Text(head, FAINT) for head in ("robot", "does", *heads)))
+    shown = robots if len(robots) < lines else robots[: max(lines - 2, 0)]
+    for robot in shown:
+        table.add_row(*_row(robot)[: 2 + len(heads)])
+    if more := len(robots) - len(shown):
+        table.add_row("", Text(f"{more} more", FAINT))
+    return table
+
+
+def _row(robot: FleetRobot) -> list[Text]:
+    left = "-" if robot.left_m2 is None else f"{robot.left_m2:.1f}"
+    return [
+        Text(robot.name, FAINT if robot.silent_s is not None else ""),
+        _doing(robot),
+        Text(f"{robot.swept_m2:.1f}"),
+        Text(left),
+        Text(f"{robot.kb_s:.1f}", FAINT),
+    ]
+
+
+def _doing(robot: FleetRobot) -> Text:
+    if robot.silent_s is not None:
+        return Text(f"gone for {phrases.age(robot.silent_s)}", GONE_COLOUR)
+    colour = WAITING_COLOUR if robot.waits_for else state_colour(robot.state)
+    doing = Text(robot.doing, colour)
+    if robot.away and robot.away != robot.state:
+        away = "not heard by others" if robot.away == "gone" else robot.away
+        doing.append(f" ({away})", WAITING_COLOUR)
+    return doing
+
+
+def total_rows(
+    floor: FleetFloor, unheard: Sequence[str], width: int, glyphs: GlyphSet
+) -> list[Text]:
+    """Return lines with the total of all robots, and the names of silent robots."""
+    silent = [Text(f"not heard: {', '.join(unheard)}", GONE_COLOUR)] if unheard else []
+    if floor.fraction is None:
+        return silent
+    swept_m2, area_m2 = floor.swept * floor.cell_m2, floor.area * floor.cell_m2
+    share = Text(phrases.percent(floor.fraction), "bold")
+    share.append(f" swept: {swept_m2:.1f} of {area_m2:.1f} m2", "not bold")
+    lines = [share, glyphs.bar(floor.fraction, min(width, LONGEST_BAR))]
+    if floor.twice:
+        lines.append(Text(f"{floor.twice * floor.cell_m2:.1f} m2 swept by two or more"))
+    if floor.division:
+        by = f" by {short(floor.by)}" if floor.by else ""
+        lines.append(Text(f"division {floor.division}{by}", FAINT))
+    return lines + silent
 
 
 class FleetPage:
@@ -75,3 +153,104 @@ def headline(view: FleetView, robots: Sequence[FleetRobot], now: float) -> Text:
         if view.floor.fraction is not None:
             line.append(f"  {percent(view.floor.fraction)} of cells")
     return on_a_line(line.append(f"   {clock(now)}   q quits", FAINT))
+
+
+# Time to wait for the other robots after the first message [s]. Each robot sends its place and its
+# swept cells once a second.
+REST_S, TOLD_S = 4.0, 1.3
+# Period of counting rates and of printing JSON [s].
+EVERY_S = 1.0
+
+
+class FleetWatch:
+    """The watch of a fleet, see ``live.Watched``."""
+
+    rest_s = REST_S
+
+    def __init__(self, feed: FleetFeed, view: FleetView, console: Console) -> None:
+        self._feed, self._view = feed, view
+        self._page = FleetPage(console)
+        self._known_at = self._counted_at = phrases.steady_now()
+        self._printed_at = float("-inf")
+        self._printed: dict[str, object] = {}
+
+    @property
+    def events(self) -> EventLog:
+        """What happened."""
+        return self._view.events
+
+    @property
+    def trouble(self) -> str:
+        """Why the bus cannot be reached; "" if it can."""
+        return self._view.trouble
+
+    def take(self, timeout_s: float) -> bool:
+        """Take in arrivals; wait up to ``timeout_s`` [s] for one; return whether one came."""
+        view, feed = self._view, self._feed
+        items = feed.take(timeout_s)
+        was_known = self.is_known()
+        for heard in items:
+            view.take(heard)
+            if view.members.get(heard.robot) is None:
+                # A queue for each of any number of names would leave no room for real robots.
+                feed.forget(heard.robot)
+        now = phrases.steady_now()
+        if not was_known:
+            self._known_at = now
+        view.trouble = feed.trouble
+        feed.attend(view.names())
+        self._count(now)
+        view.tick(now)
+        return bool(items)
+
+    def documents(self) -> list[dict[str, object]]:
+        """Return the fleet, once a second if it has changed."""
+        now = phrases.steady_now()
+        if now - self._printed_at < EVERY_S or not self.is_known():
+            return []
+        document = self.document()
+        if document == self._printed:
+            return []
+        self._printed_at, self._printed = now, document
+        return [document]
+
+    def document(self) -> dict[str, object]:
+        """Return the fleet and its robots."""
+        return self._view.document(phrases.steady_now())
+
+    def line(self, now: float) -> str:
+        """Return the robots' activities in a line."""
+        view, robots = self._view, self._view.robots(now)
+        if view.trouble:
+            return f"waiting for the bus at {one_line(view.trouble)}"
+        if not robots:
+            return f"waiting for robots of fleet {one_line(view.fleet)}"
+        fraction = view.floor.fraction
+        share = "" if fraction is None else f"{phrases.percent(fraction)} of cells  "
+        return f"{share}{', '.join(f'{robot.name}: {robot.doing}' for robot in robots)}"
+
+    def page(self, now: float, width: int, height: int) -> list[str]:
+        """Return a page of lines."""
+        return self._page.lines(self._view, now, width, height)
+
+    def press(self, keys: str) -> bool:
+        """Handle typed keys: none has an effect here."""
+        return False
+
+    def is_known(self) -> bool:
+        """Return whether a message of a robot has arrived."""
+        return len(self._view.members) > 0
+
+    def is_whole(self) -> bool:
+        """Return whether all robots have had time for a message."""
+        view = self._view
+        is_told = phrases.steady_now() - self._known_at > TOLD_S
+        return is_told and view.floor.robots >= set(view.names())
+
+    def _count(self, now: float) -> None:
+        passed_s = now - self._counted_at
+        if passed_s < EVERY_S:
+            return
+        self._counted_at = now
+        for name in self._view.names():
+            self._view.note_rate(name, 1e-3 * self._feed.traffic(name).bytes / passed_s)

@@ -32,8 +32,7 @@ from fasaco_edge.mission.core.order_changes import OrderChanges
 from fasaco_edge.mission.core.route import Route
 from fasaco_edge.mission.core.trail_layer import TrailLayer
 from fasaco_edge.mission.core.way_out import WayOut
-from fasaco_edge.mission.coverage.drive_meter import DriveMeter
-from fasaco_edge.mission.coverage.driven_poses import Driven
+from fasaco_edge.mission.coverage.drive_meter import DriveMeter, Driven
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
 from fasaco_edge.mission.line.layer import LineLayer
 from fasaco_edge.mission.map.inputs import InputMonitor

@@ -13,9 +13,8 @@ from fasaco_edge.mission.company import Waiting
 from fasaco_edge.mission.config import MissionPolicy
 from fasaco_edge.mission.core.blocked_follower import BlockedFollower
 from fasaco_edge.mission.core.charging import Charging
-from fasaco_edge.mission.core.dock_current import DockCurrent
 from fasaco_edge.mission.core.events import State
-from fasaco_edge.mission.core.in_dock import InDock
+from fasaco_edge.mission.core.in_dock import DockCurrent, InDock
 from fasaco_edge.mission.core.path_checks import FAR_APART
 from fasaco_edge.mission.core.standing import Standing
 from fasaco_edge.mission.core.way_out import WayOut

@@ -1,9 +1,15 @@
-"""Drive meter: the robot's speed and turn durations, measured from its poses.
+"""Driving by poses: the robot's speed and turn durations, and the poses it can have driven to.
 
 Turn duration = time from ``BESIDE_S`` before to ``BESIDE_S`` after the turn, minus the travel time
 of that distance at full speed: braking and starting count, as in ``robot.quarter_turn_s``. Only
 turns between two straight stretches count, and no rate below ``TURNS_RAD_S``. Medians are reported,
 so a robot that waits at a turn changes them little. Times are those of the poses' stamps.
+
+Swept floor uses only poses to which the robot can have driven. A localiser sometimes errs by more
+than its noise: one pose lies beside the track, the next one lies on it again. A pose farther away
+than the robot can have driven since the previous pose is held until the next one. If the robot can
+have driven to the next pose without it, it was an error. Otherwise the robot is there, and its
+track from the previous pose is unknown.
 """
 
 from __future__ import annotations
@@ -15,7 +21,7 @@ from itertools import pairwise
 from statistics import median
 from typing import NamedTuple
 
-from fasaco_edge.grid.geometry import StampedPose
+from fasaco_edge.grid.geometry import Pose2D, StampedPose
 
 # Straight driving required before and after a turn [s].
 BESIDE_S = 1.5
@@ -172,3 +178,65 @@ def _apart(a: _Seen, b: _Seen) -> float:
 
 def _median(values: deque[float]) -> float | None:
     return median(values) if len(values) >= FEWEST else None
+
+
+# A base may be faster than configured by this factor. Between two poses farther apart in time its
+# track is unknown, for any timeout of the pose [s].
+SPEED_MARGIN, LONGEST_S = 1.2, 3.0
+# Largest excess of two poses' distance over the drive, by noise and corrections [cells].
+NOISE_CELLS = 0.5
+
+
+class Driven(NamedTuple):
+    """A pose that counts.
+
+    Attributes:
+        pose: the pose.
+        farthest_m: longest possible drive to it from the previous pose; 0 if not known [m].
+        is_joined: whether it has driven from there.
+    """
+
+    pose: Pose2D
+    farthest_m: float = 0.0
+    is_joined: bool = True
+
+
+class DrivenPoses:
+    """Holds a pose that may be an error until the next one comes."""
+
+    def __init__(self, speed_m_s: float, cell_m: float) -> None:
+        """Start without a pose; ``speed_m_s``: of the robot [m/s], 0 if not known."""
+        self._speed_m_s, self._noise_m = speed_m_s, NOISE_CELLS * cell_m
+        self._sure: StampedPose | None = None
+        self._held: StampedPose | None = None
+
+    @property
+    def holds(self) -> bool:
+        """Whether the newest pose may be an error."""
+        return self._held is not None
+
+    def break_track(self) -> None:
+        """Note that the next pose counts wherever it is, as after a motion of the map."""
+        self._sure = self._held = None
+
+    def farthest_m(self, before: StampedPose, after: StampedPose) -> float:
+        """Return how far the robot can have driven between two poses; 0 if not known [m]."""
+        took_s = (after.stamp_ns - before.stamp_ns) * 1e-9
+        return SPEED_MARGIN * self._speed_m_s * took_s if 0.0 < took_s <= LONGEST_S else 0.0
+
+    def take(self, stamped: StampedPose) -> list[Driven]:
+        """Take in the next pose; return those that count now."""
+        sure, held = self._sure, self._held
+        farthest_m = 0.0 if sure is None else self.farthest_m(sure, stamped)
+        if sure is None or not farthest_m or self._is_near(sure, stamped, farthest_m):
+            self._sure, self._held = stamped, None
+            return [Driven(stamped.pose, farthest_m)]
+        if held is None:
+            self._held = stamped
+            return []
+        self._sure, self._held = held, None
+        return [Driven(held.pose, is_joined=False), *self.take(stamped)]
+
+    def _is_near(self, before: StampedPose, after: StampedPose, farthest_m: float) -> bool:
+        one, other = before.pose, after.pose
+        return math.hypot(other.x - one.x, other.y - one.y) <= farthest_m + self._noise_m

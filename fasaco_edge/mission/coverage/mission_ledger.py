@@ -29,8 +29,7 @@ from fasaco_edge.mission.coverage.ledger import (
     CoverageLedger,
     LedgerSnapshot,
 )
-from fasaco_edge.mission.coverage.missed_cells import MissedCells
-from fasaco_edge.mission.coverage.passed_cells import PassedCells
+from fasaco_edge.mission.coverage.passed_cells import MissedCells, PassedCells
 from fasaco_edge.mission.coverage.swept_floor import (
     DROPPED_FLOOR_TILES,
     MOST_FLOOR_TILES,

@@ -1,8 +1,11 @@
-"""Passed cells: cells that the robot has passed, but in which floor is unswept.
+"""Cells that the robot has passed, but in which floor is unswept.
 
 In a fleet a cell counts as swept once a robot has swept its centre, and no robot drives there for
 the rest. That floor stays with this robot, in any robot's part: its line sweeps it when it passes
 near again.
+
+The robot comes back for missed cells, in which it left floor as it drove through. A base that
+drives beside its line leaves some each time, so it comes back to a cell a few times only.
 """
 
 from __future__ import annotations
@@ -49,3 +52,26 @@ class PassedCells:
     def inside(self, window: Window) -> NDArray[np.bool_]:
         """Return which cells of a window are passed cells, bool (rows, cols)."""
         return mask_of(self._cells, window)
+
+
+# So often the robot comes back to a cell: floor that it left twice more it would leave again.
+MOST_AGAIN = 2
+
+
+class MissedCells:
+    """Counts how often the robot comes back to each cell."""
+
+    def __init__(self) -> None:
+        self._again: dict[Cell, int] = {}
+
+    def clear(self) -> None:
+        """Forget all counts."""
+        self._again.clear()
+
+    def may_come_back(self, cell: Cell) -> bool:
+        """Return whether the robot may come back to a cell once more."""
+        return self._again.get(cell, 0) < MOST_AGAIN
+
+    def come_back(self, cell: Cell) -> None:
+        """Note that the robot comes back to a cell."""
+        self._again[cell] = self._again.get(cell, 0) + 1

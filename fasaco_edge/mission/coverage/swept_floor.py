@@ -20,7 +20,6 @@ from typing import TYPE_CHECKING, NamedTuple, Self
 import numpy as np
 
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D, Window
-from fasaco_edge.mission.coverage.bends import SHORT_M, beside_m, corner_between
 from fasaco_edge.mission.coverage.floor_tiles import (
     FLOOR_TILE,
     PIXEL_M,
@@ -38,7 +37,13 @@ from fasaco_edge.mission.coverage.floor_tiles import (
 )
 from fasaco_edge.mission.coverage.floor_tiles import Place as TilePlace
 from fasaco_edge.mission.coverage.shared_tiles import SharedTiles
-from fasaco_edge.mission.coverage.steady_track import Place, SteadyTrack
+from fasaco_edge.mission.coverage.steady_track import (
+    SHORT_M,
+    Place,
+    SteadyTrack,
+    beside_m,
+    corner_between,
+)
 
 if TYPE_CHECKING:
     from fasaco_edge.mission.coverage.tool_sight import ToolSight

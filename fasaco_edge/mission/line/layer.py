@@ -24,11 +24,10 @@ from fasaco_edge.mission.coverage.floor_tiles import pixels_under
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
 from fasaco_edge.mission.coverage.swept_floor import ANYWHERE, NOWHERE, SweptFloor
 from fasaco_edge.mission.line.line_ahead import LineAhead
-from fasaco_edge.mission.line.missed_floor import MissedFloor
+from fasaco_edge.mission.line.missed_floor import REASONS, MissedFloor, causes_of
 from fasaco_edge.mission.line.offset import Offset
-from fasaco_edge.mission.line.out_of_reach import REASONS, causes_of
 from fasaco_edge.mission.line.polisher import Polisher
-from fasaco_edge.mission.line.publication import Publication
+from fasaco_edge.mission.line.published_line import Publication
 from fasaco_edge.mission.map.map_state import MapState
 from fasaco_edge.mission.orders.sequencer import Sequencer
 

@@ -18,12 +18,16 @@ from fasaco_edge.grid.fine_raster import map_to_raster, raster_to_map, raster_to
 from fasaco_edge.grid.floor_map import FloorMap
 from fasaco_edge.grid.geometry import GridGeometry, Point, Pose2D, Window
 from fasaco_edge.kernels.floor.line import LEAST_EDGE
-from fasaco_edge.mission.line.alignment import aligned, by_distance
 from fasaco_edge.mission.line.lead_out import fitting_radius, lead_out, leads_out
-from fasaco_edge.mission.line.line_aside import LineAside
 from fasaco_edge.mission.line.offset import Beside
 from fasaco_edge.mission.line.pieces import Joiner, Piece, exchanged, kept_pieces
-from fasaco_edge.mission.line.place_on_line import LOOK_AHEAD_M, PlaceOnLine
+from fasaco_edge.mission.line.place_on_line import (
+    LOOK_AHEAD_M,
+    LineAside,
+    PlaceOnLine,
+    aligned,
+    by_distance,
+)
 from fasaco_edge.mission.line.polyline import (
     NO_EDGES,
     POLISHED,

@@ -1,13 +1,20 @@
-"""Missed floor: which of the floor left at the end of a path is worth coming back for."""
+"""Missed floor: what is worth coming back for at the end of a path, and what is out of reach."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from enum import IntEnum
 from typing import Self
 
+import numpy as np
+from numpy.typing import NDArray
+
+from fasaco_edge.grid.floor_map import FloorMap
+from fasaco_edge.grid.geometry import Window
 from fasaco_edge.grid.lattice import Cell
+from fasaco_edge.kernels.floor.bits import WORD, unpacked
 from fasaco_edge.planners.line import LineConfig
 
 
@@ -78,3 +85,44 @@ def _pieces(cells: set[Cell]) -> list[list[Cell]]:
             piece += sorted(near)
         pieces.append(sorted(piece))
     return sorted(pieces)
+
+
+class Cause(IntEnum):
+    """Why the tool cannot reach a pixel; 0 if it can, or if the pixel is not free."""
+
+    NARROW = 1
+    CLOSED = 2
+    KEPT_OUT = 3
+
+
+REASONS = {
+    Cause.NARROW: "too narrow for the robot, or too near to a wall or to furniture",
+    Cause.CLOSED: "closed off: no way leads there that the robot fits through",
+    Cause.KEPT_OUT: "in a keep-out zone, or too near to one",
+}
+
+
+def causes_of(
+    floor: FloorMap, free: FloorMap, reachable: NDArray[np.bool_], part: Window
+) -> NDArray[np.uint8]:
+    """Return the cause of each pixel in a window of the raster, uint8 (rows, cols).
+
+    Args:
+        floor: the floor with keep-out zones.
+        free: the floor of the same map without; the same object if there are none.
+        reachable: bool (rows, cols) of the lattice, the reachable cells.
+        part: window of the raster.
+    """
+    anywhere = floor.stands.lattice.coverable
+    fits = floor.reached(anywhere, part)
+    fits_free = fits if free is floor else free.reached(free.stands.lattice.coverable, part)
+    first, end = part.col0 // WORD, -(-part.col1 // WORD)
+    words = unpacked(free.blocked[part.row0 : part.row1, first:end], (end - first) * WORD)
+    is_free = ~words[:, part.col0 - first * WORD : part.col1 - first * WORD]
+    causes = np.full(fits.shape, Cause.NARROW, np.uint8)
+    causes[fits_free] = Cause.KEPT_OUT
+    causes[fits] = 0
+    if (anywhere & ~reachable).any():
+        causes[fits & ~floor.reached(reachable, part)] = Cause.CLOSED
+    causes[~is_free] = 0
+    return causes

@@ -1,16 +1,26 @@
-"""Place on line: the robot's place on its line, between two points, and its arrival.
+"""Place on line: where on its line the robot is, in which cells, and the line that it set aside.
 
 Lengths are in pixels of the fine raster, as the line's points, float64 (n, 2).
+
+Line aside: the rest of a polished line, kept while the robot drives an errand or makes way.
+
+Alignment of a line with its walk: the cell of the walk that each point stands for.
+
+The polisher moves, removes and inserts points, and its lanes may differ from those of the walk; so
+the cells are found again by place (dynamic time warping, Sakoe and Chiba 1978).
 """
 
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass, field, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
+from fasaco_edge.grid.geometry import Window
 from fasaco_edge.mission.line.offset import CORNER_M, Beside
-from fasaco_edge.mission.line.polyline import Points
+from fasaco_edge.mission.line.polyline import Line, Numbers, Points, Walk
 
 # The robot is searched for this far ahead on its line, or as far as it can have driven [m]: farther
 # on, the next lane may be as near.
@@ -116,3 +126,78 @@ class PlaceOnLine:
         else:
             self._poses_there += 1
         return self._poses_there >= STANDING_POSES
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LineAside:
+    """A line on the raster that it will be resumed on; empty if there is none.
+
+    Attributes:
+        walk: int32 (n, 2), its cells.
+        line: from the place where the robot left it on.
+        touched: window of the raster that maps may have changed since; None for none.
+    """
+
+    walk: Walk = field(default_factory=lambda: np.empty((0, 2), np.int32))
+    line: Line = field(default_factory=Line)
+    touched: Window | None = None
+
+    @classmethod
+    def of(cls, walk: Walk, line: Line, cell: int, place: Points) -> LineAside:
+        """Set a line aside.
+
+        Args:
+            walk, line: the walk and the line along it.
+            cell: index of the robot's cell in the walk.
+            place: the robot's place on the first edge, (2,).
+        """
+        points = line.points.copy()
+        points[0] = place
+        return cls(walk[cell:], Line(points, np.maximum(line.cells - cell, 0), line.state))
+
+    def moved(self, by: tuple[int, int]) -> LineAside:
+        """Return this line shifted by rows and columns of the raster."""
+        touched = self.touched and self.touched.moved(*by)
+        return LineAside(self.walk, self.line.moved(by), touched)
+
+    def on_map(self, touched: Window) -> LineAside:
+        """Return this line on another map, which differs within a window."""
+        return replace(self, touched=Window.around(self.touched, touched))
+
+
+# Squared distance to a cell without a stand [pixels2]: more than any other.
+NOWHERE_PX2 = 1e12
+
+
+def aligned(points: Points, stands: Points) -> Numbers:
+    """Return the index of each point's stand, ascending; ends belong to ends.
+
+    The sum of the squared distances between points and their stands is the least.
+
+    Args:
+        points: float64 (n, 2): y, x [pixels], n of 2 or more.
+        stands: float64 (m, 2), the same, NaN where a cell has none; m of 1 or more.
+
+    Returns:
+        int64 (n,).
+    """
+    apart = (points[:, :1] - stands[:, 0]) ** 2 + (points[:, 1:] - stands[:, 1]) ** 2
+    apart[np.isnan(apart)] = NOWHERE_PX2
+    # Least sums of the points up to now, by the last point's stand.
+    sums = np.empty_like(apart)
+    sums[0] = np.inf
+    sums[0, 0] = 0.0
+    for number in range(1, len(points)):
+        np.minimum.accumulate(sums[number - 1], out=sums[number])
+        sums[number] += apart[number]
+    found = np.empty(len(points), np.int64)
+    found[-1] = len(stands) - 1
+    for number in range(len(points) - 2, -1, -1):
+        found[number] = np.argmin(sums[number, : found[number + 1] + 1])
+    return found
+
+
+def by_distance(place: Points, stands: Points) -> NDArray[np.intp]:
+    """Return the indices of stands by their distance to a place, (2,); NaN stands last."""
+    apart: NDArray[np.float64] = ((stands - place) ** 2).sum(axis=1)
+    return np.argsort(apart, kind="stable")

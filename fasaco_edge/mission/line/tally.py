@@ -26,7 +26,7 @@ from fasaco_edge.kernels.floor.open_floor import (
     set_open,
 )
 from fasaco_edge.kernels.floor.sweeps import BLOCK, NEVER, Scratch, Sweeps, sweep_edges
-from fasaco_edge.mission.line.out_of_reach import Cause
+from fasaco_edge.mission.line.missed_floor import Cause
 from fasaco_edge.planners.line import blocks_of, left_in_blocks, memory_for_moves
 
 NO_MASK = np.zeros((0, 0), np.bool_)

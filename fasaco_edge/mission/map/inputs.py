@@ -17,7 +17,7 @@ from fasaco_edge.errors import FasacoError, WrongFrame
 from fasaco_edge.grid.geometry import StampedPose
 from fasaco_edge.grid.occupancy import MapPatch, OccupancyGrid
 from fasaco_edge.mission.config import MissionConfig
-from fasaco_edge.mission.coverage.driven_poses import DrivenPoses
+from fasaco_edge.mission.coverage.drive_meter import DrivenPoses
 from fasaco_edge.mission.coverage.ledger import JUMP_CELLS
 
 # Time for which map and poses must arrive in another frame alone before it becomes active [s].

@@ -29,10 +29,15 @@ from fasaco_edge.mission.coverage.progress import Coverage, FreeArea
 from fasaco_edge.mission.map.building_watch import BuildingWatch
 from fasaco_edge.mission.map.ground import Ground
 from fasaco_edge.mission.map.inputs import FrameSelector
-from fasaco_edge.mission.map.loop_closure import Motion, has_moved, shows_floor
+from fasaco_edge.mission.map.loop_closure import (
+    Motion,
+    closes_cells,
+    has_moved,
+    shows_floor,
+    small_shift,
+)
 from fasaco_edge.mission.map.obstacles import Obstacles
 from fasaco_edge.mission.map.reachable_area import ReachableArea, anchor_cell
-from fasaco_edge.mission.map.small_shift import closes_cells, small_shift
 from fasaco_edge.mission.map.standing_places import StandingPlaces
 from fasaco_edge.mission.orders.order import MissionOrder
 

@@ -1,21 +1,25 @@
-"""Cells left of an order: which still need a visit, by this robot or by others of its fleet."""
+"""What is left of an order: cells that need a visit, floor that opened, zones beyond reach."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.grid.geometry import Window
+from fasaco_edge.grid.changes import carried
+from fasaco_edge.grid.geometry import Polygon, Window, polygon_bounds
+from fasaco_edge.grid.lattice import BLOCKED, CoverageLattice
+from fasaco_edge.grid.polygons import area_m2
 from fasaco_edge.mission.company import Company
 from fasaco_edge.mission.config import MissionConfig
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
 from fasaco_edge.mission.map.map_state import MapState
 from fasaco_edge.mission.map.reachable_area import ReachableArea
-from fasaco_edge.mission.orders.exploration import Exploration, frontier
-from fasaco_edge.mission.orders.order import Zone
-from fasaco_edge.mission.orders.zones import in_zones
+from fasaco_edge.mission.orders.exploration import Exploration, frontier, is_in_reach
+from fasaco_edge.mission.orders.order import MissionOrder, Zone
+from fasaco_edge.mission.orders.zones import cells_inside, in_zones
 
 
 class CellsLeft:
@@ -109,3 +113,72 @@ class CellsLeft:
         """Return the number of cells that this robot has to visit."""
         area = self._map.area
         return 0 if area is None else int(np.count_nonzero(self.open_to_me(area) & area.reachable))
+
+
+@dataclass(slots=True)
+class LeftBehind:
+    """Finds floor for which a robot on its way home turns back.
+
+    Attributes:
+        times: how often it did. A gap that opens whenever the robot has left must not hold it for
+            ever.
+    """
+
+    times: int = 0
+    # What was reachable when it set out; None if that is not known, as after a restart.
+    _area: ReachableArea | None = None
+
+    def set_out(self, area: ReachableArea | None) -> None:
+        """Note that the robot sets out for home; ``area``: the reachable area at that time."""
+        self._area = area
+
+    def is_open(self, unswept: NDArray[np.bool_], area: ReachableArea) -> bool:
+        """Return whether floor has opened since: a square of two by two cells at least.
+
+        Rows of cells along walls come and go with the map's noise. ``unswept``: bool (rows, cols)
+        of the area.
+        """
+        before = self._area = self._area or area
+        opened = unswept & area.reachable
+        opened &= ~carried(before.reachable, before.lattice.window, area.lattice.window)
+        pairs = opened[1:] & opened[:-1]
+        return bool((pairs[:, 1:] & pairs[:, :-1]).any())
+
+    def turn_back(self) -> None:
+        """Note that the robot turns back."""
+        self._area, self.times = None, self.times + 1
+
+
+def zones_beyond(
+    order: MissionOrder, area: ReachableArea, free: CoverageLattice, visits: NDArray[np.uint16]
+) -> str:
+    """Return zones with their areas as text that follows another; "" for none.
+
+    A zone that was covered before its way was closed does not count.
+
+    Args:
+        order: the order.
+        area: the reachable area.
+        free: the lattice without keep-out zones.
+        visits: of its cells, uint16 (rows, cols).
+    """
+    beyond = []
+    for zone in order.zones:
+        if zone.polygon is None or is_in_reach(zone, area):
+            continue
+        inside = cells_inside(zone.polygon, free.window, free.cell_m)
+        visited = inside & (visits > 0)
+        left = inside & ~visited & (free.states != BLOCKED)
+        left_m2 = np.count_nonzero(left) * free.cell_m**2
+        if _sticks_out(zone.polygon, free):
+            left_m2 += max(area_m2(zone.polygon) - np.count_nonzero(inside) * free.cell_m**2, 0.0)
+        if left_m2 or not visited.any():
+            beyond.append(f"{zone.name!r} ({left_m2:.1f} m2)")
+    return f"; not reached: {', '.join(beyond)}" if beyond else ""
+
+
+def _sticks_out(polygon: Polygon, lattice: CoverageLattice) -> bool:
+    """Return whether part of a polygon lies beyond the map."""
+    x0, y0, x1, y1 = (edge / lattice.cell_m for edge in polygon_bounds(polygon))
+    window = lattice.window
+    return x0 < window.col0 or y0 < window.row0 or x1 > window.col1 or y1 > window.row1

@@ -17,14 +17,12 @@ from fasaco_edge.mission.coverage.unreached import Unreached, UnreachedFinder
 from fasaco_edge.mission.map.loop_closure import Motion, moved_cells
 from fasaco_edge.mission.map.map_state import MapState
 from fasaco_edge.mission.map.reachable_area import ReachableArea, anchor_cell
-from fasaco_edge.mission.orders.cells_left import CellsLeft
+from fasaco_edge.mission.orders.cells_left import CellsLeft, LeftBehind, zones_beyond
 from fasaco_edge.mission.orders.exploration import Exploration
-from fasaco_edge.mission.orders.left_behind import LeftBehind
 from fasaco_edge.mission.orders.order import Errand, Zone
 from fasaco_edge.mission.orders.order_state import NO_ORDER, OrderState, Stage
 from fasaco_edge.mission.orders.reached_cells import ReachedCells
 from fasaco_edge.mission.orders.zones import in_zones
-from fasaco_edge.mission.orders.zones_beyond import zones_beyond
 from fasaco_edge.planners.problem import CoverageProblem
 
 # After this many paths in a row that cover no further cell, those left wait for the retry: the

@@ -75,7 +75,7 @@ def encode_goal(
         points: of the path [m], at least two; each pose faces the next one.
         frame: of the points.
         stamp_ns: of the path [ns]; 0 for the newest transform.
-        plugins: as many names as the server's release has, see ``ros_actions.RELEASES``.
+        plugins: as many names as the server's release has, see ``ros_keys.RELEASES``.
         end_yaw: heading of the last pose [rad]; None for that of the one before it.
 
         Raises:

@@ -11,7 +11,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fasaco_edge.errors import FleetError
-from fasaco_edge.fleet.mission.division_numbers import BELIEVED_S, MOST_AHEAD, MOST_FIRST
 from fasaco_edge.fleet.mission.layer import MANY_TAKEN
 from fasaco_edge.fleet.mission.members import GONE_S
 from fasaco_edge.fleet.mission.shared import (
@@ -20,6 +19,7 @@ from fasaco_edge.fleet.mission.shared import (
     SharedProgress,
     Telling,
 )
+from fasaco_edge.fleet.mission.shared_work import BELIEVED_S, MOST_AHEAD, MOST_FIRST
 from fasaco_edge.fleet.mission.tiles import TILE_BYTES
 from fasaco_edge.grid.geometry import Pose2D, Window
 from fasaco_edge.mission.coverage.ledger import CoverageLedger

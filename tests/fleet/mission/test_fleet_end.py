@@ -8,7 +8,7 @@ import pytest
 
 from fasaco_edge.fleet.mission.ground import GroundTelling
 from fasaco_edge.fleet.mission.members import HANGING_S
-from fasaco_edge.fleet.mission.remainder import STUCK_S, WAITING_S, Remainder
+from fasaco_edge.fleet.mission.shared_work import STUCK_S, WAITING_S, Remainder
 from fasaco_edge.mission.core.events import CommandReceived, MapReceived, Part
 from fasaco_edge.mission.orders.order import MissionOrder, Zone
 from tests.fleet.mission.fleets import FleetDrive, FleetRobot

@@ -5,8 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fasaco_edge.fleet.observer.members import GONE_NS, Member, Members
-from fasaco_edge.fleet.observer.shares import NOBODY, owners_of, shares_of
+from fasaco_edge.fleet.observer.members import (
+    GONE_NS,
+    NOBODY,
+    Member,
+    Members,
+    owners_of,
+    shares_of,
+)
 from fasaco_edge.grid.geometry import Window
 from fasaco_edge.wire.documents.fleet import FleetPart
 from tests.fleet.told import member

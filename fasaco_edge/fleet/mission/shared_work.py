@@ -1,0 +1,211 @@
+"""Shared work of a fleet: which robots take part, what is left, and which division is the newest.
+
+Robots at work: which of the others take part in a division, and where.
+
+Remainder: how many cells are left for a fleet, and whether others sweep them all.
+
+A robot without a part stands while the others make progress: it would be in their way.
+
+Numbers of divisions: which division is the newest, of those made here and those received.
+
+The higher number is newer; between equal numbers the author's name that sorts first wins. Numbers
+too far ahead are errors of their sender, unless it keeps sending them: then it has counted on while
+it was out of range.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from fasaco_edge.fleet.mission.division import Division, Robot
+from fasaco_edge.fleet.mission.members import GONE, GONE_S, Members
+from fasaco_edge.grid.geometry import MOST_INDEX, Pose2D
+from fasaco_edge.grid.lattice import CoverageLattice
+from fasaco_edge.mission.core.events import MemberHeard
+from fasaco_edge.mission.map.reachable_area import ReachableArea, anchor_cell
+
+# Others make progress if the number of swept cells has grown within this time [s].
+STUCK_S = 30.0
+# They make none once all of them have waited for this long, perhaps for this robot [s].
+WAITING_S = 6.0
+
+
+class Remainder:
+    """Tracks the cells left for a fleet.
+
+    Attributes:
+        others_go_on: whether only parts of other robots are left, and these make progress. Once
+            they have swept nothing for STUCK_S, they count as stuck until this robot has a part.
+        had_part: whether the last division gave this robot a part.
+        divided: number of cells left at that time.
+    """
+
+    def __init__(self) -> None:
+        self.others_go_on = self.had_part = False
+        self.divided = 0
+        # Largest number of swept cells since this robot has no part, and its time; None while it
+        # has a part. The number of cells left may grow as others sweep, by cells that they find.
+        self._most: tuple[int, float] | None = None
+        # Since when all others wait; None while one is at work.
+        self._waiting_since: float | None = None
+
+    def note_others(self, now: float, *, wait: bool) -> None:
+        """Note whether all other robots at work wait for one, perhaps for this robot."""
+        if not wait:
+            self._waiting_since = None
+        elif self._waiting_since is None:
+            self._waiting_since = now
+
+    def note(self, cells: int, own: int, swept: int, now: float) -> None:
+        """Take in the numbers of cells left, in all and in this robot's part, and of cells swept.
+
+        Cells of its part that only other robots' maps show count, too: it has to go and see them.
+        """
+        if own > 0:
+            self._most, self.others_go_on = None, False
+            return
+        most, since = self._most or (swept, now)
+        is_stuck = now - since > STUCK_S
+        self._most = (swept, now) if swept > most and not is_stuck else (most, since)
+        waiting_s = 0.0 if self._waiting_since is None else now - self._waiting_since
+        self.others_go_on = cells > 0 and not is_stuck and waiting_s <= WAITING_S
+
+    def note_division(self, cells: int, own: int, swept: int, now: float) -> None:
+        """Take in a new division, as ``note`` does."""
+        self.had_part, self.divided = own > 0, cells
+        self.note(cells, own, swept, now)
+
+
+# Limits on a division's number: absolute, ahead of this robot's own, and the first of a newcomer.
+MOST_NUMBER, MOST_AHEAD, MOST_FIRST = 2**31 - 1, 2**10, 2**24
+# How long a number ahead, but below the last limit, is sent until it is accepted [s].
+BELIEVED_S = 10.0
+
+
+class DivisionNumbers:
+    """Numbers the divisions of one robot, and checks the numbers that others send.
+
+    Attributes:
+        number: number of the newest division.
+        by: name of the robot that made it.
+    """
+
+    def __init__(self, robot: str, others: Members) -> None:
+        self.number = 0
+        self.by = ""
+        self._robot, self._others = robot, others
+        # Times of the first message of each robot whose number is too far ahead [s].
+        self._too_far: dict[str, float] = {}
+
+    def newer(self) -> MemberHeard | None:
+        """Return the newest division received above ``number`` that has a part for this robot.
+
+        Newer divisions without this robot are skipped: their author takes this robot for absent.
+        """
+        most = self._most_valid()
+        found = [
+            member.newest
+            for member in self._others.known.values()
+            if not member.left_out
+            and member.newest.division <= most
+            and any(part.robot == self._robot for part in member.newest.parts)
+        ]
+        first = min(found, key=lambda heard: (-heard.division, heard.by), default=None)
+        mine = -self.number, self.by
+        return first if first and (-first.division, first.by) < mine else None
+
+    def follow(self, newer: MemberHeard) -> None:
+        """Take over the number of a received division."""
+        self.number, self.by = newer.division, newer.by
+
+    def count_on(self) -> None:
+        """Number a division that this robot makes: above all valid numbers received."""
+        most = self._most_valid()
+        heard = [one for one in self._others.division_numbers().values() if one <= most]
+        self.number, self.by = min(max([self.number, *heard]) + 1, MOST_NUMBER), self._robot
+
+    def _most_valid(self) -> int:
+        """Return the highest number that is no error."""
+        told = self._others.division_numbers()
+        first = min((number for number in told.values() if number), default=0)
+        most = (self.number or min(first, MOST_FIRST)) + MOST_AHEAD
+        too_far = {name for name, number in told.items() if most < number <= MOST_FIRST}
+        heard_at = {name: self._others.known[name].heard_at for name in too_far}
+        self._too_far = {name: self._too_far.get(name, at) for name, at in heard_at.items()}
+        is_long = {name for name in too_far if heard_at[name] - self._too_far[name] >= BELIEVED_S}
+        return max([most, *(told[name] for name in is_long)])
+
+
+class AtWork:
+    """Decides which of the other robots take part.
+
+    A robot divides again if a participant is left out, so all robots have to agree. If two robots
+    do not receive each other, or one map shows no way between them, a third robot decides.
+    """
+
+    def __init__(self, others: Members, numbers: DivisionNumbers) -> None:
+        self._others, self._numbers = others, numbers
+
+    def in_reach(self, area: ReachableArea, now: float) -> list[Robot]:
+        """Return the robots at work in an area that this robot can reach."""
+        robots = []
+        for name, member in self._others.known.items():
+            place = anchor_cell(area.lattice, Pose2D(member.newest.x, member.newest.y))
+            if not member.absence(now) and place is not None and area.contains(place):
+                robots.append(Robot(name, place, member.newest.step_s))
+        return robots
+
+    def unseen(
+        self,
+        division: Division | None,
+        lattice: CoverageLattice,
+        robots: Iterable[Robot],
+        divided_at: float,
+        now: float,
+    ) -> list[Robot]:
+        """Return robots of the last division that take part, but are out of this robot's reach.
+
+        Its map shows no way to them, or their messages no longer arrive, but the robot that made
+        the division still reaches them. If left out, they would make a division of their own, and
+        leave out the robots that they do not reach.
+
+        Args:
+            division: the last division.
+            lattice: the cells to divide.
+            robots: the robots that this one reaches.
+            divided_at: when the last division was made or taken over [s].
+            now: time [s].
+        """
+        found, seen = [], {robot.name for robot in robots}
+        last = () if division is None else zip(division.robots, division.seeds, strict=True)
+        for robot, seed in last:
+            if robot.name in seen or self.is_gone(robot.name, divided_at, now):
+                continue
+            member = self._others.known.get(robot.name)
+            if member is None or member.absence(now):
+                found.append(Robot(robot.name, seed, robot.step_s))
+                continue
+            row, col = lattice.cell_at(member.newest.x, member.newest.y)
+            # A seed farther away does not fit into a message.
+            if max(abs(row), abs(col)) <= MOST_INDEX:
+                found.append(Robot(robot.name, (row, col), member.newest.step_s))
+        return found
+
+    def is_gone(self, name: str, divided_at: float, now: float) -> bool:
+        """Return whether a robot no longer takes part in a division made at ``divided_at`` [s]."""
+        member = self._others.known.get(name)
+        if member is None:
+            return now - divided_at > GONE_S and not self._is_vouched(now)
+        absence = member.absence(now)
+        return bool(absence) and not (absence == GONE and self._is_vouched(now))
+
+    def _is_vouched(self, now: float) -> bool:
+        """Return whether the division's author is another robot at work that still sends it.
+
+        It receives robots that this one does not: the two would divide again and again, one with
+        and one without these robots.
+        """
+        maker = self._others.known.get(self._numbers.by)
+        if maker is None or maker.absence(now):
+            return False
+        return maker.newest.division == self._numbers.number
