@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import struct
 import zlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Container, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import accumulate, pairwise
 from typing import Annotated
@@ -163,9 +163,14 @@ class SampleEncoder:
 
 
 class SampleDecoder:
-    """Decodes the batches of one run, in order."""
+    """Decodes the batches of one run, in order.
 
-    def __init__(self) -> None:
+    Args:
+        topics: those to decode; None for all.
+    """
+
+    def __init__(self, topics: Container[str] | None = None) -> None:
+        self._topics = topics
         self._last: dict[str, Numbered] = {}
 
     def samples(self, batch: bytes) -> list[Numbered]:
@@ -179,6 +184,7 @@ class SampleDecoder:
             samples = [
                 numbered
                 for lane in _lanes(_inflated(batch[_HEAD.size :]))
+                if self._topics is None or lane.topic in self._topics
                 for numbered in self._samples(lane)
             ]
         except (zlib.error, struct.error, msgspec.DecodeError, ValueError, IndexError) as error:

@@ -56,32 +56,6 @@ def json_line(document: object) -> str:
     return json.dumps(document).replace("\x7f", "\\u007f")
 
 
-class Html(str):
-    """Mark-up of ours: what is not of this type is text, and is escaped."""
-
-    __slots__ = ()
-
-
-def html(*parts: object, most: int = MOST) -> Html:
-    """Return parts as they are to stand on a page or in an SVG: text escaped, quotes too."""
-    return Html("".join(part if isinstance(part, Html) else _escaped(part, most) for part in parts))
-
-
-def element(name: str, *parts: object, **attributes: object) -> Html:
-    """Return an element; ``class_`` stands for ``class``, and ``_`` in a name for ``-``."""
-    written = "".join(
-        f' {key.rstrip("_").replace("_", "-")}="{html(value)}"' for key, value in attributes.items()
-    )
-    return Html(f"<{name}{written}>{html(*parts)}</{name}>")
-
-
-def _escaped(part: object, most: int) -> str:
-    # Loads a table of two thousand names, of no use to a follower.
-    from html import escape  # noqa: PLC0415
-
-    return escape(one_line(str(part), most), quote=True)
-
-
 def _bounded(text: str, most: int) -> str:
     return text if len(text) <= most else f"{text[:most]}… ({len(text) - most} more)"
 

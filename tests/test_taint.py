@@ -16,7 +16,6 @@ import subprocess
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
 
@@ -300,23 +299,10 @@ def recorded(folder: Path) -> Path:
     return file
 
 
-class Page(HTMLParser):
-    """The elements of a page, and what of them would run."""
-
-    def __init__(self, text: str) -> None:
-        super().__init__()
-        self.names: set[str] = set()
-        self.feed(text)
-
-    def handle_starttag(self, tag: str, attrs: Any) -> None:
-        self.names.add(tag)
-        assert not any(name.startswith("on") for name, _ in attrs)
-
-
 def test_a_recording_is_reviewed_without_harm(tmp_path):
     file = recorded(tmp_path)
-    page, picture, folder = tmp_path / "p.html", tmp_path / "p.png", tmp_path / "files"
-    code, said = run("review", file, "--long", "--html", page, "--png", picture, "--export", folder)
+    picture, folder = tmp_path / "p.png", tmp_path / "files"
+    code, said = run("review", file, "--long", "--png", picture, "--export", folder)
     assert code == 0
     assert "INJECTED" in said
     assert run("review", file)[0] == 0
@@ -324,17 +310,11 @@ def test_a_recording_is_reviewed_without_harm(tmp_path):
     assert code == 0
     # A table cuts a word that is wider than its column.
     assert "INJECT" in said
-    text = page.read_text(encoding="utf-8")
-    judge(text)
-    assert "script" not in Page(text).names
-    assert "&lt;script&gt;" in text
     for table in folder.glob("*.csv"):
         judge(table.read_text(encoding="utf-8"))
         assert not re.search(r"(^|,)\"?=T", table.read_text(encoding="utf-8"), re.MULTILINE)
     assert json.loads(run("review", file, "--json")[1])["robot"] == TAINT
-    assert run("review", file, "--against", file, "--html", page)[0] == 0
-    judge(page.read_text(encoding="utf-8"))
-    assert "script" not in Page(page.read_text(encoding="utf-8")).names
+    assert run("review", file, "--against", file)[0] == 0
     run("replay", file)
 
 

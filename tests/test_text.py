@@ -8,7 +8,7 @@ import unicodedata
 
 import pytest
 
-from fasaco_edge.text import MOST, Html, element, html, json_line, lines, one_line, shown
+from fasaco_edge.text import MOST, json_line, lines, one_line, shown
 
 # What a terminal obeys or nobody sees, by Unicode's own tables. Signs that Arabic, Syriac and
 # Kaithi numbers begin with are of a category with them, and seen.
@@ -67,15 +67,6 @@ def test_a_value_is_shown_however_large_it_is():
     for value in (ring, 10**5000, ["lol"] * 10**6, {"a": "\x1b" * 10**6}, "\u202e"):
         assert len(shown(value)) < 1000
         assert one_line(shown(value)) == shown(value)
-
-
-def test_on_a_page_text_is_no_mark_up():
-    text = "<script>'\"&\x1b\n"
-    assert html(text) == r"&lt;script&gt;&#x27;&quot;&amp;\x1b\n"
-    assert html(Html("<b>"), text) == "<b>" + html(text)
-    assert element("p", text, class_=text, aria_label=1) == (
-        f'<p class="{html(text)}" aria-label="1">{html(text)}</p>'
-    )
 
 
 def test_json_has_escapes_of_its_own():

@@ -189,7 +189,7 @@ def _pheromone(review: Review) -> PheromoneFigures:
     counted = [each.status.coverage for each in review.data.statuses if each.status.coverage]
     stands = counted[-1].coverable + counted[-1].unreachable if counted else 0
     share = spanned / stands if spanned is not None and stands else None
-    return PheromoneFigures(review.record.field_count, _rounded(share), _rounded(branching))
+    return PheromoneFigures(len(review.record.field_ns), _rounded(share), _rounded(branching))
 
 
 def _replan(path: PathSample) -> Replan:

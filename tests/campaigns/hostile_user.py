@@ -183,7 +183,7 @@ def try_together(campaign: Campaign) -> None:
     recording = next(recordings.glob("*.rrd"))
     torn = folder / "torn.rrd"
     torn.write_bytes(recording.read_bytes()[:-7])
-    told = [f"--html={folder}/a.html", f"--png={folder}/a.png", "--json"]
+    told = [f"--png={folder}/a.png", "--json"]
     campaign.run("review", str(recording), *told)
     campaign.run("review", str(torn), ends=(0, 1))
     campaign.run("replay", str(recording), ends=(0, 1))

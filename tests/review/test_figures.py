@@ -175,5 +175,5 @@ def test_counts_by_code_go_on_after_a_restart():
         "metrics/errors/wrong_frame": np.array([(0, 1), (1, 3), (2, 1), (3, 2)], np.float64),
         "metrics/latency/plan": np.array([(0, 9)], np.float64),
     }
-    record = RunRecord("", (), 0, 0, plots, {}, {}, 0, (), ())
+    record = RunRecord("", (), 0, 0, plots, {}, {}, (), ())
     assert faults_of(RunData(), record).by_code == {"wrong_frame": 5}

@@ -1,4 +1,4 @@
-"""What a review writes: picture, page, files; and what it says where it cannot."""
+"""What a review writes: pictures, files; and what it says where it cannot."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ import shutil
 import subprocess
 import sys
 from dataclasses import replace
-from html.parser import HTMLParser
 from pathlib import Path
 
 import numpy as np
@@ -28,7 +27,6 @@ from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.review.figures import document_of
 from fasaco_edge.review.moments import Span
 from fasaco_edge.review.output.export import FORMATS, export
-from fasaco_edge.review.output.page import page_of
 from fasaco_edge.review.output.pictures import SIZE, draw_review
 from fasaco_edge.review.output.rows import charge_rows, screen_rows
 from fasaco_edge.review.review import CoverageCounts, read_review, review_of
@@ -44,7 +42,6 @@ TABLES = (
     *("floor", "pheromone"),
 )
 ROOT = Path(__file__).parents[2]
-VOID = ("meta", "img")
 
 
 @pytest.fixture(scope="module")
@@ -55,67 +52,6 @@ def parts(tmp_path_factory):
 @pytest.fixture(scope="module")
 def review(parts):
     return read_review(parts)
-
-
-class Page(HTMLParser):
-    """Text and elements of a page; each that is opened has to be closed."""
-
-    def __init__(self, page):
-        super().__init__()
-        self.open, self.text, self.names, self.links = [], "", [], []
-        self.feed(page)
-        assert self.open == []
-
-    def handle_starttag(self, tag, attrs):
-        self.names.append(tag)
-        self.links += [value for name, value in attrs if name in ("src", "href")]
-        if tag not in VOID:
-            self.open.append(tag)
-
-    def handle_startendtag(self, tag, attrs):
-        self.names.append(tag)
-
-    def handle_endtag(self, tag):
-        assert self.open.pop() == tag
-
-    def handle_data(self, data):
-        self.text += data
-
-
-def test_the_page_needs_nothing_else(review):
-    text = page_of(review)
-    page = Page(text)
-    assert "script" not in page.names
-    assert "link" not in page.names
-    (picture,) = page.links
-    assert picture.startswith("data:image/png;base64,")
-    assert "://" not in re.sub(r"data:image/png[^\"]*", "", text)
-    assert "default-src 'none'" in text
-    assert "prefers-color-scheme: dark" in text
-    assert page.names.count("svg") == 3
-
-
-def test_the_page_tells_the_figures(review):
-    page, told = Page(page_of(review)), document(review)
-    for text in (told["recording"], "4 of 24 cells", "not complete", "no pose for 3 s", "<odd>"):
-        assert text in page.text
-    # Three cells' widths there and back, and a disc, in a room of 2.3 x 1.7 m without its corners.
-    assert told["swept_m2"] == pytest.approx(0.9 * 0.3 + np.pi * 0.15**2, rel=0.03)
-    assert told["reachable_m2"] == pytest.approx(2.3 * 1.7, rel=0.06)
-    assert (told["patches_over_4_dm2"], told["largest_patch_m2"]) == (
-        1,
-        pytest.approx(told["reachable_m2"] - told["swept_m2"], abs=0.05),
-    )
-    swept = f"{told['swept_m2']:.1f} of {told['reachable_m2']:.1f} m2 ("
-    assert page.text.count(swept) == 1
-    assert "of the reachable floor swept" in page.text
-
-
-def test_the_page_sets_two_side_by_side(review):
-    page = Page(page_of(review, review))
-    assert page.names.count("svg") == 4
-    assert page.names.count("img") == 2
-    assert "first less second" in page.text
 
 
 def test_the_picture_shows_map_and_trail(review):
@@ -137,7 +73,6 @@ def test_without_map_and_poses_there_are_still_charts(review):
         counts=None,
     )
     assert draw_review(bare).size == SIZE
-    assert "there is no map" in page_of(bare)
     told = document(bare)
     assert told["steps"] is told["covered_cells"] is None
     assert len(told["not_recorded"]) >= 2
@@ -164,7 +99,6 @@ def test_a_map_without_a_lattice_is_named(review, changes, why):
     told = document(without)
     assert told["steps"] is None
     assert why in told["not_recorded"]["steps, revisits, turns_90, turns_180, driven_m, reached_s"]
-    assert why in page_of(without)
 
 
 def zone(cells, covered):
@@ -224,16 +158,6 @@ def test_texts_of_a_recording_do_nothing_to_a_terminal(review, capsys):
     assert r"[/]\x1b[2J" in out
 
 
-def test_texts_of_a_recording_are_no_mark_up_on_the_page(review):
-    evil = "<script>alert(1)</script>'\"\x1b"
-    states = (*review.states[:-1], replace(review.states[-1], name=evil, reason=evil))
-    text = page_of(replace(review, states=states))
-    page = Page(text)
-    assert "script" not in page.names
-    assert f"while the mission was {evil[:-1]}\\x1b" in page.text
-    assert "\x1b" not in text
-
-
 def test_what_begins_like_a_formula_is_text_to_a_table(review, tmp_path):
     names = ("=1+1", "+1+1", "-1+1", "@sum", "-1.5e-3", "a\nb", "ok")
     states = tuple(Span(name, 0, 1, name) for name in names)
@@ -259,14 +183,11 @@ def test_a_terminal_of_few_characters_is_told_everything(parts, tmp_path, encodi
 
 
 def test_the_command_writes_them(parts, tmp_path):
-    picture, page, folder = tmp_path / "a.png", tmp_path / "a.html", tmp_path / "files"
-    ended = fasaco_edge(
-        "review", *parts, "--png", picture, "--html", page, "--export", folder, "--json"
-    )
+    picture, folder = tmp_path / "a.png", tmp_path / "files"
+    ended = fasaco_edge("review", *parts, "--png", picture, "--export", folder, "--json")
     assert ended.code == 0, ended.err
     with Image.open(picture) as image:
         assert image.size == SIZE
-    assert page.read_text(encoding="utf-8").startswith("<!doctype html>")
     names = {file.name for file in folder.iterdir()}
     assert names == {*(f"{name}.csv" for name in (*TABLES, "columns")), "end.npz"}
 
@@ -342,15 +263,13 @@ def _as_csv(value):
     return "" if value is None else str(int(value) if isinstance(value, bool) else value)
 
 
-@pytest.mark.parametrize("option", ["--png", "--html"])
-def test_a_full_disk_is_named(parts, option, capsys):
-    assert main(["review", *map(str, parts), option, "/dev/full"]) == 1
+def test_a_full_disk_is_named(parts, capsys):
+    assert main(["review", *map(str, parts), "--png", "/dev/full"]) == 1
     assert "cannot write /dev/full: No space left on device" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize(("option", "name"), [("--png", "none/a.png"), ("--html", "none/a.html")])
-def test_a_missing_folder_is_named_first(parts, tmp_path, option, name, capsys):
-    assert main(["review", *map(str, parts), option, str(tmp_path / name)]) == 78
+def test_a_missing_folder_is_named_first(parts, tmp_path, capsys):
+    assert main(["review", *map(str, parts), "--png", str(tmp_path / "none" / "a.png")]) == 78
     told = capsys.readouterr()
     assert told.out == ""
     assert "there is no folder" in told.err

@@ -19,7 +19,6 @@ from fasaco_edge.drawing import palette
 from fasaco_edge.recording import entities
 from fasaco_edge.review.figures import document_of
 from fasaco_edge.review.instant import direction, heading_from, scene_at
-from fasaco_edge.review.output.page import page_of
 from fasaco_edge.review.output.rows import instant_rows, screen_rows
 from fasaco_edge.review.review import read_review
 from fasaco_edge.review.spot import explain, is_inside, spots_left
@@ -244,12 +243,6 @@ def test_zones_are_drawn_for_the_viewer(parts):
     assert np.allclose(np.asarray(zones[0])[:, :2], [*ZONE, ZONE[0]], atol=1e-6)
     kept = read_column(parts[0], entities.KEEP_OUT, "LineStrips3D:strips").values[-1]
     assert np.allclose(np.asarray(kept[0])[:, :2], [*KEEP_OUT, KEEP_OUT[0]], atol=1e-6)
-
-
-def test_the_page_has_a_chapter_of_the_order(review):
-    page = page_of(review)
-    for text in ("zone a, keep out of (2.6, 0.4)", "in a keep-out zone"):
-        assert text in page
 
 
 @pytest.mark.parametrize("option", ["--at", "--point"])

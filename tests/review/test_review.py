@@ -16,9 +16,7 @@ from fasaco_edge.errors import UnreadableRecording
 from fasaco_edge.review.drive import walk_figures
 from fasaco_edge.review.figures import _used
 from fasaco_edge.review.instant import scene_at
-from fasaco_edge.review.output.page import page_of
-from fasaco_edge.review.output.panels import TimeAxis, branching_panel, covered_share, saved_panel
-from fasaco_edge.review.output.pictures import FIELDS, draw_fields
+from fasaco_edge.review.output.panels import covered_share
 from fasaco_edge.review.review import CoverageCounts, read_review
 from tests.benchmarks.judge import check_walk
 from tests.review.naive import nearest_rank, passed_cells, quarter_turns
@@ -219,36 +217,6 @@ def test_the_living_trail_s_share_is_of_cells_that_have_a_stand(review, told):
     assert review.counts is not None
     fewer = CoverageCounts(covered=10, coverable=10, recovered=0, unreachable=0, source="trail")
     assert document(replace(review, counts=fewer))["pheromone"] == told["pheromone"]
-
-
-def test_the_page_shows_some_trail_fields_and_their_branching(review):
-    pictures = draw_fields(review)
-    times = [at_s for at_s, _ in pictures]
-    # Four, where fields came often enough.
-    assert 2 <= len(times) <= FIELDS
-    assert times == sorted(times)
-    assert times[-1] <= review.duration_s
-    assert len({picture.size for _, picture in pictures}) == 1
-    assert len({picture.tobytes() for _, picture in pictures}) > 1
-    assert branching_panel(review) is not None
-    page = page_of(review)
-    assert page.count('alt="pheromone field"') == len(pictures)
-    assert "Branching of the trail" in page
-
-
-def test_the_page_shows_what_ants_and_local_search_saved(review, recording):
-    panel = saved_panel(review)
-    local_search, ants = panel.lines
-    unit_s = TimeAxis.over(review.duration_s).unit_s
-    for line, member in ((local_search, "saved_by_local_search_s"), (ants, "saved_by_ants_s")):
-        saved = {note["revision"]: note.get(member) or 0.0 for _, note in recording.notes}
-        end, total = line.points[-1]
-        assert end * unit_s == pytest.approx(review.duration_s)
-        # The recorder may have missed the first path.
-        assert sum(saved.values()) - max(saved.values()) <= total + 0.01
-        assert total <= sum(saved.values()) + 0.01
-    assert local_search.points[-1][1] > 0
-    assert panel.title in page_of(review)
 
 
 def test_a_moment_tells_what_the_colony_held(review):

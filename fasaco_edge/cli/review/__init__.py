@@ -41,7 +41,7 @@ examples:
   fasaco-edge review night.rrd --point 2.55,0.24       why is this spot (x, y) [m] not swept?
   fasaco-edge review night.rrd --against last.rrd --png both.png
   fasaco-edge review night.rrd --export night --export-as parquet
-  fasaco-edge review night.rrd --html night.html       everything, as a page to pass on
+  fasaco-edge serve night.rrd                          the mission in a browser, at any time
 """
 
 OF_A_FLEET = (
@@ -105,9 +105,8 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         metavar="FILE",
         help="write a picture of the run, with --against of both",
     )
-    parser.add_argument(
-        "--html", type=Path, metavar="FILE", help="write a page, one file that needs no network"
-    )
+    # Of earlier releases.
+    parser.add_argument("--html", nargs="?", const=True, help=argparse.SUPPRESS)
     parser.add_argument(
         "--export",
         type=Path,
@@ -129,7 +128,12 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Review."""
     recordings = [*args.recordings, *(args.against or ())]
-    check_outputs((args.png, args.html), recordings)
+    if args.html:
+        raise BadConfiguration(
+            "--html: review writes no page",
+            hint="fasaco-edge serve FILE.rrd shows the recording in a browser",
+        )
+    check_outputs((args.png,), recordings)
     for file in recordings:
         with open_part(file):  # reports a file that is no recording before loading the rest
             pass
@@ -164,11 +168,6 @@ def run(args: argparse.Namespace) -> int:
 
         with writing(args.png) as file:
             draw_review(review, other).save(file, "PNG")
-    if args.html:
-        from fasaco_edge.review.output.page import page_of
-
-        with writing(args.html) as file:
-            file.write_text(page_of(review, other), encoding="utf-8")
     if args.export:
         from fasaco_edge.review.output.export import export
 

@@ -73,7 +73,7 @@ def _print_screen(console: Console, review: Review, document: ReviewDocument, *,
     for name, text in rows.screen_rows(review, document):
         line = Text.assemble((f"{name:<12}", "cyan"), one_line(text))
         console.print(_fitting(line, console.width))
-    hint = "more: --long; a moment: --at MM:SS; a spot: --point X,Y; a page: --html FILE"
+    hint = "more: --long; a moment: --at MM:SS; a spot: --point X,Y; a browser: serve FILE"
     console.print(_fitting(Text(hint), console.width))
 
 

@@ -15,7 +15,7 @@ from fasaco_edge.fleet.review.report import FleetFigures, review_fleet
 from fasaco_edge.review.wording import clock
 from fasaco_edge.text import one_line
 
-ONE_ROBOT = ("long", "at", "point", "against", "html", "export")
+ONE_ROBOT = ("long", "at", "point", "against", "export")
 HEADER = (
     "robot", "state", "busy", "waited", "swept m2", "through", "again", "driven m", "kB/s",
     "plan ms",

@@ -1,28 +1,20 @@
-"""Lines, labels and pheromone fields of a recording, in the order in which they were drawn.
-
-A review keeps some fields, spread over the whole time; everything else is read on demand.
-"""
+"""Grids, lines, labels and poses as they were drawn in a recording; all are read on demand."""
 
 from __future__ import annotations
 
 import math
-import zlib
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.grid.geometry import Window
-from fasaco_edge.grid.rotation import rotated_point
+from fasaco_edge.grid.geometry import GridGeometry, Pose2D
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.arrow import pa
 from fasaco_edge.recording.read.frames import Chunk, chunks, column, wall_ns
 from fasaco_edge.recording.read.repair import open_part
-
-# Most fields that are kept; beyond that every other one is dropped.
-MOST_FIELDS = 64
 
 _POINT = pa.list_(pa.field("item", pa.float32(), nullable=False), 3)
 _STRIPS = pa.list_(pa.list_(pa.field("item", _POINT, nullable=False)))
@@ -33,33 +25,22 @@ _CELL = pa.list_(pa.float32())
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class DrawnField:
-    """A field as it was drawn.
+class DrawnGrid:
+    """A grid as it was drawn.
 
     Attributes:
         at_ns: time by the recorder's clock [ns].
-        window: the cells it spans, relative to the origin of the drawing.
-        cell_m: edge of a cell [m].
-        yaw_deg: angle of the rows of cells about that origin [deg]; the window is in these cells.
-        anchor: origin of the drawing, (x, y) [m] in the map frame, if known.
+        geometry: its size and place in the map frame.
+        pixels: uint8 (rows, cols), row 0 with the smallest y; of tinted pixels their opacity.
     """
 
     at_ns: int
-    window: Window
-    _packed: bytes
-    cell_m: float
-    yaw_deg: float = 0.0
-    anchor: tuple[float, float] = (0.0, 0.0)
-
-    @property
-    def levels(self) -> NDArray[np.uint8]:
-        """Pheromone on a log scale, uint8 (rows, cols), row 0 with the smallest y; 0 for none."""
-        shape = self.window.rows, self.window.cols
-        return np.frombuffer(zlib.decompress(self._packed), np.uint8).reshape(shape)
+    geometry: GridGeometry
+    pixels: NDArray[np.uint8]
 
 
-def fields_in(batch: pa.RecordBatch, times: list[int]) -> Iterator[DrawnField]:
-    """Yield the fields of a batch of rows, drawn at ``times`` [ns].
+def grids_in(batch: pa.RecordBatch, anchor: NDArray[np.float64]) -> Iterator[DrawnGrid]:
+    """Yield the grid of each row of a batch; ``anchor``: the origin of drawings, (x, y) [m].
 
     Raises:
         ValueError: the batch holds something else.
@@ -71,59 +52,21 @@ def fields_in(batch: pa.RecordBatch, times: list[int]) -> Iterator[DrawnField]:
     if data is None or cells is None or places is None:
         return
     formats = batch.column("GridMap:format").to_pylist()
-    for row, at_ns in enumerate(times):
-        levels = np.asarray(data[row].values[0].values, np.uint8)
-        shape = int(formats[row][0]["height"]), int(formats[row][0]["width"])
+    dx, dy = anchor.tolist()
+    for row, at_ns in enumerate(wall_ns(batch)):
+        pixels = np.asarray(data[row].values[0].values, np.uint8)
+        rows, cols = int(formats[row][0]["height"]), int(formats[row][0]["width"])
         cell_m, (x, y, _) = cells[row].as_py()[0], places[row].as_py()[0]
-        if levels.size != shape[0] * shape[1] or not cell_m > 0:
-            raise ValueError(f"a field of {levels.size} cells, stated {shape[0]} x {shape[1]}")
-        yaw_deg = 0.0
+        if pixels.size not in (rows * cols, 4 * rows * cols) or not cell_m > 0:
+            raise ValueError(f"a grid of {pixels.size} pixels, stated {rows} x {cols}")
+        yaw = 0.0
         if turns is not None:
             _, _, sine, cosine = turns[row].as_py()[0]
-            yaw_deg = math.degrees(2.0 * math.atan2(sine, cosine))
-        x, y = rotated_point(x, y, -yaw_deg)
-        corner = Window(0, 0, *shape).moved(round(y / cell_m), round(x / cell_m))
-        # An image's row 0 is its top.
-        upright = np.ascontiguousarray(levels.reshape(shape)[::-1])
-        yield DrawnField(at_ns, corner, zlib.compress(upright.data, 1), cell_m, yaw_deg)
-
-
-@dataclass(slots=True)
-class FieldSampler:
-    """Takes fields in order of time and keeps some.
-
-    Attributes:
-        count: number of all fields.
-        fields: the kept ones, about evenly spread, and the last one.
-    """
-
-    count: int = 0
-    fields: list[DrawnField] = field(default_factory=list)
-    _every: int = 1
-    _last: DrawnField | None = None
-
-    def take(self, batch: pa.RecordBatch, times: list[int]) -> None:
-        """Take the fields of a batch of rows.
-
-        Raises:
-            ValueError: the batch holds something else.
-        """
-        for taken in fields_in(batch, times):
-            self._keep(taken)
-
-    def _keep(self, taken: DrawnField) -> None:
-        if self.count % self._every == 0:
-            self.fields.append(taken)
-        self.count += 1
-        self._last = taken
-        if len(self.fields) > MOST_FIELDS:
-            self.fields = self.fields[::2]
-            self._every *= 2
-
-    def spread(self) -> tuple[DrawnField, ...]:
-        """Return the kept fields in order of time, with the last one."""
-        last = [] if self._last is None or self._last in self.fields else [self._last]
-        return tuple(sorted([*self.fields, *last], key=lambda one: one.at_ns))
+            yaw = 2.0 * math.atan2(sine, cosine)
+        # An image's row 0 is its top; the last channel is the opacity.
+        upright = pixels.reshape(rows, cols, -1)[::-1, :, -1] if pixels.size else pixels
+        geometry = GridGeometry(rows, cols, cell_m, Pose2D(x + dx, y + dy, yaw))
+        yield DrawnGrid(at_ns, geometry, np.ascontiguousarray(upright).reshape(rows, cols))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -149,7 +92,7 @@ class DrawnLabel:
     text: str
 
 
-Drawn = DrawnLine | DrawnLabel | DrawnField
+Drawn = DrawnLine | DrawnLabel | DrawnGrid
 
 
 def drawings(paths: Sequence[Path], *wanted: str) -> Iterator[tuple[str, Drawn]]:
@@ -171,8 +114,7 @@ def drawings(paths: Sequence[Path], *wanted: str) -> Iterator[tuple[str, Drawn]]
                 if chunk is None or not chunk.batch.num_rows:
                     continue
                 if chunk.is_static and chunk.entity == entities.WORLD:
-                    place = column(chunk.batch, "Transform3D:translation", _PLACE)
-                    anchor = anchor if place is None else np.array(place[0].as_py()[0][:2])
+                    anchor = anchor_in(chunk.batch, anchor)
                 elif not chunk.is_static and chunk.entity in wanted:
                     yield from ((chunk.entity, one) for one in _drawn(chunk, anchor))
 
@@ -180,16 +122,45 @@ def drawings(paths: Sequence[Path], *wanted: str) -> Iterator[tuple[str, Drawn]]
 def _drawn(chunk: Chunk, anchor: NDArray[np.float64]) -> Iterator[Drawn]:
     batch, times = chunk.batch, wall_ns(chunk.batch)
     if chunk.entity == entities.PHEROMONE:
-        x, y = anchor.tolist()
-        yield from (replace(field, anchor=(x, y)) for field in fields_in(batch, times))
-    elif (strips := column(batch, "LineStrips3D:strips", _STRIPS)) is not None:
-        numbers = [0] * len(times)
-        if entities.REPLAN in batch.schema.names:
-            numbers = [number or 0 for number in batch.column(entities.REPLAN).to_pylist()]
-        for at_ns, number, row in zip(times, numbers, strips, strict=True):
-            points = row.values.flatten().flatten() if len(row.values) else ()
-            xyz = np.asarray(points, np.float64).reshape(-1, 3)
-            yield DrawnLine(at_ns, number, xyz[:, :2] + anchor)
+        yield from grids_in(batch, anchor)
+    elif column(batch, "LineStrips3D:strips", _STRIPS) is not None:
+        yield from lines_in(batch, anchor)
     elif (labels := column(batch, "Points3D:labels", pa.list_(pa.string()))) is not None:
         for at_ns, row in zip(times, labels.to_pylist(), strict=True):
             yield DrawnLabel(at_ns, "\n".join(row))
+
+
+def lines_in(batch: pa.RecordBatch, anchor: NDArray[np.float64]) -> Iterator[DrawnLine]:
+    """Yield the line of each row of a batch; as ``grids_in``."""
+    strips, times = column(batch, "LineStrips3D:strips", _STRIPS), wall_ns(batch)
+    numbers = [0] * len(times)
+    if entities.REPLAN in batch.schema.names:
+        numbers = [number or 0 for number in batch.column(entities.REPLAN).to_pylist()]
+    for at_ns, number, row in zip(times, numbers, strips or (), strict=False):
+        points = row.values.flatten().flatten() if len(row.values) else ()
+        xyz = np.asarray(points, np.float64).reshape(-1, 3)
+        yield DrawnLine(at_ns, number, xyz[:, :2] + anchor)
+
+
+def poses_in(batch: pa.RecordBatch) -> NDArray[np.float64]:
+    """Return the poses in a batch from the origin of drawings, float64 (n, 3): x, y [m], yaw [rad].
+
+    Raises:
+        ValueError: the batch holds something else.
+    """
+    places = column(batch, "Transform3D:translation", _PLACE)
+    turns = column(batch, "Transform3D:quaternion", _TURN)
+    if places is None or turns is None:
+        raise ValueError("poses without a place or a turn")
+    xyz, turned = (
+        np.asarray(each.flatten().flatten(), np.float64).reshape(batch.num_rows, -1)
+        for each in (places, turns)
+    )
+    yaw = 2.0 * np.arctan2(turned[:, 2], turned[:, 3])
+    return np.column_stack((xyz[:, :2], yaw))
+
+
+def anchor_in(batch: pa.RecordBatch, before: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the origin of drawings, (x, y) [m], in static data of ``world``; else ``before``."""
+    place = column(batch, "Transform3D:translation", _PLACE)
+    return before if place is None else np.array(place[0].as_py()[0][:2])

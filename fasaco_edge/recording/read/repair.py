@@ -218,7 +218,7 @@ def view(paths: Sequence[Path]) -> None:
     if ended.returncode:
         raise ProcessEnded(
             f"Rerun's viewer ended with {ended.returncode}",
-            hint="it needs a screen: run it where there is one, or write --png or --html",
+            hint="it needs a screen: run it where there is one, or `fasaco-edge serve FILE.rrd`",
         )
 
 

@@ -7,7 +7,7 @@ Pictures are skipped chunk by chunk, so that memory does not grow with them.
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Self
@@ -19,7 +19,6 @@ from fasaco_edge.bus.arrival import Arrival
 from fasaco_edge.errors import DifferentRuns, MalformedMessage, UnreadableRecording
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.arrow import pa
-from fasaco_edge.recording.read.drawn import DrawnField, FieldSampler
 from fasaco_edge.recording.read.frames import Chunk, chunks, column, wall_ns
 from fasaco_edge.recording.read.repair import HINT, open_part
 from fasaco_edge.samples import Place, SampleDecoder, place_of
@@ -48,6 +47,7 @@ class RecordedSamples:
     """
 
     def __init__(self, paths: Sequence[Path]) -> None:
+        self._topics: Container[str] | None = None
         batches = [batch for path in paths for batch in _batches(path)]
         # A single part may have none: its recorder was killed just after it began.
         if paths and not batches:
@@ -55,9 +55,13 @@ class RecordedSamples:
         self._take(batches)
 
     @classmethod
-    def of(cls, batches: Sequence[Batch]) -> Self:
-        """Return the samples of batches that were read already, in any order."""
+    def of(cls, batches: Sequence[Batch], topics: Container[str] | None = None) -> Self:
+        """Return the samples of batches that were read already, in any order.
+
+        ``topics``: those to decode, without counting any as missing; None for all.
+        """
         samples = cls(())
+        samples._topics = topics
         samples._take(batches)
         return samples
 
@@ -73,10 +77,11 @@ class RecordedSamples:
             UnreadableRecording: a batch is malformed.
         """
         self.missing = 0
-        run, following, begun, decoder = -1, 0, False, SampleDecoder()
+        run, following, begun, decoder = -1, 0, False, SampleDecoder(self._topics)
         for batch in self._batches:
             if batch.place.run != run:
-                run, following, begun, decoder = batch.place.run, 0, False, SampleDecoder()
+                run, following, begun = batch.place.run, 0, False
+                decoder = SampleDecoder(self._topics)
             try:
                 samples = decoder.samples(batch.body)
             except MalformedMessage as error:
@@ -86,7 +91,8 @@ class RecordedSamples:
                 if numbered.number < following:
                     continue
                 # Samples before the first given part are not missing.
-                self.missing += numbered.number - following if begun else 0
+                if self._topics is None and begun:
+                    self.missing += numbered.number - following
                 begun = begun or numbered.number >= batch.place.first
                 following = numbered.number + 1
                 yield numbered.arrival
@@ -153,8 +159,7 @@ class RunRecord:
         plots: float64 (n, 2) of each plotted entity: time since ``began_ns`` [s], and value.
         states: times and names of the states of each state entity.
         log: times and texts of each log entity.
-        field_count: number of drawings of the pheromone field.
-        fields: some of these, spread over the whole time, with the last.
+        field_ns: times of the drawings of the pheromone field.
         batches: samples, for ``RecordedSamples.of``.
     """
 
@@ -165,8 +170,7 @@ class RunRecord:
     plots: Mapping[str, NDArray[np.float64]]
     states: Mapping[str, tuple[TimedText, ...]]
     log: Mapping[str, tuple[TimedText, ...]]
-    field_count: int
-    fields: tuple[DrawnField, ...]
+    field_ns: tuple[int, ...]
     batches: tuple[Batch, ...]
 
 
@@ -210,7 +214,7 @@ class _RunReader:
     span: list[int] = field(default_factory=list)
     rows: dict[str, list[Row]] = field(default_factory=lambda: defaultdict(list))
     batches: list[Batch] = field(default_factory=list)
-    fields: FieldSampler = field(default_factory=FieldSampler)
+    field_ns: list[int] = field(default_factory=list)
 
     def read(self, path: Path) -> None:
         with open_part(path) as (recording, scan):
@@ -240,7 +244,7 @@ class _RunReader:
             ]
         else:
             if entity == entities.PHEROMONE and not chunk.is_static and batch.num_rows:
-                self.fields.take(batch, wall_ns(batch))
+                self.field_ns += wall_ns(batch)
             return 0
         return chunk.bytes
 
@@ -264,8 +268,7 @@ class _RunReader:
             plots=dict(self._plots(began)),
             states=self._texts("state/"),
             log=self._texts("log/"),
-            field_count=self.fields.count,
-            fields=self.fields.spread(),
+            field_ns=tuple(sorted(self.field_ns)),
             batches=tuple(self.batches),
         )
 

@@ -1,1 +1,1 @@
-"""Output formats of a review: rows, tables, charts, pictures, an HTML page."""
+"""Output formats of a review: rows, tables, charts, pictures."""

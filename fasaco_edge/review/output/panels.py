@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from fasaco_edge.drawing import palette
 from fasaco_edge.drawing.chart import COLOURS, Axis, Line, Panel
 from fasaco_edge.drawing.palette import Colour
-from fasaco_edge.recording import entities
 from fasaco_edge.review.review import Review
 
 Points = tuple[NDArray[np.float64], NDArray[np.float64]]
@@ -139,48 +138,6 @@ def state_panel(review: Review) -> Panel:
     ticks = tuple((float(level), SHORT.get(name, name)) for level, name in enumerate(names))
     y = Axis("", -0.7, max(len(names) - 0.3, 0.7), ticks)
     return Panel("State of the mission", "", time.axis, y, tuple(lines))
-
-
-def branching_panel(review: Review) -> Panel | None:
-    """Return a chart of how decided the trail was; None if not recorded."""
-    points = review.record.plots.get(entities.BRANCHING)
-    if points is None:
-        return None
-    time = TimeAxis.over(review.duration_s)
-    curve = time.points(points[:, 0], points[:, 1])
-    y = Axis.linear("", [0.0, *points[:, 1].tolist()])
-    caption = "mean number of a cell's directions within reach of its strongest; 1: only one"
-    line = Line("", COLOURS[0], curve, dotted=False, width=2.2)
-    return Panel("Branching of the trail", caption, time.axis, y, (line,))
-
-
-def saved_panel(review: Review) -> Panel | None:
-    """Return a chart of savings by ants and local search, plan by plan; None if not recorded."""
-    plots = review.record.plots
-    saved = [
-        (colour, points)
-        for entity, colour in (
-            (entities.SAVED_BY_LOCAL_SEARCH, COLOURS[0]),
-            (entities.SAVED_BY_ANTS, COLOURS[1]),
-        )
-        if (points := plots.get(entity)) is not None
-    ]
-    if not saved:
-        return None
-    time = TimeAxis.over(review.duration_s)
-    lines = [
-        Line("", colour, time.points(*_held(points, review.duration_s)), dotted=False, width=2.2)
-        for colour, points in saved
-    ]
-    y = Axis.linear("s", [0.0, *(value for _, points in saved for value in points[:, 1].tolist())])
-    caption = "blue: local search, red: ants; time taken off the initial walks"
-    return Panel("Saved by search, all plans together", caption, time.axis, y, tuple(lines))
-
-
-def _held(points: NDArray[np.float64], end_s: float) -> Points:
-    """Return a plot, float64 (n, 2), as a staircase."""
-    at_s = np.concatenate((points[:, 0].repeat(2)[1:], [end_s]))
-    return at_s, points[:, 1].repeat(2)
 
 
 def _curve(time: TimeAxis, review: Review) -> tuple[tuple[float, float], ...]:

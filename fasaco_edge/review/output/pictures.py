@@ -1,4 +1,4 @@
-"""Pictures of a review: the map with the track, pheromone fields, all on one sheet."""
+"""Pictures of a review: the map with the track, charts, a moment, spots."""
 
 from __future__ import annotations
 
@@ -14,7 +14,6 @@ from fasaco_edge.drawing.chart import draw_panels
 from fasaco_edge.drawing.pictures import draw_mission, draw_order, draw_unswept
 from fasaco_edge.drawing.plot import MapLayer, Plot, View, bounds_of
 from fasaco_edge.drawing.sheet import KeyEntry, Sheet
-from fasaco_edge.grid.geometry import Window
 from fasaco_edge.judge.floor import swept_words
 from fasaco_edge.review.instant import Scene
 from fasaco_edge.review.output.panels import coverage_panel, replan_panel, state_panel
@@ -22,33 +21,6 @@ from fasaco_edge.review.output.rows import instant_rows, spot_rows
 from fasaco_edge.review.review import Review
 from fasaco_edge.review.spot import Spot
 from fasaco_edge.review.wording import clock
-
-# Fields on a page; the edge of the square that each has to fit into [px].
-FIELDS, FIELD_PX = 4, 440
-
-
-def draw_fields(review: Review) -> list[tuple[float, Image.Image]]:
-    """Return the pheromone field at four moments: when [s], and RGB pictures of one place."""
-    fields, record = review.record.fields, review.record
-    around = Window.around(*(field.window for field in fields))
-    if around is None:
-        return []
-    first, last = fields[0].at_ns, fields[-1].at_ns
-    wanted = [first + (last - first) * number // FIELDS for number in range(1, FIELDS + 1)]
-    chosen = [max((f for f in fields if f.at_ns <= at), key=lambda f: f.at_ns) for at in wanted]
-    scale = max(FIELD_PX // max(around.rows, around.cols), 1)
-    pictures = []
-    for field in dict.fromkeys(chosen):
-        levels = np.zeros((around.rows, around.cols), np.uint8)
-        levels[field.window.slices_in(around)] = field.levels
-        pixels = palette.gradient(levels.ravel() / 255.0).reshape(*levels.shape, 3)
-        pixels[levels == 0] = palette.UNKNOWN
-        size = around.cols * scale, around.rows * scale
-        shown = Image.fromarray(pixels[::-1]).resize(size, Image.Resampling.NEAREST)
-        shown.thumbnail((FIELD_PX, FIELD_PX))
-        pictures.append((1e-9 * (field.at_ns - record.began_ns), shown))
-    return pictures
-
 
 SIZE = (1600, 900)
 # Space of title, caption and key beside the map.

@@ -31,7 +31,6 @@ CARD_SETTINGS = ("planner.name", "robot.tool_width_m", "robot.radius_m", "planne
 ORDERS = ("order", "from", "to", "result", "driven", "replans", "paused", "asked for")
 UNREACHED = ("order", "m2", "at", "why")
 LEFT = ("m2", "at", "why")
-COMMANDS = ("at", "command")
 """Columns of ``order_rows``, ``unreached_rows``, ``left_rows`` and ``command_rows``."""
 MOST_PLACES = 3
 CHARGES = ("at", "for", "battery")

@@ -10,13 +10,15 @@ import msgspec
 import numpy as np
 from msgspec.structs import astuple
 
-from fasaco_edge.grid.rotation import rotated_points
 from fasaco_edge.mission.orders.order import order_document
 from fasaco_edge.recording import entities
-from fasaco_edge.recording.read.drawn import DrawnField, DrawnLine, drawings
+from fasaco_edge.recording.read.drawn import DrawnGrid, DrawnLine, drawings
 from fasaco_edge.review.orders import command_words
 from fasaco_edge.review.output.panels import covered_share
 from fasaco_edge.review.review import Review
+
+# Most pheromone fields of a table, beside the last one.
+MOST_FIELDS = 64
 
 
 class Column(NamedTuple):
@@ -224,16 +226,18 @@ def _pheromone(review: Review) -> Table:
 
 
 def _levels(review: Review) -> Iterator[tuple[object, ...]]:
-    record, wanted = review.record, {field.at_ns for field in review.record.fields}
+    record = review.record
+    # Some fields, spread over the whole time, and the last one.
+    every = -(-len(record.field_ns) // MOST_FIELDS) or 1
+    wanted = {*record.field_ns[::every], *record.field_ns[-1:]}
     for _, field in drawings([part.path for part in record.parts], entities.PHEROMONE):
-        if not isinstance(field, DrawnField) or field.at_ns not in wanted:
+        if not isinstance(field, DrawnGrid) or field.at_ns not in wanted:
             continue
         wanted.remove(field.at_ns)
-        levels, corner = field.levels, np.array((field.window.row0, field.window.col0))
         at_s = round(1e-9 * (field.at_ns - record.began_ns), 6)
-        cells = np.argwhere(levels > 0)
-        middles = rotated_points((cells + corner + 0.5)[:, ::-1] * field.cell_m, field.yaw_deg)
-        middles += field.anchor
-        values = levels[levels > 0].tolist()
-        for (x, y), level in zip(middles.tolist(), values, strict=True):
-            yield at_s, round(x, 4), round(y, 4), level
+        rows, cols = np.nonzero(field.pixels)
+        middles = cols.astype(np.float64) + 0.5, rows.astype(np.float64) + 0.5
+        x, y = field.geometry.to_map(*middles)
+        levels = field.pixels[rows, cols].tolist()
+        for place_x, place_y, level in zip(x.tolist(), y.tolist(), levels, strict=True):
+            yield at_s, round(place_x, 4), round(place_y, 4), level
