@@ -31,9 +31,11 @@ from fasaco_edge.client.robot_state import Token
 from fasaco_edge.grid.geometry import Window
 from fasaco_edge.planners.planner import ColonySnapshot
 from fasaco_edge.recording import entities
+from fasaco_edge.recording.read.timeline import open_timeline
 from fasaco_edge.recording.sdk import rr
 from fasaco_edge.recording.write.part import Part
 from fasaco_edge.samples import SampleEncoder
+from fasaco_edge.serve.recorded import Playback
 from fasaco_edge.serve.served_view import ServedView
 from fasaco_edge.text import json_line
 from fasaco_edge.wire import schemas
@@ -316,6 +318,18 @@ def test_a_recording_is_reviewed_without_harm(tmp_path):
     assert json.loads(run("review", file, "--json")[1])["robot"] == TAINT
     assert run("review", file, "--against", file)[0] == 0
     run("replay", file)
+
+
+def test_a_recording_is_served_without_harm(tmp_path):
+    file = recorded(tmp_path)
+    with open_timeline([file]) as timeline:
+        playback = Playback(timeline, [file])
+        messages = [message for _, _, message in playback.newest()] + playback.at(1e6)
+    texts = [text for text in messages if isinstance(text, str)]
+    assert any("INJECTED" in text for text in texts)
+    for text in texts:
+        for said in _texts_in(json.loads(text)):
+            judge(said)
 
 
 def test_names_of_files_do_nothing(tmp_path):

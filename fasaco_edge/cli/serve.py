@@ -1,10 +1,11 @@
-"""``fasaco-edge serve``: a robot's mission as a live page in a browser, also of a phone."""
+"""``fasaco-edge serve``: a robot's mission, live or recorded, as a page in a browser or phone."""
 
 from __future__ import annotations
 
 import argparse
 import os
 import sys
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
 
@@ -15,10 +16,15 @@ from fasaco_edge.text import one_line
 
 if TYPE_CHECKING:
     import ssl
+    from collections.abc import Callable, Iterator
 
     from fasaco_edge.serve.guard import Guard
+    from fasaco_edge.serve.recorded import Playback
+    from fasaco_edge.serve.server import Server
 
 PORT = 8465
+# Options of a robot on the bus.
+NOT_RECORDED = ("allow_commands", "config", "robot", "base", "connect", "security")
 EPILOG = f"""\
 examples:
   fasaco-edge serve                                    http://127.0.0.1:{PORT}, to look only
@@ -26,20 +32,32 @@ examples:
   fasaco-edge serve --listen 0.0.0.0:{PORT} --tokens page-tokens
                                                        for phones: prints a link for each role
   fasaco-edge serve --connect tcp/192.168.1.20:7447 --robot hall2
+  fasaco-edge serve run00001-*.rrd                     a recorded mission, with a time line
 
 The page shows map, swept floor, path, zones and robot, and starts, pauses and sends home where that
 is allowed. It is a client of the bus as `watch` is, with the credentials of --config or --security;
 to command, these have to be an operator's.
 
+Of FILE.rrd it shows the recording in the same page, to look only: map, path, driven track and swept
+floor as they were at each time, state and figures by the last status recorded, one in 15 s.
+
 FILE of --tokens has lines `viewer: TOKEN` and `operator: TOKEN`; where it is not there it is made,
 with new ones. A page asks for a token, or has it behind the # of its address. Without --certificate
 tokens and pictures go over the network in the clear.
 
-exit codes: 0 ended by a signal; 1 it cannot listen there; 78 wrong configuration
+exit codes: 0 ended by a signal; 1 it cannot listen there, or FILE.rrd cannot be read; 78 wrong
+configuration
 """
 
 
 def _add_options(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "recordings",
+        nargs="*",
+        type=Path,
+        metavar="FILE.rrd",
+        help="the parts of a recorded run; without, a robot live",
+    )
     parser.add_argument(
         "--listen",
         default=f"127.0.0.1:{PORT}",
@@ -74,9 +92,6 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Serve until a signal."""
-    import asyncio
-    import logging
-
     from fasaco_edge.host.processes import return_soon
     from fasaco_edge.serve.guard import guard_for
 
@@ -86,28 +101,62 @@ def run(args: argparse.Namespace) -> int:
         if (error.name or "").partition(".")[0] != "websockets":
             raise
         raise MissingExtra(
-            f"the live page needs websockets, which is not installed: {error}",
+            f"the page needs websockets, which is not installed: {error}",
             hint="pip install 'fasaco-edge[serve]'",
         ) from error
-    from fasaco_edge.client.feed import Feed
-    from fasaco_edge.serve.served_view import ServedView
-
     address = read_address("--listen", args.listen, example=PORT)
     guard = guard_for(address, args.tokens, args.name, allow_commands=args.allow_commands)
-    secured = _tls(args)
-    here = robot_on_bus(args)
     return_soon()
+    if args.recordings:
+        guard = guard.to_look_only()
+        with _recording(args) as source_of:
+            _serve(Server(guard, source_of), args, address, guard)
+    from fasaco_edge.client.feed import Feed
+    from fasaco_edge.serve.live import LiveServer
+    from fasaco_edge.serve.served_view import ServedView
+
+    here = robot_on_bus(args)
+    with Feed(here.bus, here.keys, hears_fleet=True) as feed:
+        server = LiveServer(feed, ServedView(here.keys), guard)
+        _serve(server, args, address, guard)
+
+
+@contextmanager
+def _recording(args: argparse.Namespace) -> Iterator[Callable[[], Playback]]:
+    """Open a recording; yield what makes the source of a viewer's messages."""
+    for option in NOT_RECORDED:
+        if getattr(args, option):
+            raise BadConfiguration(
+                f"--{option.replace('_', '-')}: a recording is only looked at, and has no bus",
+                hint="leave it out, or leave out FILE.rrd",
+            )
+    from fasaco_edge.recording.read.frames import is_fleet_recording
+    from fasaco_edge.recording.read.timeline import open_timeline
+    from fasaco_edge.serve.recorded import Playback
+
+    if is_fleet_recording(args.recordings[0]):
+        raise BadConfiguration(
+            f"{args.recordings[0]}: this is the recording of a fleet",
+            hint="serve the recording of one of its robots",
+        )
+    with open_timeline(args.recordings) as timeline:
+        yield lambda: Playback(timeline, args.recordings)
+
+
+def _serve(server: Server, args: argparse.Namespace, address: Address, guard: Guard) -> NoReturn:
+    import asyncio
+    import logging
+
+    secured = _tls(args)
     # It logs each connection.
     logging.getLogger("websockets").setLevel(logging.WARNING)
-    with Feed(here.bus, here.keys, hears_fleet=True) as feed:
-        server = Server(feed, ServedView(here.keys), guard)
-        try:
-            _say(address, guard, args.tokens, secured is not None)
-            asyncio.run(server.run(address, secured))
-        except OSError as error:
-            why = f"--listen: cannot listen at {address.shown}: {error.strerror or error}"
-            print(one_line(f"fasaco-edge: {why}"), file=sys.stderr)
-            _leave(Exit.ERROR)
+    try:
+        _say(address, guard, args.tokens, secured is not None)
+        asyncio.run(server.run(address, secured))
+    except OSError as error:
+        why = f"--listen: cannot listen at {address.shown}: {error.strerror or error}"
+        print(one_line(f"fasaco-edge: {why}"), file=sys.stderr)
+        _leave(Exit.ERROR)
     _leave(Exit.OK)
 
 

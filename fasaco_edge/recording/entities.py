@@ -6,6 +6,11 @@ from typing import Final
 
 APPLICATION: Final = "fasaco_edge"
 
+STATUS_PERIOD_S: Final = 15.0
+"""Of statuses without news, one in so many seconds is recorded."""
+SWEPT_OPACITY: Final = 150
+"""Opacity of swept floor, where all of a pixel is swept; 255 hides what is below."""
+
 WALL_CLOCK: Final = "wall"
 """Timeline: when the recorder received it."""
 REPLAN: Final = "replan"

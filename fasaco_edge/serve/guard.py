@@ -55,6 +55,11 @@ class Guard:
             return name.lower() in self.names
         return True
 
+    def to_look_only(self) -> Guard:
+        """Return a guard of which all clients may only look."""
+        tokens: tuple[tuple[Role, str], ...] = tuple(("viewer", token) for _, token in self.tokens)
+        return Guard(self.names, tokens)
+
     def role_of(self, token: str) -> Role | None:
         """Return the role of a client with ``token``; None for none."""
         if not self.tokens:

@@ -35,6 +35,12 @@ class Wants(msgspec.Struct, tag="wants", tag_field="kind", forbid_unknown_fields
     field: bool = False
 
 
+class Seek(msgspec.Struct, tag="seek", tag_field="kind", forbid_unknown_fields=True):
+    """The time of a recording to show, since it began [s]."""
+
+    at: float
+
+
 class Order(msgspec.Struct, tag="command", tag_field="kind", forbid_unknown_fields=True):
     """A command for the robot.
 
@@ -53,7 +59,7 @@ class Order(msgspec.Struct, tag="command", tag_field="kind", forbid_unknown_fiel
     keep_out: dict[str, Any] | None = None
 
 
-FromPage = Hello | Wants | Order
+FromPage = Hello | Wants | Seek | Order
 _DECODER: msgspec.json.Decoder[FromPage] = msgspec.json.Decoder(FromPage)
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from importlib.resources import files
 
 # Concatenated in this order they are one script.
-SCRIPTS = ("model.js", "view.js", "picture.js", "drawing.js", "panel.js", "link.js")
+SCRIPTS = ("model.js", "view.js", "picture.js", "drawing.js", "panel.js", "timeline.js", "link.js")
 
 
 @dataclass(frozen=True, slots=True)

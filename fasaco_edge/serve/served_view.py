@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 import zlib
 from array import array
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 
 from fasaco_edge.bus.arrival import Sample
 from fasaco_edge.client.robot_state import PathProgress, RobotState
@@ -47,7 +47,13 @@ PERIODS_S = {
 
 
 class ServedView(RobotState):
-    """The newest samples of one robot; grids stay bytes."""
+    """The newest samples of one robot; grids stay bytes.
+
+    Attributes:
+        periods_s: least period of each message [s].
+    """
+
+    periods_s: Mapping[str, float] = PERIODS_S
 
     def __init__(self, keys: Keys) -> None:
         super().__init__(keys.robot)
@@ -89,7 +95,7 @@ class ServedView(RobotState):
         """Return the messages, by kind, that are due and changed."""
         found: dict[str, str | bytes] = {}
         for kind, make in self._makers.items():
-            if now - self._made_at[kind] < PERIODS_S[kind] or not self._is_new(kind, now):
+            if now - self._made_at[kind] < self.periods_s[kind] or not self._is_new(kind, now):
                 continue
             self._made_at[kind] = now
             message = make(now)

@@ -1,4 +1,4 @@
-"""The server of the page: HTTP for the page, a WebSocket for each viewer, a thread for the bus."""
+"""The server of the page: HTTP for the page, a WebSocket for each viewer."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import logging
 import signal
 import ssl
 import threading
+from collections.abc import Callable
 from http import HTTPStatus
 
 from websockets.asyncio.server import ServerConnection, serve
@@ -15,17 +16,12 @@ from websockets.exceptions import ConnectionClosed
 from websockets.frames import CloseCode
 from websockets.http11 import Request, Response
 
-from fasaco_edge.bus.queries import Reply
-from fasaco_edge.client.feed import Feed
-from fasaco_edge.client.phrases import steady_now
 from fasaco_edge.host.addresses import Address
 from fasaco_edge.host.processes import release_unused
 from fasaco_edge.serve.guard import Guard, is_same_origin
 from fasaco_edge.serve.messages import Role
 from fasaco_edge.serve.page import load_page
-from fasaco_edge.serve.served_view import ServedView
-from fasaco_edge.serve.viewer import Viewer, ending_oddities
-from fasaco_edge.wire.topics import FLOOR, PHEROMONE
+from fasaco_edge.serve.viewer import Source, Viewer, ending_oddities
 
 LOG = logging.getLogger(__name__)
 
@@ -35,8 +31,6 @@ MOST_VIEWERS = 20
 MOST_STRANGERS = 20
 # The longest order has a few hundred kilobytes.
 MOST_BYTES = 262_144
-# Least period of messages to pages; without any, period of the check for viewers [s].
-FRAME_S, IDLE_S = 0.1, 0.2
 # Timeout of a connection that is no page yet, and of one whose computer is gone [s].
 OPEN_S, PING_S = 5.0, 15.0
 # Send buffer for a viewer in this process [bytes], beside the message being sent.
@@ -47,30 +41,19 @@ class Server:
     """Serves one robot's page.
 
     Args:
-        feed: its samples.
-        view: makes messages of them.
         guard: decides rights.
+        source_of: makes the source of a viewer's messages.
     """
 
-    def __init__(self, feed: Feed, view: ServedView, guard: Guard) -> None:
-        self._feed = feed
-        self._view = view
+    def __init__(self, guard: Guard, source_of: Callable[[], Source]) -> None:
         self._guard = guard
+        self._source_of = source_of
         self._page = load_page()
         self._viewers: set[Viewer] = set()
         # In order of arrival.
         self._strangers: dict[Viewer, ServerConnection] = {}
-        self._newest: dict[str, tuple[int, str | bytes]] = {}
         self._ended = threading.Event()
         self._loop: asyncio.AbstractEventLoop | None = None
-
-    def newest(self) -> list[tuple[str, int, str | bytes]]:
-        """Return the newest messages: kind, number, message."""
-        return [(kind, number, message) for kind, (number, message) in self._newest.items()]
-
-    def ask(self, query: str, payload: bytes, timeout_s: float) -> list[Reply]:
-        """Ask the daemon; blocks."""
-        return self._feed.ask(query, payload, timeout_s)
 
     async def run(self, address: Address, secured: ssl.SSLContext | None = None) -> None:
         """Serve until SIGTERM or SIGINT.
@@ -98,12 +81,16 @@ class Server:
             write_limit=WAITING_BYTES,
         ):
             release_unused()
-            hearing = asyncio.create_task(asyncio.to_thread(self._hear))
+            working = asyncio.create_task(asyncio.to_thread(self._work))
             # If it fails the server ends, too: a page must not show old data for ever.
-            hearing.add_done_callback(lambda _: stop.set())
+            working.add_done_callback(lambda _: stop.set())
             await stop.wait()
             self._ended.set()
-        await hearing
+        await working
+
+    def _work(self) -> None:
+        """Work in a thread of its own until the server ends."""
+        self._ended.wait()
 
     def _answer(self, connection: ServerConnection, request: Request) -> Response | None:
         """Answer a request that is no WebSocket; None lets one begin."""
@@ -144,7 +131,7 @@ class Server:
         return Response(status.value, status.phrase, Headers(headers), content)
 
     async def _attend(self, socket: ServerConnection) -> None:
-        viewer = Viewer(socket, self, self._guard)
+        viewer = Viewer(socket, self._source_of(), self._guard)
         try:
             async with ending_oddities(socket):
                 role = await self._greet(viewer, socket)
@@ -171,25 +158,3 @@ class Server:
             await socket.close(CloseCode.TRY_AGAIN_LATER)
             return None
         return role
-
-    def _hear(self) -> None:
-        """Take in samples, and make messages of them while there are viewers."""
-        while not self._ended.is_set():
-            items = self._feed.take(IDLE_S)
-            now = steady_now()
-            for topic, item in items:
-                self._view.take(topic, item, now)
-            self._view.trouble = self._feed.trouble
-            viewers = tuple(self._viewers)
-            self._feed.want(FLOOR, bool(viewers))
-            self._feed.want(PHEROMONE, any(viewer.wants_field for viewer in viewers))
-            if viewers and (news := self._view.news(now)) and self._loop is not None:
-                self._loop.call_soon_threadsafe(self._publish, news)
-            self._ended.wait(max(FRAME_S - (steady_now() - now), 0.0))
-
-    def _publish(self, news: dict[str, str | bytes]) -> None:
-        for kind, message in news.items():
-            number, _ = self._newest.get(kind, (0, b""))
-            self._newest[kind] = number + 1, message
-        for viewer in self._viewers:
-            viewer.news.set()

@@ -9,9 +9,11 @@ from collections.abc import AsyncIterator
 from typing import TYPE_CHECKING, Protocol
 
 import msgspec
+from websockets.frames import CloseCode
 
-from fasaco_edge.errors import FasacoError
-from fasaco_edge.serve.messages import Hello, Order, Role, Wants, from_page, message_text
+from fasaco_edge.errors import FasacoError, UnreadableRecording
+from fasaco_edge.serve.messages import Hello, Order, Role, Seek, Wants, from_page, message_text
+from fasaco_edge.text import one_line
 from fasaco_edge.wire.documents.json_text import decode_tolerant, encode_json
 from fasaco_edge.wire.documents.replies import Error
 from fasaco_edge.wire.documents.replies import Reply as Answer
@@ -39,6 +41,13 @@ class Source(Protocol):
 
     def ask(self, query: str, payload: bytes, timeout_s: float) -> list[Reply]:
         """Ask the daemon; blocks."""
+
+    def at(self, at_s: float) -> list[str | bytes]:
+        """Return what a recording shows at a time since it began [s]; blocks.
+
+        Raises:
+            UnreadableRecording: it can no longer be read.
+        """
 
 
 class Viewer:
@@ -81,6 +90,9 @@ class Viewer:
                     case Wants(field):
                         self.wants_field = field
                         self.news.set()
+                    case Seek(at_s):
+                        for message in await asyncio.to_thread(self._source.at, at_s):
+                            await self._send(message)
                     case Order() as order:
                         await self._send(await self._carry_out(order, role))
                     case Hello():
@@ -136,8 +148,11 @@ class Viewer:
 
 @contextlib.asynccontextmanager
 async def ending_oddities(socket: ServerConnection) -> AsyncIterator[None]:
-    """Close the connection of a viewer that sends what no page sends."""
+    """Close the connection of a viewer that sends what no page sends, or asks what is lost."""
     try:
         yield
     except (msgspec.DecodeError, TimeoutError, RecursionError):
         await socket.close(MALFORMED)
+    except UnreadableRecording as error:
+        LOG.warning("%s", one_line(str(error)))
+        await socket.close(CloseCode.INTERNAL_ERROR)

@@ -10,7 +10,7 @@ import urllib.error
 import urllib.request
 import zlib
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -49,12 +49,17 @@ class Served:
             return error.code, dict(error.headers), error.read().decode()
 
 
+def served(folder: Path, endpoint: str, *words: str) -> AbstractContextManager[Served]:
+    """Serve the page of a daemon's robot."""
+    return serving(folder, "--connect", endpoint, *words)
+
+
 @contextmanager
-def served(folder: Path, endpoint: str, *words: str) -> Iterator[Served]:
-    """Serve the page of a daemon's robot; end it, and check how it ended."""
+def serving(folder: Path, *words: str) -> Iterator[Served]:
+    """Serve a page; end it, and check how it ended."""
     address = free_endpoint().removeprefix("tcp/")
     log = folder / f"serve-{address.rpartition(':')[2]}.log"
-    command = [*PROGRAM, "serve", "--connect", endpoint, "--listen", address, *words]
+    command = [*PROGRAM, "serve", "--listen", address, *words]
     with log.open("wb") as out:
         process = subprocess.Popen(command, stdout=out, stderr=out, env=ENVIRONMENT)
     page = Served(process, address, log)

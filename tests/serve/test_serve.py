@@ -26,8 +26,9 @@ from fasaco_edge.client.feed import Feed
 from fasaco_edge.host.addresses import Address
 from fasaco_edge.host.processes import own_mb
 from fasaco_edge.serve.guard import Guard
+from fasaco_edge.serve.live import LiveServer
 from fasaco_edge.serve.served_view import ServedView
-from fasaco_edge.serve.server import MOST_STRANGERS, MOST_VIEWERS, Server
+from fasaco_edge.serve.server import MOST_STRANGERS, MOST_VIEWERS
 from fasaco_edge.wire.keys import Keys
 from tests.serve.serving import Served, listens, looking, served, until
 from tests.support.outsider import TIMEOUT_S, Outsider
@@ -323,7 +324,7 @@ def test_a_server_that_hears_no_more_ends():
             raise RuntimeError("deaf")
 
     with Deaf(BusSettings("client", (free_endpoint(),)), Keys()) as feed:
-        server = Server(feed, ServedView(Keys()), Guard(frozenset()))
+        server = LiveServer(feed, ServedView(Keys()), Guard(frozenset()))
         serving = server.run(Address("127.0.0.1", 0))
         with pytest.raises(RuntimeError, match="deaf"):
             asyncio.run(asyncio.wait_for(serving, TIMEOUT_S))

@@ -8,6 +8,7 @@ message is malformed. The footer, an index, is not needed for sequential reading
 
 from __future__ import annotations
 
+import os
 import struct
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -50,6 +51,7 @@ class Chunk:
         is_static: whether it has no times.
         batch: the rows, validated.
         bytes: its uncompressed size.
+        offset: of its frame in the file, for ``chunk_at``.
     """
 
     recording_id: str
@@ -57,6 +59,7 @@ class Chunk:
     is_static: bool
     batch: pa.RecordBatch
     bytes: int
+    offset: int
 
 
 def chunks(recording: BinaryIO, scan: Scan) -> Iterator[Chunk | None]:
@@ -66,7 +69,8 @@ def chunks(recording: BinaryIO, scan: Scan) -> Iterator[Chunk | None]:
         ValueError: a frame is malformed.
         OSError: the file cannot be read.
     """
-    recording.seek(HEADER_BYTES)
+    offset = HEADER_BYTES
+    recording.seek(offset)
     for number in range(1, scan.frames + 1):
         kind, length = FRAME.unpack(recording.read(FRAME.size))
         if kind == FOOTER_KIND:
@@ -74,10 +78,28 @@ def chunks(recording: BinaryIO, scan: Scan) -> Iterator[Chunk | None]:
             return
         body = recording.read(length)
         try:
-            yield _chunk(body) if kind == CHUNK_KIND else None
+            yield _chunk(body, offset) if kind == CHUNK_KIND else None
         # StopIteration: Arrow's, where a message is missing.
         except (*BROKEN, pa.ArrowException) as error:
             raise ValueError(f"frame {number} of {scan.frames}: {error or 'torn'}") from error
+        offset += FRAME.size + length
+
+
+def chunk_at(descriptor: int, offset: int) -> Chunk:
+    """Return a chunk of an open file that was read before.
+
+    Raises:
+        ValueError: it is no longer there.
+        OSError: the file cannot be read.
+    """
+    try:
+        _, length = FRAME.unpack(os.pread(descriptor, FRAME.size, offset))
+        chunk = _chunk(os.pread(descriptor, length, offset + FRAME.size), offset)
+    except (*BROKEN, pa.ArrowException) as error:
+        raise ValueError(f"the frame at byte {offset}: {error or 'torn'}") from error
+    if chunk is None:
+        raise ValueError(f"the frame at byte {offset} is another one by now")
+    return chunk
 
 
 def column(batch: pa.RecordBatch, name: str, kind: pa.DataType) -> pa.Array | None:
@@ -107,7 +129,7 @@ def wall_ns(batch: pa.RecordBatch) -> list[int]:
     return times
 
 
-def _chunk(body: bytes) -> Chunk | None:
+def _chunk(body: bytes, offset: int) -> Chunk | None:
     message = _fields(body)
     store = _fields(_bytes(message, STORE))
     if store.get(STORE_KIND) != RECORDING:
@@ -116,7 +138,8 @@ def _chunk(body: bytes) -> Chunk | None:
     batch = _batch(content)
     entity = (batch.schema.metadata or {})[ENTITY_PATH].decode().removeprefix("/")
     identifier = _bytes(store, STORE_ID).decode()
-    return Chunk(identifier, entity, bool(_number(message, IS_STATIC, 0)), batch, len(content))
+    is_static = bool(_number(message, IS_STATIC, 0))
+    return Chunk(identifier, entity, is_static, batch, len(content), offset)
 
 
 def _unpacked(message: Fields) -> pa.Buffer:

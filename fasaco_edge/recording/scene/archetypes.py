@@ -97,7 +97,7 @@ def floor_archetype(grid: OccupancyGrid) -> rr.GridMap:
     """Return swept floor as a layer over the map, the denser the more of a square is swept."""
     tints = np.zeros((256, 4), np.uint8)
     tints[:101, :3] = SWEPT_COLOUR
-    tints[:101, 3] = np.linspace(0, 150, 101)
+    tints[:101, 3] = np.linspace(0, entities.SWEPT_OPACITY, 101)
     return grid_archetype(grid.geometry, tints[grid.cells.view(np.uint8)], None, FLOOR_ORDER)
 
 

@@ -14,6 +14,7 @@ from typing import Final
 
 from fasaco_edge.bus.arrival import Arrival, Sample
 from fasaco_edge.errors import MalformedMessage
+from fasaco_edge.recording import entities
 from fasaco_edge.recording.write.writer import RecordingWriter
 from fasaco_edge.samples import Numbered, SampleEncoder
 from fasaco_edge.wire.documents.json_text import decode_tolerant
@@ -25,7 +26,7 @@ from fasaco_edge.wire.topics import RECORDED_INPUTS
 # These have an effect only when they arrive; all other inputs stay in force.
 TRANSIENT: Final = ("pose", "command", "turns")
 PERIOD_NS = 900_000_000
-STATUS_PERIOD_NS = 15_000_000_000
+STATUS_PERIOD_NS = round(1e9 * entities.STATUS_PERIOD_S)
 WAITING_BYTES = 4_000_000
 # Each node publishes its own once.
 MOST_STATIC = 64

@@ -79,6 +79,8 @@ function show(message) {
     case "answer": showAnswer(message); break;
     case "state": showState(); redraw(); break;
     case "events": showEvents(); break;
+    case "recording": showRecording(); break;
+    case "time": showTime(message); break;
     case "areas": showDrafts(); showPicked(); break;
     default: redraw();
   }

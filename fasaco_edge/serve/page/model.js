@@ -2,6 +2,8 @@
 const model = {
   state: null, pose: null, areas: null, events: [], others: [],
   map: null, floor: null, field: null, path: null, role: "viewer",
+  // Of a recording: what it is, the track driven in all of it, and the time shown.
+  recording: null, track: null, at: 0,
 };
 
 async function inflate(bytes) {
@@ -15,13 +17,13 @@ async function take(data) {
     const message = JSON.parse(data);
     if (message.kind === "events") model.events = message.entries;
     else if (message.kind === "others") model.others = message.robots;
-    else if (["state", "pose", "areas"].includes(message.kind)) model[message.kind] = message;
+    else if (["state", "pose", "areas", "recording"].includes(message.kind)) model[message.kind] = message;
     return message;
   }
   const length = new DataView(data).getUint32(0, true);
   const head = JSON.parse(new TextDecoder().decode(new Uint8Array(data, 4, length)));
   const body = await inflate(new Uint8Array(data, 4 + length));
-  if (head.kind === "path") {
+  if (head.kind === "path" || head.kind === "track") {
     head.xy = new Float32Array(body.buffer, 0, body.length >> 2);
   } else {
     head.marks = body;

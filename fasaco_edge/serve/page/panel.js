@@ -33,7 +33,12 @@ function showState() {
   find("absent").hidden = !state.absent;
   const others = state.others.length ? `; on this bus: ${state.others.join(", ")}` : "";
   find("absent").textContent = state.absent && state.absent + (state.absent.includes("of the name") ? others : "");
-  if (!state.state) return;
+  find("progress").hidden = !state.state;
+  if (!state.state) {
+    find("state").textContent = "waiting";
+    find("state").className = "chip";
+    return;
+  }
   find("state").textContent = WORDS[state.state] || state.state;
   find("state").className = `chip ${state.in_trouble ? "bad" : LOOKS[state.state] || ""}`;
   find("reason").textContent = state.reason;

@@ -105,10 +105,27 @@ function drawPath(context) {
     context.strokeStyle = colour;
     context.stroke();
   };
-  line(points.slice(0, at + 1), colours.driven, width);
+  if (!model.track) line(points.slice(0, at + 1), colours.driven, width);
   const ahead = points.slice(at + 1);
   if (pose) ahead.unshift([pose.x, pose.y]);
   line(ahead, colours.ahead, width);
+}
+
+// Where the robot really drove, up to the time shown; of a robot live only its way on the path is known.
+function drawTrack(context) {
+  const track = model.track;
+  if (!track) return;
+  let [x0, y0] = [NaN, NaN];
+  context.beginPath();
+  for (let i = 0; i < track.xy.length && track.xy[i + 2] <= model.at; i += 3) {
+    const [x, y] = [track.x + track.xy[i], track.y + track.xy[i + 1]];
+    context[Math.hypot(x - x0, y - y0) < track.jump ? "lineTo" : "moveTo"](...toScreen(x, y));
+    [x0, y0] = [x, y];
+  }
+  context.lineJoin = context.lineCap = "round";
+  context.lineWidth = Math.min(Math.max(0.05 * view.scale, 1.2), 3);
+  context.strokeStyle = colours.driven;
+  context.stroke();
 }
 
 function drawRobot(context) {
@@ -201,6 +218,7 @@ function draw() {
   else drawGrid(context, model.floor);
   for (const zone of (model.areas && model.areas.zones) || []) drawArea(context, zone.polygon, colours.zone, zone.name, zone.is === "standing", zone.is === "standing" ? 0.03 : 0.14);
   for (const area of (model.areas && model.areas.keep_out) || []) drawArea(context, area.polygon, colours.keepout, area.name || "", area.is === "standing", area.name && area.name === picked ? 0.4 : 0.14);
+  if (!showsField) drawTrack(context);
   if (!showsField) drawPath(context);
   drawHome(context);
   drawDrafts(context);

@@ -1,0 +1,179 @@
+"""A recording by time: what was in force at any moment.
+
+Grids and paths are large: of each drawing only its place in the file is kept, and it is read when
+it is to be shown. Poses, statuses and commands are kept.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections import defaultdict
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fasaco_edge.bus.arrival import Arrival
+from fasaco_edge.errors import UnreadableRecording
+from fasaco_edge.recording import entities
+from fasaco_edge.recording.arrow import pa
+from fasaco_edge.recording.read.drawn import (
+    DrawnGrid,
+    DrawnLine,
+    anchor_in,
+    grids_in,
+    lines_in,
+    poses_in,
+)
+from fasaco_edge.recording.read.frames import BROKEN, Chunk, chunk_at, chunks, wall_ns
+from fasaco_edge.recording.read.repair import open_part
+from fasaco_edge.recording.read.run import RecordedSamples, read_run_record
+from fasaco_edge.wire.documents.path_documents import PATH_DIGEST
+
+GRIDS = (entities.MAP, entities.FLOOR, entities.PHEROMONE)
+KEPT = ("status", "command", PATH_DIGEST)
+# Rows of poses and drawings in a file: at least this many bytes each, beyond these few.
+ROW_BYTES, FEW_ROWS = 8, 100_000
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """Where a drawing is: its time [ns], its open file, its frame and its row there."""
+
+    at_ns: int
+    descriptor: int
+    offset: int
+    row: int
+
+
+@dataclass(slots=True)
+class Timeline:
+    """What was drawn, and what came, in order of time.
+
+    Attributes:
+        began_ns, ended_ns: of the recording, since the epoch [ns].
+        samples: statuses, commands and digests of paths.
+        pose_ns, poses: times int64 (n,) [ns], and float64 (n, 3): x [m], y [m], yaw [rad].
+    """
+
+    began_ns: int
+    ended_ns: int
+    samples: tuple[Arrival, ...]
+    pose_ns: NDArray[np.int64]
+    poses: NDArray[np.float64]
+    _anchor: NDArray[np.float64]
+    _places: dict[str, list[Place]]
+
+    def newest(self, entity: str, at_ns: int) -> Place | None:
+        """Return the last drawing of an entity up to a time; None before the first."""
+        places = self._places.get(entity, [])
+        index = bisect_right(places, at_ns, key=lambda place: place.at_ns)
+        return places[index - 1] if index else None
+
+    def samples_between(self, since_ns: int, until_ns: int) -> tuple[Arrival, ...]:
+        """Return the samples that came after one time, up to another [ns]."""
+        first, last = (
+            bisect_right(self.samples, at_ns, key=lambda one: one.wall_ns)
+            for at_ns in (since_ns, until_ns)
+        )
+        return self.samples[first:last]
+
+    def poses_between(self, since_ns: int, until_ns: int) -> NDArray[np.float64]:
+        """Return the poses after one time, up to another [ns]."""
+        first, last = np.searchsorted(self.pose_ns, (since_ns, until_ns), side="right")
+        return self.poses[first:last]
+
+    def grid(self, place: Place) -> DrawnGrid:
+        """Read a drawn grid.
+
+        Raises:
+            UnreadableRecording: it is damaged, or its file was changed.
+        """
+        return _first(partial(grids_in, anchor=self._anchor), place)
+
+    def line(self, place: Place) -> DrawnLine:
+        """Read a drawn line; raises as ``grid``."""
+        return _first(partial(lines_in, anchor=self._anchor), place)
+
+
+Drawn = TypeVar("Drawn")
+
+
+def _first(read: Callable[[pa.RecordBatch], Iterator[Drawn]], place: Place) -> Drawn:
+    try:
+        return next(read(chunk_at(place.descriptor, place.offset).batch.slice(place.row, 1)))
+    except BROKEN as error:
+        raise UnreadableRecording(f"the recording can no longer be read: {error}") from error
+
+
+@contextmanager
+def open_timeline(paths: Sequence[Path]) -> Iterator[Timeline]:
+    """Open the parts of one run, in any order; the files stay open, even if they are deleted.
+
+    Raises:
+        UnreadableRecording: a file is missing or no recording, or there are no samples.
+        DifferentRuns: the parts are not of one run.
+    """
+    record = read_run_record(paths, lambda: None)
+    samples = sorted(RecordedSamples.of(record.batches, KEPT), key=lambda one: one.wall_ns)
+    reader = _Reader()
+    with ExitStack() as files:
+        for path in sorted(set(paths)):
+            with open_part(path) as (recording, scan):
+                descriptor = files.enter_context(path.open("rb")).fileno()
+                left = scan.total_bytes // ROW_BYTES + FEW_ROWS
+                for chunk in chunks(recording, scan):
+                    left -= reader.take(chunk, descriptor) if chunk is not None else 0
+                    if left < 0:
+                        raise ValueError("holds more rows than its size allows")
+        yield reader.timeline(record.began_ns, record.ended_ns, tuple(samples))
+
+
+@dataclass(slots=True)
+class _Reader:
+    """Collects the places of drawings, and the poses."""
+
+    anchor: NDArray[np.float64] = field(default_factory=lambda: np.zeros(2))
+    places: dict[str, list[Place]] = field(default_factory=lambda: defaultdict(list))
+    pose_ns: list[NDArray[np.int64]] = field(default_factory=list)
+    poses: list[NDArray[np.float64]] = field(default_factory=list)
+
+    def take(self, chunk: Chunk, descriptor: int) -> int:
+        """Take a chunk; return the number of rows kept."""
+        entity, batch = chunk.entity, chunk.batch
+        if chunk.is_static and entity == entities.WORLD:
+            self.anchor = anchor_in(batch, self.anchor)
+        if chunk.is_static or entity not in (*GRIDS, entities.PATH, entities.ROBOT):
+            return 0
+        times = wall_ns(batch)
+        if entity == entities.ROBOT:
+            self.pose_ns.append(np.array(times, np.int64))
+            self.poses.append(poses_in(batch))
+        else:
+            rows = enumerate(times)
+            self.places[entity] += [Place(at, descriptor, chunk.offset, row) for row, at in rows]
+        return len(times)
+
+    def timeline(self, began_ns: int, ended_ns: int, samples: tuple[Arrival, ...]) -> Timeline:
+        """Return all of it, in order of time."""
+        for places in self.places.values():
+            places.sort(key=lambda place: place.at_ns)
+        pose_ns = np.concatenate([np.zeros(0, np.int64), *self.pose_ns])
+        poses = np.concatenate([np.zeros((0, 3)), *self.poses])
+        poses[:, :2] += self.anchor
+        order = np.argsort(pose_ns, kind="stable")
+        last_ns = max((one.wall_ns for one in samples), default=0)
+        return Timeline(
+            began_ns,
+            max(ended_ns, last_ns),
+            samples,
+            pose_ns[order],
+            poses[order],
+            self.anchor,
+            self.places,
+        )
