@@ -199,8 +199,9 @@ def _leave(code: int) -> NoReturn:
 
 COMMAND = Command(
     description="Serve a page that shows a robot's mission live: map, swept floor, path and "
-    "robot, progress and what is left; with commands and zones drawn by hand where allowed. "
-    "Several may look at once. It runs on the robot or on any other machine of the bus.",
+    "robot, progress and what is left; with commands and zones drawn by hand where allowed; or a "
+    "recorded mission, with a time line. Several may look at once. It runs on the robot or on any "
+    "other machine of the bus.",
     run=run,
     add_options=_add_options,
     epilog=EPILOG,

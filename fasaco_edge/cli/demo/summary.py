@@ -163,7 +163,9 @@ def print_summary(summary: Summary, *, as_json: bool) -> None:
         console.print(file, soft_wrap=True)
     if files := " ".join(summary.fleet_recording or summary.recording):
         console.print(f"review it:   fasaco-edge review {files}", soft_wrap=True)
-        console.print(f"look at it:  rerun {files}", soft_wrap=True)
+        if not summary.fleet_recording:
+            console.print(f"look at it:  fasaco-edge serve {files}", soft_wrap=True)
+        console.print(f"in Rerun:    rerun {files}", soft_wrap=True)
 
 
 def _rows(summary: Summary) -> list[tuple[str, str]]:
