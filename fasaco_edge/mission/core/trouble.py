@@ -26,6 +26,9 @@ from fasaco_edge.mission.map.map_state import MapState
 # wait for the first map and pose [s].
 REST_S = 30.0
 
+# Why a robot stands that was led back along its track as far as it may.
+STILL_INSIDE = "inside a wall of the map: backed out, and still does not fit: waits for a new map"
+
 # States of a robot that drives, or soon will.
 DRIVING = frozenset((State.PLANNING, State.COVERING, State.RETURNING))
 # States of a mission that is not over. A robot without an order may be switched off.
@@ -153,7 +156,12 @@ class Troubles:
         return f"in the dock the battery, at {level:.0%}, does not charge: {why}" if why else ""
 
     def shut_in(self, *_: object) -> str:
-        """Return what shuts the robot in; "" for one whose pose is no place for it."""
+        """Return what shuts the robot in; "" for one whose pose is no place for it.
+
+        Once it has backed out of a wall, its pose is one.
+        """
+        if self.way_out.has_given_up:
+            return STILL_INSIDE
         return self.way_out.why if self.map.area is not None else ""
 
     def stands(self, _: State, now: float) -> str:
