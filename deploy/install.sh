@@ -34,8 +34,8 @@ newer, and root.
 
 What it does:
   1. builds the version in /opt/fasaco-edge/VERSION, beside the one that runs
-  2. checks it: with your configuration, and by loading its kernels; those that the release does not
-     bring along are compiled into the service's cache
+  2. checks it: with your configuration, and by compiling its kernels into the service's cache, for
+     minutes, unless they are there
   3. points /opt/fasaco-edge/current to it, installs its units, starts it
   4. goes back to the version before if the service does not come up
 A mission that is under way goes on from its ledger. /etc/fasaco-edge/config.yaml is written if there
@@ -90,7 +90,7 @@ install_version() {
     if ! is_complete "$NAME"; then
         require_room
         step "build version $NAME in $PREFIX/$NAME" build_version
-        step "check it${START:+, and load or compile its kernels}" try_version
+        step "check it${START:+, and compile its kernels, for minutes}" try_version
         [[ $DRY_RUN ]] || write_complete
     fi
     lay_settings "$old"

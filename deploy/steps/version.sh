@@ -67,7 +67,7 @@ try_version() {
         return
     fi
     as_service "$program" check-config "$config" >"$SCRATCH/said" 2>&1 || not_fit "its check of $config"
-    as_service "$program" warmup >"$SCRATCH/said" 2>&1 || not_fit "loading or compiling its kernels"
+    as_service "$program" warmup >"$SCRATCH/said" 2>&1 || not_fit "compiling its kernels"
 }
 
 not_fit() {

@@ -16,9 +16,7 @@ The folder holds the wheels of fasaco_edge and of all it needs, and what install
 robot (scp, a USB stick), its install.sh needs no network. Making it needs one; this computer need
 not be of the robot's kind. Rerun comes without its viewer: a robot records, it shows nothing.
 
-Kernels are compiled here, if this computer has the robot's kind of processor and Python. If not,
-`fasaco-edge warmup --for-release DIR` on a computer that has, with this version, makes a folder for
---kernels; without it each robot compiles them while it is installed.
+The robot compiles its kernels while it is installed.
 
 examples:
   make wheelhouse                                  for this kind of computer, Python 3.11
@@ -33,9 +31,7 @@ def main() -> int:
     args = _parser().parse_args()
     target = Target(args.arch, args.python)
     try:
-        release = make_release(
-            target, args.out, recording=not args.without_recording, kernels=args.kernels
-        )
+        release = make_release(target, args.out, recording=not args.without_recording)
     except (IncompleteError, subprocess.CalledProcessError) as error:
         print(f"wheelhouse: {error}", file=sys.stderr)
         return 1
@@ -61,9 +57,6 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument(
         "--out", type=Path, default=SOURCE / "dist", metavar="DIR", help="(default: dist)"
-    )
-    parser.add_argument(
-        "--kernels", type=Path, metavar="DIR", help="compiled kernels for the robot's processor"
     )
     parser.add_argument("--without-recording", action="store_true", help="leave Rerun out")
     return parser

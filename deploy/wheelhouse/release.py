@@ -13,7 +13,6 @@ import tempfile
 from pathlib import Path
 
 from wheelhouse.closure import Closure, Target, closure_of, installed_mb
-from wheelhouse.kernels import check_kernels, compile_kernels, python_for, with_kernels
 from wheelhouse.viewer import without_viewer
 
 DEPLOY = Path(__file__).resolve().parents[1]
@@ -23,17 +22,13 @@ MANYLINUX = ("2_28", "2_27", "2_24", "2_17")
 LOCK, RECORD_LOCK = "requirements.txt", "requirements-record.txt"
 
 
-def make_release(
-    target: Target, out: Path, *, recording: bool, kernels: Path | None = None
-) -> Path:
+def make_release(target: Target, out: Path, *, recording: bool) -> Path:
     """Make a release folder within ``out`` and return it.
 
     Args:
         target: the computer it is for.
         out: where to.
         recording: whether Rerun comes along.
-        kernels: a folder of kernels that were compiled for the target; without it they are
-            compiled here, if that can be.
 
     Raises:
         IncompleteError: a wheel that another one needs is not there.
@@ -49,26 +44,10 @@ def make_release(
             without_viewer(rerun)
         _pip("download", "--no-deps", "--dest", scratch, "pip")
         pip = next(Path(scratch).glob("pip-*.whl"))
-        own = _with_kernels(own, wheels, pip, target, kernels)
         release = out / f"fasaco-edge-{own.name.split('-')[1]}-{target.name}"
         fill_release(release, wheels, pip, target, recording=recording)
     _try_out(release, target)
     return release
-
-
-def _with_kernels(own: Path, wheels: Path, pip: Path, target: Target, kernels: Path | None) -> Path:
-    """Return our wheel with compiled kernels, where there are any for the target."""
-    if kernels is None:
-        if (python := python_for(target)) is None:
-            print(
-                f"without compiled kernels: there is no Python {target.python} for "
-                f"{target.machine} here; a robot compiles them itself, which takes minutes"
-            )
-            return own
-        print("compiling the kernels, which takes a minute or more", flush=True)
-        kernels = compile_kernels(python, wheels, own, pip, wheels.parent)
-    check_kernels(kernels, own, target, closure_of(wheels, target, extras=()).versions)
-    return with_kernels(own, kernels, target)
 
 
 def fill_release(

@@ -24,6 +24,7 @@ from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.grid.map_files import find_map, map_sources
 from fasaco_edge.host.processes import first_signal_calls
 from fasaco_edge.offline.settings import CELLS
+from fasaco_edge.planners.compiling import stages_of_plan
 from fasaco_edge.planners.planner import ColonySnapshot, Interrupt, ignore
 
 if TYPE_CHECKING:
@@ -52,7 +53,7 @@ def run(args: argparse.Namespace) -> int:
             "--pheromone-png: the planner leaves no pheromone",
             hint=f"choose --planner {' or '.join(WITH_PHEROMONE)}",
         )
-    compile_kernels()
+    compile_kernels(stages_of_plan(search.planner))
     # After that, as they import the compiler.
     from fasaco_edge.offline.maps import load_map
     from fasaco_edge.offline.plan import plan

@@ -3,28 +3,17 @@
 from __future__ import annotations
 
 import argparse
-import os
-import shutil
-import subprocess
-import tempfile
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager, nullcontext
-from pathlib import Path
+from collections.abc import Collection
 
 from fasaco_edge.cli.console.arguments import Command, Exit, add_json
 from fasaco_edge.cli.console.streams import print_json
 from fasaco_edge.cli.console.terminal import err, progress
-from fasaco_edge.errors import BadConfiguration
-from fasaco_edge.host.processes import available_memory, end_with_parent, python_program
-from fasaco_edge.kernels import cache, release
+from fasaco_edge.kernels import folder as kernels
+from fasaco_edge.kernels.manifest import chosen_folder, why_missing
+from fasaco_edge.planners.compiling import STAGES, compile_missing
 
-# The compiler has 930 MB in the end.
-TWO_NEED_BYTES = 2_000_000_000
 EPILOG = """\
-An installation from a release folder ships compiled kernels and compiles nothing, as long as
-they are intact and numba, llvmlite and Python have the versions they were made for.
-
 The cache is $NUMBA_CACHE_DIR, else fasaco-edge in $XDG_CACHE_HOME or ~/.cache. Its code is for
 these sources, one version each of numba, llvmlite and Python, and one processor; a daemon that
 finds none compiles it with its first map. Each file is checked before use; a damaged one is
@@ -47,36 +36,16 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--prune", action="store_true", help="then remove kernels of other versions"
     )
-    parser.add_argument(
-        "--for-release",
-        type=Path,
-        metavar="DIR",
-        help="compile for any processor of this architecture into DIR, to ship with a release",
-    )
-    parser.add_argument(
-        "--jobs",
-        type=int,
-        choices=(1, 2),
-        metavar="N",
-        help="processes that compile (default: 2 where there are two cores and 2 GB to spare)",
-    )
-    # The second of two processes: the last stage first.
-    parser.add_argument("--backward", action="store_true", help=argparse.SUPPRESS)
     add_json(parser, "the result")
 
 
 def run(args: argparse.Namespace) -> int:
     """Compile or check, and say where."""
-    if args.for_release is not None:
-        return compile_for_release(args.for_release)
-    if args.backward:
-        end_with_parent(os.getppid())
-        compile_all(backward=True)
-        return Exit.OK
-    seconds = 0.0 if args.check else compile_kernels(args.jobs)
-    folder, passed_over = cache.usable_folder()
-    missing = cache.missing_from(folder)
-    removed, freed_mb = cache.prune(cache.wanted_folder()) if args.prune else (0, 0.0)
+    seconds = 0.0 if args.check else compile_kernels()
+    folder, passed_over = chosen_folder(STAGES)
+    missing = why_missing(folder, STAGES) if folder else "no folder can be used"
+    folder = folder or kernels.wanted_folder()
+    removed, freed_mb = kernels.prune(kernels.wanted_folder()) if args.prune else (0, 0.0)
     if args.json:
         document = {
             "ready": not missing,
@@ -101,83 +70,19 @@ def run(args: argparse.Namespace) -> int:
     return Exit.ERROR if missing and args.check else Exit.OK
 
 
-def compile_kernels(jobs: int | None = None) -> float:
-    """Compile or load every kernel with a progress bar; return the seconds it took.
-
-    Args:
-        jobs: processes that compile; without it two, where there is room for them.
-    """
+def compile_kernels(stages: Collection[str] = STAGES) -> float:
+    """Compile what is missing of some stages with a progress bar; return the seconds it took."""
     started = time.monotonic()
-    folder = cache.cache_folder()
-    has_work = folder is not None and bool(cache.missing_from(folder))
-    if jobs is None:
-        jobs = 2 if has_work and _has_room_for_two() else 1
-    with _from_the_end(folder) if jobs == 2 and folder else nullcontext():
-        compile_all()
-    return time.monotonic() - started
-
-
-def _has_room_for_two() -> bool:
-    return len(os.sched_getaffinity(0)) > 1 and available_memory() >= TWO_NEED_BYTES
-
-
-@contextmanager
-def _from_the_end(folder: Path) -> Iterator[None]:
-    """Let another process compile from the last stage on; each loads the other's kernels.
-
-    Nothing depends on it: what it leaves over this process compiles.
-    """
-    other = subprocess.Popen(
-        python_program("fasaco_edge", "warmup", "--backward"),
-        env=os.environ | {"NUMBA_CACHE_DIR": str(folder)},
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
-    )
-    try:
-        yield
-    finally:
-        # The stages that are left to it are compiled. Killed, it leaves no file that counts.
-        other.terminate()
-        other.wait()
-
-
-def compile_all(*, backward: bool = False) -> None:
-    """Compile or load every kernel with a progress bar; ``backward``: the last stage first."""
     with progress() as bar:
-        task = bar.add_task("loading numba", total=None)
-        from fasaco_edge.planners.warmup import STAGES, warm_up
-
-        bar.update(task, total=len(STAGES), completed=-1)
+        task = bar.add_task("looking at the kernels", total=len(stages))
+        places = {stage: place for place, stage in enumerate(stages)}
 
         def report(stage: str) -> None:
-            bar.update(task, description=f"compiling kernels (first run only): {stage}", advance=1)
+            said = f"compiling kernels (first run only): {stage}"
+            bar.update(task, description=said, completed=places.get(stage))
 
-        warm_up(report, backward=backward)
-
-
-def compile_for_release(folder: Path) -> int:
-    """Compile every kernel for any processor of this kind; put them and their manifest there."""
-    if release.has_kernels():
-        raise BadConfiguration(
-            f"--for-release {folder}: this installation has its kernels from a release itself",
-            hint=f"copy {release.FOLDER}",
-        )
-    folder.mkdir(parents=True, exist_ok=True)
-    if left := next(folder.iterdir(), None):
-        raise BadConfiguration(
-            f"--for-release {folder} is not empty: {left.name}", hint="name a new folder"
-        )
-    with tempfile.TemporaryDirectory(dir=folder) as scratch:
-        environment = os.environ | release.FOR_ANY_PROCESSOR | {"NUMBA_CACHE_DIR": scratch}
-        # By one process: names in the code count what it has compiled before.
-        words = ("warmup", "--jobs", "1")
-        subprocess.run(python_program("fasaco_edge", *words), env=environment, check=True)
-        for file in sorted(Path(scratch).rglob(f"*{release.KERNEL_SUFFIX}")):
-            shutil.move(file, folder)
-    count = release.write_manifest(folder)
-    err().print(f"{count} compiled kernels and {release.MANIFEST} in {folder}", soft_wrap=True)
-    return Exit.OK
+        compile_missing(report, stages)
+    return time.monotonic() - started
 
 
 COMMAND = Command(

@@ -12,11 +12,12 @@ from pathlib import Path
 from fasaco_edge.daemon.ledger.file import lock_file, why_no_lock
 from fasaco_edge.doctor.finding import CheckContext, Finding, Level, fail, ok, warn, worst
 from fasaco_edge.host.files import why_not_trusted
-from fasaco_edge.kernels import release
-from fasaco_edge.kernels.cache import missing_from, outdated, wanted_folder
+from fasaco_edge.kernels.folder import outdated, wanted_folder
+from fasaco_edge.kernels.manifest import why_missing
+from fasaco_edge.planners.compiling import STAGES
 
-# The ledger takes a few hundred kilobytes, the kernels ten megabytes.
-LEAST_MB = {"state": 20.0, "kernel cache": 50.0}
+# The ledger takes a few hundred kilobytes, the kernels fifty megabytes.
+LEAST_MB = {"state": 20.0, "kernel cache": 100.0}
 
 
 def disk(context: CheckContext) -> Finding:
@@ -109,12 +110,6 @@ def _state_faults(context: CheckContext) -> list[Finding]:
 def kernels(context: CheckContext) -> Finding:
     """Check that the kernels are compiled, whole, and safe from other users."""
     folder, user = wanted_folder(context.environ), _user(context)
-    if not release.why_unusable(user):
-        return ok("came with this installation, all there and whole", details=[str(release.FOLDER)])
-    return _own_kernels(context, folder, user)
-
-
-def _own_kernels(context: CheckContext, folder: Path, user: int | None) -> Finding:
     command = _warmup(context)
     later = "the first plan waits for them, some minutes"
     try:
@@ -132,7 +127,7 @@ def _own_kernels(context: CheckContext, folder: Path, user: int | None) -> Findi
         details.append(f"folders of other versions: {len(old)}; {command} --prune removes them")
     if why := why_not_trusted(folder, user):
         return _distrusted(why, details)
-    if missing := missing_from(folder, user):
+    if missing := why_missing(folder, STAGES, user):
         return warn(f"{missing}: {later}", command, details)
     found = "all there and whole, for this code and processor"
     return ok(found, details=details)

@@ -1,57 +1,301 @@
-"""Decorators that compile a function on its first call, or load its code from a file."""
+"""Decorators that compile a function on its first call, or load its code from numba's cache.
+
+numba keeps code where ``KernelLocator`` says (``NUMBA_CACHE_LOCATOR_CLASSES``): all of it in one
+folder (``kernels.folder``), which is compared with its manifest before the first kernel is loaded.
+One process writes there, the one that compiles (``planners.compiling``). Any other that needs a
+kernel for types that are not there compiles it for itself, and what numba keeps of it is gone with
+that process.
+
+Import numba from here alone: a file in the working folder could change its settings otherwise.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import atexit
+import errno
+import fcntl
+import functools
+import logging
+import os
+import shutil
+import sys
+import tempfile
+import threading
+import warnings
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar, cast
 
-from fasaco_edge.kernels.code_files import KernelCache
-from fasaco_edge.kernels.compiler import numba, take_constants_as_values
-from fasaco_edge.kernels.release import KERNELS
+from fasaco_edge.host.files import why_not_trusted
+from fasaco_edge.host.processes import ctrl_c_waits
+from fasaco_edge.kernels.folder import KERNELS, kernel_module, temporary_folder, warn_of
+from fasaco_edge.kernels.manifest import (
+    MANIFEST,
+    UnsoundError,
+    chosen_folder,
+    locked,
+    read_manifest,
+)
+
+# numba takes settings from .numba_config.yaml in the working folder, which may be anybody's, unless
+# it finds no reader of YAML when it is imported.
+warnings.filterwarnings("ignore", "A Numba config file is found")
+_yaml = sys.modules.get("yaml")
+sys.modules["yaml"] = None  # type: ignore[assignment]
+try:
+    import numba
+    from numba.core import event
+finally:
+    del sys.modules["yaml"]
+    if _yaml is not None:
+        sys.modules["yaml"] = _yaml
 
 if TYPE_CHECKING:
     from numba.core.dispatcher import Dispatcher
 
+LOG = logging.getLogger(__name__)
+
 Kernel = TypeVar("Kernel", bound=Callable[..., object])
 
 
-def _compiled(function: Kernel, compiler: Callable[[Kernel], Dispatcher]) -> Kernel:
-    """Return ``function`` as a dispatcher that loads or compiles it on its first call."""
-    compiled = compiler(function)
-    if not numba.config.DISABLE_JIT:
-        take_constants_as_values(compiled)
+class _Kept:
+    """What this process has its kernels from.
+
+    Attributes:
+        folder: where they are; None where none can be used.
+        before_each: called before each kernel is compiled into the folder, with how many were.
+            None: this process does not compile into it.
+        kernels: all that are kept.
+    """
+
+    def __init__(self) -> None:
+        self.folder, why = chosen_folder()
+        warn_of(why, self.folder)
+        self.before_each: Callable[[int], None] | None = None
+        self.kernels: list[Dispatcher] = []
+        self._is_sound = False
+        self._why, self._seen = "", (0, 0)
+        self._looking = threading.Lock()
+
+    def look(self) -> None:
+        """Load from the folder what is as its manifest says; look again once there is another."""
+        with self._looking:
+            if self._is_sound or self.folder is None or self.before_each is not None:
+                return
+            if (seen := _mark_of(self.folder)) == self._seen:
+                return
+            self._seen, self._why = seen, ""
+            try:
+                # Shared: a process that compiles has files that are in no manifest yet.
+                with locked(self.folder, fcntl.LOCK_SH, self._say_waiting):
+                    read_manifest(self.folder)
+                self._is_sound = True
+            except UnsoundError as why:
+                self._why = str(why)
+            for kernel in self.kernels:
+                _keep(kernel, KernelLocator if self._is_sound else ScratchLocator)
+
+    def log_compiling(self, kernel: Dispatcher) -> None:
+        """Log that a kernel is compiled which is not kept; the first time why."""
+        if why := self._why:
+            LOG.warning("%s: %s: kernels are compiled for this process alone", self.folder, why)
+            self._why = ""
+        LOG.debug("%s is compiled for this process alone", kernel)
+
+    def _say_waiting(self) -> None:
+        LOG.warning("waiting for kernels that are compiled in %s", self.folder)
+
+
+def _mark_of(folder: Path) -> tuple[int, int]:
+    """Return what differs once a folder has another manifest."""
+    try:
+        status = os.stat(folder / MANIFEST, follow_symlinks=False)
+    except OSError:
+        return -1, -1
+    return status.st_ino, status.st_mtime_ns
+
+
+class KernelLocator:
+    """Where numba keeps the code of a kernel; see ``NUMBA_CACHE_LOCATOR_CLASSES``."""
+
+    def __init__(self, function: Callable[..., object], file: str) -> None:
+        line = function.__code__.co_firstlineno
+        self._name = f"{kernel_module(Path(file))}-{line}"
+
+    @classmethod
+    def from_function(cls, function: Callable[..., object], file: str) -> KernelLocator:
+        """Return the locator for a function of a file."""
+        return cls(function, file)
+
+    def get_cache_path(self) -> str:
+        """Return the folder."""
+        return str(_KEPT.folder)
+
+    def ensure_cache_path(self) -> None:
+        """Do nothing: the folder is there where this process writes."""
+
+    def get_source_stamp(self) -> str:
+        """Return what has to be equal for code to be used: the folder's name has all of that."""
+        return ""
+
+    def get_disambiguator(self) -> str:
+        """Return what makes names of files differ for functions of one name."""
+        return self._name
+
+
+class ScratchLocator(KernelLocator):
+    """Where numba keeps what this process alone compiles."""
+
+    def get_cache_path(self) -> str:
+        """Return the folder of this process."""
+        return _scratch()
+
+
+@functools.cache
+def _scratch() -> str:
+    base = temporary_folder()
+    if why := why_not_trusted(base / "kernels"):
+        raise PermissionError(errno.EPERM, f"no folder for what is compiled: {why}", str(base))
+    folder, maker = tempfile.mkdtemp(prefix="fasaco-edge-", dir=base), os.getpid()
+
+    def clear() -> None:
+        # A process that is forked off is not the one to remove it.
+        if os.getpid() == maker:
+            shutil.rmtree(folder, ignore_errors=True)
+
+    atexit.register(clear)
+    return folder
+
+
+@contextmanager
+def _located_by(locator: type[KernelLocator]) -> Iterator[None]:
+    """Let a function that is decorated meanwhile be kept there; others as they are set up."""
+    before = numba.config.CACHE_LOCATOR_CLASSES
+    numba.config.CACHE_LOCATOR_CLASSES = f"{__name__}.{locator.__name__}"
+    try:
+        yield
+    finally:
+        numba.config.CACHE_LOCATOR_CLASSES = before
+
+
+def _keep(kernel: Dispatcher, locator: type[KernelLocator]) -> None:
+    with _located_by(locator):
+        kernel.enable_caching()
+
+
+class _Compiling(event.Listener):  # type: ignore[misc]
+    """Called for each kernel that numba does not find in its cache, before it is compiled."""
+
+    def __init__(self) -> None:
+        self._compiled = 0
+
+    def on_start(self, event: event.Event) -> None:
+        """Let the folder be as it is, unless this process is the one to compile into it."""
+        kernel = event.data["dispatcher"]
+        if _KEPT.before_each is not None:
+            _KEPT.before_each(self._compiled)
+        elif kernel in _KEPT.kernels:
+            _KEPT.log_compiling(kernel)
+            _keep(kernel, ScratchLocator)
+
+    def on_end(self, event: event.Event) -> None:
+        """Count it."""
+        self._compiled += 1
+
+
+class _Locking(event.Listener):  # type: ignore[misc]
+    """Called around each call of the compiler, to load a kernel or to compile it."""
+
+    def __init__(self) -> None:
+        self._thread = threading.local()
+
+    def on_start(self, event: event.Event) -> None:
+        """Look at the folder, and have Ctrl-C wait.
+
+        LLVM calls back for machine code: interrupted there, it goes on without, or crashes.
+        """
+        held = ExitStack()
+        held.enter_context(ctrl_c_waits())
+        self._held().append(held)
+        _KEPT.look()
+
+    def on_end(self, event: event.Event) -> None:
+        """Raise the KeyboardInterrupt that came meanwhile."""
+        self._held().pop().close()
+
+    def _held(self) -> list[ExitStack]:
+        if not hasattr(self._thread, "held"):
+            self._thread.held = []
+        return cast(list[ExitStack], self._thread.held)
+
+
+_KEPT = _Kept()
+
+
+@functools.cache
+def _listen() -> None:
+    event.register("numba:compile", _Compiling())
+    event.register("numba:compiler_lock", _Locking())
+
+
+def kernel_folder() -> Path | None:
+    """Return the folder that this process has its kernels from; None where none can be used."""
+    return _KEPT.folder
+
+
+def compile_into(folder: Path, before_each: Callable[[int], None]) -> None:
+    """Have kernels that are compiled from now on kept in a folder, whose lock this process holds.
+
+    Args:
+        folder: the folder; call this before kernels are imported.
+        before_each: called before each is compiled, with how many were before it.
+    """
+    assert not _KEPT.kernels, "kernels have another folder already"
+    _KEPT.folder, _KEPT.before_each = folder, before_each
+
+
+def _compiled(function: Kernel, **options: bool) -> Kernel:
     # The folder's name is a hash of these files alone, and says nothing of closures.
     is_ours = KERNELS in Path(function.__code__.co_filename).parents
-    is_named = is_ours and not function.__closure__
-    if is_named and not numba.config.DISABLE_JIT:
-        compiled._cache = KernelCache(function)  # type: ignore[attr-defined]
+    is_kept = is_ours and not function.__closure__ and _KEPT.folder is not None
+    with _located_by(KernelLocator):
+        compiled = numba.njit(cache=is_kept, nogil=True, no_cfunc_wrapper=True, **options)(function)
+    if is_kept and not numba.config.DISABLE_JIT:
+        _KEPT.kernels.append(compiled)
+        # Not before the first one is decorated: numba takes its lock for that, too.
+        _listen()
     return cast(Kernel, compiled)
 
 
-# Nothing calls kernels from C: without that entry point they compile a fifth faster.
-_compile = numba.njit(nogil=True, no_cfunc_wrapper=True)
-
-
 def kernel(function: Kernel) -> Kernel:
-    """Compile ``function`` on its first call; it runs without the interpreter lock."""
-    return _compiled(function, _compile)
+    """Compile ``function`` on its first call; it runs without the interpreter lock.
 
-
-# Innermost loops allocate nothing. Without reference counts on the arrays they pass on, a
-# loop of small functions runs four times as fast.
-_compile_lean = numba.njit(nogil=True, no_cfunc_wrapper=True, _nrt=False)
-_compile_into = numba.njit(nogil=True, forceinline=True, no_cfunc_wrapper=True, _nrt=False)
+    Nothing calls kernels from C: without that entry point they compile a fifth faster.
+    """
+    return _compiled(function)
 
 
 def lean_kernel(function: Kernel) -> Kernel:
-    """Compile a kernel that allocates no array, nor does anything it calls."""
-    return _compiled(function, _compile_lean)
+    """Compile a kernel that allocates no array, nor does anything it calls.
+
+    Without reference counts on the arrays they pass on, a loop of small functions runs four times
+    as fast.
+    """
+    return _compiled(function, _nrt=False)
 
 
 def inlined(function: Kernel) -> Kernel:
     """Compile a small function without allocations into each kernel that calls it."""
-    compiled = _compile_into(function)
-    if not numba.config.DISABLE_JIT:
-        take_constants_as_values(compiled)
-    return cast(Kernel, compiled)
+    options = {"nogil": True, "forceinline": True, "no_cfunc_wrapper": True, "_nrt": False}
+    return cast(Kernel, numba.njit(**options)(function))
+
+
+@inlined
+def as_value(number: int) -> int:
+    """Return a constant as a value of its type, to call a large kernel with.
+
+    In ``f(0)`` numba gives it a type of its own, and compiles ``f``, and all that it calls in turn,
+    once for each constant.
+    """
+    return number + 0

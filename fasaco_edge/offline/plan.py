@@ -29,6 +29,7 @@ from fasaco_edge.offline.settings import (
     require,
 )
 from fasaco_edge.planners.bound import lower_bound_of
+from fasaco_edge.planners.compiling import compile_missing, stages_of_plan
 from fasaco_edge.planners.line import LINES
 from fasaco_edge.planners.own.loading import UserCode, user_code
 from fasaco_edge.planners.own.planner import OwnPlanner
@@ -112,6 +113,7 @@ def plan(
         own = planner if isinstance(planner, UserCode) else user_code(planner)
         search = replace(search, local_search=False)
     line = line or default_line(search, has_floor=map.grid is not None)
+    compile_missing(stages=stages_of_plan(search.planner))
     ground = _ground(map, robot, start, start_xy, line, align)
     problem = _problem(ground, robot, end)
     path, ended_by, wall_s, cpu_s = _search(problem, search, own, stop, watch, observe)

@@ -1,8 +1,8 @@
-"""Warm-up: compiles all kernels of a mission, or loads them from the cache."""
+"""Warm-up: runs every kernel of a mission once on a tiny map, stage by stage."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import replace
 from functools import cached_property, partial
 
@@ -16,7 +16,6 @@ from fasaco_edge.grid.floor_map import FloorMap
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D, Window
 from fasaco_edge.grid.lattice import CoverageLattice, Footprint, pixels_of, placement_on
 from fasaco_edge.grid.occupancy import OCCUPIED, OccupancyGrid
-from fasaco_edge.kernels.code_files import note_all_compiled
 from fasaco_edge.kernels.fleet.nearest import walk_parts
 from fasaco_edge.kernels.floor.capsule import is_clear
 from fasaco_edge.kernels.floor.certain import TILE, FloorTiles, Whereabouts, certain_floor
@@ -29,6 +28,21 @@ from fasaco_edge.kernels.lattice.polygons import add_near, count_in, turn_inside
 from fasaco_edge.kernels.lattice.reach import update_reach
 from fasaco_edge.kernels.lattice.ways import ways_from
 from fasaco_edge.planners.bound import lower_bound_of
+from fasaco_edge.planners.compiling import (
+    AREAS,
+    BOUND,
+    CHANGES,
+    LATTICE,
+    LINE,
+    LOCAL_SEARCH,
+    REACH,
+    REPAIR,
+    SHARES,
+    STAGES,
+    WALKS,
+    WINDOWS,
+    compile_missing,
+)
 from fasaco_edge.planners.cost import CoverageCost
 from fasaco_edge.planners.line import LineConfig, line_over, memory_for_moves
 from fasaco_edge.planners.paper.colony import ColonyConfig
@@ -43,29 +57,28 @@ from fasaco_edge.planners.search.repair import repaired
 from fasaco_edge.planners.search.walk_region import WalkRegion, stream_of
 from fasaco_edge.planners.search.windows import WindowSearch
 
-LATTICE, CHANGES, REACH, AREAS = "lattice", "changes of the map", "reachability", "areas"
-WALKS, BOUND = "shortest walks", "lower bound"
-LOCAL_SEARCH, REPAIR, LINE = "local search", "repair", "driven line"
-WINDOWS, SHARES = "windows of the walk", "shares of a fleet"
 
-
-def warm_up(report: Callable[[str], None] | None = None, *, backward: bool = False) -> None:
-    """Run every kernel once on a tiny map.
+def warm_up(report: Callable[[str], None] | None = None, stages: Collection[str] = STAGES) -> None:
+    """Compile what is missing in a process of its own, then load kernels into this one.
 
     Args:
         report: called with each stage's name before it begins.
-        backward: whether to run the stages in reverse order. Of two processes that fill one
-            cache from both ends, each loads what the other one has already compiled.
+        stages: those whose kernels are needed.
     """
-    room = _TinyRoom()
-    for name in reversed(STAGES) if backward else STAGES:
-        if report is not None:
-            report(name)
-        _STAGES[name](room)
-    note_all_compiled()
+    report = report or (lambda _: None)
+    compile_missing(report, stages)
+    room = TinyRoom()
+    for stage in stages:
+        report(stage)
+        run_stage(stage, room)
 
 
-class _TinyRoom:
+def run_stage(stage: str, room: TinyRoom) -> None:
+    """Run every kernel of a stage."""
+    _STAGES[stage](room)
+
+
+class TinyRoom:
     """Sixteen free cells, and plans on them."""
 
     def __init__(self) -> None:
@@ -99,7 +112,7 @@ class _TinyRoom:
         return framed, framed.framed(cells)
 
 
-def _take_changes_in(room: _TinyRoom) -> None:
+def _take_changes_in(room: TinyRoom) -> None:
     cells = np.zeros((4, 5), np.int8)
     cells[1, 1] = OCCUPIED
     grown = OccupancyGrid(GridGeometry(4, 5, 1.0, Pose2D(0.0, 0.0)), cells)
@@ -111,7 +124,7 @@ def _take_changes_in(room: _TinyRoom) -> None:
     count_free_beside(pixels_of(grown), 25, place, reachable, 0, 0)
 
 
-def _take_areas(room: _TinyRoom) -> None:
+def _take_areas(room: TinyRoom) -> None:
     states = room.lattice.states
     cells = np.zeros(states.shape, np.bool_)
     cells_beside(find_areas(states.copy()), cells)
@@ -121,7 +134,7 @@ def _take_areas(room: _TinyRoom) -> None:
     count_in(np.packbits(cells)[np.newaxis], np.packbits(cells))
 
 
-def _take_local_search(room: _TinyRoom) -> None:
+def _take_local_search(room: TinyRoom) -> None:
     """Improve and perturb a walk even if it is proven optimal, which no search does."""
     framed, walk = room.framed()
     region = WalkRegion(framed.rows, framed.cols, 4 * walk.size, 1)
@@ -133,7 +146,7 @@ def _take_local_search(room: _TinyRoom) -> None:
     region.go_back()
 
 
-def _take_windows(room: _TinyRoom) -> None:
+def _take_windows(room: TinyRoom) -> None:
     framed, walk = room.framed()
     windows = WindowSearch(room.costly, framed, lower_bound_of(room.costly))
     windows.load(walk)
@@ -143,19 +156,19 @@ def _take_windows(room: _TinyRoom) -> None:
     windows.walk()
 
 
-def _take_shares(room: _TinyRoom) -> None:
+def _take_shares(room: TinyRoom) -> None:
     steps, cols = room.lattice.steps.ravel().copy(), room.lattice.steps.shape[1]
     offsets, cells = np.array([1, cols, -1, -cols], np.int64), np.arange(2, dtype=np.int64)
     walk_parts(steps, offsets, cells, cells, cells)
     ways_from(room.lattice.steps, 0)
 
 
-def _take_repair(room: _TinyRoom) -> None:
+def _take_repair(room: TinyRoom) -> None:
     problem = replace(room.costly, before=room.path.cells[2:])
     repaired(problem, room.path.planner, 0, _perturbed)
 
 
-def _take_line(room: _TinyRoom) -> None:
+def _take_line(room: TinyRoom) -> None:
     discs = RobotDiscs(radius_m=0.4, tool_m=0.6)
     floor = Floor.around(room.grid, discs, (0.5, 0.5))
     stands = StandLattice.over(floor, 1.0)
@@ -177,7 +190,7 @@ def _take_line(room: _TinyRoom) -> None:
     certain_floor(tiles, tiles, still)
 
 
-def _plan_with(name: str, room: _TinyRoom) -> None:
+def _plan_with(name: str, room: TinyRoom) -> None:
     planner_of(name, ColonyConfig(ants=1, velocities=(1,))).plan(room.problem, never, ignore)
 
 
@@ -185,7 +198,7 @@ def _perturbed(progress: SearchProgress) -> bool:
     return progress.work.perturbations > 0
 
 
-_STAGES: dict[str, Callable[[_TinyRoom], object]] = {
+_STAGES: dict[str, Callable[[TinyRoom], object]] = {
     LATTICE: lambda room: room.lattice,
     CHANGES: _take_changes_in,
     REACH: lambda room: room.problem,
@@ -199,4 +212,3 @@ _STAGES: dict[str, Callable[[_TinyRoom], object]] = {
     LINE: _take_line,
     **{name: partial(_plan_with, name) for name in PLANNER_NAMES},
 }
-STAGES = tuple(_STAGES)

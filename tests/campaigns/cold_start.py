@@ -1,12 +1,12 @@
-"""Install a release in a lab without a network, and start it cold: nothing may be compiled.
+"""Install a release in a lab without a network, and start it cold and warm.
 
     PYTHONPATH=deploy python -m tests.campaigns.cold_start RELEASE [--json]
 
-RELEASE is a folder that `make wheelhouse` has made, with compiled kernels in it. Measured are the
-installation, a first start until systemd calls the service ready, the time from a first map and
-pose to the first path, the memory that this takes at most, and a roll back to a version before.
-Then a byte of one kernel is changed: the service has to say so, and plan. Exit code 1 where
-something is compiled that need not be, or fails; 77 where there can be no lab.
+RELEASE is a folder that `make wheelhouse` has made. Measured are the installation, which compiles
+the kernels, a start until systemd calls the service ready, the time from a first map and pose to
+the first path, the memory that this takes at most, and a roll back to a version before. Then a byte
+of one kernel is changed: the service has to say so, compile again what is damaged, within the
+unit's limit on memory, and plan. 77 where there can be no lab.
 """
 
 from __future__ import annotations
@@ -26,7 +26,6 @@ CANNOT_RUN = 77
 CHECKOUT = Path(__file__).parents[2]
 SERVICE = "fasaco-edge"
 PYTHON = f"{PREFIX}/current/bin/python"
-KERNELS = f"{PREFIX}/current/lib/python3.*/site-packages/fasaco_edge/_share/kernels"
 CACHE = "/var/cache/private/fasaco-edge"
 FIRST_PATH = """\
 import sys, time
@@ -66,22 +65,20 @@ def main() -> int:
         robot.run("sh", "-c", "cp -r /srv/release /srv/first; cp -r /srv/release /srv/second")
         robot.run("sh", "-c", "echo '# another' >>/srv/second/fasaco-edge.yaml")
         figures = {"install_s": _install(robot, "first")}
-        figures |= _cold(robot)
+        figures |= _started(robot)
         print(robot.run("fasaco-edge", "warmup", "--check").stderr, file=sys.stderr)
         figures["upgrade_s"] = _install(robot, "second")
         figures["rollback_s"] = _install(robot, "first", "--rollback")
-        compiled = _compiled(robot)
         harmed = _harmed(robot)
     report = {
         **{name: round(value, 2) for name, value in figures.items()},
-        "compiled_files": compiled,
         **{f"harmed_{name}": round(value, 2) for name, value in harmed.items()},
     }
     if args.json:
         print(json.dumps(report))
     else:
         print("\n".join(f"{name:24} {value:g}" for name, value in report.items()))
-    return 1 if compiled else 0
+    return 0
 
 
 def _install(robot: Robot, version: str, *words: str) -> float:
@@ -90,10 +87,9 @@ def _install(robot: Robot, version: str, *words: str) -> float:
     return time.monotonic() - began
 
 
-def _cold(robot: Robot) -> dict[str, float]:
-    """Start with nothing compiled on the robot; return what it took."""
+def _started(robot: Robot) -> dict[str, float]:
+    """Start the service again; return what it took."""
     robot.run("systemctl", "stop", SERVICE)
-    robot.run("sh", "-c", f"rm -rf {CACHE}/*")
     began = time.monotonic()
     robot.run("systemctl", "start", SERVICE, timeout_s=900.0)
     ready_s = time.monotonic() - began
@@ -104,20 +100,14 @@ def _cold(robot: Robot) -> dict[str, float]:
     return {"ready_s": ready_s, "first_path_s": first_path_s, "peak_mb": peak_mb}
 
 
-def _compiled(robot: Robot) -> int:
-    """Return how many kernels were compiled into the service's cache."""
-    return len(robot.run("find", CACHE, "-name", "*.kernel").stdout.splitlines())
-
-
 def _harmed(robot: Robot) -> dict[str, float]:
-    """Change a byte of one kernel; the service says so, compiles them for itself, and plans."""
-    change = f"file=$(ls {KERNELS}/*.kernel | head -n 1) && printf x >>$file && echo $file"
-    file = robot.run("sh", "-c", change).stdout.strip()
-    figures = _cold(robot)
+    """Change a byte of one kernel; the service says so, compiles it again, and plans."""
+    change = f"file=$(find {CACHE} -name '*.nbc' | head -n 1) && printf x >>$file && echo $file"
+    file = Path(robot.run("sh", "-c", change).stdout.strip())
+    figures = _started(robot)
     journal = robot.run("journalctl", "--unit", SERVICE, "--output", "cat", "--no-pager").stdout
-    said = f"compiled kernels of this installation are not used: {Path(file).resolve()} is damaged"
-    assert said.rpartition("/")[2] in journal, journal
-    assert _compiled(robot) > 0
+    assert f"{file.name} is damaged" in journal, journal
+    assert "kernels compiled in" in journal, journal
     return figures
 
 

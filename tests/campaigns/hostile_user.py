@@ -29,7 +29,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from fasaco_edge.bench.processes import warm_kernels
-from fasaco_edge.kernels.cache import own_folder
+from fasaco_edge.kernels.manifest import chosen_folder
+from fasaco_edge.planners.compiling import STAGES, compile_missing
 from tests.campaigns.trap import NOBODY, Trap
 from tests.deploy import installed, lab, releases
 from tests.deploy.installing import Robot, bare_robot
@@ -72,7 +73,7 @@ class Campaign:
         program.write_text(PROGRAM.format(python=sys.executable))
         program.chmod(0o755)
         self.program = str(program)
-        self.own_cache = {"NUMBA_CACHE_DIR": str(own_folder().parent)}
+        self.own_cache = {"NUMBA_CACHE_DIR": str(kernel_folder().parent)}
 
     @contextmanager
     def judged(self, what: str) -> Iterator[None]:
@@ -254,7 +255,7 @@ def try_scripts(campaign: Campaign) -> None:
     with bare_robot(place, folders) as robot:
         installed.warm(robot)
         # In the lab's own folder: what is bound into it is read-only.
-        trap = Trap(Path(f"{robot.root}{shown}"), own_folder())
+        trap = Trap(Path(f"{robot.root}{shown}"), kernel_folder())
         inside = {
             name: value.replace(str(robot.root), "") for name, value in trap.environment.items()
         }
@@ -349,12 +350,20 @@ def _until(holds: Callable[[], bool], seconds: float = 60.0) -> None:
         time.sleep(0.1)
 
 
+def kernel_folder() -> Path:
+    """Return the folder of compiled kernels, with all of them in it."""
+    compile_missing()
+    folder, _ = chosen_folder(STAGES)
+    assert folder is not None
+    return folder
+
+
 def run_campaign(folder: Path, say: Callable[[str], None], *, short: bool) -> Campaign:
     """Lure every command; ``short``: without the demo, a cold compiler and an installation."""
     place = folder / "trap"
     own = folder / "own"
     own.mkdir(mode=0o700)
-    campaign = Campaign(own, Trap(place, own_folder()), not short, say)
+    campaign = Campaign(own, Trap(place, kernel_folder()), not short, say)
     try_alone(campaign)
     try_together(campaign)
     try_scripts_dry(campaign)

@@ -35,7 +35,7 @@ from pathlib import Path
 
 from fasaco_edge.cli.console.arguments import Exit
 from tests.campaigns.file_calls import Failure, Kind, Watch, why_not
-from tests.campaigns.io_scenarios import LONG, SCENARIOS, WrongError
+from tests.campaigns.io_scenarios import SCENARIOS, WrongError
 from tests.campaigns.services import show
 
 # What each kind may fail with. Who calls again after EINTR, and who writes the rest of what was
@@ -161,7 +161,7 @@ def main() -> int:
     )
     parser.add_argument(
         "--only", choices=SCENARIOS, action="append", metavar="SCENARIO",
-        help=f"run these alone, of {', '.join(SCENARIOS)}; only so: {', '.join(LONG)}",
+        help=f"run these alone, of {', '.join(SCENARIOS)}",
     )  # fmt: skip
     parser.add_argument(
         "--most", type=int, default=0, metavar="N", help="so many faults of each kind of call "
@@ -194,7 +194,7 @@ def main() -> int:
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     outcomes = _read(args.json) if args.resume else []
     try:
-        for name in args.only or [name for name in SCENARIOS if name not in LONG]:
+        for name in args.only or SCENARIOS:
             known = {outcome.failure for outcome in outcomes if outcome.scenario == name}
             for outcome in _all_of(name, args.most, args.seed, known, every=args.every_error):
                 outcomes.append(outcome)

@@ -5,12 +5,9 @@ Each is a real process of ours that is given something to do, with real sessions
 
 from __future__ import annotations
 
-import functools
 import json
 import math
 import os
-import shutil
-import subprocess
 import threading
 import time
 from collections.abc import Callable, Sequence
@@ -23,25 +20,22 @@ from fasaco_edge.bus.arrival import Sample
 from fasaco_edge.daemon.ledger.codec import decode_ledger
 from fasaco_edge.daemon.ledger.file import LedgerFile
 from fasaco_edge.errors import LedgerFileError, UnreadableRecording
-from fasaco_edge.kernels.sealed import PARTIAL
+from fasaco_edge.planners.compiling import WARNING
 from fasaco_edge.recording.read.repair import repair_folder
 from fasaco_edge.wire import topics
 from fasaco_edge.wire.keys import Keys
 from tests.campaigns.kill_recorder import driving
 from tests.campaigns.services import START_S, Service, service
 from tests.daemon.test_commands import command
+from tests.support.compilers import compile_into, why_not_whole
 from tests.support.ledgers import CELL_M, Cell, contents, lane, visits_of
 from tests.support.outsider import Outsider
-from tests.support.processes import ENVIRONMENT, PROGRAM, free_endpoint
+from tests.support.processes import free_endpoint
 from tests.support.recordings import bus_on_free_port, read_summary
 from tests.support.rooms import begin, drive, lanes
 
 DRIVEN, MESSAGES = 6, 60
-# To compile all kernels takes a minute; on a busy computer, many.
-COMPILE_S = 900.0
-STATE, RECORDINGS, CACHE, TEMPORARY = "state", "recordings", "cache", "tmp"
-
-Completed = subprocess.CompletedProcess[str]
+STATE, RECORDINGS, CACHE = "state", "recordings", "cache"
 
 
 class WrongError(AssertionError):
@@ -218,97 +212,27 @@ def _recordings_read(folder: Path, is_told: bool) -> None:
 # ---- compiled kernels ----
 
 
-def _lay_cache(folder: Path) -> None:
-    """Copy a complete cache, all but a few kernels and the note that it is complete."""
-    compiled = _compiled_kernels()
-    _kernel_names()
-    copied = folder / CACHE / compiled.name
-    shutil.copytree(compiled, copied)
-    for start in TO_COMPILE:
-        gone = list(copied.glob(f"{start}-*"))
-        if not gone:
-            raise WrongError(f"no kernel is named {start} any more: see TO_COMPILE")
-        for file in gone:
-            file.unlink()
-    # Whoever may not use that folder has this one, and need not compile for minutes.
-    (folder / TEMPORARY).mkdir()
-    (folder / TEMPORARY).chmod(0o1777)
-    shutil.copytree(compiled, folder / TEMPORARY / f"fasaco-edge-{os.geteuid()}-{compiled.name}")
-
-
-def _lay_empty_cache(folder: Path) -> None:
-    _kernel_names()
-    for name in (CACHE, TEMPORARY):
-        (folder / name).mkdir()
-
-
-@functools.cache
-def _compiled_kernels() -> Path:
-    """Return the folder in which all kernels are compiled."""
-    words = [*PROGRAM, "warmup", "--json"]
-    told = subprocess.run(words, env=ENVIRONMENT, capture_output=True, text=True, check=True)
-    return Path(json.loads(told.stdout)["folder"])
-
-
-@functools.cache
-def _kernel_names() -> frozenset[str]:
-    """Return the files of all kernels, before a test compiles some for types of its own."""
-    return frozenset(name for name in os.listdir(_compiled_kernels()) if PARTIAL not in name)
-
-
 def _warm_up(folder: Path, environment: dict[str, str]) -> tuple[int | None, str]:
-    done = _command(folder, environment, "warmup", "--jobs", "1")
-    return done.returncode, done.stderr
-
-
-def _command(folder: Path, environment: dict[str, str], *words: str) -> Completed:
-    places = {"NUMBA_CACHE_DIR": str(folder / CACHE), "TMPDIR": str(folder / TEMPORARY)}
-    environment = ENVIRONMENT | places | environment
-    try:
-        return subprocess.run(
-            [*PROGRAM, *words],
-            env=environment,
-            capture_output=True,
-            text=True,
-            timeout=COMPILE_S,
-            check=False,
-        )
-    except subprocess.TimeoutExpired as error:
-        raise WrongError(f"{words} hangs") from error
+    done = compile_into(folder / CACHE / "kernels", environment)
+    # Its stages and reasons are no faults.
+    told = [line for line in done.stdout.splitlines() if line.startswith(WARNING)]
+    return done.returncode, "\n".join(told) + done.stderr
 
 
 def _is_warm(folder: Path, is_told: bool) -> None:
     """Check that the kernels are there, or were said not to be and are with the next try."""
+    kernels = folder / CACHE / "kernels"
     if is_told:
-        again = _command(folder, {}, "warmup", "--jobs", "1")
+        again = compile_into(kernels)
         if again.returncode != 0:
             raise WrongError(f"the next try ends with {again.returncode}: {again.stderr[-600:]}")
-    check = _command(folder, {}, "warmup", "--check")
-    if check.returncode != 0:
-        raise WrongError(f"not ready: {check.stderr[-600:]}")
-    compiled = _compiled_kernels()
-    left = set(os.listdir(folder / CACHE / compiled.name))
-    if gone := _kernel_names() - left:
-        raise WrongError(f"said to be ready, without {sorted(gone)}")
-    if begun := [name for name in left if PARTIAL in name]:
-        raise WrongError(f"left behind: {sorted(begun)}")
+    if why := why_not_whole(kernels):
+        raise WrongError(f"not ready: {why}")
 
 
-# The note that all is there; and kernels of different modules that compile within a second. All
-# are called from Python: what others call, a process that loads those does not compile.
-TO_COMPILE = (
-    "complete",
-    "ants.colony.deposit",
-    "lattice.areas.cells_beside",
-    "lattice.polygons.count_in",
-    "local_search.regions.changed_cells",
-)
 SCENARIOS = {
     "orders": Scenario(_lay_ledgers, _give_orders, _keeps_the_four, (STATE, "etc")),
     "mission": Scenario(_lay_config, _drive, _knows_its_drive, (STATE, RECORDINGS)),
     "recorder": Scenario(lambda _: None, _record, _recordings_read, (RECORDINGS,)),
-    "warmup": Scenario(_lay_cache, _warm_up, _is_warm, (CACHE,)),
-    "compile": Scenario(_lay_empty_cache, _warm_up, _is_warm, (CACHE,)),
+    "warmup": Scenario(lambda folder: (folder / CACHE).mkdir(0o700), _warm_up, _is_warm, (CACHE,)),
 }
-# Each fault compiles all kernels anew, a minute or more: run only where it is named.
-LONG = frozenset({"compile"})

@@ -6,9 +6,9 @@ A real daemon with its recorder is watched while its robot drives, is told to be
 it is started again; and the compiler, while it fills an empty cache. From each call that changed a
 file, what a loss of power may leave is rebuilt: what was synchronised is there, of the rest the
 bytes may be whole, those from before, none, zeros or half, the names moved or not. On each of these
-a real daemon is started as a service starts it. It has to become ready without help; to know all
-that was on the disk and nothing else, or say that it does not; and what is left of recordings has
-to be readable, once a recorder has looked it through.
+a real daemon is started as a service starts it, or the compiler goes on. It has to become ready
+without help; to know all that was on the disk and nothing else, or say that it does not; and what
+is left of recordings has to be readable, once a recorder has looked it through.
 
 Exit code 1 where one of these does not hold; the folder of each such cut is kept, and the command
 that starts a daemon on it again is printed.
@@ -39,9 +39,10 @@ from tests.campaigns.power_states import Cut, Disk, Spread, cuts_of
 from tests.campaigns.roaming import entries, roaming_robot
 from tests.campaigns.services import START_S, service, show
 from tests.daemon.test_commands import command
+from tests.support.compilers import compile_into, why_not_whole
 from tests.support.ledgers import CELL_M, Cell, contents
 from tests.support.outsider import Outsider
-from tests.support.processes import ENVIRONMENT, PROGRAM, free_endpoint
+from tests.support.processes import free_endpoint
 from tests.support.recordings import begun_parts, read_summary
 
 # At so small a distance from the border of "under the tool", rounding may decide.
@@ -49,7 +50,7 @@ DOUBT_M = 0.01
 MOST_LOST_S = 1.0
 STATE, RECORDINGS, CACHE = "state", "recordings", "cache"
 MISSION, FIRST_START = "mission", "first-start"
-# Of the cuts, so many are of a first start: to compile a kernel again takes seconds.
+# Of the cuts, so many are of a first start: to compile the kernels again takes seconds.
 FIRST_SHARE = 0.15
 # A recorder takes longer to start than all the rest: one is, after each so many cuts.
 RECORDS_EACH = 8
@@ -262,23 +263,14 @@ def watched_first_start(folder: Path) -> Trace:
     root = folder / "computer"
     root.mkdir()
     with Watch([root], is_logged=True) as watch:
-        _warm_up(root / CACHE, watch.environment, "--jobs", "1")
+        compile_into(root / CACHE / "kernels", watch.environment)
         return Trace(root, watch.calls(), {}, set())
-
-
-def _warm_up(place: Path, environment: Mapping[str, str], *words: str) -> Completed:
-    told = ENVIRONMENT | {"NUMBA_CACHE_DIR": str(place)} | dict(environment)
-    command = [*PROGRAM, "warmup", *words]
-    return subprocess.run(command, env=told, capture_output=True, text=True, check=False)
 
 
 def first_start_outcomes(
     trace: Trace, cuts: Sequence[Cut], folder: Path, keep: Path
 ) -> Iterator[Outcome]:
-    """Cut a first start, and start a daemon on each.
-
-    What was still to be compiled then is given to it: else each would take as long as the first.
-    """
+    """Cut a first start, and let the compiler go on from each."""
     disk, done = Disk(trace.root), 0
     for cut in cuts:
         for call in trace.calls[done : cut.after]:
@@ -288,30 +280,15 @@ def first_start_outcomes(
         place.mkdir()
         started = time.monotonic()
         disk.write(cut, place)
-        _give_the_rest(trace.root, disk, place)
-        environment = {"NUMBA_CACHE_DIR": str(place / CACHE)}
-        wrong = _start(place, 0, environment)
-        if not wrong and (check := _warm_up(place / CACHE, {}, "--check")).returncode:
-            wrong = f"ready, and its kernels are not: {check.stderr[-500:]}"
+        ended = compile_into(place / CACHE / "kernels")
+        wrong = ended.stderr[-500:] or why_not_whole(place / CACHE / "kernels")
         kept = ""
         if wrong:
             kept = str(keep / f"{FIRST_START}-{cut.salt}")
             shutil.copytree(place, kept, dirs_exist_ok=True)
-        said = (place / "service.log").read_text(errors="replace")
-        fault = "compiled again" if "compiled in" in said else ""
         shutil.rmtree(place)
         seconds = time.monotonic() - started
-        yield Outcome(FIRST_START, str(cut), wrong, round(seconds, 3), False, fault, kept)
-
-
-def _give_the_rest(root: Path, disk: Disk, place: Path) -> None:
-    """Copy into ``place`` what in the end is in the root, and was not begun at the cut."""
-    for path in sorted(root.rglob("*")):
-        to = place / path.relative_to(root)
-        if path.is_dir():
-            to.mkdir(parents=True, exist_ok=True)
-        elif not disk.has_had(path):
-            shutil.copy2(path, to)
+        yield Outcome(FIRST_START, str(cut), wrong, round(seconds, 3), False, "", kept)
 
 
 PARTS = {

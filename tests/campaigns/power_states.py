@@ -177,10 +177,6 @@ class Disk:
                 how = rng.choice(kinds) if cut.bytes is Bytes.MIXED else cut.bytes
                 place.write_bytes(node.left(how if path in damaged else Bytes.WHOLE))
 
-    def has_had(self, path: Path) -> bool:
-        """Tell whether there is or was something of that name."""
-        return str(path) in self._had
-
     @property
     def moves(self) -> int:
         """How many changes of names are not on the disk."""

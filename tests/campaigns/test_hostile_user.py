@@ -6,7 +6,6 @@ import pytest
 
 pytest.importorskip("rerun")
 
-from fasaco_edge.kernels.cache import own_folder
 from tests.campaigns import hostile_user
 from tests.campaigns.trap import Trap
 
@@ -22,7 +21,7 @@ def test_no_file_of_another_user_is_loaded_or_written_through(tmp_path_factory):
 
 @pytest.mark.skipif(bool(hostile_user.why_not()), reason=hostile_user.why_not())
 def test_a_trap_separates_planted_files_from_those_of_neighbours(tmp_path_factory):
-    trap = Trap(tmp_path_factory.mktemp("hostile") / "trap", own_folder())
+    trap = Trap(tmp_path_factory.mktemp("hostile") / "trap", hostile_user.kernel_folder())
     ours, theirs = trap.state / "run00004.rrd", trap.work / "json.py"
     ours.write_bytes(b"recorded by another process of ours")
     with trap.watched() as opened:

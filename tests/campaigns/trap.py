@@ -19,7 +19,7 @@ from contextlib import contextmanager
 from datetime import UTC, datetime
 from pathlib import Path
 
-from fasaco_edge.kernels.cache import code_digest
+from fasaco_edge.kernels.folder import code_digest
 from fasaco_edge.recording.write.quota import next_run
 
 NOBODY = 65534

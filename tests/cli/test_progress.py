@@ -53,7 +53,7 @@ def recording(tmp_path):
         (PLAN, "steps, [0-9.]+% above the bound ", "┌──.*"),
         (("plan", "flat", "--ants", "40", "--no-local-search"), "ants ━* +0/40 ", "┌──.*"),
         ((*PLAN, "--robots", "1,1", "2,2"), "steps ━", "┌──.*"),
-        (("warmup",), "loading numba ", "kernels ready after [0-9.]+ s in .*"),
+        (("warmup",), "looking at the kernels ", "kernels ready after [0-9.]+ s in .*"),
         (
             ("bench", "latency", "--samples", "2"),
             "warming the kernels' cache ━* 0/2 ",

@@ -2,42 +2,37 @@
 
 from __future__ import annotations
 
-import shutil
 import subprocess
 import sys
-from pathlib import Path
 
-from fasaco_edge.daemon.compiling import MODULE, REASON, STAGE
-from fasaco_edge.kernels.cache import missing_from, own_folder
-from fasaco_edge.planners.warmup import STAGES
+from fasaco_edge.kernels.manifest import why_missing
+from fasaco_edge.planners.compiling import AREAS, LATTICE, MODULE, REASON, STAGE, WARNING
 from tests.support.processes import ENVIRONMENT
 
-GROWN = f"import {MODULE} as compiling; compiling.MOST_MB = 0.0; compiling.main()"
-# Small kernels that Python calls: what is loaded needs no others.
-LOST = ("lattice.reach.update_reach-*", "bound.lines.lines_of-*")
+GROWN = f"import {MODULE} as it; it.MOST_MB, it.PLENTY_MB = 0.0, 1e9; it.main()"
 
 
-def lose_some(folder: Path) -> None:
-    """Remove a kernel of each of ``LOST``, and the list of them all."""
-    for pattern in (*LOST, "complete-*"):
-        min(folder.glob(pattern), key=lambda file: file.stat().st_size).unlink()
+def compiler_in(folder, *stages, **process):
+    words = [sys.executable, "-c", GROWN, str(folder), "0", *stages]
+    process = subprocess.run(
+        words, env=ENVIRONMENT, capture_output=True, text=True, check=True, **process
+    )
+    return [line.partition("\t")[0::2] for line in process.stdout.splitlines()]
 
 
 def test_compiling_continues_in_a_fresh_process_when_it_is_large(tmp_path):
-    warm = own_folder()
-    assert warm is not None
-    folder = shutil.copytree(warm, tmp_path / warm.name)
-    folder.chmod(0o700)
-    lose_some(folder)
-    done = subprocess.run(
-        [sys.executable, "-c", GROWN],
-        env=ENVIRONMENT | {"NUMBA_CACHE_DIR": str(folder)},
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    said = [line.partition("\t")[0::2] for line in done.stdout.splitlines()]
+    folder = tmp_path / "cache" / "kernels"
+    said = compiler_in(folder, LATTICE)
     assert [word for word, _ in said].count(REASON) == 1
-    assert said.count((STAGE, STAGES[0])) > 1
-    assert said[-1] == (STAGE, STAGES[-1])
-    assert missing_from(folder) == ""
+    assert said.count((STAGE, LATTICE)) > 1
+    assert why_missing(folder, (LATTICE,)) == ""
+    assert why_missing(folder, (LATTICE, AREAS)) == f"not compiled yet: {AREAS}"
+    assert {file.stat().st_mode & 0o077 for file in (folder, *folder.iterdir())} == {0}
+    assert compiler_in(folder, LATTICE) == []
+
+
+def test_a_folder_that_cannot_be_written_is_told(tmp_path):
+    (tmp_path / "file").touch()
+    ((word, text),) = compiler_in(tmp_path / "file" / "kernels", LATTICE)
+    assert word == WARNING
+    assert text.endswith("each process compiles its own kernels")

@@ -84,11 +84,9 @@ class Tree:
         )
 
 
-def make_release(out: Path, kernels: Path | None = None) -> Path:
-    """Make a release folder for arm64, with kernels that were compiled there; needs the network."""
+def make_release(out: Path) -> Path:
+    """Make a release folder for arm64; needs the network."""
     words = [sys.executable, "-m", "wheelhouse", "--arch", "aarch64", "--out", str(out)]
-    if kernels is not None:
-        words += ["--kernels", str(kernels)]
     _run(*words, more={"PYTHONPATH": str(CHECKOUT / "deploy")})
     return next(out.glob("fasaco-edge-*-aarch64-*"))
 

@@ -11,9 +11,9 @@ import subprocess
 import sys
 from pathlib import Path
 
-from fasaco_edge.kernels.cache import cache_folder, missing_from
+from fasaco_edge.kernels.manifest import chosen_folder
+from fasaco_edge.planners.compiling import STAGES, compile_missing
 from tests.deploy.lab import Lab
-from tests.support.processes import PROGRAM
 
 HOME = "/opt/fasaco-edge"
 PYTHON = Path("/usr/bin/python3")
@@ -61,12 +61,11 @@ def binds(folder: Path) -> dict[str, Path]:
 
 def warm(lab: Lab) -> None:
     """Give the service, and root, the kernels that were compiled for this checkout: all of them."""
-    here = cache_folder()
+    compile_missing()
+    here, _ = chosen_folder(STAGES)
     assert here is not None
-    if missing_from(here):
-        subprocess.run([*PROGRAM, "warmup"], check=True, capture_output=True)
     # The folder's name tells the patch level of Python, of which the code in it is independent.
-    tell = "from fasaco_edge.kernels.cache import code_digest; print(f'kernels-{code_digest()}')"
+    tell = "from fasaco_edge.kernels.folder import code_digest; print(f'kernels-{code_digest()}')"
     path = ":".join(map(str, (CHECKOUT, *LIBRARIES)))
     told = subprocess.run(
         [str(PYTHON), "-c", tell],

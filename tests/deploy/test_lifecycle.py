@@ -63,10 +63,10 @@ def test_it_is_not_ready_before_the_kernels_are_compiled(service: Service):
 
 def test_kernels_that_are_all_there_are_found_again(service: Service):
     marks = "/var/cache/private/fasaco-edge/numba"
-    service.lab.run("find", marks, "-name", "complete-*", "-delete")
+    forget = ("sed", "-i", 's/"zigzag"/"another"/', "{}", "+")
+    service.lab.run("find", marks, "-name", "manifest.json", "-exec", *forget)
     print(f"loaded all kernels: ready after {service.start():.2f} s")
     assert "kernels compiled in" in service.text()
-    assert service.lab.run("find", marks, "-name", "complete-*").stdout
 
 
 def test_a_wrong_configuration_is_no_reason_to_try_again(service: Service):

@@ -18,7 +18,9 @@ from fasaco_edge.config.metrics import MetricsConfig
 from fasaco_edge.config.robot import RobotConfig
 from fasaco_edge.doctor import installation, machine, report, security, session
 from fasaco_edge.doctor.finding import Check, CheckContext, Finding, Level, Unit, find_unit
-from fasaco_edge.kernels.sealed import write_sealed
+from fasaco_edge.kernels import manifest
+from fasaco_edge.kernels.folder import wanted_folder
+from fasaco_edge.planners.compiling import STAGES
 from fasaco_edge.wire import topics
 from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.topics import QOS
@@ -233,10 +235,9 @@ def test_kernels_that_are_not_there_or_are_somebody_elses(tmp_path, monkeypatch)
     )
     assert list(tmp_path.iterdir()) == []
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
-    from fasaco_edge.kernels.cache import cache_folder
-
-    folder = cache_folder()
-    assert "never all compiled" in installation.kernels(context).found
+    folder = wanted_folder()
+    folder.mkdir(0o700)
+    assert "never compiled" in installation.kernels(context).found
     folder.chmod(0o770)
     found = installation.kernels(CheckContext(DaemonConfig()))
     assert found.level is Level.WARN
@@ -249,21 +250,20 @@ def test_kernels_that_are_not_there_or_are_somebody_elses(tmp_path, monkeypatch)
     assert found.found.startswith(f"{folder} belongs to user 4242: the daemon takes no")
 
 
-def test_kernels_that_are_damaged_or_were_written_by_several(tmp_path, monkeypatch):
-    *files, note = fill_with(tmp_path, 3)
-    monkeypatch.setattr(installation, "wanted_folder", lambda environ: note.parent)
-    assert installation.kernels(CheckContext(DaemonConfig())).level is Level.OK
-    # By another process, that compiles at the same time.
-    write_sealed(files[1], b"the same, compiled again")
-    assert installation.kernels(CheckContext(DaemonConfig())).level is Level.OK
+def test_kernels_that_are_damaged(tmp_path, monkeypatch):
+    folder = fill_with(tmp_path, 3, stages=STAGES)
+    file = folder / "1.nbc"
+    before = file.read_bytes()
+    monkeypatch.setattr(installation, "wanted_folder", lambda environ: folder)
     for harm in HARMS.values():
-        before = files[1].read_bytes()
-        harm(files[1])
+        monkeypatch.setattr(manifest, "_COMPARED", {})
+        harm(file)
         found = installation.kernels(CheckContext(DaemonConfig()))
         assert found.level is Level.WARN
-        assert found.found.startswith(f"{files[1].name} ")
+        assert found.found.startswith(f"{file.name} ")
         assert found.to_do == "fasaco-edge warmup"
-        files[1].write_bytes(before)
+        file.write_bytes(before)
+    assert installation.kernels(CheckContext(DaemonConfig())).level is Level.OK
 
 
 def test_nobody_is_there():

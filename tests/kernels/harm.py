@@ -10,15 +10,17 @@ from pathlib import Path
 
 import pytest
 
+from fasaco_edge.kernels.manifest import LOCK, MANIFEST
+
 # Whoever else is on this computer.
 NOBODY = 65534
 needs_root = pytest.mark.skipif(os.geteuid() != 0, reason="only root can give files away")
 
 
-def kernel_files(cache: Path) -> list[Path]:
-    """Return all files of a cache, as they are harmed: the code first, what is noted after it."""
-    files = (file for file in cache.glob("kernels-*/*") if file.is_file())
-    return sorted(files, key=lambda file: (file.suffix != ".kernel", file.name))
+def kernel_files(folder: Path) -> list[Path]:
+    """Return all files of compiled kernels in a folder; what is noted of them comes last."""
+    files = (file for file in folder.iterdir() if file.name != LOCK)
+    return sorted(files, key=lambda file: (file.name == MANIFEST, file.name))
 
 
 def cut(at: float | int) -> Callable[[Path], None]:
@@ -57,10 +59,9 @@ class _Mischief:
 
 def other_pickle(file: Path) -> None:
     """Put a pickle in place of what a file holds, of the same length, that leaves a mark."""
-    content = file.read_bytes()
-    head, line, held = content.partition(b"\n")
+    held = file.read_bytes()
     evil = pickle.dumps(_Mischief(mark_of(file)))
-    file.write_bytes(head + line + evil + held[len(evil) :])
+    file.write_bytes(evil + held[len(evil) :])
 
 
 def mark_of(file: Path) -> Path:

@@ -11,24 +11,27 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from fasaco_edge import host
-from fasaco_edge.kernels import cache, code_files, compiler, jit, release, sealed
-from fasaco_edge.kernels.cache import note_complete
-from fasaco_edge.kernels.release import KERNEL_SUFFIX
-from tests.kernels.harm import kernel_files
+from fasaco_edge.kernels import folder, jit, manifest
 from tests.support.forked import run_forked
 
 KERNELS = """
+import contextlib
 import json
 import logging
+import os
 
 # Before anything can be logged.
 logging.basicConfig(handlers=[handler := logging.Handler()])
 said = []
 handler.emit = lambda record: said.append(record.getMessage())
 
-from fasaco_edge.kernels import cache, code_files, jit
+from fasaco_edge.kernels import jit, manifest
 
-more = []
+held = contextlib.ExitStack()
+place = jit.kernel_folder()
+if "COMPILES" in os.environ:
+    noted = held.enter_context(manifest.compiling_into(place, lambda: print("waits", flush=True)))
+    jit.compile_into(place, lambda compiled: None)
 
 @jit.kernel
 def seven(x):
@@ -38,28 +41,27 @@ def seven(x):
 def eight(x):
     return seven(x) + x
 
-def tell(x=1, note=True):
-    folder, passed_over = cache.usable_folder()
-    missing = cache.missing_from(folder)
+more = []
+
+def tell(x=1):
     assert eight(x) == 8 * x
-    if note:
-        code_files.note_all_compiled()
+    if "COMPILES" in os.environ:
+        if not noted.stages:
+            manifest.record(place, noted, "all")
+        held.close()
     stats = [seven.stats, eight.stats, *more]
     loaded, compiled = (
         sum(sum(getattr(stat, kind).values()) for stat in stats)
         for kind in ("cache_hits", "cache_misses")
     )
-    place = (folder := code_files.kernel_folder()) and str(folder)
-    print(json.dumps([missing, passed_over, loaded, compiled, said, place]))
+    print(json.dumps([loaded, compiled, said, place and str(place)]))
 """
 
 
 @dataclass(frozen=True)
 class Told:
-    """What a process found, and what it did: how many kernels it loaded and compiled."""
+    """What a process did: how many kernels it loaded and compiled, and where they are."""
 
-    missing: str
-    passed_over: str
     loaded: int
     compiled: int
     warnings: list[str]
@@ -67,6 +69,7 @@ class Told:
 
 
 PATIENCE_S = 300.0
+COMPILES = {"COMPILES": "1"}
 # The one that is called by the other is linked into it, and not loaded.
 ALL_LOADED = (1, 0, [])
 
@@ -87,36 +90,28 @@ class Installation:
             shutil.copytree(place, folder / place.name)
         return Installation(folder / self.root.name, folder / self.cache.name)
 
+    def compile(self, *, env=None, umask: int = -1, **process) -> Told:
+        """Run both kernels in a process that compiles into the folder."""
+        return self.tell(env=COMPILES | (env or {}), umask=umask, **process)
+
     def tell(self, code: str = "seven.tell()", *, env=None, umask: int = -1, **process) -> Told:
         """Run both kernels, and tell what came of it.
 
-        With other words, or a library to load, in a process that is started; else in a forked one.
+        With other words, in a process that is started; else in a forked one.
         """
-        if process or (env and "LD_PRELOAD" in env):
+        if process:
             return told_by(self.start(code, env=env, umask=umask, **process))
         program = f"from fasaco_edge.kernels import seven\n{code}"
         environment = self._environment(env)
         return told(*run_forked(("-c", program), environment, PATIENCE_S, str(self.root), umask))
 
     def start(
-        self,
-        code: str = "seven.tell()",
-        *,
-        name: str = "seven",
-        before: str = "",
-        words=(),
-        env=None,
-        **process,
-    ):
-        """Begin a process that imports the module ``name`` of kernels, and runs ``code``."""
-        program = [
-            *words,
-            sys.executable,
-            "-c",
-            f"{before}\nfrom fasaco_edge.kernels import {name}\n{code}",
-        ]
+        self, code: str = "seven.tell()", *, before: str = "", words=(), env=None, **process
+    ) -> subprocess.Popen[str]:
+        """Begin a process that imports the kernels, and runs ``code``."""
+        program = f"{before}\nfrom fasaco_edge.kernels import seven\n{code}"
         return subprocess.Popen(
-            program,
+            [*words, sys.executable, "-c", program],
             cwd=self.root,
             env=self._environment(env),
             stdout=subprocess.PIPE,
@@ -129,13 +124,6 @@ class Installation:
         ours = {"NUMBA_DISABLE_JIT": "0", "NUMBA_CACHE_DIR": str(self.cache)}
         environment = os.environ | ours | (env or {})
         return {name: value for name, value in environment.items() if value is not None}
-
-    def look(self, env: dict[str, str]) -> str:
-        """Return what a process that runs no kernel says is missing."""
-        code = "folder, _ = cache.usable_folder()\nprint(cache.missing_from(folder))"
-        out, err = self.start(code, name="cache", env=env).communicate(timeout=100)
-        assert err == ""
-        return out.strip()
 
     @property
     def folder(self) -> Path:
@@ -157,24 +145,25 @@ def told(code: int, out: str, err: str) -> Told:
     return Told(*json.loads(out.splitlines()[-1]))
 
 
-def fill_with(cache: Path, count: int, name: str = "kernels-0") -> list[Path]:
-    """Make sealed files, as if these were compiled kernels, and the list of them; return all."""
-    folder = cache / name
-    folder.mkdir(parents=True, mode=0o700)
-    for number in range(count):
-        payload = bytes(range(256)) * (number + 1)
-        sealed.write_sealed(folder / f"{number}{KERNEL_SUFFIX}", payload)
-    note_complete(folder)
-    return kernel_files(cache)
+def fill_with(cache: Path, count: int, name: str = "kernels-0", stages=("all",)) -> Path:
+    """Make files, as if these were compiled kernels, and their manifest; return the folder."""
+    place = cache / name
+    with manifest.compiling_into(place, lambda: None) as noted:
+        for number in range(count):
+            (place / f"{number}.nbc").write_bytes(bytes(range(256)) * (number + 1))
+            (place / f"{number}.nbc").chmod(0o600)
+        noted.stages += stages
+        manifest.record(place, noted)
+    return place
 
 
-def package_in(folder: Path) -> Path:
+def package_in(root: Path) -> Path:
     """Begin another installation, of no kernels yet; return the place for them."""
-    package = folder / "fasaco_edge" / "kernels"
+    package = root / "fasaco_edge" / "kernels"
     package.mkdir(parents=True)
     for part in (package.parent / "__init__.py", package / "__init__.py"):
         part.touch()
     shutil.copytree(Path(host.__file__).parent, package.parent / "host")
-    for module in (jit, code_files, compiler, cache, release, sealed):
+    for module in (jit, folder, manifest):
         shutil.copy(module.__file__, package)
     return package

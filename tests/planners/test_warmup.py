@@ -1,6 +1,8 @@
 """Warming up compiles all that a mission needs: nothing is compiled while a robot waits."""
 
 import importlib
+import subprocess
+import sys
 from collections.abc import Iterator
 from dataclasses import replace
 
@@ -10,23 +12,26 @@ import pytest
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D, StampedPose, Window
 from fasaco_edge.grid.lattice import Footprint
 from fasaco_edge.grid.occupancy import MapPatch, OccupancyGrid
-from fasaco_edge.kernels.release import KERNEL_SOURCES, kernel_module
+from fasaco_edge.kernels.folder import KERNEL_SOURCES, kernel_module
+from fasaco_edge.kernels.manifest import chosen_folder
 from fasaco_edge.mission.config import Sweeping
 from fasaco_edge.mission.core.events import MapReceived, PatchReceived, PlanReady, PoseReceived
 from fasaco_edge.mission.core.mission import Mission, MissionConfig
+from fasaco_edge.planners.compiling import STAGES, compile_missing, stages_of_plan
 from fasaco_edge.planners.cost import CoverageCost, SearchWork
 from fasaco_edge.planners.line import LINES
 from fasaco_edge.planners.paper.fasaco import Fasaco
 from fasaco_edge.planners.path import walk_figures
 from fasaco_edge.planners.planner import WorkLimit
 from fasaco_edge.planners.search.near_optimal import NearOptimal
-from fasaco_edge.planners.warmup import STAGES, warm_up
+from fasaco_edge.planners.warmup import warm_up
 from fasaco_edge.wire.messages.maps import (
     decode_map_update,
     decode_occupancy_grid,
     encode_map_update,
     encode_occupancy_grid,
 )
+from tests.support.processes import ENVIRONMENT
 
 
 def compiled_signatures() -> set[str]:
@@ -98,12 +103,30 @@ def test_a_mission_with_decoded_maps_compiles_nothing_new(turn_s, sweeping):
     assert compiled_signatures() == before
 
 
-def test_two_processes_meet_where_one_begins_with_the_last_stage():
-    heard = []
-    warm_up(heard.append, backward=True)
-    assert heard == list(reversed(STAGES))
+PLAN = """
+import fasaco_edge as fe
+from fasaco_edge.planners.compiling import stages_of_plan
+from fasaco_edge.planners.warmup import TinyRoom, run_stage
+from tests.planners.test_warmup import compiled_signatures
+room = TinyRoom()
+for stage in stages_of_plan("fasaco"):
+    run_stage(stage, room)
+before = compiled_signatures()
+fe.plan(fe.load_map("flat"))
+print(*sorted(compiled_signatures() - before))
+"""
 
 
-def test_no_kernel_is_compiled_anew_for_a_constant_argument():
-    warm_up()
-    assert [found for found in sorted(compiled_signatures()) if "iteral" in found] == []
+def test_a_plan_needs_no_more_than_its_stages():
+    """They are compiled first, so that the first plan comes soon."""
+    assert set(stages_of_plan("fasaco")) < set(STAGES)
+    words = [sys.executable, "-c", PLAN]
+    done = subprocess.run(words, env=ENVIRONMENT, capture_output=True, text=True, check=False)
+    assert (done.stdout, done.stderr) == ("\n", "")
+
+
+@pytest.mark.parametrize(("kernel", "most"), [("line.gain_above", 2), ("program.solve_window", 1)])
+def test_a_large_kernel_is_not_compiled_for_each_constant(kernel, most):
+    compile_missing()
+    folder, _ = chosen_folder(STAGES)
+    assert 1 <= len(list(folder.glob(f"{kernel}-*.nbc"))) <= most

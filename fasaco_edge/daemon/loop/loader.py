@@ -17,6 +17,7 @@ from fasaco_edge.daemon.memory import floor_pixels
 from fasaco_edge.host.processes import release_unused
 from fasaco_edge.mission.config import MissionConfig, Sweeping
 from fasaco_edge.mission.orders.order_state import NO_ORDER, OrderState
+from fasaco_edge.planners.compiling import compile_missing, stages_of_mission
 
 if TYPE_CHECKING:
     from fasaco_edge.daemon.loop.worker import PlanningWorker
@@ -63,14 +64,16 @@ class Loader:
         self._mailbox.post("loaded", None)
 
     def _load(self) -> tuple[Mission, PlanningWorker]:
+        # Before they are imported, which decides where they come from.
+        compile_missing(self._report)
         from fasaco_edge.daemon.loop.worker import PlanningWorker  # noqa: PLC0415
         from fasaco_edge.mission.core.mission import Mission  # noqa: PLC0415
         from fasaco_edge.planners.registry import planner_of  # noqa: PLC0415
         from fasaco_edge.planners.warmup import warm_up  # noqa: PLC0415
 
-        warm_up(self._report)
-        release_unused()
         planner = self._config.planner
+        warm_up(self._report, stages_of_mission(planner.name, has_fleet=bool(self._config.fleet)))
+        release_unused()
         chosen = planner_of(planner.name, planner.colony(), planner.threads, planner.local_search)
         worker = PlanningWorker(chosen, planner.budget_s, self._mailbox.post)
         first = (

@@ -21,6 +21,7 @@ from fasaco_edge.cli.warmup import compile_kernels
 from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.host.processes import first_signal_calls
 from fasaco_edge.offline.settings import ANYWHERE, CELLS, HOME
+from fasaco_edge.planners.compiling import stages_of_plan
 from fasaco_edge.planners.cost import count_turns
 from fasaco_edge.planners.planner import Interrupt, SearchProgress, TimeBudget
 from fasaco_edge.wire.limits import MAX_FLEET_PARTS
@@ -36,7 +37,7 @@ def plan_fleet(args: argparse.Namespace, request: PlanRequest) -> int:
     """Plan, print the figures, and write the requested files."""
     robot, search = request.robot, request.search
     _check(args, request)
-    compile_kernels()
+    compile_kernels(stages_of_plan(search.planner, is_shared=True))
     # Imported late, as they import the compiler.
     from fasaco_edge.fleet.planning.division import Fleet, divide
     from fasaco_edge.offline.maps import load_map

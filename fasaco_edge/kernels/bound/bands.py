@@ -28,7 +28,7 @@ from fasaco_edge.kernels.bound.ways import (
     list_ways,
     use_way,
 )
-from fasaco_edge.kernels.jit import inlined, lean_kernel
+from fasaco_edge.kernels.jit import as_value, inlined, lean_kernel
 
 # A band's next limit is the excess found plus a quarter of it, plus 1 / SLACK of a corner.
 SLACK = 8
@@ -90,7 +90,7 @@ def solve_bands(
     until = bands.first[band] + cells
     while band < bands.first.size - 1 and bands.first[band] < until:
         if _solve(lines, prices, bands, memory, band, step, turn, saving):
-            _trace(lines, prices, bands, memory, band, 0, step, turn, saving, 1)
+            _trace(lines, prices, bands, memory, band, as_value(0), step, turn, saving, as_value(1))
         else:
             _use_cells(lines, prices, bands, band, step, turn)
         memory.sums[TOTAL] += memory.found[band, 0]
@@ -141,8 +141,8 @@ def _end(
         if not _solve(lines, prices, bands, memory, ends, step, turn, saving):
             return cost
     if _solve(lines, prices, bands, memory, ends, step, turn, saving):
-        _trace(lines, prices, bands, memory, ends, 0, step, turn, saving, -1)
-        _trace(lines, prices, bands, memory, ends, 1, step, turn, saving, 1)
+        _trace(lines, prices, bands, memory, ends, as_value(0), step, turn, saving, as_value(-1))
+        _trace(lines, prices, bands, memory, ends, as_value(1), step, turn, saving, as_value(1))
     return cost
 
 
@@ -287,4 +287,4 @@ def _use_cells(
         sides = sides_of(lines, prices, cell)
         if lines.wanted[cell]:
             least = cheapest(sides, step, turn)
-            use_passage(lines, prices.use, cell, sides, least, step, turn, 1)
+            use_passage(lines, prices.use, cell, sides, least, step, turn, as_value(1))

@@ -34,7 +34,7 @@ from fasaco_edge.kernels.bound.passages import (
     use_side,
     which_side,
 )
-from fasaco_edge.kernels.jit import inlined, lean_kernel
+from fasaco_edge.kernels.jit import as_value, inlined, lean_kernel
 
 
 @lean_kernel
@@ -87,7 +87,7 @@ def _relaxed(lines: Lines, prices: StepPrices, step: int, turn: int) -> int:
             sides = sides_of(lines, prices, cell)
             least = cheapest(sides, step, turn)
             total += least
-            use_passage(lines, use, cell, sides, least, step, turn, 1)
+            use_passage(lines, use, cell, sides, least, step, turn, as_value(1))
             if least - step // 2 - min(sides) > saving:
                 saving, last = least - step // 2 - min(sides), cell
     if lines.end >= 0:
@@ -96,9 +96,9 @@ def _relaxed(lines: Lines, prices: StepPrices, step: int, turn: int) -> int:
         sides = sides_of(lines, prices, last)
         least = cheapest(sides, step, turn)
         total -= least
-        use_passage(lines, use, last, sides, least, step, turn, -1)
+        use_passage(lines, use, last, sides, least, step, turn, as_value(-1))
     for end in (lines.start, last):
         sides = sides_of(lines, prices, end)
         total += step // 2 + min(sides)
-        use_side(lines, use, end, which_side(sides, min(sides)), 1)
+        use_side(lines, use, end, which_side(sides, min(sides)), as_value(1))
     return total

@@ -23,7 +23,7 @@ from fasaco_edge.kernels.floor.sweeps import (
     swept_more,
 )
 from fasaco_edge.kernels.floor.turning import Turning
-from fasaco_edge.kernels.jit import inlined, lean_kernel
+from fasaco_edge.kernels.jit import as_value, inlined, lean_kernel
 
 # Least gain of a move [s]: rounding of sums must not cause cycles.
 LEAST_GAIN_S = 1e-3
@@ -330,7 +330,7 @@ def replace_points(
         given = _prepare_edges(scratch, taken, memory.after, lead, last_new, tool)
         exchange(floor.sweeps, scratch, taken, given, tool)
     else:
-        _sweep_between(line, floor, memory, begin, end, -1)
+        _sweep_between(line, floor, memory, begin, end, as_value(-1))
     # New points reuse the numbers of the replaced ones. Free numbers are taken only after these: a
     # caller that holds a number sees the same or a new point.
     free, last = following[begin], begin
@@ -355,6 +355,6 @@ def replace_points(
     if end != NONE:
         preceding[end] = last
     if not olds:
-        _sweep_between(line, floor, memory, begin, end, 1)
+        _sweep_between(line, floor, memory, begin, end, as_value(1))
     line.state[TIME] += 1
     note_change(line, begin, tool, HOPS, line.state[TIME])

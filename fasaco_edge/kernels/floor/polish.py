@@ -24,7 +24,7 @@ from fasaco_edge.kernels.floor.line import (
     note_change,
     replace_points,
 )
-from fasaco_edge.kernels.jit import inlined, lean_kernel
+from fasaco_edge.kernels.jit import as_value, inlined, lean_kernel
 
 # A pass that gains less is the last [s].
 LEAST_PASS_S = 0.2
@@ -68,12 +68,12 @@ def _leave_out(line: Line, floor: Floor, price: Price, memory: Memory, begin: in
         end, gain = line.next[begin], 0.0
         for _ in range(2):
             end = line.next[end]
-            gain = gain_of(line, floor, price, memory, begin, end, 0)
+            gain = gain_of(line, floor, price, memory, begin, end, as_value(0))
             if gain > 0.0 or end == NONE:
                 break
         if gain == 0.0:
             break
-        replace_points(line, floor, memory, begin, end, 0)
+        replace_points(line, floor, memory, begin, end, as_value(0))
         gained += gain
     return gained
 
@@ -98,9 +98,9 @@ def _move(line: Line, floor: Floor, price: Price, memory: Memory, begin: int) ->
         for shift in SHIFTS:
             new[0, 0] = points[middle, 0] + shift * dy
             new[0, 1] = points[middle, 1] + shift * dx
-            gain = gain_of(line, floor, price, memory, begin, end, 1)
+            gain = gain_of(line, floor, price, memory, begin, end, as_value(1))
             if gain > 0.0:
-                replace_points(line, floor, memory, begin, end, 1)
+                replace_points(line, floor, memory, begin, end, as_value(1))
                 gained += gain
                 break
     if end == NONE or preceding[begin] == NONE or following[end] == NONE:
@@ -112,9 +112,9 @@ def _move(line: Line, floor: Floor, price: Price, memory: Memory, begin: int) ->
         dx = memory.place[1] - points[middle, 1]
         if dy * dy + dx * dx <= FARTHEST_MEETING * FARTHEST_MEETING:
             new[0, 0], new[0, 1] = memory.place[0], memory.place[1]
-            gain = gain_of(line, floor, price, memory, begin, end, 1)
+            gain = gain_of(line, floor, price, memory, begin, end, as_value(1))
             if gain > 0.0:
-                replace_points(line, floor, memory, begin, end, 1)
+                replace_points(line, floor, memory, begin, end, as_value(1))
                 gained += gain
     return gained
 
@@ -162,9 +162,9 @@ def _shift(line: Line, floor: Floor, price: Price, memory: Memory, begin: int) -
                     moved |= slide(new[1], points[b], points[end], memory, ay, ax, by, bx)
                 if not moved:
                     continue
-            gain = gain_of(line, floor, price, memory, begin, end, 2)
+            gain = gain_of(line, floor, price, memory, begin, end, as_value(2))
             if gain > 0.0:
-                replace_points(line, floor, memory, begin, end, 2)
+                replace_points(line, floor, memory, begin, end, as_value(2))
                 gained += gain
                 break
     return gained
@@ -195,7 +195,7 @@ def polish(
             if line.state[TRIED] >= most_tried:
                 return gained + pass_s
             if line.seen[begin] > 0 and (
-                note_change(line, begin, floor.tool + 1.0, HOPS, 0) <= line.seen[begin]
+                note_change(line, begin, floor.tool + 1.0, HOPS, as_value(0)) <= line.seen[begin]
             ):
                 begin = line.next[begin]
                 continue

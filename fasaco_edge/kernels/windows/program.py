@@ -19,7 +19,7 @@ rings may close there at a price (``ring_price``), and ``kernels.windows.rings``
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.kernels.jit import inlined, lean_kernel
+from fasaco_edge.kernels.jit import as_value, inlined, lean_kernel
 from fasaco_edge.kernels.local_search.walk_array import Ground
 from fasaco_edge.kernels.windows.choices import price_cells, real_cost
 from fasaco_edge.kernels.windows.decide import decide
@@ -85,7 +85,7 @@ def solve_window(
         allowance: accepted increase in cost: several rings in the window become one.
         random: state of the stream, uint64 (1,).
     """
-    begin_window(ground, passages, terms, window, program, noise, allowance, 0, random)
+    begin_window(ground, passages, terms, window, program, noise, allowance, as_value(0), random)
     while advance_window(ground, passages, terms, window, program, beam):
         pass
     return end_window(ground, passages, terms, window, program)

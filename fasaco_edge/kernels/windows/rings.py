@@ -7,7 +7,7 @@ seam of two, re-optimised for one ring, joins them at the least cost.
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.kernels.jit import lean_kernel
+from fasaco_edge.kernels.jit import as_value, lean_kernel
 from fasaco_edge.kernels.local_search.walk_array import Ground
 from fasaco_edge.kernels.random import draw, index_of
 from fasaco_edge.kernels.windows.memory import Program, Terms
@@ -63,7 +63,15 @@ def join_rings(
         col = cell % aim.cols - 1 - index_of(draw(random), cols - 2)
         window = laid_in(aim, row, col, rows, cols, 0)
         tally[COST] += solve_window(
-            ground, passages, terms, window, program, aim.beam, 0, ANY_PRICE, random
+            ground,
+            passages,
+            terms,
+            window,
+            program,
+            aim.beam,
+            as_value(0),
+            as_value(ANY_PRICE),
+            random,
         )
         tally[SOLVED] += 1
         left = _label(ground, passages, aim, rings)

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.kernels.jit import inlined, lean_kernel
+from fasaco_edge.kernels.jit import as_value, inlined, lean_kernel
 from fasaco_edge.kernels.local_search.walk_array import Ground
 from fasaco_edge.kernels.random import draw, index_of
 from fasaco_edge.kernels.windows.memory import EXPANDED, Program, Terms, Window
@@ -85,7 +85,9 @@ def solve_windows(
         # At first nearly any change gains: few states suffice.
         beam = min(aim.beam, FIRST_BEAM + FIRST_BEAM * (tally[SWEPT] // aim.cells.size) // 2)
         noise = terms.turn // NOISE
-        gain = solve_window(ground, passages, terms, window, program, beam, noise, 0, random)
+        gain = solve_window(
+            ground, passages, terms, window, program, beam, noise, as_value(0), random
+        )
         tally[SOLVED] += 1
         tally[SWEPT] += window.rows * window.cols
         tally[COST] += gain

@@ -1,0 +1,260 @@
+"""The manifest of a folder of compiled kernels: what is in it, file by file, as it was compiled.
+
+A power failure leaves files that are empty, truncated or full of zeros, a worn card wrong bytes;
+such machine code crashes the process, and a pickle may do anything. So the manifest has size and
+SHA-256 of each file, and is compared with them before numba reads a byte. It also has the stages of
+the warm-up that are compiled. That detects damage, not malice, which could write the manifest, too:
+``fasaco_edge.host.files`` checks who could have written the folder.
+
+One process compiles at a time, as numba's own index of a function's files goes wrong where two
+write it: it holds a lock on the folder. What it compiles counts once it is in the manifest; a
+reader waits meanwhile. A folder without a sound manifest is begun anew.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import hashlib
+import json
+import os
+import shutil
+from collections.abc import Callable, Collection, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from fasaco_edge.host.durable import make_folder, sync_folder, write_through
+from fasaco_edge.host.files import UntrustedFileError, read_trusted, why_not_trusted
+from fasaco_edge.kernels.folder import places, why_not_writable
+
+MANIFEST, LOCK = "manifest.json", "lock"
+_NEW = "manifest.new"
+NEVER = "they were never compiled for this version"
+# Manifests of folders that were compared with their files by this process.
+_COMPARED: dict[Path, bytes] = {}
+
+
+@dataclass(slots=True)
+class Manifest:
+    """Size and SHA-256 of each file, and the stages that they are all of."""
+
+    stages: list[str] = field(default_factory=list)
+    files: dict[str, str] = field(default_factory=dict)
+
+    def why_short_of(self, stages: Collection[str]) -> str:
+        """Return which of ``stages`` is not compiled; "" if all are."""
+        missing = [stage for stage in stages if stage not in self.stages]
+        return f"not compiled yet: {', '.join(missing)}" if missing else ""
+
+
+class UnsoundError(Exception):
+    """Kernels in a folder cannot be used; the text says why."""
+
+
+def read_manifest(folder: Path, user: int | None = None) -> Manifest:
+    """Return the manifest of a folder, once all files are as it says.
+
+    Those of a folder are compared once a process.
+
+    Args:
+        folder: the folder.
+        user: who would load them; without it this process's.
+
+    Raises:
+        UnsoundError: there is none, or something differs, or others could have written it.
+    """
+    if why := why_not_trusted(folder, user):
+        raise UnsoundError(why)
+    content, manifest = _parsed(folder, user)
+    if _COMPARED.get(folder) != content:
+        for name, seal in manifest.files.items():
+            if why := _why_another(folder / name, seal, user):
+                raise UnsoundError(f"{name} {why}")
+        _COMPARED[folder] = content
+    return manifest
+
+
+def _parsed(folder: Path, user: int | None) -> tuple[bytes, Manifest]:
+    try:
+        content = read_trusted(folder / MANIFEST, user)
+        document = json.loads(content)
+        files = {str(name): str(seal) for name, seal in document["files"].items()}
+        return content, Manifest([str(stage) for stage in document["stages"]], files)
+    except FileNotFoundError:
+        raise UnsoundError(NEVER) from None
+    except OSError as error:
+        raise UnsoundError(f"{MANIFEST} cannot be read: {error.strerror}") from error
+    except UntrustedFileError as why:
+        raise UnsoundError(f"{MANIFEST} is not trusted: {why}") from why
+    except (ValueError, TypeError, LookupError, AttributeError):
+        raise UnsoundError(f"{MANIFEST} is damaged") from None
+
+
+def _why_another(file: Path, seal: str, user: int | None = None) -> str:
+    try:
+        content = read_trusted(file, user)
+    except FileNotFoundError:
+        return "is gone"
+    except OSError as error:
+        return f"cannot be read: {error.strerror}"
+    except UntrustedFileError as why:
+        return f"is not trusted: {why}"
+    return "" if _seal(content) == seal else "is damaged"
+
+
+def _seal(content: bytes) -> str:
+    return f"{len(content)} {hashlib.sha256(content).hexdigest()}"
+
+
+def why_missing(folder: Path, stages: Collection[str], user: int | None = None) -> str:
+    """Return why kernels of ``stages`` would be compiled again; "" where none would.
+
+    Waits for nothing: while a process compiles into the folder, its files are not compared.
+    """
+    try:
+        with locked(folder, fcntl.LOCK_SH | fcntl.LOCK_NB):
+            return read_manifest(folder, user).why_short_of(stages)
+    except BlockingIOError:
+        return "another process is compiling them"
+    except UnsoundError as why:
+        return str(why)
+
+
+def chosen_folder(stages: Collection[str] = ()) -> tuple[Path | None, str]:
+    """Return the folder that this process has its kernels in, and why not the wanted one.
+
+    Nothing is made. None where none can be used.
+
+    Args:
+        stages: those that must be there where nothing can be written.
+    """
+    reason = ""
+    for folder in places():
+        why = why_not_writable(folder)
+        if not why or not why_missing(folder, stages):
+            return folder, reason
+        reason = reason or why
+    return None, reason
+
+
+@contextmanager
+def locked(
+    folder: Path, operation: int, waiting: Callable[[], None] = lambda: None
+) -> Iterator[None]:
+    """Hold a lock on a folder, see flock(2): shared to read it, exclusive to compile into it.
+
+    A folder that cannot have one, as it is not there or is read-only, is not locked.
+
+    Args:
+        folder: the folder.
+        operation: which lock, and whether to wait for it.
+        waiting: called before it waits.
+
+    Raises:
+        BlockingIOError: another process has it, and this one does not wait.
+    """
+    try:
+        descriptor = os.open(folder / LOCK, os.O_RDONLY | os.O_NOFOLLOW | os.O_CLOEXEC)
+    except OSError:
+        yield
+        return
+    try:
+        try:
+            fcntl.flock(descriptor, operation | fcntl.LOCK_NB)
+        except BlockingIOError:
+            if operation & fcntl.LOCK_NB:
+                raise
+            waiting()
+            fcntl.flock(descriptor, operation)
+        yield
+    finally:
+        os.close(descriptor)
+
+
+@contextmanager
+def compiling_into(folder: Path, waiting: Callable[[], None]) -> Iterator[Manifest]:
+    """Yield the manifest of a folder that is made if need be, while no other process writes it.
+
+    What is not in the manifest, or differs from it, is removed.
+
+    Raises:
+        OSError: the folder cannot be made or written.
+        UnsoundError: others could write it.
+    """
+    make_folder(folder, mode=0o700)
+    if why := why_not_trusted(folder):
+        raise UnsoundError(why)
+    os.close(os.open(folder / LOCK, os.O_WRONLY | os.O_CREAT | os.O_NOFOLLOW | os.O_CLOEXEC, 0o600))
+    with locked(folder, fcntl.LOCK_EX, waiting):
+        yield cleared(folder)
+
+
+def cleared(folder: Path) -> Manifest:
+    """Remove what its manifest does not have, or has otherwise; return what is left.
+
+    Where something is lost no stage counts as complete.
+
+    Raises:
+        OSError: something cannot be removed.
+    """
+    try:
+        _, manifest = _parsed(folder, None)
+    except UnsoundError:
+        manifest = Manifest()
+    names = {path.name for path in folder.iterdir()} - {MANIFEST, LOCK}
+    sound = {
+        name: seal for name, seal in manifest.files.items() if not _why_another(folder / name, seal)
+    }
+    for name in names - set(sound):
+        remove(folder / name)
+    return manifest if sound == manifest.files else Manifest([], sound)
+
+
+def record(folder: Path, manifest: Manifest, stage: str = "") -> None:
+    """Write the manifest of all that is in a folder now, through to the disk.
+
+    Args:
+        folder: the folder, whose lock this process holds.
+        manifest: what was in it before; brought up to date.
+        stage: a stage that is complete by now.
+
+    Raises:
+        OSError: that failed; the manifest before it stays.
+    """
+    for file in folder.iterdir():
+        if file.name in (MANIFEST, LOCK, _NEW):
+            continue
+        content = file.read_bytes()
+        if manifest.files.get(file.name) != (seal := _seal(content)):
+            _sync(file)
+            manifest.files[file.name] = seal
+    if stage:
+        manifest.stages.append(stage)
+    # Their names are on the disk before the list of them.
+    sync_folder(folder)
+    document = {"stages": manifest.stages, "files": dict(sorted(manifest.files.items()))}
+    write_through(folder / _NEW, json.dumps(document, indent=1).encode(), mode=0o600)
+    if (folder / MANIFEST).is_dir():
+        remove(folder / MANIFEST)
+    (folder / _NEW).replace(folder / MANIFEST)
+    sync_folder(folder)
+
+
+def _sync(file: Path) -> None:
+    descriptor = os.open(file, os.O_RDONLY | os.O_CLOEXEC)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
+
+
+def remove(path: Path) -> None:
+    """Remove whatever has this name, if anything.
+
+    Raises:
+        OSError: that failed.
+    """
+    if path.is_dir() and not path.is_symlink():
+        shutil.rmtree(path)
+    else:
+        path.unlink(missing_ok=True)

@@ -1,0 +1,226 @@
+"""The kernel compiler: a process that compiles what is missing, and goes on in a fresh one.
+
+The compiler would keep a gigabyte in the end, and what it has loaded stays in memory: so a process
+that needs kernels starts this one, waits for it, and loads what it leaves. It holds the lock of the
+folder; where it has grown it notes what is compiled and begins again as a fresh process. Kernels
+that are damaged, or that others could have written, count as missing.
+"""
+
+from __future__ import annotations
+
+import logging
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Callable, Collection, Iterator
+from pathlib import Path
+
+from fasaco_edge.errors import ProcessEnded
+from fasaco_edge.host.processes import (
+    available_memory,
+    end_with_parent,
+    python_program,
+    resident_mb,
+)
+from fasaco_edge.kernels.folder import warn_of
+from fasaco_edge.kernels.manifest import (
+    UnsoundError,
+    chosen_folder,
+    cleared,
+    compiling_into,
+    record,
+    why_missing,
+)
+from fasaco_edge.planners.registry import PLANNER_NAMES
+
+LOG = logging.getLogger(__name__)
+
+MODULE = "fasaco_edge.planners.compiling"
+LATTICE, CHANGES, REACH, AREAS = "lattice", "changes of the map", "reachability", "areas"
+WALKS, BOUND = "shortest walks", "lower bound"
+LOCAL_SEARCH, REPAIR, LINE = "local search", "repair", "driven line"
+WINDOWS, SHARES = "windows of the walk", "shares of a fleet"
+# In the order in which they are compiled; what a plan needs comes first.
+_FOR_PLANS = (LATTICE, REACH, WALKS, BOUND, "fasaco", LOCAL_SEARCH, WINDOWS, LINE, REPAIR)
+STAGES = tuple(dict.fromkeys((*_FOR_PLANS, CHANGES, AREAS, SHARES, *PLANNER_NAMES)))
+
+# Where memory is short: beside the daemon's 45 MB within the unit's limit (MemoryHigh=); a fifth of
+# it are pages of libraries, which other processes have, too, or the system takes back. Where there
+# is plenty it does not begin again, which takes a third of the time.
+MOST_MB, PLENTY_MB = 270.0, 2000.0
+# Twenty-five, as measured; a disk that keeps no file as it was written does not go on for ever.
+MOST_RESTARTS = 300
+# Lines that the process prints: one of these words, a tab and a text.
+REASON, STAGE, WARNING = "reason", "stage", "warning"
+
+
+def stages_of_plan(planner: str, *, is_shared: bool = False) -> tuple[str, ...]:
+    """Return the stages that a plan needs, by a planner's name, or for the robots of a fleet."""
+    more = (SHARES,) if is_shared else (planner,) if planner in PLANNER_NAMES else ()
+    return tuple(dict.fromkeys((*_FOR_PLANS, *more)))
+
+
+def stages_of_mission(planner: str, *, has_fleet: bool) -> tuple[str, ...]:
+    """Return the stages that a mission needs, by its planner's name: each takes memory."""
+    spared = {*PLANNER_NAMES, *(() if has_fleet else (SHARES,))} - {planner}
+    return tuple(stage for stage in STAGES if stage not in spared)
+
+
+def compile_missing(
+    report: Callable[[str], None] = lambda _: None, stages: Collection[str] = STAGES
+) -> None:
+    """Compile what is missing of some stages in another process, and wait for it.
+
+    Args:
+        report: called with each stage's name before it begins.
+        stages: names of stages.
+
+    Raises:
+        ProcessEnded: the process failed, or was killed.
+    """
+    if (process := CompilerProcess.start(stages)) is None:
+        return
+    try:
+        for word, text in process.lines():
+            if word == STAGE:
+                report(text)
+            else:
+                LOG.info("compiling the kernels, for minutes: %s", text)
+        process.check()
+    finally:
+        process.close()
+
+
+class CompilerProcess:
+    """The process, as the one that started it sees it."""
+
+    def __init__(self, folder: Path, stages: Collection[str]) -> None:
+        self._process = subprocess.Popen(
+            python_program(MODULE, str(folder), "0", *stages),
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            encoding="utf-8",
+            errors="replace",
+        )
+
+    @classmethod
+    def start(cls, stages: Collection[str] = STAGES) -> CompilerProcess | None:
+        """Start it; None if nothing is missing, or what it compiled would be lost: then say so."""
+        if os.environ.get("NUMBA_DISABLE_JIT", "0") != "0":
+            return None  # kernels run as they are written
+        folder, why = chosen_folder(stages)
+        warn_of(why, folder)
+        if folder is None or not why_missing(folder, stages):
+            return None
+        return cls(folder, stages)
+
+    def lines(self) -> Iterator[tuple[str, str]]:
+        """Yield stages and reasons until it ends; log its warnings."""
+        assert self._process.stdout is not None
+        for line in self._process.stdout:
+            word, _, text = line.rstrip("\n").partition("\t")
+            if word == WARNING:
+                LOG.warning("%s", text)
+            else:
+                yield word, text
+
+    def has_ended(self) -> bool:
+        """Return whether it has ended."""
+        return self._process.poll() is not None
+
+    def check(self) -> None:
+        """Wait for its end.
+
+        Raises:
+            ProcessEnded: it failed, or was killed.
+        """
+        if (code := self._process.wait()) != 0:
+            raise ProcessEnded(
+                f"the kernels were not compiled: the compiler {_ended(code)}",
+                hint="check that 300 MB of memory are free, then try `fasaco-edge warmup`",
+            )
+
+    def close(self) -> None:
+        """End it; the stages that it has compiled stay."""
+        self._process.kill()
+        self._process.wait()
+
+
+def _ended(code: int) -> str:
+    """Return how a process ended, in words."""
+    if code >= 0:
+        return f"ended with {code}"
+    name = signal.Signals(-code).name
+    return f"was killed by {name}" + (", probably out of memory" if name == "SIGKILL" else "")
+
+
+def main() -> None:
+    """Compile what is missing into a folder: its path, how often this has begun, and the stages."""
+    place, restarts, *stages = sys.argv[1:]
+    folder = Path(place)
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+    os.umask(0o077)
+    end_with_parent(os.getppid())
+    logging.basicConfig(level=logging.WARNING, handlers=[_ToStarter()])
+    try:
+        _compile(folder, int(restarts), stages)
+    except UnsoundError as why:
+        _say(WARNING, f"{why}: each process compiles its own kernels")
+    except OSError as error:
+        _say(
+            WARNING,
+            f"{folder} cannot be written: {error.strerror}: each process compiles its own kernels",
+        )
+
+
+def _compile(folder: Path, restarts: int, stages: list[str]) -> None:
+    why = why_missing(folder, stages)
+
+    def waiting() -> None:
+        _say(STAGE, "another process is compiling them")
+
+    with compiling_into(folder, waiting) as manifest:
+        if not manifest.why_short_of(stages):
+            return
+        if not restarts:
+            _say(REASON, why)
+        from fasaco_edge.kernels.jit import compile_into  # noqa: PLC0415
+
+        is_short = available_memory() < PLENTY_MB * 1e6
+
+        def stay_small(compiled: int) -> None:
+            """Go on as a fresh process where this one has grown, and has compiled something."""
+            if is_short and compiled and resident_mb() > MOST_MB and restarts < MOST_RESTARTS:
+                record(folder, manifest)
+                words = (str(folder), str(restarts + 1), *stages)
+                os.execv(sys.executable, python_program(MODULE, *words))
+
+        compile_into(folder, stay_small)
+        from fasaco_edge.planners.warmup import TinyRoom, run_stage  # noqa: PLC0415
+
+        room = TinyRoom()
+        try:
+            for stage in stages:
+                if stage not in manifest.stages:
+                    _say(STAGE, stage)
+                    run_stage(stage, room)
+                    record(folder, manifest, stage)
+        except OSError:
+            cleared(folder)
+            raise
+
+
+class _ToStarter(logging.Handler):
+    """Passes log messages on to the process that started this one."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        _say(WARNING, record.getMessage())
+
+
+def _say(word: str, text: str) -> None:
+    print(f"{word}\t{' '.join(text.splitlines())}", flush=True)
+
+
+if __name__ == "__main__":
+    main()

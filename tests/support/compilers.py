@@ -1,0 +1,36 @@
+"""The kernel compiler of a few small kernels, run as a process of its own."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+
+from fasaco_edge.kernels.manifest import why_missing
+from fasaco_edge.planners.compiling import AREAS, LATTICE, MODULE
+from tests.support.processes import ENVIRONMENT
+
+# They compile within seconds.
+STAGES = (LATTICE, AREAS)
+COMPILE_S = 900.0
+
+
+def compile_into(
+    folder: Path, environment: Mapping[str, str] | None = None
+) -> subprocess.CompletedProcess[str]:
+    """Compile the kernels of ``STAGES`` into a folder."""
+    words = [sys.executable, "-m", MODULE, str(folder), "0", *STAGES]
+    return subprocess.run(
+        words,
+        env=ENVIRONMENT | dict(environment or {}),
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=COMPILE_S,
+    )
+
+
+def why_not_whole(folder: Path) -> str:
+    """Return what a folder lacks of ``STAGES``, or holds beside them; "" for nothing."""
+    return why_missing(folder, STAGES) or ", ".join(file.name for file in folder.glob("*.tmp.*"))
