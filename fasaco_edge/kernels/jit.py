@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import atexit
 import errno
-import fcntl
 import functools
 import logging
 import os
@@ -34,7 +33,6 @@ from fasaco_edge.kernels.manifest import (
     MANIFEST,
     UnsoundError,
     chosen_folder,
-    locked,
     read_manifest,
 )
 
@@ -87,9 +85,7 @@ class _Kept:
                 return
             self._seen, self._why = seen, ""
             try:
-                # Shared: a process that compiles has files that are in no manifest yet.
-                with locked(self.folder, fcntl.LOCK_SH, self._say_waiting):
-                    read_manifest(self.folder)
+                read_manifest(self.folder, waiting=self._say_waiting)
                 self._is_sound = True
             except UnsoundError as why:
                 self._why = str(why)

@@ -51,7 +51,9 @@ class UnsoundError(Exception):
     """Kernels in a folder cannot be used; the text says why."""
 
 
-def read_manifest(folder: Path, user: int | None = None) -> Manifest:
+def read_manifest(
+    folder: Path, user: int | None = None, waiting: Callable[[], None] | None = None
+) -> Manifest:
     """Return the manifest of a folder, once all files are as it says.
 
     Those of a folder are compared once a process.
@@ -59,18 +61,20 @@ def read_manifest(folder: Path, user: int | None = None) -> Manifest:
     Args:
         folder: the folder.
         user: who would load them; without it this process's.
+        waiting: called before it waits for a process that compiles; without it it does not wait.
 
     Raises:
         UnsoundError: there is none, or something differs, or others could have written it.
     """
     if why := why_not_trusted(folder, user):
         raise UnsoundError(why)
-    content, manifest = _parsed(folder, user)
-    if _COMPARED.get(folder) != content:
-        for name, seal in manifest.files.items():
-            if why := _why_another(folder / name, seal, user):
-                raise UnsoundError(f"{name} {why}")
-        _COMPARED[folder] = content
+    with _locked(folder, fcntl.LOCK_SH, waiting):
+        content, manifest = _parsed(folder, user)
+        if _COMPARED.get(folder) != content:
+            for name, seal in manifest.files.items():
+                if why := _why_another(folder / name, seal, user):
+                    raise UnsoundError(f"{name} {why}")
+            _COMPARED[folder] = content
     return manifest
 
 
@@ -112,10 +116,7 @@ def why_missing(folder: Path, stages: Collection[str], user: int | None = None) 
     Waits for nothing: while a process compiles into the folder, its files are not compared.
     """
     try:
-        with locked(folder, fcntl.LOCK_SH | fcntl.LOCK_NB):
-            return read_manifest(folder, user).why_short_of(stages)
-    except BlockingIOError:
-        return "another process is compiling them"
+        return read_manifest(folder, user).why_short_of(stages)
     except UnsoundError as why:
         return str(why)
 
@@ -138,20 +139,13 @@ def chosen_folder(stages: Collection[str] = ()) -> tuple[Path | None, str]:
 
 
 @contextmanager
-def locked(
-    folder: Path, operation: int, waiting: Callable[[], None] = lambda: None
-) -> Iterator[None]:
+def _locked(folder: Path, operation: int, waiting: Callable[[], None] | None) -> Iterator[None]:
     """Hold a lock on a folder, see flock(2): shared to read it, exclusive to compile into it.
 
     A folder that cannot have one, as it is not there or is read-only, is not locked.
 
-    Args:
-        folder: the folder.
-        operation: which lock, and whether to wait for it.
-        waiting: called before it waits.
-
     Raises:
-        BlockingIOError: another process has it, and this one does not wait.
+        UnsoundError: another process compiles into it, and this one does not wait.
     """
     try:
         descriptor = os.open(folder / LOCK, os.O_RDONLY | os.O_NOFOLLOW | os.O_CLOEXEC)
@@ -162,8 +156,8 @@ def locked(
         try:
             fcntl.flock(descriptor, operation | fcntl.LOCK_NB)
         except BlockingIOError:
-            if operation & fcntl.LOCK_NB:
-                raise
+            if waiting is None:
+                raise UnsoundError("another process is compiling them") from None
             waiting()
             fcntl.flock(descriptor, operation)
         yield
@@ -185,7 +179,7 @@ def compiling_into(folder: Path, waiting: Callable[[], None]) -> Iterator[Manife
     if why := why_not_trusted(folder):
         raise UnsoundError(why)
     os.close(os.open(folder / LOCK, os.O_WRONLY | os.O_CREAT | os.O_NOFOLLOW | os.O_CLOEXEC, 0o600))
-    with locked(folder, fcntl.LOCK_EX, waiting):
+    with _locked(folder, fcntl.LOCK_EX, waiting):
         yield cleared(folder)
 
 

@@ -215,8 +215,9 @@ def _recordings_read(folder: Path, is_told: bool) -> None:
 def _warm_up(folder: Path, environment: dict[str, str]) -> tuple[int | None, str]:
     done = compile_into(folder / CACHE / "kernels", environment)
     # Its stages and reasons are no faults.
-    told = [line for line in done.stdout.splitlines() if line.startswith(WARNING)]
-    return done.returncode, "\n".join(told) + done.stderr
+    lines = [line.partition("\t") for line in done.stdout.splitlines()]
+    warnings = [f"WARNING {text}\n" for word, _, text in lines if word == WARNING]
+    return done.returncode, "".join(warnings) + done.stderr
 
 
 def _is_warm(folder: Path, is_told: bool) -> None:
