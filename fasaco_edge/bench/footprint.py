@@ -39,7 +39,7 @@ GOALS = (
     ("ready_s", "ready", 1.5, "s"),
     ("idle_own_mb", "memory before the first map, without pages of files", 32.0, "MB"),
     ("idle_percent", "share of a core, idle", 0.5, "%"),
-    ("warm_own_mb", "memory after map and plan, without pages of files", 175.0, "MB"),
+    ("warm_own_mb", "memory after map and plan, without pages of files", 135.0, "MB"),
     ("mission_percent", "share of a core in a mission", 2.0, "%"),
 )
 # In a mission maps come twice a second, and one in this many shows a change.

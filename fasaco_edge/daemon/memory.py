@@ -32,8 +32,8 @@ ledger is bounded on its own: 34 MB of cells and twice 13 MB of floor, if jumpin
 
 Measured (``python -m tests.campaigns.memory``, x86-64): a path of 440,000 cells takes 127 MB more
 than a mission on a small map, maps of 25 million pixels at 20 Hz 75 MB more, each followed by a map
-update of full size 240 MB, and 50 MB more with a recorder. That mission has 163 MB of its own, 17
-of them for its million pixels, and 270 with pages of libraries, which the system takes back
+update of full size 240 MB, and 50 MB more with a recorder. That mission has 121 MB of its own, 17
+of them for its million pixels, and 228 with pages of libraries, which the system takes back
 (``fasaco-edge bench footprint``): the base has room for what waits for the loop beside maps, 42 MB,
 and for the pages in use.
 """
@@ -51,7 +51,7 @@ from fasaco_edge.wire.topics import QUEUE_LENGTHS
 MB = 1_000_000
 MIB = 1 << 20
 # Interpreter, numpy, Zenoh, compiler, kernels, and the fixed part of a plan.
-BASE_BYTES = 215 * MB
+BASE_BYTES = 180 * MB
 MAPS = 10
 CELL_BYTES = 370
 # Bytes of a pixel of floor: 3 for the floor to sweep and the line's passes over it, 2 more while

@@ -36,20 +36,23 @@ from fasaco_edge.kernels.manifest import (
     read_manifest,
 )
 
-# numba takes settings from .numba_config.yaml in the working folder, which may be anybody's, unless
+# numba takes settings from .numba_config.yaml in the working folder, which others may write, unless
 # it finds no reader of YAML when it is imported.
 warnings.filterwarnings("ignore", "A Numba config file is found")
 _yaml = sys.modules.get("yaml")
 sys.modules["yaml"] = None  # type: ignore[assignment]
 try:
     import numba
+    from llvmlite.binding import parse_bitcode
     from numba.core import event
+    from numba.core.compiler_lock import global_compiler_lock
 finally:
     del sys.modules["yaml"]
     if _yaml is not None:
         sys.modules["yaml"] = _yaml
 
 if TYPE_CHECKING:
+    from numba.core.codegen import CPUCodeLibrary
     from numba.core.dispatcher import Dispatcher
 
 LOG = logging.getLogger(__name__)
@@ -72,6 +75,8 @@ class _Kept:
         warn_of(why, self.folder)
         self.before_each: Callable[[int], None] | None = None
         self.kernels: list[Dispatcher] = []
+        self._packed: list[tuple[CPUCodeLibrary, bytes]] = []
+        self._has_compiled = False
         self._is_sound = False
         self._why, self._seen = "", (0, 0)
         self._looking = threading.Lock()
@@ -91,6 +96,23 @@ class _Kept:
                 self._why = str(why)
             for kernel in self.kernels:
                 _keep(kernel, KernelLocator if self._is_sound else ScratchLocator)
+
+    def pack(self) -> None:
+        """Keep the bitcode of loaded kernels as bytes; the caller holds the compiler's lock."""
+        if self._has_compiled:
+            return
+        for library in [it.library for one in self.kernels for it in one.overloads.values()]:
+            # Private to numba: one without it only takes more memory.
+            if (module := getattr(library, "_shared_module", None)) is not None:
+                self._packed.append((library, module.as_bitcode()))
+                library._shared_module = None
+
+    def unpack(self) -> None:
+        """Parse it again, before the first function is compiled, which may call these kernels."""
+        self._has_compiled = True
+        while self._packed:
+            library, bitcode = self._packed.pop()
+            library._shared_module = parse_bitcode(bitcode)
 
     def log_compiling(self, kernel: Dispatcher) -> None:
         """Log that a kernel is compiled which is not kept; the first time why."""
@@ -189,6 +211,7 @@ class _Compiling(event.Listener):  # type: ignore[misc]
     def on_start(self, event: event.Event) -> None:
         """Let the folder be as it is, unless this process is the one to compile into it."""
         kernel = event.data["dispatcher"]
+        _KEPT.unpack()
         if _KEPT.before_each is not None:
             _KEPT.before_each(self._compiled)
         elif kernel in _KEPT.kernels:
@@ -238,6 +261,19 @@ def _listen() -> None:
 def kernel_folder() -> Path | None:
     """Return the folder that this process has its kernels from; None where none can be used."""
     return _KEPT.folder
+
+
+def pack_loaded() -> None:
+    """Take less memory for the kernels loaded so far: 40 MB less in a mission.
+
+    Beside its machine code, numba keeps the bitcode of each kernel that it loads, parsed, to link
+    it into functions that are compiled later. A mission compiles none, as the warm-up has loaded
+    all: so the bitcode stays as bytes. If a function is compiled after all, as for other types, all
+    bitcode is parsed again before, in a quarter of a second, and kept: that function links these
+    kernels as it would have.
+    """
+    with global_compiler_lock:
+        _KEPT.pack()
 
 
 def compile_into(folder: Path, before_each: Callable[[int], None]) -> None:

@@ -22,6 +22,7 @@ from fasaco_edge.kernels.floor.certain import TILE, FloorTiles, Whereabouts, cer
 from fasaco_edge.kernels.floor.open_floor import pass_line, set_causes, set_open
 from fasaco_edge.kernels.floor.runs import common_runs
 from fasaco_edge.kernels.floor.sweeps import Sweeps
+from fasaco_edge.kernels.jit import pack_loaded
 from fasaco_edge.kernels.lattice.areas import cells_beside, find_areas
 from fasaco_edge.kernels.lattice.pixels import count_free_beside
 from fasaco_edge.kernels.lattice.polygons import add_near, count_in, turn_inside
@@ -71,6 +72,7 @@ def warm_up(report: Callable[[str], None] | None = None, stages: Collection[str]
     for stage in stages:
         report(stage)
         run_stage(stage, room)
+        pack_loaded()
 
 
 def run_stage(stage: str, room: TinyRoom) -> None:

@@ -1,4 +1,4 @@
-"""Compiled kernels are kept and found again, and nobody meets code of other sources."""
+"""Compiled kernels are kept and found again, and code of other sources is never run."""
 
 import os
 import shutil
@@ -78,6 +78,39 @@ def test_code_for_other_types_is_kept_for_one_process(compiled, tmp_path, monkey
     after = sorted((file.name, file.stat().st_mtime_ns) for file in compiled.folder.iterdir())
     assert after == before
     assert list(tmp.iterdir()) == []
+
+
+PACKED = """
+def parsed(): return next(iter(seven.seven.overloads.values())).library._shared_module
+
+assert seven.seven(1) == 7
+assert parsed() is not None
+seven.jit.pack_loaded()
+assert parsed() is None
+"""
+CALLS_IT = """
+@seven.jit.kernel
+def nine(x): return seven.seven(x) + 2 * x
+
+assert nine(1) == 9
+seven.jit.pack_loaded()
+assert parsed() is not None
+"""
+
+
+def test_a_loaded_kernel_is_not_kept_a_second_time(compiled):
+    told = compiled.tell(f"{PACKED}\nseven.tell()")
+    assert (told.loaded, told.compiled, told.warnings) == (2, 0, [])
+
+
+def test_a_loaded_kernel_is_called_by_one_compiled_later(compiled):
+    told = compiled.tell(f"{PACKED}{CALLS_IT}\nseven.tell()")
+    assert (told.loaded, told.compiled, told.warnings) == (2, 0, [])
+
+
+def test_a_loaded_kernel_is_compiled_for_other_types_later(compiled):
+    told = compiled.tell(f"{PACKED}\nseven.tell(1.5); seven.tell()")
+    assert (told.loaded, told.compiled, told.warnings) == (1, 3, [])
 
 
 def test_other_types_are_added_by_who_compiles(compiled):
