@@ -11,7 +11,7 @@ from fasaco_edge.grid.geometry import GridGeometry, Pose2D
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.mission.config import Dock, Place
 from fasaco_edge.mission.core.events import MapReceived
-from fasaco_edge.mission.map.standing_places import PERIOD_S, IdlePlaces
+from fasaco_edge.mission.map.idle_places import PERIOD_S, IdlePlaces
 from fasaco_edge.mission.orders.keep_outs import KeepOut
 from fasaco_edge.mission.orders.mask import inline_grid, inline_mask
 from fasaco_edge.mission.orders.order_state import OrderState

@@ -47,10 +47,10 @@ from fasaco_edge.mission.coverage.swept_floor import SweptFloor
 from fasaco_edge.mission.coverage.tool_sight import ToolSight
 from fasaco_edge.mission.coverage.unreached import Unreached
 from fasaco_edge.mission.line.layer import FloorToSweep, LineLayer
+from fasaco_edge.mission.map.idle_places import IdlePlaces
 from fasaco_edge.mission.map.inputs import InputMonitor
 from fasaco_edge.mission.map.map_state import MapState
 from fasaco_edge.mission.map.reachable_area import ReachableArea
-from fasaco_edge.mission.map.standing_places import IdlePlaces
 from fasaco_edge.mission.orders.mask import mask_frame
 from fasaco_edge.mission.orders.order_state import OrderState
 from fasaco_edge.mission.orders.sequencer import Sequencer

@@ -1,0 +1,150 @@
+"""Places without effect: keep-outs that touch no free ground of the map, home or dock beside it.
+
+So are places given in another unit, with a wrong sign, or a mask with a wrong origin. A zone of an
+order is refused there; these hold for maps to come, too, and a map may still grow.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from fasaco_edge.grid.geometry import GridGeometry, Polygon, Window, polygon_bounds
+from fasaco_edge.grid.occupancy import OccupancyGrid
+from fasaco_edge.mission.config import MissionConfig
+from fasaco_edge.mission.orders.mask import mask_frame, mask_polygons
+from fasaco_edge.mission.orders.order_state import OrderState
+from fasaco_edge.mission.orders.zones import near_polygons
+
+# Least time between two looks [s]: a map that grows changes often.
+PERIOD_S = 1.0
+# Most pixels of a look, and as how many each polygon counts beside its own: some tens of
+# milliseconds.
+MOST_PIXELS, POLYGON_PIXELS = 1_000_000, 500
+# Most places that are named.
+MOST_NAMED = 5
+
+_Named = tuple[str, tuple[Polygon, ...]]
+
+
+class IdlePlaces:
+    """Finds places that have no effect on a map; used from one thread.
+
+    Args:
+        config: of the mission, with the places in the map frame.
+    """
+
+    def __init__(self, config: MissionConfig) -> None:
+        policy = config.policy
+        self._footprint = config.footprint
+        self._standing: list[_Named] = [
+            (f"mission.keep_out[{index}]", (polygon,))
+            for index, polygon in enumerate(policy.keep_out)
+        ]
+        self._points = [
+            (f"mission.{name}", (place.x_m, place.y_m))
+            for name, place in (("home", policy.home), ("dock", policy.dock))
+            if place is not None
+        ]
+        self._blank = ""
+        if mask := policy.keep_out_mask:
+            polygons = mask_polygons(mask)
+            self._standing += [("keep_out_mask", polygons)] if polygons else []
+            # One that comes as a message may be blank for a while.
+            if not polygons and not mask_frame(mask):
+                self._blank = "no pixel of mission.keep_out_mask is occupied"
+        # Keep-outs that have been found to have an effect, on maps of a frame.
+        self._frame, self._used = "", set[_Named]()
+        self._key: tuple[object, ...] = ()
+        self._looked_at, self._said = float("-inf"), ""
+
+    def look(
+        self, grid: OccupancyGrid, revision: int, order: OrderState, now: float, *, is_theirs: bool
+    ) -> str:
+        """Return which places have no effect, and why; "" if all have.
+
+        Args:
+            grid: the newest map.
+            revision: counter of its states.
+            order: the order, with the operator's keep-outs.
+            now: time [s].
+            is_theirs: whether the places of the configuration belong to this map.
+        """
+        asked = order.order.as_given.keep_out if order.order else ()
+        key = revision, asked, order.keep_out, is_theirs
+        if key == self._key or now - self._looked_at < PERIOD_S:
+            return self._said
+        self._key, self._looked_at = key, now
+        if grid.frame != self._frame:
+            self._frame, self._used = grid.frame, set()
+        areas = self._standing if is_theirs else []
+        areas = areas + [(f"order.keep_out[{index}]", (each,)) for index, each in enumerate(asked)]
+        areas += [(f"keep-out {each.name!r}", (each.polygon,)) for each in order.keep_out]
+        self._said = "; ".join(self._texts(grid, areas, is_theirs=is_theirs))
+        return self._said
+
+    def _texts(self, grid: OccupancyGrid, areas: list[_Named], *, is_theirs: bool) -> Iterator[str]:
+        idle, spent = [], 0
+        for area in areas:
+            if area in self._used:
+                continue
+            for polygon in area[1]:
+                pixels = _Pixels.of(polygon, grid.geometry, self._footprint.robot_radius_m)
+                spent += POLYGON_PIXELS + pixels.window.rows * pixels.window.cols
+                # What is left is not looked at, and taken for used on this map.
+                if spent > MOST_PIXELS or pixels.touch_free(grid, self._footprint.free_at_most):
+                    self._used.add(area)
+                    break
+            else:
+                idle.append(area[0])
+        if idle:
+            yield f"no free ground of the map so far lies in or beside {_listed(idle)}"
+        x0, y0, x1, y1 = grid.geometry.bounds()
+        outside = [name for name, (x, y) in self._points if not (x0 <= x <= x1 and y0 <= y <= y1)]
+        if outside and is_theirs:
+            yield f"outside of the map so far: {_listed(outside)}"
+        if self._blank and is_theirs:
+            yield self._blank
+
+
+@dataclass(frozen=True, slots=True)
+class _Pixels:
+    """The pixels of a map in a polygon and near it.
+
+    Attributes:
+        corners: the polygon (col, row) [pixels].
+        reach: how near [pixels].
+        window: around them, on the map.
+    """
+
+    corners: Polygon
+    reach: float
+    window: Window
+
+    @classmethod
+    def of(cls, polygon: Polygon, geometry: GridGeometry, near_m: float) -> _Pixels:
+        corners = tuple(geometry.to_pixels(x, y) for x, y in polygon)
+        reach = 0.5 + near_m / geometry.resolution
+        x0, y0, x1, y1 = polygon_bounds(corners)
+        row0, row1 = _span(y0 - reach, y1 + reach, geometry.rows)
+        col0, col1 = _span(x0 - reach, x1 + reach, geometry.cols)
+        return cls(corners, reach, Window(row0, col0, row1, col1))
+
+    def touch_free(self, grid: OccupancyGrid, free_at_most: int) -> bool:
+        """Return whether one of them is free."""
+        window = self.window
+        values = grid.cells[window.row0 : window.row1, window.col0 : window.col1]
+        free = (values >= 0) & (values <= free_at_most)
+        return bool(
+            free.any() and (free & near_polygons((self.corners,), window, 1.0, self.reach)).any()
+        )
+
+
+def _span(low: float, high: float, size: int) -> tuple[int, int]:
+    first = int(min(max(low, 0.0), size))
+    return first, max(first, int(min(max(high + 1.0, 0.0), size)))
+
+
+def _listed(names: list[str]) -> str:
+    more = len(names) - MOST_NAMED
+    return ", ".join(names[:MOST_NAMED]) + (f" and {more} more" if more > 0 else "")
