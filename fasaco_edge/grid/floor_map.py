@@ -36,8 +36,7 @@ from fasaco_edge.grid.lattice import (
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.grid.reach import REACH_CELLS, REACH_PX, Reach
 from fasaco_edge.grid.tool_reach import tool_reach, tool_steps
-from fasaco_edge.kernels.floor.bits import WORD, Bits, packed, unpacked
-from fasaco_edge.kernels.floor.capsule import is_clear
+from fasaco_edge.kernels.floor.bits import WORD, Bits, unpacked
 from fasaco_edge.kernels.floor.places import (
     disc_rows,
     keep_in_cells,
@@ -170,22 +169,6 @@ class FloorMap:
         other.shift, other.touched = None, Window(0, 0, geometry.rows, geometry.cols)
         return other
 
-    def touches_keep_out(self, a: NDArray[np.float64], b: NDArray[np.float64]) -> bool:
-        """Return whether the robot touches a keep-out polygon straight between two points.
-
-        Args:
-            a, b: the points, (2,): y, x [pixels]. What else is blocked between them does not count.
-        """
-        if not self._keep_out:
-            return False
-        radius = self.discs.radius_m / self.geometry.resolution
-        low = np.floor(np.minimum(a, b) - radius).astype(int) - 1
-        high = np.ceil(np.maximum(a, b) + radius).astype(int) + 2
-        part = Window(*low.tolist(), *high.tolist())
-        touched = packed(self._polygons().touched(part), beyond=False)
-        (ay, ax), (by, bx) = a - low, b - low
-        return not is_clear(touched, ay, ax, by, bx, radius)
-
     def stand_xy(self, cell: Cell) -> Point | None:
         """Return the stand of a cell, x, y [m]; None for none."""
         lattice = self.stands.lattice
@@ -269,7 +252,10 @@ class FloorMap:
         rows = self.geometry.rows
         keep_out = None
         if self._keep_out:
-            keep_out = self._polygons().touched
+            if self._kept_out is None or self._kept_out[0] != self.geometry:
+                kept_out = PolygonsOnRaster.of(self._keep_out, self.geometry)
+                self._kept_out = self.geometry, kept_out
+            keep_out = self._kept_out[1].touched
         free_at_most = self.discs.free_at_most
         seen = blocked_pixels(grid, self.geometry, parts, free_at_most, (first, end), keep_out)
         disc = disc_rows(self.discs.radius_m / self.geometry.resolution)
@@ -280,12 +266,6 @@ class FloorMap:
         low, high = max(first - len(disc), 0), min(end + len(disc), rows)
         places = places_of(self.blocked[low:high], disc)
         self.places[first:end] = places[first - low : end - low]
-
-    def _polygons(self) -> PolygonsOnRaster:
-        """Return the keep-out polygons, one or more, on the raster."""
-        if self._kept_out is None or self._kept_out[0] != self.geometry:
-            self._kept_out = self.geometry, PolygonsOnRaster.of(self._keep_out, self.geometry)
-        return self._kept_out[1]
 
     def _compared(self, before: CoverageLattice) -> LatticeChange:
         """Keep the previous lattice object if no cell has changed, though a stand may have."""

@@ -8,8 +8,6 @@ Read in this order:
     core/order_changes   begins orders, and carries out commands
     core/executive       then decides what the robot does next: a list of rules, in their order
     core/resting, errands, order_work, shut_in   the rules' contents
-    core/way_out         back along the track where the map shuts the robot in
-    core/back_out        the same inside a wall of the map, whatever the map shows
     core/route           owns the path and the pending plan; better paths in spare time
 
     map/map_state        owns the map, the robot's cell and the reachable area

@@ -181,10 +181,6 @@ class Waiting:
         """Return the next metres, from the robot's place on, points (x, y) [m], float64 (n, 2)."""
         return np.zeros((0, 2))
 
-    def discs(self) -> NDArray[np.float64]:
-        """Return what keeps clear of others, float64 (k, 3): x, y, radius [m]; by the last look."""
-        return np.zeros((0, 3))
-
     def look_around(self, now: float) -> None:
         """Note whether another robot is near."""
 

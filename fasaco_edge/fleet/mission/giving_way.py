@@ -118,10 +118,6 @@ class GivingWay(Waiting):
         is_held = self.waits_for and self._route.aside is not None
         return self._held if is_held else self._route.path.ahead
 
-    def discs(self) -> Points:
-        """Return where the middle of this robot is too near to others, as ``Route.beside``."""
-        return discs(self._radius_m, self._neighbours)
-
     def look_around(self, now: float) -> None:
         """Note whether another robot is near: then all publish more often, even at rest."""
         pose = self._map.pose

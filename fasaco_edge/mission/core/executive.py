@@ -76,9 +76,7 @@ class Executive:
             self.ledger, self.monitor, self.orders, self.route, self.line, standing
         )
         self._resting = Resting(self.map, self.orders, self.charging, self.dock, self.mask_frame)
-        self._shut_in = shut_in = ShutIn(
-            self.map, self.orders, self.route, self.way_out, self.giving_way
-        )
+        self._shut_in = shut_in = ShutIn(self.map, self.orders, self.route, self.way_out)
         self._errands = Errands(*driven, self.charging, standing, self._resting, shut_in)
         self._work = OrderWork(*driven, self.line, self.trail, self.company, self._errands, shut_in)
         self.troubles = Troubles(
@@ -117,7 +115,7 @@ class Executive:
     def decide(self, now: float) -> Decision:
         """Return the decision at ``now`` [s]: that of the first rule that has an answer."""
         self._now, self._update = now, None
-        self.way_out.begin_step()
+        self.way_out.end()
         doing = next(doing for rule in RULES if (doing := rule(self)) is not None)
         self._state, self._reason = doing.state, doing.reason
         self.troubles.look(self.doing, now)

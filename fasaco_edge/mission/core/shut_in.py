@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from fasaco_edge.grid.lattice import Cell
-from fasaco_edge.mission.company import Waiting
 from fasaco_edge.mission.core.events import PathUpdate, State
 from fasaco_edge.mission.core.resting import Doing
 from fasaco_edge.mission.core.route import Route
@@ -23,7 +22,6 @@ class ShutIn:
     orders: Sequencer
     route: Route
     way_out: WayOut
-    others: Waiting
 
     def lead_out(
         self, why: str, update: PathUpdate | None, now: float, goal: Cell | None = None
@@ -46,7 +44,7 @@ class ShutIn:
         def leads_on(area: ReachableArea) -> bool:
             return area.contains(goal) if goal else not self.orders.is_shut_in(area)
 
-        way = self.way_out.lead(leads_on, why, now, self.others.discs())
+        way = self.way_out.lead(leads_on, why, now)
         back = f"{why}: drives back along its track"
         if way is not None:
             reason = back if len(way) else why

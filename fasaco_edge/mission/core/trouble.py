@@ -6,6 +6,7 @@ with a trouble is ``degraded``; a state at rest stays as it is.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
@@ -25,9 +26,8 @@ from fasaco_edge.mission.map.map_state import MapState
 # Longest time between poses of a robot at rest, which may exceed ``lost_pose_s``; also the time to
 # wait for the first map and pose [s].
 REST_S = 30.0
-
-# Why a robot stands that was led back along its track as far as it may.
-STILL_INSIDE = "inside a wall of the map: backed out, and still does not fit: waits for a new map"
+# How long a robot may stand where the map says it cannot be before that is a trouble [s].
+INSIDE_S = 20.0
 
 # States of a robot that drives, or soon will.
 DRIVING = frozenset((State.PLANNING, State.COVERING, State.RETURNING))
@@ -85,6 +85,8 @@ class Troubles:
     blocked: BlockedFollower
     found: tuple[Trouble, ...] = field(default=(), init=False)
     _current: DockCurrent = field(init=False)
+    # The last time that it was where it can be, or at rest [s].
+    _inside_since: float = field(default=math.inf, init=False)
 
     def __post_init__(self) -> None:
         self._current = DockCurrent(self.charging.gauge)
@@ -155,14 +157,14 @@ class Troubles:
         why = self._current.why_none(now)
         return f"in the dock the battery, at {level:.0%}, does not charge: {why}" if why else ""
 
-    def shut_in(self, *_: object) -> str:
-        """Return what shuts the robot in; "" for one whose pose is no place for it.
-
-        Once it has backed out of a wall, its pose is one.
-        """
-        if self.way_out.has_given_up:
-            return STILL_INSIDE
-        return self.way_out.why if self.map.area is not None else ""
+    def shut_in(self, _: State, now: float) -> str:
+        """Return what shuts the robot in, or that it has stood for some time where it cannot be."""
+        why = self.way_out.why
+        if self.map.area is not None or not why:
+            self._inside_since = now
+            return why
+        self._inside_since = min(self._inside_since, now)
+        return f"{why}: pose or map is off" if now - self._inside_since > INSIDE_S else ""
 
     def stands(self, _: State, now: float) -> str:
         """Return why the robot is thought to be stuck; without poses that is not known."""

@@ -2,7 +2,7 @@
 
 Where the hull has stood, it fits. Walls get thicker by a pixel from map to map, and legs of chairs
 come and go: a gap that the robot has just driven through may be too narrow on the next map. Then it
-leaves as it came, with a smaller margin; out of a wall of the map see ``BackOut``.
+leaves as it came, with a smaller margin.
 """
 
 from __future__ import annotations
@@ -18,20 +18,25 @@ from numpy.typing import NDArray
 from fasaco_edge.grid.fine_raster import map_to_raster
 from fasaco_edge.grid.floor_map import FloorMap
 from fasaco_edge.grid.geometry import Point, Pose2D
-from fasaco_edge.mission.core.back_out import INTO_POINTS, NO_WAY, STANDING_M, BackOut
 from fasaco_edge.mission.core.route import Route
-from fasaco_edge.mission.line.lead_out import LEAST_SHARE, fitting_radius, squeezed_radius
+from fasaco_edge.mission.line.lead_out import LEAST_SHARE, fitting_radius
 from fasaco_edge.mission.line.way import is_clear_between
 from fasaco_edge.mission.map.map_state import MapState
 from fasaco_edge.mission.map.reachable_area import ReachableArea
 
 # The track is kept over this length, as points so far apart [m].
 TRACK_M, SPACING_M = 40.0, 0.05
-# A robot that has not come on by STANDING_M on its way out after this time [s] cannot drive it. It
+# On the way out the robot comes so much nearer to walls [pixels of the map]: a wall may be mapped
+# a pixel thicker than it is, and the pose be off by half of one.
+SQUEEZE_PX = 1.5
+# A robot that has not come this far [m] on its way out after this time [s] cannot drive it. It
 # tries again after as long, then after twice as long each time, until it has come that far.
-STANDING_S = 15.0
+STANDING_M, STANDING_S = 0.1, 15.0
+# It leads on by so many points of the track once the robot can go on.
+INTO_POINTS = 4
 # Longest loops that are left out first, in points of the track.
 LEAPS = (256, 128, 64, 32, 16, 8, 4, 2)
+NO_WAY: NDArray[np.float64] = np.empty((0, 2))
 
 
 class WayOut:
@@ -45,7 +50,6 @@ class WayOut:
         self.why = ""
         self._map, self._route = map_state, route
         self._track: deque[Point] = deque(maxlen=round(TRACK_M / SPACING_M))
-        self._back_out = BackOut(map_state, self._track)
         # Where the way leads to, and the floor on which it was looked for.
         self._to: Point | None = None
         self._seen: tuple[FloorMap | None, int] = None, 0
@@ -57,38 +61,23 @@ class WayOut:
     def note_pose(self, pose: Pose2D) -> None:
         """Note where the robot is."""
         here = pose.x, pose.y
-        self._back_out.note_pose(here)
-        if self._back_out.is_begun:
-            return  # the track ends where it is taken back
         if not self._track or math.dist(here, self._track[-1]) >= SPACING_M:
             self._track.append(here)
 
     def succeed(self, before: WayOut) -> None:
         """Go on with the track that another mission has kept."""
-        self._track.extend(before._track)
-        self._back_out.succeed(before._back_out)
+        self._track = before._track
 
-    def begin_step(self) -> None:
-        """Begin another step: nothing shuts the robot in until ``lead`` says so."""
+    def end(self) -> None:
+        """Note that nothing shuts the robot in."""
         self.why = ""
-        self._back_out.begin_step()
-
-    @property
-    def has_given_up(self) -> bool:
-        """Whether it has backed out of a wall as far as it may, and still does not fit."""
-        return bool(self.why) and self._back_out.has_given_up
 
     def begin_anew(self) -> None:
         """Forget the track: the robot was carried, or drove it on another map."""
         self._track.clear()
-        self._back_out.end()
 
     def lead(
-        self,
-        leads_on: Callable[[ReachableArea], bool],
-        why: str,
-        now: float,
-        others: NDArray[np.float64],
+        self, leads_on: Callable[[ReachableArea], bool], why: str, now: float
     ) -> NDArray[np.float64] | None:
         """Return the way to publish, float64 (n, 2): x, y [m]; None to go on as before.
 
@@ -98,43 +87,24 @@ class WayOut:
             leads_on: whether the robot can go on in an area.
             why: what shuts it in.
             now: the time [s].
-            others: other robots, as ``Waiting.discs``: out of a wall it comes no nearer to them.
         """
         self.why = why
-        stamped, drives = self._map.pose, self._route.is_way_out
+        floor, stamped, drives = self._map.floor, self._map.pose, self._route.is_way_out
         assert stamped is not None
         here = stamped.pose.x, stamped.pose.y
         has_moved = math.dist(here, self._place) > STANDING_M
         if has_moved:
             self._place, self._since, self._tries = here, now, 0
         waits_s = now - self._since
+        seen, self._seen = self._seen, (floor, floor.revision if floor else 0)
         if drives and waits_s > STANDING_S:
             self._since, self._tries = now, self._tries + 1
             return NO_WAY
         if self._tries and not drives and waits_s <= STANDING_S * 2 ** (self._tries - 1):
             return None
-        way = self._look(leads_on, now, drives=drives, has_moved=has_moved)
-        if self._to is not None:
-            self._back_out.end()
-            return way
-        out = self._back_out.lead(here, now, others, drives=drives)
-        return way if out is None else out
-
-    def _look(
-        self,
-        leads_on: Callable[[ReachableArea], bool],
-        now: float,
-        *,
-        drives: bool,
-        has_moved: bool,
-    ) -> NDArray[np.float64] | None:
-        """Look for a way if the floor has changed, or the robot has come to another place."""
-        floor = self._map.floor
-        seen, self._seen = self._seen, (floor, floor.revision if floor else 0)
         is_same_floor = seen[0] is floor and seen[1] == self._seen[1]
         knows_none = self._to is None and not (has_moved or self._tries)
-        is_out = drives and self._to is None and not self._back_out.is_begun
-        if is_same_floor and (drives or knows_none) and not is_out:
+        if is_same_floor and (drives or knows_none):
             return None
         way = self.find(leads_on)
         to, self._to = self._to, tuple(way[-1].tolist()) if len(way) else None
@@ -158,7 +128,8 @@ class WayOut:
         way = [here, *reversed(self._track)]
         raster = [np.array(map_to_raster(floor.geometry, x, y)) for x, y in way]
         full_px = floor.discs.radius_m / floor.geometry.resolution
-        radius = squeezed_radius(floor, self._map.grid.geometry.resolution)
+        squeeze_px = SQUEEZE_PX * self._map.grid.geometry.resolution / floor.geometry.resolution
+        radius = max(full_px - squeeze_px, LEAST_SHARE * full_px)
         radius = min(radius, fitting_radius(floor, raster[0]))
         if radius < LEAST_SHARE * full_px:
             return NO_WAY

@@ -151,9 +151,7 @@ class LineLayer:
         self._credit(passed)
         if self._orders.cells.keeps_passed:
             self._note_passed(passed)
-        # Inside a wall a robot without a path is on no line: its cell may be beyond the wall.
-        drives = len(self._route.path.cells) > 0
-        is_on_it = ahead.is_followed and len(path.cells) > 0 and (drives or ahead.fits)
+        is_on_it = ahead.is_followed and len(path.cells) > 0
         row, col = path.cells[path.index].tolist() if is_on_it else (0, 0)
         self._map.follow_path((row, col) if is_on_it else None)
 

@@ -18,9 +18,6 @@ from fasaco_edge.mission.line.way import is_clear_between
 
 # A robot nearer to an obstacle than this share of its radius has a wrong pose.
 LEAST_SHARE = 0.5
-# A way out may lead so much nearer to walls [pixels of the map]: a wall may be mapped a pixel
-# thicker than it is, and the pose be off by half of one.
-SQUEEZE_PX = 1.5
 # Number of nearest places tried for one with a straight, free way.
 TRIED = 64
 # Precision of a radius [pixels].
@@ -45,17 +42,6 @@ def fitting_radius(floor: FloorMap, here: Points) -> float:
         else:
             too_large = middle
     return fits
-
-
-def squeezed_radius(floor: FloorMap, pixel_m: float) -> float:
-    """Return the radius of a disc with which a robot drives out where it is shut in [pixels].
-
-    Args:
-        floor: the floor.
-        pixel_m: a pixel of the map [m].
-    """
-    full = floor.discs.radius_m / floor.geometry.resolution
-    return max(full - SQUEEZE_PX * pixel_m / floor.geometry.resolution, LEAST_SHARE * full)
 
 
 def leads_out(floor: FloorMap, here: Points, to: Points) -> bool:

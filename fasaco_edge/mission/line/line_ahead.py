@@ -18,7 +18,7 @@ from fasaco_edge.grid.fine_raster import map_to_raster, raster_to_map, raster_to
 from fasaco_edge.grid.floor_map import FloorMap
 from fasaco_edge.grid.geometry import GridGeometry, Point, Pose2D, Window
 from fasaco_edge.kernels.floor.line import LEAST_EDGE
-from fasaco_edge.mission.line.lead_out import LEAST_SHARE, fitting_radius, lead_out, leads_out
+from fasaco_edge.mission.line.lead_out import fitting_radius, lead_out, leads_out
 from fasaco_edge.mission.line.offset import Beside
 from fasaco_edge.mission.line.pieces import Joiner, Piece, exchanged, kept_pieces
 from fasaco_edge.mission.line.place_on_line import (
@@ -300,12 +300,6 @@ class LineAhead:
     def is_followed(self) -> bool:
         """Whether the robot is on the line, within half the tool."""
         return self._place.is_on(self.line.points, self._tool)
-
-    @property
-    def fits(self) -> bool:
-        """Whether the robot is not so near to an obstacle that its pose is wrong."""
-        here, most = self._place.here, self._floor.discs.radius_m / self._floor.geometry.resolution
-        return is_clear_between(self._floor, here, here, LEAST_SHARE * most)
 
     @property
     def here(self) -> Point:

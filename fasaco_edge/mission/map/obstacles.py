@@ -103,12 +103,6 @@ class Obstacles:
             self._past += due
         return bool(due)
 
-    def discs(self) -> NDArray[np.float64]:
-        """Return what the robot's middle keeps out of, float64 (n, 3): x, y, radius [m]."""
-        far_m = self._radius_m + MARGIN_M
-        points = [(*point, far_m) for one in self._closed for point in one.points]
-        return np.array(points, np.float64).reshape(-1, 3)
-
     def on(self, grid: OccupancyGrid) -> OccupancyGrid:
         """Return a map with the obstacles on it; the same without any, or if it is too large."""
         if not self._closed or grid.cells.size > MOST_PIXELS:

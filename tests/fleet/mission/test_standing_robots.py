@@ -16,8 +16,6 @@ from fasaco_edge.grid.lattice import CoverageLattice
 from fasaco_edge.mission.core.events import MapReceived, MemberHeard
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
 from fasaco_edge.mission.map.reachable_area import ReachableArea
-from tests.mission import line_robot
-from tests.mission.test_shut_in import inside_niche
 from tests.mission.world import CONFIG, Drive, building, pose_at, with_policy
 
 CELL_M, RADIUS_M = 0.25, 0.1
@@ -222,11 +220,3 @@ def test_one_that_makes_way_drives_to_the_middle_of_its_refuge():
     assert len(drive.mission.route.path.cells)
     drive.tell(pose_at(*last.tolist()), over, after=1.0)
     assert not len(drive.mission.route.path.cells)
-
-
-@pytest.mark.parametrize(("x", "may"), [(4.3, False), (2.0, True)], ids=["in the way", "elsewhere"])
-def test_a_robot_backs_out_of_a_wall_past_no_other(x, may):
-    robot = inside_niche(replace(line_robot.CONFIG, company=FleetKind("r1")))
-    for _ in range(200):
-        robot.step(replace(member(x, 1.5), state="done"))
-    assert (robot.x < 4.5) == may
