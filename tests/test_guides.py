@@ -87,3 +87,20 @@ def test_each_file_that_a_guide_names_is_there(guide):
     assert len(named) > 20
     folders = ROOT, ROOT / "fasaco_edge"
     assert [name for name in named if not any((at / name).is_file() for at in folders)] == []
+
+
+@pytest.mark.parametrize("guide", ["CONTRIBUTING.md"])
+def test_each_function_that_a_guide_names_is_there(guide):
+    text = re.sub(r"```.*?```", "", (ROOT / guide).read_text(encoding="utf-8"), flags=re.S)
+    spans = re.findall(r"`([^`]*)`", text)
+    names = {name for span in spans for name in re.findall(r"\b([a-zA-Z_]\w*)\(", span)}
+    sources = "".join(
+        file.read_text(encoding="utf-8")
+        for folder in ("fasaco_edge", "tests")
+        for file in (ROOT / folder).rglob("*.py")
+    )
+    unknown = {
+        name for name in names if not re.search(rf"(?:def|class) {name}\b|\b{name} = ", sources)
+    }
+    assert names
+    assert unknown <= {"f", "partial"}

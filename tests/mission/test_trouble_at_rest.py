@@ -91,11 +91,13 @@ def test_each_resting_state_reports_silence_within_a_minute(state, kind):
     assert (drive.mission.state, codes(drive)) == (state, [])
     live(drive, A_MINUTE_S, without=kind, rise=0.001)
     assert drive.mission.state is state, "what it does stays in sight"
-    assert codes(drive) == [SILENT[kind]]
+    # The blocked one stands on a pixel that the map shows as occupied.
+    inside = ["shut_in"] if state is State.BLOCKED else []
+    assert codes(drive) == [SILENT[kind], *inside]
     assert not drive.walk
     if kind != "battery":
         live(drive, 1, rise=0.001)
-        assert codes(drive) == []
+        assert codes(drive) == inside
 
 
 @pytest.mark.parametrize("kind", SILENT)

@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 
 from fasaco_edge.grid.lattice import Cell
 from fasaco_edge.mission.core.charging import Charging
+from fasaco_edge.mission.core.doing import Doing
 from fasaco_edge.mission.core.events import PathUpdate, State
-from fasaco_edge.mission.core.resting import Doing, Resting
+from fasaco_edge.mission.core.resting import Resting
 from fasaco_edge.mission.core.route import NO_CELLS, Route
 from fasaco_edge.mission.core.shut_in import ShutIn
 from fasaco_edge.mission.core.standing import Standing

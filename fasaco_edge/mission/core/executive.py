@@ -9,12 +9,13 @@ from fasaco_edge.grid.lattice import Cell
 from fasaco_edge.mission.company import Company, Waiting
 from fasaco_edge.mission.core.blocked_follower import BlockedFollower
 from fasaco_edge.mission.core.charging import Charging
+from fasaco_edge.mission.core.doing import Doing
 from fasaco_edge.mission.core.errands import Errands
 from fasaco_edge.mission.core.events import Decision, PathUpdate, State
 from fasaco_edge.mission.core.in_dock import InDock
 from fasaco_edge.mission.core.order_work import OrderWork
 from fasaco_edge.mission.core.path_checks import PathChecks
-from fasaco_edge.mission.core.resting import Doing, Resting
+from fasaco_edge.mission.core.resting import Resting
 from fasaco_edge.mission.core.route import Route
 from fasaco_edge.mission.core.shut_in import ShutIn
 from fasaco_edge.mission.core.standing import Standing

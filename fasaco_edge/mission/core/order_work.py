@@ -9,9 +9,9 @@ import numpy as np
 from fasaco_edge.errors import NothingToCover
 from fasaco_edge.grid.lattice import Cell
 from fasaco_edge.mission.company import Company
+from fasaco_edge.mission.core.doing import Doing
 from fasaco_edge.mission.core.errands import NO_WAY, Errands
 from fasaco_edge.mission.core.events import PathUpdate, State
-from fasaco_edge.mission.core.resting import Doing
 from fasaco_edge.mission.core.route import Route
 from fasaco_edge.mission.core.shut_in import ShutIn
 from fasaco_edge.mission.core.trail_layer import TrailLayer

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
 
 from fasaco_edge.mission.core.charging import Charging
-from fasaco_edge.mission.core.events import PathUpdate, PlanRequest, State
+from fasaco_edge.mission.core.events import State
 from fasaco_edge.mission.core.in_dock import InDock
 from fasaco_edge.mission.map.map_state import MapState
 from fasaco_edge.mission.orders.sequencer import Sequencer
@@ -73,19 +72,3 @@ class Resting:
         if not self.charging.gauge.power and self.dock.is_near():
             return State.BLOCKED, "near the dock: waits for the battery to say if it charges"
         return None
-
-
-class Doing(NamedTuple):
-    """The mission's activity.
-
-    Attributes:
-        state: of the mission.
-        reason: why; "" for the number of the path.
-        path: a path to publish.
-        plan: a plan to make.
-    """
-
-    state: State
-    reason: str
-    path: PathUpdate | None = None
-    plan: PlanRequest | None = None

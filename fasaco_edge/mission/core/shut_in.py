@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from fasaco_edge.grid.lattice import Cell
+from fasaco_edge.mission.core.doing import Doing
 from fasaco_edge.mission.core.events import PathUpdate, State
-from fasaco_edge.mission.core.resting import Doing
 from fasaco_edge.mission.core.route import Route
 from fasaco_edge.mission.core.way_out import WayOut
 from fasaco_edge.mission.map.map_state import MapState
