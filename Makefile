@@ -12,7 +12,7 @@ WORKERS ?= $(shell n=$$(nproc); echo $$((n < 3 ? 3 * n : 8)))
 # As images for containers set it, each of some hundred processes would compile all sources anew.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo test properties check format contract bench lab lab-install wheelhouse clean
+.PHONY: demo test quick properties check format contract bench lab lab-install wheelhouse clean
 
 demo: $(STAMP)  ## watch a robot cover a building nobody mapped before
 	$(BIN)/fasaco-edge demo $(ARGS)
@@ -25,6 +25,10 @@ test: $(STAMP)  ## all tests
 	# In the order of collection: by default files with few tests, which take longest, would come
 	# last. What a busy machine held up for too long runs once more; the closing line counts that.
 	$(BIN)/python -m pytest -n $(WORKERS) --dist loadfile --no-loadscope-reorder --reruns 1 -rR $(ARGS)
+
+quick: check  ## check, and the tests that import what has changed since the last commit: a minute or so
+	files=$$($(BIN)/python -m tests.quick) && if [ -n "$$files" ]; then \
+		$(BIN)/python -m pytest -q -n 2 --dist loadfile $(ARGS) $$files; fi
 
 properties: $(STAMP)  ## tests over generated inputs, with sixteen times as many as `make test` tries
 	EXAMPLES=4 $(BIN)/python -m pytest -n $(WORKERS) --dist worksteal -m hypothesis $(ARGS)
