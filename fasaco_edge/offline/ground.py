@@ -6,6 +6,7 @@ the centres of a walk's cells, or a line over their stands.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -104,7 +105,15 @@ class Ground:
         window = self.stands.lattice.window
         return row + window.row0, col + window.col0
 
-    def line(self, walk: NDArray[np.int32], name: str, robot: RobotConfig, *, ends: bool) -> Line:
+    def line(
+        self,
+        walk: NDArray[np.int32],
+        name: str,
+        robot: RobotConfig,
+        *,
+        ends: bool,
+        stop: Callable[[], bool],
+    ) -> Line:
         """Return the line along a walk.
 
         Args:
@@ -112,12 +121,13 @@ class Ground:
             name: CELLS, or of ``planners.line.LINES``.
             robot: its driving parameters.
             ends: whether the line must end where the walk does.
+            stop: ends the search for a better line.
         """
 
         if self.floor is None or self.stands is None:
             return line_through(self.lattice, walk)
         config = replace(LINES[name], speed_m_s=robot.speed_m_s, turning=robot.turning())
-        return line_over(walk, self.stands, self.floor, config, is_end_fixed=ends).xy
+        return line_over(walk, self.stands, self.floor, config, is_end_fixed=ends, stop=stop).xy
 
 
 def _lattice_deg(align: str | float, grid: OccupancyGrid) -> float:

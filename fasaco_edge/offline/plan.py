@@ -28,8 +28,9 @@ from fasaco_edge.offline.settings import (
     default_line,
     require,
 )
-from fasaco_edge.planners.bound import lower_bound_of
+from fasaco_edge.planners.bound import LowerBound, lower_bound_of
 from fasaco_edge.planners.compiling import compile_missing, stages_of_plan
+from fasaco_edge.planners.cost import SearchWork
 from fasaco_edge.planners.line import LINES
 from fasaco_edge.planners.own.loading import UserCode, user_code
 from fasaco_edge.planners.own.planner import OwnPlanner
@@ -41,11 +42,16 @@ from fasaco_edge.planners.planner import (
     SearchProgress,
     StoppingCriterion,
     TimeBudget,
+    WorkLimit,
     ignore,
+    never,
 )
 from fasaco_edge.planners.problem import CoverageProblem
 from fasaco_edge.planners.registry import planner_of
 
+# Most proposals of the search for a walk for each of its cells, where a line is laid along it: the
+# line gains more by a search of its own.
+PROPOSALS_A_CELL = 10_000
 # Limit on rows and columns: arrays of cells are int32.
 MOST_INDEX = 2**31 - 1
 
@@ -116,9 +122,16 @@ def plan(
     compile_missing(stages=stages_of_plan(search.planner))
     ground = _ground(map, robot, start, start_xy, line, align)
     problem = _problem(ground, robot, end)
-    path, ended_by, wall_s, cpu_s = _search(problem, search, own, stop, watch, observe)
-    xy = ground.line(path.cells, line, robot, ends=problem.end is not None)
-    return Plan(map, robot, line, search, ground, problem, path, xy, ended_by, wall_s, cpu_s)
+    bound = None if search.has_local_search else lower_bound_of(problem)
+    ending = _Ending(search, stop, watch, bound)
+    wall, cpu = time.perf_counter(), time.process_time()
+    if line != CELLS:
+        ending.leave_time(problem.cells)
+    path = _walk(problem, search, own, ending, observe)
+    ends = problem.end is not None
+    xy = ground.line(path.cells, line, robot, ends=ends, stop=ending.is_line_over)
+    wall_s, cpu_s = time.perf_counter() - wall, time.process_time() - cpu
+    return Plan(map, robot, line, search, ground, problem, path, xy, ending.by, wall_s, cpu_s)
 
 
 def _cell(name: str, given: object, expectation: str) -> Cell:
@@ -204,46 +217,69 @@ def _problem(ground: Ground, robot: RobotConfig, end: str | Cell) -> CoveragePro
     return CoverageProblem.of(ground.lattice, ground.start, end=to, cost=cost)
 
 
-def _search(
+class _Ending:
+    """What ends the search for a walk, and then that for the line along it.
+
+    Attributes:
+        by: what ended it.
+        bound: the problem's lower bound, for planners that have none of their own.
+    """
+
+    def __init__(
+        self,
+        search: Search,
+        stop: StoppingCriterion | None,
+        watch: Callable[[SearchProgress], None],
+        bound: LowerBound | None,
+    ) -> None:
+        self.by, self.bound = "the search", bound
+        self._watch, self._most_s = watch, search.most_s
+        self._progress: SearchProgress | None = None
+        self._criteria: dict[str, StoppingCriterion] = {}
+        self._leaves_time: StoppingCriterion = never
+        if stop is not None:
+            self._criteria["Ctrl-C"] = stop
+        if search.target_gap is not None:
+            self._criteria["target gap"] = GapReached(search.target_gap)
+        if search.most_s is not None:
+            self._criteria["budget"] = TimeBudget(search.most_s)
+
+    def leave_time(self, cells: int) -> None:
+        """End the search for a walk over so many cells early enough for that of its line."""
+        self._leaves_time = WorkLimit(SearchWork(proposals=PROPOSALS_A_CELL * cells))
+
+    def is_walk_over(self, progress: SearchProgress) -> bool:
+        """Return whether the search for a walk is over."""
+        if self.bound is not None:
+            progress = replace(progress, lower_bound_cost_s=self.bound.cost_s)
+        self._progress = progress
+        return self._is_over(progress) or self._leaves_time(progress)
+
+    def is_line_over(self) -> bool:
+        """Return whether the search for a line is over; without a budget it ends at once."""
+        return self._most_s is None or self._progress is None or self._is_over(self._progress)
+
+    def _is_over(self, progress: SearchProgress) -> bool:
+        self._watch(progress)
+        over = next((name for name, is_met in self._criteria.items() if is_met(progress)), None)
+        self.by = over or self.by
+        return over is not None
+
+
+def _walk(
     problem: CoverageProblem,
     search: Search,
     own: UserCode | None,
-    stop: StoppingCriterion | None,
-    watch: Callable[[SearchProgress], None],
+    ending: _Ending,
     observe: Observer,
-) -> tuple[CoveragePath, str, float, float]:
-    """Search; return the path, what ended the search, and its wall and processor time [s].
-
-    A planner without a lower bound is given one, for its path and for the target gap.
-    """
-    planner: CoveragePlanner
-    if own is None:
-        colony, improves = search.colony(), search.has_local_search
-        planner = planner_of(search.planner, colony, search.threads, improves)
-    else:
-        planner = OwnPlanner(own, search.seed)
-    bound = None if search.has_local_search else lower_bound_of(problem)
-    criteria: dict[str, StoppingCriterion] = {}
-    if stop is not None:
-        criteria["Ctrl-C"] = stop
-    if search.target_gap is not None:
-        criteria["target gap"] = GapReached(search.target_gap)
-    if search.most_s is not None:
-        criteria["budget"] = TimeBudget(search.most_s)
-    ended_by = "the search"
-
-    def is_over(progress: SearchProgress) -> bool:
-        nonlocal ended_by
-        if bound is not None:
-            progress = replace(progress, lower_bound_cost_s=bound.cost_s)
-        watch(progress)
-        over = [name for name, criterion in criteria.items() if criterion(progress)]
-        ended_by = over[0] if over else ended_by
-        return bool(over)
-
-    wall, cpu = time.perf_counter(), time.process_time()
-    path = planner.plan(problem, is_over, observe)
-    wall_s, cpu_s = time.perf_counter() - wall, time.process_time() - cpu
-    if bound is not None:
+) -> CoveragePath:
+    """Search for a walk; a planner without a lower bound is given one for its path."""
+    planner: CoveragePlanner = (
+        OwnPlanner(own, search.seed)
+        if own
+        else planner_of(search.planner, search.colony(), search.threads, search.has_local_search)
+    )
+    path = planner.plan(problem, ending.is_walk_over, observe)
+    if (bound := ending.bound) is not None:
         path = replace(path, lower_bound_steps=bound.steps, lower_bound_cost_s=bound.cost_s)
-    return path, ended_by, wall_s, cpu_s
+    return path

@@ -50,7 +50,7 @@ class Plan:
         xy: float64 (n, 2), n >= 1: points (x, y) [m] in the map frame, joined by straight
             segments.
         ended_by: what ended the search.
-        wall_s, cpu_s: duration of the search [s].
+        wall_s, cpu_s: duration of the search for walk and line [s].
     """
 
     map: Map

@@ -46,7 +46,8 @@ class Search:
         q0, visibility: likewise; None for the values that suit the search with or without local
             search.
         threads: number of threads of the ants; the walk is the same for any number.
-        budget_s: time limit of the search [s]; None for 1 s with local search, no limit without.
+        budget_s: time limit of the search for a walk, then for the line along it [s]; the line's
+            first stage is always completed; None for 1 s with local search, no limit without.
         target_gap: optimality gap at which the search ends; None for never.
 
     Raises:

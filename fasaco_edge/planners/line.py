@@ -7,6 +7,7 @@ Distances are timed at the robot's speed, turns by their angle.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,6 +18,7 @@ from fasaco_edge.kernels.floor import line as kernel
 from fasaco_edge.kernels.floor.anneal import anneal
 from fasaco_edge.kernels.floor.detour import find_patches, sweep_patches
 from fasaco_edge.kernels.floor.polish import polish
+from fasaco_edge.kernels.floor.seconds import chain_s
 from fasaco_edge.kernels.floor.sweeps import (
     BLOCK,
     COLUMNS,
@@ -36,8 +38,11 @@ PATCH_M2 = 0.04
 DESCENT_SHARE, PATCH_SHARE = 0.08, 0.12
 # Limit on the moves per point of the walk, however much floor there is.
 MOST_A_POINT = 2000
-# From the highest temperature to zero.
-COOLED = (1.0, 0.0)
+# Temperatures of the first stage, and of each later one: a line that was cooled once keeps its
+# shape in large, and is as good after stages that double as after one of their total length.
+COOLED, REHEATED = (1.0, 0.0), (0.7, 0.0)
+# Moves between two pauses: about a quarter of a second.
+MOVES_AT_ONCE = 1 << 17
 # Clearance is given up along a strip of floor that is wider than this share of the tool's width. A
 # niche or a passage gains the whole width; a wall gains the clearance alone.
 NEAR_SHARE = 0.2
@@ -89,16 +94,111 @@ class DrivenLine:
     Attributes:
         xy: float64 (n, 2), read-only: x, y in the map frame [m].
         swept_m2, reachable_m2: swept and total reachable floor [m2], by pixels of its raster.
+        seconds: time to drive it [s].
         tried: number of moves tried.
     """
 
     xy: NDArray[np.float64]
     swept_m2: float
     reachable_m2: float
+    seconds: float
     tried: int
 
     def __post_init__(self) -> None:
         self.xy.flags.writeable = False
+
+    def cost_s(self, price_s_m2: float) -> float:
+        """Return what is minimised [s]: time to drive, and ``price_s_m2`` for floor left."""
+        return self.seconds + price_s_m2 * (self.reachable_m2 - self.swept_m2)
+
+
+class LineSearch:
+    """A running search for the line along a walk, in stages; the first is always completed.
+
+    Each later stage anneals the line again, twice as long as the one before. The line of the least
+    cost is kept, so a longer search is never worse than a shorter one.
+
+    Attributes:
+        best: the line kept; None until the first stage is over.
+    """
+
+    def __init__(
+        self,
+        walk: NDArray[np.int32],
+        stands: StandLattice,
+        floor: Floor,
+        config: LineConfig,
+        *,
+        is_end_fixed: bool,
+    ) -> None:
+        self.best: DrivenLine | None = None
+        self._floor, self._config = floor, config
+        unit, tool_m = floor.geometry.resolution, floor.discs.tool_m
+        points = stands.points(walk)
+        self._has_moves = config.price_s_m2 > 0.0 and len(points) > 1
+        if len(points) == 1:
+            points = points[[0, 0]]
+        self._sweeps, self._memory = _sweeps(floor), memory_for_moves()
+        edges = np.concatenate([points[:-1], points[1:]], axis=1)
+        tool = tool_m / 2 / unit
+        sweep_edges(self._sweeps, edges, tool, 1, self._memory.capsules)
+        blocks = self._sweeps.left.shape
+        self._line = linked(points, blocks, is_end_fixed=is_end_fixed)
+        self._price = config.prices(unit, tool_m)
+        radius, clear = floor.discs.radius_m / unit, floor.discs.clear_m / unit
+        self._on = kernel.Floor(floor.blocked, floor.places, self._sweeps, radius, tool, clear)
+        self._moves = min(int(config.moves_m2 * floor.reachable_m2), MOST_A_POINT * len(points))
+        self._random = np.array([SEED], np.uint64)
+
+    def run(self) -> Iterator[None]:
+        """Search without end; pause after each piece of work."""
+        if not self._has_moves:
+            self._keep()
+            yield
+            return
+        moves = self._moves
+        farthest = FARTHEST_M / self._floor.geometry.resolution
+        line, on, memory = self._line, self._on, self._memory
+        polish(line, on, self._price, memory, farthest, int(DESCENT_SHARE * moves))
+        yield from self._stage(COOLED, moves - int(line.state[kernel.TRIED]))
+        while True:
+            yield from self._stage(REHEATED, moves)
+            moves *= 2
+
+    def _stage(self, heat: tuple[float, float], moves: int) -> Iterator[None]:
+        """Anneal the line, sweep the patches that are left, and keep the result if it is better."""
+        line, on, memory = self._line, self._on, self._memory
+        first, last = heat
+        begun = int(line.state[kernel.TRIED])
+        pieces = max(moves // MOVES_AT_ONCE, 1)
+        for piece in range(pieces):
+            if piece:
+                yield
+            per_piece = (last - first) / pieces
+            between = first + per_piece * piece, first + per_piece * (piece + 1)
+            until = begun + moves * (piece + 1) // pieces
+            anneal(line, on, self._price, memory, self._random, 0, between, until)
+        unit = self._floor.geometry.resolution
+        patch = self._price._replace(left_s=self._config.patch_s / PATCH_M2 * unit * unit)
+        if patch.left_s > self._price.left_s:
+            most = int(line.state[kernel.TRIED]) + int(PATCH_SHARE * self._moves)
+            patches = find_patches(self._sweeps, math.ceil(PATCH_M2 / (unit * unit)))
+            sweep_patches(line, on, patch, memory, FARTHEST_M / unit, patches, most)
+        self._keep()
+        yield
+
+    def _keep(self) -> None:
+        """Keep the line as it is now, if it is better than the one kept."""
+        points = straightened(self._line.points[numbers_along(self._line)])
+        unit, reachable_m2 = self._floor.geometry.resolution, self._floor.reachable_m2
+        left_m2 = int(np.count_nonzero(self._sweeps.counts == 0)) * unit * unit
+        count, price = len(points), self._config.price_s_m2
+        drive_s, turning = self._price.drive_s, self._config.turning
+        seconds = chain_s(points, 0, count - 1, count, drive_s, turning)
+        tried = int(self._line.state[kernel.TRIED])
+        if self.best is None or seconds + price * left_m2 < self.best.cost_s(price):
+            xy, swept_m2 = self._floor.to_map(points), reachable_m2 - left_m2
+            self.best = DrivenLine(xy, swept_m2, reachable_m2, seconds, tried)
 
 
 def line_over(
@@ -108,8 +208,9 @@ def line_over(
     config: LineConfig,
     *,
     is_end_fixed: bool,
+    stop: Callable[[], bool] = lambda: True,
 ) -> DrivenLine:
-    """Return the polished line along a walk.
+    """Return the line along a walk.
 
     Args:
         walk: int32 (n, 2), cells (row, col), each a step from the previous one.
@@ -117,34 +218,14 @@ def line_over(
         floor: the floor to sweep.
         config: prices.
         is_end_fixed: whether the line must end where the walk does.
+        stop: ends the search once there is a line.
     """
-    points = stands.points(walk)
-    sweeps = _sweeps(floor)
-    unit = floor.geometry.resolution
-    tool = floor.discs.tool_m / 2 / unit
-    memory = memory_for_moves()
-    along = points if len(points) > 1 else points[[0, 0]]
-    edges = np.concatenate([along[:-1], along[1:]], axis=1)
-    sweep_edges(sweeps, edges, tool, 1, memory.capsules)
-    tried = 0
-    if config.price_s_m2 > 0.0 and len(points) > 1:
-        line = linked(points, sweeps.left.shape, is_end_fixed=is_end_fixed)
-        price = config.prices(unit, floor.discs.tool_m)
-        radius, clear = floor.discs.radius_m / unit, floor.discs.clear_m / unit
-        on = kernel.Floor(floor.blocked, floor.places, sweeps, radius, tool, clear)
-        most = min(int(config.moves_m2 * floor.reachable_m2), MOST_A_POINT * len(points))
-        farthest = FARTHEST_M / unit
-        polish(line, on, price, memory, farthest, int(DESCENT_SHARE * most))
-        anneal(line, on, price, memory, np.array([SEED], np.uint64), 0, COOLED, most)
-        patch = price._replace(left_s=config.patch_s / PATCH_M2 * unit * unit)
-        if patch.left_s > price.left_s:
-            most += int(PATCH_SHARE * most)
-            patches = find_patches(sweeps, math.ceil(PATCH_M2 / (unit * unit)))
-            sweep_patches(line, on, patch, memory, farthest, patches, most)
-        points = straightened(line.points[numbers_along(line)])
-        tried = int(line.state[kernel.TRIED])
-    left = int(np.count_nonzero(sweeps.counts == 0)) * unit * unit
-    return DrivenLine(floor.to_map(points), floor.reachable_m2 - left, floor.reachable_m2, tried)
+    search = LineSearch(walk, stands, floor, config, is_end_fixed=is_end_fixed)
+    for _ in search.run():
+        if search.best is not None and stop():
+            break
+    assert search.best is not None
+    return search.best
 
 
 def _sweeps(floor: Floor) -> Sweeps:

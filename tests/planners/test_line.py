@@ -16,7 +16,7 @@ from fasaco_edge.grid.map_files import find_map, read_map, suggested_start
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.judge.floor import SweepingRobot, judge_floor
 from fasaco_edge.planners.cost import CoverageCost
-from fasaco_edge.planners.line import LINES, DrivenLine, LineConfig, line_over
+from fasaco_edge.planners.line import LINES, DrivenLine, LineConfig, LineSearch, line_over
 from fasaco_edge.planners.planner import ignore
 from fasaco_edge.planners.problem import CoverageProblem
 from fasaco_edge.planners.search.near_optimal import NearOptimal
@@ -90,6 +90,34 @@ def test_the_same_work_gives_the_same_line(planned):
     assert lines[0].xy.tobytes() == lines[1].xy.tobytes()
     # Patches come after the budget.
     assert lines[0].tried == lines[1].tried <= 600 * floor.reachable_m2
+
+
+def test_a_longer_search_is_never_worse(planned):
+    """After each stage the best line so far is kept; over four of them it gets cheaper."""
+    grid, floor, stands, walk = planned
+    config = LineConfig(moves_m2=1000)
+    price = config.price_s_m2
+    search = LineSearch(walk, stands, floor, config, is_end_fixed=False)
+    costs = []
+    for _ in search.run():
+        if (best := search.best) is not None:
+            costs.append(best.cost_s(price))
+            seconds = judge_floor(grid, best.xy, ROBOT).figures.seconds
+            assert best.seconds == pytest.approx(seconds, rel=1e-3)
+        if best is not None and best.tried > 15 * config.moves_m2 * floor.reachable_m2:
+            break
+    assert costs == sorted(costs, reverse=True)
+    assert costs[-1] < 0.98 * costs[0]
+
+
+def test_a_search_ends_with_a_line_whenever_it_is_stopped(planned):
+    _, floor, stands, walk = planned
+    config = LineConfig(moves_m2=1000)
+    at_once = line_over(walk, stands, floor, config, is_end_fixed=False)
+    calls = iter([False, False, True])
+    later = line_over(walk, stands, floor, config, is_end_fixed=False, stop=lambda: next(calls))
+    assert later.cost_s(config.price_s_m2) <= at_once.cost_s(config.price_s_m2)
+    assert next(calls, None) is None
 
 
 def test_a_fixed_end_stays(planned):

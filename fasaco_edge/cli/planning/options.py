@@ -72,6 +72,8 @@ figures of several robots:
 fasaco searches until its budget ends, the walk is proven optimal, or all ants have
 walked: a complete walk within milliseconds, then better ones by local search, restarted
 from walks of the colony's ants (up to 8,000 cells; larger maps have local search only).
+What is left of the budget goes to the line: each stage of its search takes twice as long
+as the one before, and the best line is kept, so a larger budget gives none that is worse.
 --no-local-search is the paper's colony alone. The colony's options apply to fasaco; aco
 takes all but the velocities, the other planners none; a planner of your own gets the seed.
 """
@@ -273,8 +275,8 @@ def _add_planner(group: argparse._ArgumentGroup) -> None:
         "--budget",
         type=float,
         metavar="S",
-        help="time after which the search ends with its best walk [s] "
-        f"(default: {BUDGET_S:g}; none without local search)",
+        help="time for the search of a walk, then of the line along it [s]; a first line is always "
+        f"finished (default: {BUDGET_S:g}; none without local search)",
     )
     group.add_argument(
         "--target-gap",
