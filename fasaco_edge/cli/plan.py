@@ -83,6 +83,13 @@ def run(args: argparse.Namespace) -> int:
             watch=show,
             observe=trails.append if args.pheromone_png else ignore,
         )
+    swept, asked_share = planned.swept_share, search.swept
+    if swept is not None and asked_share is not None and swept < asked_share:
+        LOG.warning(
+            "--swept %g: the line sweeps %.4f; a larger --budget may find one that sweeps more",
+            asked_share,
+            swept,
+        )
     if args.path_out is not None:
         with writing(args.path_out) as file:
             np.savetxt(file, planned.cells, "%d", ",", header="row,col", comments="")

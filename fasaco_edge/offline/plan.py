@@ -129,7 +129,9 @@ def plan(
         ending.leave_time(problem.cells)
     path = _walk(problem, search, own, ending, observe)
     ends = problem.end is not None
-    xy = ground.line(path.cells, line, robot, ends=ends, stop=ending.is_line_over)
+    xy = ground.line(
+        path.cells, line, robot, ends=ends, swept=search.swept, stop=ending.is_line_over
+    )
     wall_s, cpu_s = time.perf_counter() - wall, time.process_time() - cpu
     return Plan(map, robot, line, search, ground, problem, path, xy, ending.by, wall_s, cpu_s)
 

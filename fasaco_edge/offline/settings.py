@@ -49,6 +49,8 @@ class Search:
         budget_s: time limit of the search for a walk, then for the line along it [s]; the line's
             first stage is always completed; None for 1 s with local search, no limit without.
         target_gap: optimality gap at which the search ends; None for never.
+        swept: share of the reachable floor that a line is to sweep, in the least time; None for as
+            much as its seconds are worth.
 
     Raises:
         BadConfiguration: a value is impossible.
@@ -67,6 +69,7 @@ class Search:
     threads: int = 1
     budget_s: float | None = None
     target_gap: float | None = None
+    swept: float | None = None
 
     def __post_init__(self) -> None:
         for field in fields(self):
@@ -83,6 +86,8 @@ class Search:
         if self.target_gap is not None:
             possible = 0.0 <= self.target_gap <= 10.0
             require(possible, "target gap", "be in [0, 10]", self.target_gap)
+        if self.swept is not None:
+            require(0.0 < self.swept <= 1.0, "swept", "be a share in (0, 1]", self.swept)
 
     @property
     def has_local_search(self) -> bool:

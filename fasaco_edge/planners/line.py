@@ -41,6 +41,9 @@ MOST_A_POINT = 2000
 # Temperatures of the first stage, and of each later one: a line that was cooled once keeps its
 # shape in large, and is as good after stages that double as after one of their total length.
 COOLED, REHEATED = (1.0, 0.0), (0.7, 0.0)
+# Factors of the price of floor, if a share of it is asked for: after a line that sweeps too little,
+# after one that sweeps enough, and the most in all.
+RAISED, LOWERED, MOST_RAISED = 1.6, 0.8, 100.0
 # Moves between two pauses: about a quarter of a second.
 MOVES_AT_ONCE = 1 << 17
 # Clearance is given up along a strip of floor that is wider than this share of the tool's width. A
@@ -66,6 +69,8 @@ class LineConfig:
         turning: durations of turns on the spot.
         moves_m2: limit on the moves tried per reachable square metre.
         patch_s: at the end, patches are swept that take no longer than this [s].
+        swept: share of the reachable floor to sweep in the least time, whatever its price; None for
+            as much as pays by ``price_s_m2``.
     """
 
     price_s_m2: float = 200.0
@@ -73,6 +78,7 @@ class LineConfig:
     turning: Turning = TURNING
     moves_m2: int = 5000
     patch_s: float = 20.0
+    swept: float | None = None
 
     def prices(self, unit_m: float, tool_m: float) -> kernel.Price:
         """Return the prices on a raster of pixels ``unit_m`` wide, for a tool ``tool_m`` wide."""
@@ -116,7 +122,9 @@ class LineSearch:
     """A running search for the line along a walk, in stages; the first is always completed.
 
     Each later stage anneals the line again, twice as long as the one before. The line of the least
-    cost is kept, so a longer search is never worse than a shorter one.
+    cost is kept, so a longer search is never worse than a shorter one. If a share of the floor is
+    asked for, that is the fastest line that sweeps it, or else the one that sweeps most; the price
+    of floor rises and falls from stage to stage accordingly.
 
     Attributes:
         best: the line kept; None until the first stage is over.
@@ -144,7 +152,7 @@ class LineSearch:
         sweep_edges(self._sweeps, edges, tool, 1, self._memory.capsules)
         blocks = self._sweeps.left.shape
         self._line = linked(points, blocks, is_end_fixed=is_end_fixed)
-        self._price = config.prices(unit, tool_m)
+        self._price = self._least_price = config.prices(unit, tool_m)
         radius, clear = floor.discs.radius_m / unit, floor.discs.clear_m / unit
         self._on = kernel.Floor(floor.blocked, floor.places, self._sweeps, radius, tool, clear)
         self._moves = min(int(config.moves_m2 * floor.reachable_m2), MOST_A_POINT * len(points))
@@ -162,6 +170,7 @@ class LineSearch:
         polish(line, on, self._price, memory, farthest, int(DESCENT_SHARE * moves))
         yield from self._stage(COOLED, moves - int(line.state[kernel.TRIED]))
         while True:
+            self._adapt_price()
             yield from self._stage(REHEATED, moves)
             moves *= 2
 
@@ -187,18 +196,36 @@ class LineSearch:
         self._keep()
         yield
 
+    def _adapt_price(self) -> None:
+        """Raise the price of floor if the last line swept less than asked for, or lower it."""
+        if self._config.swept is not None:
+            change = RAISED if self._missing_m2(self._swept_m2()) > 0.0 else LOWERED
+            left_s = min(self._price.left_s * change, MOST_RAISED * self._least_price.left_s)
+            self._price = self._price._replace(left_s=max(left_s, self._least_price.left_s))
+
+    def _swept_m2(self) -> float:
+        unit = self._floor.geometry.resolution
+        return self._floor.reachable_m2 - int(np.count_nonzero(self._sweeps.counts == 0)) * unit**2
+
+    def _missing_m2(self, swept_m2: float) -> float:
+        """Return how much floor a line sweeps too little [m2]; 0 if no share is asked for."""
+        least = self._config.swept or 0.0
+        return max(least * self._floor.reachable_m2 - swept_m2, 0.0)
+
     def _keep(self) -> None:
         """Keep the line as it is now, if it is better than the one kept."""
         points = straightened(self._line.points[numbers_along(self._line)])
-        unit, reachable_m2 = self._floor.geometry.resolution, self._floor.reachable_m2
-        left_m2 = int(np.count_nonzero(self._sweeps.counts == 0)) * unit * unit
-        count, price = len(points), self._config.price_s_m2
-        drive_s, turning = self._price.drive_s, self._config.turning
+        drive_s, turning, count = self._price.drive_s, self._config.turning, len(points)
         seconds = chain_s(points, 0, count - 1, count, drive_s, turning)
-        tried = int(self._line.state[kernel.TRIED])
-        if self.best is None or seconds + price * left_m2 < self.best.cost_s(price):
-            xy, swept_m2 = self._floor.to_map(points), reachable_m2 - left_m2
-            self.best = DrivenLine(xy, swept_m2, reachable_m2, seconds, tried)
+        xy, tried = self._floor.to_map(points), int(self._line.state[kernel.TRIED])
+        line = DrivenLine(xy, self._swept_m2(), self._floor.reachable_m2, seconds, tried)
+        if self.best is None or self._rank(line) < self._rank(self.best):
+            self.best = line
+
+    def _rank(self, line: DrivenLine) -> tuple[float, float]:
+        """Return what is minimised: floor missing from the share asked for, then the cost."""
+        price = 0.0 if self._config.swept is not None else self._config.price_s_m2
+        return self._missing_m2(line.swept_m2), line.cost_s(price)
 
 
 def line_over(

@@ -226,6 +226,18 @@ def test_a_line_over_the_floor_sweeps_more_of_it(plan, tmp_path, origin):
     assert png.read_bytes().startswith(b"\x89PNG")
 
 
+def test_a_share_of_the_floor_can_be_asked_for(plan, tmp_path, caplog):
+    file = tmp_path / "room.yaml"
+    pixels = pillared_room()
+    write_map(OccupancyGrid(GridGeometry(*pixels.shape, 0.05, Pose2D(0.0, 0.0)), pixels), file)
+    usual, _ = plan(file, "--budget", 1)
+    asked, _ = plan(file, "--budget", 1, "--swept", 0.999)
+    assert usual["floor"]["swept_share"] < asked["floor"]["swept_share"] < 1.0
+    assert ("--swept 0.999" in caplog.text) == (asked["floor"]["swept_share"] < 0.999)
+    assert main(["plan", str(file), "--line", "cells", "--swept", "0.9"]) == Exit.CONFIG
+    assert main(["plan", str(file), "--swept", "1.5"]) == Exit.CONFIG
+
+
 def test_cells_lie_along_the_walls(plan, tmp_path):
     pixels = pillared_room()
     csv, png = tmp_path / "line.csv", tmp_path / "line.png"

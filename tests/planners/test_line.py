@@ -120,6 +120,22 @@ def test_a_search_ends_with_a_line_whenever_it_is_stopped(planned):
     assert next(calls, None) is None
 
 
+def test_a_share_that_is_asked_for_is_swept_in_the_least_time(planned):
+    _, floor, stands, walk = planned
+    config = LineConfig(moves_m2=1000, swept=0.992)
+    search = LineSearch(walk, stands, floor, config, is_end_fixed=False)
+    enough_s = []
+    for _ in search.run():
+        best = search.best
+        if best is not None and best.swept_m2 >= 0.992 * floor.reachable_m2:
+            enough_s.append(best.seconds)
+        if best is not None and best.tried > 60 * config.moves_m2 * floor.reachable_m2:
+            break
+    assert enough_s == sorted(enough_s, reverse=True)
+    assert enough_s
+    assert enough_s[-1] < enough_s[0]
+
+
 def test_a_fixed_end_stays(planned):
     _, floor, stands, walk = planned
     line = line_over(walk, stands, floor, LineConfig(moves_m2=1000), is_end_fixed=True)

@@ -34,6 +34,7 @@ your building and robot:
   fasaco-edge plan site.yaml --config robot.yaml --xy-out line.csv
   fasaco-edge plan scan.png --resolution 0.05 --unknown-free --png line.png
   fasaco-edge plan site.yaml --line quick --align axes --xy-out line.csv
+  fasaco-edge plan site.yaml --swept 0.995 --budget 10 --png line.png
   fasaco-edge plan office --turn-s 2 --budget 0.1 --end 12,3
   fasaco-edge plan office --robots 0,0 10,5 5,8 --end home --png fleet.png
 the paper's planners, and your own:
@@ -277,6 +278,13 @@ def _add_planner(group: argparse._ArgumentGroup) -> None:
         metavar="S",
         help="time for the search of a walk, then of the line along it [s]; a first line is always "
         f"finished (default: {BUDGET_S:g}; none without local search)",
+    )
+    group.add_argument(
+        "--swept",
+        type=float,
+        metavar="SHARE",
+        help="share of the reachable floor that the line is to sweep, in the least time; takes a "
+        "larger --budget (default: as much as pays)",
     )
     group.add_argument(
         "--target-gap",

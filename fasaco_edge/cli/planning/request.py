@@ -121,6 +121,7 @@ SEARCH_OPTIONS = {
     **{name: name for name in ("planner", "ants", "velocities", "q0", "visibility", "beta")},
     **{name: name for name in ("alpha", "tau0", "seed", "threads", "target_gap")},
     "budget": "budget_s",
+    "swept": "swept",
 }
 
 
@@ -161,6 +162,11 @@ def read_request(args: argparse.Namespace) -> PlanRequest:
     line = args.line or default_line(search, has_floor=has_floor)
     if args.line is None and config is not None and line != CELLS:
         line = config.planner.line
+    if search.swept is not None and line == CELLS:
+        raise BadConfiguration(
+            "--swept: a line through the centres of cells sweeps what it sweeps",
+            hint="ask for a line over the floor, quick or thorough",
+        )
     robot = config.robot if config else RobotConfig()
     if config is None and line == CELLS:
         robot = msgspec.structs.replace(robot, quarter_turn_s=0.0)  # as the paper counts
