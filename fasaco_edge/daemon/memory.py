@@ -51,7 +51,7 @@ from fasaco_edge.wire.topics import QUEUE_LENGTHS
 MB = 1_000_000
 MIB = 1 << 20
 # Interpreter, numpy, Zenoh, compiler, kernels, and the fixed part of a plan.
-BASE_BYTES = 180 * MB
+BASE_BYTES = 215 * MB
 MAPS = 10
 CELL_BYTES = 370
 # Bytes of a pixel of floor: 3 for the floor to sweep and the line's passes over it, 2 more while
