@@ -247,7 +247,7 @@ class _Ending:
             self._criteria["budget"] = TimeBudget(search.most_s)
 
     def leave_time(self, cells: int) -> None:
-        """End the search for a walk over so many cells early enough for that of its line."""
+        """End the search for a walk over ``cells`` cells in time for that of its line."""
         self._leaves_time = WorkLimit(SearchWork(proposals=PROPOSALS_A_CELL * cells))
 
     def is_walk_over(self, progress: SearchProgress) -> bool:

@@ -39,7 +39,7 @@ DESCENT_SHARE, PATCH_SHARE = 0.08, 0.12
 # Limit on the moves per point of the walk, however much floor there is.
 MOST_A_POINT = 2000
 # Temperatures of the first stage, and of each later one: a line that was cooled once keeps its
-# shape in large, and is as good after stages that double as after one of their total length.
+# shape in large. Stages that double, and one of their total length, cannot be told apart.
 COOLED, REHEATED = (1.0, 0.0), (0.7, 0.0)
 # Factors of the price of floor, if a share of it is asked for: after a line that sweeps too little,
 # after one that sweeps enough, and the most in all.
@@ -122,9 +122,9 @@ class LineSearch:
     """A running search for the line along a walk, in stages; the first is always completed.
 
     Each later stage anneals the line again, twice as long as the one before. The line of the least
-    cost is kept, so a longer search is never worse than a shorter one. If a share of the floor is
-    asked for, that is the fastest line that sweeps it, or else the one that sweeps most; the price
-    of floor rises and falls from stage to stage accordingly.
+    cost is kept, so along one walk a longer search is never worse than a shorter one. If a share of
+    the floor is asked for, that is the fastest line that sweeps it, or else the one that sweeps
+    most; the price of floor rises and falls from stage to stage accordingly.
 
     Attributes:
         best: the line kept; None until the first stage is over.

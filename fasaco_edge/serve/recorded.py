@@ -177,7 +177,7 @@ def _robot_of(sample: Sample) -> str:
 
 
 def stepped(corners: NDArray[np.float64], steps: int) -> NDArray[np.float64]:
-    """Return a path of about so many steps by its corners, float64 (n, 2): drawn are only these."""
+    """Return a path of about ``steps`` steps; a recording has its corners alone, float64 (n, 2)."""
     ways = np.diff(corners, axis=0)
     lengths = np.hypot(*ways.T) if len(ways) else np.zeros(0)
     # An invalid line is refused where it is encoded.
