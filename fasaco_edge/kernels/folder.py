@@ -4,9 +4,9 @@ It is named after a hash of all kernel sources, of what compiles them and of the
 kernels never use old code, and any installation of the same sources shares it.
 
 Compiled kernels are code: they are loaded only from a folder that only root and this user could
-have written, and once each file is as it was when it was compiled (``kernels.manifest``).
-Where the wanted folder cannot be used, one in memory or among the temporary files is; where that
-cannot be used either, each process compiles its own.
+have written, and once each file is as it was when it was compiled (``kernels.manifest``). If the
+wanted folder cannot be used, a folder in memory or among the temporary files is used; if that
+cannot be used either, each process compiles its own kernels.
 """
 
 from __future__ import annotations
@@ -30,11 +30,11 @@ LOG = logging.getLogger(__name__)
 KERNELS = Path(__file__).parent
 KERNEL_SOURCES = sorted(KERNELS.rglob("*.py"))
 COMPILERS = ("numba", "llvmlite")
-# Free space to have: twice the size of the code of all kernels [MB].
+# Required free space: twice the size of the code of all kernels [MB].
 NEEDED_MB = 100
 _FOLDER = re.compile(r"kernels-[0-9a-f]{12}$")
-# Of proc(5), cpuinfo: which processor it is, and what it can do. Of the second a kernel of another
-# version shows more or less; what compiled code may use it does not invent.
+# Keys of /proc/cpuinfo, see proc(5): model of the processor, and its features. Another version of
+# the Linux kernel lists more or fewer features, but none that the processor lacks.
 _PROCESSOR = ("model name", "CPU implementer", "CPU part", "CPU variant", "Features", "flags")
 _INSTRUCTIONS = re.compile(r"(avx|v?aes|abm|adx|amx|bmi|f16c|fma|gfni|movbe|popcnt|s?sse|sha)")
 _WARNED: set[str] = set()
@@ -61,13 +61,13 @@ def code_digest(version_of: Callable[[str], str] = metadata.version) -> str:
 
 
 def processor(cpuinfo: Path = Path("/proc/cpuinfo")) -> str:
-    """Return what numba compiles for, as far as that can be known without loading it."""
+    """Return the processor that numba compiles for, as far as known without loading numba."""
     given = [os.environ.get(name, "") for name in ("NUMBA_CPU_NAME", "NUMBA_CPU_FEATURES")]
     try:
         lines = cpuinfo.read_text(encoding="utf-8", errors="replace").splitlines()
     except OSError:
         lines = []
-    # Of each kind of core once.
+    # Each kind of core counts once.
     found = set()
     for key, _, value in (line.partition(":") for line in lines):
         if (name := key.strip()) in _PROCESSOR:
@@ -84,8 +84,8 @@ def wanted_folder(environ: Mapping[str, str] = os.environ) -> Path:
     """
     name, given = f"kernels-{code_digest()}", environ.get("NUMBA_CACHE_DIR")
     if not given:
-        # A relative one would be another in each working folder; so would a ``~`` that no home
-        # stands for, which expanduser leaves as it is: a container's user has no home.
+        # A relative path would be another folder in each working folder; so would a ``~`` that
+        # expanduser leaves as it is for a user without a home, as in a container.
         homes = environ.get("XDG_CACHE_HOME", ""), os.path.expanduser("~/.cache")
         home = next(filter(os.path.isabs, homes), None)
         if home is None:
@@ -110,7 +110,7 @@ def _temporary(name: str) -> Path:
 
 
 def places() -> Iterator[Path]:
-    """Yield the wanted folder, and the one in its place: a service's own, in memory, if given."""
+    """Yield the wanted folder, and its replacement: a service's own folder in memory, if given."""
     yield (wanted := wanted_folder())
     given = os.environ.get("RUNTIME_DIRECTORY", "").partition(":")[0]
     yield Path(given) / wanted.name if given else _temporary(wanted.name)
@@ -120,7 +120,7 @@ def why_not_writable(folder: Path) -> str:
     """Return why kernels cannot be compiled into ``folder``, there or not; "" if they can."""
     if why := why_not_trusted(folder):
         return why
-    # Not Path.exists, which raises what the disk may say for a moment.
+    # Not Path.exists, which raises transient errors of the disk.
     while not os.path.exists(folder) and folder != folder.parent:
         folder = folder.parent
     if not os.access(folder, os.W_OK):

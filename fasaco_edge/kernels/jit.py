@@ -2,9 +2,9 @@
 
 numba keeps code where ``KernelLocator`` says (``NUMBA_CACHE_LOCATOR_CLASSES``): all of it in one
 folder (``kernels.folder``), which is compared with its manifest before the first kernel is loaded.
-One process writes there, the one that compiles (``planners.compiling``). Any other that needs a
-kernel for types that are not there compiles it for itself, and what numba keeps of it is gone with
-that process.
+One process writes there, the one that compiles (``planners.compiling``). Any other process that
+needs a kernel for further types compiles it for itself alone; that code is removed with the
+process.
 
 Import numba from here alone: a file in the working folder could change its settings otherwise.
 """
@@ -61,13 +61,13 @@ Kernel = TypeVar("Kernel", bound=Callable[..., object])
 
 
 class _Kept:
-    """What this process has its kernels from.
+    """Where this process loads its kernels from.
 
     Attributes:
-        folder: where they are; None where none can be used.
-        before_each: called before each kernel is compiled into the folder, with how many were.
-            None: this process does not compile into it.
-        kernels: all that are kept.
+        folder: folder of the kernels; None if none can be used.
+        before_each: called before each kernel is compiled into the folder, with the number compiled
+            before. None: this process does not compile into it.
+        kernels: all kernels that are kept.
     """
 
     def __init__(self) -> None:
@@ -82,7 +82,7 @@ class _Kept:
         self._looking = threading.Lock()
 
     def look(self) -> None:
-        """Load from the folder what is as its manifest says; look again once there is another."""
+        """Load from the folder if it fits its manifest; check again once the manifest changes."""
         with self._looking:
             if self._is_sound or self.folder is None or self.before_each is not None:
                 return
@@ -102,13 +102,13 @@ class _Kept:
         if self._has_compiled:
             return
         for library in [it.library for one in self.kernels for it in one.overloads.values()]:
-            # Private to numba: one without it only takes more memory.
+            # Private to numba: a release without it only takes more memory.
             if (module := getattr(library, "_shared_module", None)) is not None:
                 self._packed.append((library, module.as_bitcode()))
                 library._shared_module = None
 
     def unpack(self) -> None:
-        """Parse it again, before the first function is compiled, which may call these kernels."""
+        """Parse the bitcode again before a function is compiled that may call these kernels."""
         self._has_compiled = True
         while self._packed:
             library, bitcode = self._packed.pop()
@@ -126,7 +126,7 @@ class _Kept:
 
 
 def _mark_of(folder: Path) -> tuple[int, int]:
-    """Return what differs once a folder has another manifest."""
+    """Return a mark that differs once a folder has another manifest."""
     try:
         status = os.stat(folder / MANIFEST, follow_symlinks=False)
     except OSError:
@@ -154,11 +154,11 @@ class KernelLocator:
         """Do nothing: the folder is there where this process writes."""
 
     def get_source_stamp(self) -> str:
-        """Return what has to be equal for code to be used: the folder's name has all of that."""
+        """Return a constant as the stamp of sources: the folder's name depends on all of them."""
         return ""
 
     def get_disambiguator(self) -> str:
-        """Return what makes names of files differ for functions of one name."""
+        """Return the part of file names that distinguishes functions of one name."""
         return self._name
 
 
@@ -178,7 +178,7 @@ def _scratch() -> str:
     folder, maker = tempfile.mkdtemp(prefix="fasaco-edge-", dir=base), os.getpid()
 
     def clear() -> None:
-        # A process that is forked off is not the one to remove it.
+        # A forked process must not remove the folder.
         if os.getpid() == maker:
             shutil.rmtree(folder, ignore_errors=True)
 
@@ -188,7 +188,7 @@ def _scratch() -> str:
 
 @contextmanager
 def _located_by(locator: type[KernelLocator]) -> Iterator[None]:
-    """Let a function that is decorated meanwhile be kept there; others as they are set up."""
+    """Use this locator for functions that are decorated during the block."""
     before = numba.config.CACHE_LOCATOR_CLASSES
     numba.config.CACHE_LOCATOR_CLASSES = f"{__name__}.{locator.__name__}"
     try:
@@ -209,7 +209,7 @@ class _Compiling(event.Listener):  # type: ignore[misc]
         self._compiled = 0
 
     def on_start(self, event: event.Event) -> None:
-        """Let the folder be as it is, unless this process is the one to compile into it."""
+        """Compile without keeping the code, unless this process compiles into the folder."""
         kernel = event.data["dispatcher"]
         _KEPT.unpack()
         if _KEPT.before_each is not None:
@@ -219,7 +219,7 @@ class _Compiling(event.Listener):  # type: ignore[misc]
             _keep(kernel, ScratchLocator)
 
     def on_end(self, event: event.Event) -> None:
-        """Count it."""
+        """Count the kernel."""
         self._compiled += 1
 
 
@@ -259,7 +259,7 @@ def _listen() -> None:
 
 
 def kernel_folder() -> Path | None:
-    """Return the folder that this process has its kernels from; None where none can be used."""
+    """Return the folder that this process loads its kernels from; None if none can be used."""
     return _KEPT.folder
 
 
@@ -281,7 +281,7 @@ def compile_into(folder: Path, before_each: Callable[[int], None]) -> None:
 
     Args:
         folder: the folder; call this before kernels are imported.
-        before_each: called before each is compiled, with how many were before it.
+        before_each: called before each kernel is compiled, with the number compiled before it.
     """
     assert not _KEPT.kernels, "kernels have another folder already"
     _KEPT.folder, _KEPT.before_each = folder, before_each

@@ -2,13 +2,14 @@
 
 A power failure leaves files that are empty, truncated or full of zeros, a worn card wrong bytes;
 such machine code crashes the process, and a pickle may do anything. So the manifest has size and
-SHA-256 of each file, and is compared with them before numba reads a byte. It also has the stages of
-the warm-up that are compiled. That detects damage, not malice, which could write the manifest, too:
-``fasaco_edge.host.files`` checks who could have written the folder.
+SHA-256 of each file, and files are compared with it before numba reads a byte. The manifest also
+has the stages of the warm-up that are compiled. That detects damage, but no attacker, who could
+also write the manifest: ``fasaco_edge.host.files`` checks which users could have written the
+folder.
 
 One process compiles at a time, as numba's own index of a function's files goes wrong where two
-write it: it holds a lock on the folder. What it compiles counts once it is in the manifest; a
-reader waits meanwhile. A folder without a sound manifest is begun anew.
+write it: that process holds a lock on the folder. A file that it compiles counts once it is in the
+manifest; readers wait meanwhile. A folder without a sound manifest is begun anew.
 """
 
 from __future__ import annotations
@@ -36,7 +37,7 @@ _COMPARED: dict[Path, bytes] = {}
 
 @dataclass(slots=True)
 class Manifest:
-    """Size and SHA-256 of each file, and the stages that they are all of."""
+    """Size and SHA-256 of each file, and the stages of which all files are there."""
 
     stages: list[str] = field(default_factory=list)
     files: dict[str, str] = field(default_factory=dict)
@@ -54,17 +55,15 @@ class UnsoundError(Exception):
 def read_manifest(
     folder: Path, user: int | None = None, waiting: Callable[[], None] | None = None
 ) -> Manifest:
-    """Return the manifest of a folder, once all files are as it says.
-
-    Those of a folder are compared once a process.
+    """Return the manifest of a folder after all files were compared with it, once per process.
 
     Args:
         folder: the folder.
-        user: who would load them; without it this process's.
-        waiting: called before it waits for a process that compiles; without it it does not wait.
+        user: the user who would load the kernels; by default the user of this process.
+        waiting: called before a wait for a process that compiles; None for no wait.
 
     Raises:
-        UnsoundError: there is none, or something differs, or others could have written it.
+        UnsoundError: there is no manifest, a file differs, or others could have written the folder.
     """
     if why := why_not_trusted(folder, user):
         raise UnsoundError(why)
@@ -111,7 +110,7 @@ def _seal(content: bytes) -> str:
 
 
 def why_missing(folder: Path, stages: Collection[str], user: int | None = None) -> str:
-    """Return why kernels of ``stages`` would be compiled again; "" where none would.
+    """Return why kernels of ``stages`` would be compiled again; "" if they would not.
 
     Waits for nothing: while a process compiles into the folder, its files are not compared.
     """
@@ -122,12 +121,12 @@ def why_missing(folder: Path, stages: Collection[str], user: int | None = None) 
 
 
 def chosen_folder(stages: Collection[str] = ()) -> tuple[Path | None, str]:
-    """Return the folder that this process has its kernels in, and why not the wanted one.
+    """Return this process's folder of kernels, None for none, and why it is not the wanted one.
 
-    Nothing is made. None where none can be used.
+    No folder is made.
 
     Args:
-        stages: those that must be there where nothing can be written.
+        stages: stages that a folder must have if it cannot be written.
     """
     reason = ""
     for folder in places():
@@ -142,7 +141,7 @@ def chosen_folder(stages: Collection[str] = ()) -> tuple[Path | None, str]:
 def _locked(folder: Path, operation: int, waiting: Callable[[], None] | None) -> Iterator[None]:
     """Hold a lock on a folder, see flock(2): shared to read it, exclusive to compile into it.
 
-    A folder that cannot have one, as it is not there or is read-only, is not locked.
+    A folder that is missing or read-only is not locked.
 
     Raises:
         UnsoundError: another process compiles into it, and this one does not wait.
@@ -167,9 +166,9 @@ def _locked(folder: Path, operation: int, waiting: Callable[[], None] | None) ->
 
 @contextmanager
 def compiling_into(folder: Path, waiting: Callable[[], None]) -> Iterator[Manifest]:
-    """Yield the manifest of a folder that is made if need be, while no other process writes it.
+    """Yield the manifest of a folder, made if missing, while no other process writes it.
 
-    What is not in the manifest, or differs from it, is removed.
+    Files that are not in the manifest, or differ from it, are removed.
 
     Raises:
         OSError: the folder cannot be made or written.
@@ -184,12 +183,12 @@ def compiling_into(folder: Path, waiting: Callable[[], None]) -> Iterator[Manife
 
 
 def cleared(folder: Path) -> Manifest:
-    """Remove what its manifest does not have, or has otherwise; return what is left.
+    """Remove files that the manifest lacks, or that differ from it; return that of the rest.
 
-    Where something is lost no stage counts as complete.
+    If a file of the manifest is lost, no stage counts as complete.
 
     Raises:
-        OSError: something cannot be removed.
+        OSError: a file cannot be removed.
     """
     try:
         _, manifest = _parsed(folder, None)
@@ -205,15 +204,15 @@ def cleared(folder: Path) -> Manifest:
 
 
 def record(folder: Path, manifest: Manifest, stage: str = "") -> None:
-    """Write the manifest of all that is in a folder now, through to the disk.
+    """Write the manifest of all files now in a folder, through to the disk.
 
     Args:
         folder: the folder, whose lock this process holds.
-        manifest: what was in it before; brought up to date.
+        manifest: the manifest before; it is updated.
         stage: a stage that is complete by now.
 
     Raises:
-        OSError: that failed; the manifest before it stays.
+        OSError: writing failed; the previous manifest stays.
     """
     for file in folder.iterdir():
         if file.name in (MANIFEST, LOCK, _NEW):
@@ -224,7 +223,7 @@ def record(folder: Path, manifest: Manifest, stage: str = "") -> None:
             manifest.files[file.name] = seal
     if stage:
         manifest.stages.append(stage)
-    # Their names are on the disk before the list of them.
+    # The files' names are on the disk before the manifest that lists them.
     sync_folder(folder)
     document = {"stages": manifest.stages, "files": dict(sorted(manifest.files.items()))}
     write_through(folder / _NEW, json.dumps(document, indent=1).encode(), mode=0o600)
@@ -243,7 +242,7 @@ def _sync(file: Path) -> None:
 
 
 def remove(path: Path) -> None:
-    """Remove whatever has this name, if anything.
+    """Remove the file or folder of this name, if there is one.
 
     Raises:
         OSError: that failed.

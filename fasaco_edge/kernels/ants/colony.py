@@ -16,7 +16,7 @@ The ants of a group walk at the same time, on the trail that the groups before t
 left. Then (7) is applied for each of their moves, ant by ant. So the ants of a group
 may walk on several threads, and the result is the same for any number of them.
 
-Where the paper is silent: a tie in (4) goes straight on; a dead end is left by
+Where the paper does not say: a tie in (4) goes straight on; a dead end is left by
 the shortest walk to the nearest cell not yet covered, whose moves are moves
 like any other, (7) included. The paper prints "max p_k" for the second branch
 of (4), which would make it the first again; as in ant colony systems, (6) is

@@ -65,7 +65,7 @@ def begin(graph: Graph, scratch: Scratch, start: int) -> int:
 
 @lean_kernel
 def close(graph: Graph, scratch: Scratch, cell: int) -> None:
-    """Note the visit of ``cell``: no step leads to an open cell there any more."""
+    """Note the visit of ``cell``: it is no longer open, so the steps to it lead to no open cell."""
     at = cell + graph.offsets[1]
     for direction in range(4):
         scratch.open_steps[at + graph.offsets[direction]] &= 255 ^ (1 << ((direction + 2) & 3))

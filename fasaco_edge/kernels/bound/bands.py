@@ -32,7 +32,8 @@ from fasaco_edge.kernels.jit import as_value, inlined, lean_kernel
 
 # A band's next limit is the excess found plus a quarter of it, plus 1 / SLACK of a corner.
 SLACK = 8
-# Entries of ``sums``: the bound so far, the largest saving by the free end, and the next band.
+# Entries of ``sums``: the bound so far, the largest saving by the walk's free end, and the next
+# band.
 TOTAL, SAVING, BAND = 0, 1, 2
 
 

@@ -135,12 +135,12 @@ class Sea(NamedTuple):
 def find_islands(sea: Sea, chosen: NDArray[np.uint8], colour: NDArray[np.uint8]) -> tuple[int, int]:
     """Number the islands with a wanted cell; return the number of islands of each colour.
 
-    An island's colour is that of its chosen cells. They agree: a step from a
-    chosen cell leads to a cell of the other colour that is not chosen, and a step from
-    there that belongs to the island leads to a chosen cell again. A wanted cell with no
-    chosen neighbour is an island by itself, of the colour it has not. So in an island
-    all cells of its colour are chosen. Two islands of one colour are never one step
-    apart: one end of the step would have that colour, so be chosen, and join them.
+    An island's colour is that of its chosen cells. They agree: a step from a chosen cell leads to a
+    cell of the other colour that is not chosen, and a step from there that belongs to the island
+    leads to a chosen cell again. A wanted cell that is not chosen and has no chosen neighbour is an
+    island by itself, and counts with the other colour than its own. So in an island all cells of
+    its colour are chosen. Two islands of one colour are never one step apart: one end of the step
+    would have that colour, so it would be chosen, and would join them.
 
     Args:
         sea: the block; ``island`` is written for its cells.

@@ -22,10 +22,10 @@ count. If there are k > 1, the walk makes further steps between them, none of th
 A walk enters and leaves each of the m islands of a colour, which takes 2 m steps, as no
 step serves two of these islands; one less for each end of the walk in one of them. With
 both ends in the same island it leaves that one, too, and returns: 2 m.
-(2) Its paths from island to island connect them, so they weigh no less than a minimum
-spanning tree. If it is closed, or ends in the island where it began, it crosses every
-cut at least twice. Without one crossing of the cut at the tree's heaviest edge, the
-lightest across it, the other paths still connect: tree + heaviest.
+(2) Its paths from island to island connect them, so they weigh no less than a minimum spanning
+tree. If it is closed, or ends in the island where it began, it crosses every cut at least twice.
+Take the cut at the tree's heaviest edge, which is the lightest edge across that cut: without one of
+its crossings the other paths still connect the islands, so all weigh at least tree + heaviest.
 
 *Return.* An open walk and a shortest path from b to a form a closed walk: its bound minus
 the distance is a bound.
@@ -62,7 +62,7 @@ from fasaco_edge.kernels.jit import kernel
 
 NO_END = -(2**30)
 # Search budget for a larger matching [cells]. On maps of a million cells with scattered obstacles a
-# larger budget improved no bound; without any search bounds were up to four steps lower.
+# larger budget improved no bound; without a search, bounds were up to four steps lower.
 SEARCHED_PER_CELL, SEARCHED_AT_LEAST = 10, 10_000
 
 
@@ -112,7 +112,7 @@ def covering_bound(
     """
     ground = _ground(steps, required)
     ground.wanted[start] = 1
-    # Steps saved, against a walk back to the cell, by an end in it or beyond it.
+    # Steps that a walk saves if it ends in the cell or beyond it instead of returning to the cell.
     saved = np.full(steps.size, NO_END, np.int32)
     if end < 0:
         for cell in range(steps.size):
@@ -187,9 +187,9 @@ def _bound_block(ground: Ground, cells: NDArray[np.int32], count: int, number: i
     same = 1 if ground.colour[top] else 0
     closed, first = 0, -1
     for attempt in range(3):
-        # The first two sets leave out all cells of one colour that any largest set leaves
-        # out; the second, of the top's colour, the top if it can. Then the third leaves out
-        # the top and what cells of the other colour can be left out with it.
+        # The first two sets are largest sets that leave out as many cells of one colour as
+        # possible; the second leaves out the top, of that colour, if a largest set can. If so, the
+        # third leaves out the top, and of the other colour the cells that can be left out with it.
         if attempt == 2:
             if ground.chosen[top]:
                 break

@@ -23,7 +23,7 @@ class Bipartite(NamedTuple):
 
     Attributes:
         cells: int32 (k,), flat cells.
-        links: uint8 (n,), for each of them a mask of the steps to others of them.
+        links: uint8 (n,), for each of these cells a mask of its steps to others of them.
         colour: uint8 (n,), 0 or 1; linked cells differ.
         offsets: int64 (4,), difference of flat index for a step in each direction.
     """
@@ -42,7 +42,7 @@ class Pairing(NamedTuple):
         queue: int32 (n,).
         seen: int32 (n,), number of the last search that reached the cell, or DEAD.
         came_by: uint8 (n,), direction by which that search reached it.
-        degree: uint8 (n,), how many links to single cells are left.
+        degree: uint8 (n,), number of the cell's links to cells still single.
     """
 
     mate: NDArray[np.int32]
@@ -114,7 +114,7 @@ def _match_lone_cells_first(graph: Bipartite, pairing: Pairing) -> None:
 
 @kernel
 def _match_with_rarest(graph: Bipartite, pairing: Pairing, cell: int, waiting: int) -> int:
-    """Match ``cell`` with the single neighbour of least degree; return how many wait."""
+    """Match ``cell`` with the single neighbour of least degree; return the length of the queue."""
     mate, degree = pairing.mate, pairing.degree
     partner, least = SINGLE, 5
     for direction in range(4):
@@ -186,10 +186,10 @@ def choose_independent(
 ) -> int:
     """Choose an independent set; return its size.
 
-    All cells of the colour other than ``side`` are chosen, except the neighbours of
-    chosen cells of ``side``: the single cells, ``first``, and the mates of displaced
-    cells. So the set is independent whatever the matching is. It is as large as any
-    (Koenig) if the matching is maximum and no single cell can be reached from ``first``.
+    Of colour ``side`` the single cells, ``first``, and the mates of displaced cells are chosen; of
+    the other colour all cells but the neighbours of these, which are displaced. So the set is
+    independent whatever the matching is. It is as large as any (Koenig) if the matching is maximum
+    and no single cell can be reached from ``first``.
 
     Args:
         graph: the cells and links.

@@ -12,8 +12,8 @@ unchanged. If no passage has a negative reduced cost, a walk costs at least the 
 
 * the cheapest first visit of the start;
 * the cheapest passage of each cell to cover;
-* the last visit: the cheapest one of a given end; else it replaces the passage of a cell where that
-  saves most, because a best walk ends in a cell to cover, at its first visit.
+* the cheapest last visit of a given end. Without a given end a last visit replaces the passage of
+  the cell where that saves most, because a best walk ends at the first visit of a cell to cover.
 
 The prices after every iteration are exactly feasible (``kernels.bound.feasible``) and give a valid
 bound; the best one counts.
@@ -51,8 +51,8 @@ def ascend(
         prices: initial ones, feasible or not; changed in place.
         step, turn: a step and a quarter-turn [half us], the step an even number.
         pace: initial step size of the prices [half us].
-        falls: the pace falls by a factor of about e to this power.
-        times: how many iterations.
+        falls: over all iterations the pace falls by a factor of about e ** falls.
+        times: number of iterations.
     """
     best = 0
     for _ in range(times):
@@ -76,7 +76,7 @@ def _copy(source: NDArray[np.int64], target: NDArray[np.int64]) -> None:
 
 @lean_kernel
 def _relaxed(lines: Lines, prices: StepPrices, step: int, turn: int) -> int:
-    """Return the bound of feasible prices; write the use of sides by its passages into ``use``."""
+    """Return the bound of feasible prices; count in ``use`` how its passages use each side."""
     use = prices.use
     for axis in range(2):
         for index in range(lines.sides.size):

@@ -14,9 +14,9 @@ from fasaco_edge.kernels.bound.lines import Lines, StepPrices
 from fasaco_edge.kernels.bound.passages import cheapest, sides_of, use_side
 from fasaco_edge.kernels.jit import inlined, lean_kernel
 
-# Two bits for each direction: all ways to use a cell's sides 0, 1 or 2 times.
+# Number of patterns: two bits for each direction, for 0, 1 or 2 uses of a side.
 PATTERNS = 256
-# Sides used behind a cell, two directions, and those ahead of it.
+# Numbers of patterns of the two sides behind a cell, and of the two ahead of it.
 INCOMING, OUTGOING = 16, 9
 
 
@@ -27,7 +27,7 @@ class BandMemory(NamedTuple):
         sums: int64 (3,), TOTAL, SAVING, BAND.
         limit: int64 (k,), excess from which states are dropped [half us].
         found: int64 (k, 2), excess without the walk's free end and with it, at least.
-        is_met: uint8 (k,), whether the latter is met, or cannot be known.
+        is_met: uint8 (k,), whether the excess with the free end is exact, or cannot be known.
         entry: int32, by state its number in ``value``, or -1.
         value, state, parent, pattern: int64 and int32 (n,), states of one band cell by cell:
             excess, the state, its predecessor, and the pattern of the cell's sides.
@@ -138,7 +138,7 @@ def _add_half(
     sides: tuple[int, int, int, int],
     step: int,
 ) -> None:
-    """Price all ways of a row of ``cost`` with a visit of one side more."""
+    """Price all patterns of a row of ``cost`` with one more visit that has one side only."""
     codes = memory.codes[inner]
     for number in range(memory.counts[inner]):
         memory.cost[target, codes[number]] = NO_SIDE

@@ -1,4 +1,4 @@
-"""Nearest-neighbour walks over the parts of robots: about how long each takes to sweep its own.
+"""Nearest-neighbour walks over the parts of robots: an estimate of each robot's time for its part.
 
 A robot drives straight on while the cell ahead is its own and unswept, else to the nearest such
 cell. All numbers are integers, so that results are equal on all machines.
@@ -43,7 +43,7 @@ def _quarters(before: int, after: int) -> int:
 
 @lean_kernel
 def _nearest(ground: _Ground, robot: int, here: int, clock: int) -> int:
-    """Return the cell of a robot that is nearest to one, NONE for none; ``came`` leads there."""
+    """Return the robot's cell nearest to cell ``here``, NONE for none; ``came`` leads there."""
     steps, offsets, owner, seen, came, queue = ground
     queue[0], seen[here] = here, clock
     at, end = 0, 1
@@ -80,7 +80,7 @@ def _walk(ground: _Ground, robot: int, here: int, count: int, clock: int) -> tup
         found = _nearest(ground, robot, here, clock)
         if found == NONE:
             return length + count, quarters, clock
-        # From its end to its begin.
+        # Follow the way from its end to its begin.
         cell, after = found, NONE
         while cell != here:
             direction = int(ground.came[cell])

@@ -37,7 +37,7 @@ FARTHEST, OCTAVES = 2.5, 5
 LEFT_OUT, MOVED, SHIFTED, CUT = 2, 4, 3, 3
 # A cut leaves at least this much of an edge.
 MOST_CUT = 0.95
-# No unswept floor nearby, or too few points for a move.
+# Returned if no unswept floor is nearby, or if there are too few points for a move.
 NO_MOVE = -1
 # Unit exponential variates, rounded: the logarithm's last bits differ between machines.
 EXPONENTIAL = np.round(-np.log((np.arange(4096) + 0.5) / 4096) * 65536) / 65536
@@ -61,7 +61,7 @@ def _length(random: NDArray[np.uint64], farthest: float) -> float:
 
 @lean_kernel
 def _move(line: Line, memory: Memory, random: NDArray[np.uint64], begin: int, far: float) -> int:
-    """Move the point behind ``begin``: along either edge, or anywhere."""
+    """Move the point after ``begin``: along either edge, or in any direction."""
     points, new = line.points, memory.new
     middle = line.next[begin]
     end = line.next[middle]
@@ -80,7 +80,7 @@ def _move(line: Line, memory: Memory, random: NDArray[np.uint64], begin: int, fa
 
 @lean_kernel
 def _shift(line: Line, memory: Memory, random: NDArray[np.uint64], begin: int, far: float) -> int:
-    """Shift the edge behind ``begin``'s next point; its ends may slide on their neighbours."""
+    """Shift the edge after ``begin``'s next point; its ends may slide along the edges beside it."""
     points, new = line.points, memory.new
     a = line.next[begin]
     b = line.next[a]
@@ -221,7 +221,7 @@ def anneal(
         margin: 1 if the first and the last edge only define the turns after and before them, as
             for a piece of a longer line; else 0.
         heat: first and last temperature, as shares of the initial one.
-        most_tried: most moves, including those tried before.
+        most_tried: limit on the moves tried, including those tried before.
 
         Returns:
             The total gain [s]; it may be negative.

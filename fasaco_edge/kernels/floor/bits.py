@@ -34,13 +34,13 @@ def unpacked(bits: Bits, cols: int) -> NDArray[np.bool_]:
 
 @inlined
 def is_marked(bits: NDArray[np.uint64], i: int, j: int) -> bool:
-    """Tell whether a pixel, which must be on the raster, is marked."""
+    """Return whether a pixel, which must be on the raster, is marked."""
     return bool((bits[i, j >> 6] >> np.uint64(j & 63)) & ONE)
 
 
 @inlined
 def any_between(row: NDArray[np.uint64], first: int, last: int) -> bool:
-    """Tell whether any pixel of a row from ``first`` to ``last``, no less, is marked."""
+    """Return whether any pixel of a row from ``first`` to ``last``, no less, is marked."""
     at, end = first >> 6, last >> 6
     low = ALL << np.uint64(first & 63)
     high = ALL >> np.uint64(63 - (last & 63))
@@ -71,8 +71,8 @@ def spread(bits: NDArray[np.uint64], reach: NDArray[np.int64]) -> NDArray[np.uin
 
     Args:
         bits: uint64 (rows, words).
-        reach: int64 (n,), of the disc, falling: how many pixels it touches to either side of the
-            middle one, in the row that many rows above, or below.
+        reach: int64 (n,), falling: the number of pixels that the disc touches on either side of the
+            middle one, for its own row first, then for each next row above, or below.
     """
     rows, words = bits.shape
     found = np.zeros((rows, words), np.uint64)

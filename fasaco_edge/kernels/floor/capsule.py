@@ -13,7 +13,7 @@ from fasaco_edge.kernels.jit import inlined, lean_kernel
 
 # Tolerance of contact: a robot exactly as wide as a door fits.
 TOUCH = 1e-3
-# No row blocks a segment; it leads out of the raster.
+# Returned if no row blocks a segment; if it leads out of the raster.
 CLEAR, BEYOND = -1, -2
 # A line that rises by less counts as level.
 LEVEL = 1e-9
@@ -36,9 +36,9 @@ def right_of(
     Args:
         y: height.
         ay, ax, by, bx: its ends, the lower one first.
-        side_y, side_x: from these to its right side, which has columns a row, ``slope``; ``side_y``
-            is infinite for a level one, whose sides are rows.
-        square: of its radius.
+        side_y, side_x: offset from its ends to its right side; ``slope``: columns of that side per
+            row. ``side_y`` is infinite for a level capsule, whose sides are rows.
+        square: square of its radius.
     """
     x = -np.inf
     if (y - ay) * (y - ay) <= square:
@@ -70,8 +70,8 @@ def _blocked_row(
 
     With the row, the columns from and to which that may be; ``CLEAR`` or ``BEYOND`` for no row.
 
-    A pixel is a square: the row's stretch that its squares may not reach into is widest where the
-    row is nearest to the height of the capsule's outermost point.
+    A pixel is a square: the stretch of a row whose pixels touch the capsule is widest at the height
+    in the row that is nearest to the capsule's outermost point.
 
     Args:
         blocked: uint64 (rows, words), see ``bits``. What lies outside is blocked, too.
@@ -95,7 +95,7 @@ def _blocked_row(
         if y0 > y1:
             continue
         if ax == bx:
-            # All between the two ends are outermost.
+            # All points between the two ends are outermost.
             y = min(max(min(max(y0, ay), by), y0), y1)
             right = right_of(y, ay, ax, by, bx, side_y, side_x, slope, square)
             left = 2.0 * ax - right
@@ -116,7 +116,7 @@ def _blocked_row(
 def _is_box_clear(
     blocked: NDArray[np.uint64], ay: float, ax: float, by: float, bx: float, radius: float
 ) -> bool:
-    """Tell whether nothing is blocked in the box around a capsule, a fast test."""
+    """Return whether nothing is blocked in the box around a capsule, a fast test."""
     first, last = (
         int(np.floor(min(ay, by) - radius + 0.5)),
         int(np.ceil(max(ay, by) + radius - 0.5)),
@@ -134,7 +134,7 @@ def _is_box_clear(
 def is_clear(
     blocked: NDArray[np.uint64], ay: float, ax: float, by: float, bx: float, radius: float
 ) -> bool:
-    """Tell whether no blocked pixel is nearer than ``radius`` to the segment a to b.
+    """Return whether no blocked pixel is nearer than ``radius`` to the segment a to b.
 
     Args:
         blocked: uint64 (rows, words), see ``bits``. What lies outside is blocked, too.
@@ -157,11 +157,11 @@ def is_clear_but(
     radius: float,
     blocker: NDArray[np.int64],
 ) -> bool:
-    """Tell the same; a pixel that is in the way is noted in ``blocker``, int64 (2,): row, col."""
+    """Return as ``is_clear``; write a pixel in the way into ``blocker``, int64 (2,): row, col."""
     row, first, last = _blocked_row(blocked, ay, ax, by, bx, radius)
     if row < 0:
         return row == CLEAR
-    # The one nearest to the middle blocks most neighbouring segments, too.
+    # The pixel nearest to the middle also blocks most neighbouring segments.
     middle = (first + last) >> 1
     for away in range(last - first + 1):
         for col in (middle - away, middle + away):
@@ -173,7 +173,7 @@ def is_clear_but(
 
 @inlined
 def is_near(y: float, x: float, ay: float, ax: float, by: float, bx: float, radius: float) -> bool:
-    """Tell whether a point is certainly nearer than ``radius`` to the segment a to b."""
+    """Return whether a point is certainly nearer than ``radius`` to the segment a to b."""
     dy, dx = by - ay, bx - ax
     length2 = max(dy * dy + dx * dx, 1e-18)
     along = min(max(((y - ay) * dy + (x - ax) * dx) / length2, 0.0), 1.0)

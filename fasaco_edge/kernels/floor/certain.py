@@ -151,7 +151,7 @@ def _find_bounds(place: NDArray[np.float64], row: int, col: int, bounds: NDArray
         i, j = row0 + up * c + right * r, col0 + right * c - up * r
         least_i, most_i = min(least_i, i), max(most_i, i)
         least_j, most_j = min(least_j, j), max(most_j, j)
-    # One beyond: a centre's position is rounded.
+    # One pixel of margin: a centre's position is rounded.
     bounds[0], bounds[1] = int(np.floor(least_i)) - 1, int(np.floor(least_j)) - 1
     bounds[2], bounds[3] = int(np.floor(most_i)) + 2, int(np.floor(most_j)) + 2
 
@@ -179,7 +179,7 @@ def _put_together(
 @inlined
 def _pixel(lookup: _Lookup, row: float, col: float) -> tuple[np.uint64, np.uint64]:
     """Return the row and column in ``_Around`` of a point."""
-    # In this order, which determines rounding.
+    # Summed in this order, as it determines the rounding.
     i = (lookup.right * row + lookup.i0) + lookup.up * col
     j = (lookup.j0 - lookup.up * row) + lookup.right * col
     return np.uint64(int(i) + lookup.rows), np.uint64(int(j) + lookup.cols)
@@ -189,7 +189,8 @@ def _pixel(lookup: _Lookup, row: float, col: float) -> tuple[np.uint64, np.uint6
 def _leave_at(
     lookup: _Lookup, around: _Around, row: int, col: int, left: NDArray[np.uint8]
 ) -> bool:
-    """Unmark unswept pixels of the tile from pixel (row, col) on; return if any is left."""
+    """Unmark unswept pixels of the tile that begins with pixel (row, col); return if any is
+    left."""
     is_any = False
     for top in range(0, TILE, BLOCK):
         for byte in range(BLOCKS):
@@ -247,7 +248,7 @@ def certain_floor(
         # If far apart, as for a map that jumped, each counts from its own corner: for a centre on
         # the border of two pixels rounding decides.
         is_near = (row1 - row0) * (col1 - col0) <= MOST_TOGETHER
-        # From the last one on, which leaves the fewest pixels.
+        # The last position first, as it leaves the fewest pixels.
         for number in range(count - 1, -1, -1):
             alone, place = bounds[number], places[number]
             if not is_near:

@@ -199,7 +199,7 @@ def find_patches(sweeps: Sweeps, least: int) -> NDArray[np.bool_]:
 
 @inlined
 def _is_near(line: Line, begin: int, place: NDArray[np.float64], farthest: float) -> bool:
-    """Tell whether the edge after ``begin`` may come near a place."""
+    """Return whether the edge after ``begin`` may come near a place."""
     a, b = line.points[begin], line.points[line.next[begin]]
     y, x = place[0], place[1]
     return bool(

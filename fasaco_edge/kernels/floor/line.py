@@ -29,11 +29,11 @@ from fasaco_edge.kernels.jit import as_value, inlined, lean_kernel
 LEAST_GAIN_S = 1e-3
 # No edge is shorter than this [pixels].
 LEAST_EDGE = 0.3
-# Most points that a move inserts.
+# Limit on the points that a move inserts.
 MOST_NEW = 4
-# Most points of a chain: those replaced, and two on either side.
+# Limit on the points of a chain: those replaced, and two on either side.
 MOST_CHAIN = MOST_NEW + 4
-# Most capsules compared: edges of the chains before and after.
+# Limit on the capsules compared: edges of the chains before and after.
 MOST_CAPSULES = 2 * (MOST_CHAIN - 1)
 NONE = -1
 
@@ -84,8 +84,8 @@ class Floor(NamedTuple):
 
 
 class Price(NamedTuple):
-    """The objective: seconds for a pixel driven, for turns, for an unswept pixel, and how many more
-    for a pixel driven without clearance."""
+    """The objective: seconds for a pixel driven, for turns, for an unswept pixel, and additional
+    seconds for a pixel driven without clearance."""
 
     drive_s: float
     turning: Turning
@@ -94,8 +94,8 @@ class Price(NamedTuple):
 
 
 class Memory(NamedTuple):
-    """Memory for a move: points before and after, float64 (MOST_CHAIN, 2), and the points to be
-    put in, those of the best so far, and a place, float64 (MOST_NEW, 2)."""
+    """Memory for a move: points before and after, float64 (MOST_CHAIN, 2); the points to insert,
+    those of the best move so far, and a place, float64 (MOST_NEW, 2)."""
 
     before: NDArray[np.float64]
     after: NDArray[np.float64]
@@ -184,7 +184,7 @@ def _chains(line: Line, memory: Memory, begin: int, end: int, count: int) -> Cha
 
 @lean_kernel
 def _is_way(floor: Floor, points: NDArray[np.float64], first: int, last: int) -> bool:
-    """Tell whether the edges between two points of a chain are clear, and none is too short."""
+    """Return whether the edges between two points of a chain are clear, and none is too short."""
     for number in range(first, last):
         ay, ax = points[number, 0], points[number, 1]
         by, bx = points[number + 1, 0], points[number + 1, 1]
@@ -225,8 +225,8 @@ def gain_above(
     Args:
         line, floor, price, memory: see above.
         begin: number of the point before.
-        end: of the point after; NONE if the line ends with the new ones.
-        count: new points.
+        end: number of the point after; NONE if the line ends with the new points.
+        count: number of new points.
         least_s: see above.
     """
     line.state[TRIED] += 1
@@ -259,14 +259,14 @@ def gain_above(
 def gain_of(
     line: Line, floor: Floor, price: Price, memory: Memory, begin: int, end: int, count: int
 ) -> float:
-    """Return the same [s]; 0.0 if it is less than LEAST_GAIN_S."""
+    """Return the gain of ``gain_above`` [s]; 0.0 if it is less than LEAST_GAIN_S."""
     return max(gain_above(line, floor, price, memory, begin, end, count, LEAST_GAIN_S), 0.0)
 
 
 @lean_kernel
 def note_change(line: Line, begin: int, tool: float, hops: int, now: int) -> int:
-    """Return when the line was last changed around some points from the one before ``begin`` on;
-    with ``now`` above 0 note a change there."""
+    """Return when the line was last changed around some points, beginning with the point before
+    ``begin``; with ``now`` above 0 note a change there."""
     points = line.points
     number = line.previous[begin] if line.previous[begin] != NONE else begin
     low_y, low_x = points[number, 0], points[number, 1]
@@ -292,13 +292,13 @@ def note_change(line: Line, begin: int, tool: float, hops: int, now: int) -> int
     return newest
 
 
-# Points around a point whose moves depend on it.
+# Number of points before and after a point whose moves depend on it.
 HOPS = 6
 
 
 @inlined
 def has_room(line: Line) -> bool:
-    """Tell whether there are free numbers for the points of a move."""
+    """Return whether there are free numbers for the points of a move."""
     return bool(line.state[USED] <= len(line.points) - MOST_NEW)
 
 

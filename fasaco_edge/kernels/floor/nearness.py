@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from fasaco_edge.kernels.floor.capsule import is_clear
 from fasaco_edge.kernels.jit import lean_kernel
 
-# Edges are looked at in pieces of at most this length [pixels].
+# Edges are checked in pieces of at most this length [pixels].
 PIECE = 4.0
 
 
@@ -19,9 +19,9 @@ def near_px(
     robot: float,
     clear: float,
 ) -> float:
-    """Return the length of edges without clearance, to about a piece [pixels].
+    """Return the length of edges without clearance [pixels], with the precision of a piece.
 
-    What has more than half of the clearance counts half: the robot gives it up bit by bit.
+    A piece with more than half of the clearance counts half.
 
     Args:
         blocked: uint64 (rows, words), see ``bits``.

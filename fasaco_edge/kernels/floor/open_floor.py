@@ -14,9 +14,9 @@ from fasaco_edge.kernels.floor.sweeps import (
 )
 from fasaco_edge.kernels.jit import inlined, lean_kernel
 
-# A pixel is wanted; the line is to sweep it; it is swept.
+# States of a pixel: it is wanted; the line is to sweep it; it is swept.
 WANTED, OPEN, SWEPT = 1, 2, 4
-# The line has been there, whether or not the robot was and swept it: this line does not go back.
+# The line has passed the pixel, whether or not the robot swept it: this line does not go back.
 PASSED = 32
 # Position in a pixel's state of the cause why it is out of reach.
 CAUSE_SHIFT, CAUSE = 3, 24
@@ -24,7 +24,7 @@ CAUSE_SHIFT, CAUSE = 3, 24
 
 @inlined
 def _is_bare(state: NDArray[np.uint8], row: int, col: int) -> bool:
-    """Tell whether a pixel and the three after it, below and beside, are wanted and not swept."""
+    """Return whether a pixel and the three after it, below and beside, are wanted and not swept."""
     if row < 0 or col < 0 or row + 1 >= state.shape[0] or col + 1 >= state.shape[1]:
         return False
     both = WANTED | SWEPT
@@ -82,11 +82,10 @@ def set_open(
     wanted: NDArray[np.bool_],
     swept: NDArray[np.bool_],
 ) -> tuple[int, int, int]:
-    """Set the wanted and swept pixels of a part of the raster, and what of it is open.
+    """Set the wanted, swept and open pixels of a part of the raster.
 
-    Pixels of another raster that are swept by the same tool differ along its rim by less than a
-    pixel, so a wanted pixel that is not swept is open only as one of two by two such pixels, and if
-    the line has not passed it.
+    The same sweep on two rasters differs along its rim by less than a pixel. So a wanted unswept
+    pixel is open only if it is one of two by two such pixels, and the line has not passed it.
 
     Args:
         sweeps: their counts are higher by ``NEVER`` where a pixel is not open.
@@ -112,7 +111,7 @@ def set_open(
                 state[row, col] = after
                 more_wanted += (after & WANTED) - (before & WANTED)
                 more_swept += (after & both == both) - (before & both == both)
-    # Neighbours of the part may have changed with it.
+    # Pixels beside the part may open or close with it.
     first_row, first_col = max(corner[0] - 1, 0), max(corner[1] - 1, 0)
     last_row = min(corner[0] + swept.shape[0], state.shape[0] - 1)
     last_col = min(corner[1] + swept.shape[1], state.shape[1] - 1)

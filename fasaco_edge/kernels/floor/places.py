@@ -18,7 +18,7 @@ from fasaco_edge.kernels.lattice.footprint import Box, Placement
 BEND_STEP = 2
 # Longest path round a corner, in edges of a cell.
 LONGEST_BEND = 3.0
-# No blocker.
+# Row of a missing blocker.
 FAR = -1_000_000
 # Tolerance for points on the border of cells or pixels, and for distances: results must not depend
 # on where the raster begins.
@@ -52,7 +52,7 @@ def places_of(blocked: Bits, disc: NDArray[np.int64]) -> Bits:
 
 
 def within(marked: Bits, radius: float) -> Bits:
-    """Return the pixels whose centre is within ``radius`` of a marked one's.
+    """Return the pixels whose centre is within ``radius`` of the centre of a marked pixel.
 
     Args:
         marked: uint64 (rows, words), see ``bits``.
@@ -64,7 +64,7 @@ def within(marked: Bits, radius: float) -> Bits:
 
 @kernel
 def connected(places: NDArray[np.bool_], row: int, col: int) -> NDArray[np.bool_]:
-    """Return the places connected to one of them by their edges, bool (rows, cols)."""
+    """Return the places that are connected to one place by their edges, bool (rows, cols)."""
     rows, cols = places.shape
     found = np.zeros((rows, cols), np.bool_)
     waiting = np.empty(rows * cols, np.int32)
@@ -107,7 +107,7 @@ def keep_in_cells(
         found: uint64 (rows, words), the part, see ``bits``; changed.
         placement: of the lattice's cells on the raster.
         chosen: bool (rows, cols) of the lattice.
-        cell: its first cell (row, col).
+        cell: first cell (row, col) of ``chosen``.
         corner: first pixel (row, col) of the part.
     """
     is_level = placement.uy == 0.0
@@ -159,8 +159,7 @@ def _step_aside(
     clear: float,
     stand: NDArray[np.float64],
 ) -> None:
-    """Move a stand without clearance to the nearest place of its cell that has it, if one is as
-    near as that may be."""
+    """Move a stand without clearance to the nearest place of its cell with it, if near enough."""
     y, x = stand[0], stand[1]
     if is_clear(blocked, y, x, y, x, clear):
         return
@@ -191,9 +190,9 @@ def choose_stands(
     clear: float,
     stands: NDArray[np.float64],
 ) -> None:
-    """Find for stale cells the place nearest to its middle; the middle itself if that is clear.
+    """Find the place nearest to the middle of each stale cell, or the middle itself if it is clear.
 
-    A place beside it that keeps the robot's clearance is preferred.
+    A place nearby that keeps the robot's clearance is preferred.
 
     Args:
         blocked, places: uint64 (rows, words), see ``bits``, of the raster, whose pixel (0, 0) is

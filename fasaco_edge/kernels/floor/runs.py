@@ -30,10 +30,11 @@ def common_runs(
         ``before``; how many steps it has; 1 where ``before`` goes the other way, else 0.
     """
     size, most = len(before), len(after)
-    # Only of the old walk, which its lattice bounds: the new one may be a thousand miles away.
+    # The index covers the old walk alone, whose size its lattice limits: the new walk may be far
+    # away.
     row0, col0 = before[:, 0].min(), before[:, 1].min()
     rows, cols = before[:, 0].max() - row0 + 1, before[:, 1].max() - col0 + 1
-    # The visits of each cell of the walk before, in order.
+    # The old walk's visits of each cell, in order.
     first = np.full(rows * cols, -1, np.int32)
     following = np.empty(size, np.int32)
     for at in range(size - 1, -1, -1):

@@ -50,7 +50,7 @@ def chain_s(
     drive_s: float,
     turning: Turning,
 ) -> float:
-    """Return the seconds of a chain: its edges from ``first`` to ``last``, all its turns.
+    """Return the driving time of a chain [s]: edges from ``first`` to ``last``, and all turns.
 
     Args:
         points: float64 (count or more, 2): y, x [pixels].

@@ -76,9 +76,9 @@ def _add_stretch(
     stretches: NDArray[np.int64],
     count: int,
 ) -> int:
-    """Sort a capsule's pixels of row i in among ``count`` stretches; return how many there are.
+    """Insert a capsule's pixels of row i into ``count`` sorted stretches; return their new number.
 
-    Of the row's ``cols`` pixels: the robot may come near to the raster's rim, and beyond it.
+    Pixels beyond the row's ``cols`` are left out: the robot may come near to the raster's rim.
     """
     ay, ax, by, bx = capsule[Y0], capsule[X0], capsule[Y1], capsule[X1]
     side_y, side_x, slope = capsule[SIDE_Y], capsule[SIDE_X], capsule[SLOPE]
@@ -102,7 +102,7 @@ def _add_stretch(
 def _add(
     row: NDArray[np.int16], blocks: NDArray[np.int32], begin: int, end: int, more: int
 ) -> None:
-    """Count pixels of a row, the last one among them, ``more`` times; 0 times counts as left."""
+    """Add ``more`` to the counts of a row's pixels, the last one included; update ``left``."""
     for j in range(begin, end + 1):
         before = row[j]
         row[j] = before + more
@@ -116,8 +116,8 @@ def _add(
 def _next_outside(
     stretches: NDArray[np.int64], count: int, at: int, col: int, last: int
 ) -> tuple[int, int, int]:
-    """Return the next columns from ``col`` to ``last`` in no stretch: first, last, the stretch
-    to look on from. There are none where first > last."""
+    """Return the next columns from ``col`` to ``last`` in no stretch: first, last, and the stretch
+    to continue with. If first > last there are none."""
     while at < count and col <= last:
         if stretches[at, 1] < col:
             at += 1
@@ -176,8 +176,8 @@ def stretches_of(
 
 @inlined
 def _over(stretches: NDArray[np.int64], count: int, col: int, end: int) -> tuple[int, int]:
-    """Return how many stretches lie over a column, and before which column, at most ``end``,
-    another number of them does."""
+    """Return how many stretches contain a column, and the column, at most ``end``, from which that
+    number differs."""
     times = 0
     for number in range(count):
         begin, behind = stretches[number, 0], stretches[number, 1] + 1

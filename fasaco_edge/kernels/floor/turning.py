@@ -55,8 +55,8 @@ def limited_turning(
 
     Args:
         turn_deg_s, turn_deg_s2: rate of turning on the spot, and its acceleration.
-        speed_m_s, acceleration_m_s2: of driving. To brake and to start takes twice as long as to
-            drive the same ways at full speed: longer by speed / acceleration in all.
+        speed_m_s, acceleration_m_s2: limits of driving. Braking and starting take twice as long as
+            the same distance at full speed: speed / acceleration longer in all.
         steered_deg: a turn up to this is steered while driving [deg].
     """
     rate, acceleration = math.radians(turn_deg_s), math.radians(turn_deg_s2)

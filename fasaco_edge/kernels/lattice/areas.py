@@ -20,7 +20,8 @@ class Areas(NamedTuple):
         labels: int32 (rows, cols), number of each cell's area, from 1; 0 for none.
         kinds: uint8 (n,), the kind of area i + 1.
         cells: int32 (n,), how many cells it has.
-        inner: int32 (n, 2), one of them, (row, col): the middle of its first longest run in a row.
+        inner: int32 (n, 2), one of its cells (row, col): the middle of its first longest run in a
+            row.
     """
 
     labels: NDArray[np.int32]
@@ -33,7 +34,7 @@ class Areas(NamedTuple):
 def root(parents: NDArray[np.integer], piece: int) -> int:
     """Return the root of ``piece`` (union-find with path compression).
 
-    Joined pieces are a tree, by each one's parent, int (n,); the root is its own.
+    Joined pieces form a tree by the parent of each, int (n,); the root is its own parent.
     """
     while parents[piece] != piece:
         parents[piece] = parents[parents[piece]]
@@ -90,7 +91,7 @@ def _number(parents: NDArray[np.int32], pieces: int) -> int:
 def _measure(
     kinds: NDArray[np.uint8], parents: NDArray[np.int32], areas: Areas, longest: NDArray[np.int32]
 ) -> None:
-    """Replace each cell's piece by its area's number, and fill in what is known of the areas."""
+    """Replace each cell's piece by its area's number; fill in the areas' kind, size, inner cell."""
     rows, cols = kinds.shape
     for row in range(rows):
         run = 0
@@ -152,7 +153,7 @@ def _beside(labels: NDArray[np.int32], row: int, col: int, found: NDArray[np.int
 def cells_beside(areas: Areas, allowed: NDArray[np.bool_]) -> NDArray[np.int32]:
     """Return for each area an allowed cell (row, col) beside it, int32 (n, 2); (-1, -1) for none.
 
-    It is the middle one of them all, row by row. An area without a square of two by two cells
+    It is the middle one of all such cells, row by row. An area without a square of two by two cells
     has none.
 
     Args:

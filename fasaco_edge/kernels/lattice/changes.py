@@ -18,8 +18,8 @@ from fasaco_edge.kernels.lattice.footprint import (
     reach_of,
 )
 
-# Rows of a strip, columns of a segment of it, and of a block, whose changed pixels mark
-# the cells around them at once.
+# Rows of a strip, columns of a segment of it, and columns of a block; the changed pixels of a block
+# mark the cells around them together.
 STRIP, SEGMENT, BLOCK = 8, 64, 8
 
 BLANK = -1
@@ -56,7 +56,7 @@ def _row_is_blank(values: NDArray[np.int8]) -> bool:
 
 @lean_kernel
 def _is_blank(pixels: Pixels, box: Box) -> bool:
-    """Return whether a box in the window holds unknown pixels alone."""
+    """Return whether a box in the window holds only unknown pixels."""
     left, right = box.col0 - pixels.col, box.col1 - pixels.col
     for row in range(box.row0 - pixels.row, box.row1 - pixels.row):
         if not _row_is_blank(pixels.values[row, left:right]):

@@ -34,8 +34,8 @@ from fasaco_edge.kernels.lattice.pixels import (
     weigh,
 )
 
-# Pixels of a tile, approximately, beside those within the robot's reach, and most cells of a
-# tile: smaller tables overlap too much, larger ones do not fit the cache.
+# Approximate pixels of a tile besides those within the robot's reach, and limit on its cells:
+# smaller tables overlap too much, larger ones do not fit the cache.
 TILE_PIXELS = 192
 MOST_TILE_CELLS = 128
 
@@ -138,7 +138,7 @@ def _classify_tile(
 ) -> None:
     pixels, placement, cells = given.pixels, given.placement, given.cells
     rows, cols = cells.stale.shape
-    # With the neighbours in the north and east, because the steps depend on their states.
+    # Includes the neighbours in the north and east, because the steps depend on their states.
     block = Box(tile.row0, tile.col0, min(tile.row1 + 1, rows), min(tile.col1 + 1, cols))
     high, wide = block.row1 - block.row0 - 1, block.col1 - block.col0 - 1
     x, y = centre(

@@ -1,4 +1,4 @@
-"""Counts of pixels: free ones outside reachable cells, and those of a rectangle in four reads.
+"""Counts of pixels: free pixels outside reachable cells, and pixels of a rectangle in four reads.
 
 Outside: a pixel is in the cell that its centre is in. Stretches of pixels outside reachable
 cells are found once for all rows of pixels in a row of cells, where the raster is aligned with
@@ -157,7 +157,7 @@ def sum_up(pixels: Pixels, weights: NDArray[np.int64], table: PixelSums) -> None
 
 @inlined
 def count_around(table: PixelSums, x: float, y: float, reach_x: float, reach_y: float) -> int:
-    """Return the count of all pixels within reach of (x, y); -1 if the sums lack some."""
+    """Return the count of all pixels within reach of (x, y); -1 beyond the window of the sums."""
     row0, row1 = int(np.floor(y - reach_y)) - table.row, int(np.floor(y + reach_y)) + 1 - table.row
     col0, col1 = int(np.floor(x - reach_x)) - table.col, int(np.floor(x + reach_x)) + 1 - table.col
     if row0 < 0 or col0 < 0 or row1 > table.height or col1 > table.width:

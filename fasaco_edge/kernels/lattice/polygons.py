@@ -16,7 +16,7 @@ BITS.flags.writeable = False
 
 @inlined
 def _clipped(value: float, low: int, high: int) -> int:
-    """Return ``value``, a whole number or infinite, within low..high."""
+    """Return ``value``, a whole number or infinite, limited to low..high."""
     if value >= high:
         return high
     return int(value) if value > low else low

@@ -151,10 +151,10 @@ def ranges_of(
     directions: NDArray[np.float64],
     goes_by: NDArray[np.bool_],
 ) -> NDArray[np.float64]:
-    """Return how far the rays of a scanner come, float64 (n,) [pixels].
+    """Return the ranges of the rays of a scanner, float64 (n,) [pixels].
 
     A ray that nothing stops within reach, that meets an unknown pixel or leaves the array has no
-    return: its way as a negative number.
+        return: its length is negative.
 
     Args:
         truth: occupancy, int8 (rows, cols), -1 unknown, 0..100.
@@ -210,7 +210,7 @@ def count_rays(
             changed[2], changed[3] = max(changed[2], row + 1), max(changed[3], col + 1)
             to_row = (next_row - y) / dy if dy != 0.0 else np.inf
             to_col = (next_col - x) / dx if dx != 0.0 else np.inf
-            # Rounding leads no ray past its end.
+            # Rounding must not lead a ray past its end.
             if row == last_row or (col != last_col and to_col < to_row):
                 col += col_step
                 next_col += col_step

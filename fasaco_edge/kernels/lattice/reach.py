@@ -117,8 +117,8 @@ def walk_cost(walk: NDArray[np.int32], step_us: int, quarter_turn_us: int) -> in
     quarters = 0
     if quarter_turn_us:
         for index in range(2, walk.size):
-            # A step is one difference of index and its opposite the negated one. (With one
-            # column, east is the same as north; but then there are no steps east.)
+            # A step is a difference of index, and the opposite step is the negative of that. (With
+            # one column, east is the same as north; but then there are no steps east.)
             before = walk[index - 1] - walk[index - 2]
             after = walk[index] - walk[index - 1]
             if after == -before:
@@ -274,7 +274,7 @@ def update_reach(
     reached = np.zeros(new_pieces + 1, np.bool_)
     if not _match(after, old, new, reachable, to_new, to_old, reached):
         return False
-    # The cell (row, col) was reachable, or lies in a piece whose rim was.
+    # The cell (row, col) was reachable, or lies in a piece whose rim was reachable.
     from_inside = _holds(new, row, col)
     if from_inside and not reached[new.labels[row - top, col - left]]:
         return False

@@ -38,12 +38,12 @@ class Tally(NamedTuple):
         rays: int64 (n,), see ``holes.rays``.
         reached: int64 (n,), number of the search that reached the cell, doubled; one
             more once its distance is settled.
-        distance: int32 (n,), steps on the path there that are walked less than twice.
-        growth: int32 (n,), growth of the walk by a change of the path there.
+        distance: int32 (n,), steps on the path to the cell that are walked less than twice.
+        growth: int32 (n,), growth of the walk by a change along the path to the cell.
         parent: int32 (n,), the cell before it on the path.
         crossed: int64 (n,), rays crossed on the path.
         order: int32 (n,), cells in the order they were settled.
-        near, far: int32 (4 * n,), cells to look at now and one step later.
+        near, far: int32 (4 * n,), cells to search now, and one step later.
         loops: int64 (n, 2), loops found: twice the cell, one more for the step north;
             and their odds.
         marked: int64 (n,), number of the last climb that passed the cell.
@@ -254,7 +254,8 @@ def draw_loop(tally: Tally, found: int, random: NDArray[np.uint64]) -> int:
 
 @inlined
 def _heading(ground: Ground, tally: Tally, depth: int) -> int:
-    """Return how to continue from the top of the stack: as before, else straight; -1 for any."""
+    """Return how to go on from the top of the stack: as in the old walk, or straight; -1 for
+    any."""
     if depth < 2:
         return -1
     here = tally.stack[depth - 1]
@@ -267,7 +268,7 @@ def _heading(ground: Ground, tally: Tally, depth: int) -> int:
 
 @lean_kernel
 def _list_jumps(tally: Tally) -> None:
-    """Let each cell's ``links`` begin the list of the jumps from there."""
+    """Build the list of jumps of each cell, which begins with the cell's ``links``."""
     for jump in range(tally.counts[JUMPS]):
         for side in range(2):
             cell = tally.jump_ends[jump, side]

@@ -54,7 +54,7 @@ class PerturbationRules(NamedTuple):
             the whole walk, at temperature 0.
         temperature_us: temperature that an annealing begins with [us].
         acceptance_us: temperature at which a worse walk is kept [us].
-        loops_of_256: so many of 256 perturbations change the end or add a loop.
+        loops_of_256: number of 256 perturbations that change the end or add a loop.
         steady: whether unchanged parts of the walk keep their order.
         strict: whether a walk of equal cost is reverted.
     """
@@ -106,7 +106,7 @@ class Search(NamedTuple):
 
 @lean_kernel
 def remember(walk: Walk, memory: Memory) -> None:
-    """Let the walk be the best one."""
+    """Store the walk as the best one."""
     copy(walk.cells, memory.best, walk.counts[LENGTH])
     for index in range(walk.counts.size):
         memory.best_counts[index] = walk.counts[index]
@@ -114,7 +114,7 @@ def remember(walk: Walk, memory: Memory) -> None:
 
 @inlined
 def _load(search: Search, cells: NDArray[np.int32], length: int) -> None:
-    """Let the walk be ``cells[:length]``, int32 (capacity,)."""
+    """Set the walk to ``cells[:length]``, int32 (capacity,)."""
     copy(cells, search.walk.cells, length)
     recount(search.ground, search.walk, length, search.prices)
 
@@ -141,7 +141,7 @@ def _change_way(search: Search, cell: int, root: int, at: int) -> int:
 
 @lean_kernel
 def _move_end(search: Search, limit: int, random: NDArray[np.uint64]) -> int:
-    """Let the walk end elsewhere; return how many cells were touched."""
+    """Move the walk's end elsewhere; return how many cells were touched."""
     walk, tally = search.walk, search.tally
     root = walk.cells[walk.counts[LENGTH] - 1]
     settled = search_ways(search.ground, tally, root, limit, random)
@@ -235,7 +235,7 @@ def touch_up(
 def perturb(
     search: Search, rules: PerturbationRules, times: int, random: NDArray[np.uint64]
 ) -> None:
-    """Perturb the walk so many times; ``memory.best`` follows the best one.
+    """Perturb the walk ``times`` times; ``memory.best`` holds the best walk.
 
     Args:
         search: changed in place.

@@ -72,7 +72,7 @@ def neighbourhood(
         cells: int32 (n,).
         radius: steps from them to the rim.
         labels: int32 (cells of the ground,), changed in place.
-        label: one that no cell has yet.
+        label: a label that no cell has yet.
         found: out, int32 (capacity,), the labelled cells, nearest first; no more are
             labelled than fit.
 
@@ -149,7 +149,7 @@ def _bound(box: Box) -> int:
 
 @inlined
 def _local(ground: Ground, box: Box, cell: int) -> int:
-    """Return a cell of the large ground, inside or just beside the box, as the region's."""
+    """Return a cell of the large ground, inside or just beside the box, as a cell of the region."""
     width = ground.offsets[NORTH]
     row, col = cell // width - box.row, cell % width - box.col
     return int((row + FRAME) * (box.cols + 2 * FRAME) + col + FRAME)
@@ -157,7 +157,7 @@ def _local(ground: Ground, box: Box, cell: int) -> int:
 
 @inlined
 def _large(ground: Ground, box: Box, cell: int) -> int:
-    """Return a cell of the region as one of the large ground."""
+    """Return a cell of the region as a cell of the large ground."""
     width = box.cols + 2 * FRAME
     row, col = cell // width - FRAME + box.row, cell % width - FRAME + box.col
     return int(row * ground.offsets[NORTH] + col)

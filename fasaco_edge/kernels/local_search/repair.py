@@ -31,7 +31,7 @@ def keep_legal(
         start: where the walk begins now.
         walk: out, int32 (capacity,): the walk from ``start``. Where a step no longer exists
             or starts elsewhere, it takes a shortest walk to the next cell that is still
-            to cover; it ends with the last of these.
+            to cover; it ends with the last such cell.
 
     Returns:
         The walk's length; it ends early where the array does.
@@ -181,17 +181,17 @@ def put_in_new(
     """Extend a walk over all cells that it misses; return the new walk's length.
 
     In a wave from the walk outward, each missing cell is visited from the nearest
-    cell that is on the walk by then: there and back; or one way, where a free end lies
-    beside it. Of several visits of that cell the last one is taken: the map may be known
-    better by then, and the walk just ahead of the robot stays as it is. A cell is visited
-    from there only where no way over missing cells leads to it from a later visit.
+    cell that is on the walk by then: there and back; or one way, where a free end lies beside it.
+    Of several visits of that cell the last one is taken: the map may be known better by then, and
+    the walk just ahead of the robot stays as it is. A cell is visited from the held visits ahead of
+    the robot only if no way over missing cells leads to it from a later visit.
 
     Args:
         ground: whose cells with ``needed`` above 0 are to be visited; those that cannot
             be reached are left out.
         before: int32 (m,), the walk, m at least 1.
         free_end: whether the walk may end anywhere.
-        held: so many first visits lie just ahead of the robot.
+        held: number of first visits that lie just ahead of the robot.
         out: out, int32 (capacity,); ``m + 2 * n`` is enough for any walk.
     """
     size = ground.bound

@@ -22,7 +22,7 @@ LENGTH, SPARE_CELLS, COST = 0, 1, 2
 # Cells that no change may touch: more visits than any walk has.
 FIXED = 1 << 30
 
-# Where the frame ends.
+# Width of the frame [cells].
 FRAME = 2
 
 
@@ -117,7 +117,7 @@ def turning(before: int, here: int, after: int, quarter_turn_us: int) -> int:
 
 @inlined
 def add_visit(ground: Ground, walk: Walk, cell: int) -> None:
-    """Count a visit more."""
+    """Count one visit more."""
     walk.visits[cell] += 1
     if walk.visits[cell] == ground.needed[cell] + 1:
         last = walk.counts[SPARE_CELLS]
@@ -128,7 +128,7 @@ def add_visit(ground: Ground, walk: Walk, cell: int) -> None:
 
 @inlined
 def take_visit(ground: Ground, walk: Walk, cell: int) -> None:
-    """Count a visit less."""
+    """Count one visit less."""
     walk.visits[cell] -= 1
     if walk.visits[cell] == ground.needed[cell]:
         last = walk.counts[SPARE_CELLS] - 1
@@ -198,7 +198,7 @@ def reverse(walk: Walk, first: int, last: int) -> None:
 
 @inlined
 def put(ground: Ground, walk: Walk, index: int, cell: int) -> None:
-    """Let visit ``index`` be one of ``cell``."""
+    """Make visit ``index`` a visit of ``cell``."""
     before = walk.cells[index]
     walk.cells[index] = cell
     walk.place[cell] = index

@@ -64,7 +64,7 @@ def price_cells(
     random: NDArray[np.uint64],
     may_end: bool,
 ) -> tuple[int, int]:
-    """Write the cells' reduced costs; return what they cost now by these, and last needed cell."""
+    """Write the cells' reduced costs; return the present cost by them, and the last needed cell."""
     now, last = 0, -1
     for index in range(count):
         cell = program.cells[index]

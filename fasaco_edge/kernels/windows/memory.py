@@ -7,21 +7,22 @@ from numpy.typing import NDArray
 
 from fasaco_edge.kernels.jit import inlined
 
-# No end of a piece; a cost that nothing has.
+# Marks that there is no end of a piece; a cost above all costs.
 NO_END = -1
 MUCH = 1 << 60
 
 # Identifiers in a state: two for each column of the frontier, two for the side ahead, the slots at
 # the window's rim, and four while a cell is decided. Windows that need more are left alone.
 MOST_IDS = 192
-# Most choices for a cell, and kinds of incoming sides that they are listed for.
+# Limit on the choices for a cell, and number of kinds of incoming sides with a list of choices.
 MOST_CHOICES, KINDS = 600, 18
-# Passages of one cell at most; ways to pair up 2, 4, 6, 8 slots, one after the other.
+# Limit on the passages of one cell. The numbers of pairings of 0, 2, 4, 6 and 8 slots, and the
+# index of the first pairing of each.
 MOST_PAIRS = 4
 PAIRINGS = 1 + 1 + 3 + 15 + 105
 FIRST_PAIRING = (0, 1, 2, 5, 20, 125)
-# The code of a choice: bits, and where in them lanes ahead, lanes below and an end begin; the
-# lowest ones are the pairing.
+# The code of a choice: its number of bits; the first bit of the lanes ahead, of the lanes below and
+# of the end; the mask of its pairing in the lowest bits.
 CODE_BITS, AHEAD, BELOW, ENDING, PAIRING = 12, 10, 8, 7, 127
 FIRST_NEW, SECOND_NEW, NO_PAIR = 1, 2, 4
 
@@ -33,7 +34,7 @@ class Choice(NamedTuple):
         listed: int32 (KINDS,), their number; -1 if they are not listed yet.
         keys: int64 (KINDS, MOST_CHOICES): cost, and in the lowest CODE_BITS the code: lanes ahead,
             lanes below, whether it ends, pairing.
-        named: int32 (KINDS,), of how many of them the ends are named.
+        named: int32 (KINDS,), number of choices whose ends are listed in ``ends``.
         ends: int16 (KINDS, MOST_CHOICES, 2 * MOST_PAIRS), identifiers that are paired up.
         how: uint8 (KINDS, MOST_CHOICES, MOST_PAIRS), which of the two are new: FIRST_NEW,
             SECOND_NEW, both or neither; NO_PAIR behind the last one.
@@ -76,8 +77,8 @@ class Program(NamedTuple):
     Attributes:
         pairs: int8 (PAIRINGS, 2 * MOST_PAIRS), the slots that each pairing joins.
         choice: of the cell that is decided.
-        mates: int16 (2, states, MOST_IDS), of each state the other end of the piece that an
-            identifier is an end of; a layer before and one after the cell.
+        mates: int16 (2, states, MOST_IDS), for each state and each identifier at an end of a piece,
+            the identifier at the other end; one layer before the cell and one after it.
         words: int64 (2, states, MOST_IDS / 4), the same memory.
         cost: int64 (2, states).
         closed: uint8 (2, states), whether the ring is closed.
@@ -87,7 +88,7 @@ class Program(NamedTuple):
         hash: int64 (states,), of the states of the layer after.
         table: int64 (slots,), stamp of the layer and number of a state, by its hash.
         order: int64 (states,), costs while the most expensive are dropped.
-        scratch, base: int16 (MOST_IDS,), the new state, and without the cell's ends;
+        scratch, base: int16 (MOST_IDS,), the new state with the cell's ends, and without them;
             scratch_words, base_words int64 (MOST_IDS / 4,), the same memory.
         ident: int16 (n, SLOTS), identifier of a slot at the rim.
         inside: uint8 (n,), 1 in the window.
@@ -154,7 +155,7 @@ class Window(NamedTuple):
     """A rectangle of framed cells.
 
     Attributes:
-        row, col: its first ones.
+        row, col: its first row and column.
         rows, cols: its size.
         width: of the framed ground.
         mirrored: bits of ``kernels.windows.order``: the corner the program begins in.
@@ -170,10 +171,10 @@ class Window(NamedTuple):
 
 LAYER_STAMP, EXPANDED = 0, 1
 
-# Entries of ``Program.at``: the next cell's number and line, the layer before it and its states;
-# the cost to come below; cells of the window, and the last that needs a passage; how many
-# identifiers; those of the walk's begin and end, -1 where they are elsewhere; what each ring but
-# the first one costs, 0 where there is to be one.
+# Entries of ``Program.at``: number and line of the next cell; the layer before it and the number of
+# its states; the cost that a result must stay below; number of cells in the window, and the last
+# cell that needs a passage; number of identifiers; identifiers of the walk's begin and end, -1 for
+# outside the window; price of each ring except the first, 0 if there must be one.
 NUMBER, LINE, LAYER, STATES, LIMIT, COUNT, LAST, IDS, BEGIN_ID, END_ID, RING_PRICE = range(11)
 
 
@@ -215,7 +216,7 @@ class Ends(NamedTuple):
         ring_price: price of each ring except the first; 0 if there must be one.
         is_given: whether the walk must end in this cell.
         is_free: whether the walk may still end in any cell that is left.
-        is_checked: whether to count the ends into each remaining part.
+        is_checked: whether to check the number of ends that lead into each remaining part.
     """
 
     begin_id: int
@@ -230,7 +231,7 @@ class Ends(NamedTuple):
 
 @inlined
 def at_rim(program: Program, cell: int, direction: int) -> int:
-    """Return the number of lanes of a side that lead out of the window, used from the first on."""
+    """Return how many lanes of a side lead out of the window; the first lanes are used first."""
     if program.ident[cell, 2 * direction] == NO_END:
         return 0
     return 1 if program.ident[cell, 2 * direction + 1] == NO_END else 2

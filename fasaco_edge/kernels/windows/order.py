@@ -1,8 +1,8 @@
 """Order of a window's cells: line by line, as the dynamic program decides them.
 
 Lines run along the shorter side, so that the frontier is short. A window can be mirrored: the
-program then goes through it from another corner. Where the beam drops states, each order gives a
-walk of its own.
+program then goes through it from another corner. If the beam drops states, each order gives another
+walk.
 """
 
 from fasaco_edge.kernels.jit import inlined

@@ -12,9 +12,9 @@ from fasaco_edge.kernels.local_search.walk_array import Ground
 from fasaco_edge.kernels.windows.memory import NO_END, Program
 from fasaco_edge.kernels.windows.passages import END
 
-# Most parts that are checked: bits of a word.
+# Limit on the parts that are checked: bits of a word.
 MOST_PARTS = 62
-# A part that did not fall apart is checked once it has no more cells left than this.
+# A part that was not split is checked once it has at most this many cells left.
 FEW_CELLS = 3
 
 PARTS, LEADS = 0, 1

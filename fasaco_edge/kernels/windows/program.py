@@ -79,10 +79,10 @@ def solve_window(
         terms: costs and end of the walk.
         window: the window.
         program: memory.
-        beam: most states kept after a cell.
+        beam: limit on the states kept after a cell.
         noise: largest random amount added to each passage's cost, so that the walk may become a
             little more expensive.
-        allowance: accepted increase in cost: several rings in the window become one.
+        allowance: accepted increase in cost, to join several rings in the window into one.
         random: state of the stream, uint64 (1,).
     """
     begin_window(ground, passages, terms, window, program, noise, allowance, as_value(0), random)
@@ -147,7 +147,7 @@ def _begin_of(passages: Passages, program: Program) -> int:
 def advance_window(
     ground: Ground, passages: Passages, terms: Terms, window: Window, program: Program, beam: int
 ) -> bool:
-    """Decide one line of cells more; return whether there are more to decide."""
+    """Decide the next line of cells; return whether any are left."""
     lines, wide = shape_of(window)
     at = program.at
     line = at[LINE]

@@ -17,7 +17,7 @@ from fasaco_edge.kernels.windows.search import COST, SOLVED, Aim, laid_in
 
 # Sides of the windows: least length, and number of lengths.
 SIDE, SIDES = 4, 3
-# Joined at any price, in half microseconds.
+# Allowance to join rings at any price [half us].
 ANY_PRICE = 1 << 50
 # Label of a cell with several rings; other cells have the number of their ring, or NONE.
 SEVERAL = -2
@@ -47,7 +47,7 @@ def join_rings(
         aim: where windows may lie; the beam.
         rings: int32 (n, 2), working memory; seams int32 (cells of ``aim``,), too.
         tally: as in ``solve_windows``; COST and SOLVED are changed in place.
-        windows: most windows.
+        windows: limit on the windows.
         random: state of the stream, uint64 (1,).
     """
     left = _label(ground, passages, aim, rings)

@@ -26,7 +26,7 @@ class Aim(NamedTuple):
         frame: cells of its frame on each side.
         least_side, most_side: of a window's shorter side.
         least_area, most_area: of a window at first, and in the end.
-        beam: most states kept.
+        beam: limit on the states kept.
     """
 
     cells: NDArray[np.int32]
@@ -68,7 +68,7 @@ def solve_windows(
     Args:
         ground: framed.
         passages: of the walk; changed in place.
-        best: out, those of the best walk, if a better one is found.
+        best: out, the passages of the best walk, if a better one is found.
         terms: costs and end of the walk.
         program: memory.
         aim: positions and sizes of windows.
@@ -107,7 +107,7 @@ def _copy(source: Passages, target: Passages) -> None:
 
 @inlined
 def _draw_window(aim: Aim, swept: int, random: NDArray[np.uint64]) -> Window:
-    """Draw a window around some cell: 3 to 8 cells wide, the longer the more was swept before."""
+    """Draw a window around some cell: 3 to 8 cells wide, and longer with each sweep."""
     grown = aim.least_area + aim.least_area * swept // (GROWTH * aim.cells.size)
     area = min(grown, aim.most_area)
     short = aim.least_side + index_of(draw(random), aim.most_side - aim.least_side + 1)
