@@ -24,8 +24,8 @@ from fasaco_edge.offline.settings import AXES, HOME, WALLS
 from fasaco_edge.planners.line import LINES, line_over
 
 Line = NDArray[np.float64]
-# Floor left by the judge over floor left by the line's own raster: 1.2 to 1.5, more where little is
-# left.
+# Unswept floor by the judge relative to that by the line's own raster: 1.2 to 1.5, more if little
+# is left.
 LEFT_BY_JUDGE = 1.6
 
 

@@ -49,8 +49,8 @@ from fasaco_edge.planners.planner import (
 from fasaco_edge.planners.problem import CoverageProblem
 from fasaco_edge.planners.registry import planner_of
 
-# Most proposals of the search for a walk for each of its cells, where a line is laid along it: the
-# line gains more by a search of its own.
+# Limit on the proposals per cell of the search for a walk, if a line is laid along it: more is
+# gained by the search for the line.
 PROPOSALS_A_CELL = 10_000
 # Limit on rows and columns: arrays of cells are int32.
 MOST_INDEX = 2**31 - 1
@@ -89,8 +89,8 @@ def plan(
             or an angle [deg]; None for walls.
         search: settings of the search; None for the defaults.
         planner: a planner of your own instead of a search: a function that takes a ``GridProblem``
-            and returns the walk's cells (row, col) in order, a class whose objects have such a
-            method ``plan``, or an object of one; of ``search`` it uses only the seed.
+            and returns the walk's cells (row, col) in order; or a class, or an object, with such a
+            method ``plan``. Of ``search`` it uses only the seed.
         stop: stopping criterion.
         watch: called with the progress of the search.
         observe: called with the colony's pheromone: a ``ColonySnapshot`` after each cohort, or

@@ -114,7 +114,7 @@ def bands_of(lines: Lines, row: NDArray[np.int64], col: NDArray[np.int64]) -> Ba
     order = np.lexsort((row, col, band)).astype(np.int32)
     last = np.concatenate((cuts, [height]))[band] - 1
     inner = lines.sides & ~((row == last) * np.uint8(2)) & ~((place == 0) * np.uint8(8))
-    # No step leads from a column of a band to the next one: the rest is another band.
+    # Where no step leads from a column of a band to the next column, another band begins.
     column = (band * (int(col.max()) + 2) + col)[order]
     leads_on = np.bincount(column, weights=lines.sides[order] & 1) > 0
     begins = np.diff(column, prepend=-1) > 0
@@ -130,7 +130,7 @@ def _cuts(down: NDArray[np.int64]) -> NDArray[np.int64]:
     least, before = [0] * (height + 1), [0] * (height + 1)
     for row in range(1, height + 1):
         cut = int(down[row - 1]) if row < height else 0
-        # The widest one among equals.
+        # Of equal cuts the one with the widest band.
         options = range(max(row - WIDEST, 0), row)
         before[row] = min(options, key=lambda top: least[top])
         least[row] = least[before[row]] + cut
@@ -168,7 +168,7 @@ def band_memory(bands: Bands, corner: int) -> BandMemory:
 
 
 def _codes() -> tuple[NDArray[np.int16], NDArray[np.int32]]:
-    """Return, by mask of sides, all uses of these 0, 1 or 2 times, and their number."""
+    """Return by mask of sides all ways to use each side 0, 1 or 2 times, and their number."""
     codes, counts = np.zeros((16, 81), np.int16), np.zeros(16, np.int32)
     for mask in range(16):
         digits = [range(3) if mask >> side & 1 else range(1) for side in range(3, -1, -1)]

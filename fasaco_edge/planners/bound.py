@@ -29,7 +29,7 @@ FEWEST, MOST = 8, 300
 # On larger lattices turns are left out of the bound: prices take about 100 bytes per cell.
 MOST_CELLS = 250_000
 
-# Initial step size of a price, as a share of a quarter-turn's cost: of the first call, of later
+# Initial step size of a price, as a share of a quarter-turn's cost: in the first call, in later
 # ones; and the exponent of its decay.
 FIRST_PACE, LATER_PACE, FALLS = 1.0, 0.5, 4
 

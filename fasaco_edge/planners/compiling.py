@@ -1,8 +1,8 @@
 """The kernel compiler: a process that compiles what is missing, and goes on in a fresh one.
 
-The compiler would keep a gigabyte in the end, and what it has loaded stays in memory: so a process
-that needs kernels starts this one, waits for it, and loads what it leaves. It holds the lock of the
-folder; where it has grown it notes what is compiled and begins again as a fresh process. Kernels
+A compiler keeps all that it has loaded, up to a gigabyte. So a process that needs kernels starts
+this process, waits for it, and loads the compiled kernels. This process holds the lock of the
+folder; once it has grown, it notes what is compiled and begins again as a fresh process. Kernels
 that are damaged, or that others could have written, count as missing.
 """
 
@@ -41,15 +41,16 @@ LATTICE, CHANGES, REACH, AREAS = "lattice", "changes of the map", "reachability"
 WALKS, BOUND = "shortest walks", "lower bound"
 LOCAL_SEARCH, REPAIR, LINE = "local search", "repair", "driven line"
 WINDOWS, SHARES = "windows of the walk", "shares of a fleet"
-# In the order in which they are compiled; what a plan needs comes first.
+# Stages in the order in which they are compiled; the stages of a plan come first.
 _FOR_PLANS = (LATTICE, REACH, WALKS, BOUND, "fasaco", LOCAL_SEARCH, WINDOWS, LINE, REPAIR)
 STAGES = tuple(dict.fromkeys((*_FOR_PLANS, CHANGES, AREAS, SHARES, *PLANNER_NAMES)))
 
-# Where memory is short: beside the daemon's 45 MB within the unit's limit (MemoryHigh=); a fifth of
-# it are pages of libraries, which other processes have, too, or the system takes back. Where there
-# is plenty it does not begin again, which takes a third of the time.
+# Memory at which it begins again if memory is short: with the daemon's 45 MB it fits the unit's
+# limit (MemoryHigh=); a fifth of it are pages of libraries, which are shared or which the system
+# reclaims. With plenty of memory it does not begin again, which would take a third of the time.
 MOST_MB, PLENTY_MB = 270.0, 2000.0
-# Twenty-five, as measured; a disk that keeps no file as it was written does not go on for ever.
+# Limit on fresh starts, of which 25 were measured: a disk that corrupts each file must not go on
+# for ever.
 MOST_RESTARTS = 300
 # Lines that the process prints: one of these words, a tab and a text.
 REASON, STAGE, WARNING = "reason", "stage", "warning"
@@ -86,14 +87,14 @@ def compile_missing(
             if word == STAGE:
                 report(text)
             else:
-                LOG.info("compiling the kernels, for minutes: %s", text)
+                LOG.info("compiling the kernels, which takes minutes: %s", text)
         process.check()
     finally:
         process.close()
 
 
 class CompilerProcess:
-    """The process, as the one that started it sees it."""
+    """The compiler process, as seen by the process that started it."""
 
     def __init__(self, folder: Path, stages: Collection[str]) -> None:
         self._process = subprocess.Popen(
@@ -106,9 +107,10 @@ class CompilerProcess:
 
     @classmethod
     def start(cls, stages: Collection[str] = STAGES) -> CompilerProcess | None:
-        """Start it; None if nothing is missing, or what it compiled would be lost: then say so."""
+        """Start it; None if nothing is missing, or if compiled kernels would be lost, which is
+        logged."""
         if os.environ.get("NUMBA_DISABLE_JIT", "0") != "0":
-            return None  # kernels run as they are written
+            return None  # kernels are not compiled
         folder, why = chosen_folder(stages)
         warn_of(why, folder)
         if folder is None or not why_missing(folder, stages):
@@ -190,7 +192,7 @@ def _compile(folder: Path, restarts: int, stages: list[str]) -> None:
         is_short = available_memory() < PLENTY_MB * 1e6
 
         def stay_small(compiled: int) -> None:
-            """Go on as a fresh process where this one has grown, and has compiled something."""
+            """Continue as a fresh process if this one has grown, and has compiled something."""
             if is_short and compiled and resident_mb() > MOST_MB and restarts < MOST_RESTARTS:
                 record(folder, manifest)
                 words = (str(folder), str(restarts + 1), *stages)

@@ -39,15 +39,15 @@ DESCENT_SHARE, PATCH_SHARE = 0.08, 0.12
 # Limit on the moves per point of the walk, however much floor there is.
 MOST_A_POINT = 2000
 # Temperatures of the first stage, and of each later one: a line that was cooled once keeps its
-# shape in large. Stages that double, and one of their total length, cannot be told apart.
+# overall shape. Stages that double give the same results as one stage of their total length.
 COOLED, REHEATED = (1.0, 0.0), (0.7, 0.0)
 # Factors of the price of floor, if a share of it is asked for: after a line that sweeps too little,
-# after one that sweeps enough, and the most in all.
+# after one that sweeps enough, and the limit of their product.
 RAISED, LOWERED, MOST_RAISED = 1.6, 0.8, 100.0
 # Moves between two pauses: about a quarter of a second.
 MOVES_AT_ONCE = 1 << 17
-# Clearance is given up along a strip of floor that is wider than this share of the tool's width. A
-# niche or a passage gains the whole width; a wall gains the clearance alone.
+# Clearance is given up for a strip of floor that is wider than this share of the tool's width. In a
+# niche or a passage that strip is as wide as the tool; along a wall it is as wide as the clearance.
 NEAR_SHARE = 0.2
 # Default turn durations.
 TURNING = proportional_turning(1.5)
@@ -270,7 +270,7 @@ def left_in_blocks(counts: NDArray[np.int16]) -> NDArray[np.int32]:
     """Return the number of unswept pixels in each block, of sweep counts (rows, cols)."""
     left = np.empty(blocks_of(counts.shape), np.int32)
     side = 1 << BLOCK
-    # As many rows at once as fit in a cache; a byte has the pixels of a row of a block.
+    # Number of rows that fit in a cache; a byte has the pixels of a row of a block.
     rows = max(CACHED // (side * counts.shape[1]), 1)
     for first in range(0, len(left), rows):
         part = counts[side * first : side * (first + rows)]

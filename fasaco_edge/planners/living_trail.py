@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 
 from fasaco_edge.grid.geometry import Window
 
-# Pull of a driven step towards tau0: by (7) that of about seven ants.
+# Pull of a driven step towards tau0: as much as equation (7) of about seven ants.
 DRIVEN = 0.5
 # A direction is within reach of the strongest if its pheromone is at least this share of the range
 # above the weakest: lambda of the mean branching factor (Gambardella and Dorigo 1995).
@@ -175,7 +175,7 @@ class LivingTrail:
             cell_m: edge of a cell [m].
         """
         window = self._window
-        # Only cells that have steps; the four directions of a cell as one word.
+        # Only cells with steps are moved; the four directions of a cell are one word.
         places = np.flatnonzero((self._tau > 0).view(np.uint32))
         if not len(places):
             return

@@ -12,7 +12,7 @@ from fasaco_edge.grid.lattice import CoverageLattice
 from fasaco_edge.kernels.lattice.reach import shortest_walk
 from fasaco_edge.planners.cost import NO_WORK, SearchWork, count_turns, gap_to
 
-# Rows that are compared first, where two walks may differ early.
+# Number of rows that are compared first, as two walks may differ early.
 FIRST_PIECE = 256
 
 
@@ -21,7 +21,7 @@ class Saved(NamedTuple):
 
     Attributes:
         ants: by walks of ants, including local search on these.
-        local_search: by local search on the first walk, or on the walk left from before.
+        local_search: by local search on the first walk, or on the rest of the previous walk.
     """
 
     ants: float = 0.0

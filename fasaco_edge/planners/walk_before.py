@@ -1,4 +1,4 @@
-"""Walk from before: the undriven rest of a walk, completed to solve the present problem.
+"""Previous walk: its undriven rest, completed to solve the present problem.
 
 Its valid parts stay as they are, cell by cell; planners start from the result.
 """
@@ -16,12 +16,12 @@ HELD_CELLS = 18
 
 
 def has_walk(problem: CoverageProblem) -> bool:
-    """Return whether there is a walk from before."""
+    """Return whether there is a previous walk."""
     return problem.before is not None and len(problem.before) > 0
 
 
 def can_repair(problem: CoverageProblem) -> bool:
-    """Return whether there is a walk from before, and repairing it suffices."""
+    """Return whether there is a previous walk, and repairing it suffices."""
     return not problem.is_full and has_walk(problem)
 
 
@@ -33,7 +33,7 @@ def completed(
     Args:
         problem: the present problem.
         framed: its ground.
-        before: int32 (n, 2), the walk from before, cells (row, col).
+        before: int32 (n, 2), the previous walk, cells (row, col).
         held: number of leading visits to keep if possible.
 
     Returns:

@@ -133,7 +133,7 @@ def _imported(name: str, said: str, place: str) -> ModuleType:
     file = ""
     try:
         for count in range(1, len(parts) + 1):
-            # Looking for a part imports those before it, which may fail.
+            # Looking up a part of the name imports the parts before it, which may fail.
             spec = importlib.util.find_spec(".".join(parts[:count]))
             if spec is None:
                 raise _not_found(said, ".".join(parts[:count]))
@@ -163,7 +163,7 @@ def _file_of(made: object) -> str:
 
 
 def failure(error: BaseException, name: str, file: str) -> PlannerFailed:
-    """Return an exception as text for the user: lines of his own file, the innermost first.
+    """Return an exception as text for the user: lines of the user's file, the innermost first.
 
     Args:
         error: the exception.

@@ -10,10 +10,10 @@ For steps alone that is ``cells / steps``, proportional to 1 over the length as 
 about 1 at best on any map, so tau0 needs no tuning to the map's size. If a walk must end in a given
 cell, ants go there by a shortest path when all is covered.
 
-With a living trail (``planners.living_trail``) and a walk from before, the search continues instead
-of restarting: ants start from that trail, as large a share of them as the share of new cells to
-cover; and the best walk so far is the one from before, with invalid parts cut out and new cells
-inserted.
+With a living trail (``planners.living_trail``) and a previous walk, the search continues instead of
+restarting. The ants start from that trail, and their number is the share of the colony that new
+cells are of the cells to cover. The best walk so far is the previous walk, with invalid parts cut
+out and new cells inserted.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ CELLS_PER_GROUP = 64_000
 # Number of ants where hardly any cell is new.
 FEWEST_ANTS = 64
 
-# Initial capacity for a walk; a longer one is repeated with more.
+# Initial capacity for a walk; ants with a longer walk walk again with more.
 STEPS_PER_CELL = 2
 
 
@@ -179,7 +179,7 @@ def groups_of(config: ColonyConfig, cells: int) -> Iterator[Group]:
 
 
 def ants_for(config: ColonyConfig, problem: CoverageProblem) -> int:
-    """Return the number of ants: all, or for a walk from before the share of new cells of it."""
+    """Return the number of ants: all; with a previous walk their share is that of new cells."""
     if problem.trail is None or problem.before is None or not can_repair(problem):
         return config.ants
     window = problem.lattice.window
@@ -191,7 +191,7 @@ def ants_for(config: ColonyConfig, problem: CoverageProblem) -> int:
 
 
 def _walk_before(problem: CoverageProblem) -> NDArray[np.int32] | None:
-    """Return the walk from before, completed, flat cells int32 (n,); None for none."""
+    """Return the previous walk, completed, flat cells int32 (n,); None for none."""
     if problem.trail is None or problem.before is None or not can_repair(problem):
         return None
     framed = FramedGround.of(problem)

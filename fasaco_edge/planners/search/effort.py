@@ -70,9 +70,10 @@ class RepairEffort:
 
     Attributes:
         rules: rules of perturbations.
-        proposals: number of proposals in each neighbourhood, after which no perturbation begins:
-            a number of perturbations takes three times as long in one as in another.
-        held: number of these that leave the walk just ahead of the robot as it is.
+        proposals: number of proposals in each neighbourhood after which no perturbation begins.
+            Proposals are counted, as perturbations take up to three times as long in one
+            neighbourhood as in another.
+        held: number of these proposals that leave the walk just ahead of the robot unchanged.
         steady_us: a walk that keeps the robot's next cells is preferred up to this extra cost
             [us].
     """

@@ -67,10 +67,10 @@ class NearOptimal:
     ) -> CoveragePath:
         """Return the cheapest walk found; see ``CoveragePlanner.plan``.
 
-        A walk from before (``problem.before``) is repaired; only if that leaves it far above its
-        bound, a short search follows. Without one, or where a full search is wanted, the colony
-        walks until stopped: it starts from the walk from before, if that costs no more than the
-        first simple walk.
+        A previous walk (``problem.before``) is repaired; if the repaired walk is far above its
+        bound, a short search follows. Without a previous walk, or for a full search, the colony
+        walks until stopped; it starts from the previous walk if that costs no more than the first
+        simple walk.
         """
         return _with_lead(problem, self._plan(problem, stop, observe))
 

@@ -74,7 +74,7 @@ def _span(number: int, shift: int, size: int) -> tuple[int, int]:
 RADIUS = 6
 # Limits on a neighbourhood: changed cells it grows from, and all cells.
 MOST_CHANGED, MOST_CELLS = 1_000, 3_000
-# Radius of a spot, where nothing has changed and the walk is to be improved.
+# Radius of a spot: a neighbourhood without a change, where the walk is to be improved.
 SPOT_RADIUS = 20
 GOLDEN_RATIO = 0.5 * (math.sqrt(5.0) - 1.0)
 # Spare capacity: visits by which a walk may grow temporarily.

@@ -1,4 +1,4 @@
-"""Repair of the walk from before, after the problem has changed.
+"""Repair of the previous walk, after the problem has changed.
 
 The walk is completed, then improved around the changes. Its valid parts stay as they are, cell by
 cell: a change is accepted only for a gain, and the next ``HELD_CELLS`` cells are left alone at
@@ -31,9 +31,10 @@ from fasaco_edge.planners.walk_before import HELD_CELLS, completed_from, framed_
 
 # Perturbations between two pauses.
 PERTURBATIONS_AT_ONCE = 8
-# Perturbations of a neighbourhood, which would be without end where nothing can be proposed.
+# Limit on the perturbations of a neighbourhood: without it, one where nothing can be proposed would
+# never end.
 MOST_PERTURBATIONS = 100
-# Share of a repair's proposals that a second one for the path ahead has.
+# Proposals of a second repair, for the path ahead, as a share of those of the first.
 FEW = 0.2
 
 # With nothing to repair: stride between the first spots of two attempts, approximate cells of a
@@ -81,7 +82,7 @@ def _steady(
     completed_us: int,
     stop: StoppingCriterion,
 ) -> CoveragePath:
-    """Return a path that begins with ``held`` steps of the walk from before, if similarly good.
+    """Return a path that begins with ``held`` steps of the previous walk, if it is similarly good.
 
     A repair accepts a gain anywhere, though a change farther ahead may gain as much. So if it has
     changed the path ahead unnecessarily, the rest of the walk is repaired alone, with few
@@ -231,9 +232,10 @@ class _Repair:
 def _changed(
     framed: FramedGround, before: NDArray[np.int32], walk: NDArray[np.int32]
 ) -> NDArray[np.int32]:
-    """Return the walk's cells at steps that one walk takes more often, int32 (n,), in its order.
+    """Return the new walk's cells at changed steps, int32 (n,), in its order.
 
-    The part driven meanwhile is missing at the old walk's beginning; that is no change.
+    A step is changed if one of the walks takes it more often. The old walk lacks the part at its
+    beginning that was driven meanwhile; that is no change.
     """
     ground = framed.ground
     listed = np.empty(2 * (before.size + walk.size), np.int32)

@@ -1,7 +1,7 @@
 """Search by colony and local search: a complete walk at once, then better ones until stopped.
 
 1. One or more simple walks, the cheapest kept: the first complete walk, within milliseconds
-   (``first_walks``). A walk from before is completed, and kept if it is as good: then the cells
+   (``first_walks``). A previous walk is completed, and kept if it is as good: then the cells
    just ahead of the robot change only for a gain.
 2. Local search improves it, region by region on a large ground.
 3. Perturbations, each followed by local search, continue from there; where turns cost, windows of
@@ -47,20 +47,20 @@ GAINLESS_PASSES = 10
 # Perturbations between two evaluations of the whole walk, with one region.
 PERTURBATIONS_IN_VISIT = 64
 
-# States that windows expand between two pauses: about two milliseconds; pauses in a round of
-# windows, which follows each visit of perturbations: with expensive turns, and otherwise.
+# States that windows expand between two pauses: about two milliseconds. Pauses in a round of
+# windows, which follows each visit of perturbations: with expensive turns, and with cheap ones.
 EXPANSIONS_AT_ONCE = 30_000
 DEAR_PIECES, PIECES = 50, 5
 # This many windows without gain count as one perturbation.
 WINDOWS_A_PERTURBATION = 10
-# Beam of solving the whole ground, where turns cost enough: WHOLE_STATES over its number of cells,
-# within the limits. It is solved from each corner, and the cheapest walk kept: four narrow beams
-# find more than one of four times the width.
+# Beam width for solving the whole ground, if turns cost enough: WHOLE_STATES divided by the number
+# of cells, within the limits. The ground is solved from each corner, and the cheapest walk kept:
+# four narrow beams find more than one beam of four times the width.
 WHOLE_STATES, LEAST_BEAM, MOST_BEAM = 8_000, 8, 100
 CORNERS = (0, LINES, PLACES, LINES | PLACES)
 
-# Cells that the bound solves in bands: per pause, and per call: some 3 % of the time with expensive
-# turns, 10 to 20 % otherwise.
+# Cells that the bound solves in bands per pause, and per call: this takes some 3 % of the time with
+# expensive turns, else 10 to 20 %.
 BAND_CELLS, BAND_CELLS_AT_ONCE = 40, 256
 
 # Distinguishes the random stream from those of the ants.
@@ -200,7 +200,7 @@ class Search:
         cost_us = problem.cost_us(walk)
         if cost_us <= self._walk.cost_us:
             self._walk.begin(walk, cost_us)
-            # Only with one region the first visits are those of the walk.
+            # The first visits of a region are those of the walk only if there is one region.
             self._walk.held = HELD_CELLS if self._walk.is_whole else 0
 
     def _begin_better(self) -> Iterator[None]:

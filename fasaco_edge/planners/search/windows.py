@@ -202,8 +202,8 @@ def _copy(source: Passages, target: Passages) -> None:
 def thinned(walk: NDArray[np.int32]) -> NDArray[np.int32]:
     """Return a walk over the same cells that takes no step three times, int32 (m,).
 
-    Of three times two are in the same direction: the part between them, reversed, leads from the
-    start of the first to the end of the second without both.
+    Of three passes over a step two have the same direction: the part between them, reversed, leads
+    from the start of the first pass to the end of the second without either.
     """
     while walk.size > 1:
         low, high = np.minimum(walk[:-1], walk[1:]), np.maximum(walk[:-1], walk[1:])
@@ -228,7 +228,7 @@ def _terms(
     step, turn = 2 * problem.cost.step_us, 2 * problem.cost.quarter_turn_us
     masks = framed.ground.steps[cells]
     sides = np.where(masks[:, np.newaxis] >> np.arange(4) & 1, priced, NO_SIDE).min(axis=1)
-    # With these no first or last visit has a negative cost.
+    # With these prices no first or last visit has a negative cost.
     ends = is_wanted if problem.end is None else flat == problem.flat_end
     begin_price = -(step // 2 + int(sides[flat == problem.flat_start].min()))
     end_price = -(step // 2 + int(sides[ends].min()))
