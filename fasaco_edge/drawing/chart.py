@@ -27,11 +27,11 @@ BORDER_PX = (62, 52, 16, 46)
 MARGIN_PX = 20
 TITLE_PX, LABEL_PX, NUMBER_PX = 22, 14, 12
 DOT_PX, LINE_PX, GOAL_PX = 3.0, 2, 13
-# How much of a band's colour is left on white.
+# Opacity of a band's colour on white.
 BAND_SHARE = 0.22
 OVERSAMPLING = 3
 MOST_TICKS = 6
-# Of one text [characters].
+# Longest text [characters].
 MOST_CHARACTERS = 200
 
 Box = tuple[float, float, float, float]
@@ -42,7 +42,7 @@ Placer = Callable[[float, float], tuple[float, float]]
 
 @dataclass(frozen=True, slots=True)
 class Axis:
-    """One axis: its name, its ends, and the values that are marked on it, with their texts."""
+    """One axis: its name, its ends, and the values marked on it, with their labels."""
 
     label: str
     low: float
@@ -106,7 +106,7 @@ class Line:
 
 @dataclass(frozen=True, slots=True)
 class Panel:
-    """One chart: heading, a line below it, axes, lines, and goals (x, y) that are dashes."""
+    """One chart: heading, a line below it, axes, lines, and goals (x, y) drawn as dashes."""
 
     title: str
     caption: str

@@ -17,7 +17,7 @@ OCCUPIED: Colour = (44, 52, 64)
 UNKNOWN: Colour = (222, 226, 231)
 
 COVERED: Colour = (226, 238, 247)
-# By number of visits: two, three, four and more.
+# Colours by number of visits: two, three, four and more.
 RECOVERED: tuple[Colour, ...] = ((255, 232, 176), (255, 206, 140), (250, 172, 120))
 LEFT_OUT: Colour = (244, 214, 232)
 # Floor that the tool could reach: stronger than the cells left out, of which it may be part.

@@ -223,7 +223,7 @@ def plot_walk(
 
 
 def in_pieces(line: Points, longest: float) -> Points:
-    """Return a line (n, 2), n >= 1, with points added so that none are further apart than that.
+    """Return a line (n, 2), n >= 1, with points added so that neighbours are near enough.
 
     A slightly longer piece stays whole: rounding may lengthen a piece of one cell.
     """

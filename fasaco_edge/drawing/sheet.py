@@ -23,7 +23,7 @@ FOOT_PX = 34
 BAR_PX = (220, 10)
 SYMBOL_PX = 16
 OVERSAMPLING = 4
-# Of one line of a caption [characters].
+# Longest line of a caption [characters].
 MOST_CHARACTERS = 400
 
 # Pillow's own font knows little beyond ASCII; it needs no file, so it stays.

@@ -87,7 +87,7 @@ def pointed_and_decided(tau: Tau) -> tuple[NDArray[np.int8], NDArray[np.float64]
 
 
 def _compared(decided: NDArray[np.float64], tau: Tau) -> NDArray[np.float64]:
-    """Return how decided cells are relative to the most decided one with a choice, 0 to 1."""
+    """Return how decided cells are, 0 to 1, relative to the most decided cell with a choice."""
     choice = decided[np.count_nonzero(tau > 0, axis=2) > 1]
     most = float(choice.max(initial=0.0))
     return np.minimum(decided / most, 1.0) if most > 0.0 else decided

@@ -3,7 +3,8 @@
 If the new map lies on the raster of the previous one (it was patched, it has grown, or its origin
 has moved by whole pixels), pixels are compared, and only cells near changed pixels are
 reclassified. On another raster (its origin has moved by a fraction of a pixel, or was rotated) all
-cells are. Either way the lattice equals, bit for bit, ``CoverageLattice.from_map`` of the new map.
+cells are reclassified. Either way the lattice equals, bit for bit, ``CoverageLattice.from_map`` of
+the new map.
 """
 
 from __future__ import annotations

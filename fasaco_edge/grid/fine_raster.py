@@ -145,7 +145,7 @@ def raster_to_map(geometry: GridGeometry, points: NDArray[np.float64]) -> NDArra
 def raster_to_raster(
     before: GridGeometry, after: GridGeometry, points: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Return points y, x of a raster [pixels], float64 (n, 2), as those of another one."""
+    """Return points y, x of a raster [pixels], float64 (n, 2), as points of another raster."""
     cols, rows = after.to_pixels(*raster_to_map(before, points).T)
     return np.stack([rows, cols], axis=1) - 0.5
 
@@ -182,7 +182,7 @@ class PolygonsOnRaster:
         """Convert polygons (x, y) [m], one or more, to the raster of a geometry."""
         ends = np.cumsum([len(polygon) for polygon in polygons])
         points = np.array([corner for polygon in polygons for corner in polygon], np.float64)
-        # How the corner of a raster is rounded must not move an edge off or onto those of pixels.
+        # Rounding of the raster's corner must not move an edge off or onto an edge of pixels.
         cols, rows = (
             np.round(each, DECIMALS) for each in geometry.to_pixels(points[:, 0], points[:, 1])
         )
@@ -194,7 +194,7 @@ class PolygonsOnRaster:
         return cls(corners, np.stack([*low, *high], axis=1).astype(np.int64))
 
     def touched(self, part: Window) -> NDArray[np.bool_]:
-        """Return which pixels of a part of the raster any of them touches, bool (rows, cols)."""
+        """Return which pixels of a part of the raster any polygon touches, bool (rows, cols)."""
         found = np.zeros((part.rows, part.cols), np.bool_)
         low, high = self.boxes[:, :2], self.boxes[:, 2:]
         near = (low < (part.row1, part.col1)) & (high > (part.row0, part.col0))

@@ -46,7 +46,7 @@ from fasaco_edge.kernels.lattice.footprint import Placement
 
 # The raster spans whole chunks of this many pixels of the map: for a map of 5 cm pixels 3.2 m.
 CHUNK = WORD
-# All bits of a word: pixels beyond a raster are blocked.
+# All bits of a word set: pixels beyond a raster are blocked.
 BLOCKED_WORD = (1 << WORD) - 1
 
 

@@ -94,7 +94,7 @@ class Window:
         )
 
     def in_chunks(self, chunk: int, rows: int, cols: int) -> Window:
-        """Return it rounded outward to whole chunks of a grid of ``rows`` x ``cols`` cells."""
+        """Return the window rounded outward to chunks of a grid of ``rows`` x ``cols`` cells."""
         return Window(
             self.row0 // chunk * chunk,
             self.col0 // chunk * chunk,
@@ -103,7 +103,7 @@ class Window:
         )
 
     def rounded_out(self, chunk: int) -> Window:
-        """Return it rounded outward to whole chunks of an unbounded grid."""
+        """Return the window rounded outward to whole chunks of an unbounded grid."""
         return Window(
             self.row0 // chunk * chunk,
             self.col0 // chunk * chunk,
@@ -146,7 +146,7 @@ class Window:
             and cols.min() >= 0
             and cols.max() < self.cols
         ):
-            # As nearly always; over paths of tens of thousands of cells.
+            # The usual case, kept fast for paths of tens of thousands of cells.
             return values.ravel().take(rows.astype(int) * self.cols + cols)
         inside = (rows >= 0) & (rows < self.rows) & (cols >= 0) & (cols < self.cols)
         found = rows.astype(values.dtype)

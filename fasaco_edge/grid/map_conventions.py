@@ -2,8 +2,8 @@
 
 ROS 2's map_saver writes three greys in trinary mode: black, 254, and 205 for never seen. Until
 2025 it wrote ``free_thresh: 0.25`` beside them, by which map_server takes 205, 19.6 % occupied, for
-free; since then it writes 0.196, as in ROS 1 (navigation2 PR 5278). Here that grey is unknown
-where it is map_saver's: a robot must not drive over ground that was never seen.
+free; since then it writes 0.196, as in ROS 1 (navigation2 PR 5278). Here that grey is unknown if
+map_saver wrote it: a robot must not drive over ground that was never seen.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ def settle(
     if negate:
         is_savers = unseen and counts[SEEN_FREE] and given == OCCUPIED
         return NEGATED.format(unseen) if is_savers else ""
-    # It is map_saver's, and not one of many shades, if most of the grey pixels are of it.
+    # The grey is from map_saver, and not one of many shades, if most grey pixels have it.
     is_grey = (values[:: image.white // 255] != OCCUPIED) & (np.arange(256) < SEEN_FREE)
     if is_mask or 2 * unseen <= counts[is_grey].sum():
         return ""
@@ -75,7 +75,7 @@ def _counts(image: MapImage) -> NDArray[np.int64]:
 
 
 def yaw_in_degrees(yaw: float) -> str:
-    """Return that an origin's yaw is more than a turn; "" if it is not."""
+    """Return the fault of an origin's yaw of more than a full turn; "" for none."""
     if abs(yaw) <= 2.0 * math.pi:
         return ""
     return f"origin's yaw is in radians, got {yaw:g}: if these are degrees, {math.radians(yaw):.4f}"

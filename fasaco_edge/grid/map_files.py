@@ -189,7 +189,7 @@ def read_coverage_grid(path: str | Path) -> NDArray[np.bool_]:
             f"{path}: expected a bool array of two dimensions, got {array.dtype} {array.shape}"
         )
     check_size(path, array.shape[1], array.shape[0])
-    # In a file of another program True may be any byte but 0; kernels read only the lowest bit.
+    # Another program may write any byte but 0 for True; kernels read only the lowest bit.
     cells: NDArray[np.bool_] = np.ascontiguousarray(array).view(np.uint8) != 0
     return cells
 
@@ -275,7 +275,7 @@ class _YamlKeys:
         return number
 
     def _finite(self, key: str, value: object, expected: str) -> float:
-        # In YAML 1.1 5e-2 is a string, for yaml-cpp, and so for ROS, a number.
+        # 5e-2 is a string in YAML 1.1, but a number for yaml-cpp, and so for ROS.
         if isinstance(value, bool) or not isinstance(value, int | float | str):
             raise self.error(key, expected)
         try:

@@ -106,7 +106,7 @@ def read_image(path: Path, most_bytes: int | None = None) -> MapImage:
     try:
         check_plain(path)
         with warnings.catch_warnings():
-            # check_size has the lower limit.
+            # check_size applies the lower limit of this project.
             warnings.simplefilter("ignore", Image.DecompressionBombWarning)
             image = Image.open(path, formats=FORMATS)
         with image:

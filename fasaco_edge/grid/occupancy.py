@@ -106,7 +106,7 @@ class UpdatedGrid:
 
 
 def coarser(grid: OccupancyGrid, most_pixels: int) -> OccupancyGrid:
-    """Return a map of at most about this many pixels: larger ones, each as its most occupied."""
+    """Return a map of about this many pixels at most: each has the highest value that it joins."""
     factor = math.ceil(math.sqrt(grid.cells.size / most_pixels))
     if factor <= 1:
         return grid
@@ -120,7 +120,7 @@ def coarser(grid: OccupancyGrid, most_pixels: int) -> OccupancyGrid:
 
 
 def without_base(patches: Iterable[MapPatch], *, updates_lost: bool) -> list[FasacoError]:
-    """Return a fault for each update without a map, or whose predecessors were lost."""
+    """Return a fault for each update that has no map, or follows lost updates."""
     why = "updates before it were lost" if updates_lost else "there is no map yet"
     return [PatchWithoutBase(f"map update refused: {why}") for _ in patches]
 

@@ -97,11 +97,12 @@ def _crossing(polygon: Polygon) -> tuple[int, int] | None:
 def _meet(
     a: NDArray[np.float64], b: NDArray[np.float64], c: NDArray[np.float64], d: NDArray[np.float64]
 ) -> NDArray[np.bool_]:
-    """Tell which segments c-d have a point in common with a-b; all points are float64 (n, 2)."""
+    """Return which segments c-d have a point in common with a-b; all points are float64 (n, 2)."""
     of_c, of_d = _side(a, b, c), _side(a, b, d)
     of_a, of_b = _side(c, d, a), _side(c, d, b)
     crossing = (of_c * of_d <= 0) & (of_a * of_b <= 0)
-    # Collinear segments meet only if their boxes do; for others that holds anyway.
+    # Collinear segments meet only if their boxes overlap; boxes of other meeting segments always
+    # do.
     overlap = (np.minimum(c, d) <= np.maximum(a, b)) & (np.maximum(c, d) >= np.minimum(a, b))
     meet: NDArray[np.bool_] = crossing & overlap.all(axis=1)
     return meet

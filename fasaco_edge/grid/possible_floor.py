@@ -2,8 +2,8 @@
 
 A pixel of a map is occupied if a wall passes through it, or if the noise of scans and poses put one
 there. So walls and furniture are thicker on a map than in the building: by about a pixel on the
-maps of a scan matcher. How much more floor there is, no such map shows; this is an estimate
-of the most.
+maps of a scan matcher. No such map shows how much more floor there is; this is an estimate of its
+upper limit.
 """
 
 from __future__ import annotations
@@ -17,7 +17,8 @@ from fasaco_edge.grid.tool_reach import tool_reach
 from fasaco_edge.kernels.floor.bits import Bits, packed, unpacked
 from fasaco_edge.kernels.floor.places import connected, disc_rows, keep_in_cells, places_of
 
-# On a larger raster it is not computed: it would take more than a quarter of a second [pixels].
+# Largest raster on which this is computed [pixels]: a larger one would take more than a quarter of
+# a second.
 MOST_PIXELS = 8_000_000
 
 
@@ -34,11 +35,11 @@ def possible_m2(
 
     Args:
         floor: of the newest map.
-        thinner_m: by how much: the edge of a pixel of the map [m].
+        thinner_m: by how much walls would be thinner: the edge of a pixel of the map [m].
         at: where the robot is, x, y [m].
         asked: bool (rows, cols) of the lattice: the cells whose floor counts.
-        cut_off: likewise: cells that were reachable once and are no more. They count with what is
-            connected to them.
+        cut_off: likewise: cells that were reachable once and are no more. They count together with
+            the cells connected to them.
     """
     geometry = floor.geometry
     if geometry.rows * geometry.cols > MOST_PIXELS:

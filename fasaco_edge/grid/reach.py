@@ -1,4 +1,4 @@
-"""Reach of a robot: which pixels and cells are concerned when others change.
+"""Reach of a robot: which pixels and cells a change of others affects.
 
 Disc and tool reach beyond the pixel or cell that they stand on, and a step may bend around a
 corner. Whatever lies farther from a change than that need not be recomputed.
@@ -84,7 +84,7 @@ class Reach:
             resolution: edge of a pixel of the map [m].
             window: window of the lattice.
         """
-        # As far as a changed pixel of the map has effects, at any yaw.
+        # The distance within which a changed pixel of the map has effects, at any yaw.
         reach_m = self.discs.clear_m + (REACH_CELLS + 1.0) * self.cell_m
         reach_m = (reach_m + (REACH_PX + 1.0) * resolution) * math.sqrt(2.0)
         near, cell_m = np.zeros((window.rows, window.cols), np.bool_), self.cell_m
@@ -99,9 +99,9 @@ class Reach:
     def lost(
         self, grids: tuple[OccupancyGrid, OccupancyGrid], geometry: GridGeometry, parts: int
     ) -> Window | None:
-        """Return a window of the raster around free pixels that the new map does not show.
+        """Return a window around the previous map's free pixels that the new map does not show.
 
-        They may lie beyond its cells. None without any.
+        They may lie beyond the new map's cells. None without any.
 
         Args:
             grids: the previous map and the new one.

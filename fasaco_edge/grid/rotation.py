@@ -39,7 +39,7 @@ def rotated_pose(pose: Pose2D, by_deg: float) -> Pose2D:
 
 
 def composed(frame: Pose2D, pose: Pose2D) -> Pose2D:
-    """Return where ``pose``, given in a frame, lies where the frame does; yaw in [-pi, pi]."""
+    """Return ``pose``, given in a frame, in the parent of that frame; yaw in [-pi, pi]."""
     cos, sin = math.cos(frame.yaw), math.sin(frame.yaw)
     return Pose2D(
         frame.x + pose.x * cos - pose.y * sin,
@@ -49,7 +49,7 @@ def composed(frame: Pose2D, pose: Pose2D) -> Pose2D:
 
 
 def inverse(pose: Pose2D) -> Pose2D:
-    """Return the pose of the origin in the frame at ``pose``."""
+    """Return the inverse pose: the origin as seen from the frame at ``pose``."""
     cos, sin = math.cos(pose.yaw), math.sin(pose.yaw)
     return Pose2D(-pose.x * cos - pose.y * sin, pose.x * sin - pose.y * cos, -pose.yaw)
 

@@ -1,8 +1,8 @@
-"""Reach of a tool: the pixels that it touches from places of the robot, and none through walls.
+"""Reach of a tool: the pixels that it touches from places of the robot, without those behind walls.
 
-All that the robot's disc covers is free. Of a tool that sticks out of it - side brushes, a wide
-deck, a lamp - those pixels count that free ones connect with the robot's disc, about within the
-tool's.
+All that the robot's disc covers is free. If the tool sticks out of it (side brushes, a wide deck, a
+lamp), a pixel of the tool's disc counts if free pixels, about inside that disc, connect it with the
+robot's disc.
 """
 
 from __future__ import annotations
@@ -16,7 +16,8 @@ from fasaco_edge.kernels.floor.places import within
 def tool_steps(radius: float, tool: float) -> int:
     """Return how many steps over edges lead from the robot's disc to the rim of the tool's.
 
-    0 for a tool within it; steps to what lies askew are as much longer a way.
+    0 for a tool within the robot's disc. Diagonal distances take more steps: the number allows for
+    that.
 
     Args:
         radius, tool: radii of robot and tool [pixels].

@@ -52,13 +52,14 @@ MOST_ROUNDS = 8
 
 # Least evidence of a direction: share of all wall (0.16 if directions are uniform), length [m].
 LEAST_SHARE, LEAST_WALL_M = 0.3, 2.0
-# Another direction replaces that of the map frame's axes if it has this many times their walls.
+# Another direction replaces the map frame's axes if it has this many times as much wall as they
+# have.
 BETTER = 1.25
 # Tolerances [deg]: walls this close to the pixels' axes are parallel to them; this close to 45
 # degrees the angle is 45, so that nearly equal maps do not rotate by 45 and by -45.
 NEAR_DEG = 0.3
-# A smaller rotation gains nothing [deg]. One of 1 degree leaves a seventh of the patches, in the
-# same time; from 2 degrees on it also saves time.
+# A smaller rotation gains nothing [deg]. A rotation of 1 degree leaves a seventh of the patches, in
+# the same time; from 2 degrees on it also saves time.
 LEAST_ROTATION_DEG = 0.5
 
 
@@ -101,7 +102,7 @@ def wall_direction(grid: OccupancyGrid) -> WallDirection | None:
     wall_m = peak.length / EDGE * grid.geometry.resolution * _parts(grid.geometry)
     if peak.share < LEAST_SHARE or wall_m < LEAST_WALL_M:
         return None
-    # Along its own pixels' axes a rotated map has level rows, whatever its yaw.
+    # The votes are relative to the axes of the pixels: add the yaw of a rotated map.
     own_deg = 0.0 if abs(peak.angle_deg) < NEAR_DEG else peak.angle_deg
     angle_deg = _folded(own_deg + yaw_deg)
     if abs(angle_deg) > 45.0 - NEAR_DEG:
@@ -111,7 +112,8 @@ def wall_direction(grid: OccupancyGrid) -> WallDirection | None:
 
 @dataclass(frozen=True, slots=True)
 class _Peak:
-    """A direction: its angle to the axes of the pixels [deg], its share, its vectors' length."""
+    """A direction: its angle to the axes of the pixels [deg], its share, and its vectors'
+    length."""
 
     angle_deg: float
     share: float
@@ -224,7 +226,7 @@ def _across(steps: NDArray[np.int8]) -> NDArray[np.int16]:
 
 def _vote(east: NDArray[np.int16], north: NDArray[np.int16], sums: NDArray[np.int64]) -> None:
     """Add a tile's vectors to ``sums``, int64 (3, 4 * BINS), by direction in a full circle."""
-    # Both at the corners of pixels.
+    # Both differences are at the corners of pixels.
     x = _smoothed(east[1:] + east[:-1])
     y = _smoothed(north[:, 1:] + north[:, :-1])
     squares = x.astype(np.int32) ** 2 + y.astype(np.int32) ** 2

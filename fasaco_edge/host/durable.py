@@ -27,7 +27,7 @@ def write_through(path: Path, payload: bytes, *, mode: int = 0o644) -> None:
 
 
 def make_folder(folder: Path, *, mode: int = 0o777) -> None:
-    """Make a folder, and what is missing above it.
+    """Make a folder, and its missing parents.
 
     Args:
         folder: its path.

@@ -1,7 +1,7 @@
-"""Files and folders that other users of this computer cannot have put in place.
+"""Files and folders that no other user of this computer can have put in place.
 
 Own files belong to this process's user or to root. Trusted files, whose content is run as code, are
-also in folders to which only root and one user may write, including all parent folders: anyone who
+also in folders to which only root and one user may write, including all parent folders: a user who
 can write to a folder can replace its files. Two cases are safe: in a sticky folder (``/tmp``) only
 the owner can replace a file, and a link is trusted like its maker and its folder (systemd's
 ``/var/cache/NAME`` of a DynamicUser= is a link of root's).
@@ -112,7 +112,7 @@ def _check_owner(path: str | Path, status: os.stat_result) -> None:
 
 
 _OTHERS_WRITE = stat.S_IWGRP | stat.S_IWOTH
-# As many as Linux itself follows, see path_resolution(7).
+# Limit on links: as many as Linux itself follows, see path_resolution(7).
 _MOST_LINKS = 40
 
 
@@ -170,7 +170,7 @@ def _walk(folder: Path, trusted: frozenset[int]) -> None:
         if not ahead:
             break
         part = ahead.pop()
-        if part == "..":  # of a link's target; ``place`` has no links in it
+        if part == "..":  # parts of a link's target; ``place`` has no links in it
             place, status = place.parent, os.lstat(place.parent)
             continue
         try:

@@ -1,7 +1,7 @@
 """Plain YAML: a document written by a user, of bounded size and depth.
 
-Aliases count as what they expand to: 500 bytes of them can be gigabytes. Tags, which turn a text
-into other types, are refused.
+Aliases count with the size that they expand to: 500 bytes of aliases can be gigabytes. Tags, which
+turn a text into other types, are refused.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import yaml
 MOST_BYTES = 1_048_576
 MOST_VALUES = 50_000
 MOST_DEPTH = 32
-# Most digits of an integer: Python refuses to show those of 4300 digits.
+# Limit on the digits of an integer: Python refuses to show one of 4300 digits.
 MOST_DIGITS = 100
 # Timeout of a pipe [s]: a daemon that reloads its configuration does nothing meanwhile.
 PIPE_S = 5.0
@@ -78,18 +78,18 @@ def compose(text: str) -> tuple[yaml.Node | None, object]:
         raise
     except RecursionError as error:
         raise PlainYamlError("nested too deeply") from error
-    # No UTF-8, no such date, a number in base 60 that no float holds.
+    # Invalid UTF-8, an impossible date, or a number in base 60 that no float holds.
     except (yaml.YAMLError, ValueError, OverflowError) as error:
         raise PlainYamlError(str(error)) from error
 
 
 class _Loader(yaml.SafeLoader):
-    """Counts values while they are read, before anything is made of them."""
+    """Counts values while they are read, before objects are built from them."""
 
     def __init__(self, text: str) -> None:
         super().__init__(text)
         self._values = self._depth = self._deepest = 0
-        # What an alias stands for: how many values, how many levels.
+        # For each alias the number of values and of levels that it stands for.
         self._sizes: dict[str, tuple[int, int]] = {}
 
     def compose_node(self, parent: yaml.Node | None, index: int) -> yaml.Node | None:

@@ -30,7 +30,7 @@ def python_program(module: str, *words: str) -> list[str]:
     return [sys.executable, shut, "-m", module, *words]
 
 
-# Options of mallopt(3) and what they are set to. A block that the system maps anew costs a page
+# Options of mallopt(3), and the values set. A block that the system maps anew costs a page
 # fault each 4 KB: with thresholds of 256 KB replans of 100,000 cells took 60 ms in place of 38.
 _TRIM_THRESHOLD = (-1, 2 << 20)
 _MMAP_THRESHOLD = (-3, 1 << 20)
@@ -133,7 +133,7 @@ def _field_mb(pid: int | str, name: str) -> float:
 
 
 def _fields(pid: int | str) -> dict[str, str]:
-    """Return what proc(5) says of a process; of this one also where no file can be opened."""
+    """Return the fields of proc(5) for a process; for this one even without free descriptors."""
     if pid == "self":
         text = os.pread(_own_status(), 1 << 16, 0).decode("ascii", errors="replace")
     else:
@@ -184,7 +184,7 @@ def call_on(*numbers: int, call: Callable[[], None]) -> Callable[[], None]:
 def end_within(seconds: float) -> None:
     """End this process if it still exists after a timeout [s]: code 1, its stacks on stderr.
 
-    A thread of C does that, which needs no lock of the interpreter's.
+    A thread of C does that: it needs no lock of the interpreter.
     """
     with suppress(AttributeError, OSError, RuntimeError, ValueError):  # no stderr, or no file
         faulthandler.dump_traceback_later(seconds, exit=True)

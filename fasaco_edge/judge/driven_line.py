@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 from fasaco_edge.grid.geometry import GridGeometry
 from fasaco_edge.judge.pixels import Mask
 
-# Distances of whole pixels are reached; rounding must not decide otherwise [pixels].
+# Tolerance of distances [pixels]: rounding must not exclude a pixel at exactly the distance.
 TOUCH_TOLERANCE_PX = 1e-3
-# So many rows of pixels beside pieces of it are looked at together while it sweeps.
+# Number of rows of pixels that are evaluated at a time.
 SWEPT_ROWS = 30_000
 Points = NDArray[np.float64]
 
@@ -119,8 +119,8 @@ class DrivenLine:
     def swept(self, half_px: float, shape: tuple[int, int]) -> Mask:
         """Return the pixels whose centre lies within ``half_px`` of the line, bool ``shape``.
 
-        Those of one row near one piece of it are a run: it is counted where each run begins, and
-        counted off behind its end.
+        The pixels of one row near one piece are a run: a counter goes up where a run begins, and
+        down behind its end.
         """
         rows, cols = shape
         reach = half_px + TOUCH_TOLERANCE_PX
@@ -138,7 +138,7 @@ class DrivenLine:
             before = row[near] * (cols + 1)
             np.add.at(runs, before + first[near].astype(np.int64), 1)
             np.add.at(runs, before + stop[near].astype(np.int64), -1)
-        # Runs that end in a row's last pixel are counted off in one of its own.
+        # One more column for the ends of runs that reach the last pixel of a row.
         beside = np.cumsum(runs, out=runs).reshape(rows, cols + 1) > 0
         return beside[:, :-1]
 
@@ -156,7 +156,8 @@ def _run_beside(starts: Points, ends: Points, y: Points, reach: float) -> tuple[
         reach: radius of the discs.
 
     Returns:
-        Two of x, float64 (n, m); the first is NaN where a line comes near no point of a segment.
+        x of entering and x of leaving, both float64 (n, m); the first is NaN where a line comes
+        near no point of a segment.
     """
     way = ends - starts
     dx, dy = way[:, :1], np.where(way[:, 1:] == 0.0, 1e-12, way[:, 1:])

@@ -8,7 +8,7 @@ Reachable floor
     sticks out of the robot's disc touches what is free, and connected with that disc by free
     pixels about within the tool's: nothing behind a wall.
 Swept floor
-    What of it the tool's disc passed over along the line, likewise.
+    The reachable floor that the tool's disc passed over along the line, by the same rules.
 Illegal share
     The part of the line on which the robot's disc would touch what is not known free.
 Patch
@@ -37,7 +37,7 @@ from fasaco_edge.judge.driven_line import (
 )
 from fasaco_edge.judge.pixels import Mask, Patches, through, within
 
-# Largest pixel [m], unless that makes more than this many of them.
+# Largest pixel [m], unless pixels that fine would be more than this many.
 FINE_M = 0.025
 MOST_PIXELS = 24_000_000
 SQRT2 = math.sqrt(2.0)
@@ -45,7 +45,8 @@ SQRT2 = math.sqrt(2.0)
 PATCH_M2 = 0.04
 # Pixels of the robot's disc that a line may lose to the raster before it counts as touching.
 TOUCH_SLACK_PX = 1.5
-# Pieces of a line in which it is looked for walls [pixels], and how many together.
+# Length of the pieces of a line that are checked for walls [pixels], and how many are checked at a
+# time.
 STEP_PX = 0.7
 PIECES = 4096
 
@@ -78,12 +79,12 @@ class FloorFigures:
     Attributes:
         reachable_m2: reachable floor [m2].
         swept_m2: area of it that was swept [m2].
-        swept_share: that as a share; None if no floor is reachable.
+        swept_share: swept area as a share of the reachable; None if no floor is reachable.
         illegal_share: part of the line on which the robot touches floor not known to be free.
         length_m: length of the line [m].
         quarter_turns: angle turned on the line, in quarter-turns.
         seconds: driving and turning [s].
-        seconds_per_m2: that for each square metre swept [s/m2]; None where nothing was.
+        seconds_per_m2: driving time per square metre swept [s/m2]; None if nothing was swept.
         patches_over_4_dm2: patches left that are larger than ``PATCH_M2``.
         largest_patch_m2: the largest patch left [m2].
         pixel_m: edge of the pixels it was judged on [m].
@@ -118,7 +119,7 @@ class JudgedFloor:
     """A floor and its parts swept by a line.
 
     Attributes:
-        figures: how well it did.
+        figures: quality of the line.
         geometry: the raster it was judged on.
         reachable, swept: bool (rows, cols) on it; swept floor is reachable.
     """
@@ -145,13 +146,13 @@ def judge_floor(
     """Judge a line driven on a map.
 
     Args:
-        grid: the map, also one that lies askew in its frame.
+        grid: the map; it may be rotated in its frame.
         line_xy: float64 (n, 2), n >= 1: points (x, y) [m] in the map frame, driven straight from
             one to the next.
         robot: the driving robot.
         driven: bool (n - 1,), which of the ways from point to point it drove; on the others it
             swept nothing, as when a pose jumped. None for all.
-        stands_at: where (x, y) [m] it could come to all that is reachable from; None for the
+        stands_at: a place (x, y) [m] from which all reachable floor is found; None for the
             beginning of the line.
 
     Raises:
@@ -173,7 +174,7 @@ def judge_floor(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Floor:
-    """What is known free of a map, on fine pixels, with a margin that is not around it."""
+    """The known free floor of a map, on fine pixels, with a margin of blocked pixels around it."""
 
     geometry: GridGeometry
     free: Mask
@@ -206,7 +207,7 @@ class _Floor:
 
     def reachable_from(self, point: tuple[float, float]) -> Mask:
         """Return the pixels that the tool touches from places reachable from a point (x, y) [m]."""
-        # Half a pixel beyond the centre of a blocked one lies its edge.
+        # The edge of a blocked pixel lies half a pixel before its centre.
         fits = ~within(~self.free, self.radius_px + 0.5 - TOUCH_TOLERANCE_PX)
         stands = Patches.of(fits).nearest_to(*self.geometry.to_pixels(*point))
         return self.under_tool(lambda radius_px: within(stands, radius_px + TOUCH_TOLERANCE_PX))
@@ -221,12 +222,12 @@ class _Floor:
         under, beyond_px = near(tool_px), tool_px - self.radius_px
         if beyond_px <= 0:
             return under
-        # Steps over edges lead to what lies askew by as much longer ways.
+        # Diagonal distances take more steps over edges: allow for that.
         return under & through(self.free, near(self.radius_px), math.ceil(SQRT2 * beyond_px))
 
     def illegal_share(self, line: DrivenLine) -> float:
         touched = within(~self.free, self.radius_px - TOUCH_SLACK_PX - TOUCH_TOLERANCE_PX)
-        # A robot smaller than that may still not stand outside free floor.
+        # Even a robot smaller than a pixel may not stand outside free floor.
         touched |= ~self.free
         rows, cols = self.free.shape
         illegal = length = 0.0
@@ -236,7 +237,7 @@ class _Floor:
             inside = (row >= 0) & (row < rows) & (col >= 0) & (col < cols)
             touches = np.ones(len(row), np.bool_)
             touches[inside] = touched[row[inside].astype(int), col[inside].astype(int)]
-            # A line of one point is judged by it.
+            # A line of one point is judged at that point.
             weight = np.hypot(*(end - start).T) if is_line else np.ones(len(row))
             illegal += float(weight[touches].sum())
             length += float(weight.sum())

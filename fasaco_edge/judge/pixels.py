@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 Mask = NDArray[np.bool_]
 
-# So many pixels are looked at together: distances along rows take eight bytes for each.
+# Number of pixels evaluated at a time: distances along rows take eight bytes each.
 BLOCK_PIXELS = 1_000_000
 FAR = 2**30
 
@@ -21,8 +21,8 @@ FAR = 2**30
 def within(mask: Mask, distance: float) -> Mask:
     """Return which pixels lie at most ``distance`` [pixels] from a marked one.
 
-    A disc is a stack of rows: a pixel is near a marked one ``d`` rows away if that one is, along
-    its own row, within half of the disc's width there.
+    A disc is a stack of rows: a pixel is near a marked one ``d`` rows away if their distance along
+    the row is at most half of the disc's width at that height.
 
     Args:
         mask: bool (rows, cols).

@@ -12,8 +12,8 @@ from fasaco_edge.grid.occupancy import UNKNOWN, OccupancyGrid
 from fasaco_edge.kernels.lattice.raycast import Scanner, cast_rays, disc_is_free, reveal_disc
 from fasaco_edge.simulation.robot import Point, SimulationConfig
 
-# Spacing of the checks whether the hull has room on a straight way [m]: between two places a corner
-# may reach less than a millimetre into it.
+# Spacing of the checks whether the hull has room along a straight line [m]: between two checks a
+# corner may reach less than a millimetre into the hull.
 SPACING_M = 0.025
 
 
@@ -56,11 +56,12 @@ class Mapper:
         self._angles = np.arange(rays) * (2.0 * math.pi / rays)
 
     def believed(self, pose: Pose2D) -> Pose2D:
-        """Return the estimated pose of a robot at ``pose``: the same."""
+        """Return the estimated pose of a robot at ``pose``: the same, as localisation is
+        perfect."""
         return pose
 
     def true_place(self, x: float, y: float) -> Point:
-        """Return the true position of a place on its map [m]: the same."""
+        """Return the true position of a place on its map [m]: equal to it."""
         return x, y
 
     def scan(self, pose: Pose2D) -> Window | None:

@@ -61,7 +61,7 @@ class Pace:
         self._patience_s = patience_s
 
     def behind_s(self, now_s: float) -> float:
-        """Return since when the next tick is due [s]; below 0, until when it is not."""
+        """Return how long the next tick has been due [s]; below 0 the time until it is due."""
         return now_s - self._due_s
 
     def ticked(self, now_s: float) -> None:
@@ -198,7 +198,7 @@ class RobotOnBus:
 
     def publish(self, emission: Emission) -> None:
         """Publish map, pose and battery, where there are any."""
-        # The map first: where the robot stands is on it.
+        # The map comes first, so that it shows the place of the pose.
         if emission.map is not None:
             self._map.put(encode_occupancy_grid(emission.map))
         if emission.pose is not None:
@@ -221,7 +221,7 @@ class RobotOnBus:
         self._world.others = {**self._world.others, name: (pose.x, pose.y)}
 
     def _part(self, now_s: float) -> None:
-        """Drop other robots that are silent: they count as carried away."""
+        """Drop other robots that are silent: they are obstacles no more."""
         places, met_at = self._world.others, self._met_at
         here = {name: at for name, at in places.items() if now_s - met_at[name] < CARRIED_AWAY_S}
         if len(here) < len(places):

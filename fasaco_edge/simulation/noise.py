@@ -34,8 +34,9 @@ class MapperNoise:
             after a metre's way; after n metres it is sqrt(n) times as large.
         closes_loops: whether the drift is corrected, in the map too, when the robot returns to a
             place mapped long ago.
-        jumps: share of scans that are added at a wrong pose; that of the next scan is right again.
-        jump_m: how far off it is [m].
+        jumps: share of scans that are added at a wrong pose; the pose of the next scan is right
+            again.
+        jump_m: error of such a pose [m].
         late_s: age of a pose when it is published [s].
     """
 
@@ -76,7 +77,7 @@ class MapperNoise:
 
     @property
     def is_in_map(self) -> bool:
-        """Whether maps and poses differ from the truth at all; late ones do not."""
+        """Whether maps and poses differ from the truth; a delay alone does not count."""
         jumps_m = self.jumps * self.jump_m
         return any((
             self.range_m, self.specks, self.leg_misses, self.shift_m, self.match_m,

@@ -25,11 +25,11 @@ from fasaco_edge.simulation.robot import SimulationConfig
 
 # Rays of a scan, as of an LDS-01.
 RAYS = 360
-# A scan is added after this much way [m] or turn [rad].
+# A scan is added after driving this far [m] or turning this much [rad].
 TRAVEL_M, TURN_RAD = 0.3, 0.35
 # Pixels are known after this many rays, and occupied if more than this share of them ended there.
 LEAST_PASSES, HITS = 2, 0.1
-# Most pixels of a leg.
+# Limit on the pixels of a leg.
 LEG_PX = 4
 # Margin around the building for pixels that are mapped beside it [m].
 MARGIN_M = 0.6

@@ -34,16 +34,16 @@ ARRIVED_M = 1e-3
 # [rad].
 ALIGNED_RAD = 1e-4
 MISALIGNED_RAD = 0.05
-# A bend below this may not count: the robot steers through it and does not stop [rad].
+# A bend below this need not be a corner: the robot steers through it and does not stop [rad].
 STRAIGHT_RAD = 0.02
-# It counts if the straight way past it is further off than this [m].
+# Such a bend is a corner if the straight line past it is farther from it than this [m].
 CUT_M = 0.002
-# A waypoint is driven through if a point of the track is this near; it must not be less
-# than half the track's spacing [m].
+# A waypoint is driven through if a point of the track is this near [m]: at least half of the
+# track's spacing.
 PASSED_WITHIN_M = 0.02
 # As a last resort the path is joined anywhere in this much of its beginning [m].
 JOIN_WITHIN_M = 2.0
-# Ways back along the track turn off at each of this many last points, further back at each n-th.
+# Ways back along the track turn off at each of this many last points, and before them at each n-th.
 BACK_POINTS, BACK_STRIDE = 100, 10
 
 

@@ -53,14 +53,14 @@ class Activity(enum.Enum):
     """Activity of the robot."""
 
     IDLE = "idle"
-    """It has no path, or has driven it to its end."""
+    """The robot has no path, or has driven it to its end."""
     DRIVING = "driving"
-    """It is on a path, or on its way to one."""
+    """The robot is on a path, or on its way to one."""
     NO_WAY = "no_way"
-    """It sees no clear way to the path's beginning, and looks again after every scan."""
+    """The robot sees no clear way to the path's beginning, and looks again after every scan."""
     STOPPED = "stopped"
-    """Its way leads into an obstacle of its own map; it stopped before that, looked once for
-    another way to its path, and waits for another path."""
+    """The robot's way leads into an obstacle of its own map; it stopped before that, looked once
+    for another way to its path, and waits for another path."""
     COLLIDED = "collided"
     """The path led into an obstacle; it stops there and waits for another path."""
 
@@ -134,7 +134,7 @@ class World:
         self.others: dict[str, Point] = {}
         self.touches = self.meetings = 0
         self._is_held = False
-        # Number of its stops when its path came.
+        # Number of the robot's stops when its path came.
         self._stopped_at = 0
         # For how many ticks the robot has stood, once it has moved; and the longest such time.
         self._stands = self._longest_stand = 0
@@ -206,7 +206,7 @@ class World:
 
     @property
     def unanswered_s(self) -> float:
-        """For how long it has been moving, or commanded to, since the newest velocity [s]."""
+        """Time since the newest velocity while the robot moves, or is commanded to [s]."""
         if self._told is None or not (self._drive.moving or any(self._told[:2])):
             return 0.0
         return (self._ticks - self._told[2]) * self.config.tick_s
@@ -240,7 +240,7 @@ class World:
         battery, drive = self.battery, self._drive
         if battery is None:
             return
-        if battery.level == 0.0:  # it stands where it is
+        if battery.level == 0.0:  # with an empty battery the robot stands
             self._drive = DriveState(drive.pose)
             self._path, self._corners, self.activity = None, [], Activity.IDLE
         away_m = math.dist(self._dock, (drive.pose.x, drive.pose.y))
