@@ -1,4 +1,4 @@
-"""Wing of fleets: several robots that share one area. A single robot does not use it.
+"""Fleets: several robots that share one area. A single robot does not use it.
 
 mission/kind         what a robot of a fleet uses in place of ``mission.company``
 mission/layer        the other robots, and this one's part of the remaining area

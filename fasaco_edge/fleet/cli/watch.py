@@ -20,7 +20,7 @@ from fasaco_edge.wire.keys import VERSION, Keys
 def fleet_on_bus(
     fleet: str, keys: Keys, bus: BusSettings
 ) -> Iterator[tuple[FleetWatch, Callable[[], FasacoError]]]:
-    """Yield the watch of a fleet, and a function for the error that none of its robots is there."""
+    """Yield the watch of a fleet, and a function that returns the error for no robots."""
     view = FleetView(fleet)
     with FleetFeed(bus, keys) as feed:
         yield FleetWatch(feed, view, out()), lambda: _no_robot(keys, feed, view)

@@ -35,7 +35,7 @@ class FleetArrivals:
         # publishers [s]; the key with the oldest message is first.
         self._heard_at: dict[str, float] = {}
         self._strange_at: dict[str, float] = {}
-        # Time of the last message of no fleet that was passed on: only its fault is used.
+        # Time of the last passed-on message that names no fleet: only its fault is used.
         self._unreadable_at = float("-inf")
         self._has_refused = False
         self._faults = deque[FasacoError](maxlen=1)
@@ -67,13 +67,13 @@ class FleetArrivals:
         return [self._faults.popleft() for _ in range(len(self._faults))]
 
     def _has_place(self, key: str, now: float) -> bool:
-        """Give a place to another robot of this fleet, if there is one."""
+        """Give a free place to another robot of this fleet; return whether there was one."""
         if len(self._heard_at) >= MOST_HEARD:
             longest = next(iter(self._heard_at))
             if now - self._heard_at[longest] < FORGOTTEN_S:
                 if not self._has_refused:
                     self._has_refused = True
-                    text = f"{MOST_HEARD} others of fleet {self._fleet!r} are heard at most"
+                    text = f"at most {MOST_HEARD} others of fleet {self._fleet!r} are kept"
                     self._faults.append(FleetError(f"{self._keys.robot_of(key)}: {text}"))
                 return False
             del self._heard_at[longest]

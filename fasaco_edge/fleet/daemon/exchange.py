@@ -1,4 +1,4 @@
-"""Fleet messages: this robot's message to the others, theirs as events, and the status of both.
+"""Fleet messages: this robot's message to the others, their messages as events, the fleet's status.
 
 Unused without a block ``fleet`` in the configuration.
 """

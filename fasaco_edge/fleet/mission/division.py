@@ -20,7 +20,7 @@ from fasaco_edge.grid.lattice import Cell, CoverageLattice
 from fasaco_edge.kernels.fleet.nearest import walk_parts
 from fasaco_edge.mission.core.events import Part
 
-# Of more cells only every second, third ... is used; larger lattices get fewer rounds.
+# Above this number of cells only every second, third ... is used; larger lattices get fewer rounds.
 MOST_CELLS, MOST_SEARCHED = 2_000, 3_000_000
 # Rounds of moving the seeds; updates of the handicaps, and the factor between successive ones.
 ROUNDS, CHANGES, DAMPING = 3, 30, 0.85

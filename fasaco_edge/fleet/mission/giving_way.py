@@ -38,13 +38,15 @@ from fasaco_edge.mission.map.map_state import MapState
 from fasaco_edge.mission.map.reachable_area import ReachableArea
 from fasaco_edge.mission.orders.order import Errand
 
-# A robot that stands on its path this near to another is blocked by it; least motion [m].
+# A robot that stands on its path within the first distance of another robot is blocked by it; least
+# motion [m].
 BESIDE_M, MOVED_M = 0.4, 0.1
 # Distance from its place in the refuge at which it has arrived [m].
 ARRIVED_M = 0.05
 # Length of the way ahead that is checked for robots in the way [points].
 LOOK_POINTS = int(WAIT_M / 2 / SPACING_M)
-# A robot is in the way if it is nearer to it by this than when the way was chosen [m].
+# Another robot is in the way if its distance from the way is smaller by this than when the way was
+# chosen [m].
 COMES_M = 0.05
 # A robot that moves less than this for LONG_S plans around the robot that obstructs it, and is
 # reported after TOO_LONG_S [m], [s], [s]: scattered poses may make the other seem to move.
@@ -58,7 +60,7 @@ class GivingWay(Waiting):
 
     Attributes:
         waits_for: name of the robot that it waits for; "" for none.
-        reason: that as text.
+        reason: the wait as text.
         is_near: whether another robot is near.
     """
 
@@ -83,9 +85,9 @@ class GivingWay(Waiting):
         self._has_work = True
         # The path to resume after the wait, and the errand of that path.
         self._held, self._errand = NO_CELLS, ""
-        # Its place, and since when it has been free to drive from there on a path.
+        # The robot's place, and since when it has been free to drive from there on a path.
         self._place, self._free_since = (math.inf, math.inf), 0.0
-        # Where it stays, and since when.
+        # Where the robot stays, and since when.
         self._stays_at, self._stays_since = (math.inf, math.inf), 0.0
         # Reason and time of its last wait.
         self._waited, self._waited_at = "", -math.inf
@@ -141,7 +143,7 @@ class GivingWay(Waiting):
         ``waits_for`` holds the result.
 
         A robot without work left only has paths to a refuge: it makes way, but does not wait.
-        Another errand may lead past no robot, so it ends the wait.
+        Another errand ends the wait: its way may not lead past the other robot.
 
         The first case that holds:
 
@@ -236,7 +238,8 @@ class GivingWay(Waiting):
             self._robot, self._radius_m, pace_s_m, spaced(line), neighbours, self.waits_for
         )
         if found is None and self._hangs(now) and len(line) > 1:
-            # It should drive: its line passes nearer than its cells, or a sensor has stopped it.
+            # The robot should drive: its line passes nearer than its cells, or a sensor has stopped
+            # it.
             return self._beside(here, neighbours)
         return found
 

@@ -1,8 +1,8 @@
 """Shared ground: the cells that the robots of a fleet can reach, each on its own map.
 
 The division includes cells that only maps of other robots show, so that all robots divide nearly
-the same area. Where this robot's own map is known, it decides; paths are planned on it alone. It
-shows a door seen only in part as shut: ``with_doors`` adds the cells beyond.
+the same area. Where this robot's own map is known, it decides; paths are planned on it alone. On
+its map a door seen only in part looks shut: ``with_doors`` adds the cells beyond such doors.
 """
 
 from __future__ import annotations
@@ -94,8 +94,8 @@ def viewpoint(
     It is the last cell (row, col) of its own area on the shortest way there.
 
     Args:
-        area: what it can reach itself.
-        joint: that with the ground of others.
+        area: cells that the robot can reach on its own map.
+        joint: that area with the ground of others.
         wanted: cells of the joint area, bool (rows, cols).
         cell: the robot's cell.
     """

@@ -30,8 +30,8 @@ class Heard:
     Attributes:
         epoch: of the tiles.
         lattice: pose of its lattice in this robot's [m], as they were placed.
-        is_doubtful: whether all cells that it sends in this epoch are disregarded: some were
-            disregarded before its lattice moved, and their new places are not known.
+        is_doubtful: whether all cells of this epoch are disregarded: some were disregarded before
+            the sender's lattice moved, and their new places are not known.
     """
 
     epoch: int
@@ -45,7 +45,7 @@ class Heard:
         self.epoch, self.tiles, self.is_doubtful = epoch, {}, False
 
     def move(self, epoch: int, lattice: Pose2D) -> None:
-        """Drop everything: it was placed elsewhere."""
+        """Drop everything: the sender's lattice was placed elsewhere."""
         is_doubtful = bool(self.disregarded) or self.is_doubtful
         self.is_doubtful = is_doubtful and epoch == self.epoch
         self.epoch, self.lattice, self.tiles, self.disregarded = epoch, lattice, {}, {}
@@ -85,7 +85,7 @@ class Kept(msgspec.Struct, frozen=True, array_like=True):
     is_doubtful: bool = False
 
     def heard(self, *, is_in_place: bool) -> Heard:
-        """Restore it; without its tiles if this robot's own lattice has moved since."""
+        """Restore the cells; without tiles if this robot's own lattice has moved since."""
         tiles = _placed(self.tiles) if is_in_place else {}
         lattice, without = Pose2D(*self.lattice), _placed(self.disregarded)
         return Heard(self.epoch, lattice, tiles, without, self.is_doubtful)

@@ -28,7 +28,7 @@ from fasaco_edge.mission.map.map_state import MapState
 from fasaco_edge.mission.map.reachable_area import ReachableArea
 from fasaco_edge.planners.cost import CoverageCost
 
-# Period of checks [s]. Least age of a division, while no robot leaves, before another one: in
+# Period of checks [s]. Least age of a division that another one replaces while no robot leaves: in
 # general, and for balance [s].
 LOOK_S, HOLDS_S, EVEN_S = 1.0, 2.0, 10.0
 # Parts are rebalanced only above this ratio and this difference [s].
@@ -67,7 +67,7 @@ class FleetLayer(Company):
         # The owners of the cells of a joint area.
         self._owners: tuple[ReachableArea | None, NDArray[np.int8]]
         self._owners = None, np.zeros((0, 0), np.int8)
-        # Cached joint area of the last check: others send their ground many times a second.
+        # Joint area of the last check, kept because others send their ground many times a second.
         self._seen: tuple[ReachableArea, ReachableArea] | None = None
         # Cells that this robot tried in vain while others are at work; and those of an area that
         # it cannot reach, though another map may show a way.
@@ -146,7 +146,7 @@ class FleetLayer(Company):
         return joint, left
 
     def _joint(self, area: ReachableArea) -> ReachableArea:
-        """Return the joint area, of this area as at the last look."""
+        """Return the joint area as of the last check."""
         if self._seen is None or self._seen[0] is not area:
             self._seen = area, self.others.ground.joint(area)
         return self._seen[1]
@@ -301,7 +301,7 @@ class FleetLayer(Company):
         owners = self._owners_on(division, joint)
         cells = np.bincount(owners[left], minlength=len(division.robots))
         if not cells[division.names.index(self._robot)]:
-            # A division that had no part for it would soon be made again without one.
+            # A division that gave this robot no part would give it none again soon after.
             is_other = self._remainder.had_part or cells.sum() > self._remainder.divided
             is_other |= now - self._divided_at >= EVEN_S
             return "own part is done" if left.any() and is_other else ""

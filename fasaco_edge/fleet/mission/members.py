@@ -19,7 +19,7 @@ from fasaco_edge.mission.core.events import MemberHeard, State
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
 from fasaco_edge.mission.map.reachable_area import ReachableArea
 
-# Timeouts of a silent robot, and of one that should move; least motion [s], [s], [m].
+# Timeout of a silent robot [s], and of a robot that should move [s]; least motion [m].
 GONE_S, HANGING_S, STANDING_M = 5.0, 8.0, 0.05
 # A robot that plans avoid has driven on once it is this far from its place [m]: the poses of a
 # standing robot scatter.
@@ -148,7 +148,7 @@ class Members:
         closed = np.zeros(area.reachable.shape, np.bool_)
         for name, (x, y) in self._avoided.items():
             clear_m = least_apart_m(radius_m, self.known[name].newest)
-            # Only the cells around it: lattices are large.
+            # Only cells around the robot are checked, as lattices are large.
             (row0, row1), (col0, col1) = (
                 (math.floor((at - clear_m) / cell_m), math.ceil((at + clear_m) / cell_m))
                 for at in (y, x)
@@ -224,6 +224,6 @@ class Members:
             return
         name = min(self.known, key=lambda name: (self.known[name].heard_at, name))
         if now - self.known[name].heard_at <= GONE_S:
-            raise FleetError(f"{robot}: {MOST_ROBOTS} others of a fleet are heard at most")
+            raise FleetError(f"{robot}: at most {MOST_ROBOTS} others of a fleet are kept")
         del self.known[name]
         self.ground.drop(name)

@@ -53,7 +53,7 @@ def refuge(
         radius_m: radius of its disc [m].
         neighbours: the other robots.
         places: returns the points of cells.
-        sees: tells whether the robot can drive straight between two points.
+        sees: returns whether the robot can drive straight between two points.
     """
     lattice, window = area.lattice, area.lattice.window
     reach = math.ceil((2 * AHEAD_M + 2.0) / lattice.cell_m)

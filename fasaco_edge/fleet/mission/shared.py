@@ -2,13 +2,13 @@
 
 Each report carries an epoch number, changed whenever the sender forgets cells. Within an epoch the
 set only grows, so reports are merged by union: lost, repeated and late messages do no harm, and two
-halves of a split fleet agree once they hear each other again. When the epoch changes, the sender's
-earlier reports are dropped. The progress of an absent robot is kept.
+halves of a split fleet agree once they receive each other's messages again. When the epoch changes,
+the sender's earlier reports are dropped. The progress of an absent robot is kept.
 
 Cells that this robot has to sweep again (a second pass, a reset, a map that moved) are disregarded
 until the robot that swept them has forgotten them itself. Each robot reports which of its cells are
-from before its epoch. If it does not know, or swept some again in an epoch of which no message
-arrived, they stay disregarded, and are swept once more than needed.
+from before its epoch. If the sender does not know that, or swept such cells again in an epoch of
+which no message arrived, they stay disregarded, and are swept once more than needed.
 """
 
 from __future__ import annotations
@@ -100,7 +100,7 @@ class SharedProgress(OthersCells):
             self.version += 1
 
     def enter(self, frame: str) -> None:
-        """Note the active frame: by default, the first has the place in the fleet's frame.
+        """Note the active frame. By default the configured place is that of the first frame.
 
         A robot on another floor has another map, whose place is not configured.
         """

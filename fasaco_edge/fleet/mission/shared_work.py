@@ -9,8 +9,8 @@ A robot without a part stands while the others make progress: it would be in the
 Numbers of divisions: which division is the newest, of those made here and those received.
 
 The higher number is newer; between equal numbers the author's name that sorts first wins. Numbers
-too far ahead are errors of their sender, unless it keeps sending them: then it has counted on while
-it was out of range.
+too far ahead are errors of their sender, unless a robot keeps sending them: it then has numbered
+further divisions while out of range.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from fasaco_edge.mission.map.reachable_area import ReachableArea, anchor_cell
 
 # Others make progress if the number of swept cells has grown within this time [s].
 STUCK_S = 30.0
-# They make none once all of them have waited for this long, perhaps for this robot [s].
+# Others make no progress once all of them have waited for this long, perhaps for this robot [s].
 WAITING_S = 6.0
 
 

@@ -104,7 +104,7 @@ def obstruction(
 
     | the other robot | this robot | decision |
     |---|---|---|
-    | its path leads over this one; waits for this one or nobody | waits for it, or has no path; \
+    | its path leads over this one; waits for this one or for none | waits for it, or has no path; \
 not if each waits for the other and this one has a path and is first by name | makes way |
     | has stopped, WAIT_M / 2 ahead or less; waits for this one; has a path | waits for it; is \
 second by name | goes on waiting |

@@ -33,7 +33,7 @@ def times_of(steps: Steps, steps_s: NDArray[np.float32] | np.float32) -> Seconds
 
 
 def on_ground(lattice: CoverageLattice, row: int, col: int) -> Cell:
-    """Return the coverable cell nearest to one, within SNAP cells; the cell itself for none.
+    """Return the coverable cell nearest to a cell, within SNAP cells; without one the cell itself.
 
     Seeds that others send may lie on cells that this robot's map does not show as coverable.
     """

@@ -154,7 +154,7 @@ def cells_of(tiles: Iterable[CellTile]) -> Cells:
 
 
 def together(parts: Iterable[Cells]) -> Cells:
-    """Return all different cells of parts; a part far away from the earlier ones is left out."""
+    """Return the cells of all parts, each once; leave out a part far away from the earlier ones."""
     joined = np.zeros((0, 2), np.int64)
     for part in parts:
         both = np.concatenate([joined, part])

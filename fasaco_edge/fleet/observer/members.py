@@ -44,9 +44,9 @@ class Member:
     """A robot of the fleet.
 
     Attributes:
-        name: on the bus.
+        name: its name on the bus.
         number: in order of joining, from 0.
-        seat: of its cells.
+        seat: position of its cells.
         newest: its newest message.
         heard_ns: time of its newest message.
         swept, ground: cells it has swept, and can reach.
@@ -193,7 +193,8 @@ class Shares:
 
 
 def union_on(seat: Seat, members: Members[M], what: str) -> Cells:
-    """Return cells of all robots on one robot's lattice, int64 (n, 2); ``what``: of which set."""
+    """Return all robots' cells on one robot's lattice, int64 (n, 2); ``what``: "swept" or
+    "ground"."""
     return together(member.seat.carried(getattr(member, what).cells(), seat) for member in members)
 
 

@@ -1,9 +1,9 @@
 """Lower bound on the steps of the longest of several robots' walks.
 
 Walks of k robots that return, joined at neighbouring cells by at most 2 (k - 1) further steps, are
-one tour over everything: they have at least as many steps as its bound, less these. An even share
-of them is a bound, and so is an even share of the visits of one colour of a chessboard, and the way
-to the farthest cell and back.
+one tour over everything: together they have at least as many steps as that tour's bound, less the
+further steps. An even share of that is a bound, and so is an even share of the visits of one colour
+of a chessboard, and the way to the farthest cell and back.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ def _all_steps(
     robots, cells = len(starts), int(np.count_nonzero(reached))
     if not returns:
         return cells - robots
-    # Where robots stay and cover their starts without a step, the others have longer walks.
+    # If robots stay at their starts, which they cover without a step, the others have longer walks.
     rows, cols = np.nonzero(reached)
     odd = int(np.count_nonzero((rows + cols) & 1))
     problem = CoverageProblem.of(lattice, starts[0], end=starts[0], reachable=reached)

@@ -31,8 +31,8 @@ from fasaco_edge.planners.search.near_optimal import NearOptimal
 
 # Proposals per cell of the search for each part while the parts are balanced.
 QUICK = 40
-# Proposals of each further search for the longest walk: factor on those of the previous search, and
-# most per cell.
+# Proposals of each further search for the longest walk: as a multiple of the previous search, and
+# limit per cell.
 MORE, MOST = 3, 40_000
 # Result of ``next`` after the last piece of work.
 _ENDED = object()

@@ -13,7 +13,8 @@ from fasaco_edge.grid.geometry import Pose2D
 from fasaco_edge.wire.documents.fleet import CellTile
 from fasaco_edge.wire.documents.status import Status
 
-# Longest distance between two poses that counts as driven; most cells and plans between two notes.
+# Longest distance between two poses that counts as driven; limits on cells and plans between two
+# notes.
 MOST_STEP_M = 2.0
 MOST_PASSES, MOST_PLANS = 2_000, 200
 

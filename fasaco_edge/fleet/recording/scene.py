@@ -39,10 +39,10 @@ RATES = {
 }  # fmt: skip
 FLEET_RATES = {entities.FLEET_SHARES: 1_000, entities.FLEET_TWICE: 1_000, entities.RUN_CARD: 800}
 CHUNK_BYTES = 1_200
-# Of a layer of cells in four bytes each, beyond that.
+# Overhead of a layer of cells in four bytes each [bytes].
 GRID_BYTES = 1_200
-# Of all maps. Each part of a recording begins with all of them, four bytes a pixel: they must not
-# fill it.
+# Limit on the pixels of all maps, four bytes each. Each part of a recording begins with all maps:
+# they must not fill it.
 MOST_PIXELS = 2_000_000
 # The view follows the growing map in steps of this share of its size.
 REFRAME = 0.15
@@ -183,7 +183,7 @@ class FleetScene:
     def add_division(self) -> None:
         """Draw the shares of the remaining cells, and the cells that two robots swept."""
         layers, now_ns = self._layers, self._writer.wall_ns
-        # Its size also limits the time of this.
+        # The size of the ground also limits the time of this drawing.
         size = CHUNK_BYTES + sum(member.ground.count for member in self._members) // 8
         layers.draw(entities.FLEET_SHARES, size, self._draw_shares, now_ns)
         layers.draw(entities.FLEET_TWICE, size, self._draw_twice, now_ns)

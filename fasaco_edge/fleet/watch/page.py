@@ -24,8 +24,8 @@ from fasaco_edge.watch.glyphs import GlyphSet
 from fasaco_edge.watch.page import Layout
 from fasaco_edge.watch.status_table import LONGEST_BAR, state_colour
 
-# Largest width of names, beside a third of the table; table width from which units and rates are
-# shown, and largest table width [characters].
+# Largest width of names, besides a third of the table; least width of a table with units and rates;
+# largest width of a table [characters].
 LEAST_NAME, UNITS, RATES, WIDEST = 12, 40, 47, 80
 GONE_COLOUR, WAITING_COLOUR = "red", "yellow"
 
@@ -70,7 +70,7 @@ def _doing(robot: FleetRobot) -> Text:
     colour = WAITING_COLOUR if robot.waits_for else state_colour(robot.state)
     doing = Text(robot.doing, colour)
     if robot.away and robot.away != robot.state:
-        away = "not heard by others" if robot.away == "gone" else robot.away
+        away = "not received by others" if robot.away == "gone" else robot.away
         doing.append(f" ({away})", WAITING_COLOUR)
     return doing
 
@@ -79,7 +79,7 @@ def total_rows(
     floor: FleetFloor, unheard: Sequence[str], width: int, glyphs: GlyphSet
 ) -> list[Text]:
     """Return lines with the total of all robots, and the names of silent robots."""
-    silent = [Text(f"not heard: {', '.join(unheard)}", GONE_COLOUR)] if unheard else []
+    silent = [Text(f"no messages: {', '.join(unheard)}", GONE_COLOUR)] if unheard else []
     if floor.fraction is None:
         return silent
     swept_m2, area_m2 = floor.swept * floor.cell_m2, floor.area * floor.cell_m2
@@ -110,7 +110,7 @@ class FleetPage:
         """
         blocks, robots, layout = self._blocks, view.robots(now), Layout.of(width, height)
         page = blocks.block(headline(view, robots, now), width, 1)
-        # The legend's line is the table's.
+        # The table takes the line of the legend.
         page += self._table(view, robots, now, width, min(layout.lines + 1, height - 1))
         if layout.entries:
             key = (view.events.count, width, layout)

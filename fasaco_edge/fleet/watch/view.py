@@ -187,7 +187,7 @@ class FleetView:
         before, seen.noted, seen.noted_at = seen.noted, doing, now
         name, status = short(robot.name), seen.status
         if doing == "gone":
-            self.events.add(now, f"{name} is gone: nothing is heard of it", BAD)
+            self.events.add(now, f"{name} is gone: no messages from it", BAD)
             return
         name += {"": " joined", "gone": " is back"}.get(before, "")
         is_troubled = not robot.waits_for and robot.state in TROUBLED

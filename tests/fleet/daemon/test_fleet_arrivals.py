@@ -73,7 +73,7 @@ def test_one_robot_too_many_displaces_nobody_and_is_named_once(arrivals):
             assert arrivals.is_due(from_robot(f"r{number}"), float(second))
         assert not arrivals.is_due(from_robot("late"), float(second))
     (fault,) = arrivals.take_faults()
-    assert str(fault) == "late: 64 others of fleet 'hall' are heard at most"
+    assert str(fault) == "late: at most 64 others of fleet 'hall' are kept"
     for number in range(1, MOST_HEARD):
         arrivals.is_due(from_robot(f"r{number}"), FORGOTTEN_S)
     # There is room once one is silent.

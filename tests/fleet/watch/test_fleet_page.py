@@ -59,7 +59,7 @@ def test_who_is_gone_is_told_and_so_is_who_is_not_heard():
     tell(view, "a", "status", status(fleet={"name": "house", "members": others}), later)
     view.tick(later)
     page = page_of(view, now=later)
-    for said in ("1 of 2 robots at work", "b     gone for 12 s", "not heard: c"):
+    for said in ("1 of 2 robots at work", "b     gone for 12 s", "no messages: c"):
         assert said in page, page
     assert "all robots are gone" in page_of(view, now=later + 60.0)
 
@@ -71,7 +71,7 @@ def test_what_others_leave_out_is_told():
     assert "(stands)" in page_of(view)
     others = [{"name": "a", "away": "gone"}]
     tell(view, "b", "status", status(fleet={"name": "house", "members": others}))
-    assert "(not heard by others)" in page_of(view)
+    assert "(not received by others)" in page_of(view)
 
 
 def test_done_is_done():

@@ -102,7 +102,7 @@ def test_a_robot_that_is_silent_is_gone_and_may_come_back():
     assert b.swept_cells == 3
     say(view, "b", later + 2.0)
     view.tick(later + 2.0)
-    assert texts(view)[-2:] == ["b is gone: nothing is heard of it", "b is back: covering"]
+    assert texts(view)[-2:] == ["b is gone: no messages from it", "b is back: covering"]
 
 
 def test_places_are_in_the_frame_of_the_fleet():
