@@ -21,8 +21,8 @@ from fasaco_edge.wire.ros_keys import (
     server_tokens,
 )
 
-# Timeout of a reply [s]; of a result, as long as driving to the end of a goal. After it the query
-# is repeated.
+# Timeout of a reply [s], and of a result, which comes only when the goal has been driven to its
+# end. After the timeout the query is repeated.
 ANSWER_S, RESULT_S = 2.5, 300.0
 # Period of searching the graph for the action's server [s].
 LOOK_EVERY_S = 2.0
@@ -33,7 +33,7 @@ class ActionClient:
 
     Args:
         bus: the session.
-        ros: how ROS comes to Zenoh, as in ``FollowSettings``.
+        ros: how ROS is connected to Zenoh, as in ``FollowSettings``.
         action: its name.
         types: its types.
     """

@@ -33,10 +33,11 @@ from fasaco_edge.wire import topics
 from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.limits import MAX_JSON_BYTES, MAX_JSON_INTEGER
 
-# Most daemons whose samples are kept; beyond that the samples of the oldest daemon are dropped.
+# Limit on the daemons whose samples are kept; beyond it the samples of the oldest daemon are
+# dropped.
 MOST_DAEMONS = 16
-# Most claims that are kept; further ones are ignored. A claim dropped in their place would not be
-# sent again.
+# Limit on the claims that are kept; further ones are ignored. A claim dropped in their place would
+# not be sent again.
 MOST_CLAIMS = 1_000
 
 PLANS = "plans"
@@ -170,7 +171,8 @@ def _object(payload: bytes) -> dict[str, Any]:
 log = logging.getLogger(__name__)
 
 DRIVES = "drives"
-# Queries of the second session for the token, their pause, and the pause after the last [s].
+# Number of queries of the second session for the token, the pause between two [s], and the pause
+# after the last one [s].
 LOOKS, LOOK_S, LOOK_AGAIN_S = 5, 0.2, 5.0
 
 Standby = tuple[State, str]

@@ -2,9 +2,9 @@
 
 Poses arrive, for example, ten times a second, and velocities are sent twenty times. A command takes
 a while to move the base, and a pose to arrive: together that is the delay. The estimate is the pose
-after all sent commands have taken effect: a pose is advanced by the commands sent since the delay
-before its arrival. The delay is measured when the robot starts, brakes and turns: the poses follow
-the commands after it.
+after all sent commands have taken effect: a pose is advanced by the commands sent from one delay
+before its arrival on. The delay is measured when the robot starts, brakes and turns: the poses
+follow the commands after it.
 
 A pose far from the expected one is not accepted at once: a momentary error of the localiser must
 not make the robot turn. After a jump, poses that agree with each other are accepted after a while.
@@ -84,8 +84,8 @@ class PoseEstimate:
                 is accepted.
             pose_at: arrival of the newest accepted pose [s]; None before there is one.
             measured: the newest pose, unfiltered.
-            commanded: motion along x and y [m] and turn [rad] that the commands until then should
-                have caused, in the headings that were measured.
+            commanded: motion along x and y [m] and turn [rad] that the commands up to that pose
+                should have caused, along the measured headings.
             delay: between a command and its effect on an arriving pose [s].
     """
 
@@ -156,7 +156,7 @@ class PoseEstimate:
                 yield seconds, command
 
     def _measure_delay(self, pose: Pose2D, now: float) -> None:
-        """Compare the motion since the last pose with the commands sent by each delay earlier."""
+        """Compare the motion since the last pose with the commands sent earlier, for each delay."""
         before = self.pose_at
         speeds, turns = [c.speed for _, c in self._sent], [c.turn_rate for _, c in self._sent]
         if before is None or not self._sent:

@@ -13,8 +13,8 @@ GAIN_M = 0.3
 # Where the path returns to itself, the next goal begins this far before the end of the last one
 # [m]: the part skipped there is less than half of a tool.
 TIP_M = 0.1
-# If the path returns to itself only further back, the next goal begins earlier: before the end by
-# one of these shares of the usual distance.
+# If a part before that point returns to itself, the next goal begins earlier: one of these shares
+# of the usual distance before the end.
 SHARES = (1.0, 0.6, 0.35, 0.2)
 # A goal that begins early extends beyond the last one by as much as it begins before that one's
 # end, up to this [m].

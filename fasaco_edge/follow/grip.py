@@ -5,7 +5,7 @@ motion. The measured share of that motion is about 1 for a robot that moves and 
 not, however it drives and turns. Scatter raises the share as often as it lowers it: if scatter
 hides all motion, one look in two ends in a pause.
 
-Of a robot at rest, averaged poses show that something moves it.
+While a robot rests, averaged poses show whether something moves it.
 """
 
 from __future__ import annotations
@@ -23,10 +23,9 @@ MEAN_S = 1.0
 # The robot was moved if an average is this far [m] from the one this many averages earlier; slower
 # motion is drift of the poses.
 MOVED_M, MEANS = 0.1, 5
-# Where poses scatter, the distance is larger: by this many times the usual step from one average to
-# the next. That is the median of the last steps, which a few steps of a moved robot do not change;
-# fewer than the least number are not enough. With normal noise, scatter alone moves one average in
-# 2^(4^2) that far.
+# If poses scatter, the distance is larger: this many times the usual step from one average to the
+# next. The usual step is the median of the last steps, at least of so many: a few steps of a moved
+# robot do not change it. With normal noise, scatter alone moves one average in 2^(4^2) that far.
 SCATTERS, STEPS, LEAST_STEPS = 4.0, 30, 6
 
 # Position and turn, as lengths [m].
@@ -102,7 +101,7 @@ class Grip:
         """Return whether the robot must pause because it did not move.
 
         Args:
-            estimate: with the newest pose, and the motion commanded until then.
+            estimate: the estimate, with the newest pose, and the motion commanded up to that pose.
             toward: the direction in which the path leads [rad].
             now: the time [s].
         """
@@ -157,7 +156,7 @@ class _Look:
         self._products = self._squares = 0.0
 
     def take(self, place: Place, commanded: Place) -> None:
-        """Take in a pose, and the motion commanded until then."""
+        """Take in a pose, and the motion commanded up to that pose."""
         self._first = self._first or (place, commanded)
         self.count += 1
         for axis in range(3):
@@ -168,7 +167,7 @@ class _Look:
             self._squares += meant * meant
 
     def share(self) -> float:
-        """Return the share of the commanded motion that the poses show; 0 without an effect yet."""
+        """Return the share of the commanded motion that the poses show; 0 before any effect."""
         went, meant = self._measured, self._commanded
         products = self._products - _product(went, meant) / self.count
         squares = self._squares - _product(meant, meant) / self.count

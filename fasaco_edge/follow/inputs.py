@@ -2,7 +2,7 @@
 
 The time is the computer's, or a simulation's by the stamps of its poses. A simulation runs at a
 multiple of the real speed, and slower where the computer cannot keep up. By the computer's time, a
-follower would then consider fresh poses old, and expect the robot to have gone further than it has.
+follower would consider fresh poses old, and expect the robot further ahead than it is.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ from fasaco_edge.wire.schemas import TF_MESSAGE
 LEAD_S = 0.09
 # After this long without a pose the simulation has stopped, and time goes on [s, real].
 SILENT_S = 2.0
-# Stamps that go back, or forward by more than this, are those of another simulation [s].
+# Stamps that jump back, or forward by more than this, come from another simulation [s].
 JUMP_S = 5.0
 
 
@@ -69,7 +69,7 @@ class SimulatedClock:
     def __init__(self, pace: float) -> None:
         self._pace = pace
         self._stamp_ns: int | None = None
-        # Its time at the newest pose, and when that arrived.
+        # The simulation's time at the newest pose, and the arrival of that pose.
         self._time = self._heard_at = 0.0
 
     def at(self, now: float) -> float:
@@ -92,7 +92,7 @@ class SimulatedClock:
 
 
 LOG = logging.getLogger(__name__)
-# Most poses that wait for the next cycle; beyond that the oldest are dropped.
+# Limit on the poses that wait for the next cycle; beyond it the oldest are dropped.
 MOST_POSES = 256
 
 
@@ -134,7 +134,7 @@ class Inputs:
         return self._clock.at(time.monotonic())
 
     def time_of(self, came_at: float) -> float:
-        """Return the same for an arrival, by the computer's monotonic clock [s]."""
+        """Return the robot's time of an arrival, given by the computer's monotonic clock [s]."""
         return self._clock.at(came_at)
 
     @property
@@ -191,7 +191,7 @@ class Inputs:
         self._daemons.take_status(sample.payload, self.now())
 
 
-# Only the newest scans count, and of maps the newest with its updates.
+# Only the newest scans count, and the newest map with its updates.
 MOST_SCANS, MOST_UPDATES = 2, 256
 # A scan has a range and an intensity for each beam, some numbers and a name.
 MOST_SCAN_BYTES = 8 * MAX_SCAN_BEAMS + 1024
@@ -231,8 +231,9 @@ class ScanInputs:
         """Pass on maps and scans.
 
         Args:
-            follower: to whom.
-            time_of: gives the time for an arrival by the computer's monotonic clock [s].
+            follower: takes the scans.
+            time_of: returns the robot's time of an arrival, given by the computer's monotonic clock
+                [s].
         """
         while self._maps:
             is_update, payload = self._maps.popleft()

@@ -32,7 +32,7 @@ from fasaco_edge.wire.messages.path_points import PathPoints
 # The next goal is sent this far before the end of the last one [m], plus the distance driven in
 # this many seconds.
 AHEAD_M, AHEAD_S = 0.5, 3.0
-# It is sent this far before the robot reaches its start [m].
+# It is sent this far before the robot reaches the start of the new goal [m].
 EARLY_M = 0.05
 # A path is driven only if the robot is this near to its beginning, a part of this length [m].
 BEGINNING_M = 1.0
@@ -44,15 +44,15 @@ DONE_M = 0.5
 # has moved this far [m] or the path leads elsewhere, by its direction this far ahead [m].
 RETRY_S, MOST_RETRY_S = 1.0, 30.0
 PROGRESS_M, LEADS_M = 0.5, 0.5
-# A robot that has moved less than this in this time is standing [m, s], near the end of its goal
-# sooner; then the result is queried again, as it may have been lost, and after a longer timeout the
-# goal is given up [s].
+# A robot that has moved less than this in this time stands [m, s]; near the end of its goal it
+# counts as standing sooner. Then the result, whose message may have been lost, is queried again;
+# after a longer timeout the goal is given up [s].
 MOVED_M, STANDS_S, ARRIVED_S, GIVE_UP_S = 0.05, 3.0, 1.0, 20.0
 
 # Time constant of the filtered position that shows whether it stands [s]: poses scatter.
 STEADY_S = 1.0
 
-# Nav2 gives no code for a goal that another client's goal has replaced; Humble has no codes at all.
+# Nav2 gives no error code if another client's goal has replaced a goal; Humble has no error codes.
 NO_CODE = "without a code; does another program send goals, too?"
 
 
@@ -95,11 +95,11 @@ class Nav2Follower(Supervision):
         self._ahead = AHEAD_M + AHEAD_S * speed
         self._new_id = new_id
         self._here: Point | None = None
-        # The same, without the scatter of single poses.
+        # The robot's position, filtered against the scatter of single poses.
         self._steady: Point = (0.0, 0.0)
         self._came_at: float | None = None
         self._path: PathDriven | None = None
-        # Its successor, once Nav2 has answered the pending request.
+        # The path that replaces the present one, once Nav2 has answered the pending request.
         self._next: Line | None = None
         # The goal that Nav2 drives, and the one sent but not answered yet.
         self._active: Goal | None = None
@@ -203,7 +203,7 @@ class Nav2Follower(Supervision):
         if self._path is not None:
             assert self._here is not None
             self._tries.moved_to(self._here)
-            # Also on an unanswered goal: the answer may be lost while the robot drives it.
+            # The robot may also be on an unanswered goal, as answers may be lost.
             self._path.advance(self._here, self._active or self._pending)
             self._believe_motion(self._path, now)
         if self._next is not None and self._pending is None and not self._join(self._next, now):

@@ -10,7 +10,7 @@ from fasaco_edge.wire.messages.follow_path import ENDED_BEFORE, NO_SUCH_GOAL, TA
 
 # Retry period of a cancellation [s].
 CANCEL_EVERY_S = 1.0
-# Most goals cancelled at a time, the newest ones: Nav2 drives no other.
+# Limit on the goals cancelled at a time, the newest ones: Nav2 drives no other.
 MOST_CANCELLED = 8
 
 
@@ -19,7 +19,7 @@ class SendGoal:
     """A request to follow points [m] in a frame.
 
     Attributes:
-        end_yaw: heading at the last one [rad]; None for that of the way there.
+        end_yaw: heading at the last point [rad]; None for the direction in which the robot arrives.
     """
 
     id: bytes

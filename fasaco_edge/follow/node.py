@@ -102,7 +102,7 @@ def _take_turns(node: Node, period_s: float, stop: threading.Event) -> None:
         due += period_s
         now = time.monotonic()
         if due <= now:
-            # Missed cycles are not made up for.
+            # Missed cycles are skipped.
             due = now + period_s
         stop.wait(due - now)
 
@@ -202,7 +202,7 @@ class FollowerNode:
         return True
 
     def _send(self, command: Command) -> None:
-        """Send a command; in a dry run, or while another follower drives, none."""
+        """Send a command; send none in a dry run, or while another follower drives."""
         if self._settings.dry_run or self._role.is_on_standby:
             return
         velocity = Velocity(command.speed, command.turn_rate)

@@ -15,7 +15,8 @@ from fasaco_edge.grid.geometry import Point
 
 # Spacing of the poses of a piece [m]: controllers search the nearest one.
 STEP_M = 0.05
-# Poses up to this many times ``near`` apart along a piece may be near: a bend of up to 120 degrees.
+# Poses that are up to this many times ``near`` apart along a piece may be near each other, as in a
+# bend of up to 120 degrees.
 APART = 2.0
 # At a sharper bend the robot turns on the spot: a piece preferably ends there [rad].
 CORNER_RAD = math.radians(60.0)

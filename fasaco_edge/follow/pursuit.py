@@ -4,8 +4,8 @@ Source: R. C. Coulter, Implementation of the Pure Pursuit Path Tracking Algorith
 the robot steers the arc through a point of the path some way ahead, of curvature 2 y / L^2. The
 speed is regulated as by S. Macenski et al., Regulated Pure Pursuit for Robot Path Tracking (2023),
 but by the limits of the base: it brakes to come to rest at each stop, and respects the turn rate.
-Deviations: past a corner the point lies straight on, so that it is not cut; corners are rounded at
-the speed at which they can be, see ``follow/rounding.py``; and a robot with a large heading error
+Deviations: past a corner the point lies straight on, so that the corner is not cut; corners are
+rounded at the speed that ``follow/rounding.py`` allows; and a robot with a large heading error
 comes to rest and turns on the spot.
 """
 
@@ -26,8 +26,8 @@ ARRIVED_M = 0.005
 ALIGNED_RAD, MISALIGNED_RAD = 0.03, 0.2
 # Near a half turn, the robot keeps its direction of turning [rad].
 BACK_RAD = 2.8
-# A cycle counts as at most this many periods long; share of the largest delay of a cycle that is
-# still expected a cycle later.
+# A cycle counts as at most this many periods long; factor of the largest expected delay from one
+# cycle to the next.
 MOST_PERIODS = 4.0
 FORGETTING = 0.98
 
@@ -36,8 +36,8 @@ class Pursuit:
     """Drives along routes, from one command to the next.
 
     On a busy computer a command comes late, and the robot drives on with the last one. The next
-    command then brakes by as much as was possible since the last one. And the robot brakes earlier,
-    by the way that it would drive on in such a delay.
+    command then brakes by as much as was possible since the last one. The robot also brakes
+    earlier, by the distance that it would drive on in such a delay.
 
     Args:
         limits: of the base.
@@ -76,7 +76,7 @@ class Pursuit:
         limits = self._limits
         here = (pose.x, pose.y)
         route.pass_bends(here)
-        # So that it turns in the middle of a cycle, not after it.
+        # Half a cycle early, so that the robot turns in the middle of a cycle, not after it.
         route.round_corner(_ahead(pose, 0.5 * self._period * self.last.speed), self.last.speed)
         while (leg := route.leg) is not None:
             along, _ = leg.placed(here)
@@ -118,7 +118,7 @@ class Pursuit:
         """
         limits, most = self._limits, self._limits.speed
         for left, speed in ends:
-            # As if the robot came to rest further on.
+            # As if the robot came to rest beyond the corner.
             further = min(speed, limits.speed) ** 2 / (2.0 * limits.acceleration)
             way = max(left + further - self.last.speed * self._late, 0.0)
             most = min(most, max(stopping_rate(way, limits.acceleration, self._period), speed))
@@ -148,7 +148,7 @@ class Pursuit:
         return math.copysign(rate, side)
 
     def _sped(self, goal: float) -> float:
-        """Return the next speed toward another one [m/s]."""
+        """Return the next speed on the way to a wanted speed [m/s]."""
         most = self.last.speed + self._limits.acceleration * self._period
         return min(max(goal, self._braked()), most)
 

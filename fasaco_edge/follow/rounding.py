@@ -23,8 +23,8 @@ STEPS = 32
 
 @lru_cache(maxsize=1024)
 def times(turn: float, turn_rate: float, turn_acceleration: float) -> tuple[float, float]:
-    """Return how long before a corner its turn begins, and its distance from the corner, each for a
-    speed of 1 m/s: in seconds.
+    """Return how long before a corner its turn begins [s], and how far from the corner the robot
+    passes, as seconds of driving [s].
 
     Args:
         turn: in the corner, above 0 and below pi [rad].

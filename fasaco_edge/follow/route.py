@@ -32,7 +32,7 @@ NEAREST_M, BEGINNING_M = 0.15, 0.6
 LEAST_LEAD_M, LEAD_M = 0.15, 2.0
 # A corner, or the place where a turn begins, was overshot by more than this [m].
 MISSED_M = 0.03
-# A corner of the new path is that of the old one, if it is as near as this [m].
+# A corner of the new path is the same as one of the old path if they are this near [m].
 SAME_M = 1e-3
 # Cosine of the angle up to which two legs lead in the same direction.
 SAME_DIRECTION = math.cos(ALONG_RAD)
@@ -112,11 +112,13 @@ class Route:
         self.rounds = 0.0
         self._take = take
         self._limits = limits
-        # The first leg is the robot's; the end of the last one may be unknown yet.
+        # The first leg is the one that the robot is on; the end of the last leg may not be known
+        # yet.
         self._legs: list[Leg] = []
         self._ahead: list[Point] = []
         self._is_read = False
-        # How far it was from the corner that it returns to; infinity where it does not return [m].
+        # How far the robot was from the corner that it returns to; infinity if it does not return
+        # [m].
         self._missed_by = math.inf
 
     @property
@@ -242,7 +244,7 @@ class Route:
         is_along = heading is None or abs(math.remainder(turn, math.tau)) <= ALONG_RAD
         if (is_same and aside <= NEAREST_M) or (aside <= BESIDE_M and is_along):
             del self._legs[:index]
-            # It may be about to round the corner to it.
+            # The robot may be about to round the corner to that leg.
             self.rounds = before.rounds if before is not None and is_same else 0.0
             return Joining.JOINED
         begin = self._legs[0].start
@@ -266,7 +268,7 @@ class Route:
     def _lead_to(self, point: Point, here: Point) -> list[Leg]:
         """Return the legs up to a point that they pass soon; none if they do not.
 
-        Nor for a robot that is off its leg: the leg would not lead it anywhere.
+        None either for a robot that is off its leg, as the leg does not lead it there.
         """
         leg = self.leg
         if leg is None or leg.distance(here) > NEAREST_M:
@@ -274,7 +276,7 @@ class Route:
         way, index = -leg.placed(here)[0], 0
         while way <= LEAD_M and (leg := self._leg(index)):
             along, aside = leg.placed(point)
-            # Nearer, the robot may not come to rest there.
+            # The robot may be unable to come to rest at a nearer point.
             on_leg = LEAST_LEG_M <= along <= leg.length + LEAST_LEG_M
             is_ahead = on_leg and LEAST_LEAD_M <= way + along <= LEAD_M
             if is_ahead and abs(aside) <= BESIDE_M:

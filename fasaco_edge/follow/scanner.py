@@ -1,4 +1,4 @@
-"""The lidar's view: its beams as points, what of them the map shows, and the free way between them.
+"""The lidar's view: beams as points, which of them the map shows, the free way between them.
 
 Points are in the robot's frame: x ahead, y to the left of its middle [m]. Without numpy.
 """
@@ -69,8 +69,8 @@ def points_of(scan: LaserScan, mount: Mount) -> list[Point] | None:
     ]
 
 
-# Distance kept from things [m]. If one is already nearer, the robot drives on as long as it
-# approaches no thing by more than the second [m].
+# Distance kept from things [m]. If a thing is already nearer, the robot drives on as long as it
+# comes no nearer to any thing by more than the second value [m].
 MARGIN_M, ASIDE_M = 0.03, 0.005
 # The robot stops this far before the margin [m].
 STOP_M = 0.03
@@ -134,7 +134,7 @@ def _way_to(thing: Thing, line: Sequence[Point], radius: float) -> float | None:
 
 
 def speed_before(way: float, acceleration: float, period: float) -> float:
-    """Return the highest speed [m/s] that lets it stop ``STOP_M`` before the end of a way."""
+    """Return the highest speed [m/s] that allows a stop ``STOP_M`` before the end of a way."""
     return stopping_rate(max(way - STOP_M, 0.0), acceleration, period)
 
 
@@ -145,8 +145,8 @@ def speed_beside(
 
     And the thing that limits it; infinity and None without one.
 
-    The gap must cover the robot's way until it reacts and while it brakes, and the thing's way
-    meanwhile: v late + v^2 / 2a + walk (late + v / a).
+    The gap must be as long as the robot's way before it reacts and while it brakes, plus the
+    thing's way in that time: v late + v^2 / 2a + walk (late + v / a).
     """
     nearest, decides = math.inf, None
     for thing in things:

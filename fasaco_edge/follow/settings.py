@@ -16,7 +16,7 @@ class PoseSource:
 
     Attributes:
         key: key expression to subscribe to.
-        schema: type of samples sent without one; "" for the type in the sample.
+        schema: message type of samples that name none; "" if samples name their type.
         latched, depth: whether late joiners get the newest samples, and how many.
         is_static: whether these are static transforms.
     """
@@ -38,7 +38,7 @@ class FollowSettings:
         secured: credentials, a part of Zenoh's configuration.
         speed_m_s, acceleration_m_s2: of driving.
         turn_deg_s, turn_deg_s2, steered_deg: of turning; the largest bend that is steered.
-        pose_schema: type of a pose sent without one.
+        pose_schema: message type of poses whose samples name none.
         pose_age_s: timeout of the newest pose.
         poses: keys of poses.
         frames: the map's and the robot's in ROS 2, for poses from transforms.

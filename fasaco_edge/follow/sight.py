@@ -29,8 +29,9 @@ from fasaco_edge.wire.messages.scans import decode_scan
 
 # The path is checked this far ahead [m].
 AHEAD_M = 1.5
-# A thing stands if it was seen in one place, a square of this edge [m] or one beside it, for this
-# long [s]; it is forgotten after it has not been seen for this long [s].
+# Edge of the squares in which things are followed [m]. A thing stands once it was seen in one
+# square, or one beside it, for this long [s]; it is forgotten once it was not seen for this long
+# [s].
 PLACE_M, STANDS_S, FORGET_S = 0.1, 1.5, 1.0
 # Points nearer to the robot's middle than this share of its radius are the robot itself.
 OWN_SHARE = 0.7
@@ -60,7 +61,7 @@ class SightSettings:
 
     @classmethod
     def of(cls, settings: Mapping[str, Any]) -> SightSettings:
-        """Return those in the member ``scan`` of the follower's settings."""
+        """Return the settings in the member ``scan`` of the follower's settings."""
         mount = Mount(**settings["mount"])
         return cls(mount, settings["radius_m"], settings["lost_s"], settings["free_at_most"])
 
@@ -84,7 +85,7 @@ class Sight:
     """Keeps the newest scan, without obstacles of the map.
 
     Attributes:
-        things: what it shows, in the map frame.
+        things: what the scan shows, in the map frame.
     """
 
     def __init__(self, settings: SightSettings) -> None:

@@ -1,7 +1,7 @@
 """Standstill: how long something has kept the robot from driving, and the report of that.
 
-It ends once the robot gets by, or another path leads it away. The daemon can plan around what is
-ahead, or anew from the robot's position.
+It ends once the robot gets by, or another path leads it away. The daemon can plan around the
+obstacle, or make a new plan from the robot's position.
 
 Failed tries are counted by place and by the direction in which the path leads; only progress ends
 them. A new path in the same direction leads into the same obstacle: it changes nothing. A path in
@@ -131,8 +131,8 @@ class Tries:
 
     Args:
         far: distance from the place that counts as progress [m].
-        pause: after the first failed try [s].
-        longest: pause [s].
+        pause: first pause, after the first failed try [s].
+        longest: the longest pause [s].
         most: number of tries; after the last one only progress ends the pause.
     """
 
@@ -176,7 +176,7 @@ class Tries:
         return direction is None or now >= direction.until
 
     def _like(self, toward: float) -> _Direction | None:
-        """Return the nearest direction that is alike; None for none."""
+        """Return the nearest similar direction with tries; None for none."""
 
         def off(one: _Direction) -> float:
             return abs(math.remainder(one.toward - toward, math.tau))

@@ -111,7 +111,7 @@ class Supervision:
         self._moved_to(stamped.pose, now)
 
     def heard_link(self, link: Link) -> None:
-        """Note the transform between map and robot that arrived longest ago."""
+        """Note the oldest transform between map and robot, by arrival."""
         self._link = link
 
     def refuse_pose(self, error: FasacoError) -> None:
@@ -205,12 +205,12 @@ class Supervision:
         return ""
 
     def _have_none(self, state: State, detail: str = "") -> None:
-        """Drop the path; the previous one is withdrawn, too."""
+        """Drop the path; withdraw it from the follower, too."""
         self._withdraw()
         self._path_state, self._path_detail = state, detail
 
     def _trouble(self, now: float) -> tuple[State, str]:
-        """Return why the robot must stand, with figures; or that it may drive."""
+        """Return the state: why the robot must stand, with figures, or that it may drive."""
         if self._standby is not None:
             return self._standby
         if not self._planner:
