@@ -7,9 +7,9 @@ from typing import Final
 APPLICATION: Final = "fasaco_edge"
 
 STATUS_PERIOD_S: Final = 15.0
-"""Of statuses without news, one in so many seconds is recorded."""
+"""Period of recorded statuses without news [s]."""
 SWEPT_OPACITY: Final = 150
-"""Opacity of swept floor, where all of a pixel is swept; 255 hides what is below."""
+"""Opacity of swept floor if all of a pixel is swept; 255 would hide the layers below."""
 
 WALL_CLOCK: Final = "wall"
 """Timeline: when the recorder received it."""
@@ -19,7 +19,8 @@ ITER: Final = "iter"
 """Timeline: cohorts seen, over all plans."""
 
 WORLD: Final = "world"
-"""All that has a place; far from 0 relative to whole kilometres, its static transform."""
+"""All drawings with a place; far from 0 they are relative to whole kilometres, the static
+transform."""
 MAP: Final = "world/map"
 MAP_CHANGE: Final = "world/map_change"
 REPLAN_WINDOW: Final = "world/replan_window"
@@ -35,7 +36,7 @@ HERE: Final = "world/directions/here"
 """Label of the robot's cell: the trail's direction there, and how decided it is."""
 ZONES: Final = "world/order/zones"
 KEEP_OUT: Final = "world/order/keep_out"
-"""Zones of the order, and where it keeps out of."""
+"""Zones and keep-out zones of the order."""
 PATH: Final = "world/path/current"
 OLD_PATH: Final = "world/path/previous"
 ROBOT: Final = "world/robot"

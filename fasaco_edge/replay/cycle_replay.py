@@ -45,7 +45,7 @@ from fasaco_edge.wire.topics import TURNS
 KEPT_NS = 60_000_000_000
 # The log comes twice a second: this long after its end nothing else should come [ns].
 SILENT_NS = 5_000_000_000
-# Most untaken samples that are kept of each topic.
+# Limit on the untaken samples that are kept of each topic.
 STRANGE = 4
 
 
@@ -214,7 +214,7 @@ class CycleReplay:
         batch: TurnBatch | None = None
         for arrival in samples:
             if arrival.topic in EMBEDDED and len(arrival.sample.payload) <= POSE_BYTES:
-                continue  # they are in the log
+                continue  # these samples are in the log
             if arrival.topic != TURNS.name:
                 self._untaken.add(arrival)
                 continue
@@ -256,7 +256,7 @@ class CycleReplay:
         return replace(step, as_recorded=_facts(turn.decided)["path"] == _facts(decided)["path"])
 
     def _received(self, turn: Cycle) -> list[Received]:
-        """Return the recorded ones of the samples that the daemon took."""
+        """Return the recorded samples that the daemon took in this cycle."""
         found = [(taken, self._find(turn, taken)) for taken in turn.samples]
         return [
             Received(taken.topic, sample, taken.at) for taken, sample in found if sample is not None

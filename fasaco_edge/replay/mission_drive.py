@@ -63,7 +63,7 @@ class MissionDrive:
     Attributes:
         mission: the mission, to be looked at between cycles.
         planner: the planner that the daemon would use.
-        mailbox: where samples wait, spaced by no clock.
+        mailbox: where samples wait, without rate limits.
         began: time of the first cycle [s].
         state: state of the mission after the last cycle; "" before it has begun.
     """

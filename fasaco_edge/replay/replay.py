@@ -167,7 +167,7 @@ class Replay:
     """Plays samples to a mission.
 
     Args:
-        config: of the daemon to be.
+        config: configuration of the replayed daemon.
         run: the recorded run.
         work: proposals of each plan; None for the recorded work.
 
@@ -213,7 +213,7 @@ class Replay:
         return 1e-9 * (arrival.wall_ns + self._base_ns)
 
     def _take(self, arrivals: list[Arrival]) -> Iterator[ReplayStep]:
-        """Take samples in one cycle, after those that come before it."""
+        """Take samples in one cycle, after the cycles without samples before it."""
         now = max(self._at(arrivals[0]), self._now)
         yield from self._wait(now)
         yield self._cycle(now, arrivals)

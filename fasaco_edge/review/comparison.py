@@ -13,7 +13,7 @@ from fasaco_edge.review.document import ReviewDocument
 from fasaco_edge.review.drive import MILESTONES
 from fasaco_edge.review.wording import NOT_KNOWN, clock, count
 
-# By the name of a setting.
+# Keys of the configuration by the name of a setting.
 SETTINGS = {
     "tool width": "robot.tool_width_m",
     "robot radius": "robot.radius_m",
@@ -27,7 +27,7 @@ SETTINGS = {
 }
 # If these differ, walks, cells and times belong to different problems.
 ANOTHER_PROBLEM = ("tool width", "robot radius", "line", "width of lanes", "building", "orders")
-# These members compare in any case.
+# Members that are compared in any case.
 ANYWAY = (
     *("faults", "faults_by_code", "recorder_lost", "samples_missing"),
     *("memory_mb_max", "recorder_memory_mb_max", "processor_percent_max", "threads_max"),
@@ -37,7 +37,7 @@ ANYWAY = (
 SIDE_M, CELLS_SHARE = 1.0, 0.15
 
 Difference = tuple[str, str, str]
-"""What differs, and its value in the first run and in the other."""
+"""Name of the difference, and its value in the first run and in the other."""
 Row = tuple[str, str, str, str]
 """Name, the texts of one recording and of the other, and the difference; "" for none."""
 NUMBERS = (

@@ -171,7 +171,7 @@ def swept_floor(
 ) -> JudgedFloor | None:
     """Return the swept floor; None without a pose on the map.
 
-    None also if floor was swept before the recording began: it is not in the recording.
+    Also None if floor was swept before the recording began, as the recording lacks it.
 
     Args:
         data: of the samples, with a map and a configuration.

@@ -30,8 +30,8 @@ if TYPE_CHECKING:
 
 # A turn is searched for this long before and after [s], and lasts at most this long.
 TURN_S = 2.0
-# A smaller angle is a bend [deg]; per this many more degrees a turn may be a second longer, or
-# further off.
+# A smaller angle is a bend [deg]; a turn that is sharper by this many degrees may be a second
+# longer, or a second farther away.
 TURN_DEG, SHORTER_DEG_S = 60.0, 20.0
 # Distance ahead at which a path's heading is taken [m]; the least difference of two headings.
 AHEAD_M = 0.5
@@ -57,7 +57,7 @@ class PathThen(msgspec.Struct):
 
 
 class MapThen(msgspec.Struct):
-    """What changed on the map between two times [m2], and the rectangle around it."""
+    """Changes of the map between two times [m2], and the rectangle around them."""
 
     since_s: float
     seen_m2: float
@@ -234,7 +234,8 @@ def _turn(review: Review, drawn: _Drawn, at_s: float) -> TurnThen | None:
     yaw = np.degrees(np.unwrap(track[:, 2]))
     turned = yaw[None, :] - yaw[:, None]
     seconds = times[None, :] - times[:, None]
-    # Of equally sharp turns the shortest and nearest one counts; two in a row stay apart.
+    # Of equally sharp turns the shortest and nearest one counts; two successive turns stay
+    # separate.
     away = np.abs((times[None, :] + times[:, None]) / 2 - at_s)
     sharp = np.minimum(np.abs(turned), 180.0) - SHORTER_DEG_S * (seconds + away)
     worth = np.where((seconds > 0) & (seconds <= TURN_S), sharp, 0.0)

@@ -32,7 +32,7 @@ COMMAND_S = 1.5
 RECORDER_IN_ORDER = ("recording", "stopping")
 # "path blocked at cell (2, 3)" has the kind "path blocked".
 _DETAIL = re.compile(r":| at cell|,| \d")
-# As ``mission.map.reachable_area.AreaChange`` says them.
+# Texts of ``mission.map.reachable_area.AreaChange``.
 _MAP = "map: "
 _CHANGES = ("more", "fewer", "passages changed")
 _ERROR = re.compile(r"error (\d+): ")
@@ -231,7 +231,8 @@ class Replans:
 
 
 def kind_of(reason: str) -> str:
-    """Return ``reason`` without its details; of a map, whether cells came or went."""
+    """Return ``reason`` without its details; for a change of the map, whether cells came or
+    went."""
     if reason.startswith(_MAP):
         changes = [change for change in _CHANGES if change in reason]
         cells = "" if "passages changed" in changes else "cells "
@@ -301,7 +302,7 @@ class Faults:
 def faults_of(data: RunData, record: RunRecord) -> Faults:
     """Return the faults in a recording."""
     by_code = _over_restarts(each.status.errors.by_code for each in data.statuses)
-    # Curves have them up to the end, but of a restarted daemon not each one.
+    # Curves have counts up to the end, but after a restart of the daemon not each count.
     by_code |= _plotted(record.plots)
     total = _counted(line for _, line in record.log.get(entities.MISSION_LOG, ()))
     if total > by_code.total():

@@ -17,7 +17,7 @@ from fasaco_edge.wire.documents.replies import UnreachedArea
 # Samples this soon after a status [s] are of the same step.
 SAME_STEP_S = 1.5
 ENDS = ("cancel", "reset")
-# In these an order is over, or there is none: the same one would start again.
+# States in which an order is over, or there is none: the same order would start again.
 OVER = ("done", "idle")
 
 

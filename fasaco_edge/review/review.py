@@ -70,7 +70,7 @@ def read_review(paths: Sequence[Path], progress: Progress = lambda *_: None) -> 
     total, numbers = count_frames(paths), count(1)
     record = read_run_record(paths, lambda: progress("reading", next(numbers), total))
     samples = RecordedSamples.of(record.batches)
-    # Samples are numbered: the last batch shows about how many there are.
+    # Samples are numbered: the last batch shows their approximate number.
     about = max(batch.place.first for batch in record.batches) + 1
     data = gather(_reported(samples, progress, "decoding", about), record.began_ns)
     progress("following the robot", 0, 1)
@@ -85,7 +85,7 @@ def _reported(items: Iterable[Item], progress: Progress, task: str, total: int) 
 
 
 Entered = tuple[float, str, str]
-"""When [s] which state was entered, and why."""
+"""Time [s] at which a state was entered, the state, and the reason."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -90,7 +90,7 @@ def left_patches(floor: JudgedFloor) -> list[LeftPatch]:
         if m2 < LEAST_M2:
             break
         runs = patches.of_run == patch
-        # The middle of its longest row: inside, however it bends.
+        # The middle of the patch's longest row is inside, whatever its shape.
         starts, ends = patches.starts[runs], patches.ends[runs]
         longest = int(np.argmax(ends - starts))
         row, first = divmod(int(starts[longest]), cols)
@@ -301,7 +301,7 @@ class _Judge:
 
 def is_inside(polygon: Polygon, x: float, y: float) -> bool:
     """Return whether a polygon contains a point [m]."""
-    # As one cell of a lattice with its centre at the point.
+    # Tested as one cell of a lattice with its centre at the point.
     moved = tuple((px - x + 0.5, py - y + 0.5) for px, py in polygon)
     return bool(cells_inside(moved, Window(0, 0, 1, 1), 1.0)[0, 0])
 

@@ -79,7 +79,7 @@ def chunks(recording: BinaryIO, scan: Scan) -> Iterator[Chunk | None]:
         body = recording.read(length)
         try:
             yield _chunk(body, offset) if kind == CHUNK_KIND else None
-        # StopIteration: Arrow's, where a message is missing.
+        # Arrow raises StopIteration if a message is missing.
         except (*BROKEN, pa.ArrowException) as error:
             raise ValueError(f"frame {number} of {scan.frames}: {error or 'torn'}") from error
         offset += FRAME.size + length

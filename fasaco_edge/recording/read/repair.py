@@ -99,7 +99,7 @@ def scan_recording(recording: BinaryIO, known_bytes: int = HEADER_BYTES) -> Scan
         if kind > LAST_KIND or end + FRAME.size + length > solid:
             break
         if kind == FOOTER_KIND and solid < total:
-            break  # the data after it, which locate it, are zeros
+            break  # the data that follow a footer and locate it are zeros
         end += FRAME.size + length
         frames += 1
         has_footer = kind == FOOTER_KIND
@@ -199,7 +199,7 @@ def repair_folder(folder: Path) -> list[Repair]:
     return repairs
 
 
-# Otherwise its server is open to the whole network, and refuses to start beside another viewer.
+# By default Rerun's server is open to the whole network, and does not start beside another viewer.
 VIEWER = python_program("rerun", "--bind", "127.0.0.1", "--port", "auto")
 
 

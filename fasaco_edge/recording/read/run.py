@@ -90,7 +90,7 @@ class RecordedSamples:
                 # A part begins with samples in force that the part before it may have already.
                 if numbered.number < following:
                     continue
-                # Samples before the first given part are not missing.
+                # Samples from before the first given part do not count as missing.
                 if self._topics is None and begun:
                     self.missing += numbered.number - following
                 begun = begun or numbered.number >= batch.place.first
@@ -130,11 +130,11 @@ def _batches(path: Path) -> list[Batch]:
 
 SCALAR, STATE, TEXT = "Scalars:scalars", "StateChange:state", "TextLog:text"
 READ = ("metrics/", "state/", "log/")
-# Limit of the uncompressed data kept of a file: this many times its size, plus this [bytes].
+# Limit on the uncompressed data kept of a file: this many times its size, plus this many bytes.
 MOST_RATIO, LEAST_BYTES = 16, 16_000_000
 
 TimedText = tuple[int, str]
-"""When [ns], and what."""
+"""Time [ns] and text."""
 Row = tuple[int, float | str]
 
 

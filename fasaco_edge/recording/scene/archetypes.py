@@ -138,7 +138,7 @@ def line_archetype(xy: NDArray[np.float64], style: LineStyle) -> rr.LineStrips3D
 
 
 def arrows_archetype(flows: Flows) -> rr.Arrows3D:
-    """Return arrows along the trail, the brighter the more decided it is there."""
+    """Return arrows along the trail; they are brighter where the trail is more decided."""
     count = len(flows.origins)
     origins = np.column_stack((flows.origins, np.full(count, ARROW_Z))).astype(np.float32)
     vectors = np.column_stack((flows.vectors, np.zeros(count))).astype(np.float32)

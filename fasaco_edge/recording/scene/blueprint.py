@@ -49,7 +49,7 @@ def build_blueprint(bounds: Bounds | None) -> rrb.Blueprint:
 
 def _map_view(bounds: Bounds) -> rrb.Spatial3DView:
     return rrb.Spatial3DView(
-        # Its parent may lie too far away for float32.
+        # The parent entity may lie too far away for float32.
         origin=f"/{entities.WORLD}",
         name="Map, coverage and path",
         contents=["/world/**", f"- /{entities.PHEROMONE}/**", f"- /{entities.DIRECTIONS}/**"],

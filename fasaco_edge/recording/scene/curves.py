@@ -116,7 +116,7 @@ class StatusFigures:
         self._curves = curves
         # Uptime and processor time [s] at the beginning of the current average.
         self._since: tuple[float, float] | None = None
-        # By ants and by local search, over all plans [s].
+        # Time saved by ants and by local search, over all plans [s].
         self._saved = [0.0, 0.0]
 
     def add(self, status: Status) -> None:
@@ -161,7 +161,7 @@ class StatusFigures:
 
     def _add_processor(self, uptime_s: float, cpu_s: float) -> None:
         since = self._since
-        if since is None or uptime_s < since[0]:  # it was restarted
+        if since is None or uptime_s < since[0]:  # the daemon was restarted
             self._since = uptime_s, cpu_s
         elif uptime_s - since[0] >= LEAST_SHARE_S:
             percent = 100 * (cpu_s - since[1]) / (uptime_s - since[0])

@@ -89,7 +89,7 @@ def _path_line(message: PathMessage, about: PathAttachment) -> str:
 
 
 SPACING_M = 0.02
-# Drawn with each flush of the recording, it would be a twentieth of an hour's file.
+# If it were drawn with each flush, the driven path would be a twentieth of an hour's recording.
 PERIOD_NS = 2_000_000_000
 
 

@@ -56,7 +56,8 @@ def flows_of(
     begins: list[tuple[int, int, int, int, float]] = []
     for direction in (EAST, NORTH, EAST + 2, NORTH + 2):
         up, right = ROW_STEP[direction], COL_STEP[direction]
-        # The cell before each one against its direction: of another run, if it points elsewhere.
+        # The cell behind each cell, against its direction: it belongs to another run if it points
+        # elsewhere.
         marked = np.pad((pointed == direction) & (share > 0.25 + 1e-6), 1)
         decided = np.pad(share, 1)
         before = (slice(1 - up, rows + 1 - up), slice(1 - right, cols + 1 - right))

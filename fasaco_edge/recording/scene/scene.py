@@ -176,7 +176,7 @@ class Scene:
                 entities.FLOOR, draw.floor_archetype(grid), latched=True, size=4 * grid.cells.size
             )
 
-        # As for the coverage.
+        # As for the coverage, drawn with four bytes a cell.
         self._draw(entities.FLOOR, 2 * size_in_file(grid.cells), draw_floor)
 
     def add_pheromone(
@@ -337,7 +337,7 @@ class Scene:
             self.add_line(entities.MISSION_LOG, f"{restored} cells were covered before a restart")
 
     def _add_troubles(self, status: Status) -> None:
-        """Log the troubles that began and ended; that of a degraded mission is its reason."""
+        """Log the troubles that began and ended; a degraded mission's own trouble is its reason."""
         present = {each.code: each.text for each in status.troubles[: len(TROUBLES)]}
         for code, text in present.items():
             if code not in self._troubles and text != status.reason:
@@ -347,7 +347,7 @@ class Scene:
         self._troubles = set(present)
 
     def _add_errors(self, errors: ErrorCounts) -> None:
-        # Fewer than before: the planner was restarted.
+        # Fewer errors than before: the planner was restarted.
         if errors.total > self._errors:
             last = errors.last or "no text"
             self.add_line(entities.MISSION_LOG, f"error {errors.total}: {last}", "ERROR")

@@ -23,14 +23,14 @@ from fasaco_edge.wire.documents.status import Status
 from fasaco_edge.wire.messages.paths import decode_path
 from fasaco_edge.wire.topics import RECORDED_INPUTS
 
-# These have an effect only when they arrive; all other inputs stay in force.
+# Inputs that have an effect only when they arrive; all other inputs stay in force.
 TRANSIENT: Final = ("pose", "command", "turns")
 PERIOD_NS = 900_000_000
 STATUS_PERIOD_NS = round(1e9 * entities.STATUS_PERIOD_S)
 WAITING_BYTES = 4_000_000
-# Each node publishes its own once.
+# Limit on the kept samples of static transforms: each node publishes its own once.
 MOST_STATIC = 64
-# Most updates since the last full map; with more of them a part begins without the map.
+# Limit on the updates since the last full map; with more of them a part begins without the map.
 IN_FORCE_BYTES = 8_000_000
 
 
@@ -98,7 +98,7 @@ class InputLog:
             status = decode_tolerant(arrival.sample.payload, Status)
         except MalformedMessage:
             return False
-        # A map in it: the mission has begun.
+        # A batch with a map: the mission has begun.
         has_map = status.map is not None
         news = (
             *(status.state, has_map, status.version, status.config),
@@ -152,7 +152,7 @@ class _InForce:
         self._updates.append(numbered)
         self._updates_bytes += len(numbered.arrival.sample.payload)
         if self._updates_bytes > IN_FORCE_BYTES:
-            # Without its updates the map would be wrong: better none.
+            # Without its updates the map would be wrong: it is left out.
             del self._newest["map"]
             self._updates, self._updates_bytes = [], 0
 

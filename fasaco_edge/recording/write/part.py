@@ -32,9 +32,9 @@ class Flush(enum.Enum):
     """Result of a flush."""
 
     DONE = "done"
-    """It is handed to the disk."""
+    """The data are passed to the disk."""
     STALLED = "stalled"
-    """It takes longer than the timeout."""
+    """Writing takes longer than the timeout."""
     BROKEN = "broken"
     """Rerun's writer has given up on the file, for good."""
 
@@ -76,7 +76,7 @@ class Part:
         def attach() -> None:
             try:
                 # Without a blueprint: one given here is also written before the call returns.
-                # By its descriptor: another file may have that name by now.
+                # The file is opened by its descriptor: another file may have that name by now.
                 self.stream.set_sinks(rr.FileSink(f"/proc/self/fd/{self._lock}"))
             except RuntimeError as error:
                 errors.append(error)
@@ -121,7 +121,7 @@ class Part:
         try:
             self.stream.flush(timeout_sec=timeout_s)
         except RuntimeError as error:
-            # The same exception for both: a flush whose writer has died also times out
+            # Both failures raise the same exception: a flush whose writer has died also times out
             # (rerun 0.41).
             slow = "timed out" in str(error) and self._has_writer()
             return Flush.STALLED if slow else Flush.BROKEN

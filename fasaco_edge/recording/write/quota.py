@@ -21,7 +21,7 @@ from fasaco_edge.errors import BadConfiguration
 
 MEGABYTE = 1_000_000
 NUMBERED = re.compile(r"run(\d{5,9})-.*\.rrd")
-# No recorder counts this far: a name with a larger number is not a recorder's.
+# No recorder counts this far: a name with a larger number is not from a recorder.
 MOST_RUNS = 900_000_000
 TIME = "%Y%m%dT%H%M%SZ"
 # Free space above the minimum before recording resumes: the disk must not fill again at once.
@@ -90,7 +90,8 @@ def oldest_first(folder: Path, robot: str) -> list[tuple[Path, int]]:
     matches = {path: match for path in folder.iterdir() if (match := named.fullmatch(path.name))}
     runs = {match["run"] for match in matches.values()}
     for path, match in matches.items():
-        # A number after the name may be the end of another robot's name: ours is the second of two.
+        # A number after the name may be the end of another robot's name: of two numbers the second
+        # is ours.
         if match["again"] and f"{match['when']}-{robot}" not in runs:
             continue
         if path.is_file() and not path.is_symlink():

@@ -18,7 +18,7 @@ from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.sdk import rr, rrb
 
-# Most data kept for a viewer that joins late; the oldest are dropped first.
+# Limit on the data kept for a viewer that joins late; the oldest are dropped first.
 MEMORY_LIMIT = "25MB"
 
 

@@ -239,7 +239,7 @@ class RecordingWriter:
 
     def _check_space(self, part: Part, now_ns: int) -> None:
         if self._part_until_ns is None:
-            # Parts grow slowly: once in each is enough.
+            # Parts grow slowly: once per part is enough.
             self._budget.keep_quota(self._folder)
             self._part_until_ns = now_ns + round(1e9 * self._budget.part_s)
         is_old = self._budget.part_s > 0 and now_ns >= self._part_until_ns

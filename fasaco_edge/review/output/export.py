@@ -56,7 +56,7 @@ def export(review: Review, folder: Path, form: str = CSV) -> None:
         Column("unit", "text", "", "of its values"),
         Column("description", "text", "", "what it is"),
     )
-    # As CSV even with Parquet, for people to read.
+    # This table is CSV even with Parquet, for people to read.
     _write_csv(Table(DESCRIPTION, "", columns, described), folder / f"{DESCRIPTION}.csv")
     _write_arrays(review, folder / "end.npz")
 
@@ -127,6 +127,6 @@ def _write_arrays(review: Review, file: Path) -> None:
             "lattice_corner": np.array((lattice.window.row0, lattice.window.col0)),
             "cell_m": np.array(lattice.cell_m),
         }
-    # In the form of NumPy's own readers; its stub mistakes the first array for an option.
+    # The file has NumPy's own format; NumPy's stub mistakes the first array for an option.
     with whole(file) as new:
         np.savez_compressed(new, **arrays)  # type: ignore[arg-type]

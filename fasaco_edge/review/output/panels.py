@@ -39,7 +39,7 @@ def replan_times(review: Review) -> Points:
 
 MOST_POINTS = 700
 FAINT: Colour = (150, 156, 166)
-# From the bottom up; other states are drawn as the last one.
+# States from the bottom up; other states are drawn as the last one.
 STATES: dict[str, Colour] = {
     "done": palette.BLUE,
     "returning": palette.SKY,
@@ -111,7 +111,8 @@ def replan_panel(reviews: Sequence[Review], labels: Sequence[str]) -> Panel:
     """Return a chart of the durations of replans, a dot each."""
     time = TimeAxis.over(max(review.duration_s for review in reviews))
     found = [replan_times(review) for review in reviews]
-    # Two reviews have the colours of their curves; one has another colour than the curve above.
+    # Two reviews have the colours of their curves; a single one has another colour than the curve
+    # above.
     colours = COLOURS if len(reviews) > 1 else COLOURS[1:]
     lines = [
         Line(label if len(reviews) > 1 else "", colour, _dots(time, at_s, took_ms), joined=False)

@@ -26,7 +26,7 @@ SIZE = (1600, 900)
 # Space of title, caption and key beside the map.
 AROUND = (56, 210)
 TRAIL_SPACING_M = 0.02
-# How wide a drive is drawn beside the lines of paths [m].
+# Width of a drive drawn beside the lines of paths [m].
 DRIVE_M = 0.04
 DONE = {True: "complete", False: "not complete", None: "recorded in part"}
 
@@ -84,7 +84,7 @@ def draw_map(review: Review, space: tuple[int, int]) -> Image.Image | None:
     )
 
 
-# How much of the drive before and after a moment is drawn [s].
+# Time before and after a moment for which the drive is drawn [s].
 AROUND_S = 10.0
 HEADING_M = 0.3
 

@@ -281,7 +281,7 @@ def _began(began: str) -> str:
 def instant_rows(instant: Instant) -> Iterator[tuple[str, str]]:
     """Yield name and text of all that is known of a moment."""
     state, why = instant.state or "not known", instant.state_reason
-    # The first path since that state was entered: the present one follows below.
+    # The first path since that state was entered; the present path follows below.
     yield "state", f"{state}: {why}" if why and not why.startswith("path ") else state
     if instant.order:
         yield "order", instant.order

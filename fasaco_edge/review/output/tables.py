@@ -17,7 +17,7 @@ from fasaco_edge.review.orders import command_words
 from fasaco_edge.review.output.panels import covered_share
 from fasaco_edge.review.review import Review
 
-# Most pheromone fields of a table, beside the last one.
+# Limit on the pheromone fields of a table, besides the last one.
 MOST_FIELDS = 64
 
 
