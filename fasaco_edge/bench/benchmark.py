@@ -1,8 +1,8 @@
 """A benchmark: options, samples one by one, and a report on any number of them.
 
 A new benchmark is a file that ends with a ``Benchmark``, and a row of ``BENCHMARKS`` in
-``fasaco_edge.cli.bench`` or ``tests.benchmarks.__main__``. The user may interrupt it between two
-samples, or within one, and still gets the report on those there are.
+``fasaco_edge.cli.bench`` or ``tests.benchmarks.__main__``. A user who interrupts it between two
+samples, or within one, still gets the report on the samples so far.
 """
 
 from __future__ import annotations
@@ -31,8 +31,8 @@ class Goal:
 
     Attributes:
         what: what is measured.
-        measured: None where nothing was.
-        limit: the most that is good, or the least where ``at_least``.
+        measured: the measured value; None if nothing was measured.
+        limit: the largest good value, or the least if ``at_least``.
         unit: "s", "MB", ...; "" for a plain number.
         at_least: whether more is better.
     """
@@ -45,7 +45,7 @@ class Goal:
 
     @property
     def met(self) -> bool | None:
-        """Whether it was reached; None where nothing was measured."""
+        """Whether the goal was reached; None if nothing was measured."""
         if self.measured is None:
             return None
         return self.measured >= self.limit if self.at_least else self.measured <= self.limit
@@ -103,7 +103,7 @@ class Benchmark(Generic[Sample]):
         add_options: declares the options it takes.
         count: how many samples ``measure`` will yield.
         measure: yields samples; it closes all that it opened, also if it is closed early.
-        report: sums up the samples there are, even none.
+        report: sums up the samples so far, even none.
         epilog: examples.
         write: writes the files that the options ask for, and names them.
     """

@@ -34,7 +34,7 @@ MEASURES = (
     ("mission_percent", "share of a core in a mission [%]", 2),
     ("peak_mb", "peak memory [MB]", 1),
 )
-# Measure, what it is, the most that its median may be, unit.
+# For each goal its measure, its text, the limit of its median, the unit.
 GOALS = (
     ("ready_s", "ready", 1.5, "s"),
     ("idle_own_mb", "memory before the first map, without pages of files", 32.0, "MB"),
@@ -44,7 +44,7 @@ GOALS = (
 )
 # In a mission maps come twice a second, and one in this many shows a change.
 MAP_EVERY_S, MAPS_A_CHANGE = 0.5, 20
-# The compiler and the recorder's library, by what a process has mapped of them.
+# The compiler and the recorder's library: loaded if a process has mapped their files.
 PACKAGES = {"numba": ("numba", "llvmlite"), "rerun": ("rerun_sdk", "rerun_bindings")}
 
 

@@ -25,10 +25,10 @@ from fasaco_edge.drawing.spread import percentile
 from fasaco_edge.errors import ProcessEnded
 from fasaco_edge.host.processes import cpu_seconds, python_program
 
-# As the daemon's unit has it.
+# Niceness in the daemon's unit.
 NICENESS, WEIGHT = 10, 20
 HZ = 100
-# Time for a resumed daemon to be at work again.
+# Time until a resumed daemon is at work again [s].
 SETTLE_S = 0.5
 # A daemon that is held longer loses its sessions: Zenoh's lease is ten seconds.
 LONGEST_BLOCK_S = 6.0
@@ -97,7 +97,7 @@ def _measure(args: argparse.Namespace, say: Say) -> Generator[Block, None, None]
     given = {} if args.spare_share is None else {"spare_share": args.spare_share}
     with DaemonProcess({"planner": given}) as daemon:
         say("first path")
-        # Its weight is set only then: on a busy computer the first path would come too late.
+        # The weight is set only after the first path, which would come too late on a busy computer.
         with robot_beside(daemon, daemon.join()) as robot, weighed(daemon.pid, WEIGHT) as group:
             try:
                 for name in PLACES:
@@ -124,7 +124,7 @@ def _run(
     covering: bool,
     group: str,
 ) -> Block:
-    # Held rather than ended, so that all else on the computer is the same in both.
+    # The daemon is held and not ended, so that the rest of the computer is the same in both blocks.
     os.kill(daemon.pid, signal.SIGCONT if covering else signal.SIGSTOP)
     time.sleep(SETTLE_S)
     paths, began_s = robot.paths, (time.monotonic(), cpu_seconds(daemon.pid))

@@ -20,7 +20,7 @@ GOAL_REST_P99_MS = 20.0
 GOAL_RECORDER_RATIO = 1.05
 # Rounds with and without a recorder, alternating: the number of each.
 ROUNDS = 4
-# The first paths come with the kernels and the first plan of all.
+# The first paths are not counted: they include loading of kernels, and the first plan.
 WARM_UP_MAPS = 5
 PARTS = (
     ("total", "map put to path received"),

@@ -120,7 +120,7 @@ def _rows(
 
     for code in own:
         yield code.name, OwnPlanner(code, colony.seed)
-    # As missions have it: ants that see what would be cut off.
+    # The setting of missions: ants that see which cells would be cut off.
     seeing = replace(colony, q0=SEARCH_Q0, visibility=SEARCH_VISIBILITY)
     yield WITH_SEARCH, planner_of("fasaco", seeing, local_search=True)
     for name in REGISTRY:

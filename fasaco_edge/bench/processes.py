@@ -32,12 +32,12 @@ SHARES_OF_WEIGHT = 1024 / 100
 
 
 def warm_kernels() -> None:
-    """Compile the kernels into the cache, where they are missing, so that no daemon has to.
+    """Compile missing kernels into the cache, so that no daemon has to.
 
     They are compiled in other processes: this one stays as small as a client on the bus.
 
     Raises:
-        ProcessEnded: it failed.
+        ProcessEnded: compiling failed.
     """
     warmup = [*PROGRAM, "warmup"]
     if subprocess.run([*warmup, "--check"], check=False, capture_output=True).returncode == 0:

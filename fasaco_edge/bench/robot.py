@@ -31,7 +31,7 @@ from fasaco_edge.wire.messages.poses import encode_pose_stamped
 
 RESOLUTION_M = 0.05
 HALL_PX, WALL_PX, DOOR_PX, CRATE_PX = 200, 4, 30, 16
-# A crate further along each time, by less than its own width and back again.
+# Places of the crate: each time it moves by less than its width, forth and back.
 CRATE_PLACES, CRATE_STEP_PX = 12, 12
 # Where the crate stands when the robot begins to drive.
 FIRST_CRATE = 1
@@ -39,7 +39,7 @@ POSES_HZ = 10
 SPEED_M_S = 0.5
 # Period of maps [s], each with the crate at another place: the rest of the path is replanned.
 MAP_EVERY_S = 1.0
-# The first path needs the kernels; on a slow computer their loading takes long.
+# Timeout of the first path, which needs the kernels: a slow computer loads them for long.
 PATH_TIMEOUT_S = 300.0
 
 
@@ -215,7 +215,7 @@ def robot_beside(
     Args:
         daemon, bus: whose robot it is, and a session with it.
         map_every_s, maps_a_crate: see ``CoveringRobot``.
-        source: what publishes; None for a new one.
+        source: publisher of maps and poses; None for a new one.
     """
     source = source or MapSource(daemon, bus)
     robot = CoveringRobot(source, map_every_s, maps_a_crate)

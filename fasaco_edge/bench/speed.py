@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from fasaco_edge.planners.problem import CoverageProblem
 
 DEFAULT_MAPS = ("office", "flat", "basement")
-# For 1,000 ants on the paper's basement, 520 cells; smaller grids are held to it too.
+# Goal for 1,000 ants on the paper's basement, 520 cells; it also holds for smaller grids.
 GOAL_CELLS, GOAL_ANTS, GOAL_WALL_S = 520, 1000, 0.25
 # Threads pay off where a group of ants takes long.
 GOAL_SPEEDUP, GOAL_SPEEDUP_CELLS = 1.6, 2000
@@ -102,7 +102,7 @@ def _measure(args: argparse.Namespace, say: Say) -> Generator[Timing, None, None
         say(grid.name)
         Fasaco(replace(colony, ants=len(velocities))).plan(problem)
         for _ in range(args.repeats):
-            # By turns, so that a machine that slows down does so for both.
+            # Alternating, so that a machine that slows down affects both.
             path, timing = _timed(grid, problem, Fasaco(colony))
             yield timing
             if args.threads > 1:

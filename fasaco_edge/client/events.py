@@ -65,7 +65,7 @@ def differences(before: Status | None, after: Status) -> list[tuple[str, str]]:
 
 
 def _troubles(before: Status | None, after: Status) -> Iterator[tuple[str, str]]:
-    """Yield the troubles that began and ended; that of a degraded mission is its reason."""
+    """Yield the troubles that began and ended; a degraded mission's own trouble is its reason."""
     known, present = (
         {each.code: each.text for each in (status.troubles if status else ())[: len(TROUBLES)]}
         for status in (before, after)

@@ -13,7 +13,7 @@ from fasaco_edge.wire.documents.replies import (
 )
 from fasaco_edge.wire.documents.status import TROUBLES, DriveReport, Status
 
-# Of the wall clock to the monotonic one, when this module was imported [s].
+# Offset of the wall clock from the monotonic one, when this module was imported [s].
 _OFFSET_S = time.time() - time.monotonic()
 
 

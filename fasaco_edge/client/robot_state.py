@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 # The daemon publishes a status once a second.
 SILENCE_S = 3.5
-# Without poses of their own on the native keys, those in the status are shown.
+# If no pose has come on its own key for this long [s], the poses in the status are shown.
 POSE_LASTS_S = 2.0
 
 
@@ -115,7 +115,7 @@ class RobotState:
             self.events.add(now, "the daemon is gone; waiting for it to return", BAD)
         elif self.is_here and not was_here:
             back = self.gone_since is not None
-            # It has not had the time to publish a status.
+            # The daemon has not had the time to publish a status.
             self.gone_since, self._reported_at = None, now
             self.events.add(now, f"the daemon is {'back' if back else 'there'}", GOOD)
 
@@ -130,7 +130,7 @@ class RobotState:
         if not status.state:
             raise MalformedMessage("status: it has no state")
         if status.claim.stand != "plans":
-            # It may be a second daemon of this name, whose state is not the robot's.
+            # The sender may be a second daemon of this name, whose state is not the robot's.
             if status.claim.stand != "looks":
                 self.events.add(now, f"a second daemon is {status.state}: {status.reason}", BAD)
             return

@@ -21,10 +21,10 @@ from fasaco_edge.wire.documents.status import FleetReport, Status
 
 Digest = dict[str, object]
 
-# Most entries shown of received lists.
+# Limits on the shown entries of received lists.
 MOST_ENTRIES, MOST_AREAS, MOST_ROBOTS = 40, 100, 50
 MOST_CORNERS = 1_000
-# Of the operator and of the order, each.
+# MOST_AREAS from the operator, and as many from the order.
 MOST_KEEP_OUTS = 2 * MOST_AREAS
 # A longer time means a speed of almost 0 [s].
 MOST_TO_GO_S = 1e8
@@ -35,7 +35,7 @@ UNDERWAY = ("planning", "covering", "returning", "degraded", "paused", "charging
 
 
 def state(view: RobotState, way: Way, now: float) -> Digest:
-    """Return the content of the newest status, and whether there is one; ``way``: the path."""
+    """Return the content of the newest status, and why there is none; ``way``: the path."""
     status = view.status
     others = sorted(view.robots - {view.robot})[:MOST_ROBOTS]
     found: Digest = {"robot": view.robot, "absent": _absent(view, now), "others": others}
@@ -162,7 +162,7 @@ def _fleet(fleet: FleetReport) -> list[Digest]:
 def areas(
     settings: KnownSettings, order: dict[str, Any], keep_outs: Sequence[KeepOutReport]
 ) -> Digest:
-    """Return zones, also of the order if it was received, and the keep-outs in force."""
+    """Return standing zones, the zones of the order if it was received, and keep-outs in force."""
     mission = settings.mission
     standing = [
         {"name": zone.name, "polygon": zone.polygon[:MOST_CORNERS], "is": "standing"}

@@ -46,7 +46,7 @@ class Guard:
 
     def is_ours(self, host: str) -> bool:
         """Return whether a Host header names this server."""
-        if "%" in host:  # of an IPv6 address: anything may follow
+        if "%" in host:  # the zone of an IPv6 address may be any text
             return False
         name, _, _ = host.rpartition(":") if re.search(r":\d+$", host) else (host, "", "")
         try:
@@ -56,7 +56,7 @@ class Guard:
         return True
 
     def to_look_only(self) -> Guard:
-        """Return a guard of which all clients may only look."""
+        """Return a guard under which all clients may only look."""
         tokens: tuple[tuple[Role, str], ...] = tuple(("viewer", token) for _, token in self.tokens)
         return Guard(self.names, tokens)
 

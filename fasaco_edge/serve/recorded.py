@@ -30,9 +30,10 @@ from fasaco_edge.wire.schemas import PATH
 GRIDS = {"map": entities.MAP, "floor": entities.FLOOR, "field": entities.PHEROMONE}
 # The percentage of each opacity of swept floor.
 PERCENT = bytes(min(round(100 * value / entities.SWEPT_OPACITY), 100) for value in range(256))
-# Points of the driven track: least distance [m], and number at most. Two further apart are a jump.
+# Points of the driven track: least distance [m], and number at most. Points farther apart than the
+# last value are a jump.
 SPACING_M, MOST_TRACK, JUMP_M = 0.03, 50_000, 1.0
-# Most poses that the progress on a path is found by.
+# Limit on the poses by which the progress on a path is found.
 MOST_POSES = 5_000
 
 
@@ -44,7 +45,7 @@ class RecordedView(ServedView):
     def __init__(self, robot: str) -> None:
         super().__init__(Keys())
         self.robot, self.robots = robot, {robot}
-        # Of drawn grids, to know newer ones.
+        # Places of the drawn grids in the recording, to recognise newer ones.
         self._drawn: dict[str, Place] = {}
 
     def silent_s(self, now: float) -> float:
@@ -117,7 +118,7 @@ class Playback:
         self._abouts: dict[int, bytes] = {}
 
     def newest(self) -> list[tuple[str, int, str | bytes]]:
-        """Return what holds for the whole recording: what it is, and the driven track."""
+        """Return the messages for the whole recording: its description, and the driven track."""
         began_s = 1e-9 * self._timeline.began_ns
         seconds = 1e-9 * (self._timeline.ended_ns - self._timeline.began_ns)
         names = [path.name for path in self._paths]
@@ -129,7 +130,7 @@ class Playback:
         return []
 
     def at(self, at_s: float) -> list[str | bytes]:
-        """Return what changed from the time before to this one, since the recording began [s].
+        """Return what changed since the time shown before, at a time since the recording began [s].
 
         Raises:
             UnreadableRecording: it can no longer be read.

@@ -28,9 +28,9 @@ from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.messages.grid_octets import GridOctets, read_field, read_grid, with_update
 from fasaco_edge.wire.messages.path_points import PathPoints
 
-# Most points shown of a path; reading one takes some 4 us a point.
+# Limit on the points shown of a path; reading a path takes some 4 us a point.
 MOST_POINTS = 20_000
-# Most other robots, the most recently received; they publish once a second.
+# Limit on other robots, the most recently received; they publish once a second.
 MOST_OTHERS, OTHER_LASTS_S = 50, 10.0
 # Least period of each message [s]; unchanged messages are not sent again.
 PERIODS_S = {

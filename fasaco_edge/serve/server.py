@@ -26,8 +26,8 @@ from fasaco_edge.serve.viewer import Source, Viewer, ending_oddities
 LOG = logging.getLogger(__name__)
 
 MOST_VIEWERS = 20
-# Most connections that are not yet authenticated: beyond that the oldest is closed. A page sends
-# its token at once, so silent ones block no page.
+# Limit on connections that are not yet authenticated: beyond it the oldest is closed. A page sends
+# its token at once, so silent connections block no page.
 MOST_STRANGERS = 20
 # The longest order has a few hundred kilobytes.
 MOST_BYTES = 262_144
@@ -50,7 +50,7 @@ class Server:
         self._source_of = source_of
         self._page = load_page()
         self._viewers: set[Viewer] = set()
-        # In order of arrival.
+        # Connections without authentication, in order of arrival.
         self._strangers: dict[Viewer, ServerConnection] = {}
         self._ended = threading.Event()
         self._loop: asyncio.AbstractEventLoop | None = None

@@ -148,7 +148,7 @@ class Viewer:
 
 @contextlib.asynccontextmanager
 async def ending_oddities(socket: ServerConnection) -> AsyncIterator[None]:
-    """Close the connection of a viewer that sends what no page sends, or asks what is lost."""
+    """Close the connection of a viewer that sends what no page sends, or asks for lost data."""
     try:
         yield
     except (msgspec.DecodeError, TimeoutError, RecursionError):

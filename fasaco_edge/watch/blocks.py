@@ -35,7 +35,7 @@ class Blocks:
         return drawn + [" " * width] * (height - len(drawn))
 
     def keep(self, name: str, key: object, draw: Callable[[], list[str]]) -> list[str]:
-        """Return the block of a name; drawn again if the key is another than before."""
+        """Return the block of a name; it is drawn again if the key has changed."""
         kept = self._kept.get(name)
         if kept is None or kept[0] != key:
             kept = self._kept[name] = key, draw()
@@ -68,7 +68,7 @@ class Blocks:
 
 
 def on_a_line(text: Text) -> Text:
-    """Return a text that is cut where its line ends."""
+    """Return a text that is cut to fit one line."""
     text.no_wrap, text.overflow = True, "crop"
     return text
 

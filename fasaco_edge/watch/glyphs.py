@@ -20,8 +20,9 @@ HALF = "▀"
 ARROWS, PLAIN_ARROWS = "→↗↑↖←↙↓↘", ">/^\\<,v."
 
 
-# By kind: its colour, the ANSI colour, the plain character. Dark, so that the path stands out;
-# apart in brightness, not in hue alone. The nearest ANSI colour would be one grey for three kinds.
+# For each kind its colour, ANSI colour and plain character. Colours are dark, so that the path
+# stands out, and differ in brightness, not only in hue. The nearest ANSI colour would be one grey
+# for three kinds.
 _LOOKS: dict[int, tuple[Colour, str, str]] = {
     picture.UNKNOWN: ((20, 22, 27), "black", " "),
     picture.FLOOR: ((46, 50, 58), "bright_black", "."),
@@ -112,7 +113,7 @@ class GlyphSet:
         )
 
 
-# Most lines of a picture equal those of the previous one.
+# The cache of drawn lines: most lines of a picture equal lines of the previous one.
 @lru_cache(maxsize=512)
 def _line(glyphs: GlyphSet, upper: bytes, lower: bytes) -> str:
     runs: list[str] = []

@@ -92,7 +92,7 @@ def watch_on_screen(watched: Watched) -> None:
 
 def watch_in_lines(watched: Watched) -> None:
     """Print events, and once a second the state, until a signal arrives."""
-    # What exists already arrives within the first second.
+    # State from before the start arrives within the first second.
     printed, last_line, next_line_at = 0, "", phrases.steady_now() + LINE_EVERY_S
     with stop_event(*END_SIGNALS) as stop:
         while not stop.is_set():
@@ -143,7 +143,7 @@ def _print_line(at_s: float, text: str) -> None:
 
 ENTER = "\x1b[?1049h\x1b[?25l\x1b[2J"
 LEAVE = "\x1b[0m\x1b[?25h\x1b[?1049l"
-# Terminals that know it show a whole page at once, the others ignore it.
+# Synchronised output: terminals that support it show a whole page at once, others ignore it.
 BEGIN_PAGE, END_PAGE = "\x1b[?2026h", "\x1b[?2026l"
 
 

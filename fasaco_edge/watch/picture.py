@@ -99,7 +99,7 @@ HEADING = FIELD.stop
 """The character of the robot's centre: this plus its heading in eighths of a turn."""
 EIGHTHS = 8
 
-# By the defaults of the daemon's configuration; only the picture depends on them.
+# Thresholds from the defaults of the daemon's configuration; only the picture depends on them.
 FREE_AT_MOST, OCCUPIED_AT_LEAST = 25, 65
 # A thin wall must not vanish between samples; maps larger than this resolves are rare.
 MOST_SAMPLES = 12
@@ -153,7 +153,7 @@ def draw_path(kinds: Kinds, frame: Frame, xy: NDArray[np.float64]) -> bool:
     drawn_m = way[-1] if resolved else min(way[-1], NEAR_M)
     at = np.append(np.arange(0.0, drawn_m, frame.pixel_m / 2), drawn_m)
     points = np.stack([np.interp(at, way, xy[:, axis]) for axis in (0, 1)], axis=-1)
-    # The nearest last: it is visible where the path crosses itself.
+    # The part nearest to the robot is drawn last: it is visible where the path crosses itself.
     for kind, some in ((AHEAD, points[at > NEXT_M]), (NEXT, points[at <= NEXT_M])):
         _put(kinds, frame.pixels(some), kind)
     return bool(drawn_m == way[-1])
