@@ -1,8 +1,8 @@
 """Access rules, size limits and rate limits for Zenoh, derived from roles and the topic table.
 
-They are configuration of the session that listens (or of a router): Zenoh refuses forbidden
-messages before they reach this program. A role is named after what the *other* side does, as
-listed in ``protocol/security.md``.
+The listening session (or a router) has them in its configuration: Zenoh refuses forbidden messages
+before they reach this program. A role is named after what the *other* side does, as listed in
+``protocol/security.md``.
 
 * Everything that is not named is denied. ``**`` does not match a chunk that begins with ``@``, so
   every key is named, and also the key that Zenoh's advanced publishers and subscribers use to serve
@@ -49,8 +49,8 @@ class Role:
         description: the rights in words, for people.
         speaks: topics it may publish, and on which it may reply to queries.
         listens: topics it may subscribe to and query.
-        asked: topics whose subscribers it learns of, also those of all robots: otherwise
-            it would not publish its own.
+        asked: topics whose subscribers, on this robot's key and on that of all robots, are
+            announced to it: without subscribers it would not publish.
         includes: another role whose rights it also has; "" for none.
     """
 
@@ -91,10 +91,10 @@ ROLES: Mapping[str, Role] = {
         "publishes maps, updates, poses, battery and scans on ROS 2 topics, sees path, coverage "
         "and diagnostics, commands by services"
     ),
-    # A daemon connects to it; the router itself must restrict the other clients.
+    # The router that a daemon connects to; it must restrict its other clients itself.
     "router": Role("forwards everything, both ways", speaks=EVERYTHING, listens=EVERYTHING),
     "fleet": replace(
-        _role("fleet", "another robot of the fleet, beside its own role"), asked=("fleet",)
+        _role("fleet", "another robot of the fleet, besides its own role"), asked=("fleet",)
     ),
     # The daemon itself, as a router sees it.
     "robot": _role("robot", "plans: receives maps, publishes paths"),
@@ -110,7 +110,7 @@ class Grant:
         names: common names of certificates, or user names; one may have several roles.
         prefix: first part of the keys: ``fasaco/@v1/robot``, ``fasaco/@v1/*`` for all robots;
             "" where topics are whole keys.
-        of: distinguishes grants of one role with several prefixes; "" where there is one.
+        of: distinguishes several grants of one role, each with its prefix; "" for a single grant.
         rights: rights of the role; None for those in ROLES.
     """
 
@@ -171,7 +171,7 @@ def limits(prefix: str, most: Limits) -> dict[str, Any]:
     classes: dict[str, list[str]] = {}
     for entry in ENTRIES:
         classes.setdefault(entry.size_class, []).append(entry.suffix)
-    # These reply to queries with their last sample, as a storage would.
+    # The keys of these topics reply to queries with their last sample, as a storage would.
     answered = [topic.suffix for topic in TOPICS if topic.name in RPC_NAMES]
     sizes = (
         ("grids and paths", published, classes["large"], most.map_bytes),

@@ -80,7 +80,7 @@ class Sample:
 
 
 def _sender_of(sample: zenoh.Sample) -> str:
-    """Return the id of the session that published a sample, or put the timestamp on it."""
+    """Return the id of the session that published a sample, else of the session that stamped it."""
     if sample.source_info is not None:
         return str(sample.source_info.source_id.zid)
     return str(sample.timestamp).partition("/")[2] if sample.timestamp is not None else ""

@@ -22,8 +22,8 @@ SETTLE_S = 0.2
 ASK_PERIOD_S = 1.0
 # Time that the others need to reconnect to a restarted router [s].
 REJOIN_S = 3.0
-# A session silent for this long is dead to the others: Zenoh's lease [s]. Its last sign of life may
-# be a quarter of that older than the beginning of a pause.
+# A session silent for this long is dead to the others: Zenoh's lease [s]. When a pause begins, its
+# last sign of life may already be a quarter of the lease old.
 LEASE_S = 10.0
 PAUSE_S = 0.75 * LEASE_S
 # Longest wait for a daemon that could plan but does not [s]: its lease and a margin.
@@ -145,7 +145,7 @@ class BusClaim(Claim):
         active: the last chunk of the token of the one that "plans".
 
     Attributes:
-        is_settled: whether it is known that one of them plans.
+        is_settled: whether one of the daemons is known to plan.
     """
 
     def __init__(self, bus: Bus, keys: Keys, topic: Topic, active: str = "plans") -> None:
@@ -191,7 +191,7 @@ class BusClaim(Claim):
 
 
 def claims_in(keys: Iterable[str], active: str = "plans") -> dict[str, ClaimState]:
-    """Return the states of those with these tokens, by id; other keys are left out."""
+    """Return the state of each daemon by its id, read from the keys of tokens; skip other keys."""
     claims: dict[str, ClaimState] = {}
     for key in keys:
         _, own, state = key.rsplit("/", 2)

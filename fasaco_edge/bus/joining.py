@@ -17,13 +17,13 @@ RETRY_S = 1.0
 
 def join(settings: BusSettings, stop: threading.Event) -> Bus | None:
     """Open a session once a program listens there; None if ``stop`` is set before."""
-    told = False
+    is_logged = False
     while not stop.is_set():
         try:
             return open_bus(settings)
         except BusUnavailable as error:
-            if not told:
+            if not is_logged:
                 log.warning("waiting for the bus at %s: %s", ", ".join(settings.connect), error)
-                told = True
+                is_logged = True
             stop.wait(RETRY_S)
     return None

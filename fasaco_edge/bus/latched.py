@@ -26,7 +26,7 @@ from fasaco_edge.bus.sample_order import SampleOrder
 
 # Timeout of a reply [s]: a large map on a slow link takes long. No query is repeated meanwhile.
 ANSWER_S = 10.0
-# Most tokens that are read.
+# Limit on the tokens that are read.
 MOST_TOKENS = 1024
 
 Receive = Callable[[zenoh.Sample], None]
@@ -138,7 +138,7 @@ class LatchedSubscription(Subscription):
             self._awaits_tokens = False
 
     def _on_tokens(self, tokens: list[str], is_whole: bool) -> None:
-        """Add the publishers of ``tokens``; where these are all, forget the others."""
+        """Add the publishers of ``tokens``; if these are all tokens, forget other publishers."""
         found = {"/".join(key.rpartition("/@adv/pub/")[2].split("/")[:2]): key for key in tokens}
         with self._lock:
             self._awaits_tokens = False

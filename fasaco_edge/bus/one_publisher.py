@@ -105,7 +105,7 @@ class OnePublisher:
 
 # Period of queries to a publisher for a lost last sample [s].
 ASK_PERIOD_S = 1.0
-# Most publishers of a key that are queried; samples of the others are still received.
+# Limit on the publishers of a key that are queried; samples of the others are still received.
 MOST_PUBLISHERS = 16
 
 

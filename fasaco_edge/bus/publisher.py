@@ -25,8 +25,8 @@ class Publisher:
     """Publishes samples on one key.
 
     Args:
-        session: of Zenoh.
-        key: where.
+        session: Zenoh session.
+        key: key expression to publish on.
         schema: CDR type; "" for JSON.
         qos: quality of service. In Zenoh the sender decides whether a sample is dropped on
         congestion.
@@ -48,9 +48,10 @@ class Publisher:
     def forget(self) -> None:
         """Drop the samples cached for late joiners."""
         if self._latched is not None:
-            # Released and not undeclared: undeclare() of an advanced publisher (zenoh-python 1.10)
-            # waits for Zenoh's locks while it holds the interpreter lock; with a callback that
-            # holds the former and waits for the latter, the process deadlocks.
+            # The publisher is released, not undeclared: undeclare() of an advanced publisher
+            # (zenoh-python 1.10) waits for Zenoh's locks while it holds the interpreter lock. A
+            # callback that holds Zenoh's locks and waits for the interpreter lock then deadlocks
+            # the process.
             self._publisher = None
             self._publisher = self._latched()
 

@@ -19,7 +19,7 @@ import zenoh
 from fasaco_edge.bus.arrival import schema_of
 from fasaco_edge.bus.publisher import encoding_of
 
-# Most tokens that are remembered, in case of a flood.
+# Limit on the tokens that are remembered, in case of a flood.
 MOST_TOKENS = 16_384
 # Timeout of replies from routers [s]. A late reply changes nothing. A query that has not even
 # ended by then is sent again after twice as long [s].

@@ -17,10 +17,10 @@ from fasaco_edge.bus.one_publisher import MOST_PUBLISHERS, AskedPublishers
 
 # Time that a reply with a gap before it waits [s]; where several samples count, since the last.
 UNDER_WAY_S = 0.5
-# Most publishers whose last sample is remembered.
+# Limit on the publishers whose last sample is remembered.
 MOST_REMEMBERED = 64
-# Most bytes of samples that wait for earlier ones: a publisher that does not reply must not fill
-# the memory.
+# Limit on the bytes of samples that wait for earlier ones: a publisher that does not reply must not
+# fill the memory.
 HELD_BYTES = 8_000_000
 _SEQUENCE_NUMBERS = 1 << 32
 
@@ -38,11 +38,11 @@ class SampleOrder:
         self._depth, self._publishers, self._wake = depth, publishers, wake
         # Samples to deliver, in this order.
         self._ready: list[zenoh.Sample] = []
-        # By publisher, the sequence number or timestamp of its last sample: its mark.
+        # For each publisher its mark: the sequence number or timestamp of its last sample.
         self._last_mark = OrderedDict[str, int]()
         # When that was published, by the publisher's clock; 0 if unknown.
         self._stamps = OrderedDict[str, int]()
-        # The same of publishers without a token. Used only to drop cached replies that were
+        # The marks of publishers without a token. Used only to drop cached replies that were
         # received already: a reset of such a clock would go unnoticed.
         self._unconfirmed = OrderedDict[str, int]()
         # A reply that overtook published samples: until when it waits [s], publisher, mark.
@@ -113,14 +113,15 @@ class SampleOrder:
         waits = self._depth > 1 and self._publishers.is_asking
         is_listed = sample.source_info or name in self._last_mark or name in self._publishers
         if not name or not (is_listed or waits):
-            # From a publisher without a cache, or one that is not yet found.
+            # The publisher has no cache, or is not yet found.
             if name:
                 _remember(self._unconfirmed, name, mark)
             self._ready.append(sample)
             return
         last = self._last_mark.get(name)
         if last and not mark and _ticks(sample) >= self._stamps.get(name, 0):
-            # It was restarted under the same name: samples that a reply has overtaken are older.
+            # The publisher was restarted under the same name: samples that a reply has overtaken
+            # are older.
             del self._last_mark[name]
             last = None
         is_gap = name in self._publishers and _leaves_gap(name, mark, last)

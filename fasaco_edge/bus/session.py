@@ -70,8 +70,8 @@ class Bus:
         self._listens = listens
         self._declared: list[Any] = []
         self._served: list[_Served] = []
-        # Callers hold these, too. No Zenoh object may be left to the last garbage collection, in
-        # which its threads and the interpreter may deadlock.
+        # Objects that callers hold, too: ``close`` ends them. In the last garbage collection a
+        # remaining Zenoh object may deadlock its threads and the interpreter.
         self._lent: list[Publisher | Subscription] = []
         self._asker = Asker()
 

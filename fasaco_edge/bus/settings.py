@@ -57,7 +57,7 @@ def check_settings(settings: BusSettings) -> None:
     Raises:
         BusUnavailable: Zenoh rejects it.
     """
-    # Not needed by a process that only reads a configuration.
+    # Imported here, as a process that only reads a configuration does not need it.
     import zenoh  # noqa: PLC0415
 
     try:

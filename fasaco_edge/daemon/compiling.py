@@ -1,7 +1,7 @@
-"""The kernels of a service: compiled before it is ready, by a process of its own.
+"""Compilation of the kernels before a service reports that it is ready, in a separate process.
 
-A first map must not wait minutes for them. An idle daemon stays small and loads kernels with the
-first map.
+The first map must not wait minutes for compilation. An idle daemon stays small: it loads the
+kernels with the first map.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ class KernelCompiler:
         assert self._process is not None
         for word, text in self._process.lines():
             if word == REASON:
-                LOG.info("compiling the kernels, for minutes: %s", text)
+                LOG.info("compiling the kernels, which takes minutes: %s", text)
             elif word == STAGE:
                 self._stages += 1
                 self._manager.extend(STAGE_S)

@@ -1,4 +1,4 @@
-"""Door to the wing of fleets: the parts a daemon needs, loaded only if a fleet is configured."""
+"""Interface to the package ``fleet``: what a daemon needs, loaded only if a fleet is configured."""
 
 from __future__ import annotations
 

@@ -27,7 +27,7 @@ from fasaco_edge.mission.orders.mask import inline_grid
 from fasaco_edge.wire import topics
 from fasaco_edge.wire.messages.maps import decode_occupancy_grid
 
-# Most masks that wait to be read, of as many publishers; one of them counts.
+# Limit on the masks that wait to be read, each of another publisher; one of them counts.
 MOST_WAITING = 2
 
 
@@ -52,7 +52,8 @@ class MaskTopic:
         self._came = came
         self.map_frame = ""
         self._lock = threading.Lock()
-        # By publisher, the newest mask and when it came [s, monotonic]; and the one to read.
+        # For each publisher its newest mask and time of arrival [s, monotonic]; and the mask to
+        # read.
         self._waiting: dict[str, tuple[Sample, float]] = {}
         self._newest: Sample | None = None
         self._publisher = OnePublisher("keep-out masks", topics.KEEP_OUT_MASK.one_publisher_s, bus)
@@ -67,7 +68,7 @@ class MaskTopic:
         """Take the newest mask of the publisher that counts; ``now``: monotonic [s]."""
         with self._lock:
             waiting, self._waiting = self._waiting, {}
-        # Whoever holds the lock must not call Zenoh: its threads wait for it.
+        # A thread that holds the lock must not call Zenoh, whose threads wait for the lock.
         takes = self._publisher.takes
         if taken := [sample for sender, (sample, at) in waiting.items() if takes(sender, at)]:
             with self._lock:
@@ -90,7 +91,7 @@ class MaskTopic:
     def added_to(self, config: DaemonConfig) -> tuple[DaemonConfig, list[BadConfiguration]]:
         """Return a configuration with the newest mask of the map's frame, or else the last one.
 
-        Also why the newest one is not that: it is malformed, too fine, or of another frame.
+        Also return why the newest mask is not used: it is malformed, too fine, or of another frame.
         """
         frame = self.map_frame
         with self._lock:

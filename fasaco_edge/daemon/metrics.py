@@ -26,10 +26,10 @@ from fasaco_edge.wire.documents.status import Status
 LOG = logging.getLogger(__name__)
 
 PATH = "/metrics"
-# Of a request: most bytes read, timeout of its arrival and of the delivery of its answer [s].
+# Limit on the bytes of a request; timeout of its arrival, and of the delivery of its answer [s].
 MOST_BYTES, LONGEST_S = 8192, 1.0
-# Pause between two polls [s]. Most connections accepted at each, which may wait until then; most
-# that stay open: beyond that the oldest are closed.
+# Pause between two polls [s]. Limit on the connections that wait for a poll and are accepted in it.
+# Limit on open connections: beyond it the oldest are closed.
 PAUSE_S, MOST_TAKEN, MOST_OPEN = 0.05, 64, 16
 # Send buffer, which holds a whole answer [bytes].
 ANSWER_BYTES = 1 << 17
@@ -83,7 +83,7 @@ class MetricsServer:
 
     def _wait(self, requests: list[_Request]) -> None:
         """Wait for data, or for the timeout of a request."""
-        # Not select(2), which takes only descriptors below 1024.
+        # select(2) is not used, as it takes only descriptors below 1024.
         arrivals = select.poll()
         try:
             arrivals.register(self._socket, select.POLLIN)
@@ -99,7 +99,7 @@ class MetricsServer:
             try:
                 connection, _ = self._socket.accept()
             except OSError as error:
-                # No more wait, or the socket is closed, or there are no descriptors left.
+                # No connection is waiting any more, the socket is closed, or no descriptor is left.
                 LOG.debug("metrics: %s", error)
                 return
             yield _Request(connection)
@@ -212,7 +212,7 @@ class _Request:
 
 
 def serve_metrics(address: Address | None) -> MetricsServer | None:
-    """Return a server; None if none is configured or it cannot listen: a robot drives without.
+    """Return a server; None if none is configured or it cannot listen: a robot also drives without.
 
     Args:
         address: where to listen; None for no server.

@@ -149,7 +149,7 @@ def status_line(status: Status) -> str:
         parts.append(f"{areas} m2 of floor swept")
     if path := status.path:
         parts.append(f"path {path.revision} with {path.remaining_steps} steps to go")
-    # Of a degraded mission a trouble is the reason.
+    # The reason of a degraded mission is one of the troubles.
     parts += [each.text for each in status.troubles if each.text != status.reason]
     if fault := status.ledger.fault:
         parts.append(fault)

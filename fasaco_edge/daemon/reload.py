@@ -117,7 +117,7 @@ class Reload:
     def take(self, running: DaemonConfig) -> tuple[DaemonConfig, list[BadConfiguration]]:
         """Return the running configuration with the changeable values of the file.
 
-        Also why the file, of which nothing is taken then, or the newest mask is refused.
+        Also return why the file or the newest mask is refused; no value of a refused file is taken.
         """
         assert self._reading is not None
         reading, self._reading = self._reading, None

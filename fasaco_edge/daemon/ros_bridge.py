@@ -35,7 +35,7 @@ class RosBridge:
     Attributes:
         map: the map's subscription, to query a missing map.
         path, coverage, diagnostics: where to publish them.
-        commands: the commands of services, by the keys of these.
+        commands: command of each service, by the service's key.
     """
 
     def __init__(
@@ -88,7 +88,7 @@ class RosBridge:
         self.diagnostics.put(payload)
 
     def _serve(self, service: RosTopic) -> str:
-        """Take the requests of a service; return its key, with any type hash a client appends."""
+        """Take the requests of a service; return its key expression, which allows any type hash."""
         key = self._config.input_key(service)
         post = partial(self._mailbox.post, "command")
         too_long = Reply(b"the request is too long", is_error=True)
@@ -104,7 +104,8 @@ class RosBridge:
         return RosPublisher(publisher, gid_of(token) if token else b"")
 
     def _announce(self, kind: Endpoint, topic: RosTopic) -> str:
-        """Return the liveliness token of a new endpoint; "" with a bridge, which has its own."""
+        """Return the liveliness token of a new endpoint; "" with a bridge, which declares its
+        own."""
         if self._config.kind == "bridge":
             return ""
         self._endpoints += 1

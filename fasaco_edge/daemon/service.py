@@ -46,8 +46,8 @@ LOG = logging.getLogger(__name__)
 # still works, on a slow computer, gets the rest of ``TimeoutStopSec=`` of the unit.
 RECORDER_STOP_S, RECORDER_LONGEST_S = 1.2, 6.0
 WORKER_STOP_S = 0.4
-# The ledger is written meanwhile: timeout for its disk in all, and the least time after the other
-# processes have ended.
+# Timeout for the ledger's disk, which writes while the other processes end: in all, and at least
+# after they have ended.
 LEDGER_STOP_S, LEDGER_LEAST_S = 0.5, 0.2
 # Time after which the process exits even if it is blocked [s]: the unit's ``TimeoutStopSec=`` is
 # 10, and its SIGKILL would leave no trace of the cause.
@@ -71,7 +71,7 @@ def run_daemon(
 
     Args:
         config: the configuration.
-        record_to: folder for recordings; without it there are none.
+        record_to: folder for recordings; None for no recordings.
         state: folder of the coverage ledger, in place of the configuration's.
         fresh: set the ledger aside, and cover everything again.
         read: reads the configuration again on SIGHUP from a service manager.

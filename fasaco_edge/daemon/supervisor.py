@@ -75,7 +75,8 @@ class RecorderSupervisor:
     def _launch(self) -> None:
         """Start the process; this may fail without memory or process ids."""
         try:
-            # In memory and not in a pipe, which would need concurrent writing and reading.
+            # The configuration goes through a file in memory: a pipe would need concurrent writing
+            # and reading.
             with open(os.memfd_create("configuration"), "w+b") as document:
                 document.write(self._config)
                 document.seek(0)

@@ -111,7 +111,7 @@ class CheckContext:
         file: where that was read; None for the defaults.
         unit: the daemon's unit, as systemd has it; None where there is none.
         recordings: folder for recordings; None if none was given.
-        root: the computer's root folder.
+        root: root of the computer's file system.
     """
 
     config: DaemonConfig

@@ -97,7 +97,7 @@ def _state_faults(context: CheckContext) -> list[Finding]:
     except FileNotFoundError:
         return []  # the daemon makes it
     except OSError as error:
-        # Of a service with a user of its own, in a folder that is root's alone.
+        # The folder of a service with its own user, inside a folder that only root can read.
         return [ok(f"{folder}: {error.strerror}")] if context.unit else []
     if status.st_mode & stat.S_IWOTH:
         found = f"{folder}: everybody on this computer may change what counts as covered"
@@ -142,7 +142,7 @@ def _distrusted(why: str, details: Sequence[str] = ()) -> Finding:
 
 
 def _warmup(context: CheckContext) -> str:
-    """Return the command that compiles them into that folder, as the daemon's user."""
+    """Return the command that compiles the kernels into that folder, as the daemon's user."""
     if context.unit is None:
         return "fasaco-edge warmup"
     given = context.environ.get("NUMBA_CACHE_DIR")

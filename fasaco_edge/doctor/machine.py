@@ -20,7 +20,7 @@ MACHINES = ("x86_64", "aarch64")
 FEATURES = ("avx2", "avx512f", "asimd", "sve")
 COMPILED = ("eclipse-zenoh", "llvmlite", "msgspec", "numba", "numpy", "pillow", "rerun-sdk")
 LEAST_PYTHON = (3, 11)
-# adjtimex(2): struct timex, and where in it is what.
+# adjtimex(2): struct timex, and the positions of members in it.
 TIMEX_BYTES, MAXERROR_AT, STATUS_AT = 208, 24, 40
 STA_UNSYNC = 0x40
 TIME_ERROR = 5
@@ -167,7 +167,7 @@ def controller(root: Path) -> int | None:
     """Return the version of control groups that limits memory; None if none does."""
     if "memory" in _read(root / "sys/fs/cgroup/cgroup.controllers").split():
         return 2
-    # The names of version 1's are listed even where the kernel was configured without them.
+    # Version 1 lists the names of its controllers even if the kernel was built without them.
     enabled = re.search(r"^memory\s+\d+\s+\d+\s+1$", _read(root / "proc/cgroups"), re.MULTILINE)
     return 1 if enabled and (root / "sys/fs/cgroup/memory").is_dir() else None
 

@@ -32,7 +32,7 @@ CHECKS = (
 )
 
 
-# For all together [s]: a disk, a network or a peer on the bus may not answer.
+# Timeout of all checks together [s]: a disk, a network or a peer on the bus may not answer.
 PATIENCE_S = 2.0
 
 

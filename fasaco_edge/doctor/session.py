@@ -108,7 +108,7 @@ LISTEN_S = 0.7
 ASK_S = 0.7
 # What to do about two publishers of one thing.
 ONE_ONLY = "stop all but one: the daemon uses the first it receives, until that is silent"
-# Most maps under other names that are listed.
+# Limit on the listed maps under other names.
 MOST_PLACES = 8
 # Positions of the entity's kind and of its topic's type in a token of rmw_zenoh
 # (``wire.ros_keys``).
@@ -134,7 +134,7 @@ def session(context: CheckContext) -> Finding:
         else:
             details.append(f"{endpoint}: free")
     silent = [endpoint for endpoint in bus.connect if answers(endpoint) is False]
-    details += [f"{endpoint}: nobody answers" for endpoint in silent]
+    details += [f"{endpoint}: no answer" for endpoint in silent]
     if len(silent) == len(bus.connect) > 0:
         # A client with credentials ends, as these may be what is wrong; a service starts it again.
         ends = bus.mode == "client" and bus.security.kind != "none"
@@ -145,7 +145,7 @@ def session(context: CheckContext) -> Finding:
         return ok("the endpoints are free", details)
     try:
         with _joined(context) as joined:
-            met = " and ".join(joined.met()) or "nobody"
+            met = " and ".join(joined.met()) or "no other session"
             return ok(f"joined {met} as a client", details)
     except BusUnavailable as error:
         to_do = "stop the program that listens there, or choose another port in bus.listen"
@@ -228,12 +228,12 @@ class MapsElsewhere:
         self._bus = bus
         self._own = own
         self._keys: set[str] = set()
-        # By the native key of any robot, and by that of a bridge in any namespace.
+        # Maps on the native key of any robot, and on that of a bridge in any namespace.
         for key in (f"**/{VERSION}/*/{topics.MAP.suffix}", f"**/{topics.MAP.suffix}"):
             bus.subscribe(key, lambda sample: self._keys.add(sample.key), latched=True)
 
     def places(self) -> list[str]:
-        """Return where they are, at most ``MOST_PLACES``; those of rmw_zenoh by their tokens."""
+        """Return where maps are, at most ``MOST_PLACES``; rmw_zenoh's are found by their tokens."""
         found = {f"key {key}" for key in set(self._keys) if key not in self._own}
         for token in self._bus.alive("@ros2_lv/**", ASK_S):
             parts = token.split("/")

@@ -69,7 +69,7 @@ MOST_BYTES = (
     + MAX_LATTICE_CELLS * _TRAIL_BYTES
     + 16_000_000
 )
-"""Of a body, and of a file, which is smaller; longer ones are not read."""
+"""Limit on the bytes of a body, and of a file, which is smaller; longer ones are not read."""
 # Cells look alike after a quarter-turn [deg].
 MOST_LATTICE_DEG = 90.0
 # Pheromone values rounded at a time.
@@ -96,7 +96,7 @@ def _version_of(snapshot: LedgerSnapshot) -> int:
 def _parts(snapshot: LedgerSnapshot) -> Iterator[bytes]:
     frame, floor = snapshot.frame.encode(), snapshot.floor.tiles
     counts = (len(frame), len(snapshot.under_tool), len(snapshot.tiles), len(floor))
-    # A larger one would make the ledger unreadable.
+    # A larger note would make the ledger unreadable.
     trail = snapshot.trail if snapshot.trail.tau.size <= 4 * MAX_LATTICE_CELLS else NO_TRAIL
     version = _version_of(snapshot)
     more = (*trail.tau.shape[:2], len(snapshot.fleet), snapshot.lattice_deg)[: version - 1]

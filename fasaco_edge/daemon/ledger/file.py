@@ -163,7 +163,7 @@ class LedgerFile:
 
     def _take_lock(self) -> None:
         make_folder(self.path.parent)
-        # Not opened for writing: that would keep the disk from turning read-only.
+        # The file is not opened for writing: that would keep the disk from turning read-only.
         # Non-blocking: if its name is a pipe, opening it would wait for a writer.
         name = lock_file(self.path.parent, self.path.stem)
         try:

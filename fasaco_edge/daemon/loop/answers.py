@@ -68,7 +68,7 @@ def check(request: Request, *parameters: str, payload: bool = False) -> None:
     """Check that a query has no other parameters, and a payload only if it takes one.
 
     Raises:
-        BadQuery: it has; the error names them.
+        BadQuery: a parameter or a payload that the query does not take; the error names it.
     """
     name = request.key.rpartition("/")[2]
     takes = ", ".join(parameters) or "none"
@@ -84,7 +84,7 @@ LEFT_OUT = "(left out)"
 
 
 def serve_about(bus: Bus, keys: Keys, config: Callable[[], DaemonConfig]) -> None:
-    """Serve the current ``config`` and ``version``; reply to other queries with a list of all."""
+    """Serve the current ``config`` and ``version``; reply to unknown queries with a list."""
     version = Version(__version__, VERSION.removeprefix("@"), metadata.version("eclipse-zenoh"))
     documents: dict[str, Callable[[], object]] = {
         "config": lambda: config_document(config()),

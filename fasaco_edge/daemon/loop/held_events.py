@@ -1,4 +1,4 @@
-"""Held events: the first events of a mission, from the first map until it is loaded."""
+"""Held events: a mission's first events, from the first map until the mission is loaded."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class HeldEvents:
     """
 
     def __init__(self, events: Sequence[Event] = ()) -> None:
-        # By type and frame, in order of arrival.
+        # Held events by type and frame, in order of arrival.
         self._held: dict[tuple[type, str], Event] = {}
         for event in events:
             self._held[type(event), _frame(event)] = event
@@ -83,7 +83,7 @@ class HeldEvents:
         faults: list[FasacoError] = []
         newest = next(reversed(maps))
         for frame, grid in maps.items():
-            # An update of neither frame is a mismatch with the newest map.
+            # An update in neither frame goes to the newest map, which reports the mismatch.
             theirs = [p for p in patches if (p.frame if p.frame in maps else newest) == frame]
             updated = grid.with_updates(theirs)
             self._held[MapReceived, frame] = MapReceived(updated.grid)
@@ -97,4 +97,4 @@ def _frame(event: Event) -> str:
             return grid.frame
         case PoseReceived(pose):
             return pose.frame
-    return ""  # it has none
+    return ""  # other events have no frame

@@ -1,4 +1,4 @@
-"""The inbox: the mission's subscriptions, their samples by cycle, decoded into events."""
+"""The inbox: the mission's subscriptions, and the samples of a cycle decoded into events."""
 
 from __future__ import annotations
 
@@ -42,16 +42,16 @@ if TYPE_CHECKING:
     from fasaco_edge.planners.planner import ColonySnapshot
 
 MAPS = ("map", "map_update")
-# Inputs of which one publisher counts.
+# Inputs that only one publisher may send, and their plurals in reports.
 PLURALS = {topics.MAP: "maps", topics.POSE: "poses", topics.BATTERY: "charges of the battery"}
 # Least period of queries for the map: updates without their map come in bursts [s].
 ASK_FOR_MAP_S = 2.0
 # Rate limit of maps [s]: a flood of maps must not take a core. No mapper is that fast.
 MAP_SPACING_S = 0.05
-# Most poses of a cycle: other samples must not wait for a thousand. A command waits for the poses
-# before it: floor swept before a reset must not count after it.
+# Limit on the poses of a cycle: other samples must not wait for a thousand poses. A command waits
+# for the poses before it: floor swept before a reset must not count after it.
 MOST_POSES = 32
-# Most commands of a cycle: an order of a hundred zones takes as long as a map.
+# Limit on the commands of a cycle: an order of a hundred zones takes as long as a map.
 MOST_COMMANDS = 1
 
 
@@ -242,8 +242,8 @@ class Inbox:
         """Return the events in a batch, and the faults; a malformed sample affects no other.
 
         For each frame the newest readable map counts. It replaces earlier updates of that frame,
-        lost ones included. Messages of a fleet wait in their receiver until there is a mission;
-        with it they come to the turn log, which a replay reads.
+        lost ones included. Messages of a fleet wait in their receiver until there is a mission.
+        From then on the turn log has them, so that a replay can read them.
         """
         maps, faults = self._newest_maps(batch.samples)
         events = list[Event](MapReceived(grid) for grid, _ in maps.values())
@@ -263,7 +263,7 @@ class Inbox:
                 continue
             if isinstance(event, PatchReceived):
                 if received.at < map_at.get(event.patch.frame, float("-inf")):
-                    lost = 0  # they were older still
+                    lost = 0  # the lost ones were even older
                     continue
                 if lost:
                     events.append(PatchesLost(lost))
@@ -297,7 +297,7 @@ class Inbox:
         return dict(reversed(maps.items())), faults
 
     def _event(self, received: Received) -> Event | None:
-        """Return the event in a sample; None for transforms without a new pose, and others."""
+        """Return the event in a sample; None for none, as for transforms without a new pose."""
         kind, sample = received.kind, received.sample
         if kind == topics.FLEET.name:
             return self._fleet.event(sample) if self._fleet else None

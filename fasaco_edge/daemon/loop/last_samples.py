@@ -30,7 +30,7 @@ from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.messages.maps import direction_values, encode_occupancy_grid
 from fasaco_edge.wire.messages.pheromone import encode_pheromone
 
-# The cohort that stands for the last one.
+# The value of ``cohort`` for the last cohort.
 NEWEST = "newest"
 
 

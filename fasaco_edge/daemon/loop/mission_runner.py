@@ -88,7 +88,7 @@ class MissionRunner:
     ) -> tuple[Mission | None, list[Event], list[FasacoError]]:
         """Return the mission, once it is loaded and this daemon plans, and the events for it.
 
-        Until then events are held; a new mission gets all of them. The faults are of unusable
+        Until then events are held; a new mission gets all of them. The faults are those of unusable
         events.
         """
         if self.mission is not None:
@@ -170,7 +170,8 @@ class MissionRunner:
         self._held = HeldEvents(held)
 
     def stand_by(self) -> None:
-        """Send nothing more, as another daemon plans; keep only the doubt about the building."""
+        """Send nothing more, as another daemon plans; keep a mission only if its building is in
+        doubt."""
         self.paths.forget()
         if self._before is not None and not self._before.is_in_doubt:
             self._before = None

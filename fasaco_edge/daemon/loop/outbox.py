@@ -44,7 +44,7 @@ LOG = logging.getLogger(__name__)
 
 # Rate limit of log lines for repeated failures [s].
 LOG_PERIOD_S = 10.0
-# Most failures that wait to be counted.
+# Limit on the failures that wait to be counted.
 MOST_FAULTS = 100
 
 
@@ -218,8 +218,7 @@ class PublishGuard:
 
 # Least period of the coverage [s].
 COVERAGE_PERIOD_S = 0.5
-# Least period of the swept floor [s], and the most squares of it: a large floor gets larger
-# squares.
+# Least period of the swept floor [s], and limit on its squares: a large floor gets larger squares.
 FLOOR_PERIOD_S = 2.0
 MOST_SQUARES = 1_000_000
 # Least period of the trail [s]; a large one, which takes the loop some milliseconds per 100,000

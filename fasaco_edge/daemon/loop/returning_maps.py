@@ -9,8 +9,8 @@ import numpy as np
 
 from fasaco_edge.grid.occupancy import OccupancyGrid
 
-# Number of maps, and their time [s], that each equal the last but one, byte for byte. A door that
-# opens and shuts is slower.
+# So many maps within this time [s] that each equal the last but one, byte for byte, show two
+# publishers. A door that opens and shuts is slower.
 RETURNS, PERIOD_S = 3, 10.0
 # Least difference of the two maps, as pixels flicker: the free pixels in a wall of this length [m].
 LEAST_WALL_M = 0.5

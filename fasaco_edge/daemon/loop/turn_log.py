@@ -63,7 +63,7 @@ FULL_BYTES = 4_000_000
 MARGIN_S = 0.2
 POSE = "pose"
 EMBEDDED = (POSE, "battery")
-NOBODY = "nobody listens to it"
+NO_SUBSCRIBER = "it has no subscriber"
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,7 +111,7 @@ class TurnLog:
             self._embed_until = time.monotonic() + MARGIN_S
         batch = turn.batch
         if any(isinstance(plan, PlanBroken) for plan in batch.plans):
-            self.end("a plan broke, which no replay repeats")
+            self.end("a plan failed, which no replay can repeat")
             return
         # Fleet messages before the first mission are dropped.
         samples = [
@@ -152,10 +152,10 @@ class TurnLog:
             return
         if self._is_waiting:
             if len(self._times) > WAITING_TURNS or self._samples.waiting_bytes > POSES_BYTES:
-                self.end(NOBODY)
+                self.end(NO_SUBSCRIBER)
             return
         if not self._publisher.has_listeners():
-            self.end(NOBODY)
+            self.end(NO_SUBSCRIBER)
             return
         start, kernels = None, ""
         if self._first == 1:
