@@ -67,8 +67,8 @@ def program() -> NoReturn:
 
     A session of Zenoh leaves threads behind that still release callbacks after it was closed (Zenoh
     1.10). Where the interpreter ends meanwhile, the C library aborts the process with "FATAL:
-    exception not rethrown", or the interpreter waits for ever. So it does not end by itself then;
-    but where Rerun was loaded, which writes what is left at the interpreter's end.
+    exception not rethrown", or the interpreter waits for ever. So the process then exits without
+    the interpreter's own end, except with Rerun, which writes its last data there.
     """
     code = main()
     if "zenoh" not in sys.modules or "rerun" in sys.modules:
@@ -117,7 +117,7 @@ def run_command(parser: argparse.ArgumentParser, words: Sequence[str]) -> int:
 
 
 def _parser(words: Sequence[str]) -> argparse.ArgumentParser:
-    """Return a parser that knows all commands by name, and by its options the one in ``words``."""
+    """Return a parser that knows all commands by name, and the options of the one in ``words``."""
     parser = argparse.ArgumentParser(
         prog="fasaco-edge",
         description="Coverage path planning with fast-spanning ant colonies, on a robot.",
@@ -145,7 +145,7 @@ def _describe(parser: argparse.ArgumentParser, command: Command) -> None:
 
 def _may_pass(error: BaseException | None) -> bool:
     """Return whether an error is transient: not a mistake of the user, and perhaps over soon."""
-    # What a user's own planner raised is his to mend.
+    # An error of a user's own planner is a mistake of the user.
     while error is not None and not isinstance(error, PlannerFailed):
         if isinstance(error, OSError) and error.errno in _PASSING:
             return True

@@ -88,7 +88,7 @@ TIMEOUT_S = 5.0
 
 
 def nobody_answers(prefix: str, robots: Collection[str]) -> NobodyAnswersError:
-    """Return the error that no daemon answers at ``prefix``, where these robots are."""
+    """Return the error for no answer at ``prefix``; ``robots``: those with a daemon on the bus."""
     if prefix.rpartition("/")[2] in robots:
         return NobodyAnswersError(
             f"the daemon at {prefix} is on the bus, but has not answered in time",
@@ -204,7 +204,7 @@ def print_answer(reply: Reply) -> None:
 def show(name: str, reply: Reply) -> None:
     """Print the answer to question ``name``."""
     if reply.schema:
-        # A path that no plan made has none of a plan's figures.
+        # A path that does not come from a plan has no figures of a plan.
         known = {title: value for title, value in _figures(reply).items() if value is not None}
         out().print(figures([(title, str(value)) for title, value in known.items()]))
     elif name in ("status", "mission"):

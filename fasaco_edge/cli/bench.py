@@ -111,7 +111,7 @@ def _print(report: Report, interrupted: bool) -> None:
     console = terminal.out()
     for shown in report.tables:
         table = _table(shown.title)
-        # As text, cells keep their line ends, which a string has shown as a backslash and an n.
+        # Text keeps the line breaks in a cell; a plain string shows them as a backslash and an n.
         first, *others = map(Text, shown.header)
         table.add_column(first, style="cyan", overflow="fold")
         for column in others:
@@ -158,7 +158,7 @@ def _table(title: str) -> Table:
 
 COMMAND = Command(
     description="Measure planning, the daemon's memory and delays on this machine, or compare "
-    "planners. Each benchmark says what is good and whether that is met.",
+    "planners. Each benchmark states a goal and whether it is met.",
     run=run,
     add_options=add_benchmarks,
     epilog=EPILOG,

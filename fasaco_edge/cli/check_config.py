@@ -41,7 +41,7 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def _shown(config: DaemonConfig) -> dict[str, object]:
-    # It comes with all of the daemon.
+    # This imports most of the daemon.
     from fasaco_edge.daemon.loop.answers import config_document
 
     return config_document(config)
@@ -94,7 +94,7 @@ def _document(
 
 
 def _print(file: Path, faults: list[Fault]) -> None:
-    """Print a line for each fault, as compilers do, and each hint that is not everybody's."""
+    """Print a line for each fault, as compilers do, and each hint that is specific to its fault."""
     console = out()
     for fault in faults:
         where = f"{file}:{fault.line}" if fault.line else str(file)

@@ -69,7 +69,8 @@ def run(args: argparse.Namespace) -> int:
     code = Exit.ERROR if failed else Exit.OK
     checks = {check.name for check in CHECKS}
     if any(thread.name in checks for thread in threading.enumerate()):
-        # A check hangs, which the interpreter's end would wait for. Other threads are the caller's.
+        # The interpreter would wait at its exit for a check that hangs. Other threads belong to the
+        # caller.
         sys.stdout.flush()
         os._exit(code)
     return code

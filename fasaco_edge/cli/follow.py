@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 # Descriptor of standard input; it may be closed, and sys.stdin None.
 STDIN = 0
-# Of the tool's width: lanes beside each other are further apart, and a robot is nearer to its own.
+# Share of the tool's width: lanes are further apart than this, and a robot is nearer to its lane.
 NEAR_SHARE = 0.75
 EPILOG = """\
 Speeds and accelerations are those of the configuration: robot.speed_m_s, acceleration_m_s2,
@@ -35,14 +35,14 @@ turn_deg_s, turn_deg_s2 and steered_deg. Where the configuration has a block ros
 its topics and velocities go to ros2.topics.cmd_vel; else by the keys `pose` and `cmd_vel`.
 Corners up to 135 degrees are rounded in motion, within 2 cm; at sharper ones it turns on the spot.
 
-The robot is told to stand, within 0.2 s, while
+It stops the robot within 0.2 s, and keeps it standing, while
   the newest pose is older than --pose-age, or is none, or has jumped; of poses from tf, odometry
     is older than --pose-age, or the localiser's transform older than 2 s (or --pose-age, if longer)
   the configuration has a block scan, and no scan has come for scan.lost_s, or none that can be used
   something that the map does not show is ahead, by the scan: it slows down before it, and goes on
     once that is gone
   the path is empty (mission pause, cancel; done), is driven, or is none
-  it is further than 0.3 m off the path, or does not move as it is told (three tries in a place and
+  it is further than 0.3 m off the path, or does not move as commanded (three tries in a place and
     a direction, 2 and 4 s apart)
   no daemon plans for it, or the one that plans has sent no status for 2.5 s
   another follower of this robot drives: then nothing is sent at all, and this one takes over once
@@ -51,7 +51,7 @@ and when this program ends. It drives on by itself when that is over: after the 
 pose has moved by 0.1 m, or the path leads elsewhere (by 45 degrees); a path that leads the same way
 brings no new try. A pose with the stamp of the one before is no new
 one. Zeros are sent for a second after a stop, then nothing. A base has to stop by itself where
-nothing comes for 0.5 s: nobody else can, if this program or its computer dies.
+nothing comes for 0.5 s: nothing else can stop it if this program or its computer dies.
 
 With `ros2.follow: nav2` in the configuration nothing is driven here: the path goes to Nav2's
 controller, piece by piece, as goals of /follow_path (nav2_msgs/FollowPath), which end for the same
@@ -118,12 +118,14 @@ def _become_small(args: argparse.Namespace) -> NoReturn:
     if not 0.0 < args.speed <= 100.0:
         raise BadConfiguration(f"--speed must be above 0 and at most 100, got {args.speed}")
     document = settings_of(args).encode()
-    # Not by its command line, which others can read: it may hold a password.
+    # The settings are not passed on the command line, which others can read: they may hold a
+    # password.
     reading, writing = os.pipe()
     os.write(writing, document)
     os.close(writing)
     os.dup2(reading, STDIN)
-    # Where nothing was open there, the pipe itself may be, which ends with this program otherwise.
+    # If standard input was closed, the pipe itself may have its number, and would close at the
+    # exec.
     os.set_inheritable(STDIN, True)
     words = ["follow", "--given", "--log-level", args.log_level]
     if args.with_parent is not None:

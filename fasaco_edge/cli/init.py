@@ -48,7 +48,7 @@ examples:
   fasaco-edge init
   fasaco-edge init robot.yaml --robot-radius 0.22 --tool-width 0.3 --map-by rmw_zenoh \\
       --connect tcp/127.0.0.1:7447
-exit codes: 0 written, whether or not maps were heard; 78 not written (EX_CONFIG)
+exit codes: 0 written, whether or not maps were received; 78 not written (EX_CONFIG)
 """
 
 
@@ -101,7 +101,7 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--no-try", action="store_true", help="do not look for maps on the bus")
     parser.add_argument("--force", action="store_true", help="replace the file if there is one")
-    add_json(parser, "the configuration and what was heard")
+    add_json(parser, "the configuration and what was received")
 
 
 def _size(text: str) -> dict[str, float]:
@@ -204,7 +204,7 @@ def _number(question: str, default: float) -> float:
 
 
 def _answer(question: str, default: str) -> str:
-    # Not to standard output, which may be JSON for another program.
+    # Questions do not go to standard output, which may be JSON for another program.
     err().print(f"{question} [{default or 'none'}]: ", end="", markup=False, soft_wrap=True)
     line = sys.stdin.readline()
     if not line:  # Ctrl-D: without an answer nothing is written
@@ -252,7 +252,7 @@ def _print(file: Path, text: str, config: DaemonConfig, heard: Finding | None) -
 
 COMMAND = Command(
     description="Write a first configuration for a robot: its size, its tool, how the map comes. "
-    "Looks for the map on the bus, and says what it has heard.",
+    "Looks for the map on the bus, and says what it has received.",
     run=run,
     add_options=_add_options,
     epilog=EPILOG,

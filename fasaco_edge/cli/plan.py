@@ -54,7 +54,7 @@ def run(args: argparse.Namespace) -> int:
             hint=f"choose --planner {' or '.join(WITH_PHEROMONE)}",
         )
     compile_kernels(stages_of_plan(search.planner))
-    # After that, as they import the compiler.
+    # Imported only now, as these modules import the compiler.
     from fasaco_edge.offline.maps import load_map
     from fasaco_edge.offline.plan import plan
 
@@ -65,7 +65,7 @@ def run(args: argparse.Namespace) -> int:
     asked = Interrupt()
     total = search.most_s if search.has_local_search else search.ants
     counted = not search.has_local_search
-    # Nobody asks a planner of the user's own to end.
+    # A user's own planner has no request to end: Ctrl-C interrupts it.
     on_ctrl_c = nullcontext() if request.own else first_signal_calls(signal.SIGINT, asked.asked.set)
     trails: deque[ColonySnapshot] = deque(maxlen=1)
     with on_ctrl_c, watching(total, counted=counted) as show:

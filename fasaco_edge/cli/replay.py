@@ -38,8 +38,8 @@ code 1. One without is replayed approximately: time is that of the samples and p
 in work. The same files give the same decisions on any machine.
 """
 EPILOG = """\
-The column `then` tells whether the path equals the recorded one cell by cell. Without a turn log
-a recording does not tell in full which samples the daemon took together, nor the work of plans
+The column `then` shows whether the path equals the recorded one cell by cell. Without a turn log
+a recording does not show in full which samples the daemon took together, nor the work of plans
 that were not used: a different path is no error then. With --config or --work the replay is of
 another mission, and approximate, too. So is that of a daemon of an earlier release which planned
 with a planner of the user's own: those plans cannot be repeated, and `planner.name` plans instead.
@@ -230,7 +230,7 @@ def _rows(summary: Summary) -> list[tuple[str, str]]:
     return rows
 
 
-# Most differing samples that are named.
+# Limit on the differing samples that are named.
 NAMED = 5
 
 

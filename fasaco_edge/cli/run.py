@@ -57,8 +57,8 @@ def run(args: argparse.Namespace) -> int:
 
     read = partial(read_config, args.config)
     run_daemon(read(), args.record, args.state, fresh=args.fresh, read=read)
-    # All is closed. What is left is the interpreter's own end, in which it was seen to wait for
-    # ever, now and then, where Zenoh's threads had been at work: a service must not.
+    # All is closed. The interpreter's own end is left out: after use of Zenoh's threads it was seen
+    # to wait for ever now and then, which a service must not.
     logging.shutdown()
     sys.stdout.flush()
     os._exit(Exit.OK)

@@ -148,7 +148,7 @@ def _serve(server: Server, args: argparse.Namespace, address: Address, guard: Gu
     import logging
 
     secured = _tls(args)
-    # It logs each connection.
+    # The library logs each connection.
     logging.getLogger("websockets").setLevel(logging.WARNING)
     try:
         _say(address, guard, args.tokens, secured is not None)

@@ -60,7 +60,7 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--meets-others",
         action="store_true",
-        help="stop before other robots on the bus, all of one size",
+        help="stop before other robots on the bus; all have the same size",
     )
     parser.add_argument(
         "--trail-out", type=Path, metavar="FILE.csv", help="write the driven positions, header x,y"
@@ -118,7 +118,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _words(progress: Progress) -> str:
-    """Return how the robot is, for one line."""
+    """Return the robot's progress as one line of text."""
     pose = progress.pose
     return (
         f"{progress.sim_s:8.1f} s  x {progress.speed:5.1f}  ({pose.x:7.2f}, {pose.y:7.2f}) m"

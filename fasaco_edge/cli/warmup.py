@@ -18,8 +18,8 @@ The cache is $NUMBA_CACHE_DIR, else fasaco-edge in $XDG_CACHE_HOME or ~/.cache. 
 these sources, one version each of numba, llvmlite and Python, and one processor; a daemon that
 finds none compiles it with its first map. Each file is checked before use; a damaged one is
 compiled again. A folder that anybody but root and you could write to or replace is not used, but
-a temporary one instead: `chmod go-w` on the named folder mends that. A relative $XDG_CACHE_HOME is
-ignored; a user without a home gets the temporary folder, too.
+a temporary one instead: `chmod go-w` on the named folder corrects that. A relative $XDG_CACHE_HOME
+is ignored; a user without a home gets the temporary folder, too.
 exit codes: 0 all kernels are there, 1 (--check) some are not
 
 examples:
@@ -61,7 +61,7 @@ def run(args: argparse.Namespace) -> int:
         if passed_over and args.check:  # or else it has been logged
             err().print(f"{passed_over}: not used", soft_wrap=True)
         after = "" if args.check else f" after {seconds:.1f} s"
-        # Not ready after a run that compiled them: they could not be kept, which has been logged.
+        # Kernels missing after a run that compiled them could not be kept, which has been logged.
         ready = f"not ready: {missing};" if missing else f"ready{after}"
         to_do = ": `fasaco-edge warmup` compiles them" if missing and args.check else ""
         err().print(f"kernels {ready} in {folder}{to_do}", soft_wrap=True)

@@ -132,9 +132,10 @@ def _once(args: argparse.Namespace, watched: Watched, no_answer: Callable[[], Fa
         live.print_json(watched.document())
         return
     console = out()
-    # The prompt takes a line.
+    # Leaves one line of the screen for the prompt.
     for line in watched.page(steady_now(), console.width, console.height - 1):
-        # Its colours have to go through; its texts are clean.
+        # Written as it is, to keep the colours; texts in it are already clean of control
+        # characters.
         console.file.write(f"{line.rstrip()}\n")
 
 

@@ -241,5 +241,5 @@ def test_a_configuration_that_is_no_demos_is_not_overwritten(tmp_path):
     (tmp_path / "config.yaml").write_text("robot: {name: maja}\n")
     ended = fasaco_edge("demo", "--out", tmp_path)
     assert ended.code == 78
-    assert "config.yaml is there already, and is no demo's" in ended.err
+    assert "config.yaml exists, and is not from a demo" in ended.err
     assert (tmp_path / "config.yaml").read_text() == "robot: {name: maja}\n"

@@ -73,7 +73,7 @@ def add_common(parser: argparse.ArgumentParser) -> None:
         default="info",
         help="log level on standard error (default: %(default)s)",
     )
-    # For the processes that other commands start: they end when those do.
+    # Given to processes that other commands start, so that they end with their parent.
     parser.add_argument("--with-parent", type=int, metavar="PID", help=argparse.SUPPRESS)
 
 
@@ -120,11 +120,12 @@ def seconds(text: str) -> float:
 def with_negative_pairs(words: Sequence[str]) -> list[str]:
     """Return the words of a command line with ``--start -1,2`` as ``--start=-1,2``.
 
-    argparse takes negative numbers for values, but ``-1,2`` for an option. Of an option with
-    several values each such one stands alone: ``--robots 0,0 --robots=-1,2 --robots 3,3``.
+    argparse takes negative numbers for values, but ``-1,2`` for an option. In an option with
+    several values each such value gets an option of its own: ``--robots 0,0 --robots=-1,2 --robots
+    3,3``.
     """
     joined: list[str] = []
-    # That the next word may be a value of.
+    # The option that the next word may be a value of.
     option = ""
     for word in words:
         if option and re.match(r"-[\d.]", word):
@@ -135,7 +136,8 @@ def with_negative_pairs(words: Sequence[str]) -> list[str]:
             name, has_value, _ = word.partition("=")
             takes_more = name in WITH_PAIRS or (name in WITH_PAIR and not has_value)
             option = name if takes_more else ""
-            # A pair that is no option's value stands for itself: with a space argparse sees it so.
+            # A pair that is no option's value is positional: after a space argparse takes it as
+            # such.
             joined.append(f" {word}" if re.match(r"-[\d.]+,", word) else word)
             continue
         else:
@@ -198,8 +200,8 @@ def robot_on_bus(args: argparse.Namespace) -> RobotOnBus:
     the defaults, in this order.
 
     Raises:
-        BadConfiguration: a name or an endpoint is none, or the configuration or what shows who
-            this is cannot be read.
+        BadConfiguration: a name or an endpoint is invalid, or the configuration or the credentials
+            cannot be read.
     """
     from fasaco_edge.wire.keys import Keys
 
@@ -269,7 +271,7 @@ def check_outputs(outputs: Iterable[Path | None], inputs: Iterable[Path] = ()) -
 
 @contextmanager
 def naming(place: Path) -> Iterator[None]:
-    """Name ``place`` where the block fails to write there, on a full disk, say.
+    """Raise an error that names ``place`` if the block cannot write there, as on a full disk.
 
     Raises:
         BadConfiguration: the block raised OSError.
@@ -282,7 +284,7 @@ def naming(place: Path) -> Iterator[None]:
 
 @contextmanager
 def writing(file: Path) -> Iterator[Path]:
-    """Yield the name by which ``file`` is to be written, see ``host.outputs.whole``.
+    """Yield the name to write ``file`` under, see ``host.outputs.whole``.
 
     Raises:
         BadConfiguration: it cannot be written.

@@ -73,7 +73,7 @@ class OneOfAKind(logging.Handler):
                 continue
             del self._kinds[kind]
             if known.last is not None:
-                # Of the same kind as well, so that its ten seconds begin again.
+                # The separate line is of the same kind, so the ten seconds begin again.
                 self._kinds[kind] = _Kind(now + PERIOD_S)
                 _add_count(known.last, known.left_out - 1)
                 self._target.handle(known.last)
@@ -119,7 +119,7 @@ class JournalHandler(logging.Handler):
     def __init__(self, address: str = SOCKET) -> None:
         super().__init__()
         self._address = address
-        # Half a megabyte, which a process without a journal does not need.
+        # The import takes half a megabyte, which a process without a journal does not need.
         import socket
 
         self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM | socket.SOCK_CLOEXEC)
@@ -184,7 +184,7 @@ def encode_entry(fields: Mapping[str, str]) -> bytes:
 
 
 LOG = logging.getLogger(__name__)
-# Of an error with all that is wrong with a file, or a traceback [characters].
+# Longest text of a line: an error that lists all faults of a file, or a traceback [characters].
 MOST_CHARACTERS = 20_000
 PLAIN, JOURNAL = "%(levelname)s %(name)s: %(message)s", "%(message)s"
 
@@ -197,7 +197,7 @@ class OneLine(logging.Formatter):
         return one_line(super().formatMessage(record))
 
     def formatException(self, ei: Any) -> str:  # noqa: ANN401, N802 - logging's names
-        """Return a traceback that no line of the log can be taken for."""
+        """Return a traceback none of whose lines looks like an entry of the log."""
         return f"    {_indented(super().formatException(ei))}"
 
 
@@ -221,7 +221,7 @@ def say_why(error: FasacoError) -> None:
         text = f"{error} ({error.hint})" if error.hint else str(error)
         LOG.error("%s", text, extra={"event": "failure", "code": error.code})
         return
-    # Further lines of a message stand further in than the hint: none can be taken for it.
+    # Further lines of a message are indented more than the hint, so that none looks like one.
     print("fasaco-edge:", _indented(str(error)), file=sys.stderr)
     if error.hint:
         print("  hint:", _indented(error.hint), file=sys.stderr)

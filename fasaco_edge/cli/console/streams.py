@@ -25,7 +25,7 @@ class CleanStream:
     """
 
     def __init__(self, stream: TextIO) -> None:
-        # By this name rich finds the stream itself: its own escapes have to go through.
+        # Rich finds the stream itself by this name: the escapes that Rich writes must stay.
         self.rich_proxied_file = stream
         self._print: Callable[[str], None] | None = None
         self._begun = ""
@@ -72,7 +72,7 @@ def open_missing_streams() -> None:
         try:
             os.fstat(number)
         except OSError:
-            # It gets the lowest number that is free, which is this one.
+            # The opened file gets the lowest free number, which is this one.
             os.set_inheritable(os.open(os.devnull, os.O_RDWR), True)
         if getattr(sys, name) is None:
             setattr(sys, name, os.fdopen(number, mode, encoding="utf-8", closefd=False))
@@ -91,7 +91,7 @@ def clean_streams() -> None:
 
 @contextmanager
 def printed_by(print_lines: Callable[[str], None]) -> Iterator[None]:
-    """Pass the lines of both outputs to ``print_lines``, of those that lead to a terminal."""
+    """Pass the lines of each output that leads to a terminal to ``print_lines``."""
     with ExitStack() as stack:
         for stream in (sys.stdout, sys.stderr):
             if isinstance(stream, CleanStream) and stream.isatty():

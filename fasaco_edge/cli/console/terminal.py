@@ -30,7 +30,8 @@ from fasaco_edge.text import lines, one_line
 
 
 class CleanConsole(Console):
-    """A console to which a string is one line of plain text: no mark-up, nothing that controls."""
+    """A console that prints strings as plain text in one line: no mark-up, no control
+    characters."""
 
     def __init__(self, *, stderr: bool = False) -> None:
         super().__init__(stderr=stderr, highlight=False, markup=False, emoji=False)
@@ -87,7 +88,7 @@ class ProgressLines(Progress):
             return
         super().start()
         self._while_shown.enter_context(printed_by(self._print_above))
-        # It ends the process without a way out that would show the cursor again.
+        # By default SIGTERM ends the process at once, and nothing would show the cursor again.
         if signal.getsignal(signal.SIGTERM) is signal.SIG_DFL:
             self._while_shown.enter_context(first_signal_calls(signal.SIGTERM, self._terminate))
 

@@ -42,7 +42,7 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         type=float,
         metavar="X",
         help=f"simulated seconds per second (default: {SPEED:g}; {FLEET_SPEED:g} for several "
-        "robots, which hear of each other once a real second)",
+        "robots, whose messages to each other come once a real second)",
     )
     parser.add_argument("--seed", type=int, default=0, metavar="N", help="the planner's seed")
     parser.add_argument(
@@ -80,7 +80,7 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         type=float,
         metavar="S",
         help="split the network after so many simulated seconds, for 15 real ones: every second "
-        "robot hears none of the others",
+        "robot then receives nothing from the others",
     )
     fleet.add_argument(
         "--record",
@@ -116,7 +116,7 @@ def run(args: argparse.Namespace) -> int:
     out: Path = args.out or RUNS / f"{datetime.now():%Y-%m-%dT%H-%M-%S}"
     with naming(out):
         if args.out is None:
-            # Its name was not given, and another user may have created it.
+            # The user did not choose this folder, and another user may have created it.
             make_own_folder(RUNS)
             make_own_folder(out)
         out.mkdir(parents=True, exist_ok=True)
@@ -124,10 +124,10 @@ def run(args: argparse.Namespace) -> int:
     err().print(f"kernels ready ({seconds:.1f} s); results go to {out}")
     robots = demo_robots(args, out)
     for robot in robots:
-        # A demo writes its own: another's would be lost.
+        # A demo writes this file, and must not overwrite one that no demo wrote.
         if robot.config.exists() and not (robot.folder / "daemon.log").exists():
             raise BadConfiguration(
-                f"--out {out}: {robot.config} is there already, and is no demo's",
+                f"--out {out}: {robot.config} exists, and is not from a demo",
                 hint="name another folder",
             )
     with DemoMission(args, robots) as mission:

@@ -10,18 +10,18 @@ from contextlib import ExitStack
 from fasaco_edge.bus.session import open_bus
 from fasaco_edge.bus.settings import BusSettings
 
-# How long the network stays split [s], in real time as all that robots time each other by.
+# How long the network stays split [s]: real time, as in the timeouts of robots for each other.
 SPLIT_S = 15.0
 
 
 class Mishaps:
     """What goes wrong in a demo, and when.
 
-    The network has two routers, one at each end, and one between that both know: without it,
-    robots at one end do not hear those at the other.
+    The network has a router at each end, and one in the middle that both connect to: without it,
+        robots at one end do not receive messages from those at the other.
 
     Args:
-        kill_after_s, split_after_s: simulated time until then [s]; None for never.
+        kill_after_s, split_after_s: simulated time until the event [s]; None for never.
         ends: endpoints of the two routers.
         say: prints the events.
     """
@@ -71,6 +71,7 @@ class Mishaps:
         daemon, *others = victim
         daemon.kill()
         for process in others:
-            # A base without messages of a daemon stands; its program writes its drive.
+            # Without messages of its daemon a base stands; its program then writes the result of
+            # its drive.
             process.send_signal(signal.SIGTERM)
         return True

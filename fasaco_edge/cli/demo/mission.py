@@ -126,7 +126,7 @@ class DemoMission:
 
     def __enter__(self) -> Self:
         with ExitStack() as stack:
-            # The router that all meet at.
+            # The router that connects all processes.
             bus = stack.enter_context(open_bus(BusSettings("router", (), (self._endpoint,))))
             if self._far != self._endpoint:
                 stack.enter_context(open_bus(BusSettings("router", (), (self._far,))))
@@ -181,7 +181,7 @@ class DemoMission:
         )  # fmt: skip
 
     def _let_happen(self, now: float, began: float) -> None:
-        """Let mishaps happen that are due; of the last robot's processes none is missed then."""
+        """Carry out due mishaps; a process of the last robot that they end is no failure."""
         last = self._robots[-1]
         victim = [one for log, one in self._processes if log.parent == last.folder]
         if self._mishaps.step(now, (now - began) * self._args.speed, victim):
@@ -210,7 +210,7 @@ class DemoMission:
             self._spawn(log, words)
 
     def _await_recorders(self, bus: Bus) -> None:
-        """Wait until all recorders listen, for a while: a robot is quicker there."""
+        """Wait for a while until all recorders listen: they start more slowly than a robot."""
         keys = {Keys(robot.name).of(topics.RECORDER_ALIVE) for robot in self._robots}
         until = time.monotonic() + RECORDERS_WITHIN_S
         while keys and time.monotonic() < until:

@@ -73,7 +73,8 @@ class DemoRobot:
         daemon = ["run", "--config", str(self.config)]
         if args.record == "all":
             daemon += ["--record", str(self.folder)]
-        # Its own progress, from the beginning: no other daemon's, nor an earlier demo's.
+        # The daemon gets a fresh state folder of its own: no progress of another daemon or an
+        # earlier demo.
         daemon += ["--state", str(self.folder / "state"), "--fresh"]
         robot = ["simulate", str(find_map(args.map)), "--driver", args.driver]
         robot += ["--connect", endpoint, "--robot", self.name, "--speed", str(args.speed)]
@@ -95,7 +96,7 @@ def fleet_recorder(out: Path, endpoint: str) -> list[str]:
 
 
 def demo_robots(args: argparse.Namespace, out: Path) -> list[DemoRobot]:
-    """Return the robots: one, as anybody's first; or several, far from one another, by number.
+    """Return the robots: one with the default name; or several with numbers, far from one another.
 
     Raises:
         StartBlocked: there are fewer places to start from than robots.

@@ -106,8 +106,8 @@ def summarise(
         if status.coverage is not None and robot.name != ending.killed
     ]
     if args.line != "cells" and reports:
-        # Along a line the robot passes beside the centres of cells: use the daemon's own count, of
-        # several that which has most left.
+        # A robot on a line passes beside the centres of cells: use the daemon's own count; of
+        # several daemons, that of the one with the most cells left.
         report = max(reports, key=lambda report: report.coverable - report.covered)
         reachable, done = report.coverable, report.covered
     figures = tuple(

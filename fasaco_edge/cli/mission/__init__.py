@@ -59,7 +59,8 @@ terminal they say how much and ask first; elsewhere they are refused without --y
 `start --keep-covered` goes on with the rest. `resume` goes on with what was paused, also the way
 home.
 
-With --fleet all its robots get the same command, those that others heard within ten minutes, too.
+With --fleet all its robots get the same command, also those whose messages others received
+within the last ten minutes.
 Some may refuse or not answer while the others obey: the exit code is 1 then, and one without an
 answer may still be driving. Robots share a zone; corners are in the frame of each robot's own map:
 with fleet.frame use zones and keep-outs of their configurations.
@@ -195,7 +196,7 @@ def _order(args: argparse.Namespace) -> dict[str, object]:
         "return_home": args.return_home,
         "keep_covered": args.keep_covered,
     }
-    # Not by their truth: 0 passes are a mistake to report.
+    # Options are compared with None and False, not by truth: 0 passes are a mistake to report.
     given = {
         name: value for name, value in options.items() if value is not None and value is not False
     }

@@ -1,4 +1,4 @@
-"""Request of ``fasaco-edge plan``: robot, search and line by its options, and its progress."""
+"""Request of ``fasaco-edge plan``: robot, search and line by the options; display of progress."""
 
 from __future__ import annotations
 
@@ -36,8 +36,8 @@ def watching(
     """Yield a display of the progress of a search.
 
     Args:
-        total: of its budget [s], or with ``counted`` of its ants.
-        counted: whether its ants are counted.
+        total: budget of the search [s], or with ``counted`` its number of ants.
+        counted: whether progress counts ants instead of time.
     """
     with terminal.progress(counted=counted) as bar:
         task = bar.add_task("ants", total=total)
@@ -59,8 +59,8 @@ def _words(search: SearchProgress) -> str:
     return words if search.gap is None else f"{words}, {search.gap:.2%} above the bound"
 
 
-# By the name of a limit: its metavar, the least and most that ``RobotConfig`` allows, their unit,
-# and what it is.
+# For each limit: the option's metavar, the range that ``RobotConfig`` allows, its unit, and the
+# help text.
 LIMITS = {
     "turn_deg_s": ("W", 1.0, 1e3, "deg/s", "rate of turning on the spot, in place of --turn-s; "
                    "each bend then costs braking and starting, too"),
@@ -82,7 +82,7 @@ def add_turning(group: argparse._ArgumentGroup, turn_s_help: str) -> None:
 
 
 def turning_of(args: argparse.Namespace, robot: RobotConfig) -> dict[str, float | None]:
-    """Return the changes of a robot's turning by the options.
+    """Return the members of a robot's turning that the options change.
 
     Raises:
         BadConfiguration: a limit is impossible, or of no use with the other options.
@@ -109,7 +109,7 @@ def _option(name: str) -> str:
     return f"--{name.replace('_', '-')}"
 
 
-# Members of ``RobotConfig`` and ``Search`` by the options for them.
+# Options, and the members of ``RobotConfig`` and ``Search`` that they set.
 ROBOT_OPTIONS = {
     "cell": "tool_width_m",
     "robot_radius": "radius_m",
@@ -164,7 +164,7 @@ def read_request(args: argparse.Namespace) -> PlanRequest:
         line = config.planner.line
     if search.swept is not None and line == CELLS:
         raise BadConfiguration(
-            "--swept: a line through the centres of cells sweeps what it sweeps",
+            "--swept: a line through the centres of cells has no share to choose",
             hint="ask for a line over the floor, quick or thorough",
         )
     robot = config.robot if config else RobotConfig()
@@ -200,7 +200,7 @@ def require_frame(map: Map, xy_out: Path | None) -> None:
 
 
 def _search(config: DaemonConfig | None) -> Search:
-    """Return how the daemon of a configuration searches; how ``plan`` does, without one."""
+    """Return the search settings of a daemon's configuration; the defaults of ``plan`` for None."""
     if config is None:
         return Search()
     planner = msgspec.structs.asdict(config.planner)
@@ -209,6 +209,6 @@ def _search(config: DaemonConfig | None) -> Search:
 
 
 def _given(args: argparse.Namespace, members: Mapping[str, str]) -> dict[str, Any]:
-    """Return the values of the options that are given, by the member each is for."""
+    """Return the values of the given options, with the member that each sets as key."""
     values = {member: getattr(args, option) for option, member in members.items()}
     return {member: value for member, value in values.items() if value is not None}

@@ -105,7 +105,7 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         metavar="FILE",
         help="write a picture of the run, with --against of both",
     )
-    # Of earlier releases.
+    # An option of earlier releases.
     parser.add_argument("--html", nargs="?", const=True, help=argparse.SUPPRESS)
     parser.add_argument(
         "--export",

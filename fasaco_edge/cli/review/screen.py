@@ -31,7 +31,7 @@ MOST_VERDICTS = 4
 
 
 def print_review(review: Review, document: ReviewDocument, *, full: bool) -> None:
-    """Print a review, whose document is given, too: in ``full``, or as much as a screen holds."""
+    """Print a review and its document: in ``full``, or as much as fits on a screen."""
     console = terminal.out()
     colours = {True: "green", False: "red", None: "yellow"}
     verdicts = rows.verdicts(document)
