@@ -1,7 +1,7 @@
 """The table of all errors that users meet: each with its code, and a hint on what to do.
 
-The code is what travels: in a status, an error reply, the command line's ``--json``. The text says
-what is wrong and where. (``cli.ask`` repeats errors that a daemon has answered with.)
+A status, an error reply and ``--json`` of the command line carry the code. The text says what is
+wrong and where. (``cli.ask`` repeats errors that a daemon has answered with.)
 """
 
 
@@ -263,14 +263,14 @@ class PlacesElsewhere(FasacoError):
 
 
 class FleetError(FasacoError):
-    """There is no room for what another robot of the fleet says; it is left out.
+    """There is no room for the data of another robot of the fleet; they are left out.
 
     Also raised on a message of another version, which a daemon takes for a robot that does not fit.
     """
 
     code = "fleet_member"
     hint = (
-        "a fleet has at most 33 robots; look for a robot that tells cells far outside the building"
+        "a fleet has at most 33 robots; look for a robot that sends cells far outside the building"
     )
 
 

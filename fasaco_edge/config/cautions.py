@@ -26,7 +26,7 @@ ROUNDING_M = 1e-6
 
 
 def cautions(config: DaemonConfig) -> list[str]:
-    """Return them, each with the keys it is about."""
+    """Return the cautions, each with the keys that it is about."""
     robot = config.robot
     found = (
         *(_tool(robot), _clearance(config), _turns(robot), _planner(config), _places(config)),
@@ -36,7 +36,7 @@ def cautions(config: DaemonConfig) -> list[str]:
 
 
 def log_cautions(config: DaemonConfig) -> None:
-    """Log them."""
+    """Log the cautions."""
     for text in cautions(config):
         LOG.warning("%s", text, extra={"event": "caution"})
 
@@ -73,8 +73,8 @@ def _clearance(config: DaemonConfig) -> Iterator[str]:
     if config.planner.line != "cells" and robot.clearance_m > most_m:
         yield (
             f"robot.clearance_m {robot.clearance_m:g} is more than a fifth of robot.tool_width_m, "
-            f"{most_m:.2g}: so wide a strip of floor along a wall is worth giving it up, and lines "
-            "do; what the robot must never come nearer to belongs into robot.radius_m"
+            f"{most_m:.2g}: lines give up that clearance along walls, as so wide a strip of floor "
+            "is worth it; a distance that must always be kept belongs in robot.radius_m"
         )
 
 

@@ -98,7 +98,7 @@ def _context(files: TlsFiles, *, server: bool) -> ssl.SSLContext:
     context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER if server else ssl.PROTOCOL_TLS_CLIENT)
     context.check_hostname = False
     context.verify_mode = ssl.CERT_REQUIRED
-    # Whether it is valid by now is a question of its own.
+    # Whether the certificate is valid now is checked separately.
     context.verify_flags |= NO_CHECK_TIME
     # A locked key must not prompt for its password.
     context.load_cert_chain(files.certificate, files.private_key, password=lambda: "")
@@ -107,7 +107,7 @@ def _context(files: TlsFiles, *, server: bool) -> ssl.SSLContext:
 
 
 def _handshake(listening: ssl.SSLContext, connecting: ssl.SSLContext) -> ssl.SSLObject:
-    """Return the listening side, which was shown the certificate."""
+    """Return the listening side, which received the certificate."""
     there, back = ssl.MemoryBIO(), ssl.MemoryBIO()
     client = connecting.wrap_bio(back, there)
     server = listening.wrap_bio(there, back, server_side=True)

@@ -86,7 +86,7 @@ class MapConfig(Section, frozen=True):
 
 
 class PoseConfig(Section, frozen=True):
-    """The type of poses that come without one, as under ROS 2."""
+    """The type of poses whose samples name none, as under ROS 2."""
 
     schema: Literal[
         "geometry_msgs/msg/PoseStamped",
@@ -197,8 +197,8 @@ class FleetConfig(Section, frozen=True):
 
     That frame has one origin: only its name is compared. With maps of their own they give one
     ``frame``, and where the origin of their map lies in it: ``x_m``, ``y_m`` [m], ``yaw_deg``
-    [deg]. That holds for the map in ``map_frame``, or else for the first that the daemon gets with
-    them: on another floor, with another map, the robot takes no part.
+    [deg]. That holds for the map in ``map_frame``, or else for the first map that the daemon
+    receives with these values: with another map, as on another floor, the robot takes no part.
     """
 
     name: Annotated[str, Meta(min_length=1, max_length=64)]
@@ -210,7 +210,7 @@ class FleetConfig(Section, frozen=True):
 
 
 class BatteryConfig(Section, BatteryPolicy, frozen=True, kw_only=True):
-    """When to charge; without the block ``battery`` the robot never does by itself."""
+    """When to charge; without the block ``battery`` the robot never charges by itself."""
 
 
 class ScanConfig(Section, frozen=True):
@@ -261,7 +261,8 @@ class DaemonConfig(Section, frozen=True):
 
     @property
     def cell_m(self) -> float:
-        """Edge of a cell [m]: lanes of a line overlap, those through centres lie side by side."""
+        """Edge of a cell [m]: lanes over the floor overlap, lanes through cell centres lie side by
+        side."""
         robot = self.robot
         if self.planner.line == "cells":
             return robot.tool_width_m
@@ -269,10 +270,10 @@ class DaemonConfig(Section, frozen=True):
 
     @property
     def lattice_deg(self) -> float | None:
-        """The angle of the cells' rows to the x axis of the map frame [deg]; None for the walls'.
+        """The angle of the cells' rows to the x axis of the map frame [deg]; None for the walls.
 
-        Walks through the centres of cells, and robots that share cells, keep to the axes: those of
-        a fleet would each see other walls first.
+        Walks through the centres of cells, and robots that share cells, keep to the axes: each
+        robot of a fleet would see other walls first.
         """
         if self.planner.line == "cells" or self.planner.align == "axes":
             return 0.0

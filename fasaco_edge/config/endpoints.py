@@ -56,14 +56,14 @@ def from_here(endpoint: str) -> str:
         return endpoint
     if not anywhere:
         return endpoint
-    # By a name, which a certificate may hold.
+    # Connect by the name ``localhost``, which a certificate may contain.
     shown = f"[{host}]" if ":" in host else host
     return endpoint.replace(f"/{shown}:", "/localhost:", 1)
 
 
 # Further protocols of Zenoh, for users who build it with them.
 DEVICES = ("serial", "vsock")
-# Zenoh takes no longer one [bytes].
+# Longest endpoint that Zenoh accepts [bytes].
 MOST_BYTES = 255
 
 

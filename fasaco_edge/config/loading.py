@@ -45,12 +45,12 @@ def with_mask(
     """Return a configuration that holds its keep-out mask itself.
 
     Args:
-        config: with the name of a file, sought from the configuration's own folder.
+        config: configuration that names a mask file, relative to its own folder.
         file: of the configuration.
         most_bytes: most memory for reading the mask [bytes]; None for no limit.
 
     Raises:
-        BadConfiguration: the mask cannot be read, or takes more.
+        BadConfiguration: the mask cannot be read, or takes more memory.
     """
     mission = config.mission
     if not mission.keep_out_mask or mission.keep_out_mask.startswith(INLINE):

@@ -20,7 +20,8 @@ class MetricsConfig(Section, frozen=True):
         """Return where to listen; None for nowhere.
 
         Raises:
-            BadConfiguration: it is no address with a port, or lets others in unasked.
+            BadConfiguration: it is no address with a port, or other computers can reach it although
+                ``open_to_everyone`` is not set.
         """
         if not self.listen:
             return None

@@ -56,7 +56,7 @@ def section_faults(
         kind: the section.
         document: result of parsing its text as YAML.
         key: of the section, "" for the whole.
-        root: the whole, where a key that is unknown here may belong elsewhere.
+        root: the whole document: a key that is unknown in the section may belong elsewhere in it.
     """
     root = root or kind
     fields = {field.encode_name: field for field in msgspec.structs.fields(kind)}

@@ -67,16 +67,16 @@ class FootprintConfig(Section, frozen=True):
 class RobotConfig(Section, frozen=True):
     """The robot: its name on the bus, its size [m], and what driving takes it.
 
-    ``quarter_turn_s`` is a turn by 90 degrees on the spot [s], braking and starting
-    included; 0 minimises steps, whatever the turns. Where ``turn_deg_s`` is given, the
-    robot's limits count in its place: the rate of turning [deg/s], its acceleration [deg/s2], that
-    of driving [m/s2], and the largest bend that is steered while driving [deg]. ``overlap`` is by
-    what share of the tool's width lanes overlap where a line is driven (``planner.line``).
+    ``quarter_turn_s`` is a turn by 90 degrees on the spot [s], braking and starting included; 0
+    minimises steps, whatever the turns. Where ``turn_deg_s`` is given, the robot's limits count in
+    its place: the rate of turning [deg/s], its acceleration [deg/s2], that of driving [m/s2], and
+    the largest bend that is steered while driving [deg]. ``overlap`` is the share of the tool's
+    width by which lanes of a line over the floor overlap (``planner.line``).
     ``footprint`` stands in place of ``radius_m``: the disc around it is planned with.
-    ``clearance_m`` is what driven lines keep beside the radius from walls and furniture, except
-    where only giving it up, half of it or all, reaches floor that is worth it.
-    ``tool_ahead_m`` is from where the robot turns about to the centre of its tool, ahead; below 0
-    behind.
+    ``clearance_m`` is a distance that lines keep from walls and furniture in addition to the
+    radius; they give up half of it, or all, where only that reaches floor that is worth it.
+    ``tool_ahead_m`` is how far the tool's centre lies ahead of the point that the robot turns
+    about; below 0 behind.
     """
 
     name: str = "robot"
@@ -129,13 +129,14 @@ class RobotConfig(Section, frozen=True):
     def turning_deg_s(self) -> float:
         """Return the rate of turning on the spot [deg/s].
 
-        Without ``turn_deg_s`` that by which a quarter-turn takes ``quarter_turn_s``, braking before
-        and starting after it left out.
+        Without ``turn_deg_s`` it is the rate at which a quarter-turn takes ``quarter_turn_s``,
+        without braking before it and starting after it.
         """
         if self.turn_deg_s is not None:
             return self.turn_deg_s
         seconds = self.quarter_turn_s - self.speed_m_s / self.acceleration_m_s2
-        # 90 = rate (seconds - rate / acceleration); where that cannot be, as fast as it goes.
+        # 90 = rate (seconds - rate / acceleration); if no rate is fast enough, the fastest possible
+        # one.
         half = 0.5 * seconds * self.turn_deg_s2
         square = half * half - 90.0 * self.turn_deg_s2
         if seconds <= 0.0 or square <= 0.0:

@@ -25,7 +25,7 @@ _MAX_TOPIC_LENGTH = 247
 _MAX_PREFIX_LENGTH = _MAX_TOPIC_LENGTH - len("/resume")
 
 DEFAULT_NODE = "fasaco_edge"
-# As rclcpp's services have it.
+# History depth of rclcpp's services.
 SERVICE_DEPTH = 10
 # What a follower needs of them: poses, and maps to compare scans with.
 OF_DRIVER = ("map", "map_update", "pose", TF_STATIC)
@@ -49,7 +49,8 @@ class RosTopicNames(Section, frozen=True):
 
 
 class RosFrames(Section, frozen=True):
-    """First and last frame of the chain of transforms; frames in between are found by itself."""
+    """First and last frame of the chain of transforms; the frames between are found
+    automatically."""
 
     map: str = "map"
     robot: str = "base_link"
@@ -59,8 +60,9 @@ class Nav2Config(Section, frozen=True):
     """Nav2's controller server, where ``follow`` is ``nav2``.
 
     ``controller``, ``goal_checker``, ``progress_checker`` and ``path_handler`` name its plugins, ""
-    for the only one there is; ``release`` is whose goals a server behind a bridge takes. A goal
-    does not come nearer to itself than ``near_m`` [m]; without it, than 0.75 of the tool's width.
+    for the only one there is; ``release`` is the ROS release whose goals a server behind a bridge
+    accepts. A goal does not come nearer to itself than ``near_m`` [m]; without it, than 0.75 of the
+    tool's width.
 
     Its docking server, where ``dock`` is ``nav2``: ``dock_id`` names a dock of its database, "" for
     the pose ``mission.dock``; ``dock_type`` is its plugin, "" for the only one there is.
@@ -87,7 +89,7 @@ class RosConfig(Section, frozen=True):
     ``pose`` is the type of the pose's topic, or "tf"; the mission's commands are services
     below ``services``. ``follow`` says what ``fasaco-edge follow`` does: drive the base itself, or
     hand the path to Nav2's controller. ``dock`` says who moves the robot from before its dock into
-    it, and out: the base by itself, or Nav2's docking server, told by ``fasaco-edge follow``.
+    it, and out: the base by itself, or Nav2's docking server, on request of ``fasaco-edge follow``.
     """
 
     kind: Literal["bridge", "rmw_zenoh"]
@@ -150,7 +152,7 @@ class RosConfig(Section, frozen=True):
 
     @property
     def undock_action(self) -> str:
-        """Name of the one that undocks."""
+        """Name of the action of Nav2's docking server that undocks."""
         return self._name(self.nav2.undock_action)
 
     def velocities(self, schema: str) -> RosTopic:
@@ -173,14 +175,14 @@ class RosConfig(Section, frozen=True):
         return topic.bridge_key if self.kind == "bridge" else topic.rmw_key(self.domain)
 
     def rights(self) -> Role:
-        """Return what those may do that have the role ``ros``."""
+        """Return the rights of the role ``ros``."""
         said = [*map(self.output_key, self.outputs.values()), *self._driven_by]
         said += map(self.input_key, self.commands.values())
         heard = [*self.inputs.values(), self.keep_out_mask, self.scan]
         return ros_rights([*map(self.input_key, heard)], said, self._graph)
 
     def driver_rights(self) -> Role:
-        """Return what those may do that have the role ``driver``."""
+        """Return the rights of the role ``driver``."""
         heard = [topic for name, topic in self.inputs.items() if name in OF_DRIVER]
         said = [*map(self.input_key, (*heard, self.scan))]
         return ros_rights(self._driven_by, said, self._graph)
@@ -194,9 +196,7 @@ class RosConfig(Section, frozen=True):
         return [] if self.kind == "bridge" else [graph_key(self.domain)]
 
     def faults(self) -> Iterator[BadConfiguration]:
-        """Yield what no single value's type shows.
-
-        A name is none, two topics have one name, or what is for rmw_zenoh alone was said of a
+        """Yield faults beyond types: an invalid name, two equal names, a setting of rmw_zenoh for a
         bridge.
         """
         if self.namespace != "/" and not _TOPIC.fullmatch(self.namespace):

@@ -91,20 +91,20 @@ class SecurityConfig(Section, frozen=True):
             written = [os.stat(path).st_mtime for _, path in files(self)]
             if time.time() >= max(*written, Path(__file__).stat().st_mtime):
                 return
-            # It imports ssl, which a daemon whose clock is right does not need.
+            # This module imports ssl, which a daemon whose clock is right does not need.
             from fasaco_edge.config.certificates import read_certificate  # noqa: PLC0415
 
             read_certificate(self.tls)
         except ClockBeforeCertificate as error:
             LOG.warning("%s; %s", error, error.hint, extra={"event": "clock"})
         except (OSError, BadConfiguration):
-            return  # to open the session raises that
+            return  # opening the session raises this error
 
     def of_client(self, dictionary_file: str = "") -> dict[str, Any]:
         """Return the credentials of a session, as a part of Zenoh's configuration.
 
         Args:
-            dictionary_file: of the users who may connect to it; "" where nobody may.
+            dictionary_file: passwords of the users who may connect to it; "" for none.
 
         Raises:
             BadConfiguration: a file cannot be read.
@@ -136,7 +136,7 @@ class SecurityConfig(Section, frozen=True):
         ros: access.Role | None = None,
         ros_driver: access.Role | None = None,
     ) -> dict[str, Any]:
-        """Return the same with access control for the other participants, for a daemon's session.
+        """Return the credentials of a daemon's session, with access control for all others.
 
         Args:
             prefix: of all keys of the robot.
@@ -203,7 +203,7 @@ def security_faults(
         named = [role for role, who in security.names().items() if who]
         if named:
             yield BadConfiguration(
-                f"bus.security.roles.{named[0]}: with bus.security.kind none nobody has a name"
+                f"bus.security.roles.{named[0]}: with bus.security.kind none there are no names"
             )
         return
     if open_to_everyone:

@@ -16,7 +16,7 @@ Read in this order:
     map/loop_closure     whether a map has moved, and which cells are uncertain then
 
     coverage/mission_ledger  owns the ledger, until a map contradicts it
-    coverage/fit         whether a map does
+    coverage/fit         whether a map contradicts the ledger
     coverage/ledger      covered cells
     coverage/progress    progress on the path, of the coverage, of each zone
     coverage/unreached   uncovered cells, and the causes

@@ -1,8 +1,8 @@
 """Company: the interface of a mission to other robots in its building, here for a single robot.
 
 A robot of a fleet has another ``Company``, that of ``fleet.mission``, which its configuration
-names; the mission knows nothing else of a fleet. That one divides the area among robots, and
-decides which robot waits for which.
+names; the mission knows nothing else of a fleet. The company of a fleet divides the area among
+robots, and decides which robot waits for which.
 """
 
 from __future__ import annotations
@@ -35,8 +35,8 @@ Inside = Callable[[Cells, Cells], NDArray[np.bool_]]
 class OthersCells:
     """The cells that others have swept, a part of the ledger: none.
 
-    Cells that the ledger holds from a time in a fleet stay in it until this robot forgets cells of
-    its own: a fleet that it joins again would count these as swept.
+    Cells of others that the ledger has from a time in a fleet stay in it until this robot forgets
+    cells of its own: a fleet that the robot joins again would count the forgotten cells as swept.
 
     Attributes:
         version: counter of changes.
@@ -167,7 +167,7 @@ class Waiting:
 
     Attributes:
         waits_for: name of the robot that it waits for; "" for none.
-        reason: that as text.
+        reason: the wait as text.
         is_near: whether another robot is near.
     """
 

@@ -26,20 +26,20 @@ MAX_GRID_TILT: Final = 0.01
 """Largest magnitude of the x and y of a grid's orientation: a map lies in the plane."""
 
 MAX_TRANSFORM_TILT: Final = 0.2
-"""The same of a transform between map and robot: a ramp of 23 degrees."""
+"""Largest magnitude of the x and y of the rotation between map and robot: a ramp of 23 degrees."""
 
 MAX_GRID_CELLS: Final = 64_000_000
 MAX_PATH_POSES: Final = 1_000_000
 MAX_TRANSFORMS: Final = 4096
-"""In one tf message, and frames that are remembered."""
+"""Limit on the transforms of one tf message, and on the frames that are kept."""
 
 MAX_POSE_BYTES: Final = 1_048_576
 """Longest pose or tf message."""
 
 MAX_SCAN_BEAMS: Final = 32_768
-"""Of a laser scan."""
+"""Limit on the beams of a laser scan."""
 MAX_SCAN_SPAN_RAD: Final = 6.5
-"""From its first beam to its last: a turn, and rounding [rad]."""
+"""Largest angle from the first beam of a scan to the last [rad]: a full turn, and rounding."""
 
 MAX_JSON_BYTES: Final = 1_048_576
 MAX_JSON_DEPTH: Final = 32
@@ -50,14 +50,15 @@ MAX_JSON_NUMBER: Final = 1e15
 """Largest magnitude of any other number in it."""
 
 MAX_FLEET_TILES: Final = 24
-"""Of progress in one message of a fleet's robot, of 64 x 64 cells each: 17 kB; and of ground."""
+"""Limit on the tiles of 64 x 64 cells in one progress message of a fleet's robot (17 kB), and in
+one ground message."""
 MAX_FLEET_PARTS: Final = 33
-"""Of a division, a robot each: the most robots of a fleet."""
+"""Limit on the parts of a division, one for each robot: the largest fleet."""
 MAX_FLEET_INDEX: Final = geometry.MOST_INDEX
-"""Magnitude of a cell's row and column: as far as any lattice reaches."""
+"""Largest magnitude of a cell's row and column: as far as any lattice reaches."""
 MAX_FLEET_POINTS: Final = 64
-"""Of a robot's next metres."""
+"""Limit on the points of a robot's path ahead, in a message of the fleet."""
 MAX_BLOCKED_BYTES: Final = 16_384
 """Longest report of a robot that is blocked."""
 MAX_BLOCKED_POINTS: Final = 64
-"""Of what is ahead of a robot that is blocked."""
+"""Limit on the points ahead of a robot in its report that it is blocked."""

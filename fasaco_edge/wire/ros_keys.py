@@ -44,13 +44,13 @@ TYPE_HASHES = {
     schemas.DIAGNOSTIC_ARRAY: "5a8a36efb05fb25070fa0fb3810290c0e6cd4862b54a8fb975a1ee8dc55a333e",
     schemas.PATH: "1957a5bb3cee5da65c4e52e52b65a93df227efce4c20f8458b36e73066ca334b",
 }
-"""Of each type its definition's hash in hexadecimal, version 1 (REP 2016)."""
+"""For each type the hash of its definition, in hexadecimal, version 1 (REP 2016)."""
 
 TRIGGER: Final = "std_srvs/srv/Trigger"
 SERVICE_HASHES = {
     TRIGGER: "eeff2cd6fa5ad9d27cdf4dec64818317839b62f212a91e6b5304b634b2062c5f",
 }
-"""The same of services: of request, response and event together."""
+"""The hashes of services: of request, response and event together."""
 
 GID_BYTES = 16
 
@@ -147,7 +147,7 @@ def gid_of(token: str) -> bytes:
     rmw_zenoh uses XXH3 for that, and identifies publishers by it. A lookup of a sample's publisher
     in the graph by gid does not find ours.
     """
-    # Loads OpenSSL, three megabytes of no use to a follower without ROS.
+    # This module loads OpenSSL: three megabytes that a follower without ROS does not need.
     from hashlib import blake2b  # noqa: PLC0415
 
     return blake2b(token.encode(), digest_size=GID_BYTES).digest()
@@ -198,16 +198,16 @@ UNDOCK_ROBOT: Final = ("nav2_msgs/action/UndockRobot", "opennav_docking_msgs/act
 
 Release = Literal["humble", "jazzy", "lyrical"]
 RELEASES: Final[dict[Release, int]] = {"humble": 2, "jazzy": 3, "lyrical": 4}
-"""How many names of plugins a goal of nav2_msgs/FollowPath ends with: controller, goal checker,
-from Iron on progress checker, from Lyrical on path handler. What is sent to Iron and Kilted is as
-for Jazzy."""
+"""Number of plugin names at the end of a goal of nav2_msgs/FollowPath: controller, goal checker,
+from Iron on progress checker, from Lyrical on path handler. Iron and Kilted get the same as
+Jazzy."""
 
 _GOALS: Final[dict[str, Release]] = {
     "TypeHashNotSupported": "humble",
     "RIHS01_5b662aee1159e1d7e7b5f8fef21f556b8bc67c818c730a68e18bb29b85f66946": "jazzy",
     "RIHS01_0c091793c90a67349df3445771d5d30005daea785137bd6e6bf5d96ea53fb721": "lyrical",
 }
-"""By the hash in the key of ``send_goal``."""
+"""The release by the hash in the key of ``send_goal``."""
 
 
 def bridge_keys(action: str) -> dict[Call, str]:

@@ -19,6 +19,6 @@ DIAGNOSTIC_ARRAY: Final = "diagnostic_msgs/msg/DiagnosticArray"
 PHEROMONE_GRID: Final = "fasaco_msgs/msg/PheromoneGrid"
 
 POSE_SCHEMAS = (POSE_STAMPED, POSE_WITH_COVARIANCE_STAMPED, ODOMETRY)
-"""What a robot's pose may come in."""
+"""Message types of a robot's pose."""
 TWIST_SCHEMAS = (TWIST, TWIST_STAMPED)
-"""What a base may be driven by."""
+"""Message types of a base's velocities."""

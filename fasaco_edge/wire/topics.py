@@ -298,7 +298,7 @@ TOPICS = (
     *(RECORDER, RECORDER_ALIVE),
     *(CMD_VEL, BLOCKED, DRIVER),
 )
-# These keep the order of their one publisher: an update changes the map before it.
+# Samples of these topics keep the order of their publisher: an update changes the map before it.
 IN_ORDER = frozenset({MAP.name, MAP_UPDATE.name})
 QOS = {topic.name: topic.qos for topic in TOPICS if topic.qos is not None}
 
@@ -337,7 +337,8 @@ QUERIES = (
 RPC_NAMES = tuple(query.name for query in QUERIES)
 
 TF_STATIC = "tf_static"
-# As in tf2's listeners. A bridge keeps the static transforms of all nodes in one history.
+# History depths of tf2's listeners. A bridge keeps the static transforms of all nodes in one
+# history.
 TF_DEPTH = POSE_DEPTH = 100
 TF = (schemas.TF_MESSAGE,)
 _ROS_ROWS = (
@@ -357,7 +358,7 @@ _ROS_ROWS = (
     RosRow("cmd_vel", "cmd_vel", "out", CMD_VEL.schemas, latched=False, depth=1),
 )
 ROS_TOPICS = {row.name: row for row in _ROS_ROWS}
-"""By their key under ``ros2.topics`` of the configuration."""
+"""ROS 2 topics by their key under ``ros2.topics`` of the configuration."""
 
 
 def _queue_lengths() -> dict[str, int]:

@@ -171,7 +171,7 @@ def user(**more):
         ),
         (
             {"security": {"roles": {"mapper": ["slam"]}}},
-            "bus.security.roles.mapper: with bus.security.kind none nobody has a name",
+            "bus.security.roles.mapper: with bus.security.kind none there are no names",
         ),
         ({"security": {"kind": "tsl"}}, "bus.security.kind: expected none, tls or user"),
         ({"security": {"roles": {"admin": []}}}, "unknown key bus.security.roles.admin"),

@@ -8,7 +8,7 @@ from fasaco_edge.mission.core.events import FollowerBlocked
 
 # A follower repeats its report once a second; a report not repeated for this long is over.
 SHOWN_S = 3.0
-# Period of new paths for a follower that cannot join its path, or is blocked by no known place.
+# Period of new paths for a follower that cannot join its path, or is blocked at an unknown place.
 AGAIN_S = 5.0
 
 

@@ -136,11 +136,11 @@ class Charging:
     _to_dock_s: float = field(default=0.0, init=False)
     _rest_s: float | None = field(default=None, init=False)
     _looked_at: float | None = field(default=None, init=False)
-    # Stamp of the pose by then [ns].
+    # Stamp of the pose at that time [ns].
     _looked_at_ns: int = field(default=0, init=False)
     # Whether this is the best place on the path to leave for the dock.
     _is_best_here: bool = field(default=False, init=False)
-    # The highest level since the robot is in its dock, and its time; None elsewhere.
+    # The highest level since the robot entered its dock, and its time; None outside the dock.
     _best: tuple[float, float] | None = field(default=None, init=False)
     # The level of turning back when the robot went to charge. The level at which the battery last
     # stopped charging, if below the level at which to resume; None for none.
@@ -276,7 +276,8 @@ class Charging:
         return f"battery at {self.gauge.level:.0%}{but}, goes on at {self.goes_on_at:.0%}"
 
     def _finds_nothing_better(self) -> bool:
-        """Return whether the robot, which will have to charge soon, is best placed for it now.
+        """Return whether to leave for the dock here, as charging is due soon and no later place is
+        better.
 
         The best place on its path, up to the level of turning back, has the shortest way to the
         dock relative to the drive between two charges. A path that ends before that level gives no

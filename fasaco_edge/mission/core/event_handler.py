@@ -90,7 +90,7 @@ class EventHandler:
         try:
             change()
         except FasacoError as error:
-            # Its traceback would hold the map until garbage is collected.
+            # The error's traceback would hold the map until garbage is collected.
             self._faults.append(error.with_traceback(None))
 
     def _apply(self, event: Event | PatchRun) -> None:
@@ -273,7 +273,7 @@ class EventHandler:
         self.drive.note(stamped)
         self.way_out.note_pose(stamped.pose)
         motion, uncertain = None, 0
-        # On the map of another building, the pose and the floor under it mean nothing.
+        # On the map of another building the pose is not valid, nor is the floor under it.
         is_known = self.map.building.note_pose(stamped.pose, self._now)
         if is_known:
             motion = self.ledger.map_motion(stamped.pose)

@@ -170,7 +170,7 @@ class Executive:
         return Doing(*resting)
 
     def _find_place(self) -> Doing | None:
-        """Find the robot's cell; lead a robot outside of all cells back to one."""
+        """Find the robot's cell; if it is outside of all cells, lead it back to the nearest one."""
         route, cell = self.route, self.map.robot_cell()
         if cell is None or self.map.area is None:
             self.map.forget_area()

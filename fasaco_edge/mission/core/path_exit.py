@@ -135,10 +135,10 @@ class PathExit:
         self._sent = self._due = None
 
     def send(self, publish: Callable[[PublishedPath], bool]) -> PublishedPath | None:
-        """Send what is due, and return it; None if nothing is, or if it cannot be sent.
+        """Send the path that is due, and return it; None if none is due, or if it cannot be sent.
 
-        Where a path cannot be sent, an empty one is due: the robot must not follow the previous
-        path. It is tried again with each call until it is sent.
+        If a path cannot be sent, an empty one is due: the robot must not follow the previous path.
+        Each call tries again until a path is sent.
 
         Args:
             publish: sends a path; returns whether it did.

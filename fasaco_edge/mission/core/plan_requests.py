@@ -79,7 +79,7 @@ class PlanRequests:
         self.discard_pending()
 
     def pause(self) -> None:
-        """Discard the pending plan; its reason is planned for again once the robot continues."""
+        """Discard the pending plan; it is requested again, with its reason, on continuing."""
         if self.pending is not None and self.is_planning and not self._is_abandoned:
             if self.pending.problem.is_full:
                 self._full = self.pending.reason
@@ -130,7 +130,7 @@ class PlanRequests:
     def why_not_yet(self, now: float) -> str:
         """Return why no plan may be requested yet; "" if one may be."""
         why, since = self._failure
-        # Each map is another problem; a planner that breaks over all of them is asked less often.
+        # Each map is another problem; a planner that fails with every map gets requests less often.
         pause_s = min(2.0 ** (self._failures - 1) - 1.0, BROKEN_S)
         if not why or now - since >= (pause_s if self._has_map else BROKEN_S):
             return ""
@@ -139,9 +139,9 @@ class PlanRequests:
         return f"{why}; tried again {sooner}after {BROKEN_S:g} s"
 
     def note_map(self) -> None:
-        """Note another map: what failed may not fail again."""
+        """Note another map: a plan that failed with the previous map may succeed now."""
         self._has_map = True
 
     def forget_failure(self) -> None:
-        """Allow a request after a failed plan: one was asked for, or has succeeded since."""
+        """Forget the failed plan: a command requests one, or one has succeeded since."""
         self._failure, self._failures = ("", 0.0), 0

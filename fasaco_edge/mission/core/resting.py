@@ -48,9 +48,9 @@ class Resting:
         return (State.BLOCKED, no_mask) if no_mask else None
 
     def why_no_mask(self) -> str:
-        """Return why keep-out zones for this map are missing; "" where none is due, or none is.
+        """Return why the keep-out zones of this map are missing; "" if they are not.
 
-        Those of another map would keep out of other places.
+        The zones of another map would close other places.
         """
         if why := self.map.places.why_no_keep_out:
             return why

@@ -39,9 +39,10 @@ class Route(PlanRequests):
             path, or because they no longer hold.
         published_at: when a path was last published or confirmed by a plan.
         is_way_out: whether the published path is a way out, along no cells.
-        begun_at: when there was something to drive again, after a path without.
+        begun_at: when a path with something to drive last followed one without.
         beside: other robots that the path's line keeps clear of, float64 (k, 3): x, y, least
-            distance [m]; where it begins nearer to one, it comes no nearer. None for any line.
+            distance [m]; if the line begins nearer to a robot than that, it comes no nearer. None
+            for any line.
     """
 
     def __init__(self, spare_share: float, map_state: MapState, orders: Sequencer) -> None:

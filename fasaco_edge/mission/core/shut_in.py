@@ -16,7 +16,7 @@ from fasaco_edge.mission.orders.sequencer import Sequencer
 
 @dataclass(frozen=True, slots=True)
 class ShutIn:
-    """Leads the robot out, if its track does."""
+    """Leads the robot out, if its track leads out."""
 
     map: MapState
     orders: Sequencer
@@ -33,8 +33,8 @@ class ShutIn:
 
         Args:
             why: what shuts it in.
-            update: the path that this step has made up to now: a path already cut to nothing is
-                not withdrawn again.
+            update: the path that this step has made up to now: an empty path is not withdrawn
+                again.
             now: time [s].
             goal: destination; None for the nearest work.
         """

@@ -19,9 +19,9 @@ REPAIR_S, SEARCH_S = 0.05, 0.3
 # A path is replaced only if that saves this many steps and this share of the rest.
 LEAST_STEPS, LEAST_SHARE = 2, 0.002
 # The same share for a new walk, whose line has to be made and polished again: first the time
-# without a needed plan [s], then the shares after and before that time. Before it, the next change
-# of the map may undo the saving: with 0.01 four robots took 3 % more time in unknown buildings,
-# within the scatter.
+# without a needed plan [s], then the shares after and before that time. Before that time the next
+# change of the map may undo the saving: with a share of 0.01 four robots took 3 % more time in
+# unknown buildings, which is within the scatter.
 SETTLED_S, SETTLED_SHARE, CHANGING_SHARE = 20.0, 0.01, 0.06
 # The share of time is halved at most this many times.
 MOST_VAIN = 4

@@ -18,8 +18,8 @@ from fasaco_edge.mission.map.map_state import MapState
 PATIENCE_S = 1.0
 # A robot that stands for this long on its path gets the path again: the follower may have lost it,
 # or stopped for an obstacle that is gone. Not sooner: it may be waiting for a person to pass, or
-# driving out of a corner, which another path would interrupt. The robot's clock counts, as a
-# simulation may run at twenty times the real speed.
+# driving out of a corner, which another path would interrupt. The time is that of the robot's
+# clock, as a simulation may run at twenty times the real speed.
 STANDING_S, STANDING_M = 30.0, 0.1
 # Number of times that a standing robot gets its path again before its mission is degraded.
 TRIES = 2
@@ -46,7 +46,7 @@ class Standing:
         self._had_path = 0.0, 0
         # Number of times that it got its path again in that place.
         self._tries = 0
-        # Its yaw when it last turned [rad], and the time of that.
+        # The robot's yaw when it last turned [rad], and the time of that turn.
         self._yaw, self._turned_at = 0.0, -math.inf
 
     def succeed(self, before: Standing) -> None:

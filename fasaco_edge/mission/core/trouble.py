@@ -85,7 +85,7 @@ class Troubles:
     blocked: BlockedFollower
     found: tuple[Trouble, ...] = field(default=(), init=False)
     _current: DockCurrent = field(init=False)
-    # The last time that it was where it can be, or at rest [s].
+    # The last time that the robot was at a possible place, or at rest [s].
     _inside_since: float = field(default=math.inf, init=False)
 
     def __post_init__(self) -> None:
@@ -93,7 +93,7 @@ class Troubles:
 
     @property
     def policy(self) -> MissionPolicy:
-        """Its limits."""
+        """The limits after which troubles are reported."""
         return self.charging.config.policy
 
     def succeed(self, before: Troubles) -> None:
@@ -150,7 +150,7 @@ class Troubles:
         return f"{why}: {what} is not known" if why else ""
 
     def no_current(self, _: State, now: float) -> str:
-        """Return why the dock is thought to give no current."""
+        """Return the evidence that the dock gives no current."""
         policy, level = self.charging.policy, self.charging.gauge.level
         if policy is None or level is None or self.charging.silence(now) or level >= policy.enough:
             return ""
@@ -158,7 +158,8 @@ class Troubles:
         return f"in the dock the battery, at {level:.0%}, does not charge: {why}" if why else ""
 
     def shut_in(self, _: State, now: float) -> str:
-        """Return what shuts the robot in, or that it has stood for some time where it cannot be."""
+        """Return what shuts the robot in, or that it has stood long at an impossible place of the
+        map."""
         why = self.way_out.why
         if self.map.area is not None or not why:
             self._inside_since = now
@@ -167,7 +168,7 @@ class Troubles:
         return f"{why}: pose or map is off" if now - self._inside_since > INSIDE_S else ""
 
     def stands(self, _: State, now: float) -> str:
-        """Return why the robot is thought to be stuck; without poses that is not known."""
+        """Return the evidence that the robot is stuck; "" without poses: then it is not known."""
         if self.monitor.is_pose_lost(now):
             return ""
         return self.giving_way.why_stuck(now) or self.standing.why_stuck

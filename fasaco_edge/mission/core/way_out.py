@@ -1,8 +1,8 @@
 """Way out: back along the driven track, for a robot that the map has shut in.
 
-Where the hull has stood, it fits. Walls get thicker by a pixel from map to map, and legs of chairs
-come and go: a gap that the robot has just driven through may be too narrow on the next map. Then it
-leaves as it came, with a smaller margin.
+The hull fits wherever it has stood. Walls get thicker by a pixel from map to map, and legs of
+chairs come and go: a gap that the robot has just driven through may be too narrow on the next map.
+The robot then drives back along its track, with a smaller margin.
 """
 
 from __future__ import annotations
@@ -24,17 +24,17 @@ from fasaco_edge.mission.line.way import is_clear_between
 from fasaco_edge.mission.map.map_state import MapState
 from fasaco_edge.mission.map.reachable_area import ReachableArea
 
-# The track is kept over this length, as points so far apart [m].
+# Length of the track that is kept, and spacing of its points [m].
 TRACK_M, SPACING_M = 40.0, 0.05
-# On the way out the robot comes so much nearer to walls [pixels of the map]: a wall may be mapped
-# a pixel thicker than it is, and the pose be off by half of one.
+# On the way out the robot may come this much nearer to walls [pixels of the map]: a wall may be a
+# pixel thicker on the map than it is, and the pose off by half a pixel.
 SQUEEZE_PX = 1.5
 # A robot that has not come this far [m] on its way out after this time [s] cannot drive it. It
 # tries again after as long, then after twice as long each time, until it has come that far.
 STANDING_M, STANDING_S = 0.1, 15.0
-# It leads on by so many points of the track once the robot can go on.
+# The way out continues over this many points of the track past the place where the robot can go on.
 INTO_POINTS = 4
-# Longest loops that are left out first, in points of the track.
+# Longest loops that are left out first [points of the track].
 LEAPS = (256, 128, 64, 32, 16, 8, 4, 2)
 NO_WAY: NDArray[np.float64] = np.empty((0, 2))
 
@@ -50,7 +50,7 @@ class WayOut:
         self.why = ""
         self._map, self._route = map_state, route
         self._track: deque[Point] = deque(maxlen=round(TRACK_M / SPACING_M))
-        # Where the way leads to, and the floor on which it was looked for.
+        # Where the way out leads to, and the floor on which it was found.
         self._to: Point | None = None
         self._seen: tuple[FloorMap | None, int] = None, 0
         # Where the robot stands, since when [s], and how often it could not drive a way from there.
@@ -133,7 +133,7 @@ class WayOut:
         radius = min(radius, fitting_radius(floor, raster[0]))
         if radius < LEAST_SHARE * full_px:
             return NO_WAY
-        # Areas that the robot cannot go on in, its own among them.
+        # Areas in which the robot cannot go on, with its own area.
         seen = np.zeros(lattice.states.shape, bool)
         for index, (a, b) in enumerate(pairwise(raster), start=1):
             if not is_clear_between(floor, a, b, radius):
@@ -144,7 +144,7 @@ class WayOut:
                 continue
             area = ReachableArea.around(lattice, cell)
             if leads_on(area):
-                # Well into it: at the border of a cell the robot may count as in the one before.
+                # Well into the next cell: at its border the robot may count as in the cell before.
                 end = index
                 while end < min(index + INTO_POINTS, len(way) - 1) and is_clear_between(
                     floor, raster[end], raster[end + 1]
@@ -158,7 +158,7 @@ class WayOut:
 def _without_loops(floor: FloorMap, track: list[NDArray[np.float64]]) -> list[int]:
     """Return the numbers of the points of a track that remain where it leaves out loops.
 
-    Only where the robot's whole disc fits; elsewhere it keeps to the track.
+    Loops are left out only where the robot's whole disc fits; elsewhere the way keeps to the track.
     """
     kept, last = [0], len(track) - 1
     while kept[-1] < last:

@@ -34,7 +34,7 @@ from fasaco_edge.mission.coverage.ledger import LedgerSnapshot
 # Nothing is decided unless this many covered cells are blocked, or expected to be by chance.
 LEAST_CELLS = 10
 # Ratio of blocked covered cells to those expected by chance: up to the first the ledger belongs
-# to this building, above the second to another; in between the next map decides.
+# to this building, above the second to another; between the two the next map decides.
 SAME_UP_TO, OTHER_FROM = 0.3, 0.6
 # Share of blocked among the known covered cells: below the first it may be this building, above the
 # second it cannot be.

@@ -29,8 +29,7 @@ ROW_BYTES = FLOOR_TILE // 8
 # so that the result does not depend on the queried window [pixels].
 TIE = 1e-6
 
-# Edges of the squares in which swept floor is published [pixels]: whole bytes, and fractions of a
-# tile.
+# Edges of the squares in which swept floor is published [pixels]: whole bytes that divide a tile.
 SQUARES = (1, 8, 16, 32, 64, FLOOR_TILE)
 
 _BITS = np.array([bin(byte).count("1") for byte in range(256)], np.uint8)
@@ -75,7 +74,7 @@ class Similarity(NamedTuple):
 
 
 def pixels_under(window: Window, geometry: GridGeometry) -> Window:
-    """Return a window of a grid that contains all its centres in a window of floor."""
+    """Return a window of the grid with all pixels whose centre lies in the window of floor."""
     rows, cols = (window.row0, window.row1), (window.col0, window.col1)
     corners = [geometry.to_pixels(col * PIXEL_M, row * PIXEL_M) for row in rows for col in cols]
     x, y = zip(*corners, strict=True)

@@ -35,7 +35,7 @@ class Loss:
         return f"{self.cells} covered {cells} ({self.m2:.1f} m2){percent}"
 
     def check(self, command: str) -> None:
-        """Refuse a command by which this would be lost.
+        """Refuse a command that would lose these cells.
 
         Raises:
             WouldForget: there is a loss; the text gives its size.
@@ -45,7 +45,7 @@ class Loss:
 
 
 def percents(share: float) -> str:
-    """Return a share in words, never 0 % for some."""
+    """Return a share in words; never 0 % for a share above 0."""
     return "less than 1 %" if share < 0.01 else f"{100 * share:.0f} %"
 
 
@@ -74,7 +74,7 @@ def loss_in(zones: tuple[Zone, ...], ledger: MissionLedger, on: MapState) -> Los
 def _beyond(window: Window, zones: tuple[Zone, ...], own: LedgerSnapshot) -> int:
     """Return how many cells in zones are covered outside of a window.
 
-    A map may have shrunk, as that of a mapper that begins again.
+    A map may have shrunk, as when a mapper begins anew.
     """
     cells = 0
     for i, j in own.tiles:

@@ -40,7 +40,8 @@ from fasaco_edge.mission.map.loop_closure import Motion, certain_floor, uncertai
 if TYPE_CHECKING:
     from fasaco_edge.mission.coverage.tool_sight import ToolSight
 
-# Share of blocked among the known covered cells that no furniture blocks from one map to the next.
+# Share of blocked cells among the known covered ones that furniture never reaches from one map to
+# the next.
 MANY_AT_ONCE = 0.2
 
 PlaceOf = Callable[[Cell], Point | None]
@@ -104,7 +105,8 @@ class MissionLedger:
         Args:
             cell_m: edge of a cell [m].
             tool_m: width of the tool [m].
-            ahead_m: from where the robot turns about to the tool's centre, ahead [m].
+            ahead_m: how far the tool's centre lies ahead of the point that the robot turns about
+                [m].
             shared: cells swept by other robots; None for a robot alone.
             sight: for a tool that sticks out of the robot; None for one that does not.
         """
@@ -115,8 +117,8 @@ class MissionLedger:
         self.reopened = 0
         self.shared = shared or OthersCells()
         self.passed, self.missed = PassedCells(), MissedCells()
-        # The ledger from before a restart while no map has confirmed it, and what was covered
-        # since, which is true in any building.
+        # The ledger from before a restart while no map has confirmed it, and what was covered since
+        # the restart, which holds in any building.
         self._resumed: tuple[LedgerSnapshot, _Covered] | None = None
         # The robot's last pose before the map moved.
         self._pose_before_motion: Pose2D | None = None
@@ -128,7 +130,7 @@ class MissionLedger:
 
     @property
     def version(self) -> tuple[int, int, int]:
-        """Changes whenever more cells are covered, or some are no longer."""
+        """Changes whenever cells become covered, or are no longer covered."""
         return self.current.total, self.shared.version, self.reopened
 
     def visits(self, window: Window) -> NDArray[np.uint16]:
@@ -225,7 +227,8 @@ class MissionLedger:
         for covered in self._all:
             covered.cells.forget(cells)
             covered.floor.leave(floor)
-        # Other robots' cells are as uncertain here: they track them on maps of their own.
+        # Cells of other robots are as uncertain on this map: each robot records them on a map of
+        # its own.
         self.shared.disregard(uncertain_cells(self.shared.snapshot(self._cell_m), motion))
         self.shared.note_forgotten()
         return before.cells - self.current.snapshot().cells

@@ -1,8 +1,8 @@
 """Cells that the robot has passed, but in which floor is unswept.
 
 In a fleet a cell counts as swept once a robot has swept its centre, and no robot drives there for
-the rest. That floor stays with this robot, in any robot's part: its line sweeps it when it passes
-near again.
+the rest. This robot keeps that floor, in whichever robot's part it lies, and sweeps it when its
+line passes near again.
 
 The robot comes back for missed cells, in which it left floor as it drove through. A base that
 drives beside its line leaves some each time, so it comes back to a cell a few times only.
@@ -24,7 +24,7 @@ class PassedCells:
     """Keeps passed cells until their floor is swept."""
 
     def __init__(self) -> None:
-        # In the order in which they were looked at last.
+        # In the order of their last check.
         self._cells: dict[Cell, None] = {}
 
     def clear(self) -> None:
@@ -54,7 +54,8 @@ class PassedCells:
         return mask_of(self._cells, window)
 
 
-# So often the robot comes back to a cell: floor that it left twice more it would leave again.
+# Limit on the returns to a cell: floor that the robot left unswept in two returns, a third would
+# leave, too.
 MOST_AGAIN = 2
 
 

@@ -17,7 +17,8 @@ from fasaco_edge.mission.map.reachable_area import ReachableArea
 from fasaco_edge.mission.orders.order_state import OrderState, Stage
 from fasaco_edge.mission.orders.zones import counts_in
 
-# The robot is searched for this many cells ahead; farther on the path may revisit the same cell.
+# The robot is searched for this many cells ahead; farther ahead the path may visit the same cell
+# again.
 LOOK_AHEAD = 16
 FAR_CELLS = 4
 

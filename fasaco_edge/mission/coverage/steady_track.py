@@ -1,16 +1,16 @@
 """Steady track: filtered robot positions from noisy poses, and how far it may bend between them.
 
-A place is the mean of a window of poses: wide enough for an error of a quarter of a pixel,
-symmetric, and no wider than the tool reaches. Exact poses are taken as they are, without delay;
-noisy ones give places some poses later.
+A place is the mean over a symmetric window of poses. The window is wide enough for an error of a
+quarter of a pixel, and no wider than the tool reaches. Exact poses are taken as they are, without
+delay; noisy ones give places some poses later.
 
 The noise is estimated from three consecutive poses. A robot drives smoothly: within a tenth of a
 second it leaves the straight line between the pose before and the pose after by only some
 millimetres. The lateral deviation from that line is localisation noise; a longitudinal one would be
 timestamp error. Three lateral errors of standard deviation s give a deviation of sqrt(1 + 1/4 +
-1/4) s, whose median size is 0.674 times that. Corners are rare, so the median over the last ones
-ignores them; of poses that are far apart they are not, and are left out. A drift, constant from
-pose to pose, is not seen.
+1/4) s, whose median size is 0.674 times that. Corners are rare, so the median over the last
+deviations ignores them. Between poses that are far apart corners are not rare, so these are left
+out. A drift, constant from pose to pose, is not seen.
 
 Between two places the robot turns once at most: its track stays within the triangle of the
 direction in which it came to the first and that in which it left the second. These are known by the
@@ -42,8 +42,7 @@ class PoseScatter:
     """
 
     def __init__(self, corner_m: float) -> None:
-        """Start without a pose; ``corner_m``: of steps longer than that a sharp bend is a corner
-        [m]."""
+        """Start without a pose; ``corner_m``: a sharp bend between longer steps is a corner [m]."""
         self.sigma_m = 0.0
         self._corner_m = corner_m
         self._before: tuple[Pose2D, ...] = ()
@@ -194,7 +193,7 @@ Point = tuple[float, float]
 # Up to this length [m] a right angle between two places lies less than a pixel beside the segment.
 SHORT_M = 2.0 * math.sqrt(2.0) * PIXEL_M
 NO_YAWS = math.nan, math.nan
-# Sides this near to parallel do not meet within any room.
+# Sides this near to parallel meet farther away than any room is long.
 LEAST_RAD = 1e-3
 
 
@@ -255,7 +254,7 @@ def _turns(start: Point, end: Point, yaws: tuple[float, float]) -> tuple[float, 
 def _height(one: float | None, other: float | None) -> float:
     """Return the height of a triangle over a base of 1 with these angles [rad].
 
-    An angle that is not known is taken for a right one, two of them for none.
+    One unknown angle counts as a right angle, two as none.
     """
     if one is None and other is None:
         return 0.0

@@ -5,9 +5,10 @@ consecutive poses, and not behind a wall from there (``tool_sight``).
 
 With noisy poses, the union of tool discs is wider than the strip really swept. So the disc moves
 along the steady track and shrinks by the track's error bound: not at all with exact poses, and
-never to less than half of the tool. Between poses that are far apart it shrinks by how far the
-robot may have driven beside the segment, down to nothing, see ``bends``. Sweeps along the newest
-poses are visible at once; they are stored, and counted, as soon as the track there is final.
+never to less than half of the tool. Between poses that are far apart it also shrinks by the
+distance that the robot may have driven beside the segment, down to nothing, see ``bends``. Sweeps
+along the newest poses are visible at once; they are stored, and counted, as soon as the track there
+is final.
 """
 
 from __future__ import annotations
@@ -68,14 +69,15 @@ ANYWHERE = Window(-(2**40), -(2**40), 2**40, 2**40)
 YAW_RAD = math.radians(1.0)
 # Tolerance, so that rounding does not decide whether a pixel at the rim is swept [m].
 TOUCH_M = 1e-9
-# Grids are looked up in blocks of BLOCK x BLOCK of these pixels; coarser grids in smaller blocks.
+# Grids are processed in blocks of BLOCK x BLOCK pixels of the floor; coarser grids in smaller
+# blocks.
 BLOCK = 256
 
 
 class Segment(NamedTuple):
     """A segment from one place to the next, and the radius swept along it with certainty [m].
 
-    The radius is 0 where none is.
+    A radius of 0: nothing is swept with certainty.
     """
 
     start: Place
@@ -276,7 +278,7 @@ class SweptFloor:
     def _segments(
         self, before: Place | None, start: Place, end: Place, after: Place | None
     ) -> list[Segment]:
-        """Return the sweeps between two places: along the way, or at the places alone."""
+        """Return the sweeps between two places: along the segment, or only at the places."""
         away_m = beside_m(
             start.point,
             end.point,
@@ -324,7 +326,7 @@ class SweptFloor:
             windows = [self._around(segment) for segment in segments]
             whole = Window.around(*windows) or NOWHERE
             if whole.rows * whole.cols > MOST_AHEAD:
-                # Poses that noisy are no drive, and a mask would take much memory.
+                # Poses with so much noise are no drive, and a mask would take much memory.
                 whole, segments = NOWHERE, []
             if len(segments) * whole.rows * whole.cols <= MOST_TOGETHER:
                 ahead = self._under(segments, whole)

@@ -1,4 +1,4 @@
-"""Tool sight: the floor that a tool wider than the robot touches, which walls hide.
+"""Tool sight: the floor that a tool wider than the robot touches, without floor behind walls.
 
 Side brushes, a wide deck or a lamp reach over the rim of the robot's disc. As in
 ``grid.tool_reach``, a pixel counts if free pixels connect it with the disc, about within the tool.

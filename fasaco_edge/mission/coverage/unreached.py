@@ -109,12 +109,12 @@ class UnreachedFinder:
         self._ledger = ledger
         # Number of paths that left cells over.
         self._failures = 0
-        # Why the last one did; "" if that is not known.
+        # Why the last path left cells over; "" if not known.
         self._why_left = ""
         self._newest: ReachableArea | None = None
         # Which cells of a window around all maps received have ever been reachable.
         self._once: tuple[Window, NDArray[np.bool_]] | None = None
-        # The same before the map moved, and whether cells have moved since the newest area.
+        # These cells before the map moved, and whether cells have moved since the newest area.
         self._before_motion: tuple[Window, NDArray[np.bool_]] | None = None
         self._have_moved = False
         self._found: tuple[object, Unreached] = (None, Unreached())
@@ -147,7 +147,8 @@ class UnreachedFinder:
             once = self._once_on(window)
             here = once[area.lattice.window.slices_in(window)]
             if self._have_moved:
-                # Beside reachable cells, a cell that moved by part of a cell is a wall.
+                # After a motion by part of a cell, a cell beside reachable cells that is not
+                # coverable lies in a wall.
                 here &= area.lattice.coverable | ~_widened(area.reachable)
             here |= reachable
             self._once, self._newest, self._have_moved = (window, once), area, False
@@ -157,7 +158,7 @@ class UnreachedFinder:
         self._before_motion = self._before_motion or self._once
 
     def move(self, motion: Motion) -> None:
-        """Move the cells with the map: its areas since have been looked for from a pose before."""
+        """Move the cells with the map: areas since were found from a pose before the motion."""
         before, self._before_motion = self._before_motion, None
         if before is not None and not motion.is_still:
             lattice = self._map.lattice
@@ -173,7 +174,7 @@ class UnreachedFinder:
             self._have_moved = True
 
     def _around(self, window: Window) -> Window:
-        """Return the window of the newest map with that of the maps before, if not too large.
+        """Return the window around the newest map and the maps before, if not too large.
 
         A map that was cut is still known to have been larger.
         """
@@ -184,7 +185,8 @@ class UnreachedFinder:
     def known(self, lattice: CoverageLattice) -> NDArray[np.bool_]:
         """Return which cells of a lattice are reachable or have been, bool (rows, cols).
 
-        Without cells that keep-out zones close now, and cells that were but assumed to be.
+        Without cells that keep-out zones close now, and cells that were only assumed to be
+        reachable.
         """
         known, area = self._once_on(lattice.window), self._map.area
         if area is not None and area.lattice is lattice:

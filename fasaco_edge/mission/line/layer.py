@@ -31,17 +31,18 @@ from fasaco_edge.mission.line.published_line import Publication
 from fasaco_edge.mission.map.map_state import MapState
 from fasaco_edge.mission.orders.sequencer import Sequencer
 
-# A cell with less unswept floor than this is not driven to [m2].
+# The robot does not drive to a cell with less unswept floor than this [m2].
 LEAST_LEFT_M2 = 0.04
-# A passed cell is kept while the price of the floor left in it, and in a rim around it, is so high
-# [s], [m]; cells looked at each time that the robot passes one. It is not gone back to: at the end
-# of a mission that took four robots a tenth more time, for 0.1 % of the floor.
+# A passed cell is kept while the floor left in it, and in a rim of this width around it, is worth
+# this much [s], [m]; number of kept cells that are checked each time that the robot passes one. The
+# robot does not go back to them: at the end of a mission that took four robots a tenth more time,
+# for 0.1 % of the floor.
 WORTH_S, RIM_M, LOOKED_AT = 4.0, 0.1, 24
-# Nor is floor that was missed here and there, up to this share of all: on the map of a real scan
-# matcher that took an eighth more time, for 0.3 % of the floor. A base that drives beside its line
-# misses more, and poses that come seldom leave more unknown.
+# Nor does it go back for floor that was missed here and there, up to this share of all floor: on
+# the map of a real scan matcher that took an eighth more time, for 0.3 % of the floor. A base that
+# drives beside its line misses more, and poses that come seldom leave more unknown.
 LEAST_MISSED = 0.05
-# Less unswept floor is not reported at the end: rounded to a tenth it is 0 [m2].
+# Least unswept floor that is reported at the end [m2]: less would be rounded to 0.
 LEAST_TOLD_M2 = 0.05
 
 
@@ -52,10 +53,11 @@ class FloorToSweep(NamedTuple):
         asked_m2: reachable floor that is asked for, swept or not [m2].
         ahead_m2: the unswept part of it that the line ahead sweeps [m2].
         left_m2: the unswept part of it that the line ahead does not sweep [m2].
-        passed_m2: the rest of it: what the line has passed, and strips as narrow as a pixel [m2].
+        passed_m2: the rest of the unswept part: floor that the line has passed, and strips as
+            narrow as a pixel [m2].
         beyond_m2: free floor out of the tool's reach, asked for or not, by cause [m2].
-        possible_m2: what would be reachable were walls a pixel thinner than on the map [m2]; None
-            before the end of the order, or if not known.
+        possible_m2: floor that would be reachable if walls were a pixel thinner than on the map
+            [m2]; None before the end of the order, or if not known.
     """
 
     asked_m2: float
@@ -105,7 +107,7 @@ class LineLayer:
         self._forgotten = 0
         # The floor at the last update, and its revision.
         self._seen: tuple[FloorMap | None, int] = None, 0
-        # What of the floor of an order that is over may be reachable [m2].
+        # Floor of an order that is over which may be reachable [m2].
         self._possible_m2: float | None = None
 
     def note_map(self) -> None:
@@ -121,7 +123,8 @@ class LineLayer:
         before = self._ahead.tally
         if self._ahead.follow_floor(floor):
             self._is_dropped = True
-        # A floor without its last keep-out is another one, whatever its newest map has changed.
+        # A floor without its last keep-out is another floor object, even if the newest map has
+        # changed little.
         if floor.shift is None or self._ahead.tally is not before:
             whole = Window(0, 0, floor.geometry.rows, floor.geometry.cols)
             self._touched, self._unexplained, self._asked = whole, None, None
@@ -164,7 +167,7 @@ class LineLayer:
         touched, self._touched = self._touched, None
         self._take_floor(touched)
         reason, path = "", self._route.path
-        # Its cell may be ahead of its place on the line, which may skip cells.
+        # The robot's cell may be ahead of its place on the line, which may skip cells.
         is_further = path.index > ahead.cell
         if update is not None:
             self._set_aside(ahead, len(update.cells) > 0)
@@ -183,7 +186,7 @@ class LineLayer:
         if update is None and not reason and not is_further:
             self._explain()
         may_change = (update is None or update.may_wait) and not reason and not is_further
-        # On such a way it sweeps nothing beside its path.
+        # On such a way the robot sweeps nothing beside its path.
         if may_change and not self._is_way:
             self._polisher.polish(ahead, self._map.floor, held, is_settled=self._is_settled)
             self._publication.look(ahead)
@@ -197,7 +200,7 @@ class LineLayer:
     def _lay(
         self, ahead: LineAhead, cells: NDArray[np.int32], pose: Pose2D, *, is_cut: bool = False
     ) -> None:
-        """Lay the line along cells; a way leads straight there, past no other robot's place."""
+        """Lay the line along cells; a way leads straight to the goal, clear of other robots."""
         beside = self._route.beside
         ahead.lay(cells, pose, is_cut=is_cut, keeps=not self._is_way, beside=beside)
 
@@ -234,7 +237,7 @@ class LineLayer:
     def sum_up(self) -> str:
         """Return at the end of an order how much floor was swept, as text that follows another.
 
-        "" where hardly any is left, or where cells are counted.
+        "" if hardly any floor is left, or if cells are counted.
         """
         floor, grid, stamped = self._map.floor, self._map.grid, self._map.pose
         self._possible_m2 = None
@@ -258,7 +261,7 @@ class LineLayer:
 
     @property
     def is_worth_driving(self) -> bool:
-        """Whether the line ahead sweeps floor to speak of; where cells are counted none is."""
+        """Whether the line ahead sweeps enough floor to drive it; False if cells are counted."""
         if self._ahead is None:
             return False
         return self._ahead.tally.open_m2 - self._ahead.tally.left_m2 >= self._worth_m2
@@ -266,8 +269,8 @@ class LineLayer:
     def _credit(self, passed: NDArray[np.int32]) -> None:
         """Count passed cells as covered if hardly any of their floor is left.
 
-        A polished line need not pass the stand of a cell. Where no floor is asked for, none seems
-        left: such cells, of another robot's part for instance, need a visit.
+        A polished line need not pass the stand of a cell. Cells in which no floor is asked for, as
+        those of another robot's part, need a visit although no floor seems left in them.
         """
         ahead, floor, covered = self._ahead, self._map.floor, self._ledger.current
         assert ahead is not None
@@ -286,7 +289,7 @@ class LineLayer:
                 self._ledger.credit(cell)
 
     def open_missed(self) -> bool:
-        """Open cells again in which floor is left that is worth the way; return whether any is.
+        """Open cells again whose floor left is worth the way; return whether there are any.
 
         To be called at the end of a path: the robot may have driven beside its line.
         """
@@ -375,7 +378,7 @@ class LineLayer:
     def _asked_part(self, floor: FloorMap) -> Window | None:
         """Update the asked-for cells; return the window of pixels where they changed."""
         area = self._map.area
-        # Without an area nothing is known; afterwards everything is updated.
+        # Without a reachable area nothing is known; once there is one, everything is updated.
         if area is None or area.lattice.window != floor.stands.lattice.window:
             return None
         window = area.lattice.window

@@ -48,7 +48,7 @@ TRIED = 8
 
 
 class LineAhead:
-    """Owns the line from the last point behind the robot on, and its sweeps.
+    """Owns the line, which begins at the last point behind the robot, and its sweeps.
 
     Attributes:
         line: the rest of the line.
@@ -93,7 +93,7 @@ class LineAhead:
         return dropped
 
     def _carry(self, before: GridGeometry) -> None:
-        """Convert everything on a raster to the floor's, of another size or shifted by a sub-pixel.
+        """Convert to the floor's raster, which has another size or is shifted by part of a pixel.
 
         If a mapper's map begins at the farthest point seen, all its pixels move with that point.
         """
@@ -160,7 +160,7 @@ class LineAhead:
                 kept for the next walk.
             keeps: False for a walk that is only a way, see ``way``: a polished line reaches its
                 cells in another order, and by far longer ways.
-            beside: what such a way keeps clear of, as ``Route.beside``.
+            beside: discs that such a way keeps clear of, as ``Route.beside``.
         """
         self._see(pose)
         # A plan's cells are read-only; for those kernels would be compiled again, in the loop.
@@ -263,7 +263,7 @@ class LineAhead:
             if not self._is_clear(line.points[number], line.points[number + 1])
         ]
         if blocked[:1] == [0] and self.is_followed:
-            # A step that leads out is never clear: one more with each map would lead nowhere.
+            # The step that leads a robot out is never clear; do not add one with each map.
             blocked = blocked[leads_out(self._floor, self._place.here, line.points[1]) :]
         if not blocked:
             return False
@@ -351,7 +351,7 @@ class LineAhead:
         return all(self._is_clear(a, b) for a, b in pairwise(points))
 
     def next_xy(self, count: int) -> Points:
-        """Return its first points from the robot's place on it, at most ``count``, as ``xy``."""
+        """Return the first points of ``xy``, from the robot's place on, at most ``count``."""
         return raster_to_map(self._floor.geometry, self._from_place()[:count])
 
     def _from_place(self) -> Points:
@@ -397,7 +397,7 @@ class LineAhead:
         return begin + next(seen, nearest[0])
 
     def _stands(self, begin: int, end: int) -> Points:
-        """Return the stands of the walk's cells from ``begin`` to ``end``; of one at least."""
+        """Return the stands of the walk's cells from ``begin`` to ``end``, at least one."""
         return self._floor.stands.stands_of(self._walk[begin : max(end, begin + 1)])
 
     def note(self, first: int, end: int, state: int) -> None:
@@ -407,7 +407,7 @@ class LineAhead:
     def lengths(self, within_m: float = math.inf) -> NDArray[np.float64]:
         """Return the distance along the line to each point, float64 (n,) [m]; the first is 0.
 
-        To the first points alone if the last of them is farther than ``within_m`` [m].
+        Only for the first points, up to one that is farther than ``within_m`` [m], if there is one.
         """
         unit_m = self.tally.unit_m
         return lengths(self.line.points, within_m / unit_m, self._place.along) * unit_m

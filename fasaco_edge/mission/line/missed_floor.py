@@ -1,4 +1,4 @@
-"""Missed floor: what is worth coming back for at the end of a path, and what is out of reach."""
+"""Missed floor: floor worth coming back for at the end of a path, and floor out of reach."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class MissedFloor:
 
     @classmethod
     def at(cls, line: LineConfig, least_s: float) -> Self:
-        """Return it for the speed and price of a line."""
+        """Return the costs for the speed and price of a line."""
         return cls(line.speed_m_s, line.price_s_m2, least_s)
 
     def worth_the_way(
@@ -75,7 +75,7 @@ def _apart(one: Cell, other: Cell) -> float:
 
 
 def _pieces(cells: set[Cell]) -> list[list[Cell]]:
-    """Return cells in pieces that hang together by edges or corners."""
+    """Return cells in pieces that are connected by edges or corners."""
     rest, pieces = set(cells), []
     while rest:
         piece = [rest.pop()]

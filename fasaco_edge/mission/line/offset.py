@@ -1,8 +1,8 @@
-"""Offset from the line: whether the robot drives beside its line all the time, and on which side.
+"""Offset from the line: whether the robot always drives beside its line, and on which side.
 
-A robot strays from its line at corners and after a push, to either side. One that is on the same
-side by the same distance, metre after metre, has a fault that it cannot see: its pose is not that
-of the point that its base leads along the line, or the base pulls to a side.
+A robot strays from its line at corners and after a push, to either side. A robot that stays on one
+side by the same distance, metre after metre, has a fault that it cannot detect: its pose is not
+that of the point that its base leads along the line, or the base pulls to a side.
 """
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ STEP_M, CORNER_M, JUMP_M = 0.05, 0.25, 1.0
 BEND_RAD = math.radians(10.0)
 # Number of samples used, of the last 10 m; and least number, of 5 m.
 MOST, LEAST = 200, 100
-# The least offset that counts: a share of the tool's width, and a distance that no follower is more
-# exact than [m].
+# The least offset that counts: a share of the tool's width, and a distance that no follower can
+# keep more exactly [m].
 TOOL_SHARE, LEAST_M = 0.1, 0.03
 # Share of the offsets that must be on that side.
 ONE_SIDE = 0.8

@@ -1,4 +1,4 @@
-"""Pieces of a line, and their joining to a line.
+"""Pieces of a line, and how they are joined to a line.
 
 A line along a new walk reuses the pieces of the previous line that lead along the same cells,
 forward or backward; between them it goes over stands.
@@ -27,7 +27,7 @@ class Piece:
 
     Attributes:
         line: the piece, as in the new line.
-        begin: index of its first point in the previous line; of its last one if ``backward``.
+        begin: index of its first point in the previous line, or of its last point if ``backward``.
         backward: whether the direction is reversed.
     """
 
@@ -69,7 +69,7 @@ def kept_pieces(line: Line, before: Walk, after: Walk) -> list[Piece]:
 
 
 def exchanged(line: Line, pieces: list[Piece]) -> tuple[Line, Edges, Edges]:
-    """Return the line that consists of pieces, and the edges that it exchanges for others.
+    """Return the line that consists of pieces, with the edges removed and the edges added.
 
     Points where the line differs, and where an old piece meets a new one, are to be polished again.
 
@@ -124,7 +124,7 @@ class Joiner:
     def joined(self, pieces: list[Piece]) -> list[Piece]:
         """Return the line as pieces; new ones have ``begin`` -1."""
         self._done = [Piece(self.here, -1)]
-        # The point behind the robot needs the next one; both are kept or dropped.
+        # The point behind the robot needs the next point; both are kept or dropped.
         if pieces and pieces[0].begin == 0:
             if len(pieces[0].line) > 1:
                 self._done = pieces[:1]

@@ -23,10 +23,10 @@ from fasaco_edge.mission.line.offset import CORNER_M, Beside
 from fasaco_edge.mission.line.polyline import Line, Numbers, Points, Walk
 
 # The robot is searched for this far ahead on its line, or as far as it can have driven [m]: farther
-# on, the next lane may be as near.
+# ahead, another lane may be as near.
 LOOK_AHEAD_M = 0.8
 # Distance to the end of its line at which a robot has arrived [m]; it has also arrived if the tool
-# covers the end, and this many poses come no nearer: it may drive beside its line.
+# covers the end and this many poses come no nearer, as a robot may drive beside its line.
 ARRIVED_M, STANDING_POSES = 0.05, 10
 
 
@@ -130,11 +130,11 @@ class PlaceOnLine:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LineAside:
-    """A line on the raster that it will be resumed on; empty if there is none.
+    """A line on the raster on which it will be resumed; empty if there is none.
 
     Attributes:
         walk: int32 (n, 2), its cells.
-        line: from the place where the robot left it on.
+        line: its points, beginning where the robot left it.
         touched: window of the raster that maps may have changed since; None for none.
     """
 

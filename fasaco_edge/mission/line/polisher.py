@@ -42,7 +42,7 @@ ANNEAL_MOVES, HOTTEST = 300, 0.3
 SEEN_M = 20.0
 # Limit on the moves per call, which bounds a cycle of the loop.
 MOST_MOVES = 3000
-# As the greatest detour: excludes detours.
+# Value of the greatest detour that excludes detours.
 NO_DETOURS = -1e6
 
 

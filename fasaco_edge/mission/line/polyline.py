@@ -17,7 +17,7 @@ Walk = NDArray[np.int32]
 # States of points: at a stand; moved; polished with all moves.
 RAW, MOVED, POLISHED = range(3)
 NO_EDGES = np.empty((0, 4))
-# Lengths are computed for so many points first, and for twice as many until they suffice.
+# Lengths are computed for this many points first, then for twice as many until they suffice.
 FIRST_POINTS = 128
 
 
@@ -79,7 +79,7 @@ class Line:
         return Line(self.points, self.cells, states)
 
     def first_below(self, state: int) -> int:
-        """Return the index of the first point below MOVED, or POLISHED; the count if none."""
+        """Return the index of the first point with a lower state; the count if there is none."""
         below = self.state < state
         return int(np.argmax(below)) if below.any() else len(below)
 
@@ -119,13 +119,13 @@ def edges_near(points: Points, part: Window, shape: tuple[int, int], margin: flo
         points: float64 (n, 2): y, x [pixels].
         part: the window.
         shape: of the raster, (rows, cols); edges beyond it are always included.
-        margin: how far that is [pixels].
+        margin: the distance that counts as near [pixels].
     """
     if len(points) < 2:
         return []
     outside = is_outside(points, shape, margin)
     near = outside[:-1] | outside[1:]
-    # Those with both ends on one side of the window are not near it.
+    # Edges with both ends on one side of the window are not near it.
     close = np.ones(len(near), np.bool_)
     for axis, low, high in ((0, part.row0, part.row1), (1, part.col0, part.col1)):
         ends = points[:, axis]
@@ -140,7 +140,7 @@ def lengths(points: Points, within: float, along: float) -> NDArray[np.float64]:
 
     Args:
         points: float64 (n, 2), n of 1 or more.
-        within: m is n, or so many that the last is farther than this.
+        within: a distance [pixels]: m is n, or the last of the points is farther than this.
         along: fraction of the first edge that is not counted.
     """
     count = FIRST_POINTS

@@ -1,10 +1,10 @@
 """Published line: the part of the line that the robot has, and when it needs the newest line.
 
 Maps, plans and polish change the line all the time, mostly far ahead of the robot. A change waits
-until the robot comes near it; so it may yet be taken back, and is published with others. What is
+until the robot comes near it: it may be undone before, and is published with others. What is
 published stays as it is for the next metres: polish begins beyond.
 
-A new path for a robot that stands never waits: it may come near nothing for long.
+A new path for a robot that stands never waits, as the robot comes no nearer to the change.
 """
 
 from __future__ import annotations
@@ -23,15 +23,16 @@ from fasaco_edge.mission.line.polyline import POLISHED, Points
 
 # A change this near is published at once: the robot needs a metre to stop, and a second [m], [s].
 NEAR_M, NEAR_S = 1.0, 1.0
-# One that is less than this ahead is published, once nothing is under way that changes the line
-# there, or after the patience [m], [s]. So is a line that is cut off nearer than that, if the robot
-# can drive on along the published one: a cell was lost, and a plan is there within that time.
+# A change less than this ahead is published once neither a plan nor polish is under way there, or
+# after the patience [m], [s]. The same holds for a line that is cut off nearer than that, if the
+# robot can drive on along the published one: a cell was lost, and a new plan comes within that
+# time.
 DUE_M, DUE_S, PATIENCE_S = 2.0, 1.0, 1.0
 # Length of a published line ahead of the robot that is no longer polished [m].
 HELD_M = 4.0
-# Points that are looked at: they reach farther than that.
+# Number of points compared: they reach farther than that.
 SEEN_POINTS = 128
-# A point is where it was if it is this near [m]: rasters are shifted.
+# A point has not moved if it is this near to its former place [m]: rasters are shifted.
 SAME_M = 1e-3
 NONE: NDArray[np.float64] = np.empty((0, 2))
 
@@ -46,12 +47,12 @@ class PublishedLine:
     def __init__(self, speed_m_s: float) -> None:
         self._near_m = NEAR_M + NEAR_S * speed_m_s
         self._due_m = DUE_M + DUE_S * speed_m_s
-        # The published points, of which one is the next ahead of the robot, and which of them is
-        # the last that is held.
+        # The published points; the index of the next one ahead of the robot, and of the last one
+        # that is held.
         self._xy: Points = NONE
         self._next = self._last_held = 0
-        # Of the line at the last look: how many points after its first one are as published, and
-        # how far it is to the last one of these; infinite if all are [m].
+        # At the last comparison: the number of points after the line's first one that equal the
+        # published ones, and the distance to the last of these [m]; infinite if all are equal.
         self._common, self.differs_m = 0, 0.0
         self._due_since = math.inf
 
@@ -81,11 +82,11 @@ class PublishedLine:
 
     @property
     def held(self) -> int:
-        """How many points of the line, from its first one on, are not to be polished."""
+        """Number of points, from the line's first on, that are not to be polished."""
         return min(self._last_held - self._next + 2, self._common + 1)
 
     def is_due(self, now: float, is_settled: bool, leads_on: Callable[[Points], bool]) -> bool:
-        """Return whether the line has to be published, as it was at the last look.
+        """Return whether the line of the last comparison has to be published.
 
         Args:
             now: [s].

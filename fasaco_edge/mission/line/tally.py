@@ -168,7 +168,7 @@ class SweepTally:
 
     @property
     def left_m2(self) -> float:
-        """The part of that which the line ahead does not sweep [m2]."""
+        """The part of the open area that the line ahead does not sweep [m2]."""
         return int(self.sweeps.left.sum()) * self.unit_m**2
 
     @property

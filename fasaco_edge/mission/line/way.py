@@ -1,7 +1,7 @@
 """Way: a line that only leads somewhere, with as few corners as the floor allows.
 
-A walk over cells is a staircase wherever it leads across their rows: a robot that turns on the spot
-needs twice as long for its corners as for its length.
+A walk over cells is a staircase wherever it leads diagonally across them: a robot that turns on the
+spot needs twice as long for the corners as for the length.
 """
 
 from __future__ import annotations
@@ -143,8 +143,7 @@ def _place_beside(
 def way_s(walk: NDArray[np.int32], pose: Pose2D, floor: FloorMap, sweeping: Sweeping) -> float:
     """Return how long the way along a walk takes [s].
 
-    Counted with a half turn at each of its ends: the robot may face away from it, and from the
-    heading that it ends with.
+    Includes a half turn at each end: the robot may face away from the way, or from its next way.
 
     Args:
         walk: int32 (n, 2), n >= 1, cells (row, col), each a legal step from the previous one.

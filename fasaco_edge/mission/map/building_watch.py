@@ -10,10 +10,11 @@ two buildings in turn, nothing is decided: the robot stands until one of them st
 A map is compared with a map of some seconds before (the reference), not with the last one: a map
 sent in parts, or that of a restarted mapper, which is almost empty at first, differs from it, too.
 
-Measured on 5 buildings, cells of 0.3 m: the highest kappa of two buildings is 0.22, of the first
-2 m that a scanner sees in another one 0.35; the lowest in one building 0.59 for maps 0.3 m apart,
-0.32 for 0.6 m, 0.67 and 0.34 with furniture moved from and to 10 and 30 % of the coverable cells.
-Floors with the same walls are one building to this watch: they need frames of their own.
+Measured on 5 buildings, cells of 0.3 m: the highest kappa of two buildings is 0.22, and 0.35 for
+the first 2 m that a scanner sees in another building. The lowest kappa in one building is 0.59 for
+maps 0.3 m apart, 0.32 for 0.6 m, and 0.67 and 0.34 if furniture moves from and to 10 and 30 % of
+the coverable cells. Floors with the same walls are one building to this watch: they need frames of
+their own.
 """
 
 from __future__ import annotations
@@ -35,7 +36,7 @@ LEAST_SHARE = 0.05
 FOREIGN, ALIKE = 0.3, 0.7
 # Least rise of kappa by a motion of the map that explains the difference of two maps.
 BETTER = 0.1
-# Most cells compared under a motion.
+# Limit on the cells compared under a motion.
 MOST_CELLS = 20_000
 # Longest time from a map to the pose that shows its motion, before the robot stops [s].
 GRACE_S = 0.5
@@ -44,7 +45,7 @@ GRACE_S = 0.5
 PATIENCE_S, SETTLED_S, SOON_S, LONGEST = 5.0, 5.0, 600.0, 16
 # Age at which the reference is replaced [s], by a map that knows at least this share of its cells.
 AGE_S, KNOWN_SHARE = 5.0, 0.5
-# A pose that jumped this long before the map has moved with it [s].
+# A pose that jumped at most this long before a map counts as moved with it [s].
 JUMP_S = 6.0
 
 
@@ -134,25 +135,25 @@ class BuildingWatch:
         self._reference: CoverageLattice | None = None
         self._reference_at = 0.0
         self._newest: CoverageLattice | None = None
-        # Since when all maps disagree with the reference, how the first one does, and the pose by
-        # then; None while the newest agrees.
+        # Since when all maps disagree with the reference, the agreement of the first of them, and
+        # the pose at that time; None while the newest map agrees.
         self._foreign: tuple[float, Agreement, Pose2D | None] | None = None
         self._agreed_at = 0.0
         # Whether the newest map shows no floor, so that nothing is decided.
         self._is_blind = False
-        # Changes of building, and the last one.
+        # Number of changes of building, and the time of the last one.
         self._changes, self._changed_at = 0, float("-inf")
-        # How a map that still shows the building before agrees with the reference, and the pose by
-        # then, until the next pose; None for a map that is all but equal.
+        # Until the next pose: the agreement of a map that still shows the previous building with
+        # the reference, and the pose at that time; None for a map that is nearly equal.
         self._shifted: tuple[Agreement, Pose2D] | None = None
         # Whether a loop closure was found since ``take_closure``.
         self._has_closed = False
-        # The last jump of the pose, and when.
+        # The last jump of the pose, and its time.
         self._jump: tuple[Motion, float] | None = None
 
     @property
     def is_foreign(self) -> bool:
-        """Whether the newest map shows another building, by the poses received."""
+        """Whether the newest map shows another building, as far as the poses received show."""
         return self._foreign is not None
 
     def begin_anew(self) -> None:
@@ -173,7 +174,7 @@ class BuildingWatch:
         self._jump = Motion(start, end), now
 
     def note_no_floor(self) -> None:
-        """Note a map without floor: it is of any building, and the time with it does not count."""
+        """Note a map without floor: it shows no building, and the time with it does not count."""
         self._is_blind = True
 
     def note_map(
@@ -189,11 +190,11 @@ class BuildingWatch:
             lattice: cell centres of the map.
             pose: the robot's, on the map before.
             now: time.
-            contradicts: whether the covered cells speak against the map; asked where its walls
-                leave that open.
+            contradicts: returns whether the covered cells contradict the map; called if its walls
+                do not decide.
 
         Returns:
-            The robot's pose on the map before, which differs from ``pose`` if that moved first.
+            The robot's pose on the map before, which differs from ``pose`` if the pose moved first.
         """
         self._newest, before = lattice, self._reference
         if self._is_blind and self._foreign is not None:
@@ -259,7 +260,7 @@ class BuildingWatch:
         return for_s >= patience_s
 
     def _explains(self, motion: Motion, seen: Agreement) -> bool:
-        """Return whether the newest map is that of the building before, moved like this."""
+        """Return whether the newest map shows the previous building, moved as the poses show."""
         if motion.is_still or self._reference is None or self._newest is None:
             return False
         moved = Agreement.moved(self._reference, self._newest, motion)

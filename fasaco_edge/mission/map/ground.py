@@ -63,7 +63,7 @@ class Ground:
             within: window of the pixels that may differ, see ``LatticeChange.between``.
 
         Raises:
-            MapTooLarge, MapTooFar: see there.
+            MapTooLarge, MapTooFar: see ``begin``.
         """
         assert self.plain is not None
         footprint, most = self._config.footprint, self._config.max_lattice_cells
@@ -90,7 +90,7 @@ class Ground:
     def is_decided(self, window: Window) -> NDArray[np.bool_] | None:
         """Return for which cells of a window the map shows whether the robot fits at the centre.
 
-        For the others the stand lies at the border of the known map, and will soon be elsewhere.
+        In the other cells the stand lies at the border of the known map, and will soon move.
 
         Returns:
             bool (rows, cols); None where cells are counted, or for another window.

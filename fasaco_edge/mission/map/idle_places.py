@@ -1,7 +1,8 @@
 """Places without effect: keep-outs that touch no free ground of the map, home or dock beside it.
 
-So are places given in another unit, with a wrong sign, or a mask with a wrong origin. A zone of an
-order is refused there; these hold for maps to come, too, and a map may still grow.
+Places in a wrong unit or with a wrong sign have no effect, nor has a mask with a wrong origin. A
+zone of an order would be refused there; these places are kept, as they hold for later maps, too,
+and a map may still grow.
 """
 
 from __future__ import annotations
@@ -18,10 +19,10 @@ from fasaco_edge.mission.orders.zones import near_polygons
 
 # Least time between two looks [s]: a map that grows changes often.
 PERIOD_S = 1.0
-# Most pixels of a look, and as how many each polygon counts beside its own: some tens of
-# milliseconds.
+# Limit on the pixels of a check, and number of pixels that each polygon counts in addition to its
+# own: some tens of milliseconds in all.
 MOST_PIXELS, POLYGON_PIXELS = 1_000_000, 500
-# Most places that are named.
+# Limit on the places that are named.
 MOST_NAMED = 5
 
 _Named = tuple[str, tuple[Polygon, ...]]
@@ -50,7 +51,7 @@ class IdlePlaces:
         if mask := policy.keep_out_mask:
             polygons = mask_polygons(mask)
             self._standing += [("keep_out_mask", polygons)] if polygons else []
-            # One that comes as a message may be blank for a while.
+            # A mask that comes as a message may be blank for a while.
             if not polygons and not mask_frame(mask):
                 self._blank = "no pixel of mission.keep_out_mask is occupied"
         # Keep-outs that have been found to have an effect, on maps of a frame.
@@ -91,7 +92,7 @@ class IdlePlaces:
             for polygon in area[1]:
                 pixels = _Pixels.of(polygon, grid.geometry, self._footprint.robot_radius_m)
                 spent += POLYGON_PIXELS + pixels.window.rows * pixels.window.cols
-                # What is left is not looked at, and taken for used on this map.
+                # The remaining places are not checked, and count as used on this map.
                 if spent > MOST_PIXELS or pixels.touch_free(grid, self._footprint.free_at_most):
                     self._used.add(area)
                     break
@@ -113,8 +114,8 @@ class _Pixels:
 
     Attributes:
         corners: the polygon (col, row) [pixels].
-        reach: how near [pixels].
-        window: around them, on the map.
+        reach: the distance that counts as near [pixels].
+        window: window of the map around them.
     """
 
     corners: Polygon
@@ -131,7 +132,7 @@ class _Pixels:
         return cls(corners, reach, Window(row0, col0, row1, col1))
 
     def touch_free(self, grid: OccupancyGrid, free_at_most: int) -> bool:
-        """Return whether one of them is free."""
+        """Return whether one of the pixels is free."""
         window = self.window
         values = grid.cells[window.row0 : window.row1, window.col0 : window.col1]
         free = (values >= 0) & (values <= free_at_most)

@@ -39,7 +39,7 @@ class FrameSelector:
 
     def __init__(self) -> None:
         self.active = ""
-        # By frame, the newest last.
+        # Maps and poses by frame, the newest last.
         self._maps: dict[str, OccupancyGrid] = {}
         self._poses: dict[str, tuple[StampedPose, float]] = {}
         # The other frame in which map and poses arrive, and since when.
@@ -188,7 +188,7 @@ class InputMonitor:
         self._pose: StampedPose | None = None
         # Whether a pose has arrived, in any frame.
         self._has_pose = False
-        # When the last ones came; before that, when they began to be due.
+        # When the last pose and map came; before that, when they began to be due.
         self._pose_at: float | None = None
         self._map_at: float | None = None
         # Number of the plan requested from the doubtful pose.
@@ -211,7 +211,7 @@ class InputMonitor:
 
     @property
     def map_at(self) -> float | None:
-        """The same of maps and updates."""
+        """When the last map or update came; before that, when it began to be due, or None."""
         return self._map_at
 
     def note_map(self, now: float) -> None:

@@ -5,9 +5,9 @@ tool passed over, only that the map was somewhere between its old position and t
 cells that were covered under every possible intermediate map position still count.
 
 Small shifts are found by walls alone. A loop closure that moves the map by less than a cell changes
-too few cells to count as a motion (``loop_closure.has_moved``), and by less than poses differ while
-the robot drives. Its walls show it: pixels at the border of occupied and free lie in the walls
-before, once they are moved back.
+too few cells to count as a motion (``loop_closure.has_moved``), and is smaller than the steps
+between poses of a driving robot. The walls show it: pixels at the border of occupied and free lie
+in the previous walls once they are moved back.
 """
 
 from __future__ import annotations
@@ -61,7 +61,7 @@ def shows_floor(lattice: CoverageLattice) -> bool:
 
 
 def has_moved(change: LatticeChange) -> bool:
-    """Return whether a map shows the walls at other places all over."""
+    """Return whether a map shows most walls at other places."""
     if change.before is None or len(change.cells) < LEAST_CELLS:
         return False
     then, now = (
@@ -133,9 +133,9 @@ def moved_cells(cells: NDArray[np.int32], motion: Motion, cell_m: float) -> NDAr
 def moved_mask(
     window: Window, mask: NDArray[np.bool_], motion: Motion, cell_m: float
 ) -> tuple[Window, NDArray[np.bool_]] | None:
-    """Return which cells have their centre on a marked one after a motion, with their window.
+    """Return which cells have their centre on a marked cell after a motion, with their window.
 
-    None if that is too large. ``mask``: bool (rows, cols) of a window before.
+    None if the window is too large. ``mask``: bool (rows, cols) of a window before.
     """
     rows, cols = (window.row0, window.row1), (window.col0, window.col1)
     y, x = np.array(list(product(rows, cols))).T * cell_m
@@ -175,7 +175,7 @@ def uncertain_cells(
 def certain_floor(
     before: FloorSnapshot, motion: Motion
 ) -> Callable[[Tiles], list[tuple[Place, Bits]]]:
-    """Return a function of tiles: the certain rest of those with pixels that may not be swept."""
+    """Return a function that returns the pixels certainly swept, for tiles with uncertain ones."""
     known = _stacked(before.tiles)
 
     def left_of(tiles: Tiles) -> list[tuple[Place, Bits]]:
@@ -219,7 +219,7 @@ def _places_between(tiles: NDArray[np.int64], motion: Motion) -> NDArray[np.int6
 def _covered(
     before: LedgerSnapshot, x: NDArray[np.float64], y: NDArray[np.float64]
 ) -> NDArray[np.bool_]:
-    """Tell for points [m] whether all cells around them were covered."""
+    """Return for points [m] whether all cells around them were covered."""
     row, col = y / before.cell_m - 0.5, x / before.cell_m - 0.5
     low_row, high_row = np.floor(row + NEAR).astype(int), np.ceil(row - NEAR).astype(int)
     low_col, high_col = np.floor(col + NEAR).astype(int), np.ceil(col - NEAR).astype(int)
@@ -282,7 +282,7 @@ def small_shift(before: OccupancyGrid, after: OccupancyGrid, footprint: Footprin
 
 
 def _wall_faces(cells: NDArray[np.int8], footprint: Footprint) -> NDArray[np.bool_]:
-    """Return which pixels are occupied, with a free one beside them, bool (rows, cols)."""
+    """Return which pixels are occupied and beside a free one, bool (rows, cols)."""
     free = np.pad((cells >= 0) & (cells <= footprint.free_at_most), 1)
     beside = free[:-2, 1:-1] | free[2:, 1:-1] | free[1:-1, :-2] | free[1:-1, 2:]
     faces: NDArray[np.bool_] = beside & (cells >= footprint.occupied_at_least)

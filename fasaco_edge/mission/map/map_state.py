@@ -50,7 +50,7 @@ class MapState:
 
     Attributes:
         grid: the newest map, with all updates and obstacles; None before there is one.
-        given: the same without obstacles, as it came.
+        given: the same map as received, without obstacles.
         obstacles: obstacles that the map does not show.
         map_revision: counter of map states: full maps, batches of updates, changes of frame; 0
             before the first.
@@ -98,7 +98,7 @@ class MapState:
         """
         is_active_now = False
         if self.frames.active not in ("", grid.frame):
-            # It may be needed later, if its size is acceptable.
+            # The map may be needed later, if its size is acceptable.
             lattice_window(
                 grid.geometry, self._config.footprint.cell_m, self._config.max_lattice_cells
             )
@@ -148,12 +148,12 @@ class MapState:
         """Draw the newest map again: the closed floor on it has changed."""
         if self.given is not None:
             self._take_map(self.given)
-            self.has_moved = False  # its walls are where they were
+            self.has_moved = False  # closed floor does not move walls
 
     def without_obstacles(self, lattice: CoverageLattice) -> CoverageLattice:
         """Return a lattice over the newest map on which cells near obstacles are unknown.
 
-        It shows the map alone: the building without robots that stand in it.
+        It shows only the building, without robots that stand in it.
         """
         if self.grid is None or self.given is None or self.grid is self.given:
             return lattice
@@ -191,7 +191,7 @@ class MapState:
             self.pose = self.frames.pose_in(grid.frame)
 
     def _compare(self, change: LatticeChange) -> None:
-        """Find whether the newest map shows floor, and has moved since the last that did."""
+        """Find whether the newest map shows floor, and has moved since the last one that did."""
         assert self.free is not None
         self.has_moved, self.shows_floor = False, shows_floor(self.free)
         if not self.shows_floor:
@@ -201,7 +201,7 @@ class MapState:
         self.has_moved, self._shown = has_moved(change), change.after
 
     def watch_on(self, building: BuildingWatch) -> None:
-        """Compare maps with the building that another mission, on the same cells, was in."""
+        """Compare maps with the building of another mission on the same cells."""
         self.building = building
 
     def keep_out(self, polygons: tuple[Polygon, ...]) -> None:

@@ -19,7 +19,7 @@ from fasaco_edge.grid.occupancy import OCCUPIED, OccupancyGrid
 
 # Time for which floor is closed [s], doubled each time it is closed again, up to a limit.
 CLOSED_S, MOST_CLOSED_S = 20.0, 320.0
-# Distance within which it is the same floor [m]; time after which it is forgotten [s].
+# Distance within which obstacles count as the same [m]; time after which one is forgotten [s].
 SAME_M, FORGET_S = 0.5, 600.0
 # A follower that still stands there after this time [s] cannot drive the new path either: the floor
 # is closed wider by this much each time [m], up to this number of times.
@@ -29,7 +29,7 @@ AGAIN_S, WIDER_M, MOST_WIDER = 3.0, 0.05, 4
 DEEP_M, SPACING_M, MARGIN_M, FREE_M = 0.3, 0.05, 0.06, 0.01
 # Largest map on which they are drawn [pixels]: it is kept twice then, see ``daemon.memory``.
 MOST_PIXELS = 6_000_000
-# Most obstacles that are kept, the newest; and points of each.
+# Limit on the obstacles that are kept, the newest; and on the points of each.
 MOST, MOST_POINTS = 32, 192
 
 
@@ -40,7 +40,7 @@ class _Obstacle:
     Attributes:
         points: points seen of it, the nearest first [m].
         here: where the robot was [m].
-        at, until: from when until when its floor is closed [s].
+        at, until: begin and end of the time for which its floor is closed [s].
         times: how often it was closed, opened in between.
         wider: how often it was closed wider.
     """
@@ -67,7 +67,7 @@ class Obstacles:
 
     @property
     def closed(self) -> int:
-        """How many there are for now."""
+        """Number of obstacles whose floor is closed now."""
         return len(self._closed)
 
     def close(self, points: Sequence[Point], here: Point, now: float) -> bool:

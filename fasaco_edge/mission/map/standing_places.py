@@ -1,10 +1,10 @@
 """Standing places: zones, keep-out zones, home and dock of the configuration, on their map alone.
 
-Their coordinates are valid only on the map that they were given for. It is the map in the frame
-``map_frame`` of the configuration, or without one in the first frame used with these places, which
-is kept with the ledger. They are not used on a map in another frame, or of another building in this
-frame. With keep-out zones configured, the robot does not drive there, as the zones of that map are
-not known. After a command ``reset`` they belong to the map in use at that time.
+Their coordinates are valid only on the map that they were given for. That is the map in the frame
+``map_frame`` of the configuration, or else in the first frame used with these places; that frame is
+kept with the ledger. The places are not used on a map in another frame, or of another building in
+this frame. With keep-out zones configured, the robot does not drive there, as the zones of that map
+are not known. After a command ``reset`` the places belong to the map in use at that time.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from fasaco_edge.mission.orders.order_state import NO_PLACES, PlacesNote
 
 
 class StandingPlaces:
-    """Gives the places of the configuration out while the map is theirs.
+    """Returns the places of the configuration while the map is the one that they belong to.
 
     Attributes:
         note: which map they belong to; kept with the order.
@@ -33,14 +33,14 @@ class StandingPlaces:
 
         Args:
             policy: with the places in the frame of the lattice.
-            given: the same, with the places as given.
+            given: the policy with the places as configured.
         """
         self.note = NO_PLACES
         self._policy, self._given = policy, given
         self._names = [
             name for name in ("zones", "keep_out", "home", "dock") if getattr(given, name)
         ]
-        # A mask that came as a message has a frame of its own, and another may come.
+        # A mask that came as a message has its own frame, and another mask may come.
         mask = given.keep_out_mask
         self._mask_frame = mask_frame(mask)
         self._mask = f"{zlib.crc32(mask.encode()):08x}" if self._mask_frame else ""
@@ -64,7 +64,7 @@ class StandingPlaces:
     def leave_building(self, frame: str) -> None:
         """Note that the map in a frame shows another building; ``enter`` returns the fault.
 
-        Places that are new in the configuration are given for that one.
+        Places that are new in the configuration belong to the new building.
         """
         if self.note.of == self._of and self.note.frame == frame:
             self.note = replace(self.note, is_left=True)
@@ -76,7 +76,7 @@ class StandingPlaces:
         self.note = note
 
     def begin_anew(self) -> None:
-        """Take them for places of the next map in use."""
+        """Let the places belong to the next map in use."""
         self.note = NO_PLACES
 
     @property

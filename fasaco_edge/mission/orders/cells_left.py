@@ -1,4 +1,4 @@
-"""What is left of an order: cells that need a visit, floor that opened, zones beyond reach."""
+"""The rest of an order: cells that need a visit, floor that opened, zones beyond reach."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ class CellsLeft:
 
     @property
     def is_exploring(self) -> bool:
-        """Whether for some reachable cells the map does not yet show whether the robot fits."""
+        """Whether for some reachable cell the map does not yet show if the robot fits."""
         area = self._map.area
         decided = None if area is None else self._map.is_decided(area.lattice.window)
         if area is None or decided is None:
@@ -94,7 +94,7 @@ class CellsLeft:
         return self._company.has_members
 
     def asked_of_me(self, area: ReachableArea) -> NDArray[np.bool_]:
-        """Return on which cells of an area this robot has to sweep the floor, covered or not."""
+        """Return the cells of an area whose floor this robot has to sweep, covered or not."""
         window = area.lattice.window
         asked = self.asked_for(window)
         mine = self._company.mine_to_sweep(asked, self.unswept(window), area)
@@ -120,12 +120,12 @@ class LeftBehind:
     """Finds floor for which a robot on its way home turns back.
 
     Attributes:
-        times: how often it did. A gap that opens whenever the robot has left must not hold it for
-            ever.
+        times: how often it turned back. A gap that opens whenever the robot has left must not hold
+            it for ever.
     """
 
     times: int = 0
-    # What was reachable when it set out; None if that is not known, as after a restart.
+    # Cells that were reachable when the robot set out; None if not known, as after a restart.
     _area: ReachableArea | None = None
 
     def set_out(self, area: ReachableArea | None) -> None:
@@ -133,7 +133,7 @@ class LeftBehind:
         self._area = area
 
     def is_open(self, unswept: NDArray[np.bool_], area: ReachableArea) -> bool:
-        """Return whether floor has opened since: a square of two by two cells at least.
+        """Return whether floor has opened since it set out: at least a square of two by two cells.
 
         Rows of cells along walls come and go with the map's noise. ``unswept``: bool (rows, cols)
         of the area.
@@ -160,7 +160,7 @@ def zones_beyond(
         order: the order.
         area: the reachable area.
         free: the lattice without keep-out zones.
-        visits: of its cells, uint16 (rows, cols).
+        visits: visits of the lattice's cells, uint16 (rows, cols).
     """
     beyond = []
     for zone in order.zones:

@@ -14,7 +14,7 @@ from fasaco_edge.mission.map.reachable_area import ReachableArea
 from fasaco_edge.mission.orders.order import Zone
 from fasaco_edge.mission.orders.zones import in_zones
 
-# Cells this close to one from which nothing new was seen are not visited either [cells].
+# Cells this close to a cell that showed nothing new are not visited either [cells].
 SEEN_AROUND = 1
 # Period of looking again for a way past robots that stand in it [s].
 AGAIN_S = 1.0
@@ -61,10 +61,10 @@ class Exploration:
 
     Attributes:
         viewpoints: cells (row, col) to look from, not yet reached.
-        reached: number of those that were.
+        reached: number of viewpoints that were reached.
         looked: cells already visited in search of the zone, or of ground that others see.
         seeks_zone: whether the viewpoints are for a zone.
-        is_shut: whether other robots stand in the way to all cells from which it may be seen.
+        is_shut: whether other robots stand in the way to all cells from which the zone may be seen.
     """
 
     viewpoints: set[Cell] = field(default_factory=set)
@@ -72,10 +72,10 @@ class Exploration:
     reached: int = 0
     seeks_zone: bool = False
     is_shut: bool = False
-    # The last viewpoint of ground that others see, and since when the robot is there.
+    # The last viewpoint of ground that others see, and since when the robot has been there.
     _beyond: Cell | None = None
     _there_since: float | None = None
-    # Since when it has waited for those robots, and when it looked last.
+    # Since when the robot has waited for those robots, and when it looked for a way last.
     _shut_since: float | None = None
     _shut_looked: float = float("-inf")
 

@@ -33,7 +33,7 @@ INLINE = "mask:"
 class _Inline(msgspec.Struct, frozen=True, omit_defaults=True):
     geometry: tuple[int, int, float, float, float, float]
     deflated: str
-    # Of the map that it belongs to; "" for any, as a file names none.
+    # Frame of the map that the mask belongs to; "" for any, as a file names none.
     frame: str = ""
 
 

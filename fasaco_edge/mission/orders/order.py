@@ -99,7 +99,7 @@ class Command(NamedTuple):
     """A command to a mission.
 
     Attributes:
-        name: which.
+        name: name of the command.
         order: what to cover, for ``start``.
         keep_out: what to add or remove, for ``keep_out_add`` and ``keep_out_remove``.
         discard: whether ``start`` and ``reset`` may forget covered cells.
@@ -149,8 +149,8 @@ class CommandDocument(_Document, frozen=True):
     Attributes:
         order: for `start` only.
         keep_out: for `keep_out_add` and, by its name alone, `keep_out_remove`.
-        discard: for `start` and `reset`: whether they may forget what is covered; where they would
-            and this is not true, they are refused (`would_forget`).
+        discard: for `start` and `reset`: whether they may forget what is covered. Without it, a
+            command that would forget covered cells is refused (`would_forget`).
     """
 
     command: CommandName
@@ -194,7 +194,7 @@ def read_command(document: object) -> Command:
 
 
 def read_recorded(document: dict[str, object]) -> Command:
-    """Return a command of a recording; a release before ``discard`` forgot without a question.
+    """Return a command of a recording; releases before ``discard`` always forgot covered cells.
 
     Raises:
         OrderError: as ``read_command``.

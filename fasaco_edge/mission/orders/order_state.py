@@ -53,10 +53,10 @@ class PlacesNote:
     """Which map the places of the configuration belong to.
 
     Attributes:
-        of: checksum of these places; "" while they belong to none.
+        of: checksum of these places; "" while they belong to no map.
         frame: frame of that map.
         is_left: whether the map in that frame has shown another building since.
-        left_mask: checksum of a keep-out mask that came as a message, whose map has shown another
+        left_mask: checksum of a keep-out mask that came as a message, if its map has shown another
             building since; "" for none.
     """
 
@@ -218,12 +218,12 @@ class OrderState:
     def in_other_building(self, why: str) -> OrderState:
         """Return the state in another building, where zones, keep-outs and home are invalid."""
         if self.automatic:
-            # Sent home, it does not sweep there instead.
+            # A robot that was sent home must not sweep in the new building instead.
             is_to_stand = self.paused or self.errand == "home"
             return replace(OrderState.autostart(), paused=is_to_stand)
         if self.order is not None:
             return OrderState.idle(f"{why}: the order was dropped")
-        # Its errand led to a place that lies in the building before.
+        # The errand led to a place in the previous building.
         is_paused = self.paused and not self.errand
         here = replace(self, home=None, errand="", paused=is_paused)
         return replace(here, frame="", keep_out=())

@@ -25,7 +25,7 @@ from fasaco_edge.mission.orders.reached_cells import ReachedCells
 from fasaco_edge.mission.orders.zones import in_zones
 from fasaco_edge.planners.problem import CoverageProblem
 
-# After this many paths in a row that cover no further cell, those left wait for the retry: the
+# After this many paths in a row that cover no further cell, the cells left wait for the retry: the
 # robot may stop short of its path's end, with the last cell out of the tool's reach.
 MAX_IN_VAIN = 3
 # A robot is shut in if its reachable area is less than this share of all area ever reachable: the
@@ -40,9 +40,9 @@ class _Run:
 
     Attributes:
         exploration: the viewpoints.
-        done: number of cells covered, and looked from, by the end of the last path; -1 before the
-            first.
-        in_vain: number of paths in a row that ended with that many.
+        done: number of cells covered, or visited to look from them, by the end of the last path; -1
+            before the first.
+        in_vain: number of paths in a row that did not increase ``done``.
         left_behind: floor that opens while the robot is on its way home.
         retry_at: time of the next retry [s]; None if nothing waits.
         ending: how the order ended.
@@ -83,7 +83,7 @@ class Sequencer:
         self._retry_check: tuple[object, bool] = (None, False)
 
     def ask_for_floor(self, sum_up: Callable[[], str]) -> None:
-        """Have the end of an order say how much floor was swept, as text that follows another."""
+        """Set the function that returns, as text for an order's end, how much floor was swept."""
         self._sum_up = sum_up
 
     @property
@@ -132,7 +132,7 @@ class Sequencer:
         if state.stage is Stage.OVER and state.why:
             self._run.ending = state.why
         self._retry_check = (None, False)
-        # What obstacles close for a while is in reach of another order on the same map, too.
+        # Floor that obstacles close for a while stays reachable for another order on the same map.
         is_crowded = state.home is not None and self._map.obstacles.closed > 0
         self._unreached.restart(self._unreached.reached if is_crowded else state.reached)
         self._company.try_again()
@@ -146,7 +146,7 @@ class Sequencer:
         self._unreached.succeed(before._unreached)
 
     def move_home(self, motion: Motion) -> None:
-        """Move home with the map, if it is a cell."""
+        """Move home with the map, if home is a cell."""
         if (home := self.order_state.home) is not None:
             cells = np.array([home], np.int32)
             ((row, col),) = moved_cells(cells, motion, self._config.footprint.cell_m).tolist()
@@ -159,7 +159,7 @@ class Sequencer:
     def move_reached(self, motion: Motion) -> None:
         """Move the reached cells with the map."""
         self._unreached.move(motion)
-        # What was reachable before lies elsewhere on the map now.
+        # Cells that were reachable before lie elsewhere on the map now.
         self._run.left_behind.set_out(None)
 
     def shift_reached(self, motion: Motion) -> None:
@@ -185,9 +185,10 @@ class Sequencer:
         return self._unreached.reached_m2(area)
 
     def is_shut_in(self, area: ReachableArea) -> bool:
-        """Return whether most of the floor and home are out of reach from an area, or nearly all.
+        """Return whether home and most of the floor are out of reach of an area, or nearly all
+        floor.
 
-        Not where all is covered: then nothing keeps the order from its end.
+        False if all is covered: then nothing keeps the order from its end.
         """
         (reached, once), home = self.reached_m2(area), self.goal()
         share = HOME_SHARE if home is None or area.contains(home) else MOST_SHARE
@@ -280,8 +281,8 @@ class Sequencer:
     def why_looking(self, cell: Cell, now: float) -> str:
         """Return why the robot stands where it has nothing to cover, or "".
 
-        It looks at ground that others see, or waits for others that stand in the way to its zone,
-        for as long as cells that it has not reached would be tried again.
+        It looks at ground that others see, or waits for others that stand in the way to its zone:
+        as long as the retries of an order take.
         """
         exploration, policy = self._run.exploration, self._config.policy
         if exploration.waits_for_way(now, policy.retries * policy.retry_s):
@@ -301,7 +302,7 @@ class Sequencer:
         run, cells = self._run, self.cells.left_to_me()
         if cells > 0:
             self._unreached.note_failure(why)
-        # Not by the cells left: the map may show some now and then.
+        # Counted by cells done, not by cells left: a map may show further ones at any time.
         done = self.done
         run.in_vain = run.in_vain + 1 if cells and done <= run.done else 1
         run.done = done
@@ -315,7 +316,7 @@ class Sequencer:
 
     @property
     def done(self) -> int:
-        """Number of cells that this robot has covered, and has come to only to look from there."""
+        """Number of cells that this robot has covered, or has visited only to look from them."""
         return self._ledger.current.snapshot().cells + self._run.exploration.reached
 
     def _leave_to_others(self) -> bool:
@@ -327,9 +328,9 @@ class Sequencer:
         return not self._company.untried(unswept, area).any()
 
     def pass_over_unreachable(self) -> bool:
-        """Pass over what this robot cannot come to now, in a fleet; return whether there was any.
+        """In a fleet pass over cells that are out of reach now; return whether there were any.
 
-        What it can come to of the others' parts comes before a retry.
+        Cells of others' parts that it can reach come before a retry.
         """
         area = self._map.area
         if area is None or not self._company.has_company:
@@ -340,7 +341,7 @@ class Sequencer:
         return bool(mine.any())
 
     def advance(self, now: float) -> None:
-        """Continue with the next part: nothing more can be done in this one now.
+        """Continue with the next part, as nothing more can be done in this one now.
 
         A robot that is shut in has no next part: it waits, and tries this one again.
         """
@@ -371,8 +372,8 @@ class Sequencer:
             self._end()
 
     def reopen(self) -> None:
-        """Continue an order after a change of the map: an automatic one that was over, and one on
-        its way home for floor that has opened, once and as often as there are retries."""
+        """Continue an order after a change of the map: an automatic one that was over; and one on
+        its way home if floor has opened, at most once more than there are retries."""
         state, run, area = self.order_state, self._run, self._map.area
         if state.automatic and state.stage is Stage.OVER:
             self.order_state = replace(state, stage=Stage.COVERING, why="")
@@ -419,7 +420,7 @@ class Sequencer:
     def _is_worth_trying(self) -> bool:
         """Return whether a retry is worthwhile; recomputed if anything changed.
 
-        It is while floor is closed for a while, by something that may be gone then.
+        It is also worthwhile while floor is closed for a while: the obstacle may be gone later.
         """
         closed = self._map.obstacles.closed
         key = (self._map.area, self._ledger.version, closed)

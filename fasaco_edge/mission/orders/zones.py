@@ -41,7 +41,7 @@ def kept_out(
 ) -> NDArray[np.bool_]:
     """Return which cells of ``window`` the robot must keep out of, bool (rows, cols), read-only.
 
-    Those that a polygon touches, or where the robot would touch one.
+    These are the cells that a polygon touches, or in which the robot would touch one.
     """
     return cells_near(polygons, window, cell_m, max(0.5 * cell_m, robot_radius_m))
 
@@ -133,7 +133,7 @@ def near_polygons(
 def with_kept_out(grid: OccupancyGrid, keep_out: tuple[Polygon, ...]) -> OccupancyGrid:
     """Return a map on which the pixels with their centre in a keep-out zone are occupied.
 
-    ``kept_out`` is stricter: it gives the cells where the robot would touch one.
+    ``kept_out`` is stricter: it includes the cells where the robot would touch a zone.
     """
     if not keep_out:
         return grid

@@ -27,7 +27,7 @@ class Blocked(msgspec.Struct, frozen=True, kw_only=True):
         daemon: Zenoh id of the daemon whose path it is.
         revision: of the path; 0 where that is not known.
         reason: obstacle: something is ahead that the map does not show; stuck: the robot does not
-            move as it is told, or its controller has given up; elsewhere: it cannot join the path.
+            move as commanded, or its controller has given up; elsewhere: it cannot join the path.
         detail: the same in words.
         held_s: for how long [s].
         frame: of the places.
@@ -52,7 +52,7 @@ def decode_blocked(payload: bytes) -> Blocked:
     """Return the report in ``payload``.
 
     Raises:
-        MalformedMessage: it is none, or its reason is none that is known.
+        MalformedMessage: it is no such report, or its reason is unknown.
     """
     report = decode_document(payload, Blocked)
     if report.reason not in REASONS:

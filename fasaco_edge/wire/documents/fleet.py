@@ -87,7 +87,7 @@ class FleetMember(Document, frozen=True):
         division: number of the newest division of the remaining cells known to it.
         open_cells: number of cells known to it that are still to sweep.
         swept: its swept tiles: changed ones first, then all in turn.
-        kept: which cells of these tiles it swept before this epoch, no tile for none; null where it
+        kept: which cells of these tiles it swept before this epoch, no tile for none; null if it
             does not know.
         lattice_deg: the angle of its cells' rows to the x axis of the map frame [deg].
         ground: tiles of cells that it can reach: changed ones first, then all in turn.
@@ -96,9 +96,9 @@ class FleetMember(Document, frozen=True):
         radius_m: radius of the robot's disc [m].
         ahead: points x, y of the path's next metres [m], in the frame of the map.
         origin: where the origin of its map frame lies in the fleet's frame: x, y [m], the angle
-            [deg]; without a frame of the fleet's own 0.
-        waits_for: name of the robot that it waits or makes way for, or that has most of what is
-            left, of which this one has no part; "" for none.
+            [deg]; 0 if the robots share one map frame.
+        waits_for: name of the robot that it waits for or makes way for; for a robot without a part,
+            of the one with the largest part left; "" for none.
     """
 
     version: Annotated[int, Meta(ge=1)]

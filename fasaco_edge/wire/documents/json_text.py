@@ -1,9 +1,9 @@
 """JSON documents on the bus (RFC 8259: no NaN, no infinities).
 
 Strict readers refuse a document with a member of the wrong type or out of its range; tolerant
-readers, for documents of other versions, drop that member. Both ignore unknown members, and refuse
-a document with a number or a depth beyond the limits, whichever member has it: what was decoded
-can be calculated with.
+readers, for documents of other versions, drop that member. Both ignore unknown members. Both refuse
+a document if a number in it or its depth is beyond the limits, even in an unknown member: decoded
+numbers are safe to calculate with.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ Struct = TypeVar("Struct", bound=msgspec.Struct)
 def allowed(**schema: object) -> Meta:
     """Return a limit that a schema states and writers keep; readers do not check it.
 
-    Those of numbers are checked: ``Meta(ge=...)``.
+    Limits of numbers, which readers check, are stated by ``Meta(ge=...)``.
     """
     return Meta(extra_json_schema=schema)
 
@@ -132,13 +132,13 @@ def _is_within_bounds(value: object) -> bool:
 
 
 def _is_in_range(value: object) -> bool:
-    """Return whether a value is none of the numbers beyond the limits; NaN is beyond them."""
+    """Return False for a number beyond the limits, and for NaN; True for any other value."""
     if not isinstance(value, int | float):
         return True
     return abs(value) <= (MAX_JSON_INTEGER if isinstance(value, int) else MAX_JSON_NUMBER)
 
 
-def _fitting(value: object, kind: Any) -> object:  # noqa: ANN401 - a type as annotations have it
+def _fitting(value: object, kind: Any) -> object:  # noqa: ANN401 - any type annotation
     """Return a JSON value as one of ``kind``; UNSET where it does not fit."""
     origin, arguments = get_origin(kind), get_args(kind)
     if origin is Annotated:
@@ -150,7 +150,7 @@ def _fitting(value: object, kind: Any) -> object:  # noqa: ANN401 - a type as an
         return next((found for found in fitting if found is not UNSET), UNSET)
     if origin is tuple and isinstance(value, list):
         if Ellipsis not in arguments:
-            # Of a corner without its y nothing is left.
+            # A tuple of fixed length fits as a whole: half a corner is of no use.
             return _fitting_plain(value, kind)
         items = (_fitting(item, arguments[0]) for item in value)
         return tuple(item for item in items if item is not UNSET)

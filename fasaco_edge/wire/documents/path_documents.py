@@ -63,7 +63,8 @@ class PlanFigures(Document, frozen=True):
             lower_bound_cost_s=round(plan.lower_bound_cost_s, 3) or None,
             gap=None if plan.gap is None else round(plan.gap, 6),
             saved_by_ants_s=round(plan.saved.ants, 3),
-            # A repair that keeps the path ahead may cost more: it has saved nothing.
+            # A repair that keeps the path ahead may cost more than the walk before; it then saved
+            # nothing.
             saved_by_local_search_s=round(max(plan.saved.local_search, 0.0), 3),
         )
 
@@ -109,7 +110,7 @@ class PathAttachment(PlanFigures, frozen=True):
         reason: why it replaces the previous one.
         steps: steps from pose to pose.
         plan_ms: duration of planning; 0 if no plan was needed.
-        changed: rectangle of the map whose cells appeared, vanished or have other neighbours;
+        changed: rectangle of the map in which cells appeared, vanished or have other neighbours;
             null if that is not the reason.
     """
 

@@ -77,8 +77,8 @@ class FloorReport(Document, frozen=True):
         left: unswept part of that by reason, the largest first; null if unknown.
         out_of_reach: floor that the map shows free and the tool cannot reach, part of the order or
             not, by reason, the largest first; null if unknown.
-        possible_m2: floor that the tool would reach were walls and furniture a pixel of the map
-            thinner than the map shows them; null before the end of an order, or if unknown.
+        possible_m2: floor that the tool would reach if walls and furniture were a pixel thinner
+            than on the map; null before the end of an order, or if unknown.
     """
 
     swept_m2: Amount = 0.0
@@ -138,9 +138,9 @@ class KeepOutReport(Document, frozen=True):
     """A keep-out in force, of the order or of the operator.
 
     Attributes:
-        name: of one of the operator's, by which it is removed; "" for one of the order.
+        name: name by which the operator removes it; "" for a keep-out of the order.
         polygon: corners x, y [m] in the frame of the map.
-        by: whose it is.
+        by: whether the operator or the order set it.
     """
 
     name: str = ""

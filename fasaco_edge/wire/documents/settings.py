@@ -31,7 +31,7 @@ class MapSettings(Document, frozen=True):
 
 
 class PoseSettings(Document, frozen=True):
-    """The type of poses sent without a type."""
+    """The message type of poses whose samples name none."""
 
     schema: str = ""
 

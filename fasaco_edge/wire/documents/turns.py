@@ -119,8 +119,8 @@ class TurnBatch(msgspec.Struct, frozen=True, omit_defaults=True):
         times: time of each, by the daemon's monotonic clock [s].
         turns: cycles with any input or decision.
         beginning: only in the first batch.
-        told: poses and small maps received in these cycles, in order, as ``samples`` encodes
-            them: on a busy link a recorder may miss some.
+        told: poses and small maps received in these cycles, in order, encoded as in ``samples``: on
+            a busy link a recorder may miss some of them.
         kernels: name of the compiled kernels; only in the first batch with a mission.
     """
 

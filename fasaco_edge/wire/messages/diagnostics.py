@@ -17,9 +17,9 @@ LEVELS: Final = {
     "degraded": WARN,
     "blocked": ERROR,
 }
-"""Of the states that are not in order; a daemon that does not plan is stale."""
+"""Levels of the states that are not OK; a daemon that does not plan is STALE."""
 IN_ORDER: Final = ("starting", "recording", "stopping")
-"""The states of a recorder that are."""
+"""The states of a recorder that are OK."""
 
 
 def level_of(status: Status) -> int:
@@ -36,7 +36,7 @@ def level_of(status: Status) -> int:
 def message_of(status: Status) -> str:
     """Return state, reason and troubles of a status in a line."""
     parts = [f"{status.state}: {status.reason}"]
-    # Of a degraded mission a trouble is the reason.
+    # The reason of a degraded mission is one of the troubles.
     parts += [each.text for each in status.troubles if each.text != status.reason]
     return "; ".join(parts)
 

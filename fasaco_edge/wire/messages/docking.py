@@ -40,7 +40,7 @@ ERRORS: Final = {
 }
 """Codes of both actions."""
 
-# Limits of the server for driving there, and out again, as its own defaults [s].
+# Time limits of the server for driving to the dock, and for undocking: its own defaults [s].
 STAGING_S, UNDOCKING_S = 1000.0, 30.0
 
 _TIME = struct.Struct("<f")
@@ -65,7 +65,7 @@ class DockEnding:
 
     @property
     def is_done(self) -> bool:
-        """Whether the robot is where the goal wanted it, also if it was there before."""
+        """Whether the robot is where the goal asks it to be, even if it was there before."""
         is_there = self.status == ABORTED and self.success and not self.code
         return self.status == SUCCEEDED or is_there
 
@@ -93,7 +93,7 @@ def encode_dock(
     write_pose(writer, dock, "dock_pose.pose")
     writer.string(dock_type, "dock_type")
     writer.words(_TIME, ("max_staging_time",), STAGING_S)
-    # The server drives there only from further away than its tolerance, 0.5 m.
+    # The server drives to the staging pose only from farther away than its tolerance, 0.5 m.
     writer.octets(b"\1")
     return writer.payload()
 

@@ -23,9 +23,9 @@ CANCEL_GOAL: Final = "action_msgs/srv/CancelGoal"
 
 GOAL_ID_BYTES = 16
 UNKNOWN, SUCCEEDED, CANCELED, ABORTED = 0, 4, 5, 6
-"""Status of a goal, as action_msgs/GoalStatus has it: those that a result may have."""
+"""Statuses of action_msgs/GoalStatus that a result may have."""
 TAKEN, REJECTED, NO_SUCH_GOAL, ENDED_BEFORE = 0, 1, 2, 3
-"""What becomes of a request to cancel."""
+"""Result of a request to cancel."""
 
 ERRORS: Final = {
     100: "unknown error",

@@ -87,7 +87,7 @@ def read_octets(
 
 # A robot's maps have one resolution, and finding its decimal takes a while.
 _FLOAT32 = struct.Struct("<f")
-# Far beyond any resolution; rounded up, it may overflow float32.
+# A value far beyond any resolution; rounded up, it may overflow float32.
 _FAR = 1e30
 
 

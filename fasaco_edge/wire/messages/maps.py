@@ -26,7 +26,7 @@ from fasaco_edge.wire.messages.grid_info import (
 from fasaco_edge.wire.schemas import OCCUPANCY_GRID, OCCUPANCY_GRID_UPDATE
 
 PATCH_CELLS = 4096
-"""Fewer cells are looked through by calls that are quick to begin, but copy them."""
+"""Up to this many cells are checked by calls that start quickly, but copy the cells."""
 
 
 class CoverageValue(IntEnum):
@@ -119,7 +119,8 @@ def _least_and_most(cells: NDArray[np.int8]) -> tuple[int, int]:
         return int(np.minimum.reduce(cells, axis=None)), int(np.maximum.reduce(cells, axis=None))
     if not cells.size:
         return UNKNOWN, OCCUPIED
-    # A reduction takes a microsecond to begin. These do not, but copy read-only data.
+    # A reduction of numpy takes a microsecond to start. min and max start faster, but copy
+    # read-only data.
     return cells.item(cells.argmin()), cells.item(cells.argmax())
 
 

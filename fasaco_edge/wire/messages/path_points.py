@@ -13,7 +13,7 @@ from fasaco_edge.wire.messages.fields import POSE, check_pose, read_header
 from fasaco_edge.wire.schemas import PATH
 
 LEAST_POSE_BYTES = 72
-"""Of a PoseStamped with an empty frame: stamp 8, length 4, NUL 1, padding 3, floats 56."""
+"""Size of a PoseStamped with an empty frame: stamp 8, length 4, NUL 1, padding 3, floats 56."""
 
 
 class PathPoints:

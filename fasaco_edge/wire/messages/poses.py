@@ -77,7 +77,8 @@ def encode_pose_stamped(stamped: StampedPose) -> bytes:
 
 
 LEAST_TRANSFORM_BYTES = 80
-"""Of a TransformStamped with empty names: stamp 8, twice length 4, NUL 1, padding 3, floats 56."""
+"""Size of a TransformStamped with empty names: stamp 8, twice length 4, NUL 1, padding 3, floats
+56."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -179,7 +180,7 @@ class TransformTree:
         self._map_frame = map_frame
         self._robot_frame = robot_frame
         self.oldest: Link | None = None
-        # By child frame.
+        # The newest link to each child frame.
         self._links: dict[str, Link] = {}
         self._told: StampedPose | None = None
 
@@ -277,7 +278,7 @@ class PoseDecoder:
     """Decodes successive poses: messages of three types, or transforms.
 
     Args:
-        schema: type of messages sent without one.
+        schema: message type of samples that name none.
         frames: the map's and the robot's, for transforms; None to take no transforms.
 
     Attributes:
@@ -306,7 +307,7 @@ class PoseDecoder:
 
         Args:
             payload: the message.
-            schema: its type; "" if sent without one.
+            schema: its type; "" if the sample names none.
             is_static: whether its transforms are static.
             came_at: time of arrival [s], for ``oldest_link``.
 

@@ -20,7 +20,7 @@ _NAMES = (
     *("angle_min", "angle_max", "angle_increment", "time_increment", "scan_time"),
     *("range_min", "range_max"),
 )
-# Those that are used.
+# Indices of the numbers that are used.
 _FIRST, _STEP, _LEAST, _MOST = 0, 2, 5, 6
 
 
@@ -32,7 +32,8 @@ class LaserScan:
         first_rad: direction of the first beam in the sensor's frame, counter-clockwise [rad].
         step_rad: from one beam to the next [rad]; negative for a scan that turns clockwise.
         least_m, most_m: shortest and longest range that the sensor measures [m].
-        ranges: of the beams, in order [m]; one that is not in ``least_m`` to ``most_m`` is none.
+        ranges: ranges of the beams, in order [m]; a value outside ``least_m`` to ``most_m`` is no
+            range.
         frame: name of the sensor's frame.
         stamp_ns: time of the first beam [ns].
     """
@@ -70,7 +71,7 @@ def decode_scan(payload: bytes) -> LaserScan:
 
     Raises:
         MalformedMessage: it is no such message, has no beams or more than ``MAX_SCAN_BEAMS``, or
-            its angles or its limits of ranges are none.
+            its angles or its limits of ranges are invalid.
     """
     reader = CdrReader(payload, LASER_SCAN)
     frame, stamp_ns = read_header(reader)
