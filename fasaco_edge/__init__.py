@@ -16,8 +16,8 @@ from importlib import import_module
 
 __version__ = "0.1.0"
 
-# Imported when they are used: commands begin without the planners. For type checkers they stand in
-# ``__init__.pyi``.
+# These names are imported on use, so that commands start without the planners. ``__init__.pyi``
+# lists them for type checkers.
 _PLACES = {
     "Map": "offline.maps:Map",
     "Plan": "offline.result:Plan",

@@ -5,7 +5,7 @@ from typing import NoReturn
 
 
 def program() -> NoReturn:
-    """Run the command line; Ctrl-C while that is still being imported ends it like any other."""
+    """Run the command line; Ctrl-C during its import ends it as at any other time."""
     try:
         from fasaco_edge.cli import program as run  # noqa: PLC0415
 

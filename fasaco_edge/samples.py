@@ -31,7 +31,7 @@ from fasaco_edge.errors import MalformedMessage
 from fasaco_edge.wire.limits import MAX_MESSAGE_BYTES
 
 FORMAT = 1
-# Format, run, number of the first sample that is in no earlier batch.
+# Format, run, and number of the first sample that no earlier batch contains.
 _HEAD = struct.Struct("<BQQ")
 LARGE_BYTES = 16_384
 DEFLATE_LEVEL = 6
@@ -42,7 +42,7 @@ MOST_SAMPLES = 200_000
 # Value of ``_Lane.against`` where the first payload is stored as a whole.
 WHOLE = -1
 
-# Runs are stored if at most one byte in so many is not zero.
+# Runs of zeros are stored if at most one byte in this many is not zero.
 SPARSE = 8
 _COUNT = struct.Struct("<I")
 
@@ -341,7 +341,7 @@ def _flat(lane: _Lane, size: int) -> NDArray[np.uint8]:
     starts, lengths = edges[0::2], runs[1::2]
     if int(lengths.sum(dtype=np.int64)) != body.size - end:
         raise ValueError(f"runs of {lengths.sum(dtype=np.int64)} bytes, {body.size - end} follow")
-    # Of each byte that is not zero: its place among them, and how many zeros come before.
+    # For each byte that is not zero its place among such bytes, and the number of zeros before it.
     places = np.arange(body.size - end)
     places += np.repeat(starts - (np.cumsum(lengths, dtype=np.int64) - lengths), lengths)
     flat = np.zeros(size, np.uint8)

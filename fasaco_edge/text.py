@@ -65,5 +65,5 @@ def _visible(match: re.Match[str]) -> str:
 
 
 def is_reported(count: int) -> bool:
-    """Tell whether the so many-th of the same fault gets a line: the 1st, 2nd, 4th, 8th ..."""
+    """Return whether occurrence number ``count`` of a fault gets a line: 1, 2, 4, 8 ..."""
     return count & (count - 1) == 0
