@@ -3,8 +3,8 @@
 A power failure leaves files that are empty, truncated or full of zeros, a worn card wrong bytes;
 such machine code crashes the process, and a pickle may do anything. So the manifest has size and
 SHA-256 of each file, and files are compared with it before numba reads a byte. The manifest also
-has the stages of the warm-up that are compiled. That detects damage, but no attacker, who could
-also write the manifest: ``fasaco_edge.host.files`` checks which users could have written the
+has the stages of the warm-up that are compiled. That detects damage, but not an attack, which could
+also change the manifest: ``fasaco_edge.host.files`` checks which users could have written the
 folder.
 
 One process compiles at a time, as numba's own index of a function's files goes wrong where two

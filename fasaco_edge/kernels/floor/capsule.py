@@ -13,7 +13,7 @@ from fasaco_edge.kernels.jit import inlined, lean_kernel
 
 # Tolerance of contact: a robot exactly as wide as a door fits.
 TOUCH = 1e-3
-# Returned if no row blocks a segment; if it leads out of the raster.
+# In place of a row: no row blocks the segment; the segment leads out of the raster.
 CLEAR, BEYOND = -1, -2
 # A line that rises by less counts as level.
 LEVEL = 1e-9
@@ -68,7 +68,8 @@ def _blocked_row(
 ) -> tuple[int, int, int]:
     """Return the first row with a blocked pixel nearer than ``radius`` to the segment a to b.
 
-    With the row, the columns from and to which that may be; ``CLEAR`` or ``BEYOND`` for no row.
+    Also return the first and the last column in which that pixel may be; ``CLEAR`` or ``BEYOND`` in
+    place of the row if there is none.
 
     A pixel is a square: the stretch of a row whose pixels touch the capsule is widest at the height
     in the row that is nearest to the capsule's outermost point.

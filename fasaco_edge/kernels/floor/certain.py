@@ -189,8 +189,7 @@ def _pixel(lookup: _Lookup, row: float, col: float) -> tuple[np.uint64, np.uint6
 def _leave_at(
     lookup: _Lookup, around: _Around, row: int, col: int, left: NDArray[np.uint8]
 ) -> bool:
-    """Unmark unswept pixels of the tile that begins with pixel (row, col); return if any is
-    left."""
+    """Unmark unswept pixels of the tile with first pixel (row, col); return if any is left."""
     is_any = False
     for top in range(0, TILE, BLOCK):
         for byte in range(BLOCKS):

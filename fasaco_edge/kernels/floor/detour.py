@@ -224,7 +224,7 @@ def sweep_patches(
         line, floor, memory, farthest: as for ``polish``.
         price: value of a pixel of a patch.
         patches: bool (rows, cols), of blocks, see ``find_patches``.
-        most_tried: most moves, including those tried before.
+        most_tried: limit on the moves tried, including those tried before.
     """
     place = memory.place
     for i in range(patches.shape[0]):

@@ -180,7 +180,7 @@ def polish(
         line: counted into ``floor.sweeps``.
         floor, price, memory: see above.
         farthest: unswept floor further from an edge is ignored [pixels].
-        most_tried: most moves.
+        most_tried: limit on the moves tried.
 
     Returns:
         The total gain [s].

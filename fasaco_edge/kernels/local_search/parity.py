@@ -254,8 +254,7 @@ def draw_loop(tally: Tally, found: int, random: NDArray[np.uint64]) -> int:
 
 @inlined
 def _heading(ground: Ground, tally: Tally, depth: int) -> int:
-    """Return how to go on from the top of the stack: as in the old walk, or straight; -1 for
-    any."""
+    """Return how to go on from the stack's top: as in the old walk, or straight; -1 for any."""
     if depth < 2:
         return -1
     here = tally.stack[depth - 1]
