@@ -41,7 +41,7 @@ from fasaco_edge.wire.topics import IN_ORDER
 LOG = logging.getLogger(__name__)
 
 # A port without a listener for this long [s] is taken over: a process that only restarts gets its
-# port back. Retry period where another process was first [s].
+# port back. Retry period if another process has taken it over first [s].
 ABSENT_S, RETRY_S = 2.0, 1.0
 
 # Timeout for closing a session [s]: if a peer no longer reads, Zenoh tries for ten seconds to flush
@@ -70,8 +70,8 @@ class Bus:
         self._listens = listens
         self._declared: list[Any] = []
         self._served: list[_Served] = []
-        # Objects that callers hold, too: ``close`` ends them. In the last garbage collection a
-        # remaining Zenoh object may deadlock its threads and the interpreter.
+        # Zenoh objects that callers hold as well; ``close`` releases them. One that is left to the
+        # interpreter's last garbage collection may deadlock with Zenoh's threads.
         self._lent: list[Publisher | Subscription] = []
         self._asker = Asker()
 

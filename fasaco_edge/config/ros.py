@@ -196,9 +196,7 @@ class RosConfig(Section, frozen=True):
         return [] if self.kind == "bridge" else [graph_key(self.domain)]
 
     def faults(self) -> Iterator[BadConfiguration]:
-        """Yield faults beyond types: an invalid name, two equal names, a setting of rmw_zenoh for a
-        bridge.
-        """
+        """Yield faults beyond types: invalid or equal names, settings of rmw_zenoh for a bridge."""
         if self.namespace != "/" and not _TOPIC.fullmatch(self.namespace):
             yield BadConfiguration(f"namespace must be / or like /robot1, got {self.namespace!r}")
         if (

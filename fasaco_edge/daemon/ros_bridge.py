@@ -104,8 +104,7 @@ class RosBridge:
         return RosPublisher(publisher, gid_of(token) if token else b"")
 
     def _announce(self, kind: Endpoint, topic: RosTopic) -> str:
-        """Return the liveliness token of a new endpoint; "" with a bridge, which declares its
-        own."""
+        """Return the token of a new endpoint; "" with a bridge, which declares its own tokens."""
         if self._config.kind == "bridge":
             return ""
         self._endpoints += 1

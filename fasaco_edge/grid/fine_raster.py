@@ -62,7 +62,7 @@ def fine_geometry(
         coarse: the map.
         discs: robot and tool.
         most_pixels: limit on the pixels.
-        chunk: the raster spans whole chunks of so many pixels of the map if the limit allows it:
+        chunk: the raster spans whole chunks of this many pixels of the map if the limit allows it:
             a map that grows within them keeps its raster.
 
     Raises:

@@ -233,7 +233,7 @@ class GridGeometry:
         """Return this grid moved exactly onto its raster, see ``on_raster``.
 
         Grids on the same pixels become equal, even if the origin of one was rounded, as float32 or
-        by a transform. The grid is extended to whole chunks of so many pixels of the raster.
+        by a transform. The grid is extended to whole chunks of this many pixels of the raster.
         """
         raster, window = self.on_raster()
         window = window.rounded_out(chunk)
@@ -244,7 +244,8 @@ class GridGeometry:
         return GridGeometry(window.rows, window.cols, raster.resolution, origin)
 
     def corner_of(self, other: GridGeometry) -> tuple[int, int]:
-        """Return the pixel (row, col) at the corner of a grid whose pixels' edges lie on these."""
+        """Return the pixel (row, col) at the corner of another grid, whose pixels' edges lie on
+        this grid's."""
         col, row = self.to_pixels(other.origin.x, other.origin.y)
         return round(row), round(col)
 

@@ -112,8 +112,7 @@ def wall_direction(grid: OccupancyGrid) -> WallDirection | None:
 
 @dataclass(frozen=True, slots=True)
 class _Peak:
-    """A direction: its angle to the axes of the pixels [deg], its share, and its vectors'
-    length."""
+    """A direction: its angle to the pixels' axes [deg], its share, and its vectors' length."""
 
     angle_deg: float
     share: float

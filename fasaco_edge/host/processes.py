@@ -38,7 +38,7 @@ _ARENA_MAX = (-8, 2)
 
 
 def resident_mb(pid: int | str = "self") -> float:
-    """Return the resident memory of a process now [MB]; without ``pid`` of this one."""
+    """Return the resident memory of a process now [MB]; by default of this process."""
     return _field_mb(pid, "VmRSS")
 
 
@@ -192,7 +192,7 @@ def end_within(seconds: float) -> None:
 
 def _call_apart(call: Callable[[], None]) -> None:
     try:
-        # Beneath ``threading``, whose locks the main thread may hold as well.
+        # Below the level of ``threading``, whose locks the main thread may hold as well.
         _thread.start_new_thread(call, ())
     except RuntimeError:  # there can be no more threads
         call()

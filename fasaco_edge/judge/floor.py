@@ -5,14 +5,14 @@ Its inputs are a map and a line of points, no cells, walks or planners.
 Reachable floor
     All that the tool's disc touches at the places that the robot's disc can come to from the
     beginning of the line. The robot fits where all that its disc touches is known free. A tool that
-    sticks out of the robot's disc touches what is free, and connected with that disc by free
-    pixels about within the tool's: nothing behind a wall.
+    sticks out of the robot's disc touches only free pixels that are connected with that disc by
+    free pixels, about inside the tool's disc: none behind a wall.
 Swept floor
     The reachable floor that the tool's disc passed over along the line, by the same rules.
 Illegal share
     The part of the line on which the robot's disc would touch what is not known free.
 Patch
-    Pixels of reachable floor that were not swept, and hang together by their edges.
+    Pixels of reachable floor that were not swept, and are connected by their edges.
 
 A map is judged on its own pixels, divided until they are ``FINE_M`` or finer; so a wall lies where
 its pixels do, and a robot fits a corridor that is a finer pixel or two wider than itself.
@@ -37,7 +37,7 @@ from fasaco_edge.judge.driven_line import (
 )
 from fasaco_edge.judge.pixels import Mask, Patches, through, within
 
-# Largest pixel [m], unless pixels that fine would be more than this many.
+# Largest pixel [m], and limit on the number of pixels: pixels are larger where it is reached.
 FINE_M = 0.025
 MOST_PIXELS = 24_000_000
 SQRT2 = math.sqrt(2.0)

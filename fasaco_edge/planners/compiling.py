@@ -107,8 +107,7 @@ class CompilerProcess:
 
     @classmethod
     def start(cls, stages: Collection[str] = STAGES) -> CompilerProcess | None:
-        """Start it; None if nothing is missing, or if compiled kernels would be lost, which is
-        logged."""
+        """Start it; None if nothing is missing, or if kernels would be lost, which is logged."""
         if os.environ.get("NUMBA_DISABLE_JIT", "0") != "0":
             return None  # kernels are not compiled
         folder, why = chosen_folder(stages)

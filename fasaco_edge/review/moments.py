@@ -231,8 +231,7 @@ class Replans:
 
 
 def kind_of(reason: str) -> str:
-    """Return ``reason`` without its details; for a change of the map, whether cells came or
-    went."""
+    """Return ``reason`` without its details; of a map's change, whether cells came or went."""
     if reason.startswith(_MAP):
         changes = [change for change in _CHANGES if change in reason]
         cells = "" if "passages changed" in changes else "cells "

@@ -49,7 +49,7 @@ class Order(msgspec.Struct, tag="command", tag_field="kind", forbid_unknown_fiel
         command: one of the page's commands.
         order: what to cover, as in ``protocol/schema/mission.json``; only with ``start``.
         discard: whether it may forget what is covered; only with ``start``.
-        keep_out: as there; only with ``keep_out_add`` and ``keep_out_remove``.
+        keep_out: as in that schema; only with ``keep_out_add`` and ``keep_out_remove``.
     """
 
     id: int

@@ -1,4 +1,4 @@
-"""The page of a recording: for each time that a page asks for, the messages that it had live."""
+"""The page of a recording: for each requested time the messages that a live page had then."""
 
 from __future__ import annotations
 
@@ -151,7 +151,8 @@ class Playback:
             self._path, since_ns = path, path.at_ns
             line = timeline.line(path)
             view.follow(line, self._abouts.get(line.revision, b""), now)
-            # The path is there once its message is made: then the poses since move the robot on it.
+            # A path is known only once its message is made: then later poses move the robot along
+            # it.
             found = view.news(now)
         poses = timeline.poses_between(since_ns, at_ns)
         view.drive(poses[:: -(-len(poses) // MOST_POSES) or 1], now)
@@ -188,7 +189,7 @@ def stepped(corners: NDArray[np.float64], steps: int) -> NDArray[np.float64]:
     def pieces_of(step_m: float) -> NDArray[np.int64]:
         return np.maximum(np.rint(lengths / step_m), 1.0).astype(np.int64)
 
-    # The least length of a step at which there are not more.
+    # The least length of a step with which there are not more steps than that.
     least, most = 0.0, float(lengths.sum()) or 1.0
     for _ in range(50):
         step_m = (least + most) / 2

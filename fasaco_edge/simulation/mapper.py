@@ -56,8 +56,7 @@ class Mapper:
         self._angles = np.arange(rays) * (2.0 * math.pi / rays)
 
     def believed(self, pose: Pose2D) -> Pose2D:
-        """Return the estimated pose of a robot at ``pose``: the same, as localisation is
-        perfect."""
+        """Return the estimated pose of a robot at ``pose``: the same, without any error."""
         return pose
 
     def true_place(self, x: float, y: float) -> Point:

@@ -30,8 +30,7 @@ from fasaco_edge.text import lines, one_line
 
 
 class CleanConsole(Console):
-    """A console that prints strings as plain text in one line: no mark-up, no control
-    characters."""
+    """A console that prints a string as one line of plain text, without control characters."""
 
     def __init__(self, *, stderr: bool = False) -> None:
         super().__init__(stderr=stderr, highlight=False, markup=False, emoji=False)

@@ -170,7 +170,7 @@ class MissionRunner:
         self._held = HeldEvents(held)
 
     def stand_by(self) -> None:
-        """Send nothing more, as another daemon plans; keep a mission only if its building is in
+        """Send nothing more: another daemon plans; keep a mission only if its building is in
         doubt."""
         self.paths.forget()
         if self._before is not None and not self._before.is_in_doubt:

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from fasaco_edge.grid.lattice import Cell, CoverageLattice
 from fasaco_edge.kernels.lattice.ways import FAR, ways_from
 
-# A cell that is not coverable counts as on the nearest one within this distance [cells].
+# A cell that is not coverable is replaced by the nearest coverable cell within this distance
+# [cells].
 SNAP = 2
 # Travel time to a cell that cannot be reached [s].
 UNREACHED_S = np.float32(1e9)

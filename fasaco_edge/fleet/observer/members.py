@@ -193,8 +193,7 @@ class Shares:
 
 
 def union_on(seat: Seat, members: Members[M], what: str) -> Cells:
-    """Return all robots' cells on one robot's lattice, int64 (n, 2); ``what``: "swept" or
-    "ground"."""
+    """Return all robots' cells on one's lattice, int64 (n, 2); ``what``: "swept" or "ground"."""
     return together(member.seat.carried(getattr(member, what).cells(), seat) for member in members)
 
 

@@ -276,7 +276,7 @@ class Charging:
         return f"battery at {self.gauge.level:.0%}{but}, goes on at {self.goes_on_at:.0%}"
 
     def _finds_nothing_better(self) -> bool:
-        """Return whether to leave for the dock here, as charging is due soon and no later place is
+        """Return whether to leave for the dock here: charging is due soon, no later place is
         better.
 
         The best place on its path, up to the level of turning back, has the shortest way to the

@@ -158,8 +158,7 @@ class Troubles:
         return f"in the dock the battery, at {level:.0%}, does not charge: {why}" if why else ""
 
     def shut_in(self, _: State, now: float) -> str:
-        """Return what shuts the robot in, or that it has stood long at an impossible place of the
-        map."""
+        """Return what shuts the robot in, or that it has stood long at an impossible place."""
         why = self.way_out.why
         if self.map.area is not None or not why:
             self._inside_since = now

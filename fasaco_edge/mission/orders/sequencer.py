@@ -185,8 +185,7 @@ class Sequencer:
         return self._unreached.reached_m2(area)
 
     def is_shut_in(self, area: ReachableArea) -> bool:
-        """Return whether home and most of the floor are out of reach of an area, or nearly all
-        floor.
+        """Return whether home and most floor, or nearly all floor, are out of reach of an area.
 
         False if all is covered: then nothing keeps the order from its end.
         """
