@@ -36,27 +36,28 @@ its topics and velocities go to ros2.topics.cmd_vel; else by the keys `pose` and
 Corners up to 135 degrees are rounded in motion, within 2 cm; at sharper ones it turns on the spot.
 
 It stops the robot within 0.2 s, and keeps it standing, while
-  the newest pose is older than --pose-age, or is none, or has jumped; of poses from tf, odometry
-    is older than --pose-age, or the localiser's transform older than 2 s (or --pose-age, if longer)
-  the configuration has a block scan, and no scan has come for scan.lost_s, or none that can be used
-  something that the map does not show is ahead, by the scan: it slows down before it, and goes on
-    once that is gone
-  the path is empty (mission pause, cancel; done), is driven, or is none
-  it is further than 0.3 m off the path, or does not move as commanded (three tries in a place and
-    a direction, 2 and 4 s apart)
-  no daemon plans for it, or the one that plans has sent no status for 2.5 s
-  another follower of this robot drives: then nothing is sent at all, and this one takes over once
-    that one is gone; or access rules keep others from seeing that this one drives
-and when this program ends. It drives on by itself when that is over: after the third try once the
-pose has moved by 0.1 m, or the path leads elsewhere (by 45 degrees); a path that leads the same way
-brings no new try. A pose with the stamp of the one before is no new
-one. Zeros are sent for a second after a stop, then nothing. A base has to stop by itself where
-nothing comes for 0.5 s: nothing else can stop it if this program or its computer dies.
+  the newest pose is older than --pose-age, missing, malformed, or has jumped; with poses from tf,
+    while odometry is older than --pose-age, or the localiser's transform is older than 2 s (or than
+    --pose-age, if longer)
+  the configuration has a block scan, and no usable scan has come for scan.lost_s
+  the scan shows something ahead that the map does not show: the robot slows down before it, and
+    drives on once it is gone
+  the path is empty (mission pause, cancel; done), missing, malformed, or driven to its end
+  the robot is further than 0.3 m off the path, or does not move as commanded (three tries in a
+    place and a direction, 2 and 4 s apart)
+  no daemon plans for it, or the daemon that plans has sent no status for 2.5 s
+  another follower of this robot drives: this one sends nothing at all then, and takes over once the
+    other is gone; or access rules keep others from seeing that this one drives
+and when this program ends. The robot drives on by itself once the reason is gone; after the third
+try, once the pose has moved by 0.1 m, or the path leads elsewhere (by 45 degrees): a path in the
+same direction brings no new try. A pose with the stamp of the previous one does not count as new.
+Zeros are sent for a second after a stop, then nothing. A base has to stop by itself if nothing
+comes for 0.5 s: nothing else can stop it if this program or its computer dies.
 
-With `ros2.follow: nav2` in the configuration nothing is driven here: the path goes to Nav2's
-controller, piece by piece, as goals of /follow_path (nav2_msgs/FollowPath), which end for the same
-reasons. What Nav2 says of them is said here. Were this program or its computer to die, Nav2 would
-drive to the end of the goal that it has, at most 20 m.
+With `ros2.follow: nav2` in the configuration this program sends no velocities: the path goes to
+Nav2's controller, piece by piece, as goals of /follow_path (nav2_msgs/FollowPath), which are
+cancelled for the same reasons. Nav2's results are reported here. If this program or its computer
+dies, Nav2 drives to the end of the present goal, at most 20 m.
 
 With `ros2.dock: nav2` Nav2's docking server moves the robot into its dock, from before it, and out
 again before the next path, as goals of /dock_robot and /undock_robot (nav2_msgs/DockRobot,

@@ -62,42 +62,51 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         help="where to write (default: %(default)s)",
     )
     parser.add_argument(
-        "--robot-radius", type=float, metavar="M", help="of the disc around the robot [m]"
+        "--robot-radius", type=float, metavar="M", help="radius of the disc around the robot [m]"
     )
     parser.add_argument(
         "--robot-size",
         type=_size,
         metavar="WxL",
-        help="in its place, of a rectangular robot: width and length [m], 0.5x0.6 say; it is "
-        "planned with the disc around that",
+        help="instead for a rectangular robot: width and length [m], such as 0.5x0.6; plans use "
+        "the disc around that",
     )
     parser.add_argument(
-        "--tool-width", type=float, metavar="M", help="of the brush, mop or mower [m]"
+        "--tool-width", type=float, metavar="M", help="width of the brush, mop or mower [m]"
     )
     parser.add_argument(
         "--clearance",
         type=float,
         default=CLEARANCE_M,
         metavar="M",
-        help="what its lines keep from walls and furniture beside the radius, except where giving "
-        "it up gains enough floor [m]; 0 for a map and poses without errors (default: %(default)g)",
+        help="distance that lines keep from walls and furniture in addition to the radius, except "
+        "where giving it up gains enough floor [m]; 0 for a map and poses without errors (default: "
+        "%(default)g)",
     )
     parser.add_argument(
         "--map-by",
         choices=WAYS,
-        help="how the map comes: " + "; ".join(f"{way}: {what}" for way, what in WAYS.items()),
+        help="source of the map: " + "; ".join(f"{way}: {what}" for way, what in WAYS.items()),
     )
     parser.add_argument(
         "--connect",
         metavar="ENDPOINT",
-        help="router or bridge to connect to, tcp/127.0.0.1:7447 say; without one the daemon "
+        help="router or bridge to connect to, such as tcp/127.0.0.1:7447; without one the daemon "
         "listens there itself",
     )
-    parser.add_argument("--name", metavar="NAME", help="of the robot on the bus (default: robot)")
-    parser.add_argument("--domain", type=int, metavar="N", help="ROS_DOMAIN_ID of rmw_zenoh")
-    parser.add_argument("--namespace", metavar="NS", help="before all ROS topics, /robot1 say")
     parser.add_argument(
-        "--listen", type=seconds, default=5.0, metavar="S", help="for maps (default: %(default)g s)"
+        "--name", metavar="NAME", help="name of the robot on the bus (default: robot)"
+    )
+    parser.add_argument("--domain", type=int, metavar="N", help="ROS_DOMAIN_ID of rmw_zenoh")
+    parser.add_argument(
+        "--namespace", metavar="NS", help="namespace of all ROS topics, such as /robot1"
+    )
+    parser.add_argument(
+        "--listen",
+        type=seconds,
+        default=5.0,
+        metavar="S",
+        help="time to look for maps (default: %(default)g s)",
     )
     parser.add_argument("--no-try", action="store_true", help="do not look for maps on the bus")
     parser.add_argument("--force", action="store_true", help="replace the file if there is one")

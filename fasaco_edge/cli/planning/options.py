@@ -139,7 +139,7 @@ def _add_problem(group: argparse._ArgumentGroup) -> None:
         nargs="+",
         action="extend",
         metavar="X,Y",
-        help="the same as points [m]",
+        help="start points instead of cells [m]",
     )
     group.add_argument(
         "--cell",
@@ -158,8 +158,8 @@ def _add_problem(group: argparse._ArgumentGroup) -> None:
         "--clearance",
         type=float,
         metavar="M",
-        help="what a line over the floor keeps from walls beside the radius, except where giving "
-        f"it up gains enough floor [m] (default: {ROBOT.clearance_m:g})",
+        help="distance that a line over the floor keeps from walls in addition to the radius, "
+        f"except where giving it up gains enough floor [m] (default: {ROBOT.clearance_m:g})",
     )
     end = group.add_mutually_exclusive_group()
     end.add_argument(
@@ -261,7 +261,7 @@ def _add_planner(group: argparse._ArgumentGroup) -> None:
         "--seed",
         type=int,
         metavar="N",
-        help=f"of all draws: the same seed, the same walk (default: {SEARCH.seed})",
+        help=f"seed of all draws: the same seed gives the same walk (default: {SEARCH.seed})",
     )
     group.add_argument(
         "--threads",
