@@ -92,9 +92,9 @@ def _count(args: argparse.Namespace) -> int:
 def _measure(args: argparse.Namespace, say: Say) -> Generator[Run, None, None]:
     # Imported here, so that listing the benchmarks does not load the compiler.
     from fasaco_edge.planners.bound import lower_bound_of  # noqa: PLC0415
+    from fasaco_edge.planners.compiling import warm_up  # noqa: PLC0415
     from fasaco_edge.planners.grids import read_grid  # noqa: PLC0415
     from fasaco_edge.planners.problem import CoverageProblem  # noqa: PLC0415
-    from fasaco_edge.planners.warmup import warm_up  # noqa: PLC0415
 
     # Read first, so that a wrong name fails at once and not after minutes.
     own = [load(place) for place in args.planner]

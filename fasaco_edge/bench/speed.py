@@ -84,11 +84,11 @@ def _count(args: argparse.Namespace) -> int:
 
 def _measure(args: argparse.Namespace, say: Say) -> Generator[Timing, None, None]:
     # Imported here, so that listing the benchmarks does not load the compiler.
+    from fasaco_edge.planners.compiling import warm_up  # noqa: PLC0415
     from fasaco_edge.planners.grids import read_grid  # noqa: PLC0415
     from fasaco_edge.planners.paper.colony import ColonyConfig, parse_velocities  # noqa: PLC0415
     from fasaco_edge.planners.paper.fasaco import Fasaco  # noqa: PLC0415
     from fasaco_edge.planners.problem import CoverageProblem  # noqa: PLC0415
-    from fasaco_edge.planners.warmup import warm_up  # noqa: PLC0415
 
     velocities = parse_velocities(args.velocities)
     colony = ColonyConfig(ants=args.ants, velocities=velocities, seed=args.seed)

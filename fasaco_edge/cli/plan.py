@@ -24,8 +24,8 @@ from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.grid.map_files import find_map, map_sources
 from fasaco_edge.host.processes import first_signal_calls
 from fasaco_edge.offline.settings import CELLS
-from fasaco_edge.planners.compiling import stages_of_plan
 from fasaco_edge.planners.planner import ColonySnapshot, Interrupt, ignore
+from fasaco_edge.planners.stages import stages_of_plan
 
 if TYPE_CHECKING:
     from fasaco_edge.offline.result import Plan

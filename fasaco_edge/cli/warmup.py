@@ -11,7 +11,8 @@ from fasaco_edge.cli.console.streams import print_json
 from fasaco_edge.cli.console.terminal import err, progress
 from fasaco_edge.kernels import folder as kernels
 from fasaco_edge.kernels.manifest import chosen_folder, why_missing
-from fasaco_edge.planners.compiling import STAGES, compile_missing
+from fasaco_edge.planners.compiling import compile_missing
+from fasaco_edge.planners.stages import STAGES
 
 EPILOG = """\
 The cache is $NUMBA_CACHE_DIR, else fasaco-edge in $XDG_CACHE_HOME or ~/.cache. Its code is for

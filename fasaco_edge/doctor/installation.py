@@ -14,7 +14,7 @@ from fasaco_edge.doctor.finding import CheckContext, Finding, Level, fail, ok, w
 from fasaco_edge.host.files import why_not_trusted
 from fasaco_edge.kernels.folder import outdated, wanted_folder
 from fasaco_edge.kernels.manifest import why_missing
-from fasaco_edge.planners.compiling import STAGES
+from fasaco_edge.planners.stages import STAGES
 
 # The ledger takes a few hundred kilobytes, the kernels fifty megabytes.
 LEAST_MB = {"state": 20.0, "kernel cache": 100.0}

@@ -29,7 +29,7 @@ from fasaco_edge.offline.settings import (
     require,
 )
 from fasaco_edge.planners.bound import LowerBound, lower_bound_of
-from fasaco_edge.planners.compiling import compile_missing, stages_of_plan
+from fasaco_edge.planners.compiling import compile_missing
 from fasaco_edge.planners.cost import SearchWork
 from fasaco_edge.planners.line import LINES
 from fasaco_edge.planners.own.loading import UserCode, user_code
@@ -48,6 +48,7 @@ from fasaco_edge.planners.planner import (
 )
 from fasaco_edge.planners.problem import CoverageProblem
 from fasaco_edge.planners.registry import planner_of
+from fasaco_edge.planners.stages import stages_of_plan
 
 # Limit on the proposals per cell of the search for a walk, if a line is laid along it: more is
 # gained by the search for the line.

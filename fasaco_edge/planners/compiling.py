@@ -32,19 +32,11 @@ from fasaco_edge.kernels.manifest import (
     record,
     why_missing,
 )
-from fasaco_edge.planners.registry import PLANNER_NAMES
+from fasaco_edge.planners.stages import STAGES
 
 LOG = logging.getLogger(__name__)
 
 MODULE = "fasaco_edge.planners.compiling"
-LATTICE, CHANGES, REACH, AREAS = "lattice", "changes of the map", "reachability", "areas"
-WALKS, BOUND = "shortest walks", "lower bound"
-LOCAL_SEARCH, REPAIR, LINE = "local search", "repair", "driven line"
-WINDOWS, SHARES = "windows of the walk", "shares of a fleet"
-# Stages in the order in which they are compiled; the stages of a plan come first.
-_FOR_PLANS = (LATTICE, REACH, WALKS, BOUND, "fasaco", LOCAL_SEARCH, WINDOWS, LINE, REPAIR)
-STAGES = tuple(dict.fromkeys((*_FOR_PLANS, CHANGES, AREAS, SHARES, *PLANNER_NAMES)))
-
 # Memory at which it begins again if memory is short: with the daemon's 45 MB it fits the unit's
 # limit (MemoryHigh=); a fifth of it are pages of libraries, which are shared or which the system
 # reclaims. With plenty of memory it does not begin again, which would take a third of the time.
@@ -54,18 +46,6 @@ MOST_MB, PLENTY_MB = 270.0, 2000.0
 MOST_RESTARTS = 300
 # Lines that the process prints: one of these words, a tab and a text.
 REASON, STAGE, WARNING = "reason", "stage", "warning"
-
-
-def stages_of_plan(planner: str, *, is_shared: bool = False) -> tuple[str, ...]:
-    """Return the stages that a plan needs, by a planner's name, or for the robots of a fleet."""
-    more = (SHARES,) if is_shared else (planner,) if planner in PLANNER_NAMES else ()
-    return tuple(dict.fromkeys((*_FOR_PLANS, *more)))
-
-
-def stages_of_mission(planner: str, *, has_fleet: bool) -> tuple[str, ...]:
-    """Return the stages that a mission needs, by its planner's name: each takes memory."""
-    spared = {*PLANNER_NAMES, *(() if has_fleet else (SHARES,))} - {planner}
-    return tuple(stage for stage in STAGES if stage not in spared)
 
 
 def compile_missing(
@@ -91,6 +71,27 @@ def compile_missing(
         process.check()
     finally:
         process.close()
+
+
+def warm_up(
+    report: Callable[[str], None] = lambda _: None, stages: Collection[str] = STAGES
+) -> None:
+    """Compile what is missing in a process of its own, then load kernels into this one.
+
+    Args:
+        report: called with each stage's name before it begins.
+        stages: those whose kernels are needed.
+    """
+    compile_missing(report, stages)
+    # After that: kernels come from the folder that was chosen when they are imported.
+    from fasaco_edge.kernels.jit import pack_loaded  # noqa: PLC0415
+    from fasaco_edge.planners.warmup import TinyRoom, run_stage  # noqa: PLC0415
+
+    room = TinyRoom()
+    for stage in stages:
+        report(stage)
+        run_stage(stage, room)
+        pack_loaded()
 
 
 class CompilerProcess:

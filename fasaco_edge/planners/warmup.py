@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable
 from dataclasses import replace
 from functools import cached_property, partial
 
@@ -22,28 +22,12 @@ from fasaco_edge.kernels.floor.certain import TILE, FloorTiles, Whereabouts, cer
 from fasaco_edge.kernels.floor.open_floor import pass_line, set_causes, set_open
 from fasaco_edge.kernels.floor.runs import common_runs
 from fasaco_edge.kernels.floor.sweeps import Sweeps
-from fasaco_edge.kernels.jit import pack_loaded
 from fasaco_edge.kernels.lattice.areas import cells_beside, find_areas
 from fasaco_edge.kernels.lattice.pixels import count_free_beside
 from fasaco_edge.kernels.lattice.polygons import add_near, count_in, turn_inside
 from fasaco_edge.kernels.lattice.reach import update_reach
 from fasaco_edge.kernels.lattice.ways import ways_from
 from fasaco_edge.planners.bound import lower_bound_of
-from fasaco_edge.planners.compiling import (
-    AREAS,
-    BOUND,
-    CHANGES,
-    LATTICE,
-    LINE,
-    LOCAL_SEARCH,
-    REACH,
-    REPAIR,
-    SHARES,
-    STAGES,
-    WALKS,
-    WINDOWS,
-    compile_missing,
-)
 from fasaco_edge.planners.cost import CoverageCost
 from fasaco_edge.planners.line import LineConfig, line_over, memory_for_moves
 from fasaco_edge.planners.paper.colony import ColonyConfig
@@ -57,22 +41,19 @@ from fasaco_edge.planners.search.regions import regions_of
 from fasaco_edge.planners.search.repair import repaired
 from fasaco_edge.planners.search.walk_region import WalkRegion, stream_of
 from fasaco_edge.planners.search.windows import WindowSearch
-
-
-def warm_up(report: Callable[[str], None] | None = None, stages: Collection[str] = STAGES) -> None:
-    """Compile what is missing in a process of its own, then load kernels into this one.
-
-    Args:
-        report: called with each stage's name before it begins.
-        stages: those whose kernels are needed.
-    """
-    report = report or (lambda _: None)
-    compile_missing(report, stages)
-    room = TinyRoom()
-    for stage in stages:
-        report(stage)
-        run_stage(stage, room)
-        pack_loaded()
+from fasaco_edge.planners.stages import (
+    AREAS,
+    BOUND,
+    CHANGES,
+    LATTICE,
+    LINE,
+    LOCAL_SEARCH,
+    REACH,
+    REPAIR,
+    SHARES,
+    WALKS,
+    WINDOWS,
+)
 
 
 def run_stage(stage: str, room: TinyRoom) -> None:

@@ -24,10 +24,10 @@ from fasaco_edge.bench.benchmark import (
 )
 from fasaco_edge.fleet.planning.division import Division, Fleet, divide
 from fasaco_edge.grid.lattice import Cell
+from fasaco_edge.planners.compiling import warm_up
 from fasaco_edge.planners.cost import CoverageCost
 from fasaco_edge.planners.grids import NamedGrid, read_grid
 from fasaco_edge.planners.planner import SearchProgress, StoppingCriterion
-from fasaco_edge.planners.warmup import warm_up
 from tests.benchmarks.buildings import building
 from tests.benchmarks.harness import WrongWalkError, check_names, grid_name
 from tests.benchmarks.judge import check_walk, reachable

@@ -23,11 +23,11 @@ from fasaco_edge.bench.benchmark import (
 )
 from fasaco_edge.errors import NothingToCover
 from fasaco_edge.grid.lattice import Cell, CoverageLattice
+from fasaco_edge.planners.compiling import warm_up
 from fasaco_edge.planners.cost import CoverageCost, SearchWork
 from fasaco_edge.planners.grids import read_grid
 from fasaco_edge.planners.planner import WorkLimit
 from fasaco_edge.planners.problem import CoverageProblem
-from fasaco_edge.planners.warmup import warm_up
 from tests.benchmarks.harness import WrongWalkError, check_names, grid_name, planner_for
 
 DEFAULT_MAPS = ("flat", "office", "walled_grid", "basement", "warehouse")

@@ -20,13 +20,13 @@ from fasaco_edge.bench.benchmark import (
     seconds_above_zero,
     seed,
 )
+from fasaco_edge.planners.compiling import warm_up
 from fasaco_edge.planners.grids import NamedGrid, read_grid
 from fasaco_edge.planners.paper.colony import ColonyConfig, parse_velocities
 from fasaco_edge.planners.paper.fasaco import Fasaco
 from fasaco_edge.planners.planner import CoveragePlanner, ignore, never
 from fasaco_edge.planners.problem import CoverageProblem
 from fasaco_edge.planners.registry import planner_of
-from fasaco_edge.planners.warmup import warm_up
 from tests import naive
 
 DEFAULT_MAPS = ("office", "flat", "basement")

@@ -30,7 +30,8 @@ from pathlib import Path
 
 from fasaco_edge.bench.processes import warm_kernels
 from fasaco_edge.kernels.manifest import chosen_folder
-from fasaco_edge.planners.compiling import STAGES, compile_missing
+from fasaco_edge.planners.compiling import compile_missing
+from fasaco_edge.planners.stages import STAGES
 from tests.campaigns.trap import NOBODY, Trap
 from tests.deploy import installed, lab, releases
 from tests.deploy.installing import Robot, bare_robot

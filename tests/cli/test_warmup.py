@@ -13,7 +13,7 @@ import pytest
 
 from fasaco_edge.kernels.folder import code_digest
 from fasaco_edge.kernels.manifest import MANIFEST
-from fasaco_edge.planners.compiling import STAGES, WALKS
+from fasaco_edge.planners.stages import STAGES, WALKS
 from tests.kernels.harm import zeroed
 from tests.kernels.installations import fill_with
 from tests.support.processes import ENVIRONMENT, fasaco_edge
@@ -21,7 +21,7 @@ from tests.support.processes import ENVIRONMENT, fasaco_edge
 COUNT = """
 import importlib
 from fasaco_edge.kernels.folder import KERNEL_SOURCES, kernel_module
-from fasaco_edge.planners.warmup import warm_up
+from fasaco_edge.planners.compiling import warm_up
 warm_up()
 modules = [importlib.import_module(f"fasaco_edge.kernels.{kernel_module(file)}")
            for file in KERNEL_SOURCES]

@@ -6,7 +6,8 @@ import subprocess
 import sys
 
 from fasaco_edge.kernels.manifest import why_missing
-from fasaco_edge.planners.compiling import AREAS, LATTICE, MODULE, REASON, STAGE, WARNING
+from fasaco_edge.planners.compiling import MODULE, REASON, STAGE, WARNING
+from fasaco_edge.planners.stages import AREAS, LATTICE
 from tests.support.processes import ENVIRONMENT
 
 GROWN = f"import {MODULE} as it; it.MOST_MB, it.PLENTY_MB = 0.0, 1e9; it.main()"

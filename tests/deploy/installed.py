@@ -12,7 +12,8 @@ import sys
 from pathlib import Path
 
 from fasaco_edge.kernels.manifest import chosen_folder
-from fasaco_edge.planners.compiling import STAGES, compile_missing
+from fasaco_edge.planners.compiling import compile_missing
+from fasaco_edge.planners.stages import STAGES
 from tests.deploy.lab import Lab
 
 HOME = "/opt/fasaco-edge"

@@ -20,7 +20,7 @@ from fasaco_edge.doctor import installation, machine, report, security, session
 from fasaco_edge.doctor.finding import Check, CheckContext, Finding, Level, Unit, find_unit
 from fasaco_edge.kernels import manifest
 from fasaco_edge.kernels.folder import wanted_folder
-from fasaco_edge.planners.compiling import STAGES
+from fasaco_edge.planners.stages import STAGES
 from fasaco_edge.wire import topics
 from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.topics import QOS

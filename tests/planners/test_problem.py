@@ -17,13 +17,13 @@ from fasaco_edge.errors import (
 )
 from fasaco_edge.grid.geometry import Window
 from fasaco_edge.grid.lattice import COVERABLE, UNKNOWN, CoverageLattice
-from fasaco_edge.planners.compiling import STAGES
+from fasaco_edge.planners.compiling import warm_up
 from fasaco_edge.planners.paper.colony import ColonyConfig
 from fasaco_edge.planners.path import CoveragePath
 from fasaco_edge.planners.planner import ignore, never
 from fasaco_edge.planners.problem import CoverageProblem
 from fasaco_edge.planners.registry import PLANNER_NAMES, planner_of
-from fasaco_edge.planners.warmup import warm_up
+from fasaco_edge.planners.stages import STAGES
 from tests.support.grids import lattice, placed
 
 GROUND = placed(lattice("..#", "..#", "###", "..."), -2, 5)

@@ -17,14 +17,14 @@ from fasaco_edge.kernels.manifest import chosen_folder
 from fasaco_edge.mission.config import Sweeping
 from fasaco_edge.mission.core.events import MapReceived, PatchReceived, PlanReady, PoseReceived
 from fasaco_edge.mission.core.mission import Mission, MissionConfig
-from fasaco_edge.planners.compiling import STAGES, compile_missing, stages_of_plan
+from fasaco_edge.planners.compiling import compile_missing, warm_up
 from fasaco_edge.planners.cost import CoverageCost, SearchWork
 from fasaco_edge.planners.line import LINES
 from fasaco_edge.planners.paper.fasaco import Fasaco
 from fasaco_edge.planners.path import walk_figures
 from fasaco_edge.planners.planner import WorkLimit
 from fasaco_edge.planners.search.near_optimal import NearOptimal
-from fasaco_edge.planners.warmup import warm_up
+from fasaco_edge.planners.stages import STAGES, stages_of_plan
 from fasaco_edge.wire.messages.maps import (
     decode_map_update,
     decode_occupancy_grid,
@@ -105,7 +105,7 @@ def test_a_mission_with_decoded_maps_compiles_nothing_new(turn_s, sweeping):
 
 PLAN = """
 import fasaco_edge as fe
-from fasaco_edge.planners.compiling import stages_of_plan
+from fasaco_edge.planners.stages import stages_of_plan
 from fasaco_edge.planners.warmup import TinyRoom, run_stage
 from tests.planners.test_warmup import compiled_signatures
 room = TinyRoom()

@@ -8,7 +8,8 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from fasaco_edge.kernels.manifest import why_missing
-from fasaco_edge.planners.compiling import AREAS, LATTICE, MODULE
+from fasaco_edge.planners.compiling import MODULE
+from fasaco_edge.planners.stages import AREAS, LATTICE
 from tests.support.processes import ENVIRONMENT
 
 # They compile within seconds.

@@ -37,7 +37,7 @@ from typing import NoReturn
 ENVIRONMENT = os.environ | {"PYTHONPATH": str(Path(__file__).parents[2])}
 PRELOADED = ("numba", "llvmlite.binding", "msgspec", "yaml")
 # Neither Zenoh nor Rerun: by them a command decides how it ends.
-LOADED = ("fasaco_edge.planners.warmup", "fasaco_edge.daemon.loop.mission_runner")
+LOADED = ("fasaco_edge.planners.compiling", "fasaco_edge.daemon.loop.mission_runner")
 NUMBER = struct.Struct("i")
 # Of a task, which holds words and an environment.
 MOST_BYTES = 1 << 20

@@ -21,7 +21,7 @@ from fasaco_edge.errors import BusUnavailable
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D, Window
 from fasaco_edge.grid.occupancy import MapPatch, OccupancyGrid
 from fasaco_edge.grid.rotation import rotated_geometry, rotated_pose
-from fasaco_edge.planners.warmup import warm_up
+from fasaco_edge.planners.compiling import warm_up
 from fasaco_edge.simulation.robot import SimulationConfig
 from fasaco_edge.simulation.world import World
 from fasaco_edge.wire import topics

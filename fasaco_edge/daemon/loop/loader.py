@@ -17,7 +17,8 @@ from fasaco_edge.daemon.memory import floor_pixels
 from fasaco_edge.host.processes import release_unused
 from fasaco_edge.mission.config import MissionConfig, Sweeping
 from fasaco_edge.mission.orders.order_state import NO_ORDER, OrderState
-from fasaco_edge.planners.compiling import compile_missing, stages_of_mission
+from fasaco_edge.planners.compiling import compile_missing, warm_up
+from fasaco_edge.planners.stages import stages_of_mission
 
 if TYPE_CHECKING:
     from fasaco_edge.daemon.loop.worker import PlanningWorker
@@ -69,7 +70,6 @@ class Loader:
         from fasaco_edge.daemon.loop.worker import PlanningWorker  # noqa: PLC0415
         from fasaco_edge.mission.core.mission import Mission  # noqa: PLC0415
         from fasaco_edge.planners.registry import planner_of  # noqa: PLC0415
-        from fasaco_edge.planners.warmup import warm_up  # noqa: PLC0415
 
         planner = self._config.planner
         warm_up(self._report, stages_of_mission(planner.name, has_fleet=bool(self._config.fleet)))

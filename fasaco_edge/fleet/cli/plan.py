@@ -21,9 +21,9 @@ from fasaco_edge.cli.warmup import compile_kernels
 from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.host.processes import first_signal_calls
 from fasaco_edge.offline.settings import ANYWHERE, CELLS, HOME
-from fasaco_edge.planners.compiling import stages_of_plan
 from fasaco_edge.planners.cost import count_turns
 from fasaco_edge.planners.planner import Interrupt, SearchProgress, TimeBudget
+from fasaco_edge.planners.stages import stages_of_plan
 from fasaco_edge.wire.limits import MAX_FLEET_PARTS
 
 if TYPE_CHECKING:

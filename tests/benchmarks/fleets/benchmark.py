@@ -16,8 +16,8 @@ from fasaco_edge.fleet.mission.kind import fleet_of
 from fasaco_edge.grid.lattice import CoverageLattice, Footprint
 from fasaco_edge.grid.map_files import find_map, read_map
 from fasaco_edge.grid.occupancy import OccupancyGrid
+from fasaco_edge.planners.compiling import warm_up
 from fasaco_edge.planners.grids import start_point
-from fasaco_edge.planners.warmup import warm_up
 from tests.benchmarks.buildings import building
 from tests.benchmarks.fleets.run import RADIUS_M, TOOL_M, Fleet, FleetRun
 from tests.benchmarks.harness import grid_name

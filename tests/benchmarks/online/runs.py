@@ -11,9 +11,9 @@ import numpy as np
 from fasaco_edge.bench.benchmark import Say
 from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.grid.lattice import Cell, CoverageLattice
+from fasaco_edge.planners.compiling import warm_up
 from fasaco_edge.planners.grids import MAP_FOOTPRINT, NamedGrid
 from fasaco_edge.planners.problem import CoverageProblem
-from fasaco_edge.planners.warmup import warm_up
 from tests.benchmarks.harness import judged as judged_plan
 from tests.benchmarks.online.buildings import Building, BuildingChoice, of_grid
 from tests.benchmarks.online.cases import CASES, Act

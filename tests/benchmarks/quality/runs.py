@@ -25,12 +25,12 @@ from typing import Any
 
 from fasaco_edge.bench.benchmark import Say
 from fasaco_edge.errors import BadConfiguration
+from fasaco_edge.planners.compiling import warm_up
 from fasaco_edge.planners.cost import STEPS_ALONE, CoverageCost, SearchWork
 from fasaco_edge.planners.grids import NamedGrid, read_grid
 from fasaco_edge.planners.path import CoveragePath
 from fasaco_edge.planners.planner import TimeBudget
 from fasaco_edge.planners.problem import CoverageProblem
-from fasaco_edge.planners.warmup import warm_up
 from tests.benchmarks.harness import WrongWalkError, check_names, grid_name, judged, planner_for
 
 # The tour solver's walks: of the others, none is near to the best there is.

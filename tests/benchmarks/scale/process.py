@@ -16,10 +16,10 @@ from pathlib import Path
 from typing import Any
 
 from fasaco_edge.host.processes import peak_mb, resident_mb
+from fasaco_edge.planners.compiling import warm_up
 from fasaco_edge.planners.grids import NamedGrid, read_grid
 from fasaco_edge.planners.planner import SearchProgress
 from fasaco_edge.planners.problem import CoverageProblem
-from fasaco_edge.planners.warmup import warm_up
 from tests.benchmarks.harness import judged, planner_for
 
 # A gap is noted when it has fallen by so much of itself; and when it comes to one of these.

@@ -9,6 +9,7 @@ from typing import Self
 
 from fasaco_edge.bench.benchmark import Say
 from fasaco_edge.errors import BadConfiguration
+from fasaco_edge.planners.compiling import warm_up
 from fasaco_edge.planners.grids import NamedGrid, read_grid
 from fasaco_edge.planners.own.loading import UserCode
 from fasaco_edge.planners.own.planner import OwnPlanner
@@ -17,7 +18,6 @@ from fasaco_edge.planners.path import CoveragePath, WalkFigures, walk_figures
 from fasaco_edge.planners.planner import Observer, ignore, never
 from fasaco_edge.planners.problem import CoverageProblem
 from fasaco_edge.planners.registry import planner_of
-from fasaco_edge.planners.warmup import warm_up
 from tests.benchmarks.harness import check_names, grid_name
 
 

@@ -28,12 +28,12 @@ from fasaco_edge.cli.console.arguments import writing
 from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.grid.lattice import CoverageLattice
 from fasaco_edge.kernels import EAST, NORTH, SOUTH, WEST
+from fasaco_edge.planners.compiling import warm_up
 from fasaco_edge.planners.cost import CoverageCost
 from fasaco_edge.planners.grids import read_grid
 from fasaco_edge.planners.paper.baselines import spiral_stc, stc, zigzag
 from fasaco_edge.planners.planner import SearchProgress
 from fasaco_edge.planners.problem import CoverageProblem
-from fasaco_edge.planners.warmup import warm_up
 from tests.benchmarks.harness import WrongWalkError, grid_name, judged, planner_for
 from tests.benchmarks.pictures import LabelledWalk, draw_walks
 
