@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Protocol
 
-from fasaco_edge.mission.company import ALONE, CompanyKind
+from fasaco_edge.mission.company_kind import ALONE, CompanyKind
 from fasaco_edge.wire.topics import FLEET
 
 if TYPE_CHECKING:

@@ -1,6 +1,6 @@
 """Fleets: several robots that share one area. A single robot does not use it.
 
-mission/kind         what a robot of a fleet uses in place of ``mission.company``
+mission/kind         what a robot of a fleet uses in place of ``mission.company_kind``
 mission/layer        the other robots, and this one's part of the remaining area
 mission/giving_way   when the robot waits for other robots, and makes way for them
 mission/shared       cells that the others have swept

@@ -1,8 +1,8 @@
 """Company: the interface of a mission to other robots in its building, here for a single robot.
 
-A robot of a fleet has another ``Company``, that of ``fleet.mission``, which its configuration
-names; the mission knows nothing else of a fleet. The company of a fleet divides the area among
-robots, and decides which robot waits for which.
+A robot of a fleet has another ``Company``, that of ``fleet.mission``, which its mission gets by a
+``company_kind``; the mission knows nothing else of a fleet. The company of a fleet divides the area
+among robots, and decides which robot waits for which.
 """
 
 from __future__ import annotations
@@ -20,11 +20,7 @@ from fasaco_edge.mission.coverage.ledger import Cells, LedgerSnapshot
 if TYPE_CHECKING:
     # For types only: an idle daemon loads no kernels.
     from fasaco_edge.grid.lattice import Cell
-    from fasaco_edge.mission.config import MissionConfig
     from fasaco_edge.mission.core.events import MemberHeard, PathUpdate
-    from fasaco_edge.mission.core.route import Route
-    from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
-    from fasaco_edge.mission.map.map_state import MapState
     from fasaco_edge.mission.map.reachable_area import ReachableArea
     from fasaco_edge.mission.orders.order import Errand
 
@@ -194,24 +190,3 @@ class Waiting:
     def why_stuck(self, now: float) -> str:
         """Return why the robot seems stuck for good, or ""."""
         return ""
-
-
-class CompanyKind:
-    """Factory for the parts of a mission that handle other robots; here, for a single robot."""
-
-    def cells(self) -> OthersCells:
-        """Return the cells that others have swept."""
-        return OthersCells()
-
-    def company(self, config: MissionConfig, map_state: MapState, ledger: MissionLedger) -> Company:
-        """Return the other robots."""
-        return Company()
-
-    def waiting(
-        self, config: MissionConfig, map_state: MapState, route: Route, company: Company
-    ) -> Waiting:
-        """Return the part that decides when the robot waits for others."""
-        return Waiting()
-
-
-ALONE = CompanyKind()

@@ -10,7 +10,6 @@ import msgspec
 from msgspec import Meta
 
 from fasaco_edge.grid.geometry import FARTHEST_M, MAX_LATTICE_CELLS, Polygon, Pose2D
-from fasaco_edge.mission.company import ALONE, CompanyKind
 from fasaco_edge.mission.orders.keep_outs import MOST_KEEP_OUT
 from fasaco_edge.mission.orders.order import MOST_ZONES, Errand, StandingZone
 from fasaco_edge.planners.cost import STEPS_ALONE, CoverageCost
@@ -152,7 +151,6 @@ class MissionConfig:
         speed_m_s: speed of the robot; 0 if not known [m/s].
         lattice_deg: angle of the cells' rows to the x axis of the map frame [deg]; None to align
             them with the walls, once their direction is certain.
-        company: kind of its interface to other robots.
         given: the policy with its places as configured, if those in ``policy`` are rotated.
     """
 
@@ -166,6 +164,5 @@ class MissionConfig:
     plans_on_trail: bool = False
     battery: BatteryPolicy | None = None
     lattice_deg: float | None = 0.0
-    company: CompanyKind = ALONE
     given: MissionPolicy | None = None
     speed_m_s: float = 0.0

@@ -20,6 +20,7 @@ import msgspec
 import numpy as np
 
 from fasaco_edge.config.config import DaemonConfig
+from fasaco_edge.daemon.fleet_wing import company_of
 from fasaco_edge.daemon.ledger.codec import decode_ledger, encode_ledger
 from fasaco_edge.daemon.loop.last_samples import ShownTrail
 from fasaco_edge.daemon.loop.loader import mission_config
@@ -136,7 +137,7 @@ class MissionTrial:
         planner = config.planner
         self._planner = planner_of(planner.name, planner.colony(), 1, planner.local_search)
         self._config = mission_config(config, self._planner)
-        mission = Mission(self._config)
+        mission = Mission(self._config, kind=company_of(config))
         self._poses = PoseDecoder(config.pose.schema)
         self._asked: PlanRequest | None = None
         self._paths.withdraw("another mission")

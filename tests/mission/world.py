@@ -13,6 +13,7 @@ from msgspec import structs
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D, StampedPose, Window
 from fasaco_edge.grid.lattice import CoverageLattice, Footprint
 from fasaco_edge.grid.occupancy import MapPatch, OccupancyGrid
+from fasaco_edge.mission.company_kind import ALONE
 from fasaco_edge.mission.config import MissionConfig
 from fasaco_edge.mission.core.events import (
     CommandReceived,
@@ -91,9 +92,9 @@ class Drive:
 
     refused = None
 
-    def __init__(self, cell, *first_events, config=CONFIG, order_state=None):
+    def __init__(self, cell, *first_events, config=CONFIG, order_state=None, kind=ALONE):
         self.config = config
-        self.mission = Mission(config, order_state)
+        self.mission = Mission(config, order_state, kind)
         self.cell = cell
         self.now = 0.0
         self.walk = []

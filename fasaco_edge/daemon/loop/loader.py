@@ -79,7 +79,8 @@ class Loader:
         first = (
             OrderState.autostart() if self._config.mission.autostart else OrderState.idle(NO_ORDER)
         )
-        return Mission(mission_config(self._config, chosen), first), worker
+        config, kind = mission_config(self._config, chosen), company_of(self._config)
+        return Mission(config, first, kind), worker
 
     def _report(self, stage: str) -> None:
         self.stage = f"kernels: {stage}"
@@ -104,7 +105,6 @@ def mission_config(config: DaemonConfig, chosen: CoveragePlanner) -> MissionConf
         isinstance(chosen, Fasaco),
         config.battery or None,
         config.lattice_deg,
-        company_of(config),
         speed_m_s=robot.speed_m_s,
     )
 

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 from fasaco_edge.fleet.mission.giving_way import GivingWay
 from fasaco_edge.fleet.mission.layer import FleetLayer
 from fasaco_edge.fleet.mission.shared import MapPlace, SharedProgress
-from fasaco_edge.mission.company import Company, CompanyKind
+from fasaco_edge.mission.company import Company
+from fasaco_edge.mission.company_kind import CompanyKind
 
 if TYPE_CHECKING:
     from fasaco_edge.mission.config import MissionConfig

@@ -17,6 +17,7 @@ from fasaco_edge.grid.lattice import Cell, CoverageLattice
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.grid.rotation import rotated_points
 from fasaco_edge.mission.company import OthersCells
+from fasaco_edge.mission.company_kind import ALONE, CompanyKind
 from fasaco_edge.mission.config import MissionConfig
 from fasaco_edge.mission.core.blocked_follower import BlockedFollower
 from fasaco_edge.mission.core.charging import BatteryGauge, Charging
@@ -69,9 +70,11 @@ class Mission:
         charging: the battery, and when to charge; read-only.
     """
 
-    def __init__(self, config: MissionConfig, order: OrderState | None = None) -> None:
-        """Start with an order; by default with one for everything reachable."""
-        self._config = config
+    def __init__(
+        self, config: MissionConfig, order: OrderState | None = None, kind: CompanyKind = ALONE
+    ) -> None:
+        """Start with an order, by default for everything reachable, and a kind of company."""
+        self._config, self._kind = config, kind
         self._drive, self._gauge = DriveMeter(), BatteryGauge()
         self._angle = LatticeAngle(config)
         self._idle = IdlePlaces(config)
@@ -95,10 +98,9 @@ class Mission:
             sight = ToolSight(
                 tool_m, radius_m, config.footprint.free_at_most, lambda: map_state.grid
             )
-        kind = config.company
-        self._ledger = MissionLedger(cell_m, tool_m, ahead_m, kind.cells(), sight)
+        self._ledger = MissionLedger(cell_m, tool_m, ahead_m, self._kind.cells(), sight)
         monitor = InputMonitor(config)
-        self.company = kind.company(config, self._map, self._ledger)
+        self.company = self._kind.company(config, self._map, self._ledger)
         self._orders = Sequencer(config, self._map, self._ledger, self.company)
         self.route = Route(config.spare_share, self._map, self._orders)
         owners = self._map, self._ledger, monitor, self._orders, self.route
@@ -111,7 +113,7 @@ class Mission:
         blocked = BlockedFollower()
         measured = self._drive, self.company, self._gauge, way_out, blocked
         self._handler = EventHandler(*owners, self._line, self._trail, *measured, self._changes)
-        self.giving_way = kind.waiting(config, self._map, self.route, self.company)
+        self.giving_way = self._kind.waiting(config, self._map, self.route, self.company)
         decided_by = self._line, self._trail, self.company, self.charging, self.giving_way
         in_dock = InDock(self._map, self._gauge)
         mask = mask_frame(self._config.policy.keep_out_mask)

@@ -89,7 +89,7 @@ class Fleet:
         """Edge of a cell [m]."""
         return TOOL_M if self.line == "cells" else TOOL_M * (1.0 - OVERLAP)
 
-    def config(self, name: str) -> MissionConfig:
+    def config(self) -> MissionConfig:
         """Return the configuration of a mission."""
         cell_m = self.cell_m
         cost = CoverageCost.for_robot(cell_m, self.speed_m_s, TURN_S)
@@ -103,7 +103,6 @@ class Fleet:
             footprint,
             cost=cost,
             sweeping=sweeping,
-            company=FleetKind(name),
             spare_share=SPARE_SHARE,
         )
 
@@ -180,7 +179,7 @@ class FleetRun:
         )
         self.robots = []
         for name, (x, y) in zip(names, fleet.starts, strict=True):
-            mission = Mission(fleet.config(name))
+            mission = Mission(fleet.config(), kind=FleetKind(name))
             mission.shared.begin(1)
             world = World(fleet.truth, Pose2D(x, y), simulated)
             self.robots.append(FleetRobot(name, mission, world, CoverageLedger(fleet.cell_m)))

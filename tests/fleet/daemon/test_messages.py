@@ -195,7 +195,7 @@ def test_a_robot_sends_which_known_cells_precede_their_epoch():
 def test_a_robot_sends_its_next_metres_for_any_cell_size(cell_m, monkeypatch):
     monkeypatch.setattr(world, "CELL", cell_m)
     footprint = Footprint(cell_m=cell_m, robot_radius_m=cell_m / 2)
-    drive = Drive((0, 0), config=replace(WORLD, company=FleetKind("r1"), footprint=footprint))
+    drive = Drive((0, 0), config=replace(WORLD, footprint=footprint), kind=FleetKind("r1"))
     drive.mission.shared.begin(1)
     drive.tell(MapReceived(building("." * 600)), pose_at(0, 0))
     drive.plan()
@@ -215,7 +215,7 @@ def test_robots_on_a_map_in_utm_divide_its_cells(northing_m):
     ends = {"r1": corner, "r2": (corner[0] + 3, corner[1] + 11)}
     drives, subscriptions = {}, {}
     for name, cell in ends.items():
-        drives[name] = Drive(cell, config=replace(WORLD, company=FleetKind(name)))
+        drives[name] = Drive(cell, config=WORLD, kind=FleetKind(name))
         drives[name].mission.shared.begin(1)
         drives[name].tell(MapReceived(building(*["." * 12] * 4, at=corner)), pose_at(*cell))
         drives[name].plan()

@@ -1,6 +1,5 @@
 """Robots of one fleet in one building, each with a mission of its own, and the bus between them."""
 
-from dataclasses import replace
 from random import Random
 
 from fasaco_edge.fleet.mission.ground import GroundTelling
@@ -23,7 +22,7 @@ class FleetRobot(Drive):
     def __init__(self, name, cell, rows, config=CONFIG, before=None):
         self.name, self.hangs, self.told, self.cannot = name, False, Telling(), ()
         self.told_ground, self.told_epoch = GroundTelling(), 1
-        super().__init__(cell, config=replace(config, company=FleetKind(name)))
+        super().__init__(cell, config=config, kind=FleetKind(name))
         if before is not None:
             self.mission.restore_ledger(before)
         self.mission.shared.begin(1)

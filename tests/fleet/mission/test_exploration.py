@@ -19,8 +19,10 @@ from tests.mission.world import (
 def test_a_zone_behind_a_robot_that_stands_is_waited_for():
     """Cells seen past it alone were tried in one step, and the order was over, it said."""
     there = MemberHeard("r2", state="paused", x=8.5 * CELL, y=0.5 * CELL, epoch=1, radius_m=0.1)
-    config = with_policy(replace(CONFIG, company=FleetKind("r1")), retries=2, retry_s=30.0)
-    drive = Drive((0, 0), config=config, order_state=OrderState.idle("no order yet"))
+    config = with_policy(CONFIG, retries=2, retry_s=30.0)
+    drive = Drive(
+        (0, 0), config=config, order_state=OrderState.idle("no order yet"), kind=FleetKind("r1")
+    )
     rows = ["." * 16 + " " * 14]
     drive.tell(MapReceived(building(*rows)), pose_at(0, 0), there)
     drive.command("start", {"zones": [{"name": "z", "polygon": rectangle(0, 20, 1, 24)}]})

@@ -45,7 +45,7 @@ def divided_by(member, number):
 
 def test_a_robot_without_a_part_sweeps_missed_floor_of_another():
     grid = room(4.5, 3.5)
-    robot = Robot(Mission(replace(CONFIG, company=FleetKind("r1"))))
+    robot = Robot(Mission(CONFIG, kind=FleetKind("r1")))
     robot.mission.shared.begin(1)
     robot.tell(MapReceived(grid))
     for number in range(1, 2000):
@@ -58,7 +58,7 @@ def test_a_robot_without_a_part_sweeps_missed_floor_of_another():
 
 
 def test_a_polished_line_survives_the_wait_for_another_robot():
-    robot = Robot(Mission(replace(CONFIG, company=FleetKind("r1"))))
+    robot = Robot(Mission(CONFIG, kind=FleetKind("r1")))
     robot.mission.shared.begin(1)
     robot.tell(MapReceived(room(4.5, 3.5)))
     robot.drive(60)
@@ -78,7 +78,7 @@ def test_a_polished_line_survives_the_wait_for_another_robot():
 
 
 def test_a_yielding_robot_does_not_cross_its_cell_centre_first():
-    robot = Robot(Mission(replace(CONFIG, company=FleetKind("r1"))))
+    robot = Robot(Mission(CONFIG, kind=FleetKind("r1")))
     robot.mission.shared.begin(1)
     robot.tell(MapReceived(room(4.5, 3.5)))
     robot.drive(40)
@@ -100,7 +100,7 @@ def test_a_yielding_robot_does_not_cross_its_cell_centre_first():
 
 
 def test_a_robot_leaves_the_rest_of_a_line_without_open_floor():
-    robot = Robot(Mission(replace(CONFIG, company=FleetKind("r1"))))
+    robot = Robot(Mission(CONFIG, kind=FleetKind("r1")))
     robot.mission.shared.begin(1)
     robot.tell(MapReceived(room(4.5, 3.5)))
     alone = replace(divided_by("r2", 0), parts=(), by="")
@@ -123,7 +123,7 @@ def nearest_to(line, place):
 @pytest.mark.parametrize("toward", range(12))
 def test_a_yielding_robot_comes_no_nearer_to_a_close_one(toward):
     # Both stood in a doorway for good: straight to its refuge meant into the other's side.
-    robot = Robot(Mission(replace(CONFIG, company=FleetKind("r1"))))
+    robot = Robot(Mission(CONFIG, kind=FleetKind("r1")))
     robot.mission.shared.begin(1)
     robot.tell(MapReceived(room(4.5, 3.5)))
     robot.drive(150)

@@ -27,7 +27,7 @@ from fasaco_edge.mission.core.events import MapReceived, MemberHeard, Part, Pose
 from fasaco_edge.mission.coverage.ledger import TILE
 from fasaco_edge.wire.documents.fleet import CellTile, FleetMember, FleetPart
 from fasaco_edge.wire.documents.json_text import encode_json
-from tests.mission.world import CELL, CONFIG, Drive, building
+from tests.mission.world import CELL, Drive, building
 
 AT = Pose2D(3.1, -2.0, math.radians(30.0))
 
@@ -178,7 +178,7 @@ class Robot(Drive):
         self.name, self.origin, self.rows, self.heard = name, origin, rows, []
         self.said, self.receiver = [], FleetReceiver(config)
         self.sender = FleetSender(self, config)
-        super().__init__(cell, config=replace(CONFIG, company=FleetKind(name)))
+        super().__init__(cell, kind=FleetKind(name))
         self.mission.shared.begin(1)
         map_frame = seen_from(Pose2D(0.0, 0.0), origin)
         grid = building(*rows)

@@ -33,8 +33,8 @@ def member(cell, **changes):
 @pytest.fixture
 def drive():
     """A robot, r1, that drives home along a hall."""
-    config = with_policy(replace(CONFIG, company=FleetKind("r1")), home=at(2, 20))
-    drive = Drive((2, 4), config=config)
+    config = with_policy(CONFIG, home=at(2, 20))
+    drive = Drive((2, 4), config=config, kind=FleetKind("r1"))
     drive.tell(MapReceived(building(*HALL)), pose_at(2, 4))
     drive.plan()
     drive.command("home")
@@ -59,8 +59,8 @@ def test_a_robot_on_its_way_home_waits_and_goes_on(drive):
 
 
 def test_a_robot_held_up_on_its_way_home_for_a_minute_says_so():
-    config = with_policy(replace(CONFIG, company=FleetKind("r1")), home=at(0, 20))
-    drive = Drive((0, 4), config=config)
+    config = with_policy(CONFIG, home=at(0, 20))
+    drive = Drive((0, 4), config=config, kind=FleetKind("r1"))
     drive.tell(MapReceived(building("." * 24)), pose_at(0, 4))
     drive.plan()
     drive.command("home")
@@ -77,9 +77,11 @@ def test_a_robot_held_up_on_its_way_home_for_a_minute_says_so():
 
 def test_a_robot_that_returns_home_waits_though_nothing_is_left():
     # Its wait was in vain, it held, as no cell was left: it went on and waited in turn.
-    config = with_policy(replace(CONFIG, company=FleetKind("r1")), home=at(2, 20))
+    config = with_policy(CONFIG, home=at(2, 20))
     order = {"zones": [{"name": "z", "polygon": rectangle(2, 0, 3, 6)}], "return_home": True}
-    drive = Drive((2, 4), config=config, order_state=OrderState.idle("no order yet"))
+    drive = Drive(
+        (2, 4), config=config, order_state=OrderState.idle("no order yet"), kind=FleetKind("r1")
+    )
     drive.tell(MapReceived(building(*HALL)), pose_at(2, 4))
     drive.command("start", order)
     drive.plan()

@@ -11,27 +11,25 @@ from msgspec import structs
 from fasaco_edge.bus.arrival import Sample
 from fasaco_edge.config.config import DaemonConfig, FleetConfig
 from fasaco_edge.config.robot import RobotConfig
-from fasaco_edge.daemon.loop.loader import mission_config
+from fasaco_edge.daemon.fleet_wing import company_of
 from fasaco_edge.fleet.daemon.exchange import FleetReceiver, FleetSender, kind_of
 from fasaco_edge.fleet.mission.kind import FleetKind
 from fasaco_edge.fleet.mission.shared import MapPlace, SharedProgress
 from fasaco_edge.grid.geometry import Pose2D, Window
 from fasaco_edge.grid.lattice import UNKNOWN, CoverageLattice
-from fasaco_edge.mission.company import ALONE
+from fasaco_edge.mission.company_kind import ALONE
 from fasaco_edge.mission.core.events import MapReceived
 from fasaco_edge.mission.map.reachable_area import ReachableArea
-from fasaco_edge.planners.paper.fasaco import Fasaco
 from fasaco_edge.wire.documents.fleet import CellTile, FleetMember
 from fasaco_edge.wire.documents.json_text import encode_json
 from tests.fleet.mission.test_fleet_frames import AT, bits_of
-from tests.mission.world import CELL, CONFIG, Drive, building, pose_at
+from tests.mission.world import CELL, Drive, building, pose_at
 
 HALL = DaemonConfig(
     robot=RobotConfig(name="r1", overlap=0.0, tool_width_m=CELL, radius_m=CELL / 2),
     fleet=FleetConfig("hall", "house"),
 )
 IN_FLEET = kind_of(HALL)
-IN_HOUSE = replace(CONFIG, company=IN_FLEET)
 BLOCK = {(row, col) for row in range(5, 10) for col in range(5, 10)}
 
 
@@ -53,7 +51,7 @@ def swept_by_others(mission):
 
 def test_a_moved_map_of_another_robot_drops_its_earlier_cells():
     """It was restarted with an origin put right, and keeps its epoch."""
-    receiver, drive = FleetReceiver(HALL), Drive((3, 3), config=IN_HOUSE)
+    receiver, drive = FleetReceiver(HALL), Drive((3, 3), kind=IN_FLEET)
     drive.mission.shared.begin(1)
     drive.tell(MapReceived(building(*["." * 60] * 20)), pose_at(3, 3))
     drive.tell(receiver.event(told_from(0.0)))
@@ -123,7 +121,7 @@ class OnFloors(Drive):
     """A robot in a building with a lift."""
 
     def __init__(self, place=IN_FLEET.map_place, before=None, frame="house"):
-        super().__init__((0, 0), config=replace(CONFIG, company=FleetKind("r1", place)))
+        super().__init__((0, 0), kind=FleetKind("r1", place))
         if before is not None:
             self.mission.restore_ledger(before)
         self.mission.shared.begin(1)
@@ -205,12 +203,11 @@ def test_the_map_of_the_place_is_kept_over_a_restart():
 
 def test_a_daemon_gives_its_mission_the_place_of_the_map():
     fleet = FleetConfig("hall", "house", 4.2, -1.5, 90.0, "floor1")
-    planner, missions = Fasaco(HALL.planner.colony()), []
-    for block in (fleet, FleetConfig("hall"), msgspec.UNSET):
-        missions.append(mission_config(structs.replace(HALL, fleet=block), planner).company)
+    blocks = fleet, FleetConfig("hall"), msgspec.UNSET
+    kinds = [company_of(structs.replace(HALL, fleet=block)) for block in blocks]
     place = MapPlace((4.2, -1.5, 90.0), "floor1")
     name = HALL.robot.name
-    assert missions == [FleetKind(name, place), FleetKind(name), ALONE]
+    assert kinds == [FleetKind(name, place), FleetKind(name), ALONE]
 
 
 def test_a_map_frame_named_as_the_fleets_frame_is_another_frame():

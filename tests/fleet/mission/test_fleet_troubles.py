@@ -11,8 +11,8 @@ from fasaco_edge.fleet.mission.shared import MOST_ROBOTS
 from fasaco_edge.fleet.mission.traffic import OLD_S
 from fasaco_edge.mission.core.events import Part
 from tests.fleet.mission.fleets import FleetDrive
-from tests.mission.world import CONFIG, MapReceived, building, pose_at
 from tests.mission.world import Drive as Alone
+from tests.mission.world import MapReceived, building, pose_at
 
 HALL = ["." * 16] * 10
 
@@ -21,7 +21,7 @@ def test_a_fleet_of_one_drives_as_a_robot_without_a_fleet():
     fleet = FleetDrive(HALL, {"r1": (0, 0)})
     fleet.finish()
     (member,) = fleet.robots.values()
-    alone = Alone((0, 0), config=replace(CONFIG, company=FleetKind("r1")))
+    alone = Alone((0, 0), kind=FleetKind("r1"))
     alone.tell(MapReceived(building(*HALL)), pose_at(0, 0))
     driven = []
     while alone.mission.state != "done":

@@ -28,7 +28,7 @@ def around(cell):
 
 def begun():
     """A robot, r1, that has passed cells of a room beside another one; and one of those."""
-    robot = Robot(Mission(replace(CONFIG, company=FleetKind("r1"))))
+    robot = Robot(Mission(CONFIG, kind=FleetKind("r1")))
     robot.mission.shared.begin(1)
     robot.tell(MapReceived(room(4.5, 3.5)))
     robot.tell(replace(divided_by("r2", 0), parts=(), by=""))

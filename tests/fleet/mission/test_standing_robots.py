@@ -27,7 +27,7 @@ def member(x, y):
 
 def planned(**policy):
     """A robot, r1, in a hall that has its first path."""
-    drive = Drive((2, 4), config=with_policy(replace(CONFIG, company=FleetKind("r1")), **policy))
+    drive = Drive((2, 4), config=with_policy(CONFIG, **policy), kind=FleetKind("r1"))
     drive.tell(MapReceived(building(*["." * 24] * 5)), pose_at(2, 4))
     drive.plan()
     return drive

@@ -1,0 +1,35 @@
+"""Kind of company: builds the parts of a mission that handle other robots, given what they need."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from fasaco_edge.mission.company import Company, OthersCells, Waiting
+
+if TYPE_CHECKING:
+    # For types only: an idle daemon loads no kernels.
+    from fasaco_edge.mission.config import MissionConfig
+    from fasaco_edge.mission.core.route import Route
+    from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
+    from fasaco_edge.mission.map.map_state import MapState
+
+
+class CompanyKind:
+    """Factory for the parts of a mission that handle other robots; here, for a single robot."""
+
+    def cells(self) -> OthersCells:
+        """Return the cells that others have swept."""
+        return OthersCells()
+
+    def company(self, config: MissionConfig, map_state: MapState, ledger: MissionLedger) -> Company:
+        """Return the other robots."""
+        return Company()
+
+    def waiting(
+        self, config: MissionConfig, map_state: MapState, route: Route, company: Company
+    ) -> Waiting:
+        """Return the part that decides when the robot waits for others."""
+        return Waiting()
+
+
+ALONE = CompanyKind()
