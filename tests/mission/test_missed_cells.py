@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
-from fasaco_edge.mission.coverage.passed_cells import MOST_AGAIN, MissedCells
+from fasaco_edge.mission.coverage.mission_ledger import MOST_AGAIN, MissionLedger
 from tests.mission.world import CELL, pose_at
 
 
 def test_the_robot_comes_back_to_a_cell_a_few_times_only():
-    cells = MissedCells()
+    ledger = MissionLedger(CELL, CELL)
     for _ in range(MOST_AGAIN):
-        assert cells.may_come_back((0, 1))
-        cells.come_back((0, 1))
-    assert not cells.may_come_back((0, 1))
-    assert cells.may_come_back((1, 0))
-    cells.clear()
-    assert cells.may_come_back((0, 1))
+        assert ledger.may_open_again((0, 1))
+        ledger.open_again([(0, 1)])
+    assert not ledger.may_open_again((0, 1))
+    assert ledger.may_open_again((1, 0))
+    ledger.begin_elsewhere("map")
+    assert ledger.may_open_again((0, 1))
 
 
 def test_a_reopened_cell_is_covered_only_by_another_visit():

@@ -8,7 +8,8 @@ each map is compared with the building before (``map.building_watch``).
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections import Counter
+from collections.abc import Callable, Collection
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -29,7 +30,7 @@ from fasaco_edge.mission.coverage.ledger import (
     CoverageLedger,
     LedgerSnapshot,
 )
-from fasaco_edge.mission.coverage.passed_cells import MissedCells, PassedCells
+from fasaco_edge.mission.coverage.passed_cells import PassedCells
 from fasaco_edge.mission.coverage.swept_floor import (
     DROPPED_FLOOR_TILES,
     MOST_FLOOR_TILES,
@@ -43,6 +44,9 @@ if TYPE_CHECKING:
 # Share of blocked cells among the known covered ones that furniture never reaches from one map to
 # the next.
 MANY_AT_ONCE = 0.2
+# Limit on the returns to a cell: floor that the robot left unswept in two returns, a third would
+# leave, too.
+MOST_AGAIN = 2
 
 PlaceOf = Callable[[Cell], Point | None]
 
@@ -89,7 +93,6 @@ class MissionLedger:
         reopened: how often covered cells were opened again.
         shared: cells swept by other robots.
         passed: cells that this robot has passed while floor in them is unswept.
-        missed: how often it came back for such floor.
     """
 
     def __init__(
@@ -116,7 +119,8 @@ class MissionLedger:
         self.first_plan_reason = "first plan"
         self.reopened = 0
         self.shared = shared or OthersCells()
-        self.passed, self.missed = PassedCells(), MissedCells()
+        self.passed = PassedCells()
+        self._opened_again: Counter[Cell] = Counter()
         # The ledger from before a restart while no map has confirmed it, and what was covered since
         # the restart, which holds in any building.
         self._resumed: tuple[LedgerSnapshot, _Covered] | None = None
@@ -190,11 +194,16 @@ class MissionLedger:
         for covered in self._all:
             covered.cells.credit(cell)
 
-    def open_again(self, cells: Iterable[Cell]) -> None:
+    def may_open_again(self, cell: Cell) -> bool:
+        """Return whether a cell may be counted as not covered once more."""
+        return self._opened_again[cell] < MOST_AGAIN
+
+    def open_again(self, cells: Collection[Cell]) -> None:
         """Count cells as not covered: floor in them is left."""
         for covered in self._all:
             for cell in cells:
                 covered.cells.open_again(cell)
+        self._opened_again.update(cells)
         self.reopened += 1
         self.shared.note_forgotten()
 
@@ -317,7 +326,7 @@ class MissionLedger:
     def _forget_passed(self) -> None:
         """Forget passed cells: the floor there has to be swept again."""
         self.passed.clear()
-        self.missed.clear()
+        self._opened_again.clear()
 
     def _replace(self, covered: _Covered) -> None:
         self._covered, self._resumed, self._pose_before_motion = covered, None, None

@@ -3,9 +3,6 @@
 In a fleet a cell counts as swept once a robot has swept its centre, and no robot drives there for
 the rest. This robot keeps that floor, in whichever robot's part it lies, and sweeps it when its
 line passes near again.
-
-The robot comes back for missed cells, in which it left floor as it drove through. A base that
-drives beside its line leaves some each time, so it comes back to a cell a few times only.
 """
 
 from __future__ import annotations
@@ -52,27 +49,3 @@ class PassedCells:
     def inside(self, window: Window) -> NDArray[np.bool_]:
         """Return which cells of a window are passed cells, bool (rows, cols)."""
         return mask_of(self._cells, window)
-
-
-# Limit on the returns to a cell: floor that the robot left unswept in two returns, a third would
-# leave, too.
-MOST_AGAIN = 2
-
-
-class MissedCells:
-    """Counts how often the robot comes back to each cell."""
-
-    def __init__(self) -> None:
-        self._again: dict[Cell, int] = {}
-
-    def clear(self) -> None:
-        """Forget all counts."""
-        self._again.clear()
-
-    def may_come_back(self, cell: Cell) -> bool:
-        """Return whether the robot may come back to a cell once more."""
-        return self._again.get(cell, 0) < MOST_AGAIN
-
-    def come_back(self, cell: Cell) -> None:
-        """Note that the robot comes back to a cell."""
-        self._again[cell] = self._again.get(cell, 0) + 1

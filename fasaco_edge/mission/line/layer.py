@@ -313,11 +313,9 @@ class LineLayer:
         areas_m2 = pixels[kept] * floor.geometry.resolution**2
         cells = ((row, col) for row, col in found[kept].tolist())
         left_m2 = dict(zip(cells, areas_m2.tolist(), strict=True))
-        pose, missed = stamped.pose, self._ledger.missed
-        here = lattice.cell_at(pose.x, pose.y)
-        again = self._missed.worth_the_way(left_m2, here, lattice.cell_m, missed.may_come_back)
-        for cell in again:
-            missed.come_back(cell)
+        here = lattice.cell_at(stamped.pose.x, stamped.pose.y)
+        may_open = self._ledger.may_open_again
+        again = self._missed.worth_the_way(left_m2, here, lattice.cell_m, may_open)
         if again:
             self._ledger.open_again(again)
         return bool(again)
