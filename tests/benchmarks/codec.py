@@ -236,16 +236,11 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def _count(args: argparse.Namespace) -> int:
-    # Here, as below, so that to list the benchmarks does not need rosbags.
-    from tests.benchmarks.codec import MESSAGES, WAYS
-
     count: int = MESSAGES * len(WAYS) * args.repeats
     return count
 
 
 def _measure(args: argparse.Namespace, say: Say) -> Generator[CodecTiming, None, None]:
-    from tests.benchmarks.codec import measure
-
     return measure(args.side, args.poses, args.repeats, say)
 
 

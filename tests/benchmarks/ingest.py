@@ -169,9 +169,6 @@ def _sides(args: argparse.Namespace) -> list[int]:
 
 
 def _measure(args: argparse.Namespace, say: Say) -> Generator[Ingest, None, None]:
-    # Here, so that to list the benchmarks does not load the compiler.
-    from tests.benchmarks.ingest import measure
-
     return measure(_sides(args), args.repeats, say)
 
 
