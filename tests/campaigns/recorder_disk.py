@@ -12,20 +12,19 @@ from __future__ import annotations
 
 import argparse
 import os
-import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
 from fasaco_edge.recording import entities
 from tests.campaigns.kill_recorder import driving
+from tests.support.disks import small_disk
 from tests.support.recordings import bus_on_free_port, read_column, read_summary, recorder_process
 
-DISK = "size=24m"
+DISK = "24m"
 # So little is left of the room when the disk is filled [bytes].
 LEFT_BYTES = 9000
 # Between one episode and the next [s].
@@ -52,22 +51,6 @@ class Episodes:
     lost: int
     rss_mb: list[float]
     exit_code: int
-
-
-@contextmanager
-def small_disk(folder: Path) -> Iterator[Path]:
-    """Mount a small disk at ``folder``.
-
-    Raises:
-        PermissionError: one may not.
-    """
-    mount = ["mount", "-t", "tmpfs", "-o", DISK, "tmpfs", str(folder)]
-    if os.geteuid() != 0 or subprocess.run(mount, capture_output=True, check=False).returncode:
-        raise PermissionError("no right to mount a disk")
-    try:
-        yield folder
-    finally:
-        subprocess.run(["umount", "--lazy", str(folder)], check=True)
 
 
 def run_episodes(disk: Path, episodes: int) -> Episodes:
@@ -113,7 +96,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--episodes", type=int, default=20)
     args = parser.parse_args()
-    with tempfile.TemporaryDirectory() as folder, small_disk(Path(folder)) as disk:
+    with tempfile.TemporaryDirectory() as folder, small_disk(Path(folder), DISK) as disk:
         done = run_episodes(disk, args.episodes)
     print(done)
     told_once = done.on_log == done.in_recording == args.episodes

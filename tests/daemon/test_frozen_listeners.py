@@ -13,6 +13,7 @@ import pytest
 from fasaco_edge.bus.session import open_bus
 from fasaco_edge.config.config import BusConfig, DaemonConfig
 from fasaco_edge.daemon import supervisor
+from tests.support.disks import disk_fixture
 from tests.support.outsider import Outsider
 from tests.support.processes import daemon_process, free_endpoint
 from tests.support.rooms import fill, map_bytes, odometry_bytes, pose_bytes, room
@@ -120,16 +121,8 @@ def test_a_slow_recorder_gets_time_to_start_but_a_hung_one_ends(tmp_path, monkey
     assert states[-1].reason == "no status for 0 s"
 
 
-@pytest.fixture
-def small_disk(tmp_path):
-    """A disk of 60 MB: 50 MB are the least that a recorder leaves free."""
-    folder = tmp_path / "disk"
-    folder.mkdir()
-    mount = ["mount", "-t", "tmpfs", "-o", "size=60m", "tmpfs", str(folder)]
-    if os.geteuid() != 0 or subprocess.run(mount, check=False, capture_output=True).returncode:
-        pytest.skip("needs the right to mount a tmpfs")
-    yield folder
-    subprocess.run(["umount", "--lazy", str(folder)], check=True)
+# 50 MB are the least that a recorder leaves free.
+small_disk = disk_fixture("60m")
 
 
 def test_a_full_disk_is_told_and_planning_goes_on(tmp_path, small_disk):

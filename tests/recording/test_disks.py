@@ -6,15 +6,14 @@ import pytest
 
 pytest.importorskip("rerun")
 
-from tests.campaigns.recorder_disk import run_episodes, small_disk
+from tests.campaigns.recorder_disk import DISK, run_episodes
+from tests.support.disks import disk_fixture
+
+disk = disk_fixture(DISK)
 
 
-def test_each_full_disk_is_told_once_and_all_parts_are_readable(tmp_path):
-    try:
-        with small_disk(tmp_path) as disk:
-            done = run_episodes(disk, episodes=2)
-    except PermissionError as error:
-        pytest.skip(str(error))
+def test_each_full_disk_is_told_once_and_all_parts_are_readable(disk):
+    done = run_episodes(disk, episodes=2)
     assert done.on_log == done.in_recording == 2
     assert done.parts == 3
     assert done.rows > 0

@@ -30,6 +30,7 @@ from fasaco_edge.wire.documents.path_documents import PATH_DIGEST
 from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.messages.maps import decode_occupancy_grid
 from fasaco_edge.wire.schemas import OCCUPANCY_GRID
+from tests.support.disks import disk_fixture
 from tests.support.recordings import (
     SCALAR,
     TIMEOUT_S,
@@ -308,16 +309,7 @@ def test_killed_and_torn_recordings_read_after_the_next_start(tmp_path):
     assert {entities.MAP, entities.PATH} <= set(read_summary(second).rows)
 
 
-@pytest.fixture
-def tiny_disk(tmp_path):
-    """A disk of two megabytes."""
-    disk = tmp_path / "disk"
-    disk.mkdir()
-    mount = ["mount", "-t", "tmpfs", "-o", "size=2m", "tmpfs", str(disk)]
-    if os.geteuid() != 0 or subprocess.run(mount, capture_output=True, check=False).returncode:
-        pytest.skip("no right to mount a disk")
-    yield disk
-    subprocess.run(["umount", "--lazy", str(disk)], check=True)
+tiny_disk = disk_fixture("2m")
 
 
 def test_a_disk_full_at_the_start_is_no_configuration_error(tiny_disk):

@@ -1,0 +1,44 @@
+"""Small disks that fill."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+
+@contextmanager
+def small_disk(folder: Path, size: str) -> Iterator[Path]:
+    """Mount a tmpfs of a size, as 24m, at ``folder``; yield that.
+
+    Raises:
+        PermissionError: one may not.
+    """
+    mount = ["mount", "-t", "tmpfs", "-o", f"size={size}", "tmpfs", str(folder)]
+    if os.geteuid() != 0 or subprocess.run(mount, capture_output=True, check=False).returncode:
+        raise PermissionError("no right to mount a disk")
+    try:
+        yield folder
+    finally:
+        subprocess.run(["umount", "--lazy", str(folder)], check=True)
+
+
+def disk_fixture(size: str) -> Any:
+    """Return a fixture: a disk of a size; a test is skipped where none may be mounted."""
+
+    @pytest.fixture
+    def disk(tmp_path: Path) -> Iterator[Path]:
+        folder = tmp_path / "disk"
+        folder.mkdir()
+        try:
+            with small_disk(folder, size):
+                yield folder
+        except PermissionError as error:
+            pytest.skip(str(error))
+
+    return disk
