@@ -20,6 +20,7 @@ from fasaco_edge.wire.topics import QOS
 from tests.support.outsider import open_client
 from tests.support.processes import free_endpoint
 from tests.support.router import router_process
+from tests.support.waiting import until
 
 KEY = "test/@v1/key"
 TIMEOUT_S = 20.0
@@ -37,7 +38,7 @@ def bus(endpoint):
 
 
 @contextmanager
-def publishing(endpoint, numbered=True, cache=1, key=KEY):
+def publishing(endpoint, numbered=True, cache=1):
     """A session of somebody's that publishes latched, as rmw_zenoh or our mapper does."""
     text = {"mode": "client", "connect": {"endpoints": [endpoint]}}
     text["timestamping"] = {"enabled": True}
@@ -45,7 +46,7 @@ def publishing(endpoint, numbered=True, cache=1, key=KEY):
     with zenoh.open(zenoh.Config.from_json5(json.dumps(text))) as session:
         yield zenoh.ext.declare_advanced_publisher(
             session,
-            key,
+            KEY,
             # A busy computer drops megabytes that may not wait.
             congestion_control=zenoh.CongestionControl.BLOCK,
             cache=zenoh.ext.CacheConfig(max_samples=cache),
@@ -71,22 +72,13 @@ class Spy:
         with self._lock:
             return list(self._asked)
 
-    def in_rounds(self, rounds, wanted=1):
-        """Questions of ``rounds`` periods, which begin once ``wanted`` were asked."""
+    def in_rounds(self, rounds):
+        """Questions of ``rounds`` periods, which begin with the next one."""
         begun = len(self.asked())
-        deadline = time.monotonic() + TIMEOUT_S
-        while len(self.asked()) < begun + wanted and time.monotonic() < deadline:
-            time.sleep(0.01)
+        until(lambda: len(self.asked()) > begun)
         began = time.monotonic()
         time.sleep(rounds * ASK_PERIOD_S)
         return [selector for at, selector in self.asked() if at >= began]
-
-
-def until(holds):
-    deadline = time.monotonic() + TIMEOUT_S
-    while not holds():
-        assert time.monotonic() < deadline
-        time.sleep(0.01)
 
 
 def taken(samples, count):

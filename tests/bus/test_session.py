@@ -27,6 +27,7 @@ from fasaco_edge.wire.topics import QOS
 from tests.support.outsider import Collector, open_client
 from tests.support.processes import free_endpoint
 from tests.support.senders import Sender
+from tests.support.waiting import until
 
 KEY = "test/@v1/key"
 SCHEMA = "nav_msgs/msg/Path"
@@ -54,14 +55,6 @@ def client(bus, endpoint):
 @pytest.fixture
 def samples():
     return Queue()
-
-
-def until(holds):
-    """Wait for what spreads in its own time: declarations."""
-    deadline = time.monotonic() + TIMEOUT_S
-    while not holds():
-        assert time.monotonic() < deadline
-        time.sleep(0.01)
 
 
 def history():

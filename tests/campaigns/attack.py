@@ -9,7 +9,6 @@ import argparse
 import json
 import os
 import tempfile
-import threading
 import time
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
@@ -24,6 +23,7 @@ from tests.support.outsider import Outsider, open_client
 from tests.support.processes import Daemon, daemon_process
 from tests.support.rooms import pose_bytes
 from tests.support.secured import House, authority, secured_daemon, transport
+from tests.support.waiting import meanwhile
 
 # Before each attack the daemon's share of a core is looked at for so long [s].
 QUIET_S = 2.0
@@ -92,23 +92,13 @@ class Asking:
     def __init__(self, boss: Outsider) -> None:
         self.slowest_s = 0.0
         self._boss = boss
-        self._over = threading.Event()
-        self._thread = threading.Thread(target=self._ask)
 
-    def __enter__(self) -> Asking:
-        self._thread.start()
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._over.set()
-        self._thread.join()
-
-    def _ask(self) -> None:
-        while not self._over.wait(ASK_EVERY_S):
-            began = time.monotonic()
-            answered = bool(self._boss.get("@rpc/status", timeout_s=5.0))
-            took = time.monotonic() - began
-            self.slowest_s = max(self.slowest_s, took if answered else float("inf"))
+    def ask(self) -> None:
+        """Ask once."""
+        began = time.monotonic()
+        answered = bool(self._boss.get("@rpc/status", timeout_s=5.0))
+        took = time.monotonic() - began
+        self.slowest_s = max(self.slowest_s, took if answered else float("inf"))
 
 
 def begin(boss: Outsider, mapper: Any) -> None:
@@ -159,7 +149,8 @@ def tried(
     cores = Cores(daemon.pid)
     time.sleep(QUIET_S)
     quiet, before = cores.share(), boss.ask_status()
-    with Asking(boss) as asking:
+    asking = Asking(boss)
+    with meanwhile(asking.ask, ASK_EVERY_S):
         cores.share()
         began = time.monotonic()
         outcome = attack()

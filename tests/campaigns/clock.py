@@ -18,11 +18,10 @@ import re
 import subprocess
 import sys
 import tempfile
-import threading
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -39,6 +38,7 @@ from tests.support.processes import ENVIRONMENT, PROGRAM, Daemon, daemon_process
 from tests.support.recordings import read_summary
 from tests.support.rooms import map_bytes, pose_bytes
 from tests.support.secured import Authority, authority, transport
+from tests.support.waiting import meanwhile, until
 
 YEAR_S = 365 * 86_400.0
 BOOT_1970_S = 12.0
@@ -95,19 +95,10 @@ class Campaign:
     @contextmanager
     def watched(self) -> Iterator[None]:
         """Look at the folder all the time."""
-        over = threading.Event()
-
-        def look() -> None:
-            while not over.wait(0.05):
-                self.look()
-
-        thread = threading.Thread(target=look)
-        thread.start()
         try:
-            yield
+            with meanwhile(self.look, 0.05):
+                yield
         finally:
-            over.set()
-            thread.join()
             self.look()
 
     def command(self, *words: str) -> subprocess.CompletedProcess[str]:
@@ -168,24 +159,16 @@ class Campaign:
             )
 
 
-@contextmanager
-def feeding(robot: Outsider) -> Iterator[None]:
+def feeding(robot: Outsider) -> AbstractContextManager[None]:
     """Give the daemon maps that take room, and poses."""
-    rng, over = np.random.default_rng(0), threading.Event()
+    rng = np.random.default_rng(0)
 
     def feed() -> None:
-        while not over.wait(0.2):
-            noise = rng.choice(np.array([0, 100, -1], np.int8), (400, 400))
-            robot.put("map", map_bytes(noise))
-            robot.put("pose", pose_bytes(5.0, 5.0))
+        noise = rng.choice(np.array([0, 100, -1], np.int8), (400, 400))
+        robot.put("map", map_bytes(noise))
+        robot.put("pose", pose_bytes(5.0, 5.0))
 
-    thread = threading.Thread(target=feed)
-    thread.start()
-    try:
-        yield
-    finally:
-        over.set()
-        thread.join()
+    return meanwhile(feed, 0.2)
 
 
 def boot(campaign: Campaign, shifts: list[float]) -> None:
@@ -207,14 +190,14 @@ def boot(campaign: Campaign, shifts: list[float]) -> None:
             before = len(campaign.created)
             clock.shift(shift)
             campaign.counted["steps of the clock"] += 1
-            _until(lambda before=before: len(campaign.created) > before, 30.0)
+            until(lambda before=before: len(campaign.created) > before, 30.0)
             time.sleep(campaign.hold_s)
             status = robot.ask_status()
             campaign.check_ages(status, began)
             restarts = status["recorder"]["restarts"]
             campaign.check("no recorder is started again", restarts == 0, status["recorder"])
         # By each of these clocks something has to go.
-        _until(lambda: campaign.counted["parts deleted"] > gone, 60.0)
+        until(lambda: campaign.counted["parts deleted"] > gone, 60.0)
         once = campaign.command("watch", "--once", "--connect", daemon.endpoint).stdout
         campaign.check_view(once, began)
         campaign.check("watch shows ages", "up " in once, once)
@@ -250,7 +233,7 @@ def boot_secured(campaign: Campaign, ca: Authority) -> None:
     security = {"kind": "tls", "tls": ca.files("robot"), "roles": roles}
     bus = {"listen": [endpoint], "security": security}
     with daemon_process(campaign.folder, env=clock.environment, bus=bus) as daemon:
-        _until(lambda: "ready after" in daemon.log_text(), 60.0)
+        until(lambda: "ready after" in daemon.log_text(), 60.0)
         said = "before the beginning of"
         campaign.check("the log says why", said in daemon.log_text(), daemon.log_text())
         config = campaign.folder / "secured.yaml"
@@ -293,13 +276,6 @@ def _gets_in(endpoint: str, shown: dict[str, Any]) -> bool:
 def _part(name: str) -> tuple[str, int]:
     run, _, number = name.removesuffix(".rrd").rpartition("-part")
     return run, int(number)
-
-
-def _until(holds: Callable[[], bool], seconds: float) -> None:
-    deadline = time.monotonic() + seconds
-    while not holds():
-        assert time.monotonic() < deadline, "it never came to that"
-        time.sleep(0.02)
 
 
 def run_campaign(

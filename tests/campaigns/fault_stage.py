@@ -29,6 +29,7 @@ from tests.campaigns.fault_links import Link
 from tests.support.outsider import MAP, open_client
 from tests.support.processes import ENVIRONMENT, free_endpoint
 from tests.support.rooms import map_bytes, room
+from tests.support.waiting import until
 
 PREFIX = "fasaco/@v1/robot"
 TRUTH = "truth"
@@ -219,10 +220,7 @@ class Stage:
         return config
 
     def _until(self, holds: Callable[[], bool], what: str) -> None:
-        ends = time.monotonic() + READY_S
-        while not holds():
-            assert time.monotonic() < ends, f"no {what} after {READY_S:g} s: see {self._folder}"
-            time.sleep(0.05)
+        until(holds, READY_S, why=lambda: f"no {what} after {READY_S:g} s: see {self._folder}")
 
 
 def main() -> None:

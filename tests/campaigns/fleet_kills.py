@@ -34,6 +34,7 @@ from tests.support.outsider import TIMEOUT_S
 from tests.support.processes import Daemon, daemon_process, free_endpoint
 from tests.support.rooms import WALL, Cell, coverable_cells, fill, room
 from tests.support.router import router_process
+from tests.support.waiting import until
 
 # A building of three rooms along a corridor.
 FLOOR = fill(room(12.0, 8.0), 0.0, 5.0, 12.0, 5.1, WALL)
@@ -137,9 +138,7 @@ class House:
         """Start the daemon of a robot that stands, and give it what it needs."""
         self.start(name)
         seat = self.robots[name].seat
-        deadline = time.monotonic() + TIMEOUT_S
-        while not seat.alive():
-            assert time.monotonic() < deadline, f"{name} does not come back"
+        until(seat.alive, TIMEOUT_S, why=lambda: f"{name} does not come back")
         self.robots[name].look()
         self.standing.discard(name)
 

@@ -21,7 +21,6 @@ import socket
 import subprocess
 import sys
 import tempfile
-import time
 from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -36,6 +35,7 @@ from tests.campaigns.trap import NOBODY, Trap
 from tests.deploy import installed, lab, releases
 from tests.deploy.installing import Robot, bare_robot
 from tests.support.processes import free_endpoint
+from tests.support.waiting import until
 
 PROGRAM = """\
 #!{python} -I
@@ -168,20 +168,20 @@ def try_together(campaign: Campaign) -> None:
     daemon = ("run", "--config", config, "--record", state, "--state", state)
     recorder = ("record", "--config", config, "--out", str(recordings))
     with campaign.started(*daemon):
-        _until(lambda: _asks(campaign, connect))
+        until(lambda: _asks(campaign, connect))
         with (
             campaign.started("simulate", "flat", "--speed", "10", *connect),
             campaign.started(*recorder),
         ):
-            _until(lambda: _bytes_in(campaign.trap.state) > 100_000)
+            until(lambda: _bytes_in(campaign.trap.state) > 100_000)
             campaign.run("ask", "status", "--json", *connect)
             campaign.run("mission", "status", *connect)
             campaign.run("watch", "--once", *connect)
             campaign.run("doctor", "--config", config, ends=(0, 1))
-            _until(lambda: _bytes_in(recordings) > 200_000)
+            until(lambda: _bytes_in(recordings) > 200_000)
     # In the home, where it is kept unless told otherwise, and what is there is links.
     with campaign.started("run", "--config", config):
-        _until(lambda: _asks(campaign, connect))
+        until(lambda: _asks(campaign, connect))
     recording = next(recordings.glob("*.rrd"))
     torn = folder / "torn.rrd"
     torn.write_bytes(recording.read_bytes()[:-7])
@@ -342,13 +342,6 @@ def _open_inside(robot: Robot) -> list[str]:
 def _bytes_in(folder: Path) -> int:
     files = [path for path in folder.glob("*.rrd") if not path.is_symlink()]
     return sum(path.stat().st_size for path in files)
-
-
-def _until(holds: Callable[[], bool], seconds: float = 60.0) -> None:
-    deadline = time.monotonic() + seconds
-    while not holds():
-        assert time.monotonic() < deadline, "it never came to that"
-        time.sleep(0.1)
 
 
 def kernel_folder() -> Path:

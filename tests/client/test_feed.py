@@ -9,8 +9,8 @@ from fasaco_edge.bus.settings import BusSettings
 from fasaco_edge.client.feed import Feed
 from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.topics import PHEROMONE
-from tests.bus.test_session import until
 from tests.support.processes import free_endpoint
+from tests.support.waiting import until
 
 
 @pytest.fixture

@@ -6,27 +6,15 @@ import os
 import signal
 import subprocess
 import time
-from collections.abc import Iterator
 from pathlib import Path
 
-import pytest
-
 from fasaco_edge.daemon.ledger.writer import RETRY_S
+from tests.support.disks import disk_fixture
 from tests.support.outsider import Outsider
 from tests.support.processes import STOP_S, Daemon, daemon_process
 from tests.support.rooms import begin, drive, lanes, wait_written
 
-
-@pytest.fixture
-def small_disk(tmp_path: Path) -> Iterator[Path]:
-    """A disk of a quarter of a megabyte."""
-    folder = tmp_path / "disk"
-    folder.mkdir()
-    mount = ["mount", "-t", "tmpfs", "-o", "size=256k", "tmpfs", str(folder)]
-    if os.geteuid() != 0 or subprocess.run(mount, check=False, capture_output=True).returncode:
-        pytest.skip("needs the right to mount a tmpfs")
-    yield folder
-    subprocess.run(["umount", "--lazy", str(folder)], check=True)
+small_disk = disk_fixture("256k")
 
 
 def fill(ballast: Path) -> None:
@@ -62,7 +50,7 @@ def test_a_full_disk_is_told_and_nothing_is_lost(tmp_path, small_disk):
     ):
         begin(outsider)
         drive(outsider, lanes(20))
-        wait_written(outsider, 0.0)
+        wait_written(outsider)
         fill(ballast)
         check_trouble(running, outsider, "No space left on device")
         ballast.unlink()
@@ -87,7 +75,7 @@ def test_a_disk_that_turns_read_only_is_told_and_nothing_is_lost(tmp_path, small
     ):
         begin(outsider)
         drive(outsider, lanes(20))
-        wait_written(outsider, 0.0)
+        wait_written(outsider)
         remount("ro")
         check_trouble(running, outsider, "Read-only file system")
         remount("rw")

@@ -6,7 +6,6 @@ import errno
 import logging
 import os
 import time
-from collections.abc import Callable
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -28,6 +27,7 @@ from fasaco_edge.daemon.ledger.writer import (
 from fasaco_edge.errors import LedgerFileError, LedgerMismatchError
 from tests.mission.world import CELL, Drive, MapReceived, building, pose_at
 from tests.support.ledgers import CELL_M, contents, lane
+from tests.support.waiting import until
 
 DEADLINE_S = 60.0
 
@@ -39,13 +39,6 @@ def on_disk(folder: Path, cell_m: float = CELL_M) -> object:
     except FileNotFoundError:
         return None
     return contents(decode_ledger(payload, cell_m))
-
-
-def wait_until(holds: Callable[[], bool]) -> None:
-    deadline = time.monotonic() + DEADLINE_S
-    while not holds():
-        assert time.monotonic() < deadline, "it never came to that"
-        time.sleep(0.005)
 
 
 def document(writer: LedgerWriter) -> dict[str, Any]:
@@ -63,7 +56,7 @@ def test_what_is_put_is_written(tmp_path):
     path = str(tmp_path / "robot.ledger")
     assert document(writer) == {"path": path, "age_s": None, "restored_cells": 0, "fault": None}
     writer.put(lane(3))
-    wait_until(lambda: document(writer)["age_s"] is not None)
+    until(lambda: document(writer)["age_s"] is not None)
     assert on_disk(tmp_path) == contents(lane(3))
     assert 0 <= document(writer)["age_s"] < DEADLINE_S
     writer.close(1.0)
@@ -106,7 +99,7 @@ def test_what_was_wrong_on_disk_is_told(tmp_path, caplog):
     assert isinstance(fault, LedgerFileError)
     assert writer.take_faults() == []
     writer.put(lane(1))
-    wait_until(lambda: document(writer)["age_s"] is not None)
+    until(lambda: document(writer)["age_s"] is not None)
     # It is still worth knowing after all is well again.
     assert document(writer)["fault"] == f"{fault}: {fault.hint}"
     assert str(fault) in caplog.text
@@ -135,9 +128,9 @@ def test_each_new_beginning_keeps_what_there_was_until_then(tmp_path, caplog):
     writer = open_ledger(tmp_path, "robot", CELL_M)
     for length in (3, 5):
         writer.put(lane(length))
-        wait_until(lambda length=length: on_disk(tmp_path) == contents(lane(length)))
+        until(lambda length=length: on_disk(tmp_path) == contents(lane(length)))
         writer.begin_anew(LedgerMismatchError("of another building"), "mismatch")
-        wait_until(lambda: not (tmp_path / "robot.ledger").exists())
+        until(lambda: not (tmp_path / "robot.ledger").exists())
     writer.close(1.0)
     aside = sorted(path.read_bytes() for path in tmp_path.glob("robot.ledger.mismatch-*"))
     assert aside == sorted(encode_ledger(lane(length)) for length in (3, 5))
@@ -148,7 +141,7 @@ def test_the_files_are_kept_aside_although_nothing_follows(tmp_path):
     LedgerFile(tmp_path, "robot").write(lane(7))
     writer = open_ledger(tmp_path, "robot", CELL_M)
     writer.begin_anew(LedgerMismatchError("of another building"), "mismatch")
-    wait_until(lambda: not (tmp_path / "robot.ledger").exists())
+    until(lambda: not (tmp_path / "robot.ledger").exists())
     writer.close(1.0)
     assert on_disk(tmp_path) is None
 
@@ -164,7 +157,7 @@ def test_a_disk_that_fails_is_told_once_and_tried_again(tmp_path, monkeypatch, c
     monkeypatch.setattr(os, "fsync", failing)
     writer = open_ledger(tmp_path, "robot", CELL_M)
     writer.put(lane(3))
-    wait_until(lambda: len(tries) >= 4)
+    until(lambda: len(tries) >= 4)
     told = document(writer)["fault"]
     assert f"cannot write {tmp_path / 'robot.ledger'}: No space left on device" in told
     assert "kept in memory, and writing is retried" in told
@@ -173,7 +166,7 @@ def test_a_disk_that_fails_is_told_once_and_tried_again(tmp_path, monkeypatch, c
     assert min(b - a for a, b in pairwise(tries)) >= 0.05, "no busy loop"
     writer.put(lane(4))
     monkeypatch.setattr(os, "fsync", real)
-    wait_until(lambda: document(writer)["fault"] is None)
+    until(lambda: document(writer)["fault"] is None)
     assert on_disk(tmp_path) == contents(lane(4))
     assert "written again" in caplog.text
     writer.close(1.0)
@@ -211,9 +204,9 @@ def test_set_aside_comes_first_also_after_failures(tmp_path, monkeypatch, retry_
         patch.setattr(Path, "rename", failing)
         writer.begin_anew(LedgerMismatchError("of another building"), "mismatch")
         writer.put(lane(2))
-        wait_until(lambda: len(tries) >= 3)
+        until(lambda: len(tries) >= 3)
         assert on_disk(tmp_path) == contents(lane(7))
-    wait_until(lambda: on_disk(tmp_path) == contents(lane(2)))
+    until(lambda: on_disk(tmp_path) == contents(lane(2)))
     writer.close(1.0)
     assert list(tmp_path.glob("robot.ledger.mismatch-*"))
 
@@ -228,7 +221,7 @@ def test_a_disk_that_hangs_holds_nobody_up(tmp_path, caplog, retry_soon):
         writer.put(lane(length))
         document(writer)
     # Its thread may begin to write after all that.
-    wait_until(lambda: writer.report(time.monotonic() + HANGS_S).fault is not None)
+    until(lambda: writer.report(time.monotonic() + HANGS_S).fault is not None)
     report = writer.report(time.monotonic() + 2 * HANGS_S)
     assert "the disk has hung for 10 s or more" in str(report.fault)
     assert len(writer.take_faults()) == 1
@@ -253,7 +246,7 @@ def test_floor_swept_between_two_cells_is_written_once_a_second(tmp_path):
         return on_disk(tmp_path, CELL) == contents(drive.mission.snapshot())
 
     keeper.keep(drive.mission, 0.0)
-    wait_until(lambda: is_written() and not writer.is_behind())
+    until(lambda: is_written() and not writer.is_behind())
     visits = drive.mission.ledger.total
     drive.tell(pose_at(0, 0.2))
     assert drive.mission.ledger.total == visits
@@ -261,11 +254,11 @@ def test_floor_swept_between_two_cells_is_written_once_a_second(tmp_path):
     assert not writer.is_behind()
     assert not is_written()
     keeper.keep(drive.mission, FLOOR_PERIOD_S)
-    wait_until(is_written)
+    until(is_written)
     # A cell does not wait for it.
     drive.tell(pose_at(0, 1))
     keeper.keep(drive.mission, FLOOR_PERIOD_S + PERIOD_S)
-    wait_until(is_written)
+    until(is_written)
     writer.close(1.0)
 
 

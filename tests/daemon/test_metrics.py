@@ -34,6 +34,7 @@ from fasaco_edge.wire.documents.status import (
 from tests.deploy.manual import MANUAL
 from tests.support.outsider import Outsider
 from tests.support.processes import daemon_process, free_endpoint
+from tests.support.waiting import meanwhile, until
 
 STATUS = Status(
     robot="robot",
@@ -211,25 +212,19 @@ def test_many_who_say_nothing_hold_up_nobody():
 
 def test_a_flood_of_silent_connections_holds_up_nobody():
     with served() as url, ExitStack() as stack:
-        address, is_over = ("127.0.0.1", int(url.rpartition(":")[2])), threading.Event()
+        address = "127.0.0.1", int(url.rpartition(":")[2])
 
         def flood():
-            while not is_over.wait(0.01):
-                for _ in range(5):
-                    silent = stack.enter_context(socket.socket())
-                    silent.setblocking(False)
-                    silent.connect_ex(address)
+            for _ in range(5):
+                silent = stack.enter_context(socket.socket())
+                silent.setblocking(False)
+                silent.connect_ex(address)
 
-        flooding = threading.Thread(target=flood)
-        flooding.start()
-        try:
+        with meanwhile(flood, 0.01):
             for _ in range(5):
                 with OPENER.open(f"{url}/metrics", timeout=60) as answer:
                     assert answer.status == 200
                     assert answer.read()
-        finally:
-            is_over.set()
-            flooding.join()
 
 
 def test_all_who_ask_at_once_are_answered():
@@ -279,10 +274,7 @@ def test_a_taken_port_or_a_closed_server_stops_nothing(caplog):
     assert serve_metrics(None) is None
     with served():
         pass
-    until = time.monotonic() + 60.0
-    while any(thread.name == "metrics" for thread in threading.enumerate()):
-        assert time.monotonic() < until, "its thread ends"
-        time.sleep(0.05)
+    until(lambda: all(thread.name != "metrics" for thread in threading.enumerate()))
 
 
 @pytest.mark.parametrize(
@@ -321,12 +313,10 @@ def test_a_daemon_serves_its_status(tmp_path):
         Outsider(running.endpoint) as outsider,
     ):
         outsider.wait_status(lambda status: status["state"] == "waiting for map")
-        until = time.monotonic() + 60.0
-        while True:
+
+        def metrics():
             with OPENER.open(f"http://{address}/metrics", timeout=60) as answer:
-                told = parsed(answer.read().decode())
-            if told["fasaco_edge_state", ('state="waiting for map"',)]:
-                break
-            assert time.monotonic() < until
-            time.sleep(0.1)
-        assert told["fasaco_edge_memory_bytes", ()] > 1e7
+                return parsed(answer.read().decode())
+
+        until(lambda: metrics()["fasaco_edge_state", ('state="waiting for map"',)])
+        assert metrics()["fasaco_edge_memory_bytes", ()] > 1e7

@@ -23,18 +23,10 @@ from tests.support.outsider import Collector, Outsider
 from tests.support.processes import daemon_process, free_endpoint, slowness
 from tests.support.rooms import map_bytes, pose_bytes, room
 from tests.support.router import router_process
+from tests.support.waiting import until
 
 PREFIX = "fasaco/@v1/robot"
-PATIENCE_S = 90.0
 ROOM = room(4.0, 3.0)
-
-
-def until(holds):
-    deadline = time.monotonic() + PATIENCE_S
-    while not (held := holds()):
-        assert time.monotonic() < deadline, "never came"
-        time.sleep(0.02)
-    return held
 
 
 class Robot:

@@ -218,7 +218,7 @@ def test_another_building_is_told_and_begun_anew(covered):
         assert status["ledger"]["restored_cells"] == 0
         assert status["errors"]["by_code"] == {"ledger_mismatch": 1}
         assert status["coverage"]["covered"] == 1
-        wait_written(outsider, 0.0)
+        wait_written(outsider)
     assert [name for name in state_files(covered) if ".mismatch-" in name]
     with daemon_process(covered) as running, Outsider(running.endpoint) as outsider:
         assert outsider.ask_status()["ledger"]["restored_cells"] == 1

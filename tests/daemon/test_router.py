@@ -13,6 +13,7 @@ from tests.support.outsider import Collector, Outsider
 from tests.support.processes import ENVIRONMENT, daemon_process, fasaco_edge, free_endpoint
 from tests.support.rooms import WALL, fill, map_bytes, pose_bytes, room
 from tests.support.router import router_process
+from tests.support.waiting import until
 
 # On a quiet machine a late joiner has all after some milliseconds, and all is back after 0.3 s.
 LATE_S = 30.0
@@ -25,15 +26,6 @@ def member(endpoint, connect):
     """Open a client's session as Zenoh's defaults have it, but for what ``connect`` says."""
     config = {"mode": "client", "connect": {"endpoints": [endpoint], **connect}}
     return zenoh.open(zenoh.Config.from_json5(json.dumps(config)))
-
-
-def until(holds, timeout_s=150.0):
-    """Wait; return the seconds it took."""
-    started = time.monotonic()
-    while not holds():
-        assert time.monotonic() - started < timeout_s, "never came"
-        time.sleep(0.02)
-    return time.monotonic() - started
 
 
 def test_who_joins_late_has_path_and_status(daemon, outsider):

@@ -14,6 +14,7 @@ from tests.support.outsider import Outsider, open_client
 from tests.support.processes import daemon_process, free_endpoint
 from tests.support.rooms import map_bytes, pillared_room, pose_bytes
 from tests.support.secured import authority, needs_openssl, transport
+from tests.support.waiting import until
 
 pytestmark = needs_openssl
 FLEET = ("r1", "r2")
@@ -63,6 +64,10 @@ def status(seat):
     return seat.ask_status()
 
 
+def members(seat):
+    return [member["name"] for member in status(seat)["fleet"]["members"]]
+
+
 def test_a_mapper_is_heard_by_its_own_robot_alone(office, sender):
     first, second = office
     slam = sender("slam-r1")
@@ -107,14 +112,12 @@ def test_robots_of_a_fleet_receive_all_but_publish_as_themselves(office, sender)
             time.sleep(0.5)
     receiver = office[0].listen("fleet", late=False)
     for seat, other in zip(office, reversed(FLEET), strict=True):
-        deadline = time.monotonic() + 60.0
-        while [member["name"] for member in status(seat)["fleet"]["members"]] != [other]:
-            assert time.monotonic() < deadline
+        until(lambda seat=seat, other=other: members(seat) == [other])
     said = receiver.wait(lambda heard: True).payload
     for name in ("r1", "slam-r1", "tablet"):
         sender(name).put("fasaco/@v1/r3/fleet", said)
     time.sleep(SILENCE_S)
-    assert [m["name"] for m in status(office[1])["fleet"]["members"]] == ["r1"]
+    assert members(office[1]) == ["r1"]
 
 
 def test_a_viewer_views_both(ca, endpoint):
@@ -135,8 +138,5 @@ def test_a_robot_alone_claims_its_name(office, sender, ca, endpoint, tmp_path):
     security = {"kind": "tls", "tls": ca.files("r1"), "roles": {"router": ["router"]}}
     bus = {"mode": "client", "listen": [], "connect": [endpoint], "security": security}
     with daemon_process(tmp_path, bus=bus, robot={"name": "r1"}) as second:
-        deadline = time.monotonic() + 60.0
-        while "this one waits" not in second.log_text():
-            assert time.monotonic() < deadline, second.log_text()
-            time.sleep(0.05)
+        until(lambda: "this one waits" in second.log_text(), why=second.log_text)
         assert status(office[0])["claim"]["id"] in second.log_text()

@@ -17,6 +17,7 @@ from fasaco_edge.recording.read.repair import scan_recording
 from tests.support.outsider import Outsider
 from tests.support.processes import daemon_process, is_running
 from tests.support.rooms import map_bytes, pillared_room, pose_bytes, room
+from tests.support.waiting import until
 
 # 400 x 400 cells of the tool's width [m].
 HUGE_M = 120.0
@@ -104,10 +105,7 @@ def test_a_killed_daemon_leaves_no_recorder(tmp_path):
         assert is_running(recorder)
         running.process.send_signal(signal.SIGKILL)
         running.process.wait()
-        deadline = time.monotonic() + 60.0
-        while is_running(recorder):
-            assert time.monotonic() < deadline, "the recorder outlives its daemon"
-            time.sleep(0.05)
+        until(lambda: not is_running(recorder), why=lambda: "the recorder outlives its daemon")
     assert list(tmp_path.glob("*.rrd"))
 
 

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import threading
 import urllib.request
-from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from fasaco_edge.config.config import BusConfig, DaemonConfig
 from fasaco_edge.doctor import session
@@ -17,6 +15,7 @@ from tests.support.outsider import TIMEOUT_S, Outsider
 from tests.support.processes import daemon_process, fasaco_edge, free_endpoint
 from tests.support.rooms import map_bytes, pose_bytes, room
 from tests.support.ros_robot import DIAGNOSTICS, Naming, ros_robot
+from tests.support.waiting import meanwhile
 from tests.wire import oracle
 
 DOCK = {"x_m": 0.75, "y_m": 0.75, "yaw_deg": 0.0, "approach_m": 0.0}
@@ -31,25 +30,15 @@ class Battery:
     outsider: Outsider
     level: float = 0.18
     step: float = 0.0
-    stop: threading.Event = field(default_factory=threading.Event)
 
-    def run(self) -> None:
-        while not self.stop.wait(PERIOD_S):
-            self.level = min(max(self.level + self.step, 0.05), 1.0)
-            payload = encode_battery(BatteryState(self.level, "charging"))
-            self.outsider.put("battery", payload, BATTERY_STATE)
+    def publish(self) -> None:
+        self.level = min(max(self.level + self.step, 0.05), 1.0)
+        payload = encode_battery(BatteryState(self.level, "charging"))
+        self.outsider.put("battery", payload, BATTERY_STATE)
 
-    @contextmanager
     def on(self):
         """Publish."""
-        self.stop.clear()
-        thread = threading.Thread(target=self.run)
-        thread.start()
-        try:
-            yield
-        finally:
-            self.stop.set()
-            thread.join()
+        return meanwhile(self.publish, PERIOD_S)
 
 
 def codes(status):

@@ -14,6 +14,7 @@ from tests.support import processes
 from tests.support.outsider import Outsider
 from tests.support.processes import daemon_process
 from tests.support.rooms import map_bytes, pose_bytes, room
+from tests.support.waiting import until
 from tests.wire import oracle
 
 # A robot that stands says so from time to time; so long is a cycle of the daemon's and more [s].
@@ -122,10 +123,7 @@ def test_a_stop_that_fails_before_a_mission_is_sent_later(tmp_path, monkeypatch)
     with daemon_process(tmp_path) as running, Outsider(running.endpoint) as client:
         unsent = {"not_published": MOST_UNSENT}
         client.wait_status(lambda status: status["errors"]["by_code"] == unsent)
-        deadline = time.monotonic() + 60.0
-        while not (replies := client.get("@rpc/path"))[0].ok:
-            assert time.monotonic() < deadline
-            time.sleep(POSE_S)
-        assert not len(decode_path(bytes(replies[0].ok.payload)).xy)
+        reply = until(lambda: client.get("@rpc/path")[0].ok)
+        assert not len(decode_path(bytes(reply.payload)).xy)
         # Told by its exit otherwise: a traceback is in the log here.
         running.kill()

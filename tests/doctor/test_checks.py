@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import socket
 import sys
-import threading
 import time
 from pathlib import Path
 
@@ -29,6 +28,7 @@ from tests.kernels.installations import fill_with
 from tests.support.outsider import Outsider
 from tests.support.processes import daemon_process, free_endpoint
 from tests.support.rooms import map_bytes, pillared_room, pose_bytes
+from tests.support.waiting import meanwhile
 
 MEMINFO = "MemTotal:        3884328 kB\nMemFree: 100000 kB\nMemAvailable:    {} kB\n"
 V1_OFF = "#subsys_name\thierarchy\tnum_cgroups\tenabled\nmemory\t0\t70\t0\n"
@@ -338,19 +338,8 @@ def test_who_publishes_is_heard_without_a_daemon(tmp_path):
         # Latched, and said before anybody listened; and now and then.
         bus.publisher(f"{prefix}/map", qos=QOS["map"]).put(map_bytes(pillared_room()))
         poses = bus.publisher(f"{prefix}/pose", qos=QOS["pose"])
-        stop = threading.Event()
-
-        def tell() -> None:
-            while not stop.wait(0.1):
-                poses.put(pose_bytes(1.0, 1.0))
-
-        teller = threading.Thread(target=tell)
-        teller.start()
-        try:
+        with meanwhile(lambda: poses.put(pose_bytes(1.0, 1.0)), 0.1):
             found = session.peers(at(other.endpoint, name="second"))
-        finally:
-            stop.set()
-            teller.join()
     assert found.found == "no daemon of robot 'second'; maps and poses received"
     assert f"map: 1 in {session.LISTEN_S} s" in found.details
 

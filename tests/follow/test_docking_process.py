@@ -5,7 +5,7 @@ import math
 import pytest
 
 from tests.follow.nav2_missions import kind_of, nav2_follower, nav2_robot
-from tests.follow.test_nav2_process import listen, until, wait
+from tests.follow.test_nav2_process import listen, wait, wait_log
 from tests.support.driven_base import DrivenBase
 
 DOCK = {"x_m": 1.5, "y_m": 0.0, "yaw_deg": 0.0, "approach_m": 0.5}
@@ -43,14 +43,14 @@ def test_it_docks_and_comes_out_again(base, tmp_path, domain, wanted, nav2, dock
         poses = listen(base, "7/pose/**" if domain else "pose")
         base.plans()
         base.send_path(*TO_DOCK)
-        until(log, "standing, the path is driven")
+        wait_log(log, "standing, the path is driven")
         # As the daemon does it: the path ends, and it says that the robot charges.
         base.send_path()
         base.state = "charging"
         tries, line = docking.count("Dock"), "INFO fasaco_edge.follow.docking: dock: docking\n"
         wait(lambda: log.read_text().count(line) == tries, log)
         base.send_path(*OUT)
-        until(log, "dock: in its dock")
+        wait_log(log, "dock: in its dock")
         base.state = "covering"
         wait(lambda: math.dist((poses[-1].x, poses[-1].y), OUT[-1]) < 0.15, log)
     done = look_alike.end()

@@ -11,6 +11,7 @@ from tests.support.driven_base import DrivenBase
 from tests.support.outsider import Outsider
 from tests.support.processes import daemon_process
 from tests.support.rooms import map_bytes, room
+from tests.support.waiting import until
 
 LANES = ((0.0, 0.0), (2.0, 0.0), (2.0, 0.276), (0.0, 0.276), (0.0, 0.552), (2.0, 0.552))
 CROSSING = ((0.0, 0.0), (2.0, 0.0), (2.0, 1.0), (1.0, 1.0), (1.0, -1.0))
@@ -27,15 +28,12 @@ def base():
     base.close()
 
 
-def until(log, words):
+def wait_log(log, words):
     wait(lambda: words in log.read_text(), log)
 
 
 def wait(holds, log):
-    ends = time.monotonic() + PATIENCE_S
-    while not holds():
-        assert time.monotonic() < ends, log.read_text()
-        time.sleep(0.02)
+    until(holds, PATIENCE_S, why=log.read_text)
 
 
 def listen(base, key="7/pose/**"):
@@ -63,7 +61,7 @@ def test_a_path_is_driven_to_its_end(base, tmp_path, release, domain):
     with nav2_robot(**robot) as nav2, nav2_follower(tmp_path, base.endpoint, ros2) as log:
         base.plans()
         base.send_path(*LANES)
-        until(log, "standing, the path is driven")
+        wait_log(log, "standing, the path is driven")
     done = nav2.end()
     assert done["refused"] == []
     assert done["errors"] == []
@@ -78,7 +76,7 @@ def test_a_path_that_crosses_itself_is_driven_without_standing(base, tmp_path):
     with nav2_robot(**robot) as nav2, nav2_follower(tmp_path, base.endpoint, kind_of(7)) as log:
         base.plans()
         base.send_path(*CROSSING)
-        until(log, "standing, the path is driven")
+        wait_log(log, "standing, the path is driven")
     done = nav2.end()
     assert passed(done["trail"], CROSSING)
     # The next goal was sent while the robot drove.
@@ -91,11 +89,11 @@ def test_a_replan_that_changes_nothing_ahead_changes_no_goal(base, tmp_path):
     with nav2_robot(**robot) as nav2, nav2_follower(tmp_path, base.endpoint, ros2) as log:
         base.plans()
         base.send_path((0.0, 0.0), (1.0, 0.0), (1.0, 1.0))
-        until(log, "driving")
+        wait_log(log, "driving")
         time.sleep(0.5)
         # As the daemon says it again: from somewhere before the robot on.
         base.send_path((0.02, 0.0), (1.0, 0.0), (1.0, 1.0), (0.7, 1.0))
-        until(log, "standing, the path is driven")
+        wait_log(log, "standing, the path is driven")
     done = nav2.end()
     counts = undisturbed(done)
     assert counts is None or counts["goals"] == 2
@@ -112,7 +110,7 @@ def test_a_replan_that_changes_what_lies_ahead_replaces_the_goal(base, tmp_path)
         # Only what the controller drives already can be replaced.
         wait(lambda: bool(poses) and poses[-1].x > 0.05, log)
         base.send_path((0.0, 0.0), (0.9, 0.0), (0.9, 0.8))
-        until(log, "standing, the path is driven")
+        wait_log(log, "standing, the path is driven")
     done = nav2.end()
     assert undisturbed(done) in (None, {"goals": 2, "preempted": 1, "canceled": 0})
     assert math.dist((done["x"], done["y"]), (0.9, 0.8)) < 0.15
@@ -130,7 +128,7 @@ def test_what_stops_the_robot_cancels_its_goal(base, tmp_path, why):
             base.send_path()
         else:
             base.plans(False)
-        until(log, f"standing, {'stopped by an empty path' if why == 'empty path' else why}")
+        wait_log(log, f"standing, {'stopped by an empty path' if why == 'empty path' else why}")
         # While the follower is there: its own end cancels, too.
         wait(lambda: len(poses) > STILL and len({(at.x, at.y) for at in poses[-STILL:]}) == 1, log)
         done = nav2.end()
@@ -145,10 +143,12 @@ def test_no_server_and_an_error_are_said_with_their_reasons(base, tmp_path):
     base.plans()
     base.send_path(*LANES)
     with nav2_follower(tmp_path, base.endpoint, ros2) as log:
-        until(log, "no pose")
+        wait_log(log, "no pose")
         with nav2_robot(**robot):
-            until(log, "standing, given up by Nav2: 101 invalid controller: no controller Nothing")
-        until(log, "pose too old")
+            wait_log(
+                log, "standing, given up by Nav2: 101 invalid controller: no controller Nothing"
+            )
+        wait_log(log, "pose too old")
 
 
 def test_a_mission_is_driven_by_nav2_to_its_end(tmp_path):

@@ -3,7 +3,6 @@
 import os
 import subprocess
 import sys
-import threading
 import time
 from pathlib import Path
 
@@ -21,6 +20,7 @@ from tests.campaigns.raw_messages import transform
 from tests.follow.seeing import Disc, plain_map, scan_at
 from tests.support.driven_base import DrivenBase, follower_process
 from tests.support.processes import ENVIRONMENT, PROGRAM, free_endpoint
+from tests.support.waiting import meanwhile, until
 
 # Memory of its own at most, without pages of files [MB].
 FOLLOW_MB = 17.0
@@ -33,13 +33,6 @@ def base():
     base = DrivenBase()
     yield base
     base.close()
-
-
-def until(condition, timeout_s=60.0):
-    ends = time.monotonic() + timeout_s
-    while not condition():
-        assert time.monotonic() < ends, "nothing happened in time"
-        time.sleep(0.01)
 
 
 def test_it_drives_twenty_times_a_second_and_stays_small(base, tmp_path):
@@ -281,29 +274,19 @@ def test_it_takes_scans_and_compares_them_with_the_map(base, tmp_path):
     config = tmp_path / "config.yaml"
     config.write_text("scan: {lost_s: 1.0}\n")
     maps, scans = (base.bus.advertise(base.keys, topic) for topic in (topics.MAP, topics.SCAN))
-    person, ends = [Disc(1.0, 0.0)], threading.Event()
-
-    def send_scans():
-        while not ends.wait(0.1):
-            scans.put(scan_at(base.pose, person))
-
+    person = [Disc(1.0, 0.0)]
     base.plans()
     base.send_path(*AHEAD)
     log = tmp_path / "log"
     with follower_process(base.endpoint, log, "--config", str(config)) as process:
         until(lambda: "no scan: no map to compare scans with" in log.read_text())
         maps.put(plain_map())
-        sender = threading.Thread(target=send_scans)
-        sender.start()
-        try:
+        with meanwhile(lambda: scans.put(scan_at(base.pose, person)), 0.1):
             until(lambda: "obstacle ahead" in log.read_text())
             assert 0.3 < base.pose.x < 0.7
             mapped = Path(f"/proc/{process.pid}/maps").read_text()
             assert not any(name in mapped for name in ("numpy", "numba", "msgspec"))
             person.clear()
             until(lambda: base.pose.x > 1.0)
-        finally:
-            ends.set()
-            sender.join()
         until(lambda: "no scan: for 1." in log.read_text())
         until(lambda: base.newest() in (None, Command()))

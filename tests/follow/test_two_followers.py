@@ -13,8 +13,9 @@ from fasaco_edge.follow.estimate import Command
 from fasaco_edge.wire import topics
 from tests.campaigns.fault_links import Link
 from tests.follow.nav2_missions import kind_of, nav2_follower, nav2_robot
-from tests.follow.test_process import AHEAD, config_file, until
+from tests.follow.test_process import AHEAD, config_file
 from tests.support.driven_base import DrivenBase, follower_process
+from tests.support.waiting import until
 
 # As in a long hall, so that the robot drives through each test.
 FAR = ((0.0, 0.0), (30.0, 0.0))

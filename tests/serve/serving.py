@@ -19,6 +19,7 @@ from websockets.sync.client import ClientConnection, connect
 
 from tests.support.outsider import TIMEOUT_S
 from tests.support.processes import ENVIRONMENT, PROGRAM, free_endpoint
+from tests.support.waiting import until
 
 
 @dataclass
@@ -64,7 +65,7 @@ def serving(folder: Path, *words: str) -> Iterator[Served]:
         process = subprocess.Popen(command, stdout=out, stderr=out, env=ENVIRONMENT)
     page = Served(process, address, log)
     try:
-        until(lambda: listens(page), log.read_text)
+        until(lambda: listens(page), why=log.read_text)
         yield page
         process.terminate()
         assert process.wait(TIMEOUT_S) == 0, log.read_text()
@@ -81,14 +82,6 @@ def listens(page: Served) -> bool:
         return page.get()[0] == 200
     except OSError:
         return False
-
-
-def until(holds: Callable[[], bool], why: Callable[[], object] = lambda: "") -> None:
-    """Wait until something holds."""
-    deadline = time.monotonic() + TIMEOUT_S
-    while not holds():
-        assert time.monotonic() < deadline, why()
-        time.sleep(0.05)
 
 
 @dataclass

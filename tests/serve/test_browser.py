@@ -25,10 +25,11 @@ pytest.importorskip("websockets")
 
 from websockets.sync.client import ClientConnection, connect
 
-from tests.serve.serving import served, until
+from tests.serve.serving import served
 from tests.support.outsider import TIMEOUT_S, Outsider
 from tests.support.processes import daemon_process
 from tests.support.rooms import HALL, begin, drive, lanes, map_bytes, pose_bytes
+from tests.support.waiting import until
 
 BROWSER = shutil.which("chromium")
 needs_browser = pytest.mark.skipif(BROWSER is None, reason="needs chromium")
@@ -64,7 +65,7 @@ class Tab:
 
     def click(self, name: str) -> None:
         """Click a button that can be seen."""
-        until(lambda: self.js(f"find({name!r}).offsetParent !== null"), lambda: name)
+        until(lambda: self.js(f"find({name!r}).offsetParent !== null"), why=lambda: name)
         self.js(f"find({name!r}).click()")
 
     def size(self, size: tuple[int, int], scheme: str) -> None:
@@ -267,7 +268,7 @@ def button(tab: Tab, text: str) -> bool:
 
 def press(tab: Tab, text: str) -> None:
     """Press the button that has that text."""
-    until(lambda: button(tab, text), lambda: text)
+    until(lambda: button(tab, text), why=lambda: text)
     every = f"[...document.querySelectorAll('button')].filter((b) => b.textContent === {text!r})"
     tab.js(f"{every}.find((b) => b.offsetParent !== null).click()")
 

@@ -27,13 +27,14 @@ from fasaco_edge.wire import topics
 from fasaco_edge.wire.documents.json_text import encode_json
 from fasaco_edge.wire.messages.maps import encode_occupancy_grid
 from fasaco_edge.wire.messages.paths import encode_path
-from tests.serve.serving import Looker, looking, serving, until
+from tests.serve.serving import Looker, looking, serving
 from tests.serve.test_browser import browsing, has, needs_browser
 from tests.support import scripted_mission as made_up
 from tests.support.processes import fasaco_edge
 from tests.support.recordings import bus_on_free_port, recorder_process
 from tests.support.rooms import UNKNOWN, fill, map_bytes, pose_bytes, room
 from tests.support.senders import Sender
+from tests.support.waiting import until
 
 SIZE_M = 4.0, 3.0
 KEEP_OUT = [[2.0, 2.0], [2.4, 2.0], [2.4, 2.4]]

@@ -30,7 +30,7 @@ from fasaco_edge.serve.live import LiveServer
 from fasaco_edge.serve.served_view import ServedView
 from fasaco_edge.serve.server import MOST_STRANGERS, MOST_VIEWERS
 from fasaco_edge.wire.keys import Keys
-from tests.serve.serving import Served, listens, looking, served, until
+from tests.serve.serving import Served, listens, looking, served
 from tests.support.outsider import TIMEOUT_S, Outsider
 from tests.support.processes import (
     Daemon,
@@ -41,6 +41,7 @@ from tests.support.processes import (
 )
 from tests.support.rooms import HALL, begin, drive, lanes, map_bytes, pose_bytes, update_bytes
 from tests.support.statuses import FULL, MALFORMED, malformed_status
+from tests.support.waiting import until
 
 # Memory of its own at most, without pages of files [MB].
 SERVE_MB = 24.0
@@ -345,7 +346,7 @@ def test_fifty_viewers_that_come_and_go_leave_nothing(page):
             looker.wait("map")
             if number % 2:
                 looker.socket.socket.shutdown(socket.SHUT_RDWR)
-    until(lambda: page.descriptors() <= before, page.descriptors)
+    until(lambda: page.descriptors() <= before, why=page.descriptors)
     grown = own_mb(page.process.pid) - resident
     print(f"fifty viewers: {grown:+.1f} MB")
     assert grown < 8.0

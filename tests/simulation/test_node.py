@@ -30,6 +30,7 @@ from fasaco_edge.wire.messages.twists import Velocity, encode_velocity
 from tests.simulation.rooms import building, centres, distances_to, serpentine
 from tests.support.forked import ENVIRONMENT
 from tests.support.processes import PROGRAM, free_endpoint
+from tests.support.waiting import until
 
 ROBOT = """
 import json, sys
@@ -85,13 +86,6 @@ def planner():
     planner = Planner("r1")
     yield planner
     planner.bus.close()
-
-
-def until(condition, timeout_s=120.0):
-    ends = time.monotonic() + timeout_s
-    while not condition():
-        assert time.monotonic() < ends, "nothing happened in time"
-        time.sleep(0.01)
 
 
 def test_a_robot_in_another_process_maps_and_drives_until_ended(planner):

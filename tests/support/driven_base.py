@@ -34,6 +34,7 @@ from fasaco_edge.wire.messages.poses import encode_pose_stamped
 from fasaco_edge.wire.messages.twists import decode_velocity
 from fasaco_edge.wire.schemas import TWIST
 from tests.support.processes import ENVIRONMENT, PROGRAM, free_endpoint
+from tests.support.waiting import until
 
 # Whoever has not stopped by then will not [s].
 LONGEST_S = 5.0
@@ -107,16 +108,16 @@ class DrivenBase:
             return self.heard[-1][1]
         return None
 
-    def wait_until_it_moves(self, timeout_s: float = 30.0) -> None:
+    def wait_until_it_moves(self) -> None:
         """Wait for a velocity that is none of standing."""
-        ends = time.monotonic() + timeout_s
-        while (newest := self.newest()) is None or newest.speed < 0.1:
-            assert time.monotonic() < ends, f"it does not move; {self.heard[-1:]}"
-            time.sleep(0.005)
+        until(
+            lambda: (newest := self.newest()) and newest.speed >= 0.1,
+            why=lambda: f"it does not move; {self.heard[-1:]}",
+        )
 
-    def stopped_after(self, since: float, watch_s: float = 0.4) -> float:
+    def stopped_after(self, since: float) -> float:
         """Return how long after ``since`` the base was told to stand, for good [s]."""
-        until = since + watch_s
+        until = since + 0.4
         while True:
             time.sleep(max(until - time.monotonic(), 0.01))
             later = [(at, command) for at, command in list(self.heard) if at >= since]

@@ -1,5 +1,6 @@
 """Lattices and maps: drawn by hand, drawn at random, and with passages closed."""
 
+import itertools
 import json
 import math
 import os
@@ -194,3 +195,17 @@ def displaced(draw, occupancy):
                 occupancy, geometry=replace(geometry, resolution=geometry.resolution / 2)
             )
     return replace(occupancy, geometry=replace(geometry, origin=origin))
+
+
+def assert_answers(problem, path):
+    """The walk begins at the start, makes legal steps only and visits all it is asked to."""
+    ground = problem.lattice
+    walk = [ground.local(cell) for cell in path.cells.tolist()]
+    around = naive.neighbours(ground.steps)
+    assert walk[0] == ground.local(problem.start)
+    assert all(there in around[here].values() for here, there in itertools.pairwise(walk))
+    assert {(int(r), int(c)) for r, c in np.argwhere(problem.to_cover)} <= set(walk)
+    if problem.end is not None:
+        assert walk[-1] == ground.local(problem.end)
+    assert path.cells.dtype == np.int32
+    assert path.cost_s == naive.walk_us(walk, problem.cost) / 1e6

@@ -16,6 +16,8 @@ from typing import Any, Self
 import zenoh
 import zenoh.ext
 
+from tests.support.waiting import until
+
 # Nothing takes so long but on a machine that is busy with much else [s].
 TIMEOUT_S = 150.0
 
@@ -82,11 +84,8 @@ class Outsider:
     ) -> None:
         self.prefix = f"fasaco/@v1/{robot}"
         self.session = open_client(endpoint, transport)
-        deadline = time.monotonic() + TIMEOUT_S
         # The port is open a moment before anything is subscribed to.
-        while not self.alive():
-            assert time.monotonic() < deadline, f"no {robot} at {endpoint}"
-            time.sleep(0.02)
+        until(self.alive, TIMEOUT_S, why=lambda: f"no {robot} at {endpoint}")
         self.status = self.listen("status")
 
     def __enter__(self) -> Self:

@@ -33,6 +33,7 @@ from fasaco_edge.wire.messages.poses import encode_pose_stamped
 from tests.support.processes import daemon_process
 from tests.support.rooms import RESOLUTION_M, WALL, fill, room
 from tests.support.senders import Sender
+from tests.support.waiting import until
 
 SIZE_M = (3.6, 2.7)
 START = Pose2D(0.75, 0.75)
@@ -95,11 +96,7 @@ def record_mission(
     planner = {"budget_s": 0.05, "line": line}
     warm_up()  # so that the daemon need not compile while the robot waits
     with daemon_process(folder, "--record", str(runs), planner=planner) as daemon:
-        deadline = time.monotonic() + TIMEOUT_S
-        while (bus := _joined(daemon.endpoint)) is None:
-            assert time.monotonic() < deadline, daemon.log_text()
-            time.sleep(0.05)
-        with bus:
+        with until(lambda: _joined(daemon.endpoint), TIMEOUT_S, why=daemon.log_text) as bus:
             robot = MappingRobot(bus, broken_poses, yaw_deg, commands, blocked_s)
             robot.wait(lambda status: (status["recorder"] or {}).get("state") == "recording")
             robot.drive(ends)
@@ -151,10 +148,11 @@ class MappingRobot:
 
     def wait(self, holds) -> None:
         """Wait for a status."""
-        deadline = time.monotonic() + TIMEOUT_S
-        while not (self.status and holds(self.status)):
-            assert time.monotonic() < deadline, f"never came; the last was {self.status}"
-            time.sleep(0.02)
+        until(
+            lambda: self.status and holds(self.status),
+            TIMEOUT_S,
+            why=lambda: f"never came; the last was {self.status}",
+        )
 
     def drive(self, ends=is_done) -> None:
         """Drive until the daemon says that all is covered, or what else ends it."""

@@ -52,9 +52,7 @@ def two_rooms(*, door: bool) -> Pixels:
     return fill(closed, 3.0, 1.0, 3.1, 2.0, FREE) if door else closed
 
 
-def coverable_cells(
-    pixels: Pixels, cell_m: float = TOOL_M, radius_m: float = RADIUS_M
-) -> set[Cell]:
+def coverable_cells(pixels: Pixels) -> set[Cell]:
     """Return the cells (row, col) at whose centre the robot's disc touches free pixels only."""
     rows, cols = pixels.shape
     bad = [(float(c), float(r)) for r, c in np.argwhere(pixels != FREE)]
@@ -63,8 +61,8 @@ def coverable_cells(
     bad += [(float(c), float(r)) for c in (-1, cols) for r in range(rows)]
     return {
         cell
-        for cell in _cells_over(pixels, cell_m)
-        if all(_distance(cell, pixel, cell_m) > radius_m for pixel in bad)
+        for cell in _cells_over(pixels)
+        if all(_distance(cell, pixel) > RADIUS_M for pixel in bad)
     }
 
 
@@ -114,14 +112,14 @@ def _span(low: float, high: float) -> slice:
     return slice(round(low / RESOLUTION_M), round(high / RESOLUTION_M))
 
 
-def _cells_over(pixels: Pixels, cell_m: float) -> Iterator[Cell]:
-    rows, cols = (math.ceil(size * RESOLUTION_M / cell_m) for size in pixels.shape)
+def _cells_over(pixels: Pixels) -> Iterator[Cell]:
+    rows, cols = (math.ceil(size * RESOLUTION_M / TOOL_M) for size in pixels.shape)
     return ((row, col) for row in range(rows) for col in range(cols))
 
 
-def _distance(cell: Cell, pixel: tuple[float, float], cell_m: float) -> float:
+def _distance(cell: Cell, pixel: tuple[float, float]) -> float:
     """Return how far the centre of a cell is from the nearest point of a pixel [m]."""
-    x, y = (cell[1] + 0.5) * cell_m / RESOLUTION_M, (cell[0] + 0.5) * cell_m / RESOLUTION_M
+    x, y = (cell[1] + 0.5) * TOOL_M / RESOLUTION_M, (cell[0] + 0.5) * TOOL_M / RESOLUTION_M
     left, bottom = pixel
     beside = max(left - x, 0.0, x - left - 1.0)
     above = max(bottom - y, 0.0, y - bottom - 1.0)
@@ -170,11 +168,11 @@ def begin(outsider: Outsider, pixels: Pixels = HALL, at: int = 0) -> dict[str, A
     return outsider.wait_status(lambda status: status["coverage"]["covered"] > 0)
 
 
-def wait_written(outsider: Outsider, since: float) -> None:
-    """Wait until all that was covered at a time [s, uptime] is on disk."""
+def wait_written(outsider: Outsider) -> None:
+    """Wait until the ledger was written a period after the start."""
     outsider.wait_status(
         lambda status: (
             status["ledger"]["age_s"] is not None
-            and status["uptime_s"] - status["ledger"]["age_s"] > since + PERIOD_S
+            and status["uptime_s"] - status["ledger"]["age_s"] > PERIOD_S
         )
     )

@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import json
 import signal
-import threading
 import time
 from collections.abc import Iterator
 from typing import Any
@@ -27,6 +26,7 @@ from tests.support.processes import (
     mapped_files,
 )
 from tests.support.rooms import map_bytes, pose_bytes, room
+from tests.support.waiting import meanwhile
 from tests.watch.terminal import Terminal, piped
 from tests.watch.test_watch import WATCH_MB
 
@@ -43,22 +43,15 @@ class Hall:
         self.said: dict[str, dict[str, Any]] = {name: dict(ours) for name in names}
         self.said["a"] |= {"cells": [(2, col) for col in range(4)], "ahead": AHEAD}
         self.silent: set[str] = set()
-        self._ended = threading.Event()
-        self._thread = threading.Thread(target=self._tell)
 
-    def __enter__(self) -> Hall:
-        self._thread.start()
-        return self
+    def published(self) -> contextlib.AbstractContextManager[None]:
+        """Publish a message of each, again and again."""
+        return meanwhile(self._publish, EVERY_S)
 
-    def __exit__(self, *_: object) -> None:
-        self._ended.set()
-        self._thread.join()
-
-    def _tell(self) -> None:
-        while not self._ended.wait(EVERY_S):
-            for name, teller in self.tellers.items():
-                if name not in self.silent:
-                    teller.tell(**self.said[name])
+    def _publish(self) -> None:
+        for name, teller in self.tellers.items():
+            if name not in self.silent:
+                teller.tell(**self.said[name])
 
 
 @pytest.fixture(scope="module")
@@ -70,7 +63,8 @@ def hall() -> Iterator[tuple[Hall, str]]:
         open_bus(BusSettings(connect=(endpoint,))) as told,
     ):
         bus.token(Keys("a").of(topics.ALIVE))
-        with Hall(told, "a", "b") as robots:
+        robots = Hall(told, "a", "b")
+        with robots.published():
             stranger = Teller(told, "stranger")
             robots.tellers["stranger"] = stranger
             robots.said["stranger"] = {"fleet": "yard"}
@@ -159,7 +153,7 @@ def test_it_outlives_the_router():
         terminal.wait_text(f"waiting for the bus at {endpoint}")
         for state in ("covering", "planning"):
             router = BusSettings("router", (), (endpoint,))
-            with open_bus(router) as bus, Hall(bus, "a", "b", state=state):
+            with open_bus(router) as bus, Hall(bus, "a", "b", state=state).published():
                 terminal.wait_text("2 of 2 robots at work")
                 terminal.wait_text(f"b     {state}")
         terminal.type("q")
