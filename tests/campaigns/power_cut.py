@@ -24,7 +24,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
@@ -165,11 +165,11 @@ def allowed_after(history: Sequence[Written], after: int) -> list[object]:
     return [w.holds for w in history[last:] if w.begun <= after]
 
 
-def mission_outcomes(
-    trace: Trace, cuts: Sequence[Cut], folder: Path, keep: Path
+def outcomes_of(
+    part: str, trace: Trace, cuts: Sequence[Cut], folder: Path, keep: Path
 ) -> Iterator[Outcome]:
-    """Cut a mission, and start a daemon on each."""
-    history, disk, done = ledgers_of(trace), Disk(trace.root), 0
+    """Cut a part of the campaign, and judge what each cut leaves."""
+    judge, disk, done = PARTS[part][1](trace), Disk(trace.root), 0
     for cut in cuts:
         for call in trace.calls[done : cut.after]:
             disk.do(call)
@@ -178,16 +178,31 @@ def mission_outcomes(
         place.mkdir()
         started = time.monotonic()
         disk.write(cut, place)
-        found, fault, wrong = _found(place / STATE, allowed_after(history, cut.after))
-        is_torn, unreadable = _recordings(place / RECORDINGS)
-        wrong = wrong or unreadable or _start(place, found, records=cut.salt % RECORDS_EACH == 0)
+        wrong, is_torn, fault = judge(cut, place)
         kept = ""
         if wrong:
-            kept = str(keep / f"{MISSION}-{cut.salt}")
+            kept = str(keep / f"{part}-{cut.salt}")
             shutil.copytree(place, kept, dirs_exist_ok=True)
         shutil.rmtree(place)
         seconds = time.monotonic() - started
-        yield Outcome(MISSION, str(cut), wrong, round(seconds, 3), is_torn, fault, kept)
+        yield Outcome(part, str(cut), wrong, round(seconds, 3), is_torn, fault, kept)
+
+
+# What is wrong with what a cut left, whether a recording is torn, and what fault the ledger has.
+Judge = Callable[[Cut, Path], tuple[str, bool, str]]
+
+
+def judge_of_mission(trace: Trace) -> Judge:
+    """Return what starts a daemon on what a cut of a mission left."""
+    history = ledgers_of(trace)
+
+    def judge(cut: Cut, place: Path) -> tuple[str, bool, str]:
+        found, fault, wrong = _found(place / STATE, allowed_after(history, cut.after))
+        is_torn, unreadable = _recordings(place / RECORDINGS)
+        wrong = wrong or unreadable or _start(place, found, records=cut.salt % RECORDS_EACH == 0)
+        return wrong, is_torn, fault
+
+    return judge
 
 
 def _found(state: Path, allowed: Sequence[object]) -> tuple[int, str, str]:
@@ -267,33 +282,19 @@ def watched_first_start(folder: Path) -> Trace:
         return Trace(root, watch.calls(), {}, set())
 
 
-def first_start_outcomes(
-    trace: Trace, cuts: Sequence[Cut], folder: Path, keep: Path
-) -> Iterator[Outcome]:
-    """Cut a first start, and let the compiler go on from each."""
-    disk, done = Disk(trace.root), 0
-    for cut in cuts:
-        for call in trace.calls[done : cut.after]:
-            disk.do(call)
-        done = cut.after
-        place = folder / "cut"
-        place.mkdir()
-        started = time.monotonic()
-        disk.write(cut, place)
+def judge_of_first_start(trace: Trace) -> Judge:
+    """Return what lets the compiler go on from what a cut of a first start left."""
+
+    def judge(cut: Cut, place: Path) -> tuple[str, bool, str]:
         ended = compile_into(place / CACHE / "kernels")
-        wrong = ended.stderr[-500:] or why_not_whole(place / CACHE / "kernels")
-        kept = ""
-        if wrong:
-            kept = str(keep / f"{FIRST_START}-{cut.salt}")
-            shutil.copytree(place, kept, dirs_exist_ok=True)
-        shutil.rmtree(place)
-        seconds = time.monotonic() - started
-        yield Outcome(FIRST_START, str(cut), wrong, round(seconds, 3), False, "", kept)
+        return ended.stderr[-500:] or why_not_whole(place / CACHE / "kernels"), False, ""
+
+    return judge
 
 
 PARTS = {
-    MISSION: (watched_mission, mission_outcomes, Spread.ALL),
-    FIRST_START: (watched_first_start, first_start_outcomes, Spread.ONE),
+    MISSION: (watched_mission, judge_of_mission, Spread.ALL),
+    FIRST_START: (watched_first_start, judge_of_first_start, Spread.ONE),
 }
 
 
@@ -309,11 +310,11 @@ def run_campaign(
         keep: where what went wrong is kept.
     """
     for part, most in cuts.items():
-        watched, outcomes, spread = PARTS[part]
+        watched, _, spread = PARTS[part]
         (scratch / part).mkdir()
         trace = watched(scratch / part)
         chosen = cuts_of(trace.root, trace.calls, most, seed, spread)
-        for outcome in outcomes(trace, chosen, scratch, keep):
+        for outcome in outcomes_of(part, trace, chosen, scratch, keep):
             yield outcome, len(chosen)
 
 
