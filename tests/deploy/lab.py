@@ -18,6 +18,8 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
+from tests.support.waiting import until
+
 # A lab has all of these for itself.
 SPACES = ("pid", "mount", "cgroup", "ipc", "uts", "net")
 UNSHARE = ("unshare", "--fork", "--propagation=private", *(f"--{name}" for name in SPACES))
@@ -25,8 +27,6 @@ NSENTER = ("nsenter", "-p", "-m", "-C", "-i", "-u", "-n", "--root", "--wd")
 PROGRAMS = ("unshare", "nsenter", "setpriv", "pivot_root", "mount", "ip", "systemctl")
 SYSTEMD = Path("/usr/lib/systemd/systemd")
 BOOT_S = 40.0
-# Old controllers that make MemoryMax= and CPUWeight= real where the new ones are not to be had.
-LIMITS = ("memory", "cpu", "pids")
 ENVIRONMENT = {
     "PATH": "/opt/fasaco-edge/current/bin:/usr/sbin:/usr/bin:/sbin:/bin",
     "LANG": "C.UTF-8",
@@ -96,44 +96,38 @@ def why_not() -> str:
 
 
 @contextmanager
-def booted(
-    folder: Path, binds: Mapping[str, Path], *, limits: bool = False, lower: Path = Path("/")
-) -> Iterator[Lab]:
+def booted(folder: Path, binds: Mapping[str, Path]) -> Iterator[Lab]:
     """Boot a lab, and end it.
 
     Args:
         folder: an empty folder for its log.
         binds: folders to be seen inside, read-only, by their place there.
-        limits: enforce limits of memory and processor through the old cgroup controllers.
-        lower: the tree its root shows as long as nothing is written.
     """
     started = time.monotonic()
-    groups = _make_cgroups(LIMITS if limits else ())
+    group = _make_cgroup()
     (folder / "mnt").mkdir()
     orders = {
         "folder": str(folder),
-        "lower": str(lower),
-        "limits": LIMITS if limits else (),
         "binds": {inside: str(outside) for inside, outside in binds.items()},
     }
     (folder / "orders").write_text(json.dumps(orders))
-    process = _launch(folder, groups)
+    process = _launch(folder, group)
     try:
         pid = _wait_for_boot(folder, process)
         yield Lab(pid, time.monotonic() - started)
     finally:
         process.kill()  # and with it, as its last child's parent, the whole process namespace
         process.wait()
-        _remove_cgroups(groups)
+        _remove_cgroup(group)
 
 
-def _launch(folder: Path, groups: list[Path]) -> subprocess.Popen[bytes]:
+def _launch(folder: Path, group: Path) -> subprocess.Popen[bytes]:
     """Start process 1; it is killed when this thread ends, whatever ends it."""
-    join = 'for group in $GROUPS_TO_JOIN; do echo $$ >"$group/cgroup.procs"; done; exec "$@"'
+    join = 'echo $$ >"$GROUP_TO_JOIN/cgroup.procs"; exec "$@"'
     first = [sys.executable, "-I", str(Path(__file__).with_name("lab_init.py"))]
     words = ["setpriv", "--pdeathsig", "KILL", "sh", "-c", join, "sh"]
     words += [*UNSHARE, "--kill-child", *first, str(folder / "orders")]
-    environment = os.environ | {"GROUPS_TO_JOIN": " ".join(map(str, groups))}
+    environment = os.environ | {"GROUP_TO_JOIN": str(group)}
     with (folder / "console.log").open("wb") as console:
         return subprocess.Popen(
             words,
@@ -167,30 +161,25 @@ def _cgroup2() -> Path | None:
     return None
 
 
-def _make_cgroups(limits: tuple[str, ...]) -> list[Path]:
-    """Make leaves of our own, so that the lab's cgroup namespace has a root of its own."""
+def _make_cgroup() -> Path:
+    """Make a leaf of our own, so that the lab's cgroup namespace has a root of its own."""
     base = _cgroup2()
     assert base is not None
-    trees = [base, *(Path("/sys/fs/cgroup", name) for name in (*limits, "systemd") if limits)]
-    for tree in trees:
-        for left in tree.glob("fasaco-lab-*"):  # of a run that was killed
-            if not Path("/proc", left.name.rpartition("-")[2]).exists():
-                _remove_cgroups([left])
-    groups = [tree / f"fasaco-lab-{time.monotonic_ns()}-{os.getpid()}" for tree in trees]
-    for group in groups:
-        group.mkdir()
-    return groups
+    for left in base.glob("fasaco-lab-*"):  # of a run that was killed
+        if not Path("/proc", left.name.rpartition("-")[2]).exists():
+            _remove_cgroup(left)
+    group = base / f"fasaco-lab-{time.monotonic_ns()}-{os.getpid()}"
+    group.mkdir()
+    return group
 
 
-def _remove_cgroups(groups: list[Path]) -> None:
-    """Remove cgroups with all below them; the last processes may take a moment to be gone."""
-    until = time.monotonic() + 5.0
-    while groups and time.monotonic() < until:
-        for group in groups:
-            for folder, _, _ in os.walk(group, topdown=False):
-                with suppress(OSError):
-                    os.rmdir(folder)
-        groups = [group for group in groups if group.exists()]
-        if groups:
-            time.sleep(0.05)
-    assert not groups, f"left behind: {groups}"
+def _remove_cgroup(group: Path) -> None:
+    """Remove a cgroup with all below it; the last processes may take a moment to be gone."""
+
+    def is_gone() -> bool:
+        for folder, _, _ in os.walk(group, topdown=False):
+            with suppress(OSError):
+                os.rmdir(folder)
+        return not group.exists()
+
+    until(is_gone, 5.0, why=lambda: f"left behind: {group}")

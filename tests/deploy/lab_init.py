@@ -50,10 +50,10 @@ def main(orders: dict) -> None:
     upper, work, root = (folder / "mnt" / name for name in ("upper", "work", "root"))
     for made in (upper, work, root):
         made.mkdir()
-    layers = f"lowerdir={orders['lower']},upperdir={upper},workdir={work}"
+    layers = f"lowerdir=/,upperdir={upper},workdir={work}"
     mount("-t", "overlay", "overlay", "-o", layers, root)
     own_folders(root, folder / "mnt" / "own")
-    kernel_interfaces(root, orders["limits"])
+    kernel_interfaces(root)
     devices(root)
     for inside, outside in orders["binds"].items():
         place = root / inside.lstrip("/")
@@ -62,8 +62,6 @@ def main(orders: dict) -> None:
     settings(root)
     enter(root)
     words = [SYSTEMD, "--system", "--unit=lab.target", "--log-target=journal", "--show-status=no"]
-    if orders["limits"]:
-        words.append("systemd.unified_cgroup_hierarchy=0")
     os.execve(SYSTEMD, words, {"PATH": PATH, "container": "lab", "LANG": "C.UTF-8"})
 
 
@@ -85,20 +83,11 @@ def own_folders(root: Path, place: Path) -> None:
         mount("--bind", own, shown)
 
 
-def kernel_interfaces(root: Path, limits: list[str]) -> None:
+def kernel_interfaces(root: Path) -> None:
     """Mount /proc, /sys, cgroups, /run and /tmp."""
     mount("-t", "proc", "proc", root / "proc")
     mount("-t", "sysfs", "sysfs", root / "sys")
-    groups = root / "sys/fs/cgroup"
-    if limits:
-        mount("-t", "tmpfs", "-o", "mode=755", "tmpfs", groups)
-        for name in limits:
-            (groups / name).mkdir()
-            mount("-t", "cgroup", "-o", name, "cgroup", groups / name)
-        (groups / "systemd").mkdir()
-        mount("-t", "cgroup", "-o", "none,name=systemd", "cgroup", groups / "systemd")
-    else:
-        mount("-t", "cgroup2", "cgroup2", groups)
+    mount("-t", "cgroup2", "cgroup2", root / "sys/fs/cgroup")
     mount("-t", "tmpfs", "-o", "mode=755", "tmpfs", root / "run")
     mount("-t", "tmpfs", "-o", "mode=1777", "tmpfs", root / "tmp")
 
