@@ -7,14 +7,9 @@ from fasaco_edge.drawing import palette
 from fasaco_edge.grid.lattice import CoverageLattice
 from fasaco_edge.planners.planner import ColonySnapshot
 from tests.benchmarks.pictures import LabelledWalk, draw_pheromone, draw_walks
+from tests.drawing.test_pictures import places
 
 LINES = ["a caption"]
-
-
-def places(image, colour, tolerance=6):
-    """Return where (x, y) in the picture a colour is, (n, 2)."""
-    difference = np.abs(np.asarray(image, np.int16) - np.array(colour, np.int16)).max(axis=2)
-    return np.argwhere(difference <= tolerance)[:, ::-1]
 
 
 def walk(label, lattice, *cells):

@@ -21,12 +21,12 @@ A, B, C = "0a", "0b", "0c"
 CALM_S = SETTLE_S + 0.01
 
 
-def planning(own, now=0.0):
+def planning(own):
     """A claim that found nobody."""
     claim = Claim(own)
-    claim.decide({}, now)
+    claim.decide({}, 0.0)
     assert claim.state is ClaimState.LOOKS
-    claim.decide({}, now + CALM_S)
+    claim.decide({}, CALM_S)
     assert claim.state is ClaimState.PLANS
     return claim
 

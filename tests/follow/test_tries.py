@@ -16,9 +16,9 @@ def tried(times, toward=0.0, **limits):
     return tries
 
 
-def pause_s(tries, toward=0.0):
+def pause_s(tries):
     """Return the seconds until the next try, to 0.1 s."""
-    return next(tenth / 10 for tenth in range(10_000) if tries.may_try(toward, tenth / 10))
+    return next(tenth / 10 for tenth in range(10_000) if tries.may_try(0.0, tenth / 10))
 
 
 def test_each_pause_is_twice_as_long_up_to_the_longest():
@@ -65,7 +65,7 @@ def test_directions_that_turn_on_and_on_are_bounded():
     tries, count = Tries(0.1, 2.0, math.inf, 3), 0
     for degree in range(0, 3600, 7):
         toward = math.radians(degree)
-        while tries.may_try(toward, 1e9):
+        while tries.may_try(0.0, 1e9):
             tries.failed(HERE, toward, 0.0)
             count += 1
             assert count <= 8 * 3

@@ -11,8 +11,9 @@ from hypothesis import strategies as st
 from fasaco_edge.errors import MapTooLarge
 from fasaco_edge.grid.changes import LatticeChange
 from fasaco_edge.grid.geometry import Window
-from fasaco_edge.grid.lattice import BLOCKED, COVERABLE, UNKNOWN, CoverageLattice, Footprint
+from fasaco_edge.grid.lattice import BLOCKED, COVERABLE, CoverageLattice, Footprint
 from fasaco_edge.grid.occupancy import MapPatch, OccupancyGrid
+from tests.grid.test_lattice import known_cells
 from tests.support.examples import examples
 from tests.support.grids import (
     cropped,
@@ -25,15 +26,6 @@ from tests.support.grids import (
 )
 
 CELL = Footprint(0.3, 0.12)
-
-
-def known_cells(lattice):
-    """State and steps of each cell that is known, by its place in the lattice."""
-    row0, col0 = lattice.window.row0, lattice.window.col0
-    return {
-        (row + row0, col + col0): (lattice.states[row, col], lattice.steps[row, col])
-        for row, col in np.argwhere(lattice.states != UNKNOWN).tolist()
-    }
 
 
 def assert_follows(change, lattice, after, footprint):
@@ -121,10 +113,10 @@ def forged(lattice):
     )
 
 
-def looked_at(before, after, footprint=CELL, within=None):
+def looked_at(before, after):
     """Return how many cells are classified anew."""
-    lattice = forged(CoverageLattice.from_map(before, footprint))
-    change = LatticeChange.between((before, after), lattice, footprint, within=within)
+    lattice = forged(CoverageLattice.from_map(before, CELL))
+    change = LatticeChange.between((before, after), lattice, CELL)
     window = change.after.window
     return int(np.count_nonzero(change.after.states < 3)), window.rows * window.cols
 

@@ -27,16 +27,6 @@ class Battery(Drive):
         heard = [] if self.level is None else [BatteryReceived(self.level, self.power)]
         return super().tell(*heard, *events, after=after)
 
-    def run(self, until, ticks=200):
-        """Drive on until the mission is in a state."""
-        for _ in range(ticks):
-            if self.mission.state is until:
-                return
-            if self.request is not None:
-                self.plan()
-            self.go()
-        raise AssertionError(f"{self.mission.state}: {self.mission.reason}")
-
     def charge(self, to):
         while self.mission.state is State.CHARGING and self.level < to:
             self.level, self.power = min(self.level + 0.02, 1.0), "charging"

@@ -31,15 +31,6 @@ def remove(drive, name):
     return drive.command("keep_out_remove", keep_out=KeepOut(name))
 
 
-def finish(drive, ticks=300):
-    for _ in range(ticks):
-        if drive.mission.state is State.DONE:
-            return
-        drive.plan() if drive.request else None
-        drive.go()
-    raise AssertionError(drive.mission.reason)
-
-
 def test_in_mid_mission_coverage_stays_and_the_order_goes_on():
     drive = started(*ROOM)
     for _ in range(12):
@@ -50,7 +41,7 @@ def test_in_mid_mission_coverage_stays_and_the_order_goes_on():
     assert drive.mission.order_state.order is before.order
     assert decision.path is not None, "the path led there"
     assert decision.plan.reason.startswith("path blocked at cell")
-    finish(drive)
+    drive.finish()
     assert covered < drive.visited
     assert len(drive.visited) == 47
 
@@ -64,7 +55,7 @@ def test_no_path_leads_into_it_from_that_step_on():
     drive = started("..........")
     drive.go()
     assert add(drive, keep_out("door", 0, 6, 1, 7)).path.cells.tolist()[-1] == [0, 5]
-    finish(drive)
+    drive.finish()
     assert drive.driven[-1] == (0, 5)
 
 
@@ -79,7 +70,7 @@ def test_a_robot_inside_a_keep_out_stops_until_its_removal():
     assert "robot is in a keep-out zone" in drive.mission.reason
     remove(drive, "here")
     drive.tell(after=3.0)
-    finish(drive)
+    drive.finish()
     assert covered < drive.visited == ALL
 
 
@@ -94,7 +85,7 @@ def test_a_robot_at_a_keep_out_border_stops_and_is_led_out():
     drive.cell = drive.walk.pop(0)
     assert drive.cell in ((row, col - 1), (row, col + 1), (row + 1, col), (row - 1, col))
     drive.tell(pose_at(*drive.cell))
-    finish(drive)
+    drive.finish()
     assert (row, col) not in drive.driven[4:]
 
 
@@ -105,7 +96,7 @@ def test_what_is_kept_out_is_covered_once_it_is_removed():
         drive.plan() if drive.request else None
         drive.go()
     remove(drive, "vase")
-    finish(drive)
+    drive.finish()
     assert drive.visited == ALL
 
 
@@ -121,14 +112,14 @@ def test_it_holds_under_every_order_until_it_is_removed():
     for order in ({"keep_out": [rectangle(0, 7, 1, 8)]}, {}):
         drive.command("start", order)
         drive.driven.clear()
-        finish(drive)
+        drive.finish()
         assert not set(drive.driven) & inside(1, 3, 4, 5)
     drive.command("cancel")
     drive.command("reset")
     assert drive.mission.order_state.keep_out == (VASE,)
     drive.command("start")
     remove(drive, "vase")
-    finish(drive)
+    drive.finish()
     assert drive.visited == ALL
 
 
@@ -139,7 +130,7 @@ def test_it_outlives_the_daemon():
     again = Drive(drive.cell, order_state=OrderState.from_json(kept.note))
     again.mission.restore_ledger(kept)
     again.tell(MapReceived(building(*ROOM)), pose_at(*drive.cell))
-    finish(again)
+    again.finish()
     assert again.visited == ALL - inside(1, 3, 4, 5)
 
 
@@ -156,7 +147,7 @@ def test_before_there_is_a_map():
     drive = Drive((0, 0))
     add(drive, VASE)
     drive.tell(MapReceived(building(*ROOM)), pose_at(0, 0))
-    finish(drive)
+    drive.finish()
     assert drive.visited == ALL - inside(1, 3, 4, 5)
 
 

@@ -15,23 +15,16 @@ from fasaco_edge.mission.core.events import MapReceived
 from fasaco_edge.mission.orders.keep_outs import KeepOut
 from fasaco_edge.mission.orders.reached_cells import ReachedCells
 from tests.mission.line_robot import PIXEL_M, LineRobot
+from tests.mission.test_path_begins import two_rooms
 from tests.mission.test_shut_in import room_with_niche, shut_in
 
 START = (1.0, 1.0)
 WALL = slice(60, 62)
 
 
-def two_rooms():
-    """Two rooms of 3 m x 2.5 m, and a door between them."""
-    pixels = np.full((52, 124), 100, np.int8)
-    pixels[1:51, 1:60] = pixels[1:51, 62:123] = 0
-    pixels[18:34, WALL] = 0
-    return pixels
-
-
 def changed(how):
     """The same where the door is closed, the other room is unknown, or the map is cut there."""
-    pixels = two_rooms()
+    pixels = two_rooms(is_open=True)
     pixels[:, WALL] = 100
     if how == "unknown":
         pixels[:, 62:] = -1
@@ -40,7 +33,7 @@ def changed(how):
 
 def in_first_room():
     """A robot that has come back from the other room before that was swept."""
-    robot = LineRobot(two_rooms(), START)
+    robot = LineRobot(two_rooms(is_open=True), START)
     assert robot.wait(100.0, lambda robot: robot.x > 3.5)
     assert robot.wait(100.0, lambda robot: robot.x < 2.5)
     return robot
@@ -90,7 +83,7 @@ def test_a_robot_that_is_shut_in_is_not_done_after_a_restart():
 
 
 def test_one_that_is_shut_in_with_nothing_left_beyond_is_done():
-    robot = LineRobot(two_rooms(), START)
+    robot = LineRobot(two_rooms(is_open=True), START)
     assert robot.wait(300.0, lambda robot: robot.mission.coverage().remaining < 15)
     assert robot.x > 3.3
     # With the door the cells beside it are closed, so less than half remains in reach.
@@ -128,9 +121,9 @@ MOTIONS = [(0.5, 0.3, 0.0), (0.0, 0.0, 3.0), (0.5, 0.3, 8.0), (2.0, 1.0, 0.0)]
 
 @pytest.mark.parametrize("motion", MOTIONS)
 def test_what_was_reachable_moves_with_the_map(motion):
-    robot = LineRobot(two_rooms(), START)
+    robot = LineRobot(two_rooms(is_open=True), START)
     robot.wait(60.0, lambda _: False)
-    with_map_moved(robot, two_rooms(), *motion)
+    with_map_moved(robot, two_rooms(is_open=True), *motion)
     assert robot.wait(900.0, lambda robot: robot.mission.state == "done")
     assert robot.mission.reason.startswith("every reachable cell is covered")
     covered = robot.mission.coverage()
@@ -139,7 +132,7 @@ def test_what_was_reachable_moves_with_the_map(motion):
 
 @pytest.mark.parametrize("motion", MOTIONS[1:])
 def test_a_room_that_is_closed_as_the_map_moves_is_told_once(motion):
-    robot = LineRobot(two_rooms(), START)
+    robot = LineRobot(two_rooms(is_open=True), START)
     assert robot.wait(100.0, lambda robot: robot.x < 2.0)
     with_map_moved(robot, changed("closed"), *motion)
     assert robot.wait(900.0, lambda robot: robot.mission.state == "done")
@@ -155,15 +148,15 @@ SHIFTS = [(0.14, 0.0), (0.1, 0.1), (0.07, 0.0)]
 @pytest.mark.parametrize("shift", SHIFTS)
 def test_what_was_reachable_moves_with_a_map_shifted_by_pixels(shift):
     """Rows of cells along its walls were said not to be reached: 2.4 of 15 m2."""
-    robot = LineRobot(two_rooms(), START)
+    robot = LineRobot(two_rooms(is_open=True), START)
     robot.wait(30.0, lambda _: False)
-    with_map_moved(robot, two_rooms(), *shift, 0.0)
+    with_map_moved(robot, two_rooms(is_open=True), *shift, 0.0)
     assert robot.wait(900.0, lambda robot: robot.mission.state == "done")
     assert robot.mission.reason.startswith("every reachable cell is covered")
 
 
 def test_a_room_that_is_closed_as_the_map_shifts_is_told():
-    robot = LineRobot(two_rooms(), START)
+    robot = LineRobot(two_rooms(is_open=True), START)
     assert robot.wait(100.0, lambda robot: robot.x < 2.0)
     with_map_moved(robot, changed("closed"), *SHIFTS[1], 0.0)
     assert robot.wait(900.0, lambda robot: robot.mission.state == "done")

@@ -31,17 +31,6 @@ def drives(*rows, cell=(0, 0), config=RETRIES):
     return drive
 
 
-def until(drive, state, ticks=300):
-    """Drive until the mission is in ``state``."""
-    for _ in range(ticks):
-        if drive.mission.state is state:
-            return
-        if drive.request is not None:
-            drive.plan()
-        drive.go()
-    raise AssertionError(f"{drive.mission.state}: {drive.mission.reason}")
-
-
 def reasons(drive):
     return [(area.cells, area.reason) for area in drive.mission.unreached().areas]
 
@@ -49,7 +38,7 @@ def reasons(drive):
 def test_a_room_with_a_shut_door_is_tried_again_later():
     drive = drives(*ROOMS)
     drive.tell(patch("#", at=DOOR))
-    until(drive, State.BLOCKED)
+    drive.run(State.BLOCKED)
     waits = "17 cells not reached: tried again after 30 s (1 of 2)"
     assert drive.mission.reason == waits
     assert reasons(drive) == [
@@ -61,12 +50,12 @@ def test_a_room_with_a_shut_door_is_tried_again_later():
     assert decision.plan.reason == "tried again, 1 of 2"
     # The robot drives to the door, and to nowhere else.
     assert np.argwhere(decision.plan.problem.to_cover).tolist() == [[1, 3]]
-    until(drive, State.BLOCKED)
+    drive.run(State.BLOCKED)
     assert drive.cell == (1, 3)
     assert drive.mission.reason == waits.replace("1 of 2", "2 of 2")
     # It still is shut; in the end nobody waits any more.
     drive.tell(after=31.0)
-    until(drive, State.DONE)
+    drive.run(State.DONE)
     assert drive.mission.reason == (
         "48 % of 2.1 m2 covered; 1.1 m2 not reached: closed off by obstacles (1.0 m2), "
         "blocked by an obstacle that was not there before (0.1 m2)"
@@ -80,14 +69,14 @@ def test_a_room_with_a_shut_door_is_tried_again_later():
 def test_a_door_that_has_opened_when_it_is_looked_at():
     drive = drives(*ROOMS)
     drive.tell(patch("#", at=DOOR))
-    until(drive, State.BLOCKED)
+    drive.run(State.BLOCKED)
     drive.tell(after=31.0)
     drive.plan()
     while drive.cell != (1, 3):
         drive.go()
     # From here the mapper sees that it is open.
     assert drive.tell(patch(".", at=DOOR), after=2.0).plan.reason == "map: 17 cells more"
-    until(drive, State.DONE)
+    drive.run(State.DONE)
     assert reasons(drive) == []
     assert (0, 8) in drive.visited
 
@@ -95,16 +84,16 @@ def test_a_door_that_has_opened_when_it_is_looked_at():
 def test_a_door_that_opens_ends_the_wait_for_another_try():
     drive = drives(*ROOMS)
     drive.tell(patch("#", at=DOOR))
-    until(drive, State.BLOCKED)
+    drive.run(State.BLOCKED)
     drive.tell(patch(".", at=DOOR), after=3.0)
-    until(drive, State.DONE)
+    drive.run(State.DONE)
     assert drive.now < 30.0
     assert reasons(drive) == []
 
 
 def test_what_never_could_be_reached_is_named_and_not_waited_for():
     drive = drives("...#..", "...#..")
-    until(drive, State.DONE)
+    drive.run(State.DONE)
     assert drive.now < 5.0
     assert reasons(drive) == [(4, "closed off by obstacles")]
     (area,) = drive.mission.unreached().areas
@@ -115,14 +104,14 @@ def test_rows_left_along_a_wall_are_named_and_not_tried_again():
     """A map that refines its walls closes many of them."""
     drive = drives(*["......"] * 5)
     drive.tell(patch("######", at=(4, 0)))
-    until(drive, State.DONE)
+    drive.run(State.DONE)
     assert drive.now < 10.0
     assert reasons(drive) == [(6, "blocked by an obstacle that was not there before")]
 
 
 def test_what_was_covered_before_it_was_closed_is_no_loss():
     drive = drives(*["......"] * 4)
-    until(drive, State.DONE)
+    drive.run(State.DONE)
     drive.tell(patch("###", "###", at=(1, 1)))
     assert drive.mission.state is State.DONE
     assert reasons(drive) == []
@@ -178,7 +167,7 @@ def test_a_cell_left_over_can_be_covered_at_a_later_try():
     drive.go()
     stands_short(drive, 20)
     drive.tell(after=31.0)
-    until(drive, State.DONE)
+    drive.run(State.DONE)
     assert drive.mission.reason == "every reachable cell is covered"
 
 
@@ -197,10 +186,10 @@ def test_cells_left_in_one_zone_do_not_delay_the_next_zone():
         stands_short(drive, 1)
     assert drive.now < 25.0
     assert drive.request is None or drive.request.reason == "zone 'b'"
-    until(drive, State.BLOCKED)
+    drive.run(State.BLOCKED)
     assert reasons(drive) == [(1, "left over after 4 tries")]
     drive.tell(after=31.0)
-    until(drive, State.DONE)
+    drive.run(State.DONE)
     assert {(0, 0), (0, 2)} <= drive.visited
 
 

@@ -21,6 +21,7 @@ from fasaco_edge.mission.core.events import (
     PatchReceived,
     PlanReady,
     PoseReceived,
+    State,
 )
 from fasaco_edge.mission.core.mission import Mission
 from fasaco_edge.mission.orders.order import read_order
@@ -161,14 +162,18 @@ class Drive:
         return self.tell(pose_at(*self.cell), *events)
 
     def finish(self, ticks=500):
-        """Drive on, with a plan whenever one is asked for, until the mission is done."""
+        """Drive on until the mission is done."""
+        self.run(State.DONE, ticks)
+
+    def run(self, until, ticks=300):
+        """Drive on, with a plan whenever one is asked for, until the mission is in a state."""
         for _ in range(ticks):
-            if self.mission.state == "done":
+            if self.mission.state is until:
                 return
             if self.request is not None:
                 self.plan()
             self.go()
-        raise AssertionError(f"not done after {ticks} ticks: {self.mission.reason}")
+        raise AssertionError(f"{self.mission.state} after {ticks} ticks: {self.mission.reason}")
 
 
 def rectangle(row0, col0, row1, col1):

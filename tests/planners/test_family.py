@@ -1,7 +1,5 @@
 """The paper's planners beside FaSACO: what each promises, and what its authors measured."""
 
-import itertools
-
 import numpy as np
 import pytest
 from hypothesis import assume, given
@@ -18,20 +16,7 @@ from fasaco_edge.planners.problem import CoverageProblem
 from fasaco_edge.planners.registry import PLANNER_NAMES, planner_of
 from tests import naive
 from tests.support.examples import examples
-from tests.support.grids import ENDS, ROOMS, end_of, lattice, problems, reference
-
-
-def assert_answers(problem, path):
-    """The walk begins at the start, makes legal steps only and visits all it is asked to."""
-    ground = problem.lattice
-    walk = [ground.local(cell) for cell in path.cells.tolist()]
-    around = naive.neighbours(ground.steps)
-    assert walk[0] == ground.local(problem.start)
-    assert all(there in around[here].values() for here, there in itertools.pairwise(walk))
-    assert {(int(r), int(c)) for r, c in np.argwhere(problem.to_cover)} <= set(walk)
-    if problem.end is not None:
-        assert walk[-1] == ground.local(problem.end)
-    assert path.cost_s == naive.walk_us(walk, problem.cost) / 1e6
+from tests.support.grids import ENDS, ROOMS, assert_answers, end_of, lattice, problems, reference
 
 
 @pytest.mark.parametrize("name", PLANNER_NAMES)

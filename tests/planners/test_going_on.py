@@ -34,9 +34,9 @@ def trail_of(lattice, *walks):
     return trail.snapshot()
 
 
-def going_on(before_cols=12, cols=14, times=8):
+def going_on(cols=14, times=8):
     """The problem of a hall of which more has come into sight, and the walk before."""
-    known = CoverageProblem.of(hall(before_cols), (0, 0))
+    known = CoverageProblem.of(hall(12), (0, 0))
     walk = Fasaco(COLONY).plan(known).cells
     problem = CoverageProblem.of(hall(cols), (0, 0), before=walk)
     return replace(problem, trail=trail_of(problem.lattice, *[walk] * times)), walk

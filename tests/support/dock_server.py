@@ -11,8 +11,6 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from rosbags.typesys import Stores, get_types_from_msg, get_typestore
-
 from tests.support.nav2_server import (
     ABORTED,
     CANCELED,
@@ -20,6 +18,7 @@ from tests.support.nav2_server import (
     ActionServer,
     Faults,
     Handle,
+    action_store,
 )
 
 GOALS = {
@@ -52,18 +51,7 @@ STAGED_M = 1.0
 
 def dock_store(move: str, *, with_message: bool = True) -> Any:
     """Return rosbags' types with those of one of the actions."""
-    store = get_typestore(Stores.ROS2_JAZZY)
-    definitions = {
-        "Send": f"unique_identifier_msgs/UUID goal_id\n{GOALS[move]}",
-        "Sent": "bool accepted\nbuiltin_interfaces/Time stamp\n",
-        "Ask": "unique_identifier_msgs/UUID goal_id\n",
-        "Ended": f"int8 status\n{RESULTS[move]}{MESSAGE if with_message else ''}",
-        "Cancel": "action_msgs/GoalInfo goal_info\n",
-        "Canceled": "int8 return_code\naction_msgs/GoalInfo[] goals_canceling\n",
-    }
-    for name, text in definitions.items():
-        store.register(get_types_from_msg(text, f"look_alike/msg/{name}"))
-    return store
+    return action_store(GOALS[move], RESULTS[move] + (MESSAGE if with_message else ""))
 
 
 class DockActionServer(ActionServer):

@@ -55,13 +55,19 @@ RESULT_KEPT_S = 10.0
 
 def store_of(release: str) -> Any:
     """Return rosbags' types with those of the action."""
-    store = get_typestore(Stores.ROS2_JAZZY)
     names = "".join(f"string {name}\n" for name in PATH_IDS[release])
+    result = f"std_msgs/Empty result\n{RESULTS[release]}"
+    return action_store(f"nav_msgs/Path path\n{names}", result)
+
+
+def action_store(goal: str, result: str) -> Any:
+    """Return rosbags' types with those of an action, by the members of its goal and result."""
+    store = get_typestore(Stores.ROS2_JAZZY)
     definitions = {
-        "Send": f"unique_identifier_msgs/UUID goal_id\nnav_msgs/Path path\n{names}",
+        "Send": f"unique_identifier_msgs/UUID goal_id\n{goal}",
         "Sent": "bool accepted\nbuiltin_interfaces/Time stamp\n",
         "Ask": "unique_identifier_msgs/UUID goal_id\n",
-        "Ended": f"int8 status\nstd_msgs/Empty result\n{RESULTS[release]}",
+        "Ended": f"int8 status\n{result}",
         "Cancel": "action_msgs/GoalInfo goal_info\n",
         "Canceled": "int8 return_code\naction_msgs/GoalInfo[] goals_canceling\n",
     }

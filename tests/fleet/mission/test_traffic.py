@@ -143,36 +143,25 @@ def sees_in(area):
     return sees
 
 
+def area_of(free, cell):
+    return ReachableArea.around(CoverageLattice.from_free(free, 0.25), cell)
+
+
+def refuge_of(area, cell, *others, place=None, sees=None):
+    """The way of a robot in a cell, or at a place in it, out of the way of others."""
+    near = {other.robot: Neighbour(other, 0.0, 0.0, PACE_S_M) for other in others}
+    here, sees = place or at(cell), sees or sees_in(area)
+    return refuge(area, cell, here, RADIUS_M, near, area.lattice.centres, sees)
+
+
 def test_a_refuge_and_its_way_avoid_discs_and_paths():
     free = np.zeros((12, 24), np.bool_)
     free[5], free[6:9, 4] = True, True  # a corridor with a niche
-    lattice = CoverageLattice.from_free(free, 0.25)
-    area = ReachableArea.around(lattice, (5, 8))
-    other = heard("r2", (3.2, 1.375), (0.1, 1.375))
-    way = refuge(
-        area,
-        (5, 8),
-        at((5, 8)),
-        RADIUS_M,
-        {"r2": Neighbour(other, 0.0, 0.0, PACE_S_M)},
-        lattice.centres,
-        sees_in(area),
-    )
+    way = refuge_of(area_of(free, (5, 8)), (5, 8), heard("r2", (3.2, 1.375), (0.1, 1.375)))
     assert tuple(way[-1].tolist()) in {(7, 4), (5, 2)}
     # Behind the other there is a place, too, but no way to it.
     free[6:9, 4] = False
-    lattice = CoverageLattice.from_free(free, 0.25)
-    area = ReachableArea.around(lattice, (5, 8))
-    other = heard("r2", (1.2, 1.375), (3.2, 1.375))
-    way = refuge(
-        area,
-        (5, 8),
-        at((5, 8)),
-        RADIUS_M,
-        {"r2": Neighbour(other, 0.0, 0.0, PACE_S_M)},
-        lattice.centres,
-        sees_in(area),
-    )
+    way = refuge_of(area_of(free, (5, 8)), (5, 8), heard("r2", (1.2, 1.375), (3.2, 1.375)))
     assert way[-1, 1] > 13
 
 
@@ -180,11 +169,9 @@ def test_the_way_to_a_refuge_leads_round_the_disc_of_the_other():
     # A ring of corridors: the other one comes from the east, where the way would be shorter.
     free = np.ones((3, 6), np.bool_)
     free[1, 1:5] = False
-    lattice = CoverageLattice.from_free(free, 0.25)
-    area = ReachableArea.around(lattice, (0, 2))
+    area = area_of(free, (0, 2))
     ahead = [(0.125, 0.125), (0.125, 0.625), (0.625, 0.625)]
-    near = {"r2": Neighbour(heard("r2", (1.125, 0.125), *ahead), 0.0, 0.0, PACE_S_M)}
-    way = refuge(area, (0, 2), at((0, 2)), RADIUS_M, near, lattice.centres, sees_in(area))
+    way = refuge_of(area, (0, 2), heard("r2", (1.125, 0.125), *ahead))
     assert way.tolist()[-1] == [2, 4]
     assert [0, 0] in way.tolist()
     assert len(area.shortest_path((0, 2), (2, 4))) < len(way)
@@ -193,28 +180,25 @@ def test_the_way_to_a_refuge_leads_round_the_disc_of_the_other():
 def test_a_robot_close_to_another_escapes_past_cells_near_it():
     free = np.zeros((2, 12), np.bool_)
     free[0, 4], free[1, 4:] = True, True
-    lattice = CoverageLattice.from_free(free, 0.25)
-    area = ReachableArea.around(lattice, (0, 4))
-    near = {"r2": Neighbour(heard("r2", (0.7, 0.45), at((0, 4))), 0.0, 0.0, PACE_S_M)}
+    area = area_of(free, (0, 4))
+    other = heard("r2", (0.7, 0.45), at((0, 4)))
     # 0.41 m from the other; its cell is at 0.54 m, the next one of the way at 0.43 m.
-    way = refuge(area, (0, 4), (1.02, 0.2), RADIUS_M, near, lattice.centres, sees_in(area))
+    way = refuge_of(area, (0, 4), other, place=(1.02, 0.2))
     assert way is not None
     assert way.tolist() == [[0, 4], [1, 4], [1, 5], [1, 6]]
-    assert refuge(area, (0, 4), at((0, 4)), RADIUS_M, near, lattice.centres, sees_in(area)) is None
+    assert refuge_of(area, (0, 4), other) is None
 
 
 def test_a_way_out_of_a_doorway_may_begin_beside_the_own_cell():
     # Two stood in a doorway for good: the way through the next cell led round a corner, nearer to
     # the other; the way on which it had come led straight away, from a cell beside its own.
-    lattice = CoverageLattice.from_free(np.ones((6, 12), np.bool_), 0.25)
-    area = ReachableArea.around(lattice, (2, 5))
+    area = area_of(np.ones((6, 12), np.bool_), (2, 5))
     (x, y), behind = at((2, 5)), at((1, 4))
-    near = {"r2": Neighbour(heard("r2", (x, y + 0.3), (x, y)), 0.0, 0.0, PACE_S_M)}
 
     def sees(_, to):
         return math.dist(to, behind) < 0.01
 
-    way = refuge(area, (2, 5), (x, y), RADIUS_M, near, lattice.centres, sees)
+    way = refuge_of(area, (2, 5), heard("r2", (x, y + 0.3), (x, y)), sees=sees)
     assert tuple(way[0].tolist()) == (1, 4)
 
 
@@ -222,16 +206,9 @@ def test_cells_far_from_one_robot_are_no_way_through_another():
     # A corridor: r1 stands in it, and r2 comes from the other side.
     free = np.zeros((3, 24), np.bool_)
     free[1] = True
-    lattice = CoverageLattice.from_free(free, 0.25)
-    area = ReachableArea.around(lattice, (1, 8))
-    near = {
-        name: Neighbour(other, 0.0, 0.0, PACE_S_M)
-        for name, other in (
-            ("r1", heard("r1", at((1, 5)))),
-            ("r2", heard("r2", at((1, 12)), at((1, 7)))),
-        )
-    }
-    assert refuge(area, (1, 8), at((1, 8)), RADIUS_M, near, lattice.centres, sees_in(area)) is None
+    area = area_of(free, (1, 8))
+    others = heard("r1", at((1, 5))), heard("r2", at((1, 12)), at((1, 7)))
+    assert refuge_of(area, (1, 8), *others) is None
 
 
 def test_a_refuge_is_sought_only_among_cells_around_the_robot():
@@ -239,19 +216,11 @@ def test_a_refuge_is_sought_only_among_cells_around_the_robot():
     free[5, 20:91] = free[5:11, 90] = free[10, 8:91] = True
     # At the other edge of these cells lies a room, connected far away only.
     free[6:11, 8:19] = True
-    lattice = CoverageLattice.from_free(free, 0.25)
-    area = ReachableArea.around(lattice, (5, 40))
+    area = area_of(free, (5, 40))
     # Others, beside the corridor, are to drive all along it.
-    near = {
-        f"r{x}": Neighbour(
-            heard(f"r{x}", (x, 2.0), (x, 1.375), (x + 1.0, 1.375)), 0.0, 0.0, PACE_S_M
-        )
-        for x in range(5, 24)
-    }
+    others = [heard(f"r{x}", (x, 2.0), (x, 1.375), (x + 1.0, 1.375)) for x in range(5, 24)]
     assert area.reachable[7, 16]
-    assert (
-        refuge(area, (5, 40), at((5, 40)), RADIUS_M, near, lattice.centres, sees_in(area)) is None
-    )
+    assert refuge_of(area, (5, 40), *others) is None
 
 
 def test_closed_cells_have_no_steps_left():
