@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from fasaco_edge.bus.session import Bus
     from fasaco_edge.config.config import DaemonConfig
     from fasaco_edge.errors import FasacoError
-    from fasaco_edge.mission.core.events import MemberHeard
+    from fasaco_edge.mission.core.events import MemberReceived
     from fasaco_edge.mission.core.mission import Mission
     from fasaco_edge.wire.documents.status import FleetReport
 
@@ -24,7 +24,7 @@ class MessagesOfOthers(Protocol):
     def listen(self, bus: Bus, post: Callable[[Sample], None]) -> None:
         """Pass on the messages of this fleet within their rate limit."""
 
-    def event(self, sample: Sample) -> MemberHeard | None:
+    def event(self, sample: Sample) -> MemberReceived | None:
         """Return a robot's message as an event; None from another fleet or from this robot.
 
         Raises:

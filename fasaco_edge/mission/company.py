@@ -20,7 +20,7 @@ from fasaco_edge.mission.coverage.ledger import Cells, LedgerSnapshot
 if TYPE_CHECKING:
     # For types only: an idle daemon loads no kernels.
     from fasaco_edge.grid.lattice import Cell
-    from fasaco_edge.mission.core.events import MemberHeard, PathUpdate
+    from fasaco_edge.mission.core.events import MemberReceived, PathUpdate
     from fasaco_edge.mission.map.reachable_area import ReachableArea
     from fasaco_edge.mission.orders.order import Errand
 
@@ -104,7 +104,7 @@ class Company:
         """Whether only parts of other robots are left, and these make progress."""
         return False
 
-    def hear(self, event: MemberHeard, now: float) -> str:
+    def receive(self, event: MemberReceived, now: float) -> str:
         """Take in another robot's message; return why it requires a plan, or ""."""
         return ""
 

@@ -293,12 +293,12 @@ class TrailPublisher:
 
     def publish(self, mission: Mission, now: float) -> None:
         """Publish or keep the trail if due."""
-        is_heard = self._outbox.shows_pheromone
-        if not is_heard:
+        has_subscribers = self._outbox.shows_pheromone
+        if not has_subscribers:
             self._published = ()  # the next listener has not received it
         trail, lattice, grid = mission.trail, mission.lattice, mission.grid
         key = (trail, trail.changes)
-        is_known = key == self._kept and (not is_heard or key == self._published)
+        is_known = key == self._kept and (not has_subscribers or key == self._published)
         if is_known or now < self._due or grid is None or lattice is None:
             return
         held = trail.snapshot()
@@ -313,6 +313,6 @@ class TrailPublisher:
         )
         self._kept = key
         self._outbox.keep_trail(shown)
-        if is_heard:
+        if has_subscribers:
             self._published = key
             self._outbox.trail(shown)

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 
 # Robots that others received messages from within this time get the command, too [s].
-HEARD_S = 600.0
+RECENT_S = 600.0
 # Number of robots asked at a time: one that does not answer delays none of the others.
 AT_ONCE = 64
 
@@ -113,8 +113,8 @@ def _robots(bus: Bus, keys: Keys, fleet: str, timeout_s: float) -> list[str]:
     names = set[str]()
     for status in statuses:
         if status.fleet and status.fleet.name == fleet:
-            heard = (member for member in status.fleet.members if member.heard_s <= HEARD_S)
-            names |= {status.robot, *(member.name for member in heard)}
+            members = (member for member in status.fleet.members if member.heard_s <= RECENT_S)
+            names |= {status.robot, *(member.name for member in members)}
     if robots := sorted(name for name in names if is_chunk(name)):
         return robots
     fleets = one_line(", ".join(sorted({_fleet(status) for status in statuses} - {""})))

@@ -10,7 +10,7 @@ from collections import deque
 
 from fasaco_edge.bus.arrival import Sample
 from fasaco_edge.errors import FasacoError, FleetError
-from fasaco_edge.fleet.mission.frames import MOST_HEARD
+from fasaco_edge.fleet.mission.frames import MOST_OTHERS
 from fasaco_edge.wire.documents.fleet import fleet_of
 from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.limits import MAX_JSON_BYTES
@@ -33,7 +33,7 @@ class FleetArrivals:
         self._keys, self._fleet = keys, fleet
         # Times of the messages accepted from this fleet, by key, and of those decoded from other
         # publishers [s]; the key with the oldest message is first.
-        self._heard_at: dict[str, float] = {}
+        self._received_at: dict[str, float] = {}
         self._strange_at: dict[str, float] = {}
         # Time of the last passed-on message that names no fleet: only its fault is used.
         self._unreadable_at = float("-inf")
@@ -45,16 +45,16 @@ class FleetArrivals:
         key, spaced = sample.key, now - LEAST_SPACING_S
         if self._keys.robot_of(key) in ("", self._keys.robot):
             return False
-        if max(_time(self._heard_at, key), _time(self._strange_at, key)) > spaced:
+        if max(_time(self._received_at, key), _time(self._strange_at, key)) > spaced:
             return False
         fleet = fleet_of(sample.payload) if sample.size <= MAX_JSON_BYTES else None
         is_mate = fleet == self._fleet
-        if key in self._heard_at and (is_mate or fleet is None):
-            _note(self._heard_at, key, now)
+        if key in self._received_at and (is_mate or fleet is None):
+            _note(self._received_at, key, now)
             return True
         if is_mate:
             return self._has_place(key, now)
-        if len(self._strange_at) >= MOST_HEARD and key not in self._strange_at:
+        if len(self._strange_at) >= MOST_OTHERS and key not in self._strange_at:
             del self._strange_at[next(iter(self._strange_at))]
         _note(self._strange_at, key, now)
         if fleet is not None or self._unreadable_at > spaced:
@@ -68,18 +68,18 @@ class FleetArrivals:
 
     def _has_place(self, key: str, now: float) -> bool:
         """Give a free place to another robot of this fleet; return whether there was one."""
-        if len(self._heard_at) >= MOST_HEARD:
-            longest = next(iter(self._heard_at))
-            if now - self._heard_at[longest] < FORGOTTEN_S:
+        if len(self._received_at) >= MOST_OTHERS:
+            longest = next(iter(self._received_at))
+            if now - self._received_at[longest] < FORGOTTEN_S:
                 if not self._has_refused:
                     self._has_refused = True
-                    text = f"at most {MOST_HEARD} others of fleet {self._fleet!r} are kept"
+                    text = f"at most {MOST_OTHERS} others of fleet {self._fleet!r} are kept"
                     self._faults.append(FleetError(f"{self._keys.robot_of(key)}: {text}"))
                 return False
-            del self._heard_at[longest]
+            del self._received_at[longest]
         self._strange_at.pop(key, None)
         self._has_refused = False
-        _note(self._heard_at, key, now)
+        _note(self._received_at, key, now)
         return True
 
 

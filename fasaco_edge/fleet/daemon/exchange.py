@@ -19,11 +19,11 @@ from fasaco_edge.config.config import DaemonConfig, FleetConfig
 from fasaco_edge.errors import FasacoError, FleetError
 from fasaco_edge.fleet.daemon.arrivals import FleetArrivals
 from fasaco_edge.fleet.mission.frames import FleetFrames
-from fasaco_edge.fleet.mission.ground import GroundTelling
+from fasaco_edge.fleet.mission.ground import GroundQueue
 from fasaco_edge.fleet.mission.kind import FleetKind, fleet_of
-from fasaco_edge.fleet.mission.shared import MapPlace, Telling
+from fasaco_edge.fleet.mission.shared import MapPlace, SweptQueue
 from fasaco_edge.grid.geometry import Pose2D
-from fasaco_edge.mission.core.events import MemberHeard, Part
+from fasaco_edge.mission.core.events import MemberReceived, Part
 from fasaco_edge.wire.documents.fleet import (
     FLEET_VERSION,
     CellTile,
@@ -83,7 +83,7 @@ class FleetReceiver:
 
         bus.subscribe(self._keys.of_all(FLEET), post_due)
 
-    def event(self, sample: Sample) -> MemberHeard | None:
+    def event(self, sample: Sample) -> MemberReceived | None:
         """Return a robot's message as an event; None from another fleet or from this robot.
 
         Raises:
@@ -95,7 +95,7 @@ class FleetReceiver:
         try:
             member = decode_member(sample.payload, self._fleet)
         except FleetError as error:
-            return MemberHeard(robot, misfit=str(error))
+            return MemberReceived(robot, misfit=str(error))
         except FasacoError as error:
             raise type(error)(f"{robot}: {error}") from error
         if member is None:
@@ -110,7 +110,7 @@ class FleetReceiver:
                 f"its cells lie at {member.lattice_deg:g} degrees to the map frame, here at "
                 f"{self._lattice_deg:g}"
             )
-        heard = MemberHeard(
+        received = MemberReceived(
             robot=robot,
             misfit=misfit,
             frame=member.frame,
@@ -133,9 +133,9 @@ class FleetReceiver:
             kept=None if member.kept is None else _placed(member.kept),
         )
         if self._frames is None or misfit:
-            return heard
-        placed = self._frames.event(heard, _pose(*member.origin), member.lattice_deg)
-        if heard.parts and not placed.parts:
+            return received
+        placed = self._frames.event(received, _pose(*member.origin), member.lattice_deg)
+        if received.parts and not placed.parts:
             self._faults.append(
                 FleetError(f"{robot}: its division has a seed farther off than cells may lie here")
             )
@@ -160,11 +160,11 @@ class FleetSender:
         self._publisher, self._fleet, self._cell_m = publisher, config.fleet.name, config.cell_m
         self._radius_m = config.robot.radius_m
         self._frame, self._origin = config.fleet.frame, _origin(config.fleet)
-        self._telling, self._telling_ground = Telling(), GroundTelling()
+        self._swept, self._ground = SweptQueue(), GroundQueue()
         self._said: tuple[object, ...] = ()
         self._epoch = 0
         # When a message was published, and one with tiles in turn.
-        self._said_at = self._told_at = float("-inf")
+        self._said_at = self._tiles_at = float("-inf")
 
     def publish(self, mission: Mission, now: float) -> None:
         """Publish a message if due; the caller catches failures."""
@@ -175,27 +175,27 @@ class FleetSender:
         others = fleet_of(mission)
         is_near, waits_for = mission.giving_way.is_near, mission.waits_for
         key = mission.state, others.numbers.number, others.shared.epoch, waits_for
-        is_news, is_due = key != self._said, now - self._told_at >= PERIOD_S
+        is_news, is_due = key != self._said, now - self._tiles_at >= PERIOD_S
         if not (is_news or is_due or is_near):
             return
         self._said, self._said_at = key, now
         most = FEW_TILES if is_news else 0
         if is_due:
-            self._told_at, most = now, TILES
+            self._tiles_at, most = now, TILES
         tiles = mission.ledger.snapshot().tiles
         if others.shared.epoch != self._epoch:
             # Published changes are forgotten. Cells swept before a restart are not known.
             before = tiles if self._epoch else None
-            self._epoch, self._telling, most = others.shared.epoch, Telling(before), TILES
-        swept = self._telling.next(tiles, most)
-        kept = self._telling.kept(swept)
-        ground = self._telling_ground.next(mission.area, most)
+            self._epoch, self._swept, most = others.shared.epoch, SweptQueue(before), TILES
+        swept = self._swept.next(tiles, most)
+        kept = self._swept.kept(swept)
+        ground = self._ground.next(mission.area, most)
         member = FleetMember(
             version=FLEET_VERSION,
             fleet=self._fleet,
             cell_m=self._cell_m,
             lattice_deg=mission.rotation.deg,
-            frame=self._frame_told(mission),
+            frame=self._frame_sent(mission),
             state=str(mission.state),
             x=round(stamped.pose.x, 3),
             y=round(stamped.pose.y, 3),
@@ -218,7 +218,7 @@ class FleetSender:
         )
         self._publisher.put(encode_json(member))
 
-    def _frame_told(self, mission: Mission) -> str:
+    def _frame_sent(self, mission: Mission) -> str:
         """Return the frame of the fleet; the map's own frame if the map has no place in it."""
         frame = mission.ledger.frame
         if not fleet_of(mission).shared.why_misplaced(frame):
@@ -260,7 +260,7 @@ def report(fleet: str, mission: Mission | None, now: float) -> FleetReport:
         MemberReport(
             name,
             member.newest.state,
-            round(max(now - member.heard_at, 0.0), 1),
+            round(max(now - member.received_at, 0.0), 1),
             member.absence(now) or None,
             others.shared.cells_of(name),
         )

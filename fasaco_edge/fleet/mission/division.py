@@ -77,8 +77,8 @@ class Division:
     @property
     def parts(self) -> tuple[Part, ...]:
         """The division as it is sent to other robots."""
-        told = zip(self.robots, self.seeds, self.handicaps_s, strict=True)
-        return tuple(Part(robot.name, seed, s, robot.step_s) for robot, seed, s in told)
+        made = zip(self.robots, self.seeds, self.handicaps_s, strict=True)
+        return tuple(Part(robot.name, seed, s, robot.step_s) for robot, seed, s in made)
 
     def is_like(self, other: Division) -> bool:
         """Return whether it assigns all cells as another one; places of robots do not matter."""

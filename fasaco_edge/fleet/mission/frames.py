@@ -16,12 +16,12 @@ import numpy as np
 from fasaco_edge.fleet.mission.shared import MOST_TILES_OF_ONE
 from fasaco_edge.fleet.mission.tiles import EMPTY, Placed, bits_of, packed, unpacked
 from fasaco_edge.grid.geometry import MOST_INDEX, Point, Pose2D
-from fasaco_edge.mission.core.events import MemberHeard
+from fasaco_edge.mission.core.events import MemberReceived
 from fasaco_edge.mission.coverage.ledger import TILE
 
 # Number of robots tracked at once. It exceeds the number of members: a refused robot may become a
 # member, and its tiles come one after the other.
-MOST_HEARD = 64
+MOST_OTHERS = 64
 
 # Overlaps of tiles below this are ignored, and so are angles due to rounding [cells], [rad].
 TOUCH, STRAIGHT = 1e-6, 1e-9
@@ -60,10 +60,10 @@ class Relaid:
         # Places of the tiles that had a cell.
         self._shown: set[tuple[int, int]] = set()
 
-    def tiles(self, told: Iterable[Placed]) -> tuple[Placed, ...]:
+    def tiles(self, tiles: Iterable[Placed]) -> tuple[Placed, ...]:
         """Return all tiles of this robot's lattice that overlap the other's new tiles."""
         wanted: set[tuple[int, int]] = set()
-        for place, bits in told:
+        for place, bits in tiles:
             if place not in self._given and len(self._given) >= MOST_TILES_OF_ONE:
                 continue
             below = self._below(place)
@@ -133,34 +133,36 @@ class FleetFrames:
         # oldest message is first.
         self._robots: dict[str, tuple[int, Relaid, Relaid]] = {}
 
-    def event(self, heard: MemberHeard, map_frame: Pose2D, lattice_deg: float) -> MemberHeard:
+    def event(
+        self, message: MemberReceived, map_frame: Pose2D, lattice_deg: float
+    ) -> MemberReceived:
         """Return another robot's message in this robot's frames.
 
         Its division is dropped if a seed lies too far away for a message of this robot.
 
         Args:
-            heard: the message in the robot's own frames.
+            message: the message in the robot's own frames.
             map_frame, lattice_deg: as of ``FleetFrames``, of the other robot.
         """
         frame = seen_from(map_frame, self._map_frame)
         lattice = seen_from(turned(map_frame, lattice_deg), self._lattice)
-        epoch, swept, ground = self._of(heard.robot, heard.epoch, lattice)
-        self._robots.pop(heard.robot, None)
-        self._robots[heard.robot] = epoch, swept, ground
-        x, y = placed_point(frame, heard.x, heard.y)
-        parts = tuple(replace(part, seed=swept.cell(*part.seed)) for part in heard.parts)
+        epoch, swept, ground = self._of(message.robot, message.epoch, lattice)
+        self._robots.pop(message.robot, None)
+        self._robots[message.robot] = epoch, swept, ground
+        x, y = placed_point(frame, message.x, message.y)
+        parts = tuple(replace(part, seed=swept.cell(*part.seed)) for part in message.parts)
         if any(abs(index) > MOST_INDEX for part in parts for index in part.seed):
-            heard, parts = replace(heard, division=0, by=""), ()
+            message, parts = replace(message, division=0, by=""), ()
         return replace(
-            heard,
+            message,
             frame="",
             x=x,
             y=y,
-            ahead=tuple(placed_point(frame, *point) for point in heard.ahead),
-            tiles=swept.tiles(heard.tiles),
+            ahead=tuple(placed_point(frame, *point) for point in message.ahead),
+            tiles=swept.tiles(message.tiles),
             # A tile here is made of several of theirs, which arrive one after the other.
             kept=None,
-            ground=ground.tiles(heard.ground),
+            ground=ground.tiles(message.ground),
             parts=parts,
             lattice=lattice,
         )
@@ -168,7 +170,7 @@ class FleetFrames:
     def _of(self, robot: str, epoch: int, lattice: Pose2D) -> tuple[int, Relaid, Relaid]:
         """Return what is known of a robot; nothing once its frame has moved."""
         known = self._robots.get(robot)
-        if known is None and len(self._robots) >= MOST_HEARD:
+        if known is None and len(self._robots) >= MOST_OTHERS:
             del self._robots[next(iter(self._robots))]
         if known is None or known[1].lattice != lattice:
             return epoch, Relaid(lattice, self._cell_m), Relaid(lattice, self._cell_m)

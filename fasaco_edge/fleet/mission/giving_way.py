@@ -206,13 +206,13 @@ class GivingWay(Waiting):
         return {
             name: min(
                 self._clear_m(near),
-                float(np.hypot(*(line - (near.heard.x, near.heard.y)).T).min()),
+                float(np.hypot(*(line - (near.message.x, near.message.y)).T).min()),
             )
             for name, near in neighbours.items()
         }
 
     def _clear_m(self, near: Neighbour) -> float:
-        return least_apart_m(self._radius_m, near.heard)
+        return least_apart_m(self._radius_m, near.message)
 
     def _is_in(self, refuge: Cell, here: tuple[float, float]) -> bool:
         """Return whether the robot has arrived in its refuge: at its edge it may be in the way."""
@@ -252,8 +252,8 @@ class GivingWay(Waiting):
     ) -> Obstruction | None:
         """Return the robot that this one stands beside; None for none."""
         for name, near in sorted(neighbours.items()):
-            reach_m = self._radius_m + near.heard.radius_m + BESIDE_M
-            if math.dist(here, (near.heard.x, near.heard.y)) < reach_m:
+            reach_m = self._radius_m + near.message.radius_m + BESIDE_M
+            if math.dist(here, (near.message.x, near.message.y)) < reach_m:
                 return Obstruction(name, is_blocked=True)
         return None
 
@@ -303,5 +303,5 @@ class GivingWay(Waiting):
 
 def _is_near(here: tuple[float, float], neighbours: Mapping[str, Neighbour]) -> bool:
     return any(
-        math.dist((near.heard.x, near.heard.y), here) < NEAR_M for near in neighbours.values()
+        math.dist((near.message.x, near.message.y), here) < NEAR_M for near in neighbours.values()
     )

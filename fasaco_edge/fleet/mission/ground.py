@@ -7,13 +7,22 @@ its map a door seen only in part looks shut: ``with_doors`` adds the cells beyon
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Iterable
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.fleet.mission.shared import MOST_TILES_OF_ONE
-from fasaco_edge.fleet.mission.tiles import EMPTY, Placed, bits_of, packed, unpacked, window_of
+from fasaco_edge.fleet.mission.tiles import (
+    EMPTY,
+    Placed,
+    TileQueue,
+    bits_of,
+    packed,
+    unpacked,
+    window_of,
+)
 from fasaco_edge.grid.changes import carried
 from fasaco_edge.grid.geometry import Window
 from fasaco_edge.grid.lattice import BLOCKED, COVERABLE, UNKNOWN, Cell, CoverageLattice
@@ -38,7 +47,7 @@ class SharedGround:
         # The last joint areas, without and with doors, and the inputs of each.
         self._last: dict[bool, tuple[ReachableArea, int, ReachableArea]] = {}
 
-    def hear(self, robot: str, tiles: Iterable[Placed]) -> None:
+    def receive(self, robot: str, tiles: Iterable[Placed]) -> None:
         """Take in a robot's tiles, each with TILE_BYTES of bits; a newer tile replaces an older."""
         known = self._robots.setdefault(robot, {})
         for place, bits in tiles:
@@ -80,8 +89,8 @@ class SharedGround:
     def _merged(self) -> dict[Cell, NDArray[np.uint8]]:
         merged: dict[Cell, NDArray[np.uint8]] = {}
         for tiles in self._robots.values():
-            for place, told in tiles.items():
-                bits = bits_of(told)
+            for place, sent in tiles.items():
+                bits = bits_of(sent)
                 merged[place] = merged[place] | bits if place in merged else bits
         return merged
 
@@ -117,12 +126,11 @@ def viewpoint(
     return seen
 
 
-class GroundTelling:
-    """Selects the tiles of the next report: changed ones first, then all others in turn."""
+class GroundQueue:
+    """Selects the tiles of the next message, see ``TileQueue``."""
 
     def __init__(self) -> None:
-        # The tiles reported, in the order of reporting.
-        self._told: dict[Cell, bytes] = {}
+        self._queue = TileQueue[bytes](operator.eq)
         self._area: ReachableArea | None = None
         self._tiles: dict[Cell, bytes] = {}
 
@@ -130,15 +138,10 @@ class GroundTelling:
         """Return places and bits of a limited number of tiles."""
         if area is not self._area and area is not None:
             self._area, self._tiles = area, _tiles_of(area)
-            # What is no longer reachable is reported as empty.
-            self._tiles |= {place: EMPTY for place in self._told if place not in self._tiles}
-        tiles = self._tiles
-        new = [place for place, bits in tiles.items() if self._told.get(place) != bits]
-        chosen = [*sorted(new), *(place for place in self._told if place not in new)][:most]
-        for place in chosen:
-            self._told.pop(place, None)
-            self._told[place] = tiles[place]
-        return tuple((place, tiles[place]) for place in chosen)
+            # What is no longer reachable is sent as empty.
+            gone = [place for place in self._queue.sent if place not in self._tiles]
+            self._tiles |= dict.fromkeys(gone, EMPTY)
+        return tuple((place, self._tiles[place]) for place in self._queue.next(self._tiles, most))
 
 
 def _joined(
@@ -165,11 +168,11 @@ def _joined(
         if common := whole.intersection(around):
             cells = unpacked(tiles[place])
             ground[common.slices_in(around)] |= cells[common.slices_in(whole)]
-    inside, told = window.slices_in(around), ground.copy()
+    inside, known = window.slices_in(around), ground.copy()
     ground[inside] &= lattice.states == UNKNOWN
     door = np.zeros_like(ground)
     if doors:
-        door[inside] = told[inside] & (lattice.states == BLOCKED)
+        door[inside] = known[inside] & (lattice.states == BLOCKED)
     if not (ground | door).any():
         return area
     own = np.zeros_like(ground)
@@ -191,7 +194,7 @@ def _joined(
     first = int(seeds[0, 0]) + around.row0, int(seeds[0, 1]) + around.col0
     joined = ReachableArea.around(whole_lattice, first).reachable
     # Own cells that no robot can reach through the ground of others may lie behind a wall there.
-    return ReachableArea(whole_lattice, joined & (reached | told) & ~door)
+    return ReachableArea(whole_lattice, joined & (reached | known) & ~door)
 
 
 def _tiles_of(area: ReachableArea) -> dict[Cell, bytes]:

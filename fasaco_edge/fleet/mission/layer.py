@@ -22,7 +22,7 @@ from fasaco_edge.grid.changes import carried
 from fasaco_edge.grid.geometry import Window
 from fasaco_edge.grid.lattice import Cell
 from fasaco_edge.mission.company import Company, OpenCells
-from fasaco_edge.mission.core.events import MemberHeard, Part
+from fasaco_edge.mission.core.events import MemberReceived, Part
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
 from fasaco_edge.mission.map.map_state import MapState
 from fasaco_edge.mission.map.reachable_area import ReachableArea
@@ -79,9 +79,9 @@ class FleetLayer(Company):
         self._taken, self._counted = 0, 0
         self._remainder = Remainder()
 
-    def hear(self, event: MemberHeard, now: float) -> str:
+    def receive(self, event: MemberReceived, now: float) -> str:
         """Take in another robot's message; return why it requires a plan, or ""."""
-        return self.others.hear(event, now)
+        return self.others.receive(event, now)
 
     def forget_ground(self) -> None:
         """Forget the ground of others: it belongs to another map."""
@@ -218,7 +218,7 @@ class FleetLayer(Company):
         inside = area.lattice.window.slices_in(joint.lattice.window)
         own = left if before is None else left & self._of_me(before, joint)
         at_work = [one.newest for one in self.members.values() if not one.absence(now)]
-        self._remainder.note_others(now, wait=all(heard.waits_for for heard in at_work))
+        self._remainder.note_others(now, wait=all(other.waits_for for other in at_work))
         swept = self._ledger.shared.swept(joint.lattice.window) & joint.reachable
         swept_cells = int(np.count_nonzero(swept))
         self._remainder.note(int(left.sum()), int(own.sum()), swept_cells, now)

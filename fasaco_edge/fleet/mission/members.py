@@ -15,7 +15,7 @@ from fasaco_edge.fleet.mission.shared import MOST_ROBOTS, SharedProgress
 from fasaco_edge.fleet.mission.traffic import OLD_S, Neighbour, least_apart_m
 from fasaco_edge.grid.geometry import Window
 from fasaco_edge.grid.lattice import Cell
-from fasaco_edge.mission.core.events import MemberHeard, State
+from fasaco_edge.mission.core.events import MemberReceived, State
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
 from fasaco_edge.mission.map.reachable_area import ReachableArea
 
@@ -36,31 +36,31 @@ class Member:
 
     Attributes:
         newest: its newest message.
-        heard_at: time of its newest message [s].
+        received_at: time of its newest message [s].
         left_out: why it does not belong to this fleet; "" if it does.
         place: its position x, y, to within STANDING_M [m].
         moved_at: time of the last motion [s].
         left_at: when it last left a new division [s].
     """
 
-    newest: MemberHeard
-    heard_at: float
+    newest: MemberReceived
+    received_at: float
     left_out: str
     place: tuple[float, float]
     moved_at: float
     left_at: float = float("-inf")
 
-    def has_moved(self, heard: MemberHeard) -> bool:
+    def has_moved(self, message: MemberReceived) -> bool:
         """Return whether it has moved, has started to work, or has just ended a wait."""
-        has_begun = self.newest.state not in AT_WORK and heard.state in AT_WORK
-        has_begun |= bool(self.newest.waits_for) and not heard.waits_for
-        return has_begun or math.dist(self.place, (heard.x, heard.y)) > STANDING_M
+        has_begun = self.newest.state not in AT_WORK and message.state in AT_WORK
+        has_begun |= bool(self.newest.waits_for) and not message.waits_for
+        return has_begun or math.dist(self.place, (message.x, message.y)) > STANDING_M
 
     def absence(self, now: float) -> str:
         """Return why it takes no part now; "" if it does."""
         if self.left_out:
             return self.left_out
-        if now - self.heard_at > GONE_S:
+        if now - self.received_at > GONE_S:
             return GONE
         if self.newest.state not in AT_WORK:
             return self.newest.state
@@ -91,13 +91,13 @@ class Members:
         return {
             name: Neighbour(
                 member.newest,
-                now - member.heard_at,
+                now - member.received_at,
                 now - member.moved_at,
                 member.newest.step_s / self._cell_m,
                 self._is_at_avoided(name),
             )
             for name, member in self.known.items()
-            if not member.left_out and now - member.heard_at < OLD_S
+            if not member.left_out and now - member.received_at < OLD_S
         }
 
     @property
@@ -131,7 +131,7 @@ class Members:
         silent = [
             name
             for name in sorted(self._avoided)
-            if name not in self.known or now - self.known[name].heard_at >= OLD_S
+            if name not in self.known or now - self.known[name].received_at >= OLD_S
         ]
         for name in silent:
             del self._avoided[name]
@@ -170,7 +170,7 @@ class Members:
         closed[lattice.local(cell)] = False
         return ReachableArea.around(replace(lattice, steps=without(lattice.steps, closed)), cell)
 
-    def hear(self, event: MemberHeard, now: float) -> str:
+    def receive(self, event: MemberReceived, now: float) -> str:
         """Take in another robot's message; return why it requires a plan, or "".
 
         Raises:
@@ -197,12 +197,12 @@ class Members:
             self.ground.drop(event.robot)
         swept = event.robot, event.epoch, event.tiles
         try:
-            is_open_again = self.shared.hear(*swept, self.known, event.kept, event.lattice)
+            is_open_again = self.shared.receive(*swept, self.known, event.kept, event.lattice)
         except FleetError as error:
             self.known[event.robot] = replace(member, left_out=str(error))
             self.ground.drop(event.robot)
             raise
-        self.ground.hear(event.robot, event.ground)
+        self.ground.receive(event.robot, event.ground)
         return f"{event.robot}: cells must be swept again" if is_open_again else ""
 
     def division_numbers(self) -> dict[str, int]:
@@ -222,8 +222,8 @@ class Members:
         """
         if len(self.known) < MOST_ROBOTS:
             return
-        name = min(self.known, key=lambda name: (self.known[name].heard_at, name))
-        if now - self.known[name].heard_at <= GONE_S:
+        name = min(self.known, key=lambda name: (self.known[name].received_at, name))
+        if now - self.known[name].received_at <= GONE_S:
             raise FleetError(f"{robot}: at most {MOST_ROBOTS} others of a fleet are kept")
         del self.known[name]
         self.ground.drop(name)

@@ -26,8 +26,8 @@ Sees = Callable[[Points, Points], bool]
 
 def discs(radius_m: float, neighbours: Mapping[str, Neighbour]) -> Points:
     """Return where the middle of a robot's disc is too near to others, as ``Route.beside``."""
-    heard = [near.heard for _, near in sorted(neighbours.items())]
-    rows = [(one.x, one.y, least_apart_m(radius_m, one)) for one in heard]
+    messages = [near.message for _, near in sorted(neighbours.items())]
+    rows = [(one.x, one.y, least_apart_m(radius_m, one)) for one in messages]
     return np.array(rows, np.float64).reshape(-1, 3)
 
 
@@ -67,13 +67,13 @@ def refuge(
     local = row - rows.start, col - cols.start
     here = (at == local).all(axis=1)
     for near in neighbours.values():
-        heard = near.heard
-        clear_m = least_apart_m(radius_m, heard)
-        theirs = spaced([(heard.x, heard.y), *heard.ahead])
+        message = near.message
+        clear_m = least_apart_m(radius_m, message)
+        theirs = spaced([(message.x, message.y), *message.ahead])
         apart = np.hypot(*(points[:, None] - theirs[None]).transpose(2, 0, 1))
         is_free &= (apart >= clear_m).all(axis=1)
         # A robot that is too near to another may only go where the distance grows.
-        is_farther = apart[:, 0] > math.dist(place, (heard.x, heard.y)) + 1e-6
+        is_farther = apart[:, 0] > math.dist(place, (message.x, message.y)) + 1e-6
         is_passable &= (apart[:, 0] >= clear_m) | here | is_farther
     closed = np.zeros(area.reachable[rows, cols].shape, np.bool_)
     closed[tuple(at[~is_passable].T)] = True

@@ -13,6 +13,7 @@ which no message arrived, they stay disregarded, and are swept once more than ne
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
@@ -23,12 +24,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.errors import FleetError
-from fasaco_edge.fleet.mission.heard import Heard, Kept
+from fasaco_edge.fleet.mission.member_cells import Kept, MemberCells
 from fasaco_edge.fleet.mission.tiles import (
     EMPTY,
     TILE_BYTES,
     Bits,
     Placed,
+    TileQueue,
     bits_of,
     packed,
     unpacked,
@@ -80,7 +82,7 @@ class SharedProgress(OthersCells):
         self._left = ""
         self.epoch = 0
         self.version = 0
-        self._robots: dict[str, Heard] = {}
+        self._robots: dict[str, MemberCells] = {}
         # The last query and its result; the tiles that have gained cells since.
         self._known: tuple[Window | None, NDArray[np.bool_]]
         self._known = None, np.zeros((0, 0), np.bool_)
@@ -130,7 +132,7 @@ class SharedProgress(OthersCells):
         place = f"fleet.x_m, y_m and yaw_deg belong to {self._map_frame!r} (fleet.map_frame)"
         return f"{here}, {place}"
 
-    def hear(
+    def receive(
         self,
         robot: str,
         epoch: int,
@@ -152,34 +154,34 @@ class SharedProgress(OthersCells):
         Raises:
             FleetError: there is no room for its data.
         """
-        heard, has_lost = self._robots.get(robot), False
-        if heard is None:
+        member, has_lost = self._robots.get(robot), False
+        if member is None:
             has_lost = self._make_room(robot, members)
-            heard = self._robots[robot] = Heard(epoch, lattice)
-        if heard.lattice != lattice:
-            has_lost = bool(heard.tiles)
-            heard.move(epoch, lattice)
+            member = self._robots[robot] = MemberCells(epoch, lattice)
+        if member.lattice != lattice:
+            has_lost = bool(member.tiles)
+            member.move(epoch, lattice)
             self._note_lost()
-        elif heard.epoch != epoch:
-            has_lost = bool(heard.tiles)
+        elif member.epoch != epoch:
+            has_lost = bool(member.tiles)
             if sum(len(one.disregarded) for one in self._robots.values()) > MOST_TILES:
-                heard.drop_gone()
-            heard.begin(epoch)
+                member.drop_gone()
+            member.begin(epoch)
             self._note_lost()
         known = None if kept is None else dict(kept)
-        for place, told in tiles:
-            bits, before = bits_of(told), heard.tiles.get(place)
+        for place, sent in tiles:
+            bits, before = bits_of(sent), member.tiles.get(place)
             if before is None:
                 self._check_room(robot)
                 from_before = bits if known is None else bits & bits_of(known.get(place, EMPTY))
-                without = heard.disregarded.pop(place, np.uint8(0)) & from_before
+                without = member.disregarded.pop(place, np.uint8(0)) & from_before
                 if without.any():
-                    heard.disregarded[place] = without
+                    member.disregarded[place] = without
             after = bits if before is None else before | bits
             if before is None or not np.array_equal(before, after):
-                heard.tiles[place] = after
-                if heard.is_doubtful:
-                    heard.disregarded[place] = after
+                member.tiles[place] = after
+                if member.is_doubtful:
+                    member.disregarded[place] = after
                 self.version += 1
                 self._grown.add(place)
         return has_lost
@@ -204,9 +206,9 @@ class SharedProgress(OthersCells):
     def _swept_of(self, place: Cell) -> NDArray[np.bool_]:
         """Return which cells of a tile others have swept, bool (TILE, TILE)."""
         bits = np.zeros(TILE_BYTES, np.uint8)
-        for heard in self._robots.values():
-            if place in heard.tiles:
-                bits |= heard.counted(place)
+        for member in self._robots.values():
+            if place in member.tiles:
+                bits |= member.counted(place)
         return unpacked(bits)
 
     def _note_lost(self) -> None:
@@ -222,7 +224,7 @@ class SharedProgress(OthersCells):
         """
         for place in self._places():
             # Once for all robots: evaluating ``inside`` is the expensive part.
-            swept = (heard.tiles[place] for heard in self._robots.values() if place in heard.tiles)
+            swept = (one.tiles[place] for one in self._robots.values() if place in one.tiles)
             at = np.argwhere(unpacked(np.bitwise_or.reduce(list(swept))))
             rows, cols = (at + np.multiply(place, TILE)).T
             chosen = inside(rows, cols) if len(at) else np.zeros(0, np.bool_)
@@ -232,13 +234,13 @@ class SharedProgress(OthersCells):
                 self._disregard(place, np.packbits(marked))
 
     def _disregard(self, place: Cell, bits: Bits) -> None:
-        for heard in self._robots.values():
-            if place in heard.tiles and (gone := heard.tiles[place] & bits).any():
-                heard.disregarded[place] = gone | heard.disregarded.get(place, np.uint8(0))
+        for member in self._robots.values():
+            if place in member.tiles and (gone := member.tiles[place] & bits).any():
+                member.disregarded[place] = gone | member.disregarded.get(place, np.uint8(0))
         self._note_lost()
 
     def _places(self) -> set[Cell]:
-        return {place for heard in self._robots.values() for place in heard.tiles}
+        return {place for member in self._robots.values() for place in member.tiles}
 
     def clear(self) -> None:
         """Forget all reports: they belong to another frame or building."""
@@ -253,13 +255,13 @@ class SharedProgress(OthersCells):
 
     def cells_of(self, robot: str) -> int:
         """Return the number of a robot's cells that count."""
-        heard = self._robots.get(robot)
-        return 0 if heard is None else heard.count
+        member = self._robots.get(robot)
+        return 0 if member is None else member.count
 
     def encode(self) -> bytes:
         """Return everything as bytes, to be stored with the ledger; b"" for nothing."""
         if self._encoded[0] != self.version:
-            robots = {name: heard.kept() for name, heard in self._robots.items()}
+            robots = {name: member.kept() for name, member in self._robots.items()}
             note = _Note(_VERSION, self.epoch, robots, self._origin, self._map_frame, self._left)
             self._encoded = self.version, msgspec.json.encode(note)
         return self._encoded[1]
@@ -281,7 +283,7 @@ class SharedProgress(OthersCells):
         if is_in_place:
             self._map_frame = self._map_frame or note.map_frame
         robots = note.robots.items()
-        self._robots = {name: kept.heard(is_in_place=is_in_place) for name, kept in robots}
+        self._robots = {name: kept.restored(is_in_place=is_in_place) for name, kept in robots}
 
     @property
     def _origin(self) -> tuple[float, float, float] | None:
@@ -301,7 +303,7 @@ class SharedProgress(OthersCells):
     def _check_room(self, robot: str) -> None:
         if len(self._robots[robot].tiles) >= MOST_TILES_OF_ONE:
             raise FleetError(f"{robot}: {MOST_TILES_OF_ONE} tiles of a robot are kept at most")
-        if sum(len(heard.tiles) for heard in self._robots.values()) >= MOST_TILES:
+        if sum(len(member.tiles) for member in self._robots.values()) >= MOST_TILES:
             raise FleetError(f"{robot}: {MOST_TILES} tiles of others' progress are kept at most")
 
 
@@ -326,8 +328,8 @@ class _Note(msgspec.Struct, frozen=True):
     left: str = ""
 
 
-class Telling:
-    """Selects the tiles of the next report: new ones first, then all others in turn.
+class SweptQueue:
+    """Selects the tiles of the next message, see ``TileQueue``.
 
     Args:
         kept: the ledger's tiles when the epoch began; None if not known.
@@ -337,23 +339,17 @@ class Telling:
         self._kept = None
         if kept is not None:
             self._kept = {place: tile_bits(tile) for place, tile in kept.items()}
-        # Cells reported per tile, in the order of reporting.
-        self._told: dict[Cell, NDArray[np.uint16]] = {}
+        self._queue = TileQueue[NDArray[np.uint16]](operator.is_)
 
     def next(self, tiles: Mapping[Cell, NDArray[np.uint16]], most: int) -> tuple[Placed, ...]:
         """Return places and bits of a limited number of tiles of a ledger's snapshot."""
-        self._told = {place: tile for place, tile in self._told.items() if place in tiles}
-        new = [place for place, tile in tiles.items() if self._told.get(place) is not tile]
-        chosen = [*sorted(new), *(place for place in self._told if place not in new)][:most]
-        for place in chosen:
-            self._told.pop(place, None)
-            self._told[place] = tiles[place]
+        chosen = self._queue.next(tiles, most)
         return tuple((place, tile_bits(tiles[place])) for place in chosen)
 
-    def kept(self, told: Iterable[Placed]) -> tuple[Placed, ...] | None:
+    def kept(self, sent: Iterable[Placed]) -> tuple[Placed, ...] | None:
         """Return which cells of tiles were swept before this epoch; None if not known."""
         kept = self._kept
-        return None if kept is None else tuple((at, kept[at]) for at, _ in told if at in kept)
+        return None if kept is None else tuple((at, kept[at]) for at, _ in sent if at in kept)
 
 
 def tile_bits(tile: NDArray[np.uint16]) -> bytes:

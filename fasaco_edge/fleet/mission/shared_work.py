@@ -21,7 +21,7 @@ from fasaco_edge.fleet.mission.division import Division, Robot
 from fasaco_edge.fleet.mission.members import GONE, GONE_S, Members
 from fasaco_edge.grid.geometry import MOST_INDEX, Pose2D
 from fasaco_edge.grid.lattice import CoverageLattice
-from fasaco_edge.mission.core.events import MemberHeard
+from fasaco_edge.mission.core.events import MemberReceived
 from fasaco_edge.mission.map.reachable_area import ReachableArea, anchor_cell
 
 # Others make progress if the number of swept cells has grown within this time [s].
@@ -97,7 +97,7 @@ class DivisionNumbers:
         # Times of the first message of each robot whose number is too far ahead [s].
         self._too_far: dict[str, float] = {}
 
-    def newer(self) -> MemberHeard | None:
+    def newer(self) -> MemberReceived | None:
         """Return the newest division received above ``number`` that has a part for this robot.
 
         Newer divisions without this robot are skipped: their author takes this robot for absent.
@@ -110,30 +110,30 @@ class DivisionNumbers:
             and member.newest.division <= most
             and any(part.robot == self._robot for part in member.newest.parts)
         ]
-        first = min(found, key=lambda heard: (-heard.division, heard.by), default=None)
+        first = min(found, key=lambda message: (-message.division, message.by), default=None)
         mine = -self.number, self.by
         return first if first and (-first.division, first.by) < mine else None
 
-    def follow(self, newer: MemberHeard) -> None:
+    def follow(self, newer: MemberReceived) -> None:
         """Take over the number of a received division."""
         self.number, self.by = newer.division, newer.by
 
     def count_on(self) -> None:
         """Number a division that this robot makes: above all valid numbers received."""
         most = self._most_valid()
-        heard = [one for one in self._others.division_numbers().values() if one <= most]
-        self.number, self.by = min(max([self.number, *heard]) + 1, MOST_NUMBER), self._robot
+        numbers = [one for one in self._others.division_numbers().values() if one <= most]
+        self.number, self.by = min(max([self.number, *numbers]) + 1, MOST_NUMBER), self._robot
 
     def _most_valid(self) -> int:
         """Return the highest number that is no error."""
-        told = self._others.division_numbers()
-        first = min((number for number in told.values() if number), default=0)
+        numbers = self._others.division_numbers()
+        first = min((number for number in numbers.values() if number), default=0)
         most = (self.number or min(first, MOST_FIRST)) + MOST_AHEAD
-        too_far = {name for name, number in told.items() if most < number <= MOST_FIRST}
-        heard_at = {name: self._others.known[name].heard_at for name in too_far}
-        self._too_far = {name: self._too_far.get(name, at) for name, at in heard_at.items()}
-        is_long = {name for name in too_far if heard_at[name] - self._too_far[name] >= BELIEVED_S}
-        return max([most, *(told[name] for name in is_long)])
+        too_far = {name for name, number in numbers.items() if most < number <= MOST_FIRST}
+        newest = {name: self._others.known[name].received_at for name in too_far}
+        self._too_far = {name: self._too_far.get(name, at) for name, at in newest.items()}
+        is_long = {name for name in too_far if newest[name] - self._too_far[name] >= BELIEVED_S}
+        return max([most, *(numbers[name] for name in is_long)])
 
 
 class AtWork:

@@ -5,7 +5,8 @@ A tile has TILE x TILE cells; that of place (row, col) begins at cell (TILE * ro
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Generic, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,3 +46,32 @@ def unpacked(bits: Bits) -> NDArray[np.bool_]:
 def packed(cells: NDArray[np.bool_]) -> bytes:
     """Return cells, bool (TILE, TILE), as TILE_BYTES of bits."""
     return np.packbits(cells.reshape(-1)).tobytes()
+
+
+Tile = TypeVar("Tile")
+
+
+class TileQueue(Generic[Tile]):
+    """Selects tiles to send: new and changed ones first, then all others in turn.
+
+    Attributes:
+        sent: tiles as they were sent last, in the order of sending.
+    """
+
+    def __init__(self, is_same: Callable[[Tile, Tile], bool]) -> None:
+        self.sent: dict[Cell, Tile] = {}
+        self._is_same = is_same
+
+    def next(self, tiles: Mapping[Cell, Tile], most: int) -> list[Cell]:
+        """Return the places of at most ``most`` tiles; places without a tile are forgotten."""
+        self.sent = {place: tile for place, tile in self.sent.items() if place in tiles}
+        new = {
+            place
+            for place, tile in tiles.items()
+            if place not in self.sent or not self._is_same(self.sent[place], tile)
+        }
+        chosen = [*sorted(new), *(place for place in self.sent if place not in new)][:most]
+        for place in chosen:
+            self.sent.pop(place, None)
+            self.sent[place] = tiles[place]
+        return chosen

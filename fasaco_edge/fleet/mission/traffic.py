@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.mission.core.events import MemberHeard
+from fasaco_edge.mission.core.events import MemberReceived
 
 # Length of the path published and checked, spacing of the points checked, and clearance [m].
 AHEAD_M, SPACING_M, CLEARANCE_M = 2.0, 0.1, 0.1
@@ -39,14 +39,14 @@ class Neighbour(NamedTuple):
     """Another robot, as of its last message.
 
     Attributes:
-        heard: its message.
+        message: its message.
         age_s: age of the message [s].
         stands_s: how long it has stood [s].
         pace_s_m: its time for a metre [s/m].
         is_avoided: whether paths are planned around it where it stands.
     """
 
-    heard: MemberHeard
+    message: MemberReceived
     age_s: float
     stands_s: float
     pace_s_m: float
@@ -75,7 +75,7 @@ class Obstruction:
         return f"makes way for {self.robot}" if self.is_on_path else f"waits for {self.robot}"
 
 
-def least_apart_m(radius_m: float, other: MemberHeard) -> float:
+def least_apart_m(radius_m: float, other: MemberReceived) -> float:
     """Return the least distance of two robots' centres [m], for the radius of one [m]."""
     return radius_m + other.radius_m + CLEARANCE_M
 
@@ -125,20 +125,20 @@ NEARER_M farther than the other, or about as far and second by name | waits |
     """
     blocked: Obstruction | None = None
     for other, near in sorted(neighbours.items()):
-        heard, clear_m = near.heard, least_apart_m(radius_m, near.heard)
-        if math.dist(line[0], (heard.x, heard.y)) > NEAR_M + 2 * clear_m:
+        message, clear_m = near.message, least_apart_m(radius_m, near.message)
+        if math.dist(line[0], (message.x, message.y)) > NEAR_M + 2 * clear_m:
             continue
-        theirs = spaced([(heard.x, heard.y), *heard.ahead])
+        theirs = spaced([(message.x, message.y), *message.ahead])
         apart_m = np.hypot(*(line[:, None] - theirs[None]).transpose(2, 0, 1))
         is_held, is_first = waits_for == other, name < other
-        holds_it = heard.waits_for == name
+        holds_it = message.waits_for == name
         is_over = _is_over(apart_m, clear_m)
         is_its_turn = is_held and holds_it and is_first and len(line) > 1
         # This robot, which waits or has no path, obstructs the other.
-        is_in_its_way = is_over and (holds_it or not heard.waits_for)
+        is_in_its_way = is_over and (holds_it or not message.waits_for)
         if is_in_its_way and (is_held or len(line) == 1) and not is_its_turn:
             return Obstruction(other, is_on_path=True)
-        if heard.waits_for or len(theirs) == 1 or near.stands_s > STANDS_S:
+        if message.waits_for or len(theirs) == 1 or near.stands_s > STANDS_S:
             # A path around it has clearance only at the centres of cells, and only from the place
             # of its last motion.
             passes_m = clear_m - CLEARANCE_M if near.is_avoided else clear_m

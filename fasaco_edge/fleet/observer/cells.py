@@ -97,15 +97,15 @@ class TileSet:
         self._tiles: dict[Place, bytes] = {}
         self._span: tuple[int, int, int, int] | None = None
 
-    def take(self, told: Iterable[CellTile], *, grows: bool) -> list[CellTile]:
+    def take(self, tiles: Iterable[CellTile], *, grows: bool) -> list[CellTile]:
         """Take tiles in; return those that have changed.
 
         Args:
-            told: the tiles.
+            tiles: the tiles.
             grows: whether cells are only added; else a newer tile of a place replaces an older.
         """
         changed = []
-        for tile in told:
+        for tile in tiles:
             place = tile.row, tile.col
             before = self._tiles.get(place)
             if before is None and not self._has_room(place):

@@ -17,7 +17,7 @@ from functools import partial
 from fasaco_edge.bus.arrival import Arrival, Sample
 from fasaco_edge.bus.latched import Subscription
 from fasaco_edge.bus.session import Bus
-from fasaco_edge.fleet.mission.frames import MOST_HEARD
+from fasaco_edge.fleet.mission.frames import MOST_OTHERS
 from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.topic_types import Topic
 from fasaco_edge.wire.topics import FLEET, MAP, POSE
@@ -30,7 +30,7 @@ LEAST_SHARING = 4
 
 
 @dataclass(frozen=True, slots=True)
-class Heard:
+class Received:
     """A sample of a robot."""
 
     robot: str
@@ -73,7 +73,7 @@ class FleetInbox:
         with self._changed:
             queues = self._robots.get(robot)
             if queues is None:
-                if len(self._robots) >= MOST_HEARD:
+                if len(self._robots) >= MOST_OTHERS:
                     return
                 queues = self._robots[robot] = _Queues()
             if topic == FLEET.name:
@@ -83,7 +83,7 @@ class FleetInbox:
             self._is_news = True
             self._changed.notify()
 
-    def take(self, timeout_s: float) -> list[Heard]:
+    def take(self, timeout_s: float) -> list[Received]:
         """Return all waiting samples, robot by robot; wait up to ``timeout_s`` [s] for one."""
         with self._changed:
             if not self._is_news:
@@ -92,7 +92,7 @@ class FleetInbox:
             for robot, queues in self._robots.items():
                 arrivals = [one for waiting in queues.waiting.values() for one in waiting]
                 arrivals.sort(key=lambda arrival: arrival.at_ns)
-                taken += [Heard(robot, arrival) for arrival in arrivals]
+                taken += [Received(robot, arrival) for arrival in arrivals]
                 queues.waiting.clear()
                 queues.bytes = 0
             self._is_news = False
@@ -163,7 +163,7 @@ class FleetSubscriptions:
 
         self._bus.subscribe(self._keys.of_all(FLEET), post)
 
-    def hear(self, robot: str) -> None:
+    def subscribe(self, robot: str) -> None:
         """Subscribe to a robot that has joined."""
         self._subscriptions[robot] = [self._listen(robot, topic) for topic in self._topics]
 

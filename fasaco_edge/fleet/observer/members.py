@@ -48,7 +48,7 @@ class Member:
         number: in order of joining, from 0.
         seat: position of its cells.
         newest: its newest message.
-        heard_ns: time of its newest message.
+        received_ns: time of its newest message.
         swept, ground: cells it has swept, and can reach.
         changes: how often these cells have changed, or their seat.
         pose: its newest pose in its map frame.
@@ -58,7 +58,7 @@ class Member:
     number: int
     seat: Seat
     newest: FleetMember
-    heard_ns: int
+    received_ns: int
     swept: TileSet = field(default_factory=TileSet)
     ground: TileSet = field(default_factory=TileSet)
     changes: int = 0
@@ -66,9 +66,9 @@ class Member:
 
     def is_due(self, at_ns: int) -> bool:
         """Return whether a message that arrived then is read."""
-        return at_ns - self.heard_ns >= LEAST_SPACING_NS
+        return at_ns - self.received_ns >= LEAST_SPACING_NS
 
-    def hear(self, said: FleetMember, at_ns: int) -> str:
+    def receive(self, said: FleetMember, at_ns: int) -> str:
         """Take in a message; return what has changed of its frame, "" for nothing."""
         moved = ""
         if self.is_moved_by(said):
@@ -81,7 +81,7 @@ class Member:
         elif said.epoch != self.newest.epoch:
             self.swept.clear()
             self.changes += 1
-        self.newest, self.heard_ns = said, at_ns
+        self.newest, self.received_ns = said, at_ns
         swept = self.swept.take(said.swept, grows=True)
         ground = self.ground.take(said.ground, grows=False)
         if swept or ground:
@@ -95,7 +95,7 @@ class Member:
 
     def is_gone(self, now_ns: int) -> bool:
         """Return whether it is silent."""
-        return now_ns - self.heard_ns > GONE_NS
+        return now_ns - self.received_ns > GONE_NS
 
     def state(self, now_ns: int) -> str:
         """Return the state of its mission, or that it waits for another robot, or is gone."""
@@ -127,7 +127,7 @@ class Members(Generic[M]):
         self._make = make
         self._by_name: dict[str, M] = {}
 
-    def hear(self, robot: str, said: FleetMember, at_ns: int) -> tuple[M, str]:
+    def receive(self, robot: str, said: FleetMember, at_ns: int) -> tuple[M, str]:
         """Take in a message; return its robot, and the change: JOINED, what moved, or "".
 
         Raises:
@@ -137,18 +137,18 @@ class Members(Generic[M]):
         if member is None:
             member = self._make(robot, self._number(robot, at_ns), Seat.of(said), said, at_ns)
             self._by_name[robot] = member
-            member.hear(said, at_ns)
+            member.receive(said, at_ns)
             return member, JOINED
         if not member.is_due(at_ns):
             return member, ""
-        return member, member.hear(said, at_ns)
+        return member, member.receive(said, at_ns)
 
     def _number(self, robot: str, at_ns: int) -> int:
         """Return the number of a robot that joins: the next, or that of a robot long gone."""
         if len(self) < MOST_MEMBERS:
             return len(self)
-        longest = min(self, key=lambda member: member.heard_ns)
-        if at_ns - longest.heard_ns < REPLACED_NS:
+        longest = min(self, key=lambda member: member.received_ns)
+        if at_ns - longest.received_ns < REPLACED_NS:
             raise FleetError(f"{robot}: {MOST_MEMBERS} robots of a fleet are observed at most")
         del self._by_name[longest.name]
         return longest.number
@@ -170,8 +170,8 @@ class Members(Generic[M]):
         last message of an absent robot counts only if all robots are absent.
         """
         dividing = [member for member in self if member.newest.division]
-        telling = [member for member in dividing if not member.is_gone(now_ns)] or dividing
-        return min(telling, key=lambda m: (-m.newest.division, m.newest.by), default=None)
+        present = [member for member in dividing if not member.is_gone(now_ns)] or dividing
+        return min(present, key=lambda m: (-m.newest.division, m.newest.by), default=None)
 
 
 NOBODY = -1
@@ -199,24 +199,24 @@ def union_on(seat: Seat, members: Members[M], what: str) -> Cells:
 
 def shares_of(members: Members[M], now_ns: int) -> Shares | None:
     """Return the shares by the division in force at a time; None before there is one."""
-    telling = members.dividing(now_ns)
-    if telling is None:
+    divider = members.dividing(now_ns)
+    if divider is None:
         return None
-    ground = union_on(telling.seat, members, "ground")
+    ground = union_on(divider.seat, members, "ground")
     window = window_of(ground)
     if window is None:
         return None
     known = mask_of(ground, window)
-    owners = owners_of(telling, members, known, window)
-    owners[mask_of(union_on(telling.seat, members, "swept"), window)] = NOBODY
+    owners = owners_of(divider, members, known, window)
+    owners[mask_of(union_on(divider.seat, members, "swept"), window)] = NOBODY
     names = {member.number: member.name for member in members}
     counted = zip(*np.unique(owners[owners != NOBODY], return_counts=True), strict=True)
     cells = Counter({names[int(number)]: int(count) for number, count in counted})
-    return Shares(telling.seat.geometry(window), owners, cells)
+    return Shares(divider.seat.geometry(window), owners, cells)
 
 
 def owners_of(
-    telling: M,
+    divider: M,
     members: Members[M],
     known: NDArray[np.bool_],
     window: Window,
@@ -225,18 +225,18 @@ def owners_of(
     """Return the number of the robot that a division gives each cell to; NOBODY for none.
 
     Args:
-        telling: a robot that sends the division.
+        divider: a robot that sends the division.
         members: the robots.
         known: reachable cells, bool (rows, cols).
-        window: of these cells, on the telling robot's lattice.
+        window: of these cells, on the divider's lattice.
         most_steps: largest number of steps searched, over all robots; None for no limit.
     """
     first = np.full(known.shape, np.float32(np.inf))
     owners = np.full(known.shape, NOBODY, np.int16)
-    if not telling.newest.parts:
-        owners[known] = telling.number
+    if not divider.newest.parts:
+        owners[known] = divider.number
         return owners
-    for part in sorted(telling.newest.parts, key=lambda part: part.robot):
+    for part in sorted(divider.newest.parts, key=lambda part: part.robot):
         member = members.get(part.robot)
         if member is None:
             continue

@@ -17,7 +17,7 @@ from fasaco_edge.bus.session import Bus
 from fasaco_edge.bus.settings import BusSettings
 from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.errors import FasacoError
-from fasaco_edge.fleet.observer.inbox import FleetInbox, FleetSubscriptions, Heard
+from fasaco_edge.fleet.observer.inbox import FleetInbox, FleetSubscriptions, Received
 from fasaco_edge.fleet.observer.members import JOINED
 from fasaco_edge.fleet.recording.layout import build_layout
 from fasaco_edge.fleet.recording.members import RecordedMember, RecordedMembers
@@ -82,7 +82,7 @@ class FleetRecorder:
         self._subscriptions = FleetSubscriptions(
             bus, config.keys(), (STATUS, PATH, POSE), self._inbox.post
         )
-        self._first: list[Heard] = []
+        self._first: list[Received] = []
         self._gathers = True
         self._poses: dict[str, PoseDecoder] = {}
         self._notes: list[Note] = []
@@ -98,9 +98,9 @@ class FleetRecorder:
 
     def step(self, timeout_s: float) -> None:
         """Write and draw what arrives within ``timeout_s`` [s], and all drawings that are due."""
-        for heard in self._gathered(self._inbox.take(timeout_s)):
-            self._writer.message(heard.arrival.wall_ns)
-            self._attempt(heard)
+        for received in self._gathered(self._inbox.take(timeout_s)):
+            self._writer.message(received.arrival.wall_ns)
+            self._attempt(received)
             self._writer.sync(time.monotonic_ns())
         now_ns = self._clock.now_ns()
         self._writer.at(now_ns)
@@ -117,8 +117,8 @@ class FleetRecorder:
     def end(self) -> bool:
         """Write waiting data and the footer; False if the disk fails."""
         self._gathers = False
-        for heard in self._gathered(self._inbox.take(0.0)):
-            self._attempt(heard)
+        for received in self._gathered(self._inbox.take(0.0)):
+            self._attempt(received)
         now_ns = self._clock.now_ns()
         self._writer.at(now_ns)
         self._note(now_ns)
@@ -126,7 +126,7 @@ class FleetRecorder:
         self._scene.finish()
         return self._writer.close()
 
-    def _gathered(self, arrived: list[Heard]) -> list[Heard]:
+    def _gathered(self, arrived: list[Received]) -> list[Received]:
         """Return the samples to process now; those of the first robots together, sorted by name.
 
         Sorted by name, robots have the same colours in all recordings and pictures.
@@ -145,7 +145,7 @@ class FleetRecorder:
         if self._gathers:
             return []
         first, self._first = self._first, []
-        return sorted(first, key=lambda heard: heard.robot)
+        return sorted(first, key=lambda received: received.robot)
 
     @property
     def hangs(self) -> bool:
@@ -156,17 +156,17 @@ class FleetRecorder:
         """Log a fault from before the recording began."""
         self._scene.add_line(line, "WARN")
 
-    def _attempt(self, heard: Heard) -> None:
+    def _attempt(self, received: Received) -> None:
         """Take in a sample; an unusable sample is logged with its robot's name."""
         try:
-            self._take(heard.robot, heard.arrival)
+            self._take(received.robot, received.arrival)
         except FasacoError as error:
-            what = heard.robot, heard.arrival.topic
-            if self._members.get(heard.robot) is None:
+            what = received.robot, received.arrival.topic
+            if self._members.get(received.robot) is None:
                 # A queue for each of any number of names would leave no room for real robots.
-                self._inbox.forget(heard.robot)
+                self._inbox.forget(received.robot)
                 if what not in self._faults and len(self._faults) >= MOST_FAULTS:
-                    what = "other robots", heard.arrival.topic
+                    what = "other robots", received.arrival.topic
             self._faults[what] += 1
             count = self._faults[what]
             # A robot may send no other message.
@@ -215,7 +215,7 @@ class FleetRecorder:
         if before is None or before.is_moved_by(said):
             # A batch has one list of robots and frames for all its notes.
             self._write()
-        member, news = self._members.hear(robot, said, arrival.wall_ns)
+        member, news = self._members.receive(robot, said, arrival.wall_ns)
         if news == JOINED:
             for gone in known - {one.name for one in self._members}:
                 self._leave(gone)
@@ -226,7 +226,7 @@ class FleetRecorder:
     def _join(self, member: RecordedMember) -> None:
         """Record a robot from now on."""
         self._poses[member.name] = PoseDecoder(self._schema)
-        self._subscriptions.hear(member.name)
+        self._subscriptions.subscribe(member.name)
         self._scene.add_line(f"{member.name}: joined, cells of {member.seat.cell_m:g} m")
         self._scene.join(member)
 

@@ -181,9 +181,9 @@ def _tracks(batches: Sequence[NoteBatch], seat: Seat) -> tuple[list[RobotTrack],
                 continue
             track.notes.append(note)
             if note.passes:
-                told = np.array([(p.at_ms, p.row, p.col) for p in note.passes], np.int64)
-                told[:, 1:] = own.carried(told[:, 1:], seat)
-                passes.setdefault(robot.name, []).append(told)
+                passed = np.array([(p.at_ms, p.row, p.col) for p in note.passes], np.int64)
+                passed[:, 1:] = own.carried(passed[:, 1:], seat)
+                passes.setdefault(robot.name, []).append(passed)
     for name, pieces in passes.items():
         tracks[name].passes = np.concatenate(pieces)
     return sorted(tracks.values(), key=lambda track: track.name), together(ground)
@@ -284,7 +284,7 @@ def _robot(track: RobotTrack, cell_m2: float) -> FleetRobotFigures:
         for note, seconds in zip(notes, lasting, strict=True)
         if note.state in AT_WORK and not note.waits_for
     )
-    heard_s = max(sum(lasting), 1.0)
+    recorded_s = max(sum(lasting), 1.0)
     plans = [ms for note in notes for ms in note.plans_ms]
     again = sum(track.again.values())
     return FleetRobotFigures(
@@ -298,8 +298,8 @@ def _robot(track: RobotTrack, cell_m2: float) -> FleetRobotFigures:
         swept_m2=round(len(track.swept_ms) * cell_m2, 2),
         through_m2=round((len(track.again) - again) * cell_m2, 2),
         again_m2=round(again * cell_m2, 2),
-        messages_s=round(sum(note.messages for note in notes) / heard_s, 2),
-        kb_s=round(sum(note.bytes for note in notes) / heard_s / 1000, 2),
+        messages_s=round(sum(note.messages for note in notes) / recorded_s, 2),
+        kb_s=round(sum(note.bytes for note in notes) / recorded_s / 1000, 2),
         peak_kb_s=_peak_kb_s(notes),
         plans=len(plans),
         plan_ms_p50=round(float(np.percentile(plans, 50)), 1) if plans else None,

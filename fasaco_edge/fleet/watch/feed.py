@@ -10,7 +10,7 @@ from fasaco_edge.bus.session import Bus
 from fasaco_edge.bus.settings import BusSettings
 from fasaco_edge.client.feed import Joining
 from fasaco_edge.client.phrases import steady_now
-from fasaco_edge.fleet.observer.inbox import FleetInbox, FleetSubscriptions, Heard, Traffic
+from fasaco_edge.fleet.observer.inbox import FleetInbox, FleetSubscriptions, Received, Traffic
 from fasaco_edge.wire.keys import VERSION, Keys
 from fasaco_edge.wire.topics import STATUS
 
@@ -36,7 +36,7 @@ class FleetFeed(Joining):
         # A lock of its own, not the session's: tokens may arrive during ``listen``.
         self._naming = threading.Lock()
 
-    def take(self, timeout_s: float) -> list[Heard]:
+    def take(self, timeout_s: float) -> list[Received]:
         """Return what has arrived, robot by robot; wait up to ``timeout_s`` [s] for a sample."""
         return self._inbox.take(timeout_s)
 
@@ -49,7 +49,7 @@ class FleetFeed(Joining):
             subscriptions.leave(robot)
             self._inbox.forget(robot)
         for robot in set(robots) - subscriptions.robots:
-            subscriptions.hear(robot)
+            subscriptions.subscribe(robot)
 
     def forget(self, robot: str) -> None:
         """Drop the queues of a robot of another fleet."""

@@ -70,23 +70,23 @@ class FloorSurvey:
 
     def update(self, members: Members[Member], now_ns: int) -> None:
         """Bring the floor up to date, if that is due."""
-        telling = members.dividing(now_ns)
-        told = None if telling is None else (telling.name, telling.newest.division)
-        key = told, *((member.name, member.changes) for member in members)
+        divider = members.dividing(now_ns)
+        division = None if divider is None else (divider.name, divider.newest.division)
+        key = division, *((member.name, member.changes) for member in members)
         began = time.monotonic()
         if key == self._key or began < self._due_at:
             return
-        self._key, self.floor = key, floor_of(members, telling)
+        self._key, self.floor = key, floor_of(members, divider)
         ended = time.monotonic()
         self._due_at = max(began + LEAST_AGE_S, ended + LEAST_REST * (ended - began))
 
 
-def floor_of(members: Members[Member], telling: Member | None) -> FleetFloor:
-    """Return the floor of robots, of which ``telling`` sends the division in force."""
+def floor_of(members: Members[Member], divider: Member | None) -> FleetFloor:
+    """Return the floor of robots, of which ``divider`` sends the division in force."""
     seats = [member.seat for member in members]
     if not seats:
         return FleetFloor()
-    seat = seats[0] if telling is None else telling.seat
+    seat = seats[0] if divider is None else divider.seat
     robots = frozenset(member.name for member in members)
     window = _window(seat, members)
     if window is None:
@@ -104,16 +104,16 @@ def floor_of(members: Members[Member], telling: Member | None) -> FleetFloor:
         twice=int(np.count_nonzero(twice)),
         cell_m2=seat.cell_m**2,
     )
-    if telling is None:
+    if divider is None:
         return floor
-    owners = owners_of(telling, members, ground, window, MOST_STEPS)
+    owners = owners_of(divider, members, ground, window, MOST_STEPS)
     owners[once] = NOBODY
     counts = np.bincount(owners[owners != NOBODY], minlength=MOST_MEMBERS)
     return replace(
         floor,
         left=Counter({member.name: int(counts[member.number]) for member in members}),
-        division=telling.newest.division,
-        by=telling.newest.by,
+        division=divider.newest.division,
+        by=divider.newest.by,
     )
 
 

@@ -157,7 +157,7 @@ def headline(view: FleetView, robots: Sequence[FleetRobot], now: float) -> Text:
 
 # Time to wait for the other robots after the first message [s]. Each robot sends its place and its
 # swept cells once a second.
-REST_S, TOLD_S = 4.0, 1.3
+REST_S, SENT_S = 4.0, 1.3
 # Period of counting rates and of printing JSON [s].
 EVERY_S = 1.0
 
@@ -189,11 +189,11 @@ class FleetWatch:
         view, feed = self._view, self._feed
         items = feed.take(timeout_s)
         was_known = self.is_known()
-        for heard in items:
-            view.take(heard)
-            if view.members.get(heard.robot) is None:
+        for received in items:
+            view.take(received)
+            if view.members.get(received.robot) is None:
                 # A queue for each of any number of names would leave no room for real robots.
-                feed.forget(heard.robot)
+                feed.forget(received.robot)
         now = phrases.steady_now()
         if not was_known:
             self._known_at = now
@@ -244,8 +244,8 @@ class FleetWatch:
     def is_whole(self) -> bool:
         """Return whether all robots have had time for a message."""
         view = self._view
-        is_told = phrases.steady_now() - self._known_at > TOLD_S
-        return is_told and view.floor.robots >= set(view.names())
+        is_complete = phrases.steady_now() - self._known_at > SENT_S
+        return is_complete and view.floor.robots >= set(view.names())
 
     def _count(self, now: float) -> None:
         passed_s = now - self._counted_at

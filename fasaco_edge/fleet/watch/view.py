@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from fasaco_edge.bus.arrival import Sample
 from fasaco_edge.client.events import BAD, GOOD, PLAIN, TROUBLED, EventLog
 from fasaco_edge.errors import FasacoError
-from fasaco_edge.fleet.observer.inbox import Heard
+from fasaco_edge.fleet.observer.inbox import Received
 from fasaco_edge.fleet.observer.members import JOINED, MOST_MEMBERS, Member, Members
 from fasaco_edge.fleet.watch.floor import FleetFloor, FloorSurvey
 from fasaco_edge.fleet.watch.robot import FleetRobot, document_of, short
@@ -22,7 +22,7 @@ from fasaco_edge.wire.keys import is_chunk
 # Least time between two notes of a robot's state [s]; time over which its rate is averaged [s].
 NOTED_EVERY_S, RATE_S = 1.0, 5
 # Robots that others received messages from within this time are named, even if silent here [s].
-TOLD_S = 600.0
+RECENT_S = 600.0
 # Number of robots and topics whose faults are counted apart; of other fleets that are named.
 MOST_FAULTS, MOST_FLEETS = 256, 32
 
@@ -64,9 +64,9 @@ class FleetView:
         """The cells of all robots."""
         return self._survey.floor
 
-    def take(self, heard: Heard) -> None:
+    def take(self, received: Received) -> None:
         """Take in a sample. One that cannot be read is dropped and noted."""
-        arrival, robot = heard.arrival, heard.robot
+        arrival, robot = received.arrival, received.robot
         try:
             if arrival.topic == "fleet":
                 self._read_fleet(robot, arrival.sample, arrival.wall_ns)
@@ -80,11 +80,11 @@ class FleetView:
         """Note changes up to ``now``, since the epoch [s]; call it often."""
         now_ns = int(1e9 * now)
         self._survey.update(self.members, now_ns)
-        telling = self.members.dividing(now_ns)
-        if telling is not None and telling.newest.division != self._division:
-            self._division = telling.newest.division
-            among = f", {len(telling.newest.parts)} parts" if telling.newest.parts else ""
-            self.events.add(now, f"division {self._division} by {short(telling.newest.by)}{among}")
+        divider = self.members.dividing(now_ns)
+        if divider is not None and divider.newest.division != self._division:
+            self._division = divider.newest.division
+            among = f", {len(divider.newest.parts)} parts" if divider.newest.parts else ""
+            self.events.add(now, f"division {self._division} by {short(divider.newest.by)}{among}")
         for robot in self.robots(now):
             self._note_state(robot, now)
 
@@ -99,13 +99,13 @@ class FleetView:
 
     def unheard(self, now: float) -> list[str]:
         """Return the names of robots that others received lately, but this observer did not."""
-        told = {
+        named = {
             other.name
             for status in self._reports(int(1e9 * now)).values()
             for other in status.members
-            if other.heard_s <= TOLD_S and is_chunk(other.name)
+            if other.heard_s <= RECENT_S and is_chunk(other.name)
         }
-        return sorted(map(short, told - set(self._seen)))[:MOST_MEMBERS]
+        return sorted(map(short, named - set(self._seen)))[:MOST_MEMBERS]
 
     def robots(self, now: float) -> list[FleetRobot]:
         """Return the robots by name."""
@@ -129,7 +129,7 @@ class FleetView:
             name=member.name,
             state=short(said.state),
             waits_for=short(said.waits_for),
-            silent_s=now - 1e-9 * member.heard_ns if is_gone else None,
+            silent_s=now - 1e-9 * member.received_ns if is_gone else None,
             away=away,
             x=x,
             y=y,
@@ -166,7 +166,7 @@ class FleetView:
             if not self._seen and len(self.others) < MOST_FLEETS:
                 self.others |= {short(fleet_of(sample.payload) or "")} - {""}
             return
-        _, news = self.members.hear(robot, said, at_ns)
+        _, news = self.members.receive(robot, said, at_ns)
         if news == JOINED:
             # The place may have belonged to a robot long gone.
             self._seen = {name: self._seen.get(name, _Seen()) for name in self.names()}

@@ -51,16 +51,16 @@ class BatteryGauge:
     Attributes:
         level: accepted charge from 0 to 1; None before one is accepted.
         power: state of the power supply, as in the message; "" before the first one.
-        heard_at: arrival time of the last level, accepted or not [s].
+        received_at: arrival time of the last level, accepted or not [s].
     """
 
     def __init__(self) -> None:
         self.level: float | None = None
         self.power = ""
-        self.heard_at = float("-inf")
+        self.received_at = float("-inf")
         # Times of the last message and of the last accepted level; at first, when one became due.
         self._noted_at = float("-inf")
-        self._told_at: float | None = None
+        self._accepted_at: float | None = None
         # A level not accepted yet, and the time of its first report.
         self._claim: tuple[float, float] | None = None
         # Time and level where the current stretch of driving began.
@@ -78,24 +78,24 @@ class BatteryGauge:
 
     def silent_s(self, now: float) -> float:
         """Return the time since a level was last accepted, or since the beginning [s]."""
-        return 0.0 if self._told_at is None else now - self._told_at
+        return 0.0 if self._accepted_at is None else now - self._accepted_at
 
     def why_silent(self, since: float) -> str:
         """Return why no level has been accepted since then [s], as the end of a sentence."""
-        if self.heard_at >= since:
+        if self.received_at >= since:
             return ", it jumps to and fro"
         return ", its messages give none" if self._noted_at >= since else ""
 
     def begin(self, now: float) -> None:
         """Start the timeout for the first level at ``now`` [s], unless it has begun."""
-        self._told_at = now if self._told_at is None else self._told_at
+        self._accepted_at = now if self._accepted_at is None else self._accepted_at
 
     def note(self, event: BatteryReceived, now: float, *, drives: bool) -> None:
         """Take in a message at ``now`` [s]; ``drives``: whether the robot is driving."""
         self.power, self._noted_at = event.power, now
         if event.level is None:
             return
-        self.heard_at = now
+        self.received_at = now
         if self.level is None or abs(event.level - self.level) > JUMP:
             claim, level = self._claim, self.level
             # The level may drain meanwhile, or come in coarse steps: only the direction of the jump
@@ -109,7 +109,7 @@ class BatteryGauge:
             if now - self._claim[1] < HOLD_S:
                 return
             self._since = None
-        self._claim, self.level, self._told_at = None, event.level, now
+        self._claim, self.level, self._accepted_at = None, event.level, now
         # Stamps, not ``now``: under simulated time the robot drives by that clock.
         at_s = 1e-9 * event.stamp_ns if event.stamp_ns else now
         self._measure(event.level, at_s, drives=drives and event.power != "charging")

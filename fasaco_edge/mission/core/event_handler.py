@@ -19,7 +19,7 @@ from fasaco_edge.mission.core.events import (
     Event,
     FollowerBlocked,
     MapReceived,
-    MemberHeard,
+    MemberReceived,
     PatchesLost,
     PatchRun,
     PathUpdate,
@@ -120,11 +120,11 @@ class EventHandler:
                 self._obey(event)
             case FollowerBlocked():
                 self._close_floor(event)
-            case MemberHeard():
-                self._hear_member(event)
+            case MemberReceived():
+                self._receive_member(event)
 
-    def _hear_member(self, event: MemberHeard) -> None:
-        if reason := self.company.hear(event, self._now):
+    def _receive_member(self, event: MemberReceived) -> None:
+        if reason := self.company.receive(event, self._now):
             self.route.want(reason)
 
     def _close_floor(self, event: FollowerBlocked) -> None:

@@ -136,7 +136,7 @@ SAME_LATTICE = Pose2D(0.0, 0.0)
 
 
 @dataclass(frozen=True, slots=True)
-class MemberHeard:
+class MemberReceived:
     """State of another robot of the fleet.
 
     Attributes:
@@ -210,7 +210,7 @@ Event = (
     | PlanReady
     | PlanBroken
     | CommandReceived
-    | MemberHeard
+    | MemberReceived
     | FollowerBlocked
 )
 

@@ -28,7 +28,7 @@ from fasaco_edge.mission.core.events import (
     Event,
     FollowerBlocked,
     MapReceived,
-    MemberHeard,
+    MemberReceived,
     PathUpdate,
     PoseReceived,
 )
@@ -74,7 +74,7 @@ class LatticeRotation:
                 return MapReceived(_rotated_grid(grid, -self.deg), at)
             case PoseReceived(pose, at):
                 return PoseReceived(_rotated_stamped(pose, -self.deg), at)
-            case MemberHeard(x=x, y=y):
+            case MemberReceived(x=x, y=y):
                 x, y = rotated_point(x, y, -self.deg)
                 ahead = tuple(rotated_point(*point, -self.deg) for point in event.ahead)
                 return replace(event, x=x, y=y, ahead=ahead)

@@ -1,7 +1,7 @@
 """Robots of one fleet in a building that none of them knows, in simulated time.
 
 Real missions plan for simulated robots; all of it in one process, so that the same options give
-the same run. Robots hear of each other once a period, as far as ``hears`` lets them.
+the same run. Robots get each other's messages once a period, as far as ``hears`` lets them.
 """
 
 from __future__ import annotations
@@ -15,9 +15,9 @@ from typing import TypeVar
 
 import numpy as np
 
-from fasaco_edge.fleet.mission.ground import GroundTelling
+from fasaco_edge.fleet.mission.ground import GroundQueue
 from fasaco_edge.fleet.mission.kind import FleetKind, fleet_of
-from fasaco_edge.fleet.mission.shared import Telling
+from fasaco_edge.fleet.mission.shared import SweptQueue
 from fasaco_edge.fleet.review.report import RobotTrack, find_again
 from fasaco_edge.grid.geometry import Pose2D, Window
 from fasaco_edge.grid.lattice import Cell, Footprint
@@ -27,7 +27,7 @@ from fasaco_edge.mission.config import MissionConfig, Sweeping
 from fasaco_edge.mission.core.events import (
     Event,
     MapReceived,
-    MemberHeard,
+    MemberReceived,
     PlanReady,
     PlanRequest,
     PoseReceived,
@@ -119,8 +119,8 @@ class FleetRobot:
     mission: Mission
     world: World
     ledger: CoverageLedger
-    telling: Telling = field(default_factory=Telling)
-    telling_ground: GroundTelling = field(default_factory=GroundTelling)
+    telling: SweptQueue = field(default_factory=SweptQueue)
+    telling_ground: GroundQueue = field(default_factory=GroundQueue)
     epoch: int = 0
     done_s: float = 0.0
     plans: int = 0
@@ -129,9 +129,9 @@ class FleetRobot:
     plan_ms: list[float] = field(default_factory=list)
     swept_ms: dict[Cell, int] = field(default_factory=dict)
     passes: list[tuple[int, int, int]] = field(default_factory=list)
-    inbox: list[MemberHeard] = field(default_factory=list)
+    inbox: list[MemberReceived] = field(default_factory=list)
 
-    def report(self) -> MemberHeard | None:
+    def report(self) -> MemberReceived | None:
         """Return what it tells the others."""
         mission = self.mission
         if mission.pose is None or not mission.ledger.frame:
@@ -139,9 +139,9 @@ class FleetRobot:
         swept = mission.ledger.snapshot().tiles
         if mission.shared.epoch != self.epoch:
             before = swept if self.epoch else None
-            self.epoch, self.telling = mission.shared.epoch, Telling(before)
+            self.epoch, self.telling = mission.shared.epoch, SweptQueue(before)
         tiles = self.telling.next(swept, MOST_TILES)
-        return MemberHeard(
+        return MemberReceived(
             robot=self.name,
             frame=mission.ledger.frame,
             state=str(mission.state),

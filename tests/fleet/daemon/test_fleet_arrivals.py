@@ -8,7 +8,7 @@ import pytest
 
 from fasaco_edge.bus.arrival import Sample
 from fasaco_edge.fleet.daemon.arrivals import FORGOTTEN_S, LEAST_SPACING_S, FleetArrivals
-from fasaco_edge.fleet.mission.frames import MOST_HEARD
+from fasaco_edge.fleet.mission.frames import MOST_OTHERS
 from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.limits import MAX_JSON_BYTES
 
@@ -27,7 +27,7 @@ def arrivals():
     return FleetArrivals(Keys("me"), "hall")
 
 
-def test_a_robot_that_floods_is_heard_at_its_rate(arrivals):
+def test_a_robot_that_floods_is_received_at_its_rate(arrivals):
     mate = from_robot("r2")
     taken = [at for at in range(1000) if arrivals.is_due(mate, 0.001 * at)]
     assert len(taken) == 1 / LEAST_SPACING_S
@@ -38,7 +38,7 @@ def test_messages_of_the_own_fleet_arrive_on_a_crowded_bus(arrivals, stranger):
     """The 64 places went to whoever was heard first: with a second fleet of 64 to nobody else."""
     heard = 0
     for second in range(100):
-        for number in range(2 * MOST_HEARD):
+        for number in range(2 * MOST_OTHERS):
             arrivals.is_due(stranger(f"other{number}"), float(second))
         heard += arrivals.is_due(from_robot("r2"), second + 0.5)
     assert heard == 100
@@ -69,12 +69,12 @@ def test_an_unreadable_fleet_message_is_a_fault_with_a_limit(arrivals):
 
 def test_one_robot_too_many_displaces_nobody_and_is_named_once(arrivals):
     for second in range(3):
-        for number in range(MOST_HEARD):
+        for number in range(MOST_OTHERS):
             assert arrivals.is_due(from_robot(f"r{number}"), float(second))
         assert not arrivals.is_due(from_robot("late"), float(second))
     (fault,) = arrivals.take_faults()
     assert str(fault) == "late: at most 64 others of fleet 'hall' are kept"
-    for number in range(1, MOST_HEARD):
+    for number in range(1, MOST_OTHERS):
         arrivals.is_due(from_robot(f"r{number}"), FORGOTTEN_S)
     # There is room once one is silent.
     assert arrivals.is_due(from_robot("late"), FORGOTTEN_S + 2.0)

@@ -2,10 +2,10 @@
 
 from random import Random
 
-from fasaco_edge.fleet.mission.ground import GroundTelling
+from fasaco_edge.fleet.mission.ground import GroundQueue
 from fasaco_edge.fleet.mission.kind import FleetKind
-from fasaco_edge.fleet.mission.shared import Telling
-from fasaco_edge.mission.core.events import MapReceived, MemberHeard
+from fasaco_edge.fleet.mission.shared import SweptQueue
+from fasaco_edge.mission.core.events import MapReceived, MemberReceived
 from tests.mission.world import CONFIG, Drive, building, pose_at, reachable_cells
 
 MOST_TILES = 4
@@ -20,8 +20,8 @@ class FleetRobot(Drive):
     """
 
     def __init__(self, name, cell, rows, config=CONFIG, before=None):
-        self.name, self.hangs, self.told, self.cannot = name, False, Telling(), ()
-        self.told_ground, self.told_epoch = GroundTelling(), 1
+        self.name, self.hangs, self.told, self.cannot = name, False, SweptQueue(), ()
+        self.told_ground, self.told_epoch = GroundQueue(), 1
         super().__init__(cell, config=config, kind=FleetKind(name))
         if before is not None:
             self.mission.restore_ledger(before)
@@ -32,9 +32,9 @@ class FleetRobot(Drive):
         mission, pose = self.mission, self.mission.pose.pose
         swept = mission.ledger.snapshot().tiles
         if mission.shared.epoch != self.told_epoch:
-            self.told, self.told_epoch = Telling(swept), mission.shared.epoch
+            self.told, self.told_epoch = SweptQueue(swept), mission.shared.epoch
         tiles = self.told.next(swept, MOST_TILES)
-        return MemberHeard(
+        return MemberReceived(
             robot=self.name,
             frame="map",
             state=str(mission.state),
@@ -65,7 +65,7 @@ class FleetRobot(Drive):
 
 
 class FleetDrive:
-    """Robots that hear each other once a second, as far as ``hears`` lets them.
+    """Robots that get each other's messages once a second, as far as ``hears`` lets them.
 
     Attributes:
         robots: by name; those that are killed are gone.

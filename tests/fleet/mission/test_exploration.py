@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 from fasaco_edge.fleet.mission.kind import FleetKind
-from fasaco_edge.mission.core.events import MapReceived, MemberHeard
+from fasaco_edge.mission.core.events import MapReceived, MemberReceived
 from fasaco_edge.mission.orders.order_state import OrderState
 from tests.mission.world import (
     CELL,
@@ -18,7 +18,7 @@ from tests.mission.world import (
 
 def test_a_zone_behind_a_robot_that_stands_is_waited_for():
     """Cells seen past it alone were tried in one step, and the order was over, it said."""
-    there = MemberHeard("r2", state="paused", x=8.5 * CELL, y=0.5 * CELL, epoch=1, radius_m=0.1)
+    there = MemberReceived("r2", state="paused", x=8.5 * CELL, y=0.5 * CELL, epoch=1, radius_m=0.1)
     config = with_policy(CONFIG, retries=2, retry_s=30.0)
     drive = Drive(
         (0, 0), config=config, order_state=OrderState.idle("no order yet"), kind=FleetKind("r1")

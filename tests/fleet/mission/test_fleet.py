@@ -17,7 +17,7 @@ from fasaco_edge.fleet.mission.shared import (
     MOST_ROBOTS,
     MOST_TILES,
     SharedProgress,
-    Telling,
+    SweptQueue,
 )
 from fasaco_edge.fleet.mission.shared_work import BELIEVED_S, MOST_AHEAD, MOST_FIRST
 from fasaco_edge.fleet.mission.tiles import TILE_BYTES
@@ -228,7 +228,7 @@ def test_after_a_loop_closure_nothing_uncertain_is_given_back():
         {(row, col) for row in range(10) for col in range(10)},
     )
     ledger.shared.begin(5)
-    ledger.shared.hear("r2", 1, tiles_of(block))
+    ledger.shared.receive("r2", 1, tiles_of(block))
     ledger.note_map_motion(Pose2D(1.5, 1.5))
     ledger.forget_uncertain(Pose2D(2.1, 1.5))
     left = ledger.shared.swept(Window(0, 0, 10, 10))
@@ -236,11 +236,11 @@ def test_after_a_loop_closure_nothing_uncertain_is_given_back():
     assert left[:, 2:].all()
     assert not left[:, :2].any()
     assert ledger.shared.epoch == 6
-    ledger.shared.hear("r2", 1, tiles_of(block))
+    ledger.shared.receive("r2", 1, tiles_of(block))
     assert (ledger.shared.swept(Window(0, 0, 10, 10)) == left).all()
     # Who swept them forgets them, and sweeps one again: that counts.
-    ledger.shared.hear("r2", 2, tiles_of({(99, 99)}))
-    ledger.shared.hear("r2", 3, tiles_of({(0, 5), (1, 0)}))
+    ledger.shared.receive("r2", 2, tiles_of({(99, 99)}))
+    ledger.shared.receive("r2", 3, tiles_of({(0, 5), (1, 0)}))
     assert ledger.shared.cells_of("r2") == 1
 
 
@@ -260,12 +260,12 @@ def test_memory_for_a_robot_with_false_cells_is_bounded():
 def test_absent_robots_that_swept_least_make_room():
     shared, members = SharedProgress(), [f"r{number}" for number in range(MOST_ROBOTS)]
     for number, robot in enumerate(members):
-        shared.hear(robot, 1, tiles_of({(number, col) for col in range(9 - number % 8)}))
+        shared.receive(robot, 1, tiles_of({(number, col) for col in range(9 - number % 8)}))
     with pytest.raises(FleetError, match="32 robots"):
-        shared.hear("new", 1, (), members)
-    assert shared.hear("new", 1, (), members[8:])
+        shared.receive("new", 1, (), members)
+    assert shared.receive("new", 1, (), members[8:])
     assert [shared.cells_of(robot) for robot in members[6:9]] == [3, 0, 9]
-    assert not shared.hear("newer", 1, (), members)
+    assert not shared.receive("newer", 1, (), members)
 
 
 def test_a_zone_swept_again_by_many_does_not_delay_others():
@@ -273,7 +273,7 @@ def test_a_zone_swept_again_by_many_does_not_delay_others():
     angles = np.linspace(0.0, 2.0 * np.pi, 900, endpoint=False)
     ring = tuple((48.0 + 40.0 * math.cos(angle), 48.0 + 40.0 * math.sin(angle)) for angle in angles)
     for robot in range(MOST_ROBOTS - 1):
-        ledger.shared.hear(f"m{robot}", 1, [((n // 5, n % 5), bits) for n in range(24)])
+        ledger.shared.receive(f"m{robot}", 1, [((n // 5, n % 5), bits) for n in range(24)])
     inside = partial(in_zones, (Zone("ring", ring),))
     ledger.forget(inside)
     asked = []
@@ -301,16 +301,16 @@ def everywhere(rows, _cols):
 def test_disregarded_cells_count_once_swept_again(kept, counted):
     shared, cells = SharedProgress(), {(0, col) for col in range(20)}
     shared.begin(1)
-    shared.hear("r2", 1, tiles_of(cells))
+    shared.receive("r2", 1, tiles_of(cells))
     shared.disregard(everywhere)
     # It has forgotten all but what it kept, and swept all again, out of hearing.
     told = None if kept is None else tiles_of({(0, col) for col in kept})
     for _ in range(3):
-        shared.hear("r2", 2, tiles_of(cells), (), told)
+        shared.receive("r2", 2, tiles_of(cells), (), told)
         assert shared.cells_of("r2") == counted
     # In an epoch, what is disregarded stays so.
     shared.disregard(everywhere)
-    shared.hear("r2", 2, tiles_of(cells), (), told)
+    shared.receive("r2", 2, tiles_of(cells), (), told)
     assert shared.cells_of("r2") == 0
 
 
@@ -332,11 +332,11 @@ def test_disregarded_cells_are_dropped_with_the_cells_or_if_many():
     shared = SharedProgress()
     for epoch in range(1, 120):
         places = range(100 * epoch, 100 * epoch + 100)
-        shared.hear("r2", epoch, [((row, 0), b"\xff" * TILE_BYTES) for row in places])
+        shared.receive("r2", epoch, [((row, 0), b"\xff" * TILE_BYTES) for row in places])
         shared.disregard(everywhere)
     assert len(shared.encode()) < 2 * MOST_TILES * 700
-    shared.hear("r2", 120, [((row, 0), bytes(TILE_BYTES)) for row in places])
-    shared.hear("r2", 120, [((row, 0), b"\xff" * TILE_BYTES) for row in places])
+    shared.receive("r2", 120, [((row, 0), bytes(TILE_BYTES)) for row in places])
+    shared.receive("r2", 120, [((row, 0), b"\xff" * TILE_BYTES) for row in places])
     assert shared.cells_of("r2") == 100 * 8 * TILE_BYTES
 
 
@@ -482,10 +482,10 @@ def test_repeated_or_reordered_messages_of_an_epoch_are_harmless(sweeps, data):
         messages.append(tiles_of(swept))
     one, other = SharedProgress(), SharedProgress()
     for tiles in messages:
-        one.hear("r2", 7, tiles)
+        one.receive("r2", 7, tiles)
     shuffled = data.draw(st.permutations(messages + messages[-2:]))
     for tiles in shuffled:
-        other.hear("r2", 7, tiles)
+        other.receive("r2", 7, tiles)
     window = Window(-5, -5, 60, 60)
     found = {(row - 5, col - 5) for row, col in np.argwhere(one.swept(window)).tolist()}
     assert found == swept
@@ -497,7 +497,7 @@ def tiles_of(cells):
     ledger = CoverageLedger(1.0)
     for cell in cells:
         ledger.credit(cell)
-    return Telling().next(ledger.snapshot().tiles, 100)
+    return SweptQueue().next(ledger.snapshot().tiles, 100)
 
 
 def test_robots_that_meet_in_a_corridor_pass_at_a_niche():

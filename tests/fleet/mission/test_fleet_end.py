@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from fasaco_edge.fleet.mission.ground import GroundTelling
+from fasaco_edge.fleet.mission.ground import GroundQueue
 from fasaco_edge.fleet.mission.members import HANGING_S
 from fasaco_edge.fleet.mission.shared_work import STUCK_S, WAITING_S, Remainder
 from fasaco_edge.mission.core.events import CommandReceived, MapReceived, Part
@@ -145,7 +145,7 @@ def test_a_robot_whose_part_only_others_see_sweeps_what_it_sees():
     # The east half is still unknown to it, and its part lies there.
     ours = FleetRobot("r1", (0, 0), [row[:12] for row in HALL])
     other = FleetRobot("r2", (6, 12), HALL)
-    report = replace(other.report(), ground=GroundTelling().next(other.mission.area, 100))
+    report = replace(other.report(), ground=GroundQueue().next(other.mission.area, 100))
     parts = (Part("r1", (6, 22), 0.0, 1.0), Part("r2", (6, 4), 0.0, 1.0))
     for second in range(20):
         place = 3.0 + 0.2 * (second % 2)
@@ -171,7 +171,7 @@ def heard_from_the_east(other, number, to_r1):
     seed = (6, 22) if to_r1 else (0, 0)
     return replace(
         other.report(),
-        ground=GroundTelling().next(other.mission.area, 100),
+        ground=GroundQueue().next(other.mission.area, 100),
         tiles=tiles_of([cell for cell in CELLS if cell[1] < 12]),
         parts=(Part("r1", seed, 0.0 if to_r1 else 1e6, 1.0), Part("r2", (6, 14), 0.0, 1.0)),
         division=number,

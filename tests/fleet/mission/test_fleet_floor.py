@@ -12,7 +12,7 @@ import pytest
 from fasaco_edge.fleet.mission.kind import FleetKind
 from fasaco_edge.fleet.mission.layer import MANY_TAKEN
 from fasaco_edge.judge.floor import judge_floor
-from fasaco_edge.mission.core.events import MapReceived, MemberHeard, Part, State
+from fasaco_edge.mission.core.events import MapReceived, MemberReceived, Part, State
 from fasaco_edge.mission.core.mission import Mission
 from tests.fleet.mission.test_fleet import tiles_of
 from tests.grid.test_floor import room
@@ -25,7 +25,7 @@ SHARES = np.linspace(0.0, 1.0, 21)
 def divided_by(member, number):
     """A robot that stands in the corner, and gives all that is left to itself."""
     parts = (Part("r1", (5, 9), 1e6, 1.0), Part(member, (5, 10), 0.0, 1.0))
-    return MemberHeard(
+    return MemberReceived(
         robot=member,
         frame="map",
         state="covering",

@@ -14,7 +14,7 @@ from fasaco_edge.fleet.daemon.exchange import PERIOD_S, FleetReceiver, FleetSend
 from fasaco_edge.fleet.mission.division import Division
 from fasaco_edge.fleet.mission.division import Robot as SharingRobot
 from fasaco_edge.fleet.mission.frames import (
-    MOST_HEARD,
+    MOST_OTHERS,
     FleetFrames,
     Relaid,
     placed_point,
@@ -23,7 +23,7 @@ from fasaco_edge.fleet.mission.frames import (
 from fasaco_edge.fleet.mission.kind import FleetKind
 from fasaco_edge.grid.geometry import Pose2D, StampedPose
 from fasaco_edge.grid.lattice import CoverageLattice
-from fasaco_edge.mission.core.events import MapReceived, MemberHeard, Part, PoseReceived
+from fasaco_edge.mission.core.events import MapReceived, MemberReceived, Part, PoseReceived
 from fasaco_edge.mission.coverage.ledger import TILE
 from fasaco_edge.wire.documents.fleet import CellTile, FleetMember, FleetPart
 from fasaco_edge.wire.documents.json_text import encode_json
@@ -87,7 +87,7 @@ def test_tiles_are_made_of_all_that_was_told_and_repeated_alike():
 def test_a_new_epoch_ends_what_was_swept_before():
     frames = FleetFrames(Pose2D(0.0, 0.0), 0.0, CELL)
     first, second = ({(row, col) for row in range(8) for col in cols} for cols in ((1, 2), (8, 9)))
-    heard = MemberHeard("r2", frame="house", epoch=1, tiles=(((0, 0), bits_of(first)),))
+    heard = MemberReceived("r2", frame="house", epoch=1, tiles=(((0, 0), bits_of(first)),))
     before = cells_of(frames.event(heard, AT, 0.0).tiles)
     later = replace(heard, epoch=2, tiles=(((0, 0), bits_of(second)),))
     after = cells_of(frames.event(later, AT, 0.0).tiles)
@@ -99,10 +99,10 @@ def test_a_new_epoch_ends_what_was_swept_before():
 def test_as_many_robots_as_are_heard_keep_their_ground():
     """With one more than there was room for, each lost what it had told before, in turn."""
     frames, every = FleetFrames(Pose2D(10 * CELL, 0.0), 0.0, CELL), bits_of({(0, 0), (0, 63)})
-    names = [f"r{number}" for number in range(MOST_HEARD)]
+    names = [f"r{number}" for number in range(MOST_OTHERS)]
 
     def told(name, col):
-        heard = MemberHeard(name, epoch=1, ground=(((0, col), every),))
+        heard = MemberReceived(name, epoch=1, ground=(((0, col), every),))
         return frames.event(heard, Pose2D(0.0, 0.0), 0.0).ground
 
     # Shifted by ten cells, the first tile here has cells of two of theirs.
@@ -120,7 +120,7 @@ def test_as_many_robots_as_are_heard_keep_their_ground():
 def test_places_and_seeds_come_in_this_robots_frames():
     frames = FleetFrames(Pose2D(1.0, 0.0), 0.0, CELL)
     part = Part("r1", (0, 4), 0.0, 1.0)
-    heard = MemberHeard("r2", x=2.0, y=1.0, ahead=((2.0, 2.0),), parts=(part,))
+    heard = MemberReceived("r2", x=2.0, y=1.0, ahead=((2.0, 2.0),), parts=(part,))
     placed = frames.event(heard, Pose2D(1.0, 5.0, math.pi / 2), 0.0)
     assert (placed.x, placed.y) == pytest.approx((-1.0, 7.0))
     assert placed.ahead[0] == pytest.approx((-2.0, 7.0))

@@ -8,12 +8,12 @@ import pytest
 from fasaco_edge.errors import FleetError
 from fasaco_edge.fleet.mission import ground as shared_ground
 from fasaco_edge.fleet.mission.division import Division, Robot, divide
-from fasaco_edge.fleet.mission.ground import GroundTelling, SharedGround
+from fasaco_edge.fleet.mission.ground import GroundQueue, SharedGround
 from fasaco_edge.fleet.mission.members import Members
 from fasaco_edge.fleet.mission.shared import MOST_ROBOTS, MOST_TILES_OF_ONE, SharedProgress
 from fasaco_edge.fleet.mission.tiles import TILE_BYTES
 from fasaco_edge.grid.lattice import BLOCKED, UNKNOWN, CoverageLattice
-from fasaco_edge.mission.core.events import MapReceived, MemberHeard
+from fasaco_edge.mission.core.events import MapReceived, MemberReceived
 from fasaco_edge.mission.coverage.ledger import TILE
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
 from fasaco_edge.mission.map.inputs import PATIENCE_S
@@ -23,7 +23,7 @@ from tests.mission.world import CELL, building, pose_at, reachable_cells
 
 CORRIDOR = ["." * 40] * 3
 # A whole tile that r2 can reach.
-LARGER = MemberHeard("r2", frame="map", epoch=1, ground=(((0, 0), b"\xff" * TILE_BYTES),))
+LARGER = MemberReceived("r2", frame="map", epoch=1, ground=(((0, 0), b"\xff" * TILE_BYTES),))
 
 
 def area_of(*rows, cell=(0, 0)):
@@ -40,7 +40,7 @@ def cells_of(area):
 def test_ground_of_others_joins_where_the_own_map_is_unknown():
     own, other = area_of("....", "...."), area_of("...." + "." * 60, "...#" + "." * 60)
     ground = SharedGround()
-    ground.hear("r2", GroundTelling().next(other, 10))
+    ground.receive("r2", GroundQueue().next(other, 10))
     joint = ground.joint(own)
     # The other's obstacle lies where the own map shows free floor.
     assert cells_of(joint) == cells_of(own) | cells_of(other)
@@ -51,7 +51,7 @@ def test_ground_of_others_joins_where_the_own_map_is_unknown():
 def test_the_own_maps_wall_counts_unless_it_may_be_a_door():
     own, other = area_of("..#", "..#"), area_of("......", "......")
     ground = SharedGround()
-    ground.hear("r2", GroundTelling().next(other, 10))
+    ground.receive("r2", GroundQueue().next(other, 10))
     joint, beyond = ground.joint(own), ground.with_doors(own)
     assert cells_of(joint) == cells_of(own)
     assert cells_of(beyond) == {(row, col) for row in range(2) for col in (0, 1, 3, 4, 5)}
@@ -93,7 +93,7 @@ def test_own_cells_beyond_others_ground_count_only_if_reachable(told):
     own = ReachableArea.around(replace(lattice, states=states), (0, 0))
     ground = SharedGround()
     bits = np.packbits(np.arange(TILE * TILE) < told).tobytes()
-    ground.hear("r2", [((0, 0), bits)])
+    ground.receive("r2", [((0, 0), bits)])
     assert cells_of(ground.joint(own)) == {(0, col) for col in range(told)}
 
 
@@ -125,10 +125,10 @@ def test_a_robot_too_wide_for_a_door_keeps_to_its_part():
 
 
 def test_ground_that_is_lost_again_is_told():
-    own, telling, ground = area_of("...."), GroundTelling(), SharedGround()
+    own, telling, ground = area_of("...."), GroundQueue(), SharedGround()
     larger, smaller = area_of("." * 9), area_of("." * 6)
     for told in (larger, smaller):
-        ground.hear("r2", telling.next(told, 10))
+        ground.receive("r2", telling.next(told, 10))
     assert cells_of(ground.joint(own)) == cells_of(smaller)
 
 
@@ -139,19 +139,19 @@ def members():
     ledger.move_to("map")
     ledger.shared.begin(1)
     members = Members("r1", ledger, CELL)
-    members.hear(LARGER, 1.0)
+    members.receive(LARGER, 1.0)
     return members
 
 
 def test_ground_of_an_unfitting_or_forgotten_robot_is_dropped(members):
     own = area_of("....")
     assert cells_of(members.ground.joint(own)) > cells_of(own)
-    members.hear(replace(LARGER, frame="elsewhere"), 2.0)
+    members.receive(replace(LARGER, frame="elsewhere"), 2.0)
     assert cells_of(members.ground.joint(own)) == cells_of(own)
-    members.hear(LARGER, 3.0)
+    members.receive(LARGER, 3.0)
     assert cells_of(members.ground.joint(own)) > cells_of(own)
     for number in range(MOST_ROBOTS):
-        members.hear(MemberHeard(f"x{number}", frame="map", epoch=1), 10.0)
+        members.receive(MemberReceived(f"x{number}", frame="map", epoch=1), 10.0)
     assert "r2" not in members.known
     assert cells_of(members.ground.joint(own)) == cells_of(own)
 
@@ -160,7 +160,7 @@ def test_ground_of_a_robot_beyond_the_limit_is_dropped(members):
     own = area_of("....")
     tiles = tuple(((row, 9), b"\xff" * TILE_BYTES) for row in range(MOST_TILES_OF_ONE + 1))
     with pytest.raises(FleetError):
-        members.hear(replace(LARGER, tiles=tiles), 2.0)
+        members.receive(replace(LARGER, tiles=tiles), 2.0)
     assert cells_of(members.ground.joint(own)) == cells_of(own)
 
 
@@ -179,7 +179,7 @@ def test_ground_sent_in_a_frame_since_left_does_not_count():
 
 def test_tiles_are_told_a_few_at_a_time_and_changed_ones_first():
     area = ReachableArea.around(CoverageLattice.from_free(np.ones((64, 64 * 5), np.bool_)), (0, 0))
-    telling = GroundTelling()
+    telling = GroundQueue()
     assert telling.next(None, 3) == ()
     assert [place for place, _ in telling.next(area, 3)] == [(0, 0), (0, 1), (0, 2)]
     assert [place for place, _ in telling.next(area, 3)] == [(0, 3), (0, 4), (0, 0)]
@@ -188,7 +188,7 @@ def test_tiles_are_told_a_few_at_a_time_and_changed_ones_first():
 def test_ground_far_away_of_a_robot_that_lies_takes_no_memory():
     own, ground = area_of("...."), SharedGround()
     all_set = b"\xff" * TILE_BYTES
-    ground.hear("r2", [((2**20, 2**20), all_set), ((1, 0), all_set)])
+    ground.receive("r2", [((2**20, 2**20), all_set), ((1, 0), all_set)])
     joint = ground.joint(own)
     assert joint.lattice.states.size <= own.lattice.states.size + shared_ground.MOST_ADDED
 

@@ -9,7 +9,7 @@ from fasaco_edge.fleet.mission.kind import FleetKind
 from fasaco_edge.fleet.mission.tiles import TILE_BYTES
 from fasaco_edge.fleet.mission.traffic import PATIENCE_S
 from fasaco_edge.mission.config import Place
-from fasaco_edge.mission.core.events import MapReceived, MemberHeard, State
+from fasaco_edge.mission.core.events import MapReceived, MemberReceived, State
 from fasaco_edge.mission.orders.order_state import OrderState, Stage
 from tests.fleet.mission.fleets import FleetDrive, FleetRobot
 from tests.mission.world import CELL, CONFIG, Drive, building, pose_at, rectangle, with_policy
@@ -26,7 +26,7 @@ def at(row, col):
 
 def member(cell, **changes):
     x, y = (cell[1] + 0.5) * CELL, (cell[0] + 0.5) * CELL
-    heard = MemberHeard("r2", state="covering", x=x, y=y, epoch=1, radius_m=RADIUS_M)
+    heard = MemberReceived("r2", state="covering", x=x, y=y, epoch=1, radius_m=RADIUS_M)
     return replace(heard, **changes)
 
 

@@ -71,8 +71,8 @@ def test_a_moved_map_of_another_robot_drops_its_earlier_cells():
 def test_cells_of_a_moved_robot_count_if_none_were_disregarded():
     shared, tiles = SharedProgress(), (((0, 0), bits_of(BLOCK)),)
     shared.begin(1)
-    shared.hear("r2", 1, tiles)
-    assert shared.hear("r2", 1, tiles, lattice=AT)
+    shared.receive("r2", 1, tiles)
+    assert shared.receive("r2", 1, tiles, lattice=AT)
     assert shared.cells_of("r2") == 25
     # Which of its cells these are is not known at the new place.
     shared.disregard(lambda rows, _: rows < 7)
@@ -80,11 +80,11 @@ def test_cells_of_a_moved_robot_count_if_none_were_disregarded():
     kept = shared.encode()
     for again in (shared, SharedProgress()):
         again.resume(kept)
-        again.hear("r2", 1, tiles, lattice=Pose2D(0.0, 0.0))
-        again.hear("r2", 1, tiles, lattice=Pose2D(0.0, 0.0))
+        again.receive("r2", 1, tiles, lattice=Pose2D(0.0, 0.0))
+        again.receive("r2", 1, tiles, lattice=Pose2D(0.0, 0.0))
         assert again.cells_of("r2") == 0
         more = (((0, 0), bits_of(BLOCK | {(20, 20), (20, 21)})),)
-        again.hear("r2", 2, more, lattice=Pose2D(0.0, 0.0))
+        again.receive("r2", 2, more, lattice=Pose2D(0.0, 0.0))
         assert again.cells_of("r2") == 2
 
 
@@ -94,8 +94,8 @@ def test_cells_of_a_moved_robot_count_if_none_were_disregarded():
 def test_cells_from_before_a_correction_of_the_own_map_are_void(place):
     shared, tiles = SharedProgress(MapPlace((1.0, 2.0, 0.0))), (((0, 0), bits_of(BLOCK)),)
     shared.begin(5)
-    shared.hear("r2", 1, tiles, lattice=AT)
-    shared.hear("r3", 1, tiles)
+    shared.receive("r2", 1, tiles, lattice=AT)
+    shared.receive("r3", 1, tiles)
     same, other = SharedProgress(MapPlace((1.0, 2.0, 0.0))), SharedProgress(place)
     for again in (same, other):
         again.resume(shared.encode())
@@ -103,7 +103,7 @@ def test_cells_from_before_a_correction_of_the_own_map_are_void(place):
     assert [same.cells_of(robot) for robot in ("r2", "r3")] == [25, 25]
     assert not other.swept(Window(0, 0, 99, 99)).any()
     other.resume(other.encode())
-    other.hear("r2", 1, tiles)
+    other.receive("r2", 1, tiles)
     assert other.cells_of("r2") == 25
 
 
@@ -136,7 +136,7 @@ class OnFloors(Drive):
             self.tell(MapReceived(floor), pose, after=1.0)
         self.sender.publish(self.mission, self.now)
 
-    def hear(self, payload):
+    def receive(self, payload):
         """Return why the other robot does not belong to the fleet."""
         self.tell(self.receiver.event(Sample("fasaco/@v1/r2/fleet", payload)))
         return self.mission.company.members["r2"].left_out
@@ -152,25 +152,25 @@ def test_cells_of_a_robot_on_another_floor_do_not_count():
     other.stay_on(first)
     rider.stay_on(first)
     assert rider.told() == ("house", True)
-    assert other.hear(rider.listener.payload) == ""
-    rider.hear(other.listener.payload)
+    assert other.receive(rider.listener.payload) == ""
+    rider.receive(other.listener.payload)
     before = swept_by_others(other.mission)
     assert before
     rider.stay_on(second)
     assert rider.told() == ("floor2", True)
-    assert other.hear(rider.listener.payload) == (
+    assert other.receive(rider.listener.payload) == (
         "its frame is 'floor2', that of this fleet is 'house'"
     )
     assert swept_by_others(other.mission) == before
     # Nor does it take their cells for such of this floor, or them for robots in its way.
-    assert rider.hear(other.listener.payload) == (
+    assert rider.receive(other.listener.payload) == (
         "the map frame is 'floor2' here, fleet.x_m, y_m and yaw_deg belong to 'floor1' "
         "(fleet.map_frame)"
     )
     assert swept_by_others(rider.mission) == set()
     rider.stay_on(first)
     assert rider.told() == ("house", True)
-    assert rider.hear(other.listener.payload) == other.hear(rider.listener.payload) == ""
+    assert rider.receive(other.listener.payload) == other.receive(rider.listener.payload) == ""
 
 
 def test_after_a_reset_nothing_counts_before_the_frame_is_known():
@@ -178,7 +178,7 @@ def test_after_a_reset_nothing_counts_before_the_frame_is_known():
     for one in (robot, other):
         one.stay_on(FLOORS[0])
     robot.command("reset")
-    robot.hear(other.listener.payload)
+    robot.receive(other.listener.payload)
     robot.stay_on(FLOORS[1])
     assert swept_by_others(robot.mission) == set()
 

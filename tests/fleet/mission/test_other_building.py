@@ -4,7 +4,7 @@ import numpy as np
 
 from fasaco_edge.fleet.mission.kind import FleetKind
 from fasaco_edge.fleet.mission.shared import tile_bits
-from fasaco_edge.mission.core.events import MemberHeard
+from fasaco_edge.mission.core.events import MemberReceived
 from tests.mission.test_other_building import HERE, NEW, OLD, stand
 from tests.mission.world import Drive, pose_at
 
@@ -12,7 +12,8 @@ from tests.mission.world import Drive, pose_at
 def test_cells_of_others_on_the_previous_floor_do_not_count():
     """They go on telling of it, in the frame that the map here has, too."""
     everywhere = tile_bits(np.ones((64, 64), np.uint16))
-    other = MemberHeard("b", frame="map", state="covering", epoch=1, tiles=(((0, 0), everywhere),))
+    tiles = (((0, 0), everywhere),)
+    other = MemberReceived("b", frame="map", state="covering", epoch=1, tiles=tiles)
     drive = Drive(HERE, OLD, pose_at(*HERE), kind=FleetKind("a"))
     drive.tell(other)
     assert drive.mission.coverage().remaining == 0

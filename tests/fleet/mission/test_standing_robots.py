@@ -13,7 +13,7 @@ from fasaco_edge.fleet.mission.shared import SharedProgress
 from fasaco_edge.fleet.mission.tiles import TILE_BYTES
 from fasaco_edge.fleet.mission.traffic import OLD_S, PATIENCE_S, STANDS_S
 from fasaco_edge.grid.lattice import CoverageLattice
-from fasaco_edge.mission.core.events import MapReceived, MemberHeard
+from fasaco_edge.mission.core.events import MapReceived, MemberReceived
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
 from fasaco_edge.mission.map.reachable_area import ReachableArea
 from tests.mission.world import CONFIG, Drive, building, pose_at, with_policy
@@ -22,7 +22,7 @@ CELL_M, RADIUS_M = 0.25, 0.1
 
 
 def member(x, y):
-    return MemberHeard("r2", state="covering", x=x, y=y, epoch=1, radius_m=0.1)
+    return MemberReceived("r2", state="covering", x=x, y=y, epoch=1, radius_m=0.1)
 
 
 def planned(**policy):
@@ -44,7 +44,7 @@ def members():
 
 
 def test_cells_within_reach_of_a_robot_in_the_way_are_closed(area, members):
-    members.hear(member(1.125, 1.125), 0.0)
+    members.receive(member(1.125, 1.125), 0.0)
     assert members.closed(area, RADIUS_M) is None
     members.avoid("r2")
     closed = members.closed(area, RADIUS_M)
@@ -54,37 +54,37 @@ def test_cells_within_reach_of_a_robot_in_the_way_are_closed(area, members):
 
 @pytest.mark.parametrize("x", [-0.1, 10.1, 90.0])
 def test_a_robot_at_the_edge_closes_only_cells_of_the_map(area, members, x):
-    members.hear(member(x, 1.125), 0.0)
+    members.receive(member(x, 1.125), 0.0)
     members.avoid("r2")
     assert np.count_nonzero(members.closed(area, RADIUS_M)) == (0 if x == 90.0 else 1)
 
 
 def test_no_cells_stay_closed_behind_a_robot_that_drives_on(area, members):
-    members.hear(member(1.125, 1.125), 0.0)
+    members.receive(member(1.125, 1.125), 0.0)
     members.avoid("r2")
-    members.hear(member(2.125, 1.125), 1.0)
+    members.receive(member(2.125, 1.125), 1.0)
     assert members.closed(area, RADIUS_M) is None
     assert not members.is_avoided("r2")
 
 
 def test_scattered_poses_of_a_standing_robot_keep_cells_closed(area, members):
-    members.hear(member(1.125, 1.125), 0.0)
+    members.receive(member(1.125, 1.125), 0.0)
     members.avoid("r2")
     closed = members.closed(area, RADIUS_M)
-    members.hear(member(1.18, 1.07), 1.0)
+    members.receive(member(1.18, 1.07), 1.0)
     assert members.is_avoided("r2")
     assert members.closed(area, RADIUS_M).sum() == closed.sum()
 
 
 def test_no_cells_stay_closed_for_a_robot_on_another_map(area, members):
-    members.hear(member(1.125, 1.125), 0.0)
+    members.receive(member(1.125, 1.125), 0.0)
     members.avoid("r2")
-    members.hear(replace(member(1.125, 1.125), misfit="its map is another"), 1.0)
+    members.receive(replace(member(1.125, 1.125), misfit="its map is another"), 1.0)
     assert members.closed(area, RADIUS_M) is None
 
 
 def test_where_a_silent_robot_is_only_the_map_shows(area, members):
-    members.hear(member(1.125, 1.125), 0.0)
+    members.receive(member(1.125, 1.125), 0.0)
     members.avoid("r2")
     assert members.forget_silent(OLD_S - 0.1) == ""
     assert members.closed(area, RADIUS_M).any()

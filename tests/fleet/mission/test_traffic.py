@@ -8,7 +8,7 @@ import pytest
 from fasaco_edge.fleet.mission.refuge import refuge, without
 from fasaco_edge.fleet.mission.traffic import Neighbour, obstruction, spaced
 from fasaco_edge.grid.lattice import CoverageLattice
-from fasaco_edge.mission.core.events import MemberHeard
+from fasaco_edge.mission.core.events import MemberReceived
 from fasaco_edge.mission.map.reachable_area import ReachableArea
 
 RADIUS_M, PACE_S_M = 0.2, 4.0
@@ -16,7 +16,7 @@ RADIUS_M, PACE_S_M = 0.2, 4.0
 
 def heard(name, *points, waits_for=""):
     (x, y), *ahead = points
-    return MemberHeard(
+    return MemberReceived(
         name, state="covering", x=x, y=y, radius_m=RADIUS_M, ahead=tuple(ahead), waits_for=waits_for
     )
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from fasaco_edge.bus.arrival import Arrival, Sample
-from fasaco_edge.fleet.mission.frames import MOST_HEARD
+from fasaco_edge.fleet.mission.frames import MOST_OTHERS
 from fasaco_edge.fleet.observer.inbox import DEPTHS, FleetInbox
 
 CAPACITY = 4_000
@@ -66,9 +66,9 @@ def test_what_is_larger_than_a_share_is_left_out(size):
 
 def test_no_more_names_are_kept_than_there_is_room_for():
     box = Box()
-    for number in range(MOST_HEARD + 5):
+    for number in range(MOST_OTHERS + 5):
         box.put(f"r{number}", "fleet", b"")
-    assert len(box.taken()) == MOST_HEARD
+    assert len(box.taken()) == MOST_OTHERS
     box.forget("r3")
     box.put("late", "fleet", b"")
     assert box.taken() == [("late", "fleet", b"")]

@@ -28,7 +28,7 @@ def halved():
     members = Members(Member)
     assert shares_of(members, 0) is None
     for name in ("a", "b"):
-        members.hear(name, member(division=7, by="a", parts=PARTS), SECOND)
+        members.receive(name, member(division=7, by="a", parts=PARTS), SECOND)
     return members
 
 
@@ -42,20 +42,20 @@ def test_each_has_the_part_that_it_is_nearer_to(halved):
 def test_one_left_alone_has_all_that_is_left(halved):
     swept = [(0, col) for col in range(30)]
     now = SECOND + GONE_NS + 1
-    halved.hear("b", member(cells=swept, division=8, by="b"), now)
+    halved.receive("b", member(cells=swept, division=8, by="b"), now)
     assert shares_of(halved, now).cells == {"b": HALL - 30}
 
 
 def test_a_new_robot_without_a_division_changes_nothing(halved):
-    halved.hear("c", member(division=0), SECOND)
+    halved.receive("c", member(division=0), SECOND)
     assert shares_of(halved, SECOND).cells.keys() == {"a", "b"}
 
 
 def test_what_a_robot_that_is_gone_told_is_not_in_force(halved):
-    halved.hear("c", member(division=9, by="c", parts=(FleetPart("c", 0, 0, 0.0, 1.2),)), SECOND)
+    halved.receive("c", member(division=9, by="c", parts=(FleetPart("c", 0, 0, 0.0, 1.2),)), SECOND)
     now = SECOND + GONE_NS
     for name in ("a", "b"):
-        halved.hear(name, member(division=8, by="b", parts=PARTS), now)
+        halved.receive(name, member(division=8, by="b", parts=PARTS), now)
     assert shares_of(halved, now).cells == {"c": HALL}
     assert shares_of(halved, now + 1).cells.keys() == {"a", "b"}
     # Once all are gone the last division stays drawn.

@@ -16,7 +16,7 @@ from fasaco_edge.cli import review
 from fasaco_edge.cli.console.arguments import Exit
 from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.errors import FleetError, UnreadableRecording
-from fasaco_edge.fleet.mission.frames import MOST_HEARD
+from fasaco_edge.fleet.mission.frames import MOST_OTHERS
 from fasaco_edge.fleet.observer import members
 from fasaco_edge.fleet.recording import recorder, scene
 from fasaco_edge.fleet.recording.notes import read_notes
@@ -177,7 +177,7 @@ def test_no_size_of_cells_ends_the_recording_of_the_others(studio, cell_m):
 
 
 def test_names_that_send_rubbish_leave_room_for_a_late_robot(studio):
-    names = [f"x{number}" for number in range(MOST_HEARD)]
+    names = [f"x{number}" for number in range(MOST_OTHERS)]
     strangers = [studio.bus.advertise(Keys(name), topics.FLEET) for name in names]
     for payload in (b"rubbish", b'{"version": 9, "fleet": "house"}'):
         for stranger in strangers:
@@ -280,10 +280,10 @@ def test_a_robot_beyond_the_limit_replaces_one_long_gone(monkeypatch):
     monkeypatch.setattr(members, "MOST_MEMBERS", 2)
     fleet, second = members.Members(members.Member), 1_000_000_000
     for name, at_s in (("a", 1), ("b", 50)):
-        assert fleet.hear(name, member(), at_s * second)[1] == members.JOINED
+        assert fleet.receive(name, member(), at_s * second)[1] == members.JOINED
     with pytest.raises(FleetError, match="c: 2 robots"):
-        fleet.hear("c", member(), 52 * second)
-    joined, news = fleet.hear("c", member(), 70 * second)
+        fleet.receive("c", member(), 52 * second)
+    joined, news = fleet.receive("c", member(), 70 * second)
     assert (joined.number, news) == (0, members.JOINED)
     assert [one.name for one in fleet] == ["c", "b"]
 
@@ -291,7 +291,7 @@ def test_a_robot_beyond_the_limit_replaces_one_long_gone(monkeypatch):
 def test_all_robots_that_a_division_may_have_are_recorded():
     fleet = members.Members(members.Member)
     for number in range(MAX_FLEET_PARTS):
-        fleet.hear(f"r{number}", member(), 1)
+        fleet.receive(f"r{number}", member(), 1)
     assert [one.number for one in fleet] == list(range(MAX_FLEET_PARTS))
 
 

@@ -24,7 +24,7 @@ Tiles = dict["Cell", Bits]
 
 
 @dataclass(slots=True)
-class Heard:
+class MemberCells:
     """Cells swept by one robot: tiles of bits, and the bits that are disregarded.
 
     Attributes:
@@ -76,7 +76,7 @@ _Tile = tuple[int, int, Annotated[bytes, Meta(min_length=TILE_BYTES, max_length=
 
 
 class Kept(msgspec.Struct, frozen=True, array_like=True):
-    """Stored form of ``Heard``."""
+    """Stored form of ``MemberCells``."""
 
     epoch: int
     tiles: list[_Tile]
@@ -84,11 +84,11 @@ class Kept(msgspec.Struct, frozen=True, array_like=True):
     lattice: tuple[float, float, float] = (0.0, 0.0, 0.0)
     is_doubtful: bool = False
 
-    def heard(self, *, is_in_place: bool) -> Heard:
+    def restored(self, *, is_in_place: bool) -> MemberCells:
         """Restore the cells; without tiles if this robot's own lattice has moved since."""
         tiles = _placed(self.tiles) if is_in_place else {}
         lattice, without = Pose2D(*self.lattice), _placed(self.disregarded)
-        return Heard(self.epoch, lattice, tiles, without, self.is_doubtful)
+        return MemberCells(self.epoch, lattice, tiles, without, self.is_doubtful)
 
 
 def _listed(tiles: Tiles) -> list[_Tile]:
