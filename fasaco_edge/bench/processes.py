@@ -17,6 +17,7 @@ import yaml
 from fasaco_edge.bus.session import Bus, open_bus
 from fasaco_edge.bus.settings import BusSettings
 from fasaco_edge.errors import BusUnavailable, ProcessEnded
+from fasaco_edge.host.addresses import free_port
 from fasaco_edge.host.processes import python_program
 from fasaco_edge.wire import topics
 from fasaco_edge.wire.keys import Keys
@@ -58,7 +59,7 @@ class DaemonProcess:
 
     def __init__(self, config: dict[str, Any] | None = None) -> None:
         self.keys = Keys()
-        self.endpoint = f"tcp/127.0.0.1:{_free_port()}"
+        self.endpoint = f"tcp/127.0.0.1:{free_port()}"
         self._config = {**(config or {}), "bus": {"listen": [self.endpoint]}}
         self._ends = ExitStack()
 
@@ -122,13 +123,6 @@ def _listens(host: str, port: int) -> bool:
     except OSError:
         return False
     return True
-
-
-def _free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port: int = probe.getsockname()[1]
-        return port
 
 
 @contextmanager

@@ -39,9 +39,7 @@ def load_config(path: Path | None) -> DaemonConfig:
     raise type(first.error)(f"{where}: {first.error}", hint=hint) from first.error
 
 
-def with_mask(
-    config: DaemonConfig, file: Path | None, most_bytes: int | None = None
-) -> DaemonConfig:
+def with_mask(config: DaemonConfig, file: Path | None, most_bytes: int | None) -> DaemonConfig:
     """Return a configuration that holds its keep-out mask itself.
 
     Args:
@@ -60,7 +58,7 @@ def with_mask(
     return structs.replace(config, mission=structs.replace(mission, keep_out_mask=mask))
 
 
-def mask_fault(config: DaemonConfig, file: Path, most_bytes: int | None = None) -> Fault | None:
+def mask_fault(config: DaemonConfig, file: Path, most_bytes: int | None) -> Fault | None:
     """Return the fault of a configuration's keep-out mask, with its line in ``file``."""
     try:
         with_mask(config, file, most_bytes)

@@ -61,11 +61,11 @@ ROUTER_RETRY_S = 1.0
 
 def run_daemon(
     config: DaemonConfig,
-    record_to: Path | None = None,
-    state: Path | None = None,
+    record_to: Path | None,
+    state: Path | None,
     *,
-    fresh: bool = False,
-    read: Callable[[], DaemonConfig] | None = None,
+    fresh: bool,
+    read: Callable[[], DaemonConfig],
 ) -> None:
     """Serve until SIGTERM or SIGINT.
 
@@ -95,7 +95,7 @@ def run_daemon(
 
     call_on(signal.SIGTERM, signal.SIGINT, call=end)
     manager = ServiceManager()
-    reload = Reload(read or (lambda: config), manager)
+    reload = Reload(read, manager)
     if manager.is_there:
         # Without a service manager, SIGHUP comes from a closed terminal and ends the process.
         call_on(signal.SIGHUP, call=reload.asked.set)

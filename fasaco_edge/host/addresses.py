@@ -1,9 +1,10 @@
-"""Addresses that a server of this package listens at."""
+"""Addresses that servers of this package listen at."""
 
 from __future__ import annotations
 
 import ipaddress
 import re
+import socket
 from typing import NamedTuple
 
 from fasaco_edge.errors import BadConfiguration
@@ -54,3 +55,11 @@ def read_address(name: str, text: str, example: int) -> Address:
     except ValueError as error:
         raise wrong from error
     return Address(host, int(found["port"]))
+
+
+def free_port() -> int:
+    """Return a port of this computer's loopback that is free now."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port: int = probe.getsockname()[1]
+        return port

@@ -12,15 +12,10 @@ import pytest
 pytest.importorskip("rerun")
 
 from fasaco_edge.errors import BadConfiguration
+from fasaco_edge.host.addresses import free_port
 from fasaco_edge.recording.write.streams import serve_live
 from tests.support.recordings import bus_on_free_port, recorder_process
 from tests.support.scripted_mission import Mission
-
-
-def free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]
 
 
 def test_a_client_that_joins_late_reads_what_was_logged(tmp_path):

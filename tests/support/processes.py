@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import signal
-import socket
 import subprocess
 import sys
 import time
@@ -16,6 +15,7 @@ from typing import Any
 
 import yaml
 
+from fasaco_edge.host.addresses import free_port
 from tests.support.forked import ENVIRONMENT, Forked, run_forked
 
 # What a daemon may take from SIGTERM to its end on a machine that is busy with much else [s]; on
@@ -26,9 +26,7 @@ PROGRAM = (sys.executable, "-m", "fasaco_edge")
 
 def free_endpoint() -> str:
     """Return a Zenoh endpoint nobody listens on."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return f"tcp/127.0.0.1:{probe.getsockname()[1]}"
+    return f"tcp/127.0.0.1:{free_port()}"
 
 
 @dataclass

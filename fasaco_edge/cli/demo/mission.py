@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import os
 import signal
-import socket
 import subprocess
 import time
 from collections import deque
@@ -27,6 +26,7 @@ from fasaco_edge.cli.demo.mishaps import Mishaps
 from fasaco_edge.cli.demo.robots import FLEET, DemoRobot, fleet_recorder
 from fasaco_edge.client import phrases
 from fasaco_edge.errors import ProcessEnded
+from fasaco_edge.host.addresses import free_port
 from fasaco_edge.host.processes import python_program
 from fasaco_edge.wire import topics
 from fasaco_edge.wire.documents.json_text import decode_tolerant
@@ -111,11 +111,11 @@ class DemoMission:
 
     def __init__(self, args: argparse.Namespace, robots: Sequence[DemoRobot]) -> None:
         self._args, self._robots = args, robots
-        self._endpoint = f"tcp/127.0.0.1:{_free_port()}"
+        self._endpoint = f"tcp/127.0.0.1:{free_port()}"
         # Another router for every second robot, if the network is to be split.
         self._far = self._endpoint
         if args.split_after is not None:
-            self._far = f"tcp/127.0.0.1:{_free_port()}"
+            self._far = f"tcp/127.0.0.1:{free_port()}"
         self._mishaps = Mishaps(
             args.kill_after, args.split_after, (self._endpoint, self._far), err().print
         )
@@ -246,10 +246,3 @@ class DemoMission:
                 except subprocess.TimeoutExpired:
                     process.kill()
                     process.wait()
-
-
-def _free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port: int = probe.getsockname()[1]
-        return port

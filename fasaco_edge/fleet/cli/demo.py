@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fasaco_edge.errors import StartBlocked
+from fasaco_edge.fleet.mission.travel import cell_of
 from fasaco_edge.grid.geometry import Point, Pose2D
 from fasaco_edge.grid.lattice import CoverageLattice
 from fasaco_edge.kernels.lattice.ways import FAR, ways_from
@@ -28,12 +29,7 @@ def apart(lattice: CoverageLattice, first: Point, count: int) -> list[Point]:
                 f"there is no place for a robot beside the other {len(places) + 1}",
                 hint="let fewer robots start",
             )
-        ((x, y),) = lattice.centres(np.array([_cell(lattice, flat)], np.int32)).tolist()
+        ((x, y),) = lattice.centres(np.array([cell_of(lattice, flat)], np.int32)).tolist()
         places.append((x, y))
         nearest = np.minimum(nearest, ways_from(lattice.steps, flat))
     return places
-
-
-def _cell(lattice: CoverageLattice, flat: int) -> tuple[int, int]:
-    row, col = divmod(flat, lattice.steps.shape[1])
-    return row + lattice.window.row0, col + lattice.window.col0

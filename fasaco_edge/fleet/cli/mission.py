@@ -52,9 +52,7 @@ class _Member:
 Shown = Callable[[replies.Reply], str]
 
 
-def command_fleet(
-    args: argparse.Namespace, asked: dict[str, object], shown: Shown | None = None
-) -> int:
+def command_fleet(args: argparse.Namespace, asked: dict[str, object], shown: Shown | None) -> int:
     """Send a command to each robot of the fleet, and show the answers; 0 if all accept it.
 
     On a terminal, one question asks for consent for all robots that would forget covered cells.

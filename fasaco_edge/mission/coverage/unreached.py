@@ -195,7 +195,7 @@ class UnreachedFinder:
             known &= ~(self._map.free.coverable & ~lattice.coverable)
         return known
 
-    def note_failure(self, why: str = "") -> None:
+    def note_failure(self, why: str) -> None:
         """Note that a path left cells over, and why."""
         self._failures, self._why_left = self._failures + 1, why
 

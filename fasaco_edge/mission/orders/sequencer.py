@@ -293,7 +293,7 @@ class Sequencer:
         zone = self.order_state.current_zone
         return "others stand in the way" + (f" to zone {zone.name!r}" if zone else "")
 
-    def note_path_end(self, why: str = "") -> bool:
+    def note_path_end(self, why: str) -> bool:
         """Note the end of a path; return whether the cells it left over must wait for a retry.
 
         ``why``: why it left them over; "" if that is not known.

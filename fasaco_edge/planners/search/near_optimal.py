@@ -50,8 +50,8 @@ class NearOptimal:
     """The colony with local search; ants walk on ``threads`` threads.
 
     Attributes:
-        restarts: one of ``restarts.RESTARTS``; non-default values measure the benefit of ants and
-            trail.
+        restarts: source of restarts, see ``restarts.py``; others than the default measure the
+            benefit of ants and trail.
     """
 
     config: ColonyConfig = field(default_factory=ColonyConfig)

@@ -19,7 +19,7 @@ from fasaco_edge.planners.planner import ColonySnapshot
 from fasaco_edge.planners.problem import CoverageProblem
 
 # Sources of restarts: the colony's next ants; ants on a trail that is not strengthened; none.
-ANTS, FLAT, NEVER = RESTARTS = ("ants", "flat", "never")
+ANTS, FLAT, NEVER = "ants", "flat", "never"
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,7 +30,7 @@ class SearchSettings:
         planner: planner name in paths.
         colony: configuration of the ants.
         threads: number of threads of the ants.
-        restarts: one of ``RESTARTS``.
+        restarts: ANTS, FLAT or NEVER.
     """
 
     planner: str

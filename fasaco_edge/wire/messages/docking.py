@@ -98,7 +98,7 @@ def encode_dock(
     return writer.payload()
 
 
-def encode_undock(goal_id: bytes, dock_type: str = "") -> bytes:
+def encode_undock(goal_id: bytes, dock_type: str) -> bytes:
     """Return the request of UndockRobot's ``send_goal``.
 
     Raises:
