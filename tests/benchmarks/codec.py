@@ -33,6 +33,7 @@ from fasaco_edge.wire.messages.maps import (
 from fasaco_edge.wire.messages.paths import decode_path, encode_path
 from fasaco_edge.wire.messages.poses import decode_pose, encode_pose_stamped
 from fasaco_edge.wire.schemas import OCCUPANCY_GRID_UPDATE, PHEROMONE_GRID, POSE_SCHEMAS
+from tests.benchmarks.harness import within
 from tests.support.poses import encode_odometry, encode_pose_with_covariance_stamped
 
 
@@ -204,31 +205,19 @@ GOAL_RATIO = 1.0
 HEADER = ("message", "", "bytes", "ours", "rosbags", "ratio", "memory", "rosbags'", "same")
 
 
-def _side(text: str) -> int:
-    return _within(text, MOST_SIDE)
-
-
-def _poses(text: str) -> int:
-    return _within(text, MOST_POSES)
-
-
-def _within(text: str, most: int) -> int:
-    number = positive(text)
-    if number > most:
-        raise argparse.ArgumentTypeError(f"must be in 1..{most}, got {text}")
-    return number
-
-
 def _add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--side",
-        type=_side,
+        type=within(1, MOST_SIDE),
         default=DEFAULT_SIDE,
         metavar="CELLS",
         help="edge of the grid (default: %(default)s)",
     )
     parser.add_argument(
-        "--poses", type=_poses, default=DEFAULT_POSES, help="of the path (default: %(default)s)"
+        "--poses",
+        type=within(1, MOST_POSES),
+        default=DEFAULT_POSES,
+        help="of the path (default: %(default)s)",
     )
     parser.add_argument(
         "--repeats", type=positive, default=9, help="of each measurement (default: %(default)s)"

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import argparse
+from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 
@@ -14,6 +16,8 @@ from fasaco_edge.planners.problem import CoverageProblem
 from fasaco_edge.planners.search.near_optimal import NearOptimal
 from fasaco_edge.planners.search.restarts import ANTS
 from tests.benchmarks.judge import WalkVerdict, check_walk
+
+Number = TypeVar("Number", int, float)
 
 
 class WrongWalkError(Exception):
@@ -56,6 +60,18 @@ def judged(problem: CoverageProblem, path: CoveragePath) -> WalkVerdict:
             f"{path.planner}, seed {path.seed}, from {problem.start}: {'; '.join(wrong)}"
         )
     return verdict
+
+
+def within(low: Number, high: Number) -> Callable[[str], Number]:
+    """Return what reads an option's number within bounds; whole numbers if these are."""
+
+    def read(text: str) -> Number:
+        number = type(low)(text)
+        if not low <= number <= high:
+            raise argparse.ArgumentTypeError(f"must be in {low}..{high}, got {text}")
+        return number
+
+    return read
 
 
 def grid_name(name_or_path: str) -> str:

@@ -26,6 +26,7 @@ from fasaco_edge.wire.messages.maps import (
     encode_map_update,
     encode_occupancy_grid,
 )
+from tests.benchmarks.harness import within
 
 FOOTPRINT = Footprint(cell_m=0.3, robot_radius_m=0.18)
 # How far a grown map grows on each side, and how far a moved one moves [pixels].
@@ -143,18 +144,11 @@ GOAL_SIDE, GOAL_SHARE, GOAL_MS = 1024, 0.01, 10.0
 HEADER = ("side", "came as", "changed", "cells", "decode", "change", "p99", "anew", "ratio", "same")
 
 
-def _side(text: str) -> int:
-    side = int(text)
-    if not LEAST_SIDE <= side <= MOST_SIDE:
-        raise argparse.ArgumentTypeError(f"must be in {LEAST_SIDE}..{MOST_SIDE}, got {text}")
-    return side
-
-
 def _add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--sides",
         nargs="+",
-        type=_side,
+        type=within(LEAST_SIDE, MOST_SIDE),
         default=list(DEFAULT_SIDES),
         metavar="PIXELS",
         help=f"edge of the map (default: {' '.join(map(str, DEFAULT_SIDES))})",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 from fasaco_edge.bench.benchmark import (
     Benchmark,
@@ -13,6 +13,7 @@ from fasaco_edge.bench.benchmark import (
     positive,
     seconds,
 )
+from tests.benchmarks.harness import within
 from tests.benchmarks.online.buildings import BuildingChoice
 from tests.benchmarks.online.cases import CASES
 from tests.benchmarks.online.contenders import CONTENDERS, DAEMON
@@ -31,29 +32,10 @@ CONDITIONS = (
 )  # fmt: skip
 
 
-def _within(low: float, high: float) -> Callable[[str], float]:
-    """Return what reads a number within bounds."""
-
-    def read(text: str) -> float:
-        number = float(text)
-        if not low <= number <= high:
-            raise argparse.ArgumentTypeError(f"must be in {low:g}..{high:g}, got {text}")
-        return number
-
-    return read
-
-
 def _some(text: str) -> int:
     number = int(text)
     if number < 0:
         raise argparse.ArgumentTypeError(f"must be 0 or more, got {number}")
-    return number
-
-
-def _cells(text: str) -> int:
-    number = int(text)
-    if not FEWEST_CELLS <= number <= MOST_CELLS:
-        raise argparse.ArgumentTypeError(f"must be in {FEWEST_CELLS}..{MOST_CELLS}, got {text}")
     return number
 
 
@@ -67,7 +49,10 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         help="synthetic buildings of --cells cells, instead of the default maps (default: none)",
     )
     parser.add_argument(
-        "--cells", type=_cells, default=5_000, help="of generated buildings (default: %(default)s)"
+        "--cells",
+        type=within(FEWEST_CELLS, MOST_CELLS),
+        default=5_000,
+        help="of generated buildings (default: %(default)s)",
     )
     parser.add_argument(
         "--mazes", type=_some, default=1, metavar="N", help="beside (default: %(default)s)"
@@ -124,14 +109,14 @@ def _add_robot_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--ranges",
         nargs="+",
-        type=_within(0.1, 100.0),
+        type=within(0.1, 100.0),
         default=[3.5, 8.0],
         metavar="M",
         help="reach of the scanner, which looks all around [m] (default: 3.5 8)",
     )
     parser.add_argument(
         "--misread",
-        type=_within(0.0, 0.5),
+        type=within(0.0, 0.5),
         default=0.0,
         metavar="SHARE",
         help="of the cells taken for the opposite of what they are, beyond 1 m (default: "
@@ -139,7 +124,7 @@ def _add_robot_options(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--noise",
-        type=_within(0.0, 4.0),
+        type=within(0.0, 4.0),
         default=0.0,
         metavar="LEVEL",
         help="each mission in a building once more, with a mapper of so much noise; 1: of a scan "
@@ -160,7 +145,7 @@ def _add_robot_options(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--speed-m-s",
-        type=_within(0.01, 10.0),
+        type=within(0.01, 10.0),
         default=0.25,
         metavar="V",
         help="straight on [m/s] (default: %(default)g)",

@@ -19,7 +19,7 @@ from fasaco_edge.bench.benchmark import Benchmark, Say, positive, seconds_above_
 from fasaco_edge.errors import BadConfiguration, ProcessEnded
 from fasaco_edge.host.processes import python_program
 from tests.benchmarks.buildings import building
-from tests.benchmarks.harness import check_writable
+from tests.benchmarks.harness import check_writable, within
 from tests.benchmarks.scale.process import ScaleRun, ScaleTask, SizedRun
 from tests.benchmarks.scale.report import draw, report
 
@@ -27,18 +27,11 @@ DEFAULT_SIZES = (1_000, 5_000, 20_000, 100_000)
 FEWEST_CELLS, MOST_CELLS = 1_000, 2_000_000
 
 
-def _size(text: str) -> int:
-    cells = int(text)
-    if not FEWEST_CELLS <= cells <= MOST_CELLS:
-        raise argparse.ArgumentTypeError(f"must be in {FEWEST_CELLS}..{MOST_CELLS}, got {text}")
-    return cells
-
-
 def _add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--sizes",
         nargs="+",
-        type=_size,
+        type=within(FEWEST_CELLS, MOST_CELLS),
         default=list(DEFAULT_SIZES),
         metavar="CELLS",
         help=f"cells to cover, 2 %% more or less (default: {' '.join(map(str, DEFAULT_SIZES))}; "
