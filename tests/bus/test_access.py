@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 
+import pytest
 import yaml
 import zenoh
 
@@ -62,27 +63,19 @@ def test_what_a_robot_says_and_hears_is_what_the_contract_says():
     }
 
 
-def test_a_map_comes_from_mappers_and_routers_alone():
+@pytest.mark.parametrize(
+    ("role", "name", "message"),
+    [
+        ("mapper", "map", "put"),
+        ("operator", "@rpc/mission", "query"),
+        ("driver", "cmd_vel", "put"),
+    ],
+)
+def test_maps_missions_and_velocities_come_from_one_role_and_routers(role, name, message):
     everybody = {role: [role] for role in access.ROLES}
     rules = control(**everybody)
-    may = {role for role in everybody if "map" in granted(rules, role, "put", "ingress")}
-    assert may == {"mapper", "router"}
-
-
-def test_a_mission_is_commanded_by_operators_and_routers_alone():
-    everybody = {role: [role] for role in access.ROLES}
-    rules = control(**everybody)
-    asks = {
-        role for role in everybody if "@rpc/mission" in granted(rules, role, "query", "ingress")
-    }
-    assert asks == {"operator", "router"}
-
-
-def test_the_robot_is_driven_by_drivers_and_routers_alone():
-    everybody = {role: [role] for role in access.ROLES}
-    rules = control(**everybody)
-    drives = {role for role in everybody if "cmd_vel" in granted(rules, role, "put", "ingress")}
-    assert drives == {"driver", "router"}
+    may = {one for one in everybody if name in granted(rules, one, message, "ingress")}
+    assert may == {role, "router"}
 
 
 def test_nobody_may_delete():

@@ -18,23 +18,11 @@ from fasaco_edge.bus.session import open_bus
 from fasaco_edge.bus.settings import BusSettings
 from fasaco_edge.wire.topics import QOS
 from tests.support.outsider import open_client
-from tests.support.processes import free_endpoint
 from tests.support.router import router_process
 from tests.support.waiting import until
 
 KEY = "test/@v1/key"
 TIMEOUT_S = 20.0
-
-
-@pytest.fixture
-def endpoint():
-    return free_endpoint()
-
-
-@pytest.fixture
-def bus(endpoint):
-    with open_bus(BusSettings("peer", (), (endpoint,))) as session:
-        yield session
 
 
 @contextmanager

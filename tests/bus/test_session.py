@@ -7,7 +7,7 @@ import signal
 import subprocess
 import sys
 import time
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from queue import Queue
 
@@ -25,24 +25,12 @@ from fasaco_edge.wire import topics
 from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.topics import QOS
 from tests.support.outsider import Collector, open_client
-from tests.support.processes import free_endpoint
 from tests.support.senders import Sender
 from tests.support.waiting import until
 
 KEY = "test/@v1/key"
 SCHEMA = "nav_msgs/msg/Path"
 TIMEOUT_S = 60.0
-
-
-@pytest.fixture
-def endpoint():
-    return free_endpoint()
-
-
-@pytest.fixture
-def bus(endpoint):
-    with open_bus(BusSettings("peer", (), (endpoint,))) as session:
-        yield session
 
 
 @pytest.fixture
@@ -274,30 +262,37 @@ def test_where_there_is_nobody_or_nothing_it_says_so_at_once(settings):
     assert ".rs:" not in str(caught.value)
 
 
-def test_a_frozen_subscriber_does_not_hold_a_publisher(bus, endpoint):
-    """Puts drop on congestion: ten times 16 MB into a process that reads nothing."""
+@contextmanager
+def subscriber(endpoint):
+    """A process that subscribes, and prints the number in each sample."""
     code = f"""
 import time
 from fasaco_edge.bus.session import open_bus
 from fasaco_edge.bus.settings import BusSettings
 with open_bus(BusSettings("client", ({endpoint!r},))) as bus:
-    bus.subscribe({KEY!r}, lambda sample: None)
+    bus.subscribe({KEY!r}, lambda sample: print(sample.payload[:4].decode(), flush=True))
     print("listening", flush=True)
     time.sleep(60)
 """
-    publisher = bus.publisher(KEY, qos=QOS["coverage"])
-    with subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE) as listener:
+    with subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE) as process:
         try:
-            assert listener.stdout.readline() == b"listening\n"
-            until(publisher.has_listeners)
-            listener.send_signal(signal.SIGSTOP)
-            started = time.monotonic()
-            for _ in range(10):
-                publisher.put(bytes(16_000_000))
-            # One blocking put alone would take the five seconds Zenoh waits, ten of them fifty.
-            assert time.monotonic() - started < 40.0
+            assert process.stdout.readline() == b"listening\n"
+            yield process
         finally:
-            listener.kill()
+            process.kill()
+
+
+def test_a_frozen_subscriber_does_not_hold_a_publisher(bus, endpoint):
+    """Puts drop on congestion: ten times 16 MB into a process that reads nothing."""
+    publisher = bus.publisher(KEY, qos=QOS["coverage"])
+    with subscriber(endpoint) as listener:
+        until(publisher.has_listeners)
+        listener.send_signal(signal.SIGSTOP)
+        started = time.monotonic()
+        for _ in range(10):
+            publisher.put(bytes(16_000_000))
+        # One blocking put alone would take the five seconds Zenoh waits, ten of them fifty.
+        assert time.monotonic() - started < 40.0
 
 
 def test_a_resumed_subscriber_gets_the_last_sample_it_missed(bus, endpoint):
@@ -329,60 +324,34 @@ with open_bus(BusSettings("client", ({endpoint!r},))) as bus:
 @pytest.mark.parametrize("name", ["coverage", "pheromone", "directions"])
 def test_what_comes_at_once_waits_for_a_busy_subscriber(endpoint, name):
     """Cohorts come one on the other: where only two could wait, the last were dropped."""
-    code = f"""
-import time
-from fasaco_edge.bus.session import open_bus
-from fasaco_edge.bus.settings import BusSettings
-with open_bus(BusSettings("client", ({endpoint!r} + "#so_rcvbuf=65536",))) as bus:
-    bus.subscribe({KEY!r}, lambda sample: print(int(sample.payload[:4]), flush=True))
-    print("listening", flush=True)
-    time.sleep(60)
-"""
     small = BusSettings("peer", (), (f"{endpoint}#so_sndbuf=65536",))
-    with open_bus(small) as bus, subprocess.Popen([sys.executable, "-c", code], stdout=-1) as busy:
-        try:
-            assert busy.stdout.readline() == b"listening\n"
-            publisher = bus.publisher(KEY, qos=QOS[name])
-            until(publisher.has_listeners)
-            busy.send_signal(signal.SIGSTOP)
-            until(lambda: "T (stopped)" in Path(f"/proc/{busy.pid}/status").read_text())
-            for number in range(16):
-                publisher.put(_numbered(number)[:30_000])
-            busy.send_signal(signal.SIGCONT)
-            came = [int(busy.stdout.readline())]
-            while len(came) < 16 and came[-1] < 16:
-                publisher.put(_numbered(16)[:4])  # the end, of what was not dropped
-                came.append(int(busy.stdout.readline()))
-            assert came == list(range(16))
-        finally:
-            busy.kill()
+    with open_bus(small) as bus, subscriber(f"{endpoint}#so_rcvbuf=65536") as busy:
+        publisher = bus.publisher(KEY, qos=QOS[name])
+        until(publisher.has_listeners)
+        busy.send_signal(signal.SIGSTOP)
+        until(lambda: "T (stopped)" in Path(f"/proc/{busy.pid}/status").read_text())
+        for number in range(16):
+            publisher.put(_numbered(number)[:30_000])
+        busy.send_signal(signal.SIGCONT)
+        came = [int(busy.stdout.readline())]
+        while len(came) < 16 and came[-1] < 16:
+            publisher.put(_numbered(16)[:4])  # the end, of what was not dropped
+            came.append(int(busy.stdout.readline()))
+        assert came == list(range(16))
 
 
 def test_a_frozen_subscriber_does_not_hold_the_end_of_a_session(endpoint):
     """Zenoh alone tries for ten seconds to get rid of what is queued, and fails then."""
-    code = f"""
-import time
-from fasaco_edge.bus.session import open_bus
-from fasaco_edge.bus.settings import BusSettings
-with open_bus(BusSettings("client", ({endpoint!r},))) as bus:
-    bus.subscribe({KEY!r}, lambda sample: None)
-    print("listening", flush=True)
-    time.sleep(60)
-"""
     bus = open_bus(BusSettings("peer", (), (endpoint,)))
     publisher = bus.publisher(KEY, qos=QOS["path"])
-    with subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE) as listener:
-        try:
-            assert listener.stdout.readline() == b"listening\n"
-            until(publisher.has_listeners)
-            listener.send_signal(signal.SIGSTOP)
-            for _ in range(30):
-                publisher.put(bytes(1_000_000))
-            started = time.monotonic()
-            bus.close()
-            assert time.monotonic() - started < 8.0
-        finally:
-            listener.kill()
+    with subscriber(endpoint) as listener:
+        until(publisher.has_listeners)
+        listener.send_signal(signal.SIGSTOP)
+        for _ in range(30):
+            publisher.put(bytes(1_000_000))
+        started = time.monotonic()
+        bus.close()
+        assert time.monotonic() - started < 8.0
 
 
 def _numbered(number):
