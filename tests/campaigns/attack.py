@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import os
 import tempfile
 import time
 from collections.abc import Callable
@@ -17,7 +16,7 @@ from typing import Any
 
 import zenoh
 
-from fasaco_edge.host.processes import own_mb
+from fasaco_edge.host.processes import cpu_seconds, own_mb
 from tests.campaigns.attacks import AT, GOOD_MAP, attacks, pour
 from tests.support.outsider import Outsider, open_client
 from tests.support.processes import Daemon, daemon_process
@@ -72,18 +71,14 @@ class Cores:
 
     def __init__(self, pid: int) -> None:
         self._pid = pid
-        self._at, self._ticks = time.monotonic(), self._taken()
+        self._at, self._used_s = time.monotonic(), cpu_seconds(self._pid)
 
     def share(self) -> float:
         """Return its share of a core since the last call."""
-        at, ticks = time.monotonic(), self._taken()
-        share = (ticks - self._ticks) / os.sysconf("SC_CLK_TCK") / (at - self._at)
-        self._at, self._ticks = at, ticks
+        at, used_s = time.monotonic(), cpu_seconds(self._pid)
+        share = (used_s - self._used_s) / (at - self._at)
+        self._at, self._used_s = at, used_s
         return share
-
-    def _taken(self) -> int:
-        words = Path(f"/proc/{self._pid}/stat").read_text().rpartition(")")[2].split()
-        return int(words[11]) + int(words[12])
 
 
 class Asking:

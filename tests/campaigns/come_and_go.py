@@ -33,7 +33,7 @@ import zenoh
 
 from fasaco_edge.bench.processes import warm_kernels
 from fasaco_edge.bus.claim import ClaimState, claims_in
-from fasaco_edge.host.processes import own_mb
+from fasaco_edge.host.processes import cpu_seconds, own_mb
 from tests.campaigns import passing_mappers
 from tests.campaigns.services import show
 from tests.support.outsider import Outsider, open_client
@@ -101,7 +101,7 @@ class Campaign:
         took_s = time.monotonic() - since
         time.sleep(self.rest_s / 2)
         self.asked.clear()
-        before = {name: _cpu_s(pid) for name, pid in self.processes.items()}
+        before = {name: cpu_seconds(pid) for name, pid in self.processes.items()}
         time.sleep(self.rest_s)
         row = Row(
             after,
@@ -111,7 +111,7 @@ class Campaign:
                 name: Figures(
                     len(os.listdir(f"/proc/{pid}/task")),
                     len(os.listdir(f"/proc/{pid}/fd")),
-                    (_cpu_s(pid) - before[name]) / self.rest_s,
+                    (cpu_seconds(pid) - before[name]) / self.rest_s,
                     own_mb(pid),
                 )
                 for name, pid in self.processes.items()
@@ -326,11 +326,6 @@ def _counting(asked: Counter[str], topic: str) -> zenoh.handlers.Callback[zenoh.
         query.drop()  # type: ignore[no-untyped-call]
 
     return zenoh.handlers.Callback(count, indirect=False)
-
-
-def _cpu_s(pid: int) -> float:
-    fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
-    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
 def _told(row: Row) -> str:

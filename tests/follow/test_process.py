@@ -1,6 +1,5 @@
 """``fasaco-edge follow`` as a process of its own, on a real bus."""
 
-import os
 import subprocess
 import sys
 import time
@@ -12,7 +11,7 @@ import yaml
 from fasaco_edge.bus.session import open_bus
 from fasaco_edge.bus.settings import BusSettings
 from fasaco_edge.follow.estimate import Command
-from fasaco_edge.host.processes import own_mb
+from fasaco_edge.host.processes import cpu_seconds, own_mb
 from fasaco_edge.wire import schemas, topics
 from fasaco_edge.wire.messages.twists import decode_velocity
 from tests.campaigns import stop_tries
@@ -42,7 +41,7 @@ def test_it_drives_twenty_times_a_second_and_stays_small(base, tmp_path):
     with follower_process(base.endpoint, log) as process:
         base.wait_until_it_moves()
         begun, count = time.monotonic(), len(base.heard)
-        before, ticks = cpu_s(process.pid), 0
+        before, ticks = cpu_seconds(process.pid), 0
         # What this computer gives to a process that wants to run twenty times a second.
         while time.monotonic() - begun < 4.0:
             time.sleep(0.05)
@@ -52,17 +51,12 @@ def test_it_drives_twenty_times_a_second_and_stays_small(base, tmp_path):
         own = own_mb(process.pid)
         print(f"follow: {own:.1f} MB")
         assert own < FOLLOW_MB
-        assert (cpu_s(process.pid) - before) / seconds < 0.05
+        assert (cpu_seconds(process.pid) - before) / seconds < 0.05
         mapped = Path(f"/proc/{process.pid}/maps").read_text()
         assert not any(name in mapped for name in ("numpy", "numba", "msgspec"))
     assert process.returncode == 0
     assert base.heard[-1][1] == Command()
     assert "driving" in log.read_text()
-
-
-def cpu_s(pid):
-    fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
-    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
 def test_it_drives_to_the_end_and_says_so(base, tmp_path):
