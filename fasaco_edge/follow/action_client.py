@@ -1,4 +1,4 @@
-"""A client of a ROS 2 action on the bus: its services' keys, and requests to them.
+"""A client of a ROS 2 action on the bus: its services' keys, requests to them, and their replies.
 
 rmw_zenoh shows the server's types and keys in its graph; a bridge does not, and is queried by name.
 """
@@ -6,7 +6,9 @@ rmw_zenoh shows the server's types and keys in its graph; a bridge does not, and
 from __future__ import annotations
 
 import time
+from collections import deque
 from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Any
 
 from fasaco_edge.bus.queries import Reply
@@ -47,6 +49,8 @@ class ActionClient:
         self._sequence = 0
         self._gid = b""
         self._roll = None
+        # Replies, from Zenoh's threads.
+        self._replies = deque[Callable[[], None]]()
         if ros["kind"] == "rmw_zenoh":
             node = RosNode(self._domain, bus.id, ros["namespace"], ros["node"])
             self._gid = gid_of(f"{node.token}/{action}")
@@ -68,8 +72,27 @@ class ActionClient:
             return bridge_keys(self._action)
         return served_keys(self._domain, self._action, self._roll.there(), self._types)
 
-    def ask(self, key: str, call: Call, payload: bytes, end: Callable[[list[Reply]], None]) -> None:
-        """Send a request; ``end`` gets the replies, on a Zenoh thread."""
+    @property
+    def waiting(self) -> int:
+        """Number of replies that have come, or will not come, and were not taken."""
+        return len(self._replies)
+
+    def take_replies(self) -> None:
+        """Pass the replies that have come to those who asked."""
+        while self._replies:
+            self._replies.popleft()()
+
+    def ask(self, call: Call, payload: bytes, take: Callable[[bytes | None], None]) -> None:
+        """Send a request; ``take`` gets the reply in ``take_replies``, None for none."""
+
+        def end(replies: list[Reply]) -> None:
+            reply = next((reply.payload for reply in replies if not reply.is_error), None)
+            self._replies.append(partial(take, reply))
+
+        key = self.keys().get(call)
+        if key is None:
+            end([])
+            return
         self._sequence += 1
         beside = attachment(self._sequence, time.time_ns(), self._gid) if self._gid else b""
         timeout_s = RESULT_S if call == "get_result" else ANSWER_S

@@ -14,13 +14,11 @@ import logging
 import math
 import os
 import time
-from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
-from fasaco_edge.bus.queries import Reply
 from fasaco_edge.bus.session import Bus
 from fasaco_edge.errors import MalformedMessage
 from fasaco_edge.follow.action_client import ActionClient
@@ -249,16 +247,13 @@ class DockingNode:
         }
         new_id = partial(os.urandom, GOAL_ID_BYTES)
         self._docking = Docking(self._pose, dock["approach_m"], new_id)
-        # Replies of the server, from Zenoh's threads.
-        self._answers = deque[Callable[[], None]]()
         self._said = ("", "")
 
     def turn(self, inputs: Inputs, follower: Supervision) -> None:
         """Run a cycle; the follower is held while the docking server moves the robot."""
         for client in self._clients.values():
             client.look()
-        while self._answers:
-            self._answers.popleft()()
+            client.take_replies()
         requests = self._docking.step(
             time.monotonic(),
             inputs.daemon_state,
@@ -285,7 +280,6 @@ class DockingNode:
             log.info("dock: %s", docking.holds)
 
     def _ask(self, request: DockRequest) -> None:
-
         dock, client = self._dock, self._clients[request.move]
         if isinstance(request, Start):
             call: Call = "send_goal"
@@ -298,22 +292,11 @@ class DockingNode:
             call, payload = "get_result", encode_goal_id(request.id)
         else:
             call, payload = "cancel_goal", encode_cancel(request.id)
-        keys = client.keys()
-        if call not in keys:
-            self._answers.append(partial(self._take, request, []))
-            return
-        client.ask(
-            keys[call],
-            call,
-            payload,
-            lambda replies: self._answers.append(partial(self._take, request, replies)),
-        )
+        client.ask(call, payload, partial(self._take, request))
 
-    def _take(self, request: DockRequest, replies: list[Reply]) -> None:
+    def _take(self, request: DockRequest, payload: bytes | None) -> None:
         """Pass the result of a request on."""
-
         docking, now = self._docking, time.monotonic()
-        payload = next((reply.payload for reply in replies if not reply.is_error), None)
         why = f"{self._actions[request.move]} did not answer"
         try:
             if isinstance(request, Start):

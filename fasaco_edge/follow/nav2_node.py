@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import os
 import time
-from collections import deque
 from collections.abc import Callable
 from functools import partial
 
-from fasaco_edge.bus.queries import Reply
 from fasaco_edge.bus.session import Bus
 from fasaco_edge.errors import MalformedMessage
 from fasaco_edge.follow.action_client import ActionClient
@@ -57,8 +55,6 @@ class Nav2Node:
         )
         self._inputs = Inputs(settings, bus)
         self._states = StateLog()
-        # Replies of Nav2, from Zenoh's threads.
-        self._answers = deque[Callable[[], None]]()
         self._client = ActionClient(bus, ros, self._action, FOLLOW_PATH)
         self._role = Role(bus, settings)
         if ros["kind"] == "rmw_zenoh":
@@ -67,7 +63,7 @@ class Nav2Node:
     def turn(self) -> None:
         """Take the inputs, and send the resulting requests."""
         self._client.look()
-        self._take_answers()
+        self._client.take_replies()
         self._inputs.feed(self._follower)
         self._role.turn(self._inputs, self._follower)
         now = self._inputs.now()
@@ -83,12 +79,8 @@ class Nav2Node:
         for request in requests:
             self._ask(request)
         ends = time.monotonic() + END_S
-        while requests and len(self._answers) < len(requests) and time.monotonic() < ends:
+        while requests and self._client.waiting < len(requests) and time.monotonic() < ends:
             time.sleep(0.01)
-
-    def _take_answers(self) -> None:
-        while self._answers:
-            self._answers.popleft()()
 
     def _ask(self, request: Request) -> None:
         follower, now = self._follower, self._inputs.now()
@@ -98,10 +90,9 @@ class Nav2Node:
                 self._report(f"a goal of {count} poses, to {x:.2f}, {y:.2f} in {request.frame!r}")
             return
         goal_id = request.id
-        keys = self._client.keys()
         if isinstance(request, SendGoal):
             call: Call = "send_goal"
-            release, why = self._release_at(keys)
+            release, why = self._release_at(self._client.keys())
             if release is None:
                 follower.take_unsent(goal_id, why, now)
                 return
@@ -113,21 +104,11 @@ class Nav2Node:
             call, payload = "get_result", encode_goal_id(goal_id)
         else:
             call, payload = "cancel_goal", encode_cancel(goal_id)
-        if call not in keys:
-            self._answers.append(partial(self._take, request, [], time.monotonic()))
-            return
-        asked_at = time.monotonic()
-        self._client.ask(
-            keys[call],
-            call,
-            payload,
-            lambda replies: self._answers.append(partial(self._take, request, replies, asked_at)),
-        )
+        self._client.ask(call, payload, partial(self._take, request, time.monotonic()))
 
-    def _take(self, request: Request, replies: list[Reply], asked_at: float) -> None:
+    def _take(self, request: Request, asked_at: float, payload: bytes | None) -> None:
         """Pass the result of a request to the follower."""
         follower, now = self._follower, self._inputs.now()
-        payload = next((reply.payload for reply in replies if not reply.is_error), None)
         why = f"{self._action} did not answer"
         try:
             if isinstance(request, SendGoal):
