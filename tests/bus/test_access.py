@@ -71,7 +71,7 @@ def test_what_a_robot_says_and_hears_is_what_the_contract_says():
         ("driver", "cmd_vel", "put"),
     ],
 )
-def test_maps_missions_and_velocities_come_from_one_role_and_routers(role, name, message):
+def test_what_drives_a_robot_comes_from_one_role_and_routers(role, name, message):
     everybody = {role: [role] for role in access.ROLES}
     rules = control(**everybody)
     may = {one for one in everybody if name in granted(rules, one, message, "ingress")}
