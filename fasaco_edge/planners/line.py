@@ -18,6 +18,7 @@ from fasaco_edge.kernels.floor import line as kernel
 from fasaco_edge.kernels.floor.anneal import anneal
 from fasaco_edge.kernels.floor.detour import find_patches, sweep_patches
 from fasaco_edge.kernels.floor.polish import polish
+from fasaco_edge.kernels.floor.reorder import reorder
 from fasaco_edge.kernels.floor.seconds import chain_s
 from fasaco_edge.kernels.floor.sweeps import (
     BLOCK,
@@ -44,6 +45,8 @@ COOLED, REHEATED = (1.0, 0.0), (0.7, 0.0)
 # Factors of the price of floor, if a share of it is asked for: after a line that sweeps too little,
 # after one that sweeps enough, and the limit of their product.
 RAISED, LOWERED, MOST_RAISED = 1.6, 0.8, 100.0
+# Moves per point of the line after which its parts are reordered once.
+MOVES_A_POINT = 32
 # Moves between two pauses: about a quarter of a second.
 MOVES_AT_ONCE = 1 << 17
 # Clearance is given up for a strip of floor that is wider than this share of the tool's width. In a
@@ -157,9 +160,29 @@ class LineSearch:
         self._on = kernel.Floor(floor.blocked, floor.places, self._sweeps, radius, tool, clear)
         self._moves = min(int(config.moves_m2 * floor.reachable_m2), MOST_A_POINT * len(points))
         self._random = np.array([SEED], np.uint64)
+        self._pieces = self._run()
 
     def run(self) -> Iterator[None]:
-        """Search without end; pause after each piece of work."""
+        """Return the search as it goes on: it pauses after each piece of work, without end."""
+        return self._pieces
+
+    def begin(self, stop: Callable[[], bool] = lambda: False) -> bool:
+        """Complete the first stage; return False if it is stopped before."""
+        for _ in self._pieces:
+            if self.best is not None:
+                return True
+            if stop():
+                return False
+        return self.best is not None
+
+    def improve(self, stop: Callable[[], bool]) -> None:
+        """Search on until stopped; without moves there is nothing to search."""
+        if not stop():
+            for _ in self._pieces:
+                if stop():
+                    return
+
+    def _run(self) -> Iterator[None]:
         if not self._has_moves:
             self._keep()
             yield
@@ -178,8 +201,9 @@ class LineSearch:
         """Anneal the line, sweep the patches that are left, and keep the result if it is better."""
         line, on, memory = self._line, self._on, self._memory
         first, last = heat
-        begun = int(line.state[kernel.TRIED])
-        pieces = max(moves // MOVES_AT_ONCE, 1)
+        begun = reordered = int(line.state[kernel.TRIED])
+        per_pass = MOVES_A_POINT * len(numbers_along(line))
+        pieces = max(moves // min(per_pass, MOVES_AT_ONCE), 1)
         for piece in range(pieces):
             if piece:
                 yield
@@ -187,6 +211,9 @@ class LineSearch:
             between = first + per_piece * piece, first + per_piece * (piece + 1)
             until = begun + moves * (piece + 1) // pieces
             anneal(line, on, self._price, memory, self._random, 0, between, until)
+            if until - reordered >= per_pass or piece == pieces - 1:
+                reorder(line, on, self._price, memory, self._random)
+                reordered = until
         unit = self._floor.geometry.resolution
         patch = self._price._replace(left_s=self._config.patch_s / PATCH_M2 * unit * unit)
         if patch.left_s > self._price.left_s:
@@ -212,6 +239,12 @@ class LineSearch:
         least = self._config.swept or 0.0
         return max(least * self._floor.reachable_m2 - swept_m2, 0.0)
 
+    @property
+    def rank(self) -> tuple[float, float]:
+        """What is minimised: floor missing from the share asked for [m2], then the cost [s]."""
+        assert self.best is not None
+        return self._rank(self.best)
+
     def _keep(self) -> None:
         """Keep the line as it is now, if it is better than the one kept."""
         points = straightened(self._line.points[numbers_along(self._line)])
@@ -223,7 +256,6 @@ class LineSearch:
             self.best = line
 
     def _rank(self, line: DrivenLine) -> tuple[float, float]:
-        """Return what is minimised: floor missing from the share asked for, then the cost."""
         price = 0.0 if self._config.swept is not None else self._config.price_s_m2
         return self._missing_m2(line.swept_m2), line.cost_s(price)
 
@@ -248,9 +280,8 @@ def line_over(
         stop: ends the search once there is a line.
     """
     search = LineSearch(walk, stands, floor, config, is_end_fixed=is_end_fixed)
-    for _ in search.run():
-        if search.best is not None and stop():
-            break
+    search.begin()
+    search.improve(stop)
     assert search.best is not None
     return search.best
 

@@ -15,6 +15,7 @@ from fasaco_edge.kernels.floor.capsule import TOUCH
 from fasaco_edge.kernels.floor.detour import find_patches, sweep_patches
 from fasaco_edge.kernels.floor.nearness import PIECE
 from fasaco_edge.kernels.floor.polish import polish
+from fasaco_edge.kernels.floor.reorder import reorder
 from fasaco_edge.kernels.floor.sweeps import NEVER, Sweeps, sweep
 from fasaco_edge.kernels.floor.turning import (
     Turning,
@@ -99,13 +100,15 @@ class Room:
             return polish(*args, 40.0, most)
         if stage == "anneal":
             return anneal(*args, np.array([7], np.uint64), 0, (1.0, 0.0), most)
+        if stage == "reorder":
+            return sum(reorder(*args, np.array([seed], np.uint64)) for seed in range(1, 40))
         before = self.cost_s()
         sweep_patches(*args, 40.0, find_patches(self.floor.sweeps, 10), most)
         return before - self.cost_s()
 
 
 @pytest.mark.parametrize("turning", TURNINGS)
-@pytest.mark.parametrize("stage", ["polish", "anneal", "patches"])
+@pytest.mark.parametrize("stage", ["polish", "anneal", "patches", "reorder"])
 @pytest.mark.parametrize("clear", [ROBOT, ROBOT + 1.5])
 def test_what_is_gained_is_what_a_slow_count_shows(stage, turning, clear):
     room = Room(turning, clear=clear)
@@ -149,6 +152,18 @@ def test_an_annealed_line_keeps_its_ends():
     first, last = room.points[[0, -1]].tolist()
     assert room.run("anneal") > 1.0
     assert room.points[[0, -1]].tolist() == [first, last]
+
+
+def test_a_reordered_line_keeps_its_ends_and_leads_both_ways():
+    room = Room(is_end_fixed=True)
+    first, last = room.points[[0, -1]].tolist()
+    before = sorted(map(tuple, room.points.tolist()))
+    assert room.run("reorder") > 1.0
+    assert room.points[[0, -1]].tolist() == [first, last]
+    assert sorted(map(tuple, room.points.tolist())) == before
+    numbers = numbers_along(room.line)
+    assert [room.line.previous[number] for number in numbers] == [kernel.NONE, *numbers[:-1]]
+    assert kernel.is_way(room.floor, room.points, 0, len(before) - 1)
 
 
 def test_a_chain_longer_than_a_move_is_replaced_as_well():

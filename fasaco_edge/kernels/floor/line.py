@@ -112,7 +112,7 @@ def copy_point(source: NDArray[np.float64], at: int, target: NDArray[np.float64]
 
 
 @lean_kernel
-def _left_around(
+def left_around(
     left: NDArray[np.int32], points: NDArray[np.float64], first: int, last: int, tool: float
 ) -> int:
     """Return a lower bound on the unswept pixels under the edges from ``first`` to ``last``."""
@@ -183,7 +183,7 @@ def _chains(line: Line, memory: Memory, begin: int, end: int, count: int) -> Cha
 
 
 @lean_kernel
-def _is_way(floor: Floor, points: NDArray[np.float64], first: int, last: int) -> bool:
+def is_way(floor: Floor, points: NDArray[np.float64], first: int, last: int) -> bool:
     """Return whether the edges between two points of a chain are clear, and none is too short."""
     for number in range(first, last):
         ay, ax = points[number, 0], points[number, 1]
@@ -196,7 +196,7 @@ def _is_way(floor: Floor, points: NDArray[np.float64], first: int, last: int) ->
 
 
 @lean_kernel
-def _prepare_edges(
+def prepare_edges(
     scratch: Scratch, at: int, points: NDArray[np.float64], first: int, last: int, tool: float
 ) -> int:
     """Prepare the capsules of a chain's edges, from number ``at`` on; return how many."""
@@ -243,12 +243,12 @@ def gain_above(
         nearer -= near_px(floor.blocked, old, lead, last_old, floor.robot, floor.clear)
         longer_s += price.near_s * nearer
     least_more = (longer_s + least_s) / price.left_s
-    most_more = _left_around(floor.sweeps.left, new, lead, last_new, tool)
-    if most_more < least_more or not _is_way(floor, new, lead, last_new):
+    most_more = left_around(floor.sweeps.left, new, lead, last_new, tool)
+    if most_more < least_more or not is_way(floor, new, lead, last_new):
         return -np.inf
     scratch = memory.capsules
-    taken = _prepare_edges(scratch, 0, old, lead, last_old, tool)
-    given = _prepare_edges(scratch, taken, new, lead, last_new, tool)
+    taken = prepare_edges(scratch, 0, old, lead, last_old, tool)
+    given = prepare_edges(scratch, taken, new, lead, last_new, tool)
     most_lost = most_more - least_more
     more = swept_more(floor.sweeps.counts, scratch, taken, given, tool, most_lost)
     gain = price.left_s * more - longer_s
@@ -326,8 +326,8 @@ def replace_points(
     lead, olds, _, last_old, last_new = _chains(line, memory, begin, end, count)
     if olds:
         scratch = memory.capsules
-        taken = _prepare_edges(scratch, 0, memory.before, lead, last_old, tool)
-        given = _prepare_edges(scratch, taken, memory.after, lead, last_new, tool)
+        taken = prepare_edges(scratch, 0, memory.before, lead, last_old, tool)
+        given = prepare_edges(scratch, taken, memory.after, lead, last_new, tool)
         exchange(floor.sweeps, scratch, taken, given, tool)
     else:
         _sweep_between(line, floor, memory, begin, end, as_value(-1))
