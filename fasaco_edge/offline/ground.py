@@ -6,7 +6,6 @@ the centres of a walk's cells, or a line over their stands.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -21,7 +20,7 @@ from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.grid.rotation import rotated_geometry
 from fasaco_edge.grid.walls import wall_direction
 from fasaco_edge.offline.settings import AXES, HOME, WALLS
-from fasaco_edge.planners.line import LINES, line_over
+from fasaco_edge.planners.line import LINES, LineSearch
 
 Line = NDArray[np.float64]
 # Unswept floor by the judge relative to that by the line's own raster: 1.2 to 1.5, more if little
@@ -108,7 +107,7 @@ class Ground:
         window = self.stands.lattice.window
         return row + window.row0, col + window.col0
 
-    def line(
+    def line_search(
         self,
         walk: NDArray[np.int32],
         name: str,
@@ -116,24 +115,21 @@ class Ground:
         *,
         ends: bool,
         swept: float | None,
-        stop: Callable[[], bool],
-    ) -> Line:
-        """Return the line along a walk.
+    ) -> LineSearch:
+        """Return the search for a line over the floor, along a walk.
 
         Args:
             walk: int32 (n, 2), n >= 1.
-            name: CELLS, or of ``planners.line.LINES``.
+            name: of ``planners.line.LINES``.
             robot: its driving parameters.
             ends: whether the line must end where the walk does.
             swept: share of the floor to sweep, by the judge; None for as much as pays.
-            stop: ends the search for a better line.
         """
-
-        if self.floor is None or self.stands is None:
-            return line_through(self.lattice, walk)
+        assert self.floor is not None
+        assert self.stands is not None
         aim = None if swept is None else 1.0 - (1.0 - swept) / LEFT_BY_JUDGE
         config = replace(LINES[name], speed_m_s=robot.speed_m_s, turning=robot.turning(), swept=aim)
-        return line_over(walk, self.stands, self.floor, config, is_end_fixed=ends, stop=stop).xy
+        return LineSearch(walk, self.stands, self.floor, config, is_end_fixed=ends)
 
 
 def _lattice_deg(align: str | float, grid: OccupancyGrid) -> float:

@@ -17,6 +17,7 @@ from fasaco_edge.grid.lattice import Cell
 from fasaco_edge.offline.ground import Ground
 from fasaco_edge.offline.maps import Map
 from fasaco_edge.offline.result import Plan
+from fasaco_edge.offline.search import Ending, Planning
 from fasaco_edge.offline.settings import (
     ANYWHERE,
     AXES,
@@ -28,31 +29,20 @@ from fasaco_edge.offline.settings import (
     default_line,
     require,
 )
-from fasaco_edge.planners.bound import LowerBound, lower_bound_of
+from fasaco_edge.planners.bound import lower_bound_of
 from fasaco_edge.planners.compiling import compile_missing
-from fasaco_edge.planners.cost import SearchWork
 from fasaco_edge.planners.line import LINES
 from fasaco_edge.planners.own.loading import UserCode, user_code
-from fasaco_edge.planners.own.planner import OwnPlanner
-from fasaco_edge.planners.path import CoveragePath
 from fasaco_edge.planners.planner import (
-    CoveragePlanner,
-    GapReached,
     Observer,
     SearchProgress,
     StoppingCriterion,
     TimeBudget,
-    WorkLimit,
     ignore,
-    never,
 )
 from fasaco_edge.planners.problem import CoverageProblem
-from fasaco_edge.planners.registry import planner_of
 from fasaco_edge.planners.stages import stages_of_plan
 
-# Limit on the proposals per cell of the search for a walk, if a line is laid along it: more is
-# gained by the search for the line.
-PROPOSALS_A_CELL = 10_000
 # Limit on rows and columns: arrays of cells are int32.
 MOST_INDEX = 2**31 - 1
 
@@ -124,15 +114,11 @@ def plan(
     ground = _ground(map, robot, start, start_xy, line, align)
     problem = _problem(ground, robot, end)
     bound = None if search.has_local_search else lower_bound_of(problem)
-    ending = _Ending(search, stop, watch, bound)
+    budget = None if search.most_s is None else TimeBudget(search.most_s)
+    ending = Ending(search, stop, budget, watch, bound)
+    planning = Planning(problem, ground, search, own, ending, observe)
     wall, cpu = time.perf_counter(), time.process_time()
-    if line != CELLS:
-        ending.leave_time(problem.cells)
-    path = _walk(problem, search, own, ending, observe)
-    ends = problem.end is not None
-    xy = ground.line(
-        path.cells, line, robot, ends=ends, swept=search.swept, stop=ending.is_line_over
-    )
+    path, xy = planning.run(line, robot)
     wall_s, cpu_s = time.perf_counter() - wall, time.process_time() - cpu
     return Plan(map, robot, line, search, ground, problem, path, xy, ending.by, wall_s, cpu_s)
 
@@ -218,71 +204,3 @@ def _problem(ground: Ground, robot: RobotConfig, end: str | Cell) -> CoveragePro
     cost = robot.cost(ground.lattice.cell_m)
     to = ground.end(end, robot.tool_width_m)
     return CoverageProblem.of(ground.lattice, ground.start, end=to, cost=cost)
-
-
-class _Ending:
-    """What ends the search for a walk, and then that for the line along it.
-
-    Attributes:
-        by: what ended it.
-        bound: the problem's lower bound, for planners that have none of their own.
-    """
-
-    def __init__(
-        self,
-        search: Search,
-        stop: StoppingCriterion | None,
-        watch: Callable[[SearchProgress], None],
-        bound: LowerBound | None,
-    ) -> None:
-        self.by, self.bound = "the search", bound
-        self._watch, self._most_s = watch, search.most_s
-        self._progress: SearchProgress | None = None
-        self._criteria: dict[str, StoppingCriterion] = {}
-        self._leaves_time: StoppingCriterion = never
-        if stop is not None:
-            self._criteria["Ctrl-C"] = stop
-        if search.target_gap is not None:
-            self._criteria["target gap"] = GapReached(search.target_gap)
-        if search.most_s is not None:
-            self._criteria["budget"] = TimeBudget(search.most_s)
-
-    def leave_time(self, cells: int) -> None:
-        """End the search for a walk over ``cells`` cells in time for that of its line."""
-        self._leaves_time = WorkLimit(SearchWork(proposals=PROPOSALS_A_CELL * cells))
-
-    def is_walk_over(self, progress: SearchProgress) -> bool:
-        """Return whether the search for a walk is over."""
-        if self.bound is not None:
-            progress = replace(progress, lower_bound_cost_s=self.bound.cost_s)
-        self._progress = progress
-        return self._is_over(progress) or self._leaves_time(progress)
-
-    def is_line_over(self) -> bool:
-        """Return whether the search for a line is over; without a budget it ends at once."""
-        return self._most_s is None or self._progress is None or self._is_over(self._progress)
-
-    def _is_over(self, progress: SearchProgress) -> bool:
-        self._watch(progress)
-        over = next((name for name, is_met in self._criteria.items() if is_met(progress)), None)
-        self.by = over or self.by
-        return over is not None
-
-
-def _walk(
-    problem: CoverageProblem,
-    search: Search,
-    own: UserCode | None,
-    ending: _Ending,
-    observe: Observer,
-) -> CoveragePath:
-    """Search for a walk; a planner without a lower bound is given one for its path."""
-    planner: CoveragePlanner = (
-        OwnPlanner(own, search.seed)
-        if own
-        else planner_of(search.planner, search.colony(), search.threads, search.has_local_search)
-    )
-    path = planner.plan(problem, ending.is_walk_over, observe)
-    if (bound := ending.bound) is not None:
-        path = replace(path, lower_bound_steps=bound.steps, lower_bound_cost_s=bound.cost_s)
-    return path

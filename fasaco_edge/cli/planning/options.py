@@ -73,9 +73,10 @@ figures of several robots:
 fasaco searches until its budget ends, the walk is proven optimal, or all ants have
 walked: a complete walk within milliseconds, then better ones by local search, restarted
 from walks of the colony's ants (up to 8,000 cells; larger maps have local search only).
-What is left of the budget goes to the line: each stage of its search takes twice as long
-as the one before, and the best line along the walk is kept. A budget that ends the search
-of the walk early gives another walk, whose line may be better or worse.
+A line over the floor is laid along each of two walks, if the budget allows. What is left of
+the budget goes to the better line: each stage of its search takes twice as long as the one
+before. A larger budget gives no worse line, by its seconds and the price of floor that it
+leaves.
 --no-local-search is the paper's colony alone. The colony's options apply to fasaco; aco
 takes all but the velocities, the other planners none; a planner of your own gets the seed.
 """

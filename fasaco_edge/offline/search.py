@@ -1,0 +1,201 @@
+"""Search of an offline plan: for walks, and for the line along the best of them, within a budget.
+
+A line is laid along each of two walks; the better one is improved until the budget is used up. The
+first line is always completed, and each step follows from those before it, whatever the budget:
+more of it is never worse, by the seconds of the line and the price of floor that is left.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+from fasaco_edge.config.robot import RobotConfig
+from fasaco_edge.offline.ground import Ground, Line, line_through
+from fasaco_edge.offline.settings import CELLS, Search
+from fasaco_edge.planners.bound import LowerBound
+from fasaco_edge.planners.cost import SearchWork
+from fasaco_edge.planners.line import LineSearch
+from fasaco_edge.planners.own.loading import UserCode
+from fasaco_edge.planners.own.planner import OwnPlanner
+from fasaco_edge.planners.path import CoveragePath
+from fasaco_edge.planners.planner import (
+    ColonySnapshot,
+    CoveragePlanner,
+    GapReached,
+    Observer,
+    SearchProgress,
+    StoppingCriterion,
+    WorkLimit,
+    ignore,
+)
+from fasaco_edge.planners.problem import CoverageProblem
+from fasaco_edge.planners.registry import planner_of
+
+# Limit on the proposals per cell of a search for a walk: more of them gain a line less than the
+# search for the line does. The first walk, which no budget ends, has fewer of them per cell, or
+# half a second.
+PROPOSALS_A_CELL, FIRST_A_CELL, FIRST_PROPOSALS = 10_000, 2_500, 10_000_000
+# What is different in the seed of the second walk.
+SECOND_SEED = 1 << 20
+
+
+class Ending:
+    """What ends the searches for walks, and for the line along one.
+
+    Args:
+        search: settings.
+        stop: ends all searches; None for never.
+        budget: ends all but the search for the first line over the floor; None for no limit.
+        watch: called with the progress.
+        bound: see below.
+
+    Attributes:
+        by: what ended them.
+        bound: the problem's lower bound, for planners that have none of their own.
+        is_walk_limited, is_walk_cut: whether the last search for a walk ended by its proposals, or
+            by the budget or by ``stop``.
+    """
+
+    def __init__(
+        self,
+        search: Search,
+        stop: StoppingCriterion | None,
+        budget: StoppingCriterion | None,
+        watch: Callable[[SearchProgress], None],
+        bound: LowerBound | None,
+    ) -> None:
+        self.by, self.bound = "the search", bound
+        self.is_walk_limited = self.is_walk_cut = False
+        self._watch, self._budget, self._is_first = watch, budget, False
+        self._progress: SearchProgress | None = None
+        self._criteria: dict[str, StoppingCriterion] = {}
+        self._limit: StoppingCriterion | None = None
+        if stop is not None:
+            self._criteria["Ctrl-C"] = stop
+        if search.target_gap is not None:
+            self._criteria["target gap"] = GapReached(search.target_gap)
+
+    def limit_walk(self, proposals: int, *, is_first: bool) -> None:
+        """End the next search for a walk after this many proposals; the first has no budget."""
+        self._limit = WorkLimit(SearchWork(proposals=proposals))
+        self.is_walk_limited = self.is_walk_cut = False
+        self._is_first = is_first
+
+    def is_walk_over(self, progress: SearchProgress) -> bool:
+        """Return whether the search for a walk is over."""
+        if self.bound is not None:
+            progress = replace(progress, lower_bound_cost_s=self.bound.cost_s)
+        self._progress = progress
+        self.is_walk_cut = self._is_over(progress)
+        if self.is_walk_cut:
+            return True
+        self.is_walk_limited = self._limit is not None and self._limit(progress)
+        return self.is_walk_limited
+
+    def is_line_over(self) -> bool:
+        """Return whether the search for a line is over; without a budget it ends at once."""
+        self._is_first = False
+        return self._budget is None or self._progress is None or self._is_over(self._progress)
+
+    def _is_over(self, progress: SearchProgress) -> bool:
+        self._watch(progress)
+        over = next((name for name, is_met in self._criteria.items() if is_met(progress)), None)
+        if over is None and self._budget is not None and not self._is_first:
+            over = "budget" if self._budget(progress) else None
+        self.by = over or self.by
+        return over is not None
+
+
+@dataclass(frozen=True, slots=True)
+class _Laid:
+    """A walk with the search for the line along it, and the colony's pheromone."""
+
+    path: CoveragePath
+    line: LineSearch
+    snapshots: list[ColonySnapshot]
+
+
+class Planning:
+    """The searches of a plan.
+
+    Args:
+        problem: what to cover.
+        ground: its floor.
+        search: settings.
+        own: a planner of the user's own in place of the search; None for none.
+        ending: what ends the searches.
+        observe: called with the colony's pheromone.
+    """
+
+    def __init__(
+        self,
+        problem: CoverageProblem,
+        ground: Ground,
+        search: Search,
+        own: UserCode | None,
+        ending: Ending,
+        observe: Observer,
+    ) -> None:
+        self._problem, self._ground, self._search = problem, ground, search
+        self._own, self._ending, self._observe = own, ending, observe
+
+    def run(self, line: str, robot: RobotConfig) -> tuple[CoveragePath, Line]:
+        """Return a walk and the line along it.
+
+        Args:
+            line: CELLS, or one of ``planners.line.LINES``.
+            robot: its driving parameters.
+        """
+        if line == CELLS:
+            path = self._walk(self._search.seed, self._observe)
+            return path, line_through(self._ground.lattice, path.cells)
+        laid = self._begin(line, robot)
+        laid.line.improve(self._ending.is_line_over)
+        for snapshot in laid.snapshots:
+            self._observe(snapshot)
+        assert laid.line.best is not None
+        return laid.path, laid.line.best.xy
+
+    def _begin(self, line: str, robot: RobotConfig) -> _Laid:
+        """Return the better of two walks, by the line along it; the first is always laid.
+
+        There is one alone without local search, or if a gap of the walk is asked for.
+        """
+        search, ending = self._search, self._ending
+        has_two = search.has_local_search and search.target_gap is None
+        cells = self._problem.cells
+        most = PROPOSALS_A_CELL * cells
+        first = min(most, max(FIRST_A_CELL * cells, FIRST_PROPOSALS)) if has_two else most
+        ending.limit_walk(first, is_first=has_two)
+        best = self._lay(line, robot, search.seed)
+        best.line.begin()
+        if not has_two or not ending.is_walk_limited or ending.is_line_over():
+            return best
+        ending.limit_walk(most, is_first=False)
+        other = self._lay(line, robot, search.seed ^ SECOND_SEED)
+        is_laid = not ending.is_walk_cut and other.line.begin(ending.is_line_over)
+        return other if is_laid and other.line.rank < best.line.rank else best
+
+    def _lay(self, line: str, robot: RobotConfig, seed: int) -> _Laid:
+        """Search for a walk, and prepare the search for the line along it."""
+        snapshots: list[ColonySnapshot] = []
+        path = self._walk(seed, ignore if self._observe is ignore else snapshots.append)
+        ends, swept = self._problem.end is not None, self._search.swept
+        search = self._ground.line_search(path.cells, line, robot, ends=ends, swept=swept)
+        return _Laid(path, search, snapshots)
+
+    def _walk(self, seed: int, observe: Observer) -> CoveragePath:
+        """Search for a walk; a planner without a lower bound is given one for its path."""
+        search, bound = self._search, self._ending.bound
+        colony, has_local_search = replace(search.colony(), seed=seed), search.has_local_search
+        planner: CoveragePlanner = (
+            OwnPlanner(self._own, seed)
+            if self._own
+            else planner_of(search.planner, colony, search.threads, has_local_search)
+        )
+        path = planner.plan(self._problem, self._ending.is_walk_over, observe)
+        path = replace(path, seed=search.seed)
+        if bound is not None:
+            path = replace(path, lower_bound_steps=bound.steps, lower_bound_cost_s=bound.cost_s)
+        return path

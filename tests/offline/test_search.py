@@ -1,0 +1,99 @@
+"""Search of a plan: more of it is never worse, and the better of two walks goes on."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+import fasaco_edge as fe
+from fasaco_edge.grid.fine_raster import map_to_raster
+from fasaco_edge.grid.geometry import GridGeometry, Pose2D
+from fasaco_edge.grid.occupancy import OccupancyGrid
+from fasaco_edge.kernels.floor.seconds import chain_s
+from fasaco_edge.kernels.floor.sweeps import sweep_edges
+from fasaco_edge.offline.ground import Ground
+from fasaco_edge.offline.plan import _problem
+from fasaco_edge.offline.search import Ending, Planning
+from fasaco_edge.offline.settings import ANYWHERE, CELLS, WALLS
+from fasaco_edge.planners.line import LINES, _sweeps, memory_for_moves
+from fasaco_edge.planners.planner import ignore
+
+ROBOT = fe.Robot()
+# Pauses after which a search is stopped; a flat's first line takes some two hundred.
+BUDGETS = 1, 20, 150, 400, 900, 1500
+
+
+def room(seed: int) -> OccupancyGrid:
+    """Return a room of 4 x 3 m with pillars, and in some seeds a wall with a door."""
+    rng = np.random.default_rng(seed)
+    cells = np.zeros((62, 82), np.int8)
+    cells[[0, -1]] = cells[:, [0, -1]] = 100
+    cells[rng.integers(20, 60, 15), rng.integers(20, 80, 15)] = 100
+    if seed % 2:
+        cells[:, 40] = 100
+        cells[(begin := int(rng.integers(4, 40))) : begin + 12, 40] = 0
+    return OccupancyGrid(GridGeometry(62, 82, 0.05, Pose2D(0.0, 0.0)), cells)
+
+
+class Pauses:
+    """A budget of pauses, so that no clock decides."""
+
+    def __init__(self, most: int) -> None:
+        self.count, self.most = 0, most
+
+    def __call__(self, progress: object) -> bool:
+        self.count += 1
+        return self.count >= self.most
+
+
+def planned(grid: OccupancyGrid, seed: int, pauses: Pauses, observe=ignore, line="thorough"):
+    """Return the ground, walk and line of a search that ends after some pauses."""
+    search = fe.Search(seed=seed, budget_s=1e6)
+    ground = Ground.of_floor(grid, ROBOT, (0.5, 0.5), WALLS)
+    ending = Ending(search, None, pauses, lambda _: None, None)
+    problem = _problem(ground, ROBOT, ANYWHERE)
+    planning = Planning(problem, ground, search, None, ending, observe)
+    return ground, *planning.run(line, ROBOT)
+
+
+def cost_s(ground: Ground, xy: np.ndarray) -> float:
+    """Return what is minimised, counted anew."""
+    floor, config = ground.floor, LINES["thorough"]
+    assert floor is not None
+    unit_m, sweeps = floor.geometry.resolution, _sweeps(floor)
+    points = np.stack(map_to_raster(floor.geometry, *xy.T), axis=1)
+    edges = np.concatenate([points[:-1], points[1:]], axis=1)
+    sweep_edges(sweeps, edges, ROBOT.tool_width_m / 2 / unit_m, 1, memory_for_moves().capsules)
+    drive_s, count = unit_m / ROBOT.speed_m_s, len(points)
+    seconds = chain_s(points, 0, count - 1, count, drive_s, ROBOT.turning())
+    return seconds + config.price_s_m2 * np.count_nonzero(sweeps.counts == 0) * unit_m**2
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_more_of_a_search_is_never_worse(seed):
+    costs = [cost_s(*planned(room(seed), seed, Pauses(most))[::2]) for most in BUDGETS]
+    assert all(b <= a + 1e-3 for a, b in pairwise(costs)), costs
+    assert costs[-1] < costs[0]
+
+
+def test_the_first_line_is_completed_whatever_the_budget():
+    ground, path, xy = planned(room(0), 0, Pauses(1))
+    assert len(path.cells) >= len(ground.lattice.coverable.nonzero()[0])
+    assert cost_s(ground, xy) < 500.0
+
+
+def test_the_walk_is_that_below_the_line_and_its_pheromone_is_shown_once():
+    seen = []
+    ground, path, xy = planned(room(1), 1, Pauses(900), seen.append)
+    assert len(seen) == 1
+    start = ground.stands.points(path.cells[:1])[0]
+    assert xy[0] == pytest.approx(ground.floor.to_map(start[None])[0])
+
+
+def test_a_line_through_cells_is_searched_for_until_the_end():
+    pauses = Pauses(300)
+    ground, path, xy = planned(room(0), 0, pauses, line=CELLS)
+    assert pauses.count == 300
+    assert xy[0] == pytest.approx(ground.lattice.centres(path.cells[:1])[0])
