@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 
 from fasaco_edge.bench.benchmark import Benchmark, Goal, Report, Say
 from fasaco_edge.drawing.spread import percentile
+from tests.benchmarks.calm import Calm
 from tests.benchmarks.harness import grid_name
 
 if TYPE_CHECKING:
@@ -46,6 +47,7 @@ class FloorRun:
         s_m2: driving and turning for each square metre swept [s].
         illegal_share: part of the line on which the robot's disc touches a wall.
         patches: left that are larger than 4 dm2.
+        calm: how much it turns, crosses itself, and leaves the walls' directions.
         line_ms_m2: making the line for each reachable square metre [ms]; None for ``centres``.
         step_p99_ms, replan_p99_ms: of a mission, map to decision and to new path [ms].
     """
@@ -56,6 +58,7 @@ class FloorRun:
     s_m2: float
     illegal_share: float
     patches: int
+    calm: Calm
     line_ms_m2: float | None = None
     step_p99_ms: float | None = None
     replan_p99_ms: float | None = None
@@ -175,12 +178,15 @@ def _judged(
     line_xy: NDArray[np.float64],
     start: tuple[float, float],
 ) -> FloorRun:
+    from fasaco_edge.grid.walls import wall_direction
     from fasaco_edge.judge.floor import SweepingRobot, judge_floor
+    from tests.benchmarks.calm import calm_of
 
     robot = SweepingRobot(TOOL_M, RADIUS_M, SPEED_M_S, TURN_S)
     figures: FloorFigures = judge_floor(truth, line_xy, robot, stands_at=start).figures
     assert figures.swept_share is not None
     assert figures.seconds_per_m2 is not None
+    walls = wall_direction(truth)
     return FloorRun(
         building=building,
         case=case,
@@ -188,10 +194,14 @@ def _judged(
         s_m2=figures.seconds_per_m2,
         illegal_share=figures.illegal_share,
         patches=figures.patches_over_4_dm2,
+        calm=calm_of(line_xy, figures.swept_m2, walls.rotation_deg if walls else 0.0),
     )
 
 
-HEADER = ("map", "case", "swept", "s/m2", "ratio", "illegal", "left", "line", "step", "replan")
+HEADER = (
+    *("map", "case", "swept", "s/m2", "ratio", "illegal", "left"),
+    *("deg/m2", "back", "cross", "along", "line", "step", "replan"),
+)
 # Of all buildings: least swept share, most time against centres of cells.
 GOALS = {QUICK: (0.95, 0.97), THOROUGH: (0.985, 1.05), ONLINE: (0.975, 1.13)}
 
@@ -225,8 +235,9 @@ def _report(args: argparse.Namespace, samples: Sequence[FloorRun]) -> Report:
         goals=tuple(_goals(samples, ratios)),
         remarks=(
             "ratio: s/m2 against the walk through centres on the same map, known from the "
-            "beginning; left: patches larger than 4 dm2; line: making it [ms/m2]; step, replan: of "
-            "the mission, 99th percentile; both of processor time [ms]",
+            "beginning; left: patches larger than 4 dm2; deg/m2: turning; back: turns above 135 "
+            "degrees a m2; cross: crossings a m2; along: share along the walls; line: making it "
+            "[ms/m2]; step, replan: of the mission, 99th percentile; both of processor time [ms]",
         ),
     )
 
@@ -243,6 +254,10 @@ def _row(run: FloorRun, ratio: float | None) -> tuple[str, ...]:
         text(ratio, ".3f"),
         f"{run.illegal_share:.4f}",
         str(run.patches),
+        f"{run.calm.turning_deg:.0f}",
+        f"{run.calm.turns_back:.2f}",
+        f"{run.calm.crossings:.2f}",
+        f"{run.calm.along_share:.2f}",
         text(run.line_ms_m2, ".1f"),
         text(run.step_p99_ms, ".1f"),
         text(run.replan_p99_ms, ".1f"),
