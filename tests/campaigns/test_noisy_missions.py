@@ -9,10 +9,10 @@ from fasaco_edge.follow.estimate import Command
 from tests.campaigns.lab.halls import hall
 from tests.campaigns.lab.judge import Ending
 from tests.campaigns.lab.known_floor import FloorAccount
-from tests.campaigns.lab.mission import run_mission
+from tests.campaigns.lab.mission import COLUMNS, Trace, run_mission
 from tests.campaigns.lab.own import OwnBase
 from tests.campaigns.lab.settings import LabSettings
-from tests.campaigns.noisy_missions import NoisyMission, building_of, outcome_of
+from tests.campaigns.noisy_missions import NoisyMission, building_of, outcome_of, stayed_s
 
 
 @pytest.mark.parametrize(
@@ -39,6 +39,16 @@ def test_what_has_to_hold_under_noise_does(mission):
         replace(found, stayed_s=21.0),
     ):
         assert len(wrong.faults) == 1
+
+
+def test_a_wait_that_is_announced_is_no_stay():
+    trace = Trace(states=[(0.0, "covering", "", ""), (10.0, "blocked", "tried again", "")])
+    for now in range(50):
+        row = dict.fromkeys(COLUMNS, 0.0) | {"t": float(now), "x": 0.2 * min(now, 5)}
+        trace.rows.append(tuple(row.values()))
+    assert stayed_s(trace) == 4.0
+    trace.states[1] = (10.0, "covering", "", "")
+    assert stayed_s(trace) == 44.0
 
 
 def test_a_mission_under_noise_is_had_again_bit_for_bit():
