@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
@@ -13,6 +14,7 @@ from fasaco_edge.kernels.floor.anneal import anneal
 from fasaco_edge.kernels.floor.bits import packed, unpacked
 from fasaco_edge.kernels.floor.capsule import TOUCH
 from fasaco_edge.kernels.floor.detour import find_patches, sweep_patches
+from fasaco_edge.kernels.floor.exchange import Exchange, move_stretch, reverse_stretch
 from fasaco_edge.kernels.floor.nearness import PIECE
 from fasaco_edge.kernels.floor.polish import polish
 from fasaco_edge.kernels.floor.reorder import reorder
@@ -37,7 +39,12 @@ class Room:
     """A room with a pillar, and lanes through it."""
 
     def __init__(
-        self, turning: Turning = TURNINGS[0], *, is_end_fixed: bool = False, clear: float = ROBOT
+        self,
+        turning: Turning = TURNINGS[0],
+        *,
+        is_end_fixed: bool = False,
+        clear: float = ROBOT,
+        way: Sequence[tuple[float, float]] = WAY,
     ) -> None:
         self.price = kernel.Price(drive_s=0.1, turning=turning, left_s=0.11, near_s=0.3)
         free = np.zeros((ROWS, COLS), np.bool_)
@@ -51,8 +58,8 @@ class Room:
         left = (counts == 0).reshape(ROWS // 8, 8, COLS // 8, 8).sum(axis=(1, 3)).astype(np.int32)
         self.floor = kernel.Floor(blocked, places, Sweeps(counts, left), ROBOT, TOOL, clear)
         self.memory = memory_for_moves()
-        self.line = linked(np.array(WAY, float), left.shape, is_end_fixed=is_end_fixed)
-        for a, b in pairwise(WAY):
+        self.line = linked(np.array(way, float), left.shape, is_end_fixed=is_end_fixed)
+        for a, b in pairwise(way):
             sweep(self.floor.sweeps, *map(float, (*a, *b)), TOOL, 1, self.memory.capsules)
 
     @property
@@ -71,8 +78,10 @@ class Room:
 
     def near(self) -> float:
         """Return the length without clearance, counted slowly [pixels]."""
-        pixels = np.argwhere(unpacked(self.floor.blocked, COLS))
         length, (robot, clear) = 0.0, (self.floor.robot, self.floor.clear)
+        if clear <= robot:
+            return length
+        pixels = np.argwhere(unpacked(self.floor.blocked, COLS))
         for a, b in pairwise(self.points):
             edge = float(np.hypot(*(b - a)))
             count = max(math.ceil(edge / PIECE), 1)
@@ -82,7 +91,7 @@ class Room:
                 off = np.maximum(np.abs(along - pixels) - 0.5, 0.0)
                 apart = float(np.hypot(off[..., 0], off[..., 1]).min())
                 nearer = sum(apart < radius - TOUCH for radius in (clear, 0.5 * (robot + clear)))
-                length += 0.5 * nearer * edge / count if clear > robot else 0.0
+                length += 0.5 * nearer * edge / count
         return length
 
     def recounted(self) -> Sweeps:
@@ -164,6 +173,57 @@ def test_a_reordered_line_keeps_its_ends_and_leads_both_ways():
     numbers = numbers_along(room.line)
     assert [room.line.previous[number] for number in numbers] == [kernel.NONE, *numbers[:-1]]
     assert kernel.is_way(room.floor, room.points, 0, len(before) - 1)
+
+
+def reordering(rng: np.random.Generator, count: int) -> tuple[list[int | bool], list[int]]:
+    """Draw a move of a line of some points: its arguments, and the order that it leads to."""
+    order = list(range(count))
+    if rng.integers(2):
+        a, c = sorted(rng.choice(count, 2, replace=False).tolist())
+        return [a, c], order[: a + 1] + order[a + 1 : c + 1][::-1] + order[c + 1 :]
+    while True:
+        b, c = sorted(rng.choice(range(1, count), 2, replace=False).tolist())
+        if places := [e for e in order if not b - 2 <= e <= c + 1]:
+            break
+    e, is_turned = int(rng.choice(places)), int(rng.integers(2))
+    stretch, rest = order[b : c + 1], order[:b] + order[c + 1 :]
+    after = rest.index(e) + 1
+    return [b, c, e, bool(is_turned)], rest[:after] + stretch[:: 1 - 2 * is_turned] + rest[after:]
+
+
+@pytest.mark.parametrize("turning", TURNINGS)
+@pytest.mark.parametrize("is_end_fixed", [False, True])
+def test_a_reordering_is_that_of_a_list(turning, is_end_fixed):
+    rng = np.random.default_rng(5)
+    made = {2: 0, 4: 0}
+    for _ in range(400):
+        count = int(rng.integers(6, 12))
+        way = [(float(y), float(x)) for y, x in rng.uniform((10, 10), (62, 86), (count, 2))]
+        room = Room(turning, is_end_fixed=is_end_fixed, way=way)
+        args, order = reordering(rng, count)
+        other = Room(turning, way=[way[number] for number in order])
+        edges = Exchange(np.zeros((3, 4), np.int64), np.zeros((3, 4), np.int64), np.zeros(1, int))
+        move = reverse_stretch if len(args) == 2 else move_stretch
+        before = room.cost_s()
+        gain = move(room.line, room.floor, room.price, room.memory, edges, *args)
+        should = before - other.cost_s()
+        numbers = numbers_along(room.line)
+        assert [room.line.previous[number] for number in numbers] == [kernel.NONE, *numbers[:-1]]
+        below = room.floor.sweeps.counts < NEVER // 2
+        assert (room.floor.sweeps.counts[below] == room.recounted().counts[below]).all()
+        if gain > 0.0:
+            assert numbers == order
+            assert gain == pytest.approx(should, abs=1e-3)
+            made[len(args)] += 1
+            continue
+        assert numbers == list(range(count))
+        new = {frozenset(edge) for edge in pairwise(order)} - {
+            frozenset(edge) for edge in pairwise(numbers)
+        }
+        ends = (np.array([way[number] for number in edge]) for edge in map(sorted, new))
+        is_blocked = not all(kernel.is_way(room.floor, edge, 0, 1) for edge in ends)
+        assert is_blocked or should < 0.01 or (is_end_fixed and order[-1] != count - 1)
+    assert min(made.values()) > 20
 
 
 def test_a_chain_longer_than_a_move_is_replaced_as_well():

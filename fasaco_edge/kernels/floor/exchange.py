@@ -108,7 +108,8 @@ def _near_px(floor: Floor, ends: NDArray[np.float64], count: int) -> float:
 
 @lean_kernel
 def _gain(line: Line, floor: Floor, price: Price, memory: Memory, edges: Exchange) -> float:
-    """Return the gain of an exchange [s]; 0.0 if it is none, or a new edge is blocked."""
+    """Return the gain of an exchange [s]; 0.0 if a new edge is blocked, or there is none without
+    what is gained in clearance."""
     points, old, new, count = line.points, memory.before, memory.after, edges.size[0]
     longer_s = _seconds(points, edges.news, count, price)
     longer_s -= _seconds(points, edges.olds, count, price)

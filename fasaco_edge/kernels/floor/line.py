@@ -115,7 +115,7 @@ def copy_point(source: NDArray[np.float64], at: int, target: NDArray[np.float64]
 def left_around(
     left: NDArray[np.int32], points: NDArray[np.float64], first: int, last: int, tool: float
 ) -> int:
-    """Return a lower bound on the unswept pixels under the edges from ``first`` to ``last``."""
+    """Return an upper bound on the unswept pixels under the edges from ``first`` to ``last``."""
     rows, cols = left.shape
     found = 0
     for number in range(first, last):

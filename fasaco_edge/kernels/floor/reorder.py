@@ -88,7 +88,11 @@ def _try(
     a: int,
     c: int,
 ) -> float:
-    """Make a move that joins two points, drawn by ``bits``, if it gains; return the gain [s]."""
+    """Make a move drawn by ``bits``, if it gains; return the gain [s].
+
+    A stretch that begins or ends at ``c`` moves next to ``a``, three times in four; otherwise the
+    two points, or those before them, are joined by a reversal.
+    """
     if bits & 3:
         e = a if bits & 4 else line.previous[a]
         if e == NONE:
@@ -115,7 +119,9 @@ def reorder(
     memory: Memory,
     random: NDArray[np.uint64],
 ) -> float:
-    """Try to join each point of a line with half of the points nearby, chosen at random.
+    """Try a move at each point of a line for half of the points nearby, chosen at random.
+
+    The times of changes, by which ``polish`` skips points, are not kept.
 
     Args:
         line, floor, price, memory, random: as for ``anneal``.
