@@ -12,10 +12,8 @@ from numpy.typing import NDArray
 
 # A way counts as along the walls within this angle of their direction, or across [deg].
 ALONG_DEG = 3.0
-# A sharp turn; a turn back [deg].
-SHARP_DEG, BACK_DEG = 60.0, 135.0
-# A short leg [m].
-SHORT_M = 0.25
+# A turn back [deg].
+BACK_DEG = 135.0
 # Legs that are compared with all others at once.
 AT_ONCE = 512
 
@@ -26,16 +24,13 @@ class Calm:
 
     Attributes:
         turning_deg: sum of its turns [deg].
-        sharp_turns, turns_back: turns of more than 60, 135 degrees.
-        short_legs: ways between two turns of less than 25 cm.
-        crossings: of two legs that do not meet at their ends.
+        turns_back: turns of more than 135 degrees.
+        crossings: of two legs, inside of both.
         along_share: share of its length within 3 degrees of the walls' directions.
     """
 
     turning_deg: float
-    sharp_turns: float
     turns_back: float
-    short_legs: float
     crossings: float
     along_share: float
 
@@ -44,8 +39,8 @@ def calm_of(xy: NDArray[np.float64], swept_m2: float, walls_deg: float) -> Calm:
     """Return the figures of a line.
 
     Args:
-        xy: float64 (n, 2), n >= 2: its points [m].
-        swept_m2: floor that it sweeps [m2].
+        xy: float64 (n, 2): its points [m], not all in one place.
+        swept_m2: floor that it sweeps [m2], above 0.
         walls_deg: direction of the walls, any of the four [deg].
     """
     legs = np.diff(xy, axis=0)
@@ -58,9 +53,7 @@ def calm_of(xy: NDArray[np.float64], swept_m2: float, walls_deg: float) -> Calm:
     off = np.abs((headings - walls_deg + 45.0) % 90.0 - 45.0)
     return Calm(
         turning_deg=float(turns.sum()) / swept_m2,
-        sharp_turns=int(np.count_nonzero(turns > SHARP_DEG)) / swept_m2,
         turns_back=int(np.count_nonzero(turns > BACK_DEG)) / swept_m2,
-        short_legs=int(np.count_nonzero(lengths < SHORT_M)) / swept_m2,
         crossings=_crossings(begins, begins + legs) / swept_m2,
         along_share=float(lengths[off <= ALONG_DEG].sum() / lengths.sum()),
     )

@@ -6,7 +6,8 @@
 Each seed is a mission for each room and noise, with an offset of the base and a rate of poses that
 it draws. What has to hold: a mission claims no floor that its record has not, all floor that was
 ever reachable is told, a mission that is done is, and none stays in one place for more than 20 s
-with work left, unless it is blocked and says when it tries again. Exit code 1 where one does not.
+with work left, unless it is ``blocked``, and so says what it waits for. Exit code 1 where one does
+not.
 """
 
 from __future__ import annotations
@@ -133,8 +134,7 @@ def outcome_of(mission: NoisyMission) -> Outcome:
 def stayed_s(trace: Trace) -> float:
     """Return how long the robot stayed in one place at most, while it was not done [s].
 
-    Not counted is the time in which the mission is ``blocked``: its reason says what it waits for,
-    and when it tries again.
+    Not counted is the time in which the mission is ``blocked``: its reason says what it waits for.
     """
     of = trace.columns()
     begins = [state[0] for state in trace.states]
