@@ -83,7 +83,7 @@ def plan(
             and returns the walk's cells (row, col) in order; or a class, or an object, with such a
             method ``plan``. Of ``search`` it uses only the seed.
         stop: stopping criterion.
-        watch: called with the progress of the search.
+        watch: called with the progress of the search for a walk; a second walk begins anew.
         observe: called with the colony's pheromone: a ``ColonySnapshot`` after each cohort, or
             once at the end of a search with local search; not by planners without pheromone.
 

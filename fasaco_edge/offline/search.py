@@ -1,13 +1,15 @@
 """Search of an offline plan: for walks, and for the line along the best of them, within a budget.
 
-A line is laid along each of two walks; the better one is improved until the budget is used up. The
-first line is always completed, and each step follows from those before it, whatever the budget:
-more of it is never worse, by the seconds of the line and the price of floor that is left.
+A line is laid along each of two walks, and annealed three times; the better one is improved until
+the budget is used up. The first walk and line are always completed, and each step follows from
+those before it, whatever the budget: more of it is never worse, by the seconds of the line and the
+price of floor that is left. That does not hold without local search, or if a gap of the walk is
+asked for: then there is one walk, which the budget ends.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
 from fasaco_edge.config.robot import RobotConfig
@@ -33,9 +35,10 @@ from fasaco_edge.planners.problem import CoverageProblem
 from fasaco_edge.planners.registry import planner_of
 
 # Limit on the proposals per cell of a search for a walk: more of them gain a line less than the
-# search for the line does. The first walk, which no budget ends, has fewer of them per cell, or
-# half a second.
-PROPOSALS_A_CELL, FIRST_A_CELL, FIRST_PROPOSALS = 10_000, 2_500, 10_000_000
+# search for the line does; and on all of the first one, which no budget ends: five seconds.
+PROPOSALS_A_CELL, FIRST_PROPOSALS = 10_000, 25_000_000
+# Stages after which two lines are compared.
+COMPARED = 3
 # What is different in the seed of the second walk.
 SECOND_SEED = 1 << 20
 
@@ -109,11 +112,28 @@ class Ending:
 
 @dataclass(frozen=True, slots=True)
 class _Laid:
-    """A walk with the search for the line along it, and the colony's pheromone."""
+    """A walk with the running search for the line along it, and the colony's pheromone."""
 
     path: CoveragePath
     line: LineSearch
+    pieces: Iterator[None]
     snapshots: list[ColonySnapshot]
+
+    def complete(self, stages: int, stop: Callable[[], bool] = lambda: False) -> bool:
+        """Complete a number of stages in all; return False if it is stopped before."""
+        for _ in self.pieces:
+            if self.line.stages >= stages:
+                return True
+            if stop():
+                return False
+        return True
+
+    def improve(self, stop: Callable[[], bool]) -> None:
+        """Search on until stopped; without moves there is nothing to search."""
+        if not stop():
+            for _ in self.pieces:
+                if stop():
+                    return
 
 
 class Planning:
@@ -151,7 +171,7 @@ class Planning:
             path = self._walk(self._search.seed, self._observe)
             return path, line_through(self._ground.lattice, path.cells)
         laid = self._begin(line, robot)
-        laid.line.improve(self._ending.is_line_over)
+        laid.improve(self._ending.is_line_over)
         for snapshot in laid.snapshots:
             self._observe(snapshot)
         assert laid.line.best is not None
@@ -160,30 +180,34 @@ class Planning:
     def _begin(self, line: str, robot: RobotConfig) -> _Laid:
         """Return the better of two walks, by the line along it; the first is always laid.
 
-        There is one alone without local search, or if a gap of the walk is asked for.
+        There is one alone without local search, if a gap of the walk is asked for, or if the first
+        search came to its end by itself.
         """
         search, ending = self._search, self._ending
         has_two = search.has_local_search and search.target_gap is None
-        cells = self._problem.cells
-        most = PROPOSALS_A_CELL * cells
-        first = min(most, max(FIRST_A_CELL * cells, FIRST_PROPOSALS)) if has_two else most
-        ending.limit_walk(first, is_first=has_two)
-        best = self._lay(line, robot, search.seed)
-        best.line.begin()
-        if not has_two or not ending.is_walk_limited or ending.is_line_over():
+        most = PROPOSALS_A_CELL * self._problem.cells
+        ending.limit_walk(min(most, FIRST_PROPOSALS) if has_two else most, is_first=has_two)
+        best = self._lay(line, robot, search.seed, is_one_of_two=has_two)
+        best.complete(1)
+        may_go_on = has_two and ending.is_walk_limited and not ending.is_line_over()
+        if not may_go_on or not best.complete(COMPARED, ending.is_line_over):
             return best
         ending.limit_walk(most, is_first=False)
-        other = self._lay(line, robot, search.seed ^ SECOND_SEED)
-        is_laid = not ending.is_walk_cut and other.line.begin(ending.is_line_over)
+        other = self._lay(line, robot, search.seed ^ SECOND_SEED, is_one_of_two=True)
+        is_laid = not ending.is_walk_cut and other.complete(COMPARED, ending.is_line_over)
         return other if is_laid and other.line.rank < best.line.rank else best
 
-    def _lay(self, line: str, robot: RobotConfig, seed: int) -> _Laid:
-        """Search for a walk, and prepare the search for the line along it."""
+    def _lay(self, line: str, robot: RobotConfig, seed: int, *, is_one_of_two: bool) -> _Laid:
+        """Search for a walk, and prepare the search for the line along it.
+
+        The pheromone of one of two walks is shown once it is known which is the better one.
+        """
         snapshots: list[ColonySnapshot] = []
-        path = self._walk(seed, ignore if self._observe is ignore else snapshots.append)
+        is_shown_later = is_one_of_two and self._observe is not ignore
+        path = self._walk(seed, snapshots.append if is_shown_later else self._observe)
         ends, swept = self._problem.end is not None, self._search.swept
         search = self._ground.line_search(path.cells, line, robot, ends=ends, swept=swept)
-        return _Laid(path, search, snapshots)
+        return _Laid(path, search, search.run(), snapshots)
 
     def _walk(self, seed: int, observe: Observer) -> CoveragePath:
         """Search for a walk; a planner without a lower bound is given one for its path."""

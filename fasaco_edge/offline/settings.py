@@ -19,7 +19,7 @@ WALLS, AXES = "walls", "axes"
 MOST_ANGLE_DEG = 360.0
 # Default time budget of a search [s], and the colony's settings that suit local search best. The
 # colony alone has the paper's settings, and walks to its end.
-BUDGET_S = 1.0
+BUDGET_S = 2.0
 SEARCH_Q0, PAPER_Q0 = 0.98, 0.7
 SEARCH_VISIBILITY, PAPER_VISIBILITY = "fewest-open", "neighbour"
 
@@ -46,8 +46,9 @@ class Search:
         q0, visibility: likewise; None for the values that suit the search with or without local
             search.
         threads: number of threads of the ants; the walk is the same for any number.
-        budget_s: time limit of the search for a walk, then for the line along it [s]; the line's
-            first stage is always completed; None for 1 s with local search, no limit without.
+        budget_s: time limit of the search for walks and the line along one [s]; with local search a
+            first walk and line are always completed; None for 2 s, or without local search for no
+            limit.
         target_gap: optimality gap at which the search ends; None for never.
         swept: share of the reachable floor that a line is to sweep, in the least time; None for as
             much as its seconds are worth.

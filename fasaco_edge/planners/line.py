@@ -46,8 +46,8 @@ COOLED, REHEATED = (1.0, 0.0), (0.7, 0.0)
 # after one that sweeps enough, and the limit of their product.
 RAISED, LOWERED, MOST_RAISED = 1.6, 0.8, 100.0
 # Moves per point of the line after which its parts are reordered once.
-MOVES_A_POINT = 32
-# Moves between two pauses: about a quarter of a second.
+MOVES_A_POINT = 48
+# Limit on the moves between two pauses: about a quarter of a second.
 MOVES_AT_ONCE = 1 << 17
 # Clearance is given up for a strip of floor that is wider than this share of the tool's width. In a
 # niche or a passage that strip is as wide as the tool; along a wall it is as wide as the clearance.
@@ -131,6 +131,7 @@ class LineSearch:
 
     Attributes:
         best: the line kept; None until the first stage is over.
+        stages: number of stages that are over.
     """
 
     def __init__(
@@ -143,6 +144,7 @@ class LineSearch:
         is_end_fixed: bool,
     ) -> None:
         self.best: DrivenLine | None = None
+        self.stages = 0
         self._floor, self._config = floor, config
         unit, tool_m = floor.geometry.resolution, floor.discs.tool_m
         points = stands.points(walk)
@@ -160,29 +162,9 @@ class LineSearch:
         self._on = kernel.Floor(floor.blocked, floor.places, self._sweeps, radius, tool, clear)
         self._moves = min(int(config.moves_m2 * floor.reachable_m2), MOST_A_POINT * len(points))
         self._random = np.array([SEED], np.uint64)
-        self._pieces = self._run()
 
     def run(self) -> Iterator[None]:
-        """Return the search as it goes on: it pauses after each piece of work, without end."""
-        return self._pieces
-
-    def begin(self, stop: Callable[[], bool] = lambda: False) -> bool:
-        """Complete the first stage; return False if it is stopped before."""
-        for _ in self._pieces:
-            if self.best is not None:
-                return True
-            if stop():
-                return False
-        return self.best is not None
-
-    def improve(self, stop: Callable[[], bool]) -> None:
-        """Search on until stopped; without moves there is nothing to search."""
-        if not stop():
-            for _ in self._pieces:
-                if stop():
-                    return
-
-    def _run(self) -> Iterator[None]:
+        """Search without end; pause after each piece of work. To be called once."""
         if not self._has_moves:
             self._keep()
             yield
@@ -221,6 +203,7 @@ class LineSearch:
             patches = find_patches(self._sweeps, math.ceil(PATCH_M2 / (unit * unit)))
             sweep_patches(line, on, patch, memory, FARTHEST_M / unit, patches, most)
         self._keep()
+        self.stages += 1
         yield
 
     def _adapt_price(self) -> None:
@@ -280,8 +263,9 @@ def line_over(
         stop: ends the search once there is a line.
     """
     search = LineSearch(walk, stands, floor, config, is_end_fixed=is_end_fixed)
-    search.begin()
-    search.improve(stop)
+    for _ in search.run():
+        if search.best is not None and stop():
+            break
     assert search.best is not None
     return search.best
 

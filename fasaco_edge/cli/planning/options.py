@@ -278,8 +278,8 @@ def _add_planner(group: argparse._ArgumentGroup) -> None:
         "--budget",
         type=float,
         metavar="S",
-        help="time for the search of a walk, then of the line along it [s]; a first line is always "
-        f"finished (default: {BUDGET_S:g}; none without local search)",
+        help="time for the search of walks and of the line along one [s]; a first walk and line "
+        f"are always finished (default: {BUDGET_S:g}; none without local search)",
     )
     group.add_argument(
         "--swept",
