@@ -25,11 +25,13 @@ def shifted(before, after, right=0.0, up=0.0, yaw=0.0):
 
 @pytest.mark.parametrize("shift", [(1, 0), (-3, 2), (4, -4), (2.8, 0.0)])
 def test_a_map_that_was_shifted(shift):
-    assert shifted(two_rooms(), two_rooms(), *shift) == pytest.approx(np.rint(shift))
+    assert shifted(two_rooms(is_open=True), two_rooms(is_open=True), *shift) == pytest.approx(
+        np.rint(shift)
+    )
 
 
 def test_a_map_with_walls_of_many_pixels():
-    walls = np.pad(two_rooms(), 8, constant_values=100)
+    walls = np.pad(two_rooms(is_open=True), 8, constant_values=100)
     assert shifted(walls, walls, 3, 1) == pytest.approx((3, 1))
 
 
@@ -46,7 +48,7 @@ def noisy(pixels, seed):
 
 
 def furnished():
-    pixels = two_rooms()
+    pixels = two_rooms(is_open=True)
     pixels[10:20, 20:34] = pixels[30:44, 80:90] = 100
     return pixels
 
@@ -54,14 +56,14 @@ def furnished():
 @pytest.mark.parametrize(
     ("before", "after"),
     [
-        (two_rooms(), two_rooms()),
-        (two_rooms(), changed("closed")),
-        (two_rooms(), changed("unknown")),
-        (two_rooms(), furnished()),
-        (furnished(), two_rooms()),
-        (noisy(two_rooms(), 1), noisy(two_rooms(), 2)),
-        (two_rooms(), np.zeros((52, 124), np.int8)),
-        (two_rooms(), np.full((52, 124), 100, np.int8)),
+        (two_rooms(is_open=True), two_rooms(is_open=True)),
+        (two_rooms(is_open=True), changed("closed")),
+        (two_rooms(is_open=True), changed("unknown")),
+        (two_rooms(is_open=True), furnished()),
+        (furnished(), two_rooms(is_open=True)),
+        (noisy(two_rooms(is_open=True), 1), noisy(two_rooms(is_open=True), 2)),
+        (two_rooms(is_open=True), np.zeros((52, 124), np.int8)),
+        (two_rooms(is_open=True), np.full((52, 124), 100, np.int8)),
     ],
     ids=["same", "door", "unknown", "furniture", "none", "noise", "no walls", "no floor"],
 )
@@ -70,4 +72,6 @@ def test_a_map_that_was_not(before, after):
 
 
 def test_noise_hides_no_shift():
-    assert shifted(noisy(two_rooms(), 1), noisy(two_rooms(), 2), 3, 0) == pytest.approx((3, 0))
+    assert shifted(
+        noisy(two_rooms(is_open=True), 1), noisy(two_rooms(is_open=True), 2), 3, 0
+    ) == pytest.approx((3, 0))
