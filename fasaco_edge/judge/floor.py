@@ -84,6 +84,9 @@ class FloorFigures:
         length_m: length of the line [m].
         quarter_turns: angle turned on the line, in quarter-turns.
         seconds: driving and turning [s].
+        least_s: lower bound on the seconds of any line that sweeps as much [s]: a tool of width w
+            sweeps at most w l + pi w^2 / 4 along a line of length l, and turns are not counted. As
+            exact as the area swept, which a raster misstates by a pixel at its rim.
         seconds_per_m2: driving time per square metre swept [s/m2]; None if nothing was swept.
         patches_over_4_dm2: patches left that are larger than ``PATCH_M2``.
         largest_patch_m2: the largest patch left [m2].
@@ -97,10 +100,16 @@ class FloorFigures:
     length_m: float
     quarter_turns: float
     seconds: float
+    least_s: float
     seconds_per_m2: float | None
     patches_over_4_dm2: int
     largest_patch_m2: float
     pixel_m: float
+
+    @property
+    def gap(self) -> float | None:
+        """How far the line is above the lower bound, as a share of it; None if that is 0."""
+        return max(self.seconds / self.least_s - 1.0, 0.0) if self.least_s else None
 
 
 def swept_words(swept_m2: float, reachable_m2: float) -> str:
@@ -255,6 +264,7 @@ def _figures(floor: _Floor, line: DrivenLine, reachable: Mask, swept: Mask) -> F
     seconds = length_m / robot.speed_m_s + quarters * robot.turn_s
     if robot.limits is not None:
         seconds = drive_seconds(ways_px * pixel_m, bends_deg, robot.speed_m_s, robot.limits)
+    least_m = max(swept_m2 / robot.tool_m - math.pi * robot.tool_m / 4, 0.0)
     return FloorFigures(
         reachable_m2=reachable_m2,
         swept_m2=swept_m2,
@@ -263,6 +273,7 @@ def _figures(floor: _Floor, line: DrivenLine, reachable: Mask, swept: Mask) -> F
         length_m=length_m,
         quarter_turns=quarters,
         seconds=seconds,
+        least_s=least_m / robot.speed_m_s,
         seconds_per_m2=seconds / swept_m2 if swept_m2 else None,
         patches_over_4_dm2=int(np.count_nonzero(left_m2 > PATCH_M2)),
         largest_patch_m2=float(left_m2.max(initial=0.0)),

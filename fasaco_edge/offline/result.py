@@ -142,6 +142,7 @@ class PlannedFloor:
     reachable_m2: float
     swept_share: float | None
     seconds_per_m2: float | None
+    gap: float | None
     patches_over_4_dm2: int
     largest_patch_m2: float
     illegal_share: float
@@ -157,6 +158,8 @@ class PlannedFloor:
             words += f", {patches} over 4 dm2 left, the largest {self.largest_patch_m2:,.2f} m2"
         if self.seconds_per_m2 is not None:
             words += f", {self.seconds_per_m2:.1f} s/m2"
+        if self.gap is not None:
+            words += f", at most {self.gap:.0%} above the least time"
         if self.illegal_share:
             words += (
                 f"; {self.illegal_share:.1%} of the line is too close to obstacles or unknown floor"
@@ -166,11 +169,12 @@ class PlannedFloor:
     @classmethod
     def of(cls, figures: FloorFigures) -> PlannedFloor:
         """Return the figures, rounded."""
-        share, pace = figures.swept_share, figures.seconds_per_m2
+        share, pace, gap = figures.swept_share, figures.seconds_per_m2, figures.gap
         return cls(
             reachable_m2=round(figures.reachable_m2, 2),
             swept_share=None if share is None else round(share, 4),
             seconds_per_m2=None if pace is None else round(pace, 3),
+            gap=None if gap is None else round(gap, 4),
             patches_over_4_dm2=figures.patches_over_4_dm2,
             largest_patch_m2=round(figures.largest_patch_m2, 3),
             illegal_share=round(figures.illegal_share, 4),

@@ -71,6 +71,23 @@ def test_one_lane_sweeps_its_length_and_a_disc() -> None:
     assert figures.largest_patch_m2 == pytest.approx(figures.reachable_m2 - figures.swept_m2)
 
 
+def test_no_line_takes_less_than_the_least_time() -> None:
+    # Along a straight lane nothing is swept twice: the bound is reached.
+    assert judged(room(6.0, 3.0), (1.0, 1.5), (5.0, 1.5)).figures.gap == pytest.approx(
+        0.0, abs=0.01
+    )
+    # Two lanes side by side sweep two discs and a strip less than their length promises.
+    lanes = judged(room(6.0, 3.0), (1.0, 1.0), (5.0, 1.0), (5.0, 1.4), (1.0, 1.4)).figures
+    swept_m2 = 8.0 * 0.4 + 0.2 * 0.4 + 1.5 * math.pi * 0.2**2
+    least_s = (swept_m2 - math.pi * 0.2**2) / 0.4 / 0.5
+    assert lanes.gap == pytest.approx((8.4 / 0.5 + 2 * 2.0) / least_s - 1.0, abs=0.01)
+    # There and back sweeps the floor of one way.
+    again = judged(room(6.0, 3.0), (1.0, 1.5), (5.0, 1.5), (1.0, 1.5)).figures
+    assert again.gap == pytest.approx((16.0 + 2 * 2.0) / 8.0 - 1.0, abs=0.02)
+    # A tool that stands still takes no time.
+    assert judged(room(4.0, 3.0), (2.0, 1.5)).figures.gap == 0.0
+
+
 def test_turns_count_by_their_angle() -> None:
     points = [(1.0, 1.0), (2.0, 1.0), (2.0, 1.0), (2.0, 2.0), (1.0, 1.0)]
     figures = judged(room(4.0, 3.0), *points).figures

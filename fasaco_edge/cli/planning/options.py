@@ -53,8 +53,9 @@ figures:
   gap              cost_s / lower_bound_cost_s - 1, steps and turns together
   floor            (YAML maps) measured on the map's pixels, with a tool as wide as --cell:
                    reachable_m2, all that the tool touches wherever the robot's disc can
-                   be; the share of it that the line sweeps; seconds_per_m2 swept; patches
-                   larger than 4 dm2 not swept, the largest; illegal_share, the part of
+                   be; the share of it that the line sweeps; seconds_per_m2 swept; gap, to
+                   the time of driving that area once at the tool's width; patches larger
+                   than 4 dm2 not swept, the largest; illegal_share, the part of
                    the line where the robot would touch what is not known to be free
 
 figures of several robots:
