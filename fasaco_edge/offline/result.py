@@ -159,7 +159,7 @@ class PlannedFloor:
         if self.seconds_per_m2 is not None:
             words += f", {self.seconds_per_m2:.1f} s/m2"
         if self.gap is not None:
-            words += f", at most {self.gap:.0%} above the least time"
+            words += f", at most {100 * self.gap:.0f} % above the shortest possible time"
         if self.illegal_share:
             words += (
                 f"; {self.illegal_share:.1%} of the line is too close to obstacles or unknown floor"
