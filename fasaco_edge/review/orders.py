@@ -212,7 +212,13 @@ def _chapter(
 
 
 def is_still_true(sample: StatusSample, fractions: NDArray[np.float64]) -> bool:
-    """Return whether the covered share has not changed since a status came."""
+    """Return whether the covered share has not changed since a status came.
+
+    The curve is drawn up to two seconds late, its last point at the end of the recording: after the
+    end of an order, which covers no more, it says nothing.
+    """
+    if sample.status.state in OVER:
+        return True
     later = fractions[fractions[:, 0] > sample.at_s + SAME_STEP_S]
     then = fractions[fractions[:, 0] <= sample.at_s + SAME_STEP_S]
     return not len(later) or (len(then) > 0 and bool((later[:, 1] == then[-1, 1]).all()))

@@ -22,8 +22,11 @@ ALL = read_order({})
 KITCHEN = read_order({"zones": [{"name": "k", "polygon": [[0, 0], [4, 0], [4, 3]], "passes": 1}]})
 
 
-def told(*rows, commands=()):
-    """Return the chapters of a data of (time, state, covered, coverable)."""
+def told(*rows, commands=(), drawn=()):
+    """Return the chapters of a data of (time, state, covered, coverable).
+
+    ``drawn``: further points of the curve of the covered share, (time, share).
+    """
     statuses = [
         StatusSample(
             at_s,
@@ -32,7 +35,8 @@ def told(*rows, commands=()):
         for at_s, state, covered, coverable in rows
     ]
     states = spans_of([(at_s, state, "") for at_s, state, _, _ in rows], 100.0)
-    fractions = np.array([(at_s, covered / coverable) for at_s, _, covered, coverable in rows])
+    shares = [(at_s, covered / coverable) for at_s, _, covered, coverable in rows]
+    fractions = np.array(sorted([*shares, *drawn]))
     data = RunData(statuses=statuses, commands=list(commands))
     return chapters(data, states, fractions, 100.0)
 
@@ -40,6 +44,15 @@ def told(*rows, commands=()):
 def test_a_mission_without_commands_is_one_order():
     (order,) = told((0, "covering", 0, 60), (50, "done", 60, 60))
     assert (order.ordered, order.at_s, order.until_s) == ("itself", 0.0, 100.0)
+    assert (order.covered_cells, order.coverable_cells, order.complete) == (60, 60, True)
+
+
+@pytest.mark.parametrize("late_s", [1.9, 40.0])
+def test_a_curve_drawn_late_leaves_a_done_mission_done(late_s):
+    """The curve's last point may be drawn two seconds late, or at the end of the recording."""
+    (order,) = told(
+        (0, "covering", 0, 60), (50, "done", 60, 60), drawn=[(49, 0.97), (50 + late_s, 0.99)]
+    )
     assert (order.covered_cells, order.coverable_cells, order.complete) == (60, 60, True)
 
 
