@@ -294,6 +294,9 @@ def _compared_rows(compared: Comparison | None) -> list[tuple[str, str]]:
         was, now = versions.recorded, versions.replayed
         if was and was != now:
             rows.append((name, f"recorded with {was}, replayed with {now}"))
+    kernels = compared.kernels
+    if compared.difference is not None and kernels.recorded not in ("", kernels.replayed):
+        rows.append(("why", "other kernels may plan other paths: that is no fault"))
     return rows
 
 

@@ -55,6 +55,8 @@ def test_a_recording_of_another_search_replays_its_equal_part(recording, capsys)
     assert summary["difference"]["what"] == "plan 1"
     assert summary["kernels"]["recorded"] == "kernels-339d81898e70"
     assert summary["kernels"]["replayed"] != summary["kernels"]["recorded"]
+    assert main(["replay", recording]) == 1
+    assert "other kernels may plan other paths" in capsys.readouterr().out
     # The first path is the same all the same.
     assert (summary["paths"], summary["paths_as_recorded"]) == (1, 1)
 
