@@ -4,9 +4,10 @@ import json
 from pathlib import Path
 
 import msgspec
+import pytest
 import yaml
 
-from fasaco_edge.config.config import DaemonConfig, FleetConfig
+from fasaco_edge.config.config import BatteryConfig, DaemonConfig, FleetConfig, ScanConfig
 from fasaco_edge.config.loading import load_config
 from fasaco_edge.config.ros import RosConfig
 
@@ -22,11 +23,19 @@ def test_example_configuration_holds_every_key_with_its_default():
     assert json.dumps(written) == json.dumps(shown)
 
 
-def test_the_block_for_a_fleet_holds_every_key_with_its_default():
-    block = EXAMPLE.read_text(encoding="utf-8").partition("\n#fleet:")[2].partition("\n\n")[0]
+@pytest.mark.parametrize(
+    ("name", "default"),
+    [
+        ("battery", BatteryConfig()),
+        ("scan", ScanConfig()),
+        ("fleet", FleetConfig("building_7")),
+    ],
+)
+def test_a_block_without_effect_has_every_key_and_default(name, default):
+    block = EXAMPLE.read_text(encoding="utf-8").partition(f"\n#{name}:")[2].partition("\n\n")[0]
     lines = [line for line in block.splitlines() if line.startswith("#  ")]
-    written = yaml.safe_load("\n".join(line[1:] for line in lines))
-    assert written == msgspec.json.decode(msgspec.json.encode(FleetConfig("building_7")))
+    written = yaml.safe_load("\n".join(line[1:] for line in lines if line[3] != " "))
+    assert written == msgspec.json.decode(msgspec.json.encode(default))
 
 
 def test_the_ros_block_has_every_key_with_its_default(tmp_path):
