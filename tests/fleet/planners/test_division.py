@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given
+from hypothesis import given
 from hypothesis import strategies as st
 
 from fasaco_edge.errors import NothingToCover, StartBlocked
@@ -38,7 +38,7 @@ def check(free, starts, division, *, returns):
 
 
 @given(data=st.data())
-@examples(25, suppress_health_check=[HealthCheck.too_slow])
+@examples(25)
 def test_every_cell_is_covered_by_legal_walks(data):
     free = free_cells(data, 1)
     cells = [tuple(cell) for cell in np.argwhere(free).tolist()]
