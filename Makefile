@@ -34,13 +34,13 @@ properties: $(STAMP)  ## tests over generated inputs, with sixteen times as many
 	EXAMPLES=4 $(BIN)/python -m pytest -n $(WORKERS) --dist worksteal -m hypothesis $(ARGS)
 
 check: $(STAMP)  ## format, lint, types, import contracts
-	$(BIN)/ruff format --check .
+	$(BIN)/ruff format --check . || { echo "to put them into their format: make format"; exit 1; }
 	$(BIN)/ruff check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
 format: $(STAMP)  ## put the sources into their format
-	$(BIN)/ruff check --fix .
+	$(BIN)/ruff check --fix-only .
 	$(BIN)/ruff format .
 
 contract: $(STAMP)  ## files of protocol/ that are made from the package: keys, QoS, schemas, tables
