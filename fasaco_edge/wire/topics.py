@@ -111,42 +111,6 @@ PATH = Topic(
     queues=Queues(recorder=EVERY, watch=64),
     limits=("max_path_poses", "max_coordinate_m"),
 )
-CMD_VEL = Topic(
-    name="cmd_vel",
-    direction="out, by the follower",
-    when="20 times a second while the follower drives, and for a second after it has stopped",
-    speaker="driver",
-    listeners=("viewer",),
-    schemas=schemas.TWIST_SCHEMAS,
-    qos=Qos(
-        "interactive_high", express=True, why="the next velocity is better than one sent again"
-    ),
-)
-BLOCKED = Topic(
-    name="blocked",
-    direction="out, by the follower",
-    when="once a second while the follower has stood for some seconds for what keeps it from "
-    "driving its path",
-    speaker="driver",
-    listeners=("robot", "viewer"),
-    json="blocked.json",
-    qos=Qos("interactive_low"),
-    queues=Queues(daemon=16, recorder=EVERY),
-    is_input=True,
-    limits=(
-        *("max_blocked_bytes", "max_string_bytes", "max_coordinate_m"),
-        *("max_blocked_points", "queue_blocked"),
-    ),
-)
-DRIVER = Topic(
-    name="driver",
-    direction="liveliness token",
-    when="each follower of this robot has one; its key says whether it drives or waits",
-    speaker="driver",
-    # The followers of one robot find each other by these.
-    listeners=("viewer",),
-    key="driver/*/*",
-)
 COVERAGE = Topic(
     name="coverage",
     direction="out",
@@ -289,15 +253,45 @@ RECORDER_ALIVE = Topic(
     listeners=("robot", "recorder"),
     key="recorder/alive",
 )
-
-# A recorder subscribes in this order, to the turn log last: once the daemon sees that subscriber,
-# the recorder receives everything else, too.
-TOPICS = (
-    *(MAP, MAP_UPDATE, POSE, BATTERY, KEEP_OUT_MASK, SCAN),
-    *(PATH, COVERAGE, FLOOR, PHEROMONE, DIRECTIONS, STATUS, COMMAND, TURNS, FLEET, ALIVE, CLAIM),
-    *(RECORDER, RECORDER_ALIVE),
-    *(CMD_VEL, BLOCKED, DRIVER),
+CMD_VEL = Topic(
+    name="cmd_vel",
+    direction="out, by the follower",
+    when="20 times a second while the follower drives, and for a second after it has stopped",
+    speaker="driver",
+    listeners=("viewer",),
+    schemas=schemas.TWIST_SCHEMAS,
+    qos=Qos(
+        "interactive_high", express=True, why="the next velocity is better than one sent again"
+    ),
 )
+BLOCKED = Topic(
+    name="blocked",
+    direction="out, by the follower",
+    when="once a second while the follower has stood for some seconds for what keeps it from "
+    "driving its path",
+    speaker="driver",
+    listeners=("robot", "viewer"),
+    json="blocked.json",
+    qos=Qos("interactive_low"),
+    queues=Queues(daemon=16, recorder=EVERY),
+    is_input=True,
+    limits=(
+        *("max_blocked_bytes", "max_string_bytes", "max_coordinate_m"),
+        *("max_blocked_points", "queue_blocked"),
+    ),
+)
+DRIVER = Topic(
+    name="driver",
+    direction="liveliness token",
+    when="each follower of this robot has one; its key says whether it drives or waits",
+    speaker="driver",
+    # The followers of one robot find each other by these.
+    listeners=("viewer",),
+    key="driver/*/*",
+)
+
+TOPICS = tuple(each for each in tuple(globals().values()) if isinstance(each, Topic))
+"""All rows, in the order of this file."""
 # Samples of these topics keep the order of their publisher: an update changes the map before it.
 IN_ORDER = frozenset({MAP.name, MAP_UPDATE.name})
 QOS = {topic.name: topic.qos for topic in TOPICS if topic.qos is not None}

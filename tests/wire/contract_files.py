@@ -2,7 +2,7 @@
 
 From ``fasaco_edge.wire.topics``: keys and queries of ``keys.yaml``, ``qos.yaml``, the key
 expressions of the session templates, the tables of the pages. From the typed documents: the
-schemas, see ``tests.wire.make_schemas``.
+schemas, see ``tests.wire.make_schemas``, and rows of members, see ``tests.wire.page_rows``.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from fasaco_edge.bus import access
 from fasaco_edge.host.resources import folder
 from fasaco_edge.wire.topic_types import Query, Topic
 from fasaco_edge.wire.topics import QOS, QUERIES, TOPICS
-from tests.wire import make_schemas
+from tests.wire import make_schemas, page_rows
 
 PROTOCOL = folder("protocol")
 # What people read of it.
@@ -260,6 +260,11 @@ def write() -> None:
             flags=re.MULTILINE,
         )
         assert count == 1, head
+        page.write_text(text)
+    for page in PAGES:
+        text = page_rows.with_roles(page.read_text())
+        for heading in page_rows.MEMBERS:
+            text = page_rows.with_members(text, heading)
         page.write_text(text)
 
 

@@ -8,8 +8,10 @@ from __future__ import annotations
 
 import inspect
 import json
+import pkgutil
 import re
 from collections.abc import Iterator
+from importlib import import_module
 from pathlib import Path
 from typing import Any, get_args
 
@@ -17,31 +19,37 @@ import msgspec
 
 from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.mission.orders.order import CommandDocument
-from fasaco_edge.wire.documents.blocked import Blocked
+from fasaco_edge.wire import documents
 from fasaco_edge.wire.documents.fleet import FleetMember
-from fasaco_edge.wire.documents.path_documents import PathAttachment, TrailAttachment
-from fasaco_edge.wire.documents.replies import Error, Replan, Reply, Version
-from fasaco_edge.wire.documents.status import Recorder, Status
+from fasaco_edge.wire.documents.replies import Error
 from fasaco_edge.wire.documents.turns import TurnBatch
+from fasaco_edge.wire.topics import QUERIES, TOPICS
 
 HEAD = {
     "$schema": "https://json-schema.org/draft/2020-12/schema",
     "$comment": "Written by `make contract` from the typed documents of fasaco_edge.",
 }
-DOCUMENTS = {
-    "blocked": Blocked,
-    "error": Error,
-    "fleet": FleetMember,
-    "mission": CommandDocument,
-    "path_attachment": PathAttachment,
-    "recorder": Recorder,
-    "replan": Replan,
-    "reply": Reply,
-    "status": Status,
-    "trail_attachment": TrailAttachment,
-    "turns": TurnBatch,
-    "version": Version,
-}
+# Documents in no row of the table of topics, or whose struct has another name than their file.
+_OTHERS = {"error": Error, "fleet": FleetMember, "mission": CommandDocument, "turns": TurnBatch}
+
+
+def _documents() -> dict[str, type[msgspec.Struct]]:
+    """Return the struct of each file that the table of topics names: `Odometer`, odometer.json."""
+    structs = {
+        re.sub(r"(?<!^)(?=[A-Z])", "_", name).lower(): kind
+        for module in pkgutil.iter_modules(documents.__path__, f"{documents.__name__}.")
+        for name, kind in vars(import_module(module.name)).items()
+        if isinstance(kind, type) and issubclass(kind, msgspec.Struct)
+    }
+    named = {name for topic in TOPICS for name in (topic.json, topic.attachment)}
+    named |= {name for query in QUERIES for name in (query.json, query.payload)}
+    stems = {name.removesuffix(".json") for name in named - {"", "config.json"}} - _OTHERS.keys()
+    if lacking := stems - structs.keys():
+        raise LookupError(f"wire/documents has no struct for {', '.join(sorted(lacking))}.json")
+    return {name: structs[name] for name in stems} | _OTHERS
+
+
+DOCUMENTS = _documents()
 
 
 def files() -> dict[str, str]:

@@ -18,13 +18,19 @@ from fasaco_edge.wire import limits
 from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.topic_types import VOLATILE
 from fasaco_edge.wire.topics import QOS, QUERIES, QUEUE_LENGTHS, TOPICS
-from tests.wire import contract_files
+from tests.wire import contract_files, page_rows
 from tests.wire.contract_files import CONTRACT, PAGES, PROTOCOL, load
 
 PRIORITIES = (
     "real_time", "interactive_high", "interactive_low", "data_high", "data", "data_low",
     "background",
 )  # fmt: skip
+
+
+@pytest.mark.parametrize("row", page_rows.role_rows())
+def test_a_role_has_the_rights_of_the_table_of_topics(row):
+    """To write it: make contract."""
+    assert row in CONTRACT
 
 
 @pytest.mark.parametrize("table", ["key", "qos", "query", "wildcard", "error"])
