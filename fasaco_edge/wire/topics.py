@@ -292,6 +292,14 @@ DRIVER = Topic(
 
 TOPICS = tuple(each for each in tuple(globals().values()) if isinstance(each, Topic))
 """All rows, in the order of this file."""
+# The turn log last: once the daemon sees that subscriber, the recorder receives all else, too.
+RECORDED = tuple(
+    sorted(
+        (topic for topic in TOPICS if topic.queues.recorder is not None),
+        key=lambda topic: topic is TURNS,
+    )
+)
+"""What a recorder subscribes to, in this order."""
 # Samples of these topics keep the order of their publisher: an update changes the map before it.
 IN_ORDER = frozenset({MAP.name, MAP_UPDATE.name})
 QOS = {topic.name: topic.qos for topic in TOPICS if topic.qos is not None}

@@ -17,7 +17,7 @@ from fasaco_edge.mission.orders import keep_outs, order
 from fasaco_edge.wire import limits
 from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.topic_types import VOLATILE
-from fasaco_edge.wire.topics import QOS, QUERIES, QUEUE_LENGTHS, TOPICS
+from fasaco_edge.wire.topics import QOS, QUERIES, QUEUE_LENGTHS, RECORDED, TOPICS, TURNS
 from tests.wire import contract_files, page_rows
 from tests.wire.contract_files import CONTRACT, PAGES, PROTOCOL, load
 
@@ -75,6 +75,13 @@ def test_keys_queries_and_qos_equal_the_table_of_topics():
         assert entry["key"].format(base=names.base, robot=names.robot) == names.of(topic)
     for entry in keys["queries"]:
         assert entry["key"].format(base=names.base, robot=names.robot) == names.rpc(entry["name"])
+
+
+def test_a_recorder_subscribes_to_the_turn_log_last():
+    """The daemon takes that subscriber for one that receives all inputs."""
+    assert RECORDED[-1] is TURNS
+    assert set(RECORDED) == {topic for topic in TOPICS if topic.queues.recorder is not None}
+    assert {topic.name for topic in TOPICS if topic.is_input} <= {each.name for each in RECORDED}
 
 
 def test_queries_make_sense():

@@ -109,9 +109,8 @@ class Recorder:
                 self._subscribe(
                     name, ros.input_key(heard), heard.latched, heard.depth, heard.schema
                 )
-        for topic in topics.TOPICS:
-            if topic.queues.recorder is not None:
-                self._subscribe(topic.name, keys.of(topic), topic.is_latched)
+        for topic in topics.RECORDED:
+            self._subscribe(topic.name, keys.of(topic), topic.is_latched)
         self._bus.token(keys.of(topics.RECORDER_ALIVE))
 
     def step(self, timeout_s: float) -> None:
