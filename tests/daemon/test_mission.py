@@ -225,6 +225,10 @@ def test_the_status_says_all_there_is_to_know(path, pixels, outsider, daemon):
     assert status["plan"] == {"plans": 1, "unchanged": 0, "outdated": 0, "planning": False}
     assert status["latency_ms"]["plan"] > 0
     assert status["errors"] == {"total": 0, "last": "", "by_code": {}}
+    planned_s = status["drive"]["planned_quarter_turn_s"]
+    assert planned_s > 0
+    unmeasured = dict.fromkeys(("speed_m_s", "quarter_turn_s", "half_turn_s"))
+    assert status["drive"] == unmeasured | {"planned_quarter_turn_s": planned_s, "turns": 0}
     assert status["ledger"]["restored_cells"] == 0
     assert status["ledger"]["fault"] is None
     assert status["recorder"] is None

@@ -20,6 +20,7 @@ from fasaco_edge.wire.documents.replies import (
 )
 from fasaco_edge.wire.documents.status import (
     BatteryReport,
+    DriveReport,
     MapReport,
     PlanCounts,
     PoseReport,
@@ -28,6 +29,7 @@ from fasaco_edge.wire.documents.status import (
 
 if TYPE_CHECKING:
     from fasaco_edge.mission.core.mission import Mission
+    from fasaco_edge.planners.cost import CoverageCost
 
 PASSED = "passed, or in narrow strips, and not known to be swept"
 
@@ -70,6 +72,21 @@ def battery_report(mission: Mission | None, now: float) -> BatteryReport | None:
         rounded(None if drain is None else 3600.0 * drain),
         rounded(charging.turns_back_at if charging.policy else None),
         rounded(charging.goes_on_at if charging.policy and is_charging else None),
+    )
+
+
+def drive_report(mission: Mission | None, cost: CoverageCost) -> DriveReport:
+    """Return the measured driving, beside the cost that paths are planned by."""
+    planned_s = round(cost.quarter_turn_s, 3)
+    if mission is None:
+        return DriveReport(planned_s)
+    times = mission.drive_times()
+    return DriveReport(
+        planned_s,
+        rounded(times.speed_m_s),
+        rounded(times.quarter_turn_s),
+        rounded(times.half_turn_s),
+        times.turns,
     )
 
 

@@ -18,12 +18,12 @@ from fasaco_edge.daemon.loop.answers import config_document
 from fasaco_edge.daemon.loop.mission_reports import (
     battery_report,
     coverage_report,
+    drive_report,
     floor_report,
     map_report,
     mission_report,
     plan_counts,
     pose_report,
-    rounded,
     trouble_reports,
 )
 from fasaco_edge.host.processes import resident_mb, thread_count
@@ -33,7 +33,6 @@ from fasaco_edge.wire.documents.replies import (
 )
 from fasaco_edge.wire.documents.status import (
     ClaimReport,
-    DriveReport,
     Latencies,
     LedgerReport,
     Status,
@@ -129,7 +128,7 @@ class StatusBoard:
             plan=plan_counts(mission),
             latency_ms=Latencies(_ms(self.ingest_s), _ms(self.plan_s), _ms(self.map_to_path_s)),
             loop_ms=self.turns.report(),
-            drive=self._drive(mission),
+            drive=drive_report(mission, self._cost),
             battery=battery_report(mission, now),
             errors=self.faults.counts(),
             ledger=self.ledger,
@@ -192,19 +191,6 @@ class StatusBoard:
         since_s = round(now - self._unbegun_at - BEGUN_S, 1)
         text, to_do = f"the mission cannot begin: {self.waits}", "publish what it waits for"
         return (TroubleReport("not_begun", text, to_do, since_s),) if since_s >= 0.0 else ()
-
-    def _drive(self, mission: Mission | None) -> DriveReport:
-        planned_s = round(self._cost.quarter_turn_s, 3)
-        if mission is None:
-            return DriveReport(planned_s)
-        times = mission.drive_times()
-        return DriveReport(
-            planned_s,
-            rounded(times.speed_m_s),
-            rounded(times.quarter_turn_s),
-            rounded(times.half_turn_s),
-            times.turns,
-        )
 
 
 def _path_report(path: PublishedPath | None, mission: Mission | None) -> PathReport | None:
