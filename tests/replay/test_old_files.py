@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import lzma
+import math
 import shutil
 import signal
 import time
@@ -23,7 +24,9 @@ from fasaco_edge.wire.documents.path_documents import digest
 pytest.importorskip("rerun")
 
 from fasaco_edge.daemon.loop.answers import config_document
+from fasaco_edge.recording import entities
 from fasaco_edge.recording.read.run import RecordedSamples
+from fasaco_edge.recording.read.timeline import open_timeline
 from fasaco_edge.replay.replay import RecordedRun, Replay, read_run
 from tests.support.recordings import bus_on_free_port, recorder_process
 from tests.support.scripted_mission import CONFIG, Mission
@@ -80,6 +83,26 @@ def test_a_recording_is_reviewed(recording, capsys):
     assert [review[name] for name in figures] == [63, 51, 1, 15, 30, 27]
     assert review["driven_m"] == pytest.approx(15.23)
     assert (review["state"], review["complete"]) == ("done", True)
+
+
+def test_moments_and_spots_of_a_recording_are_reviewed(recording, capsys):
+    at = printed(capsys, "review", recording, "--at", "0:05")["at"]
+    assert (at["state"], at["path"]["revision"]) == ("covering", 25)
+    assert (at["x"], at["y"]) == pytest.approx((3.15, 1.64), abs=0.01)
+    (spot,) = printed(capsys, "review", recording, "--point", "1,1")["points"]
+    assert (spot["swept"], spot["why"]) == (None, "not known")
+
+
+def test_a_recording_is_shown_in_the_page(recording):
+    """Its poses are drawn as a turn about an axis, later ones as a quaternion."""
+    with open_timeline([Path(recording)]) as timeline:
+        assert len(timeline.poses) == len(timeline.pose_ns) > 100
+        at_ns = timeline.began_ns + 5_000_000_000
+        x, y, yaw = timeline.poses_between(0, at_ns)[-1]
+        assert (x, y, yaw) == pytest.approx((3.15, 1.64, -math.pi / 2), abs=0.01)
+        grid = timeline.grid(timeline.newest(entities.MAP, at_ns))
+        assert grid.geometry.resolution == pytest.approx(0.05)
+        assert len(timeline.line(timeline.newest(entities.PATH, at_ns)).xy) > 2
 
 
 @pytest.fixture(scope="module")

@@ -20,6 +20,14 @@ _POINT = pa.list_(pa.field("item", pa.float32(), nullable=False), 3)
 _STRIPS = pa.list_(pa.list_(pa.field("item", _POINT, nullable=False)))
 _PLACE = pa.list_(_POINT)
 _TURN = pa.list_(pa.list_(pa.field("item", pa.float32(), nullable=False), 4))
+_AXIS_TURN = pa.list_(
+    pa.struct(
+        [
+            pa.field("axis", _POINT, nullable=False),
+            pa.field("angle", pa.float32(), nullable=False),
+        ]
+    )
+)
 _DATA = pa.list_(pa.list_(pa.field("item", pa.uint8(), nullable=False)))
 _CELL = pa.list_(pa.float32())
 
@@ -148,16 +156,25 @@ def poses_in(batch: pa.RecordBatch) -> NDArray[np.float64]:
     Raises:
         ValueError: the batch holds something else.
     """
-    places = column(batch, "Transform3D:translation", _PLACE)
-    turns = column(batch, "Transform3D:quaternion", _TURN)
-    if places is None or turns is None:
+    places, yaw = column(batch, "Transform3D:translation", _PLACE), _yaw_in(batch)
+    if places is None or yaw is None:
         raise ValueError("poses without a place or a turn")
-    xyz, turned = (
-        np.asarray(each.flatten().flatten(), np.float64).reshape(batch.num_rows, -1)
-        for each in (places, turns)
-    )
-    yaw = 2.0 * np.arctan2(turned[:, 2], turned[:, 3])
+    xyz = np.asarray(places.flatten().flatten(), np.float64).reshape(batch.num_rows, -1)
     return np.column_stack((xyz[:, :2], yaw))
+
+
+def _yaw_in(batch: pa.RecordBatch) -> NDArray[np.float64] | None:
+    """Return the yaw of each pose [rad], float64 (n,); None without any."""
+    turns = column(batch, "Transform3D:quaternion", _TURN)
+    if turns is not None:
+        turned = np.asarray(turns.flatten().flatten(), np.float64).reshape(batch.num_rows, -1)
+        return 2.0 * np.arctan2(turned[:, 2], turned[:, 3])
+    # First recorders drew a turn about the vertical axis.
+    turns = column(batch, "Transform3D:rotation_axis_angle", _AXIS_TURN)
+    if turns is None:
+        return None
+    angles = np.asarray(turns.flatten().field("angle"), np.float64).reshape(batch.num_rows)
+    return np.arctan2(np.sin(angles), np.cos(angles))
 
 
 def anchor_in(batch: pa.RecordBatch, before: NDArray[np.float64]) -> NDArray[np.float64]:
