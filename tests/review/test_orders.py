@@ -80,6 +80,13 @@ def test_three_orders_have_three_verdicts():
     ]
 
 
+def test_a_mission_that_is_done_with_cells_left_says_how_many():
+    document = ReviewDocument(complete=False, state="done", covered_cells=549, coverable_cells=550)
+    assert verdicts(document) == [
+        (False, "not complete: the mission was done with 549 of 550 cells covered")
+    ]
+
+
 def test_the_same_order_sent_twice_goes_on_unless_it_is_over():
     rows = ((0, "idle", 0, 60), (11, "covering", 5, 60), (50, "done", 60, 60))
     twice = [(10, "start", ALL), (20, "start", ALL)]

@@ -161,6 +161,9 @@ def _ending(document: ReviewDocument) -> str:
         return "complete: every reachable cell of the order is covered"
     if document.complete is None:
         return "not recorded whether it was completed"
+    covered, coverable = document.covered_cells, document.coverable_cells
+    if document.state == "done" and (covered or 0) < (coverable or 0):
+        return f"not complete: the mission was done with {covered} of {coverable} cells covered"
     how = "ended" if document.is_ended else "broke off"
     return f"not complete: the recording {how} while the mission was {document.state}"
 
