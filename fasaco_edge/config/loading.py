@@ -12,7 +12,13 @@ from msgspec import structs
 
 from fasaco_edge.config.config import DaemonConfig, FleetConfig
 from fasaco_edge.config.endpoints import endpoint_faults
-from fasaco_edge.config.reading import Fault, read_text, section_faults, with_credentials
+from fasaco_edge.config.reading import (
+    Fault,
+    read_text,
+    section_faults,
+    with_credentials,
+    without_removed,
+)
 from fasaco_edge.config.ros import RosConfig
 from fasaco_edge.config.security import security_faults
 from fasaco_edge.errors import BadConfiguration
@@ -92,8 +98,9 @@ def inspect_config(path: Path | None) -> tuple[DaemonConfig | None, tuple[Fault,
     except BadConfiguration as error:
         return None, (Fault("", error),)
     faults = [*text.twice, *section_faults(DaemonConfig, text.document)]
-    if not faults:
-        config = msgspec.convert(with_credentials(text.document), DaemonConfig)
+    if not faults and isinstance(text.document, dict):
+        document = with_credentials(without_removed(text.document))
+        config = msgspec.convert(document, DaemonConfig)
         faults = [Fault(_named_in(error), error) for error in _misfits(config)]
         if not faults:
             return config, ()

@@ -19,7 +19,8 @@ from fasaco_edge.host.plain_yaml import PlainYamlError, compose, read_bounded
 from fasaco_edge.text import shown
 
 FOLDER = "CREDENTIALS_DIRECTORY"
-# Keys of earlier releases: why each was removed, and its replacement.
+# Keys of earlier releases: why each was removed, and its replacement. An empty one asked for
+# nothing, and is ignored: examples that were copied whole have it.
 REMOVED = {
     "planner.own": (
         "was removed in this version, the daemon plans with its own planners only",
@@ -71,7 +72,8 @@ def section_faults(
         path = f"{key}.{name}" if key else name
         if path in REMOVED:
             why, hint = REMOVED[path]
-            yield Fault(path, BadConfiguration(f"{path} {why}", hint=hint))
+            if value:
+                yield Fault(path, BadConfiguration(f"{path} {why}", hint=hint))
         elif name not in fields:
             yield _fault(path, f"unknown key {path}{_meant(name, key, list(fields), root)}")
         elif section := section_of(fields[name].type):
