@@ -20,6 +20,7 @@ from tests.benchmarks.floor import FLOOR
 from tests.benchmarks.full import FULL
 from tests.benchmarks.ingest import INGEST
 from tests.benchmarks.online.benchmark import ONLINE
+from tests.benchmarks.peers import PEERS
 from tests.benchmarks.quality.benchmark import QUALITY
 from tests.benchmarks.replan import REPLAN
 from tests.benchmarks.scale.benchmark import SCALE
@@ -28,8 +29,8 @@ from tests.benchmarks.turns.benchmark import TURNS
 from tests.benchmarks.twins import TWINS
 
 BENCHMARKS: tuple[Benchmark[Any], ...] = (
-    TABLE1, QUALITY, TURNS, FLOOR, REPLAN, FULL, FLEET, FLEET_ONLINE, ONLINE, SCALE, CODEC, INGEST,
-    TWINS,
+    TABLE1, QUALITY, TURNS, FLOOR, PEERS, REPLAN, FULL, FLEET, FLEET_ONLINE, ONLINE, SCALE, CODEC,
+    INGEST, TWINS,
 )  # fmt: skip
 
 
