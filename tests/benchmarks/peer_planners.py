@@ -31,8 +31,9 @@ if TYPE_CHECKING:
 ROOT = Path(__file__).parents[2]
 # Corners of the polygon are left out if it stays this near to them [m].
 SIMPLIFIED_M = 0.05
-# Search of Fields2Cover for an order of its swaths [s].
-ORDER_S = 5
+# Search of Fields2Cover for an order of its swaths [s], and the angle of these to the walls [rad]:
+# where one of them runs exactly along a side of the polygon, it finds none at all.
+ORDER_S, TILT = 5, 1e-3
 # Limits of an installation, which may compile, and of one line [s].
 INSTALL_S, LINE_S = 1800, 300
 SHAPELY = "shapely==2.2.0"
@@ -104,7 +105,7 @@ def _swaths(ground: Ground) -> Ring:
         closed = [f2c.Point(x, y) for x, y in (*ring, ring[0])]
         cell.addRing(f2c.LinearRing(f2c.VectorPoint(closed)))
     cells = f2c.Cells(cell)
-    angle = math.radians(ground.walls_deg)
+    angle = math.radians(ground.walls_deg) + TILT
     swaths = f2c.SG_BruteForce().generateSwaths(angle, TOOL_M, cells)
     router = f2c.RP_RoutePlannerBase()
     line = router.genRoute(cells, swaths, False, 1e-4, True, ORDER_S, True).asLineString()

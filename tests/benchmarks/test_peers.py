@@ -33,19 +33,21 @@ def pillared(tmp_path):
     return file
 
 
-def test_a_peer_and_ours_are_judged_alike(capsys, pillared):
-    if not OTHERS[STRAIGHT].folder(default_folder()).is_dir():
-        pytest.skip(f"{STRAIGHT} is not installed: python -m tests.benchmarks peers")
-    main(["peers", "--maps", str(pillared), "--peers", STRAIGHT, "--json"])
+@pytest.mark.parametrize("peer", OTHERS)
+def test_a_peer_and_ours_are_judged_alike(capsys, pillared, peer):
+    if not OTHERS[peer].folder(default_folder()).is_dir():
+        pytest.skip(f"{peer} is not installed: python -m tests.benchmarks peers")
+    main(["peers", "--maps", str(pillared), "--peers", peer, "--json"])
     document = json.loads(capsys.readouterr().out)
     ours, theirs = document["lines"]
-    assert (ours["planner"], theirs["planner"]) == (OURS, STRAIGHT)
+    assert (ours["planner"], theirs["planner"]) == (OURS, peer)
     assert {ours["fault"], theirs["fault"]} == {""}
     assert ours["illegal_share"] == 0.0
     assert theirs["illegal_share"] < 0.02
-    assert min(ours["swept_share"], theirs["swept_share"]) > 0.95
-    assert theirs["turning_deg"] > ours["turning_deg"] > 0.0
-    assert [goal["what"] for goal in document["goals"]] == [f"s/m2 to {STRAIGHT}, median"]
+    assert ours["swept_share"] > 0.95
+    assert 1.0 >= theirs["swept_share"] > 0.8
+    assert min(run["turning_deg"] for run in (ours, theirs)) > 0.0
+    assert [goal["what"] for goal in document["goals"]] == [f"s/m2 to {peer}, median"]
 
 
 def test_a_peer_that_cannot_be_installed_says_why(tmp_path):
