@@ -1,6 +1,8 @@
 """Warming up compiles all that a mission needs: nothing is compiled while a robot waits."""
 
 import importlib
+import pickle
+import re
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -32,6 +34,12 @@ from fasaco_edge.wire.messages.maps import (
     encode_occupancy_grid,
 )
 from tests.support.processes import ENVIRONMENT
+
+# Kernels that take less than half a second to compile for a constant, too.
+SMALL = {
+    *("baselines._add", "holes._has", "line.prepare_edges", "nearest._quarters"),
+    *("reorder._square", "repair._begin", "ways._add_half"),
+}
 
 
 def compiled_signatures() -> set[str]:
@@ -101,6 +109,22 @@ def test_a_mission_with_decoded_maps_compiles_nothing_new(turn_s, sweeping):
         assert mission.coverage() is not None
 
     assert compiled_signatures() == before
+
+
+def test_no_kernel_is_compiled_for_a_constant_and_its_type_too():
+    """``f(0)`` and ``f(n)`` are two kernels to numba: ``as_value(0)`` saves one."""
+    compile_missing()
+    folder, _ = chosen_folder(STAGES)
+    twice = set()
+    for index in folder.glob("*.nbi"):
+        with index.open("rb") as file:
+            pickle.load(file)  # numba's version
+            _, overloads = pickle.loads(file.read())
+        signatures = [str(signature) for signature, *_ in overloads]
+        plain = {re.sub(r"Literal\[int\]\(-?\d+\)", "int64", each) for each in signatures}
+        if len(plain) < len(signatures):
+            twice.add(index.name.partition("-")[0])
+    assert twice <= SMALL
 
 
 PLAN = """

@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 
 from fasaco_edge.kernels import EAST, NORTH, SOUTH, WEST
 from fasaco_edge.kernels.ants.graph import Graph, Scratch, append_way, begin, close, open_steps_of
-from fasaco_edge.kernels.jit import kernel, lean_kernel
+from fasaco_edge.kernels.jit import as_value, kernel, lean_kernel
 
 
 @lean_kernel
@@ -53,11 +53,11 @@ def sweep(
     """
     remaining = begin(graph, scratch, start)
     walk[0] = start
-    here, length, heading = start, 1, 0
+    here, length, heading = start, as_value(1), as_value(0)
     while remaining > 0:
         mask = open_steps_of(graph, scratch, here)
         if mask == 0:
-            length, here = append_way(graph, scratch, walk, length, here, -1)
+            length, here = append_way(graph, scratch, walk, length, here, as_value(-1))
             heading = int(scratch.came_from[here])
         else:
             first = heading if turns_along else 0
@@ -275,7 +275,7 @@ def spanning_tree_walk(
             node[cell] = unlabelled
     offsets = np.array([1, cols, -1, -cols], np.int64)
     blocks = Blocks(steps.ravel(), node, np.zeros((size, 2), np.int8), offsets)
-    nodes = 0
+    nodes = as_value(0)
     for cell in range(size):
         if node[cell] == unlabelled:
             _grow_node(blocks, cell, nodes)

@@ -36,7 +36,7 @@ from fasaco_edge.kernels.ants.graph import (
     close,
     open_steps_of,
 )
-from fasaco_edge.kernels.jit import lean_kernel
+from fasaco_edge.kernels.jit import as_value, lean_kernel
 from fasaco_edge.kernels.lattice.reach import walk_cost
 from fasaco_edge.kernels.random import draw_unit
 
@@ -157,11 +157,11 @@ def _walk_one(
     graph, rules = colony.graph, colony.rules
     remaining = begin(graph, scratch, rules.start)
     walk[0] = rules.start
-    here, length, heading = rules.start, 1, 0
+    here, length, heading = rules.start, as_value(1), as_value(0)
     while remaining > 0:
         mask = open_steps_of(graph, scratch, here)
         if mask == 0:
-            length, here = append_way(graph, scratch, walk, length, here, -1)
+            length, here = append_way(graph, scratch, walk, length, here, as_value(-1))
             heading = scratch.came_from[here]
             close(graph, scratch, here)
             remaining -= 1
@@ -170,7 +170,7 @@ def _walk_one(
             heading = _choose(mask, colony.trail, here, heading, rules.q0, random)
         else:
             _weigh(colony, scratch, here, velocity)
-            heading = _choose(mask, scratch.weights, 0, heading, rules.q0, random)
+            heading = _choose(mask, scratch.weights, as_value(0), heading, rules.q0, random)
         # A cohort of velocity v keeps straight on for up to v cells.
         for _ in range(velocity):
             here += graph.offsets[heading]

@@ -132,7 +132,7 @@ def _end(
 ) -> int:
     """Let the walk end in the band where that is cheapest; return the additional cost."""
     while True:
-        ends, cost = 0, NO_SIDE
+        ends, cost = as_value(0), NO_SIDE
         for band in range(bands.first.size - 1):
             if memory.found[band, 1] - memory.found[band, 0] < cost:
                 ends, cost = band, memory.found[band, 1] - memory.found[band, 0]

@@ -81,7 +81,7 @@ def _relaxed(lines: Lines, prices: StepPrices, step: int, turn: int) -> int:
     for axis in range(2):
         for index in range(lines.sides.size):
             use[axis, index] = 0
-    total, saving, last = 0, -NO_SIDE, -1
+    total, saving, last = 0, -NO_SIDE, as_value(-1)
     for cell in range(lines.sides.size):
         if lines.wanted[cell]:
             sides = sides_of(lines, prices, cell)

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.kernels.jit import kernel, lean_kernel
+from fasaco_edge.kernels.jit import as_value, kernel, lean_kernel
 
 NONE = -1
 
@@ -126,7 +126,7 @@ def walk_parts(
     for index in range(cells.size):
         ground.owner[cells[index]] = owners[index]
         counts[owners[index]] += 1
-    walks, clock = np.empty((starts.size, 2), np.int64), 0
+    walks, clock = np.empty((starts.size, 2), np.int64), as_value(0)
     for robot in range(starts.size):
         length, quarters, clock = _walk(ground, robot, starts[robot], counts[robot], clock)
         walks[robot, 0], walks[robot, 1] = length, quarters

@@ -17,7 +17,7 @@ from fasaco_edge.kernels.floor.line import (
     replace_points,
 )
 from fasaco_edge.kernels.floor.sweeps import BLOCK, Sweeps
-from fasaco_edge.kernels.jit import inlined, kernel, lean_kernel
+from fasaco_edge.kernels.jit import as_value, inlined, kernel, lean_kernel
 
 # A detour leaves its edge this far before the spot, and joins it this far after [pixels].
 SPREAD = 6.0
@@ -130,7 +130,7 @@ def detour(
     end = line.next[begin]
     rows, cols = left.shape
     ay, ax, by, bx = points[begin, 0], points[begin, 1], points[end, 0], points[end, 1]
-    best, count = 0.0, 0
+    best, count = 0.0, as_value(0)
     for i in range(
         max(int(min(ay, by) - farthest) >> BLOCK, 0),
         min((int(max(ay, by) + farthest) >> BLOCK) + 1, rows),
@@ -235,7 +235,7 @@ def sweep_patches(
                 continue
             if not nearest_place(floor.places, place, int(floor.tool) + 2):
                 continue
-            best, count, at, begin = 0.0, 0, 0, 0
+            best, count, at, begin = 0.0, as_value(0), as_value(0), as_value(0)
             while line.next[begin] != NONE:
                 if _is_near(line, begin, place, farthest):
                     best, better = _round_over(line, floor, price, memory, begin, best)

@@ -190,7 +190,7 @@ def polish(
     passes = 0
     while True:
         pass_s = 0.0
-        begin = 0
+        begin = as_value(0)
         while line.next[begin] != NONE and has_room(line):
             if line.state[TRIED] >= most_tried:
                 return gained + pass_s

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.kernels import COL_STEP, ROW_STEP
-from fasaco_edge.kernels.jit import kernel, lean_kernel
+from fasaco_edge.kernels.jit import as_value, kernel, lean_kernel
 
 UNSEEN = 255
 ROOT = 254
@@ -75,7 +75,8 @@ def reachable_from(steps: NDArray[np.uint8], row: int, col: int) -> NDArray[np.u
     cols = steps.shape[1]
     offsets = np.array([1, cols, -1, -cols], np.int64)
     came_from = np.full(steps.size, UNSEEN, np.uint8)
-    search(steps.ravel(), offsets, row * cols + col, -1, came_from, np.empty(steps.size, np.int32))
+    start, anywhere = row * cols + col, as_value(-1)
+    search(steps.ravel(), offsets, start, anywhere, came_from, np.empty(steps.size, np.int32))
     reached = np.empty(steps.shape, np.uint8)
     for cell in range(steps.size):
         reached[cell // cols, cell % cols] = came_from[cell] != UNSEEN

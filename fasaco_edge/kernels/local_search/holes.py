@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.kernels import EAST, NORTH
-from fasaco_edge.kernels.jit import kernel
+from fasaco_edge.kernels.jit import as_value, kernel
 from fasaco_edge.kernels.local_search.walk_array import Ground
 from fasaco_edge.kernels.random import draw
 
@@ -80,7 +80,7 @@ def rays(ground: Ground, rays_crossed: NDArray[np.int64]) -> int:
     queue = np.empty(size, np.int32)
     numbers = np.full(1, 88172645463325252, np.uint64)
     rays_crossed[:] = 0
-    _flood(ground, 0, seen, queue, bound)
+    _flood(ground, as_value(0), seen, queue, bound)
     holes, ray = 0, 0
     for square in range(bound):
         # A ray ends with its row: the frame has no step to cross.

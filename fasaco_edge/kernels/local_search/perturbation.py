@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.kernels.jit import inlined, lean_kernel
+from fasaco_edge.kernels.jit import as_value, inlined, lean_kernel
 from fasaco_edge.kernels.local_search.parity import (
     Tally,
     change_step,
@@ -147,7 +147,7 @@ def _move_end(search: Search, limit: int, random: NDArray[np.uint64]) -> int:
     settled = search_ways(search.ground, tally, root, limit, random)
     if settled < 2:
         return 0
-    return _change_way(search, draw_end(tally, settled, random), root, 0)
+    return _change_way(search, draw_end(tally, settled, random), root, as_value(0))
 
 
 @lean_kernel
@@ -166,7 +166,7 @@ def _add_loop(search: Search, limit: int, random: NDArray[np.uint64]) -> int:
     other = one + ground.offsets[step & 1]
     shared = common_ancestor(tally, one, other)
     change_step(ground, tally, one, other)
-    touched = _change_way(search, one, shared, 0)
+    touched = _change_way(search, one, shared, as_value(0))
     return _change_way(search, other, shared, touched)
 
 
@@ -199,7 +199,7 @@ def _settle(
     ground, walk, prices, memory = search.ground, search.walk, search.prices, search.memory
     if rules.radius < 0:
         proposals = rules.proposals * walk.counts[LENGTH]
-        improve(ground, walk, prices, memory.area[:0], 0, proposals, random)
+        improve(ground, walk, prices, memory.area[:0], as_value(0), proposals, random)
         memory.work[PROPOSALS] += proposals
         return
     number = memory.work[PERTURBATIONS] + 1

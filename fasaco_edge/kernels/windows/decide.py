@@ -1,6 +1,6 @@
 """One step of the dynamic program: the successor states of one cell."""
 
-from fasaco_edge.kernels.jit import inlined, lean_kernel
+from fasaco_edge.kernels.jit import as_value, inlined, lean_kernel
 from fasaco_edge.kernels.windows.choices import list_choices
 from fasaco_edge.kernels.windows.memory import (
     CODE_BITS,
@@ -120,7 +120,7 @@ def decide(
     cheapest = MUCH
     for state in range(states):
         cheapest = min(cheapest, program.cost[layer, state])
-    made = 0
+    made = as_value(0)
     for state in range(states):
         if program.cost[layer, state] < min(most, threshold):
             room = threshold - cheapest

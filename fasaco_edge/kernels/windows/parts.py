@@ -6,7 +6,7 @@ cover has at least one open end, unless it may have a ring of its own. A state t
 is infeasible and is dropped.
 """
 
-from fasaco_edge.kernels.jit import inlined, lean_kernel
+from fasaco_edge.kernels.jit import as_value, inlined, lean_kernel
 from fasaco_edge.kernels.lattice.areas import root
 from fasaco_edge.kernels.local_search.walk_array import Ground
 from fasaco_edge.kernels.windows.memory import NO_END, Program
@@ -40,7 +40,7 @@ def prepare_parts(
                     parts.root[top] = cell
                     joined += 1
         parts.splits[number] = joined > 1
-    label_parts(ground, program, 0, count, begin)
+    label_parts(ground, program, as_value(0), count, begin)
 
 
 @lean_kernel

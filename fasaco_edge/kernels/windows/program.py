@@ -105,7 +105,7 @@ def begin_window(
 ) -> None:
     """Begin to solve a window; see ``solve_window``, and above for ``ring_price``."""
     lines, wide = shape_of(window)
-    at, count = program.at, 0
+    at, count = program.at, as_value(0)
     for line in range(lines):
         for place in range(wide):
             cell = cell_at(window, line, place)
@@ -187,7 +187,7 @@ def end_window(
     """Put the best state's passages back, if it is better; return as ``solve_window`` does."""
     at, (_, wide) = program.at, shape_of(window)
     layer, end_id, count = at[LAYER], at[END_ID], at[COUNT]
-    best, cost = -1, at[LIMIT]
+    best, cost = as_value(-1), at[LIMIT]
     for state in range(at[STATES]):
         is_whole = program.closed[layer, state] == 1
         if end_id >= 0 and program.mates[layer, state, end_id] != NO_END:
