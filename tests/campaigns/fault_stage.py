@@ -26,6 +26,7 @@ from fasaco_edge.wire.messages.poses import encode_pose_stamped
 from fasaco_edge.wire.messages.twists import decode_velocity
 from fasaco_edge.wire.schemas import POSE_STAMPED
 from tests.campaigns.fault_links import Link
+from tests.support.forked import Forked
 from tests.support.outsider import MAP, open_client
 from tests.support.processes import ENVIRONMENT, free_endpoint
 from tests.support.rooms import map_bytes, room
@@ -126,7 +127,7 @@ class Stage:
     def __init__(self, folder: Path, source: str = "") -> None:
         self._folder = folder
         self._environment = ENVIRONMENT | ({"PYTHONPATH": source} if source else {})
-        self._processes: dict[str, subprocess.Popen[bytes]] = {}
+        self._processes: dict[str, subprocess.Popen[bytes] | Forked] = {}
         self._loops: list[threading.Thread] = []
         self._over = threading.Event()
         self._exits = ExitStack()
@@ -192,7 +193,9 @@ class Stage:
     def _end(self, part: str) -> None:
         process = self._processes[part]
         process.kill()
-        process.communicate()
+        process.wait()
+        if isinstance(process, subprocess.Popen) and process.stdin is not None:
+            process.stdin.close()
 
     def _start(self, part: str) -> None:
         name = part.replace(" ", "-")
@@ -206,8 +209,12 @@ class Stage:
             words = ["-m", "fasaco_edge", "run", "--config", str(self._config(part))]
             words += ["--state", str(self._folder / name)]
         is_ours = part in ("router", "pose")
+        file = self._folder / f"{name}.log"
+        if not is_ours and self._environment == ENVIRONMENT:
+            self._processes[part] = Forked(tuple(words), ENVIRONMENT, file, file)
+            return
+        log = self._exits.enter_context(file.open("ab"))
         environment = ENVIRONMENT if is_ours else self._environment
-        log = self._exits.enter_context((self._folder / f"{name}.log").open("ab"))
         self._processes[part] = subprocess.Popen(
             [sys.executable, *words], stdin=subprocess.PIPE, stdout=log, stderr=log, env=environment
         )

@@ -246,9 +246,10 @@ def run_flood(
         config["mission"] = config.get("mission", {}) | {"keep_out_topic": True}
     processes.PROGRAM = program
     manager = Manager(folder)
+    told = {"NOTIFY_SOCKET": manager.address}
     try:
         with (
-            daemon_process(folder, env={"NOTIFY_SOCKET": manager.address}, **config) as daemon,
+            daemon_process(folder, env=told, executed=True, **config) as daemon,
             Outsider(daemon.endpoint) as outsider,
         ):
             file = next(folder.glob("daemon*.yaml"))

@@ -454,6 +454,7 @@ class Campaign:
                 self._folder,
                 *(["--fresh"] if event["fresh"] else []),
                 env={"NOTIFY_SOCKET": manager.address},
+                executed=True,
                 bus={"mode": event["mode"], "listen": [], "connect": [self._endpoint]},
                 robot=robot,
                 mission=mission,

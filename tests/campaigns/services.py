@@ -15,6 +15,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
+from tests.support.forked import Forked
 from tests.support.processes import ENVIRONMENT, PROGRAM
 
 # As the unit has it; so a run that never gets ready ends.
@@ -30,7 +31,7 @@ class Service:
         log: where its standard error goes.
     """
 
-    process: subprocess.Popen[bytes]
+    process: subprocess.Popen[bytes] | Forked
     log: Path
     ready: threading.Event
 
@@ -65,7 +66,7 @@ def service(
     Args:
         folder: for its log, ``service.log``.
         words: command and options.
-        environment: beside ours.
+        environment: beside ours; with one it is executed, else forked.
     """
     log = folder / "service.log"
     with (
@@ -77,19 +78,23 @@ def service(
         heard.bind(address)
         ready = threading.Event()
         threading.Thread(target=_listen, args=(heard, ready), daemon=True).start()
-        process = subprocess.Popen(
-            [*PROGRAM, *words],
-            stderr=stderr,
-            stdout=stderr,
-            env=ENVIRONMENT | {"NOTIFY_SOCKET": address} | dict(environment or {}),
-            # So that what it has started can be ended with it.
-            start_new_session=True,
-        )
+        told = ENVIRONMENT | {"NOTIFY_SOCKET": address} | dict(environment or {})
+        process: subprocess.Popen[bytes] | Forked
+        if environment is None:
+            process = Forked((*PROGRAM[1:], *words), told, log, log)
+        else:
+            # In a session of its own, so that what it has started can be ended with it.
+            process = subprocess.Popen(
+                [*PROGRAM, *words], stderr=stderr, stdout=stderr, env=told, start_new_session=True
+            )
         try:
             yield Service(process, log, ready)
         finally:
-            with suppress(ProcessLookupError):
-                os.killpg(process.pid, signal.SIGKILL)
+            if isinstance(process, Forked):
+                process.kill()
+            else:
+                with suppress(ProcessLookupError):
+                    os.killpg(process.pid, signal.SIGKILL)
             process.wait()
             heard.shutdown(socket.SHUT_RDWR)
 

@@ -17,7 +17,7 @@ from tests.support.outsider import TIMEOUT_S, Outsider
 from tests.support.rooms import FREE, WALL, fill, map_bytes, pose_bytes, room
 
 # Replacements until all caches are full, and those after that which are measured.
-FIRST, MEASURED = 30, 50
+FIRST, MEASURED = 20, 30
 # What one may keep, on average [MB]. The allocator's own growth ends after some hundred.
 KEPT_MB = 0.1
 ROOM = room(16.0, 12.0)
@@ -84,7 +84,7 @@ def send_mask(running, outsider, square):
 def test_what_a_mission_used_is_released_when_it_is_replaced(tmp_path, replace):
     mission = {} if replace is reload else dict(MISSION)
     with (
-        service(tmp_path, mission=mission) as (running, _),
+        service(tmp_path, mission=mission, executed=True) as (running, _),
         Outsider(running.endpoint) as outsider,
     ):
         outsider.put("map", map_bytes(ROOM))

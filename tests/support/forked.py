@@ -39,6 +39,8 @@ PRELOADED = ("numba", "llvmlite.binding", "msgspec", "yaml")
 # Neither Zenoh nor Rerun: by them a command decides how it ends.
 LOADED = ("fasaco_edge.planners.compiling", "fasaco_edge.daemon.loop.mission_runner")
 NUMBER = struct.Struct("i")
+# What a service manager gives a daemon.
+OF_MANAGER = ("NOTIFY_SOCKET", "WATCHDOG_USEC")
 # Of a task, which holds words and an environment.
 MOST_BYTES = 1 << 20
 
@@ -133,7 +135,7 @@ def run_forked(
 
 def _settings(environment: Mapping[str, str]) -> dict[str, str]:
     """Return what may decide which kernels a process has."""
-    others = ("COLUMNS", "NO_COLOR")
+    others = ("COLUMNS", "NO_COLOR", *OF_MANAGER)
     return {k: v for k, v in environment.items() if k[:7] != "FASACO_" and k not in others}
 
 

@@ -16,7 +16,7 @@ from typing import Any
 import yaml
 
 from fasaco_edge.host.addresses import free_port
-from tests.support.forked import ENVIRONMENT, Forked, run_forked
+from tests.support.forked import ENVIRONMENT, OF_MANAGER, Forked, run_forked
 
 # What a daemon may take from SIGTERM to its end on a machine that is busy with much else [s]; on
 # a quiet one it is two seconds at most.
@@ -78,7 +78,7 @@ def daemon_process(
 
     Its progress is kept in the folder ``state`` of ``folder``, if words and configuration do not
     say where (``state=False``): the next one there goes on with it. It is forked, but for one with
-    an environment of its own, or ``executed``, as what is measured has to be.
+    an environment that no service manager gives, or ``executed``, as what is measured has to be.
     """
     # The robots of most tests stand still, and say so once.
     sections.setdefault("mission", {}).setdefault("lost_pose_s", 0.0)
@@ -96,11 +96,12 @@ def daemon_process(
         command += ["--state", str(folder / "state")]
     log.touch()
     process: subprocess.Popen[bytes] | Forked
-    if env is None and not executed:
-        process = Forked(tuple(command[1:]), ENVIRONMENT, os.devnull, log)
+    environment = ENVIRONMENT | (env or {})
+    if set(env or ()).issubset(OF_MANAGER) and not executed:
+        process = Forked(tuple(command[1:]), environment, os.devnull, log)
     else:
         with log.open("wb") as stderr:
-            process = subprocess.Popen(command, stderr=stderr, env=ENVIRONMENT | (env or {}))
+            process = subprocess.Popen(command, stderr=stderr, env=environment)
     daemon = Daemon(process, endpoint, log)
     try:
         yield daemon
