@@ -22,20 +22,21 @@ from fasaco_edge.planners.line import LINES, LineSearch, _sweeps, memory_for_mov
 from fasaco_edge.planners.planner import ignore
 
 ROBOT = fe.Robot()
-# Pauses after which a search is stopped; a flat's first line takes some two hundred.
-BUDGETS = 1, 40, 300, 900
+# Pauses after which a search is stopped; the second walk begins after some ninety, and the better
+# of the two lines goes on from some hundred and thirty.
+BUDGETS = 1, 40, 95, 150, 400
 
 
 def room(seed: int) -> OccupancyGrid:
-    """Return a room of 4 x 3 m with pillars, and in some seeds a wall with a door."""
+    """Return a room of 3 x 2.1 m with pillars, and in some seeds a wall with a door."""
     rng = np.random.default_rng(seed)
-    cells = np.zeros((62, 82), np.int8)
+    cells = np.zeros((44, 62), np.int8)
     cells[[0, -1]] = cells[:, [0, -1]] = 100
-    cells[rng.integers(20, 60, 15), rng.integers(20, 80, 15)] = 100
+    cells[rng.integers(18, 42, 8), rng.integers(18, 60, 8)] = 100
     if seed % 2:
-        cells[:, 40] = 100
-        cells[(begin := int(rng.integers(4, 40))) : begin + 12, 40] = 0
-    return OccupancyGrid(GridGeometry(62, 82, 0.05, Pose2D(0.0, 0.0)), cells)
+        cells[:, 30] = 100
+        cells[(begin := int(rng.integers(4, 28))) : begin + 12, 30] = 0
+    return OccupancyGrid(GridGeometry(44, 62, 0.05, Pose2D(0.0, 0.0)), cells)
 
 
 class Pauses:
@@ -98,7 +99,7 @@ def test_the_better_of_two_walks_goes_on_with_its_line(monkeypatch, better):
     monkeypatch.setattr(Ground, "line_search", line_search)
     rank = property(lambda line: float(line is not searches[better][1]))
     monkeypatch.setattr(LineSearch, "rank", rank)
-    _, path, xy = planned(room(1), 1, Pauses(900), seen.append)
+    _, path, xy = planned(room(1), 1, Pauses(400), seen.append)
     assert len(searches) == 2
     assert path.cells.tolist() == searches[better][0].tolist()
     assert xy is searches[better][1].best.xy
