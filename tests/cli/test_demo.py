@@ -106,7 +106,7 @@ def test_a_demo_covers_every_cell_that_can_be_reached(tmp_path, building):
 def test_robots_of_a_fleet_cover_a_building_together(tmp_path, building):
     pytest.importorskip("rerun")
     out = tmp_path / "demo"
-    options = ("--map", building, "--robots", 2, "--speed", 20, "--timeout", 1200)
+    options = ("--map", building, "--robots", 2, "--speed", 6, "--timeout", 1200)
     ended = fasaco_edge("demo", *options, "--out", out, "--json")
     assert ended.code == 0, ended.err
     assert "fasaco-edge watch --fleet demo --connect tcp/127.0.0.1:" in ended.err

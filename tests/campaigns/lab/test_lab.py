@@ -14,7 +14,7 @@ from tests.support.forked import ENVIRONMENT
 
 pytest.importorskip("karto_scanmatcher", reason="needs the extra 'lab'")
 pytestmark = pytest.mark.filterwarnings("default")
-SECONDS = 60.0
+SECONDS = 30.0
 # On a machine that is busy with much else [s].
 PATIENCE_S = 600.0
 
@@ -58,8 +58,8 @@ def test_a_mission_is_driven_judged_and_repeated_bit_for_bit(room, tmp_path):
     assert files[0] == files[1]
 
     figures = found["figures"]
-    assert figures["driven_m"] > 4.0
-    assert 0.3 < figures["true_share"] <= 1.0
+    assert figures["driven_m"] > 2.0
+    assert 0.15 < figures["true_share"] <= 1.0
     assert abs(figures["excess_points"]) < 20.0
     assert figures["pose_error_p95_m"] < 0.1
     assert 0.0 < figures["speed_share"] < 1.0
