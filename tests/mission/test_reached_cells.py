@@ -39,16 +39,16 @@ def in_first_room():
     return robot
 
 
-@pytest.mark.parametrize("is_restarted", [False, True])
 @pytest.mark.parametrize(
-    ("how", "why"),
+    ("how", "is_restarted", "why"),
     [
-        ("closed", "closed off by obstacles"),
-        ("unknown", "unknown to the map"),
-        ("cut", "unknown to the map"),
+        ("closed", False, "closed off by obstacles"),
+        ("closed", True, "closed off by obstacles"),
+        ("unknown", True, "unknown to the map"),
+        ("cut", False, "unknown to the map"),
     ],
 )
-def test_the_end_says_what_is_out_of_reach_now(how, why, is_restarted):
+def test_the_end_says_what_is_out_of_reach_now(how, is_restarted, why):
     robot = in_first_room()
     robot.show(changed(how))
     if is_restarted:
@@ -116,8 +116,8 @@ def with_map_moved(robot, pixels, x, y, deg):
     return robot
 
 
-MOTIONS = [(0.5, 0.3, 0.0), (0.0, 0.0, 3.0), (0.5, 0.3, 8.0), (2.0, 1.0, 0.0)]
-SHIFTS = [(0.14, 0.0), (0.1, 0.1), (0.07, 0.0)]
+MOTIONS = [(0.0, 0.0, 3.0), (0.5, 0.3, 8.0), (2.0, 1.0, 0.0)]
+SHIFTS = [(0.14, 0.0), (0.1, 0.1)]
 
 
 @pytest.mark.parametrize("motion", MOTIONS)
@@ -131,7 +131,7 @@ def test_what_was_reachable_moves_with_the_map(motion):
     assert covered.coverable == np.count_nonzero(robot.mission.area.reachable)
 
 
-@pytest.mark.parametrize("motion", [*MOTIONS[1:], (*SHIFTS[1], 0.0)])
+@pytest.mark.parametrize("motion", [MOTIONS[0], (*SHIFTS[1], 0.0)])
 def test_a_room_that_is_closed_as_the_map_moves_is_told_once(motion):
     robot = LineRobot(two_rooms(is_open=True), START)
     assert robot.wait(100.0, lambda robot: robot.x < 2.0)
