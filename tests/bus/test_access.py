@@ -6,15 +6,13 @@ import json
 import re
 
 import pytest
-import yaml
 import zenoh
 
 from fasaco_edge.bus import access
-from fasaco_edge.host.resources import folder
-from tests.wire.contract_files import CONTRACT
+from tests.wire.contract_files import CONTRACT, load
 
 PREFIX = "fasaco/@v1/robot"
-TABLE = yaml.safe_load((folder("protocol") / "keys.yaml").read_text())
+TABLE = load("keys.yaml")
 KEYS, QUERIES = TABLE["keys"], TABLE["queries"]
 MOST = access.Limits(64_001_024, 20.0, 200.0, 20.0)
 

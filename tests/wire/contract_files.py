@@ -45,8 +45,9 @@ WILDCARDS: dict[str, str] = {
 
 
 def load(name: str) -> Any:
-    """Return what a YAML file of the contract holds."""
-    return yaml.safe_load((PROTOCOL / name).read_text())
+    """Return what a YAML file of the contract holds; by libyaml, as each worker reads them all."""
+    loader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+    return yaml.load((PROTOCOL / name).read_text(encoding="utf-8"), loader)
 
 
 def key_entry(topic: Topic) -> dict[str, Any]:

@@ -9,7 +9,6 @@ import sys
 from dataclasses import dataclass
 
 import pytest
-import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -22,10 +21,10 @@ from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.messages.maps import CoverageValue
 from fasaco_edge.wire.schemas import POSE_SCHEMAS
 from tests.support.examples import examples
-from tests.wire.contract_files import CONTRACT
+from tests.wire.contract_files import CONTRACT, load
 
 PROTOCOL = folder("protocol")
-TABLE = yaml.safe_load((PROTOCOL / "keys.yaml").read_text())
+TABLE = load("keys.yaml")
 ENTRIES = {entry["name"]: entry for entry in TABLE["keys"]}
 
 

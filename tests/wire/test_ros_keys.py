@@ -5,12 +5,10 @@ from __future__ import annotations
 import re
 
 import pytest
-import yaml
 import zenoh
 import zenoh.ext
 
 from fasaco_edge.config.ros import RosConfig
-from fasaco_edge.host.resources import folder
 from fasaco_edge.wire import schemas, topics
 from fasaco_edge.wire.ros_keys import (
     GID_BYTES,
@@ -23,9 +21,9 @@ from fasaco_edge.wire.ros_keys import (
     gid_of,
 )
 from tests.wire import oracle
-from tests.wire.contract_files import CONTRACT
+from tests.wire.contract_files import CONTRACT, load
 
-TABLE = yaml.safe_load((folder("protocol") / "keys.yaml").read_text())["ros2"]
+TABLE = load("keys.yaml")["ros2"]
 PATH = RosTopic("/robot1/coverage_path", schemas.PATH, latched=True)
 NODE = RosNode(2, "aac3178e146ba6f1fc6e6a4085e77f21", "/robot1", "fasaco_edge")
 

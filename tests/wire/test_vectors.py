@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-import yaml
 
 from fasaco_edge.errors import MalformedMessage
 from fasaco_edge.host.resources import folder
+from tests.wire.contract_files import load
 from tests.wire.decoders import DECODERS
 from tests.wire.facts import facts_of, flat
 from tests.wire.make_vectors import files
@@ -18,7 +18,7 @@ VECTORS = folder("protocol") / "vectors"
 
 
 def index(kind: str) -> list[Any]:
-    entries = yaml.safe_load((VECTORS / kind / "index.yaml").read_text(encoding="utf-8"))
+    entries = load(f"vectors/{kind}/index.yaml")
     return [pytest.param(entry, id=entry["file"]) for entry in entries]
 
 
