@@ -9,11 +9,11 @@ from pathlib import Path
 
 from fasaco_edge.kernels.manifest import why_missing
 from fasaco_edge.planners.compiling import MODULE
-from fasaco_edge.planners.stages import AREAS
+from fasaco_edge.planners.stages import WALKS
 from tests.support.processes import ENVIRONMENT
 
 # It compiles within seconds.
-STAGES = (AREAS,)
+STAGES = (WALKS,)
 COMPILE_S = 900.0
 
 
