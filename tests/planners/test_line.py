@@ -136,6 +136,18 @@ def test_a_share_that_is_asked_for_is_swept_in_the_least_time(planned):
     assert enough_s[-1] < enough_s[0]
 
 
+def test_a_share_is_reached_within_few_stages(planned):
+    """A budget of two seconds has three stages on a floor of 50 m2."""
+    _, floor, stands, walk = planned
+    config = LineConfig(moves_m2=1000, swept=0.995)
+    search = LineSearch(walk, stands, floor, config, is_end_fixed=False)
+    for _ in search.run():
+        if search.stages == 3:
+            break
+    assert search.best is not None
+    assert search.best.swept_m2 >= 0.995 * floor.reachable_m2
+
+
 def test_a_fixed_end_stays(planned):
     _, floor, stands, walk = planned
     line = line_over(walk, stands, floor, LineConfig(moves_m2=1000), is_end_fixed=True)
