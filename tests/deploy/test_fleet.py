@@ -55,13 +55,33 @@ def running(lab: Lab, *words: str) -> Iterator[subprocess.Popen[bytes]]:
 
 
 def ask(lab: Lab, robot: str) -> dict[str, Any]:
+    """Return the status of a robot; nothing while its daemon does not answer."""
     words = ("fasaco-edge", "ask", "status", "--json", "--robot", robot, "--connect", ROUTER)
-    answer: dict[str, Any] = json.loads(lab.run(*words).stdout)
+    asked = lab.run(*words, check=False)
+    answer: dict[str, Any] = json.loads(asked.stdout) if asked.returncode == 0 else {}
     return answer
 
 
+def has_part(status: dict[str, Any]) -> bool:
+    """Return whether a robot has a part of the floor."""
+    return bool(status) and bool(status["fleet"]["part_cells"])
+
+
+def has_progress(status: dict[str, Any]) -> bool:
+    """Return whether a robot's progress is on disk."""
+    return bool(status) and status["ledger"]["age_s"] is not None
+
+
+def is_joined(status: dict[str, Any]) -> bool:
+    """Return whether a robot has another member's messages of just now."""
+    members = status["fleet"]["members"] if status else ()
+    return bool(members) and members[0]["heard_s"] < 1.5
+
+
 def shares_and_drives(status: dict[str, Any]) -> bool:
-    """Tell whether a robot works on a part, or is done, and knows what the other has swept."""
+    """Return whether a robot works on a part, or is done, and knows what the other has swept."""
+    if not status or not status["fleet"]["members"]:
+        return False
     fleet = status["fleet"]
     is_at_work = status["state"] == "done" or bool(fleet["part_cells"])
     return is_at_work and fleet["members"][0]["swept_cells"] > 0
@@ -81,12 +101,12 @@ def test_two_units_share_a_flat_and_a_killed_one_rejoins(
                 running(lab, "fasaco-edge", *words, "--robot", name, "--connect", ROUTER)
             )
         first, second = services.values()
-        wait_for(lambda: ask(lab, "r1")["fleet"]["part_cells"], 20.0, "a part")
-        wait_for(lambda: ask(lab, "r2")["ledger"]["age_s"] is not None, 20.0, "progress on disk")
+        wait_for(lambda: has_part(ask(lab, "r1")), 20.0, "a part")
+        wait_for(lambda: has_progress(ask(lab, "r2")), 20.0, "progress on disk")
         before = second.pid
         second.signal("KILL")
         wait_for(lambda: second.pid not in (0, before), 10.0, "another process")
-        wait_for(lambda: ask(lab, "r1")["fleet"]["members"][0]["heard_s"] < 1.5, 10.0, "joined")
+        wait_for(lambda: is_joined(ask(lab, "r1")), 10.0, "joined")
         # Whether a fleet sweeps all after a kill, tests.campaigns.fleet_kills finds out.
         for name in STARTS:
             wait_for(lambda name=name: shares_and_drives(ask(lab, name)), 60.0, "one division")

@@ -30,7 +30,7 @@ CONFIG = MissionConfig(
     cost=CoverageCost.for_robot(CELL_M, 0.25, 1.5),
     sweeping=Sweeping(TOOL_M, 1_000_000, LINES["quick"]),
 )
-SPEED_M_S, TICK_S = 0.25, 0.1
+SPEED_M_S = 0.25
 
 
 def map_of(pixels: NDArray[np.int8]) -> OccupancyGrid:
@@ -50,7 +50,10 @@ class LineRobot:
         paths: all paths that were published, with their times.
         track: where the robot was at each tick.
         is_stuck: whether its wheels turn in vain.
+        tick_s: time between two of its poses [s].
     """
+
+    tick_s = 0.2
 
     def __init__(
         self, pixels: NDArray[np.int8], start: tuple[float, float], config: MissionConfig = CONFIG
@@ -70,8 +73,8 @@ class LineRobot:
 
     def step(self, *events: Event) -> None:
         """Let a tick pass: drive, report the pose, and take the path."""
-        self.now += TICK_S
-        self._drive(0.0 if self.is_stuck else SPEED_M_S * TICK_S)
+        self.now += self.tick_s
+        self._drive(0.0 if self.is_stuck else SPEED_M_S * self.tick_s)
         self.track.append((self.x, self.y))
         stamp_ns = round(self.now * 1e9)
         pose = PoseReceived(StampedPose(self.reported, "map", stamp_ns))

@@ -25,7 +25,7 @@ from fasaco_edge.planners.planner import WorkLimit
 from fasaco_edge.planners.search.near_optimal import NearOptimal
 
 TOOL_M, RADIUS_M, CELL_M = 0.3, 0.18, 0.276
-TICK_S, STEP_S, QUARTER_TURN_S, MOST_S = 0.05, 0.1, 0.5, 1500.0
+STEP_S, QUARTER_TURN_S, MOST_S = 0.1, 0.5, 1500.0
 # It does not go back for the path that has begun behind it meanwhile.
 NEAR_M, BEHIND_M = 0.05, 0.15
 START = (1.0, 1.0)
@@ -126,7 +126,9 @@ class Outcome:
     troubles: dict[str, str]
 
 
-def driven(ground, *, speed_m_s=0.3, left_m=0.0, poses_hz=20.0, noise_m=0.0, most_s=MOST_S):
+def driven(
+    ground, *, speed_m_s=0.3, left_m=0.0, poses_hz=10.0, noise_m=0.0, most_s=MOST_S, tick_s=0.1
+):
     """Let a base carry out a mission on a known map; return its outcome.
 
     Args:
@@ -135,14 +137,15 @@ def driven(ground, *, speed_m_s=0.3, left_m=0.0, poses_hz=20.0, noise_m=0.0, mos
         poses_hz: how many poses it tells in a second.
         noise_m: standard deviation of each, along each axis.
         most_s: limit on the time of the mission.
+        tick_s: time between two looks at the base.
     """
     rng, base, mission = np.random.default_rng(5), Base(speed_m_s, left_m), None
     mission = Mission(configured(speed_m_s))
     plan, told_at, track, troubles = None, 0.0, [base.place], {}
-    between, every = round(1.0 / poses_hz / TICK_S), round(STEP_S / TICK_S)
-    for tick in range(round(most_s / TICK_S)):
-        now, events = tick * TICK_S, []
-        base.go(TICK_S)
+    between, every = round(1.0 / poses_hz / tick_s), round(STEP_S / tick_s)
+    for tick in range(round(most_s / tick_s)):
+        now, events = tick * tick_s, []
+        base.go(tick_s)
         track.append(base.place)
         if not tick:
             events.append(MapReceived(ground))

@@ -13,7 +13,7 @@ from fasaco_edge.grid.occupancy import MapPatch
 from fasaco_edge.mission.config import MissionPolicy
 from fasaco_edge.mission.core.events import FollowerBlocked, PatchReceived
 from fasaco_edge.mission.map.obstacles import AGAIN_S, CLOSED_S, Obstacles
-from tests.mission.line_robot import CONFIG, RADIUS_M, TICK_S, LineRobot, map_of
+from tests.mission.line_robot import CONFIG, RADIUS_M, LineRobot, map_of
 
 # The follower keeps this far from things [m], and says after so long that it stands [s].
 MARGIN_M, HELD_S = 0.06, 5.0
@@ -56,13 +56,13 @@ class SeeingRobot(LineRobot):
         near = [p for p in self.hidden if math.dist(p, (self.x, self.y)) < RADIUS_M + MARGIN_M]
         if any(math.dist(p, before[:2]) > math.dist(p, (self.x, self.y)) for p in near):
             self.x, self.y, self.path = before
-            self.held_s += TICK_S
+            self.held_s += self.tick_s
         elif (self.x, self.y) != before[:2]:
             self.longest_s = max(self.longest_s, self.held_s)
             self.held_s = 0.0
 
     def step(self, *events):
-        seconds = round(self.held_s / TICK_S)
+        seconds = round(self.held_s / self.tick_s)
         if self.held_s >= HELD_S and seconds % 10 == 0 and self.path:
             here = self.x, self.y
             points = sorted((math.dist(p, here), p) for p in self.hidden)

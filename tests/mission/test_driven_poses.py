@@ -18,6 +18,7 @@ AROUND = Window(-40, -40, 180, 180)
 class OftenLost(LineRobot):
     """A robot with one pose in ten beside where it is."""
 
+    tick_s = 0.1
     off_m = 0.0
 
     def _drive(self, way):

@@ -22,14 +22,14 @@ def test_floor_beside_a_base_off_its_line_is_not_called_swept(left_m):
 
 
 def test_floor_left_by_the_base_is_swept_later_or_reported():
-    outcome = driven(flat(), left_m=0.12)
+    outcome = driven(flat(), left_m=0.12, poses_hz=20.0, tick_s=0.05)
     assert outcome.mission.state is State.DONE
     # 85 % without; of a twentieth it is only told.
     assert outcome.swept > 0.95
     left_m2 = sum(left.m2 for left in floor_report(outcome.mission).left)
     assert 0.0 < left_m2 < 0.6
     # Along walls to its right it cannot come nearer.
-    outcome = driven(bare_room(), left_m=0.08)
+    outcome = driven(bare_room(), left_m=0.08, poses_hz=20.0, tick_s=0.05)
     told = floor_report(outcome.mission)
     assert told.reached_m2 < told.reachable_m2 - 0.5
     assert f"{told.reached_m2:.1f} of {told.reachable_m2:.1f} m2" in outcome.mission.reason

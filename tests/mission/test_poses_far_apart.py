@@ -6,13 +6,14 @@ import numpy as np
 import pytest
 
 from fasaco_edge.mission.core.events import PoseReceived
-from tests.mission.line_robot import CONFIG, SPEED_M_S, TICK_S, LineRobot
+from tests.mission.line_robot import CONFIG, SPEED_M_S, LineRobot
 from tests.mission.world import with_policy
 
 
 class SeldomKnown(LineRobot):
     """A robot whose mission gets a pose each so many ticks alone."""
 
+    tick_s = 0.1
     every, number = 50, 0
 
     def arrived(self, events):
@@ -28,7 +29,7 @@ def robot(rows, cols, every_s=5.0):
     config = with_policy(config, retries=1, retry_s=5.0, lost_pose_s=3.0)
     room = np.pad(np.zeros((rows, cols), np.int8), 1, constant_values=100)
     found = SeldomKnown(room, (0.5, 0.5), config)
-    found.every = round(every_s / TICK_S)
+    found.every = round(every_s / found.tick_s)
     return found
 
 

@@ -93,9 +93,9 @@ def test_pixels_that_flicker_far_ahead_change_nothing_yet():
     robot = LineRobot(pixels, (1.0, 1.0))
     robot.wait(3.0, lambda robot: False)
     seen, changes = len(robot.paths), 0
-    for number in range(1200):
+    for number in range(600):
         before = PathAhead(np.array([(robot.x, robot.y), *robot.path]))
-        if number % 30:
+        if number % 15:
             robot.step()
         else:
             robot.show(with_specks(pixels, random, (robot.x, robot.y)))
