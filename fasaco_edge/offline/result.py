@@ -247,7 +247,7 @@ def picture_of(plan: Plan) -> Image.Image:
     lines = [
         f"{plan.map.name}: {plan.problem.cells} cells of {ground.lattice.cell_m:g} m{askew}, "
         f"{walk.steps} steps, {walk.revisits} revisits, {walk.turns_90} quarter-turns; "
-        f"optimality gap at most {path.gap or 0.0:.1%}",
+        f"at most {100 * (path.gap or 0.0):.1f} % above the walk's lower bound",
     ]
     if judged is not None:
         lines.append(f"reachable floor: {plan.floor}")
