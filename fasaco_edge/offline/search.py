@@ -3,8 +3,9 @@
 A line is laid along each of two walks, and annealed three times; the better one is improved until
 the budget is used up. The first walk and line are always completed, and each step follows from
 those before it, whatever the budget: more of it is never worse, by the seconds of the line and the
-price of floor that is left. That does not hold without local search, or if a gap of the walk is
-asked for: then there is one walk, which the budget ends.
+price of floor that is left. If a share of the floor is asked for, the first line is always annealed
+three times: the price of floor is found meanwhile. All that does not hold without local search, or
+if a gap of the walk is asked for: then there is one walk, which the budget ends.
 """
 
 from __future__ import annotations
@@ -95,6 +96,10 @@ class Ending:
             return True
         self.is_walk_limited = self._limit is not None and self._limit(progress)
         return self.is_walk_limited
+
+    def is_stopped(self) -> bool:
+        """Return whether something else than the budget ends the first line."""
+        return self._progress is not None and self._is_over(self._progress)
 
     def is_line_over(self) -> bool:
         """Return whether the search for a line is over; without a budget it ends at once."""
@@ -189,6 +194,8 @@ class Planning:
         ending.limit_walk(min(most, FIRST_PROPOSALS) if has_two else most, is_first=has_two)
         best = self._lay(line, robot, search.seed, is_one_of_two=has_two)
         best.complete(1)
+        if search.swept is not None:
+            best.complete(COMPARED, ending.is_stopped)
         may_go_on = has_two and ending.is_walk_limited and not ending.is_line_over()
         if not may_go_on or not best.complete(COMPARED, ending.is_line_over):
             return best

@@ -50,8 +50,9 @@ class Search:
             first walk and line are always completed; None for 2 s, or without local search for no
             limit.
         target_gap: optimality gap at which the search ends; None for never.
-        swept: share of the reachable floor that a line is to sweep, in the least time; None for as
-            much as its seconds are worth.
+        swept: share of the reachable floor that a line is to sweep, in the least time, for which
+            three stages are completed whatever the budget; None for as much as its seconds are
+            worth.
 
     Raises:
         BadConfiguration: a value is impossible.

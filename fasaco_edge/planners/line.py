@@ -43,8 +43,8 @@ MOST_A_POINT = 2000
 # overall shape. Stages that double give the same results as one stage of their total length.
 COOLED, REHEATED = (1.0, 0.0), (0.7, 0.0)
 # Factors of the price of floor, if a share of it is asked for: after a line that sweeps too little,
-# after one that sweeps enough, and the limit of their product. A share has to be reached within the
-# few stages of a short budget.
+# after one that sweeps enough, and the limit of their product. There are few stages, as each takes
+# twice as long as the one before.
 RAISED, LOWERED, MOST_RAISED = 4.0, 0.7, 100.0
 # Moves per point of the line after which its parts are reordered once.
 MOVES_A_POINT = 48

@@ -293,11 +293,9 @@ DRIVER = Topic(
 TOPICS = tuple(each for each in tuple(globals().values()) if isinstance(each, Topic))
 """All rows, in the order of this file."""
 # The turn log last: once the daemon sees that subscriber, the recorder receives all else, too.
-RECORDED = tuple(
-    sorted(
-        (topic for topic in TOPICS if topic.queues.recorder is not None),
-        key=lambda topic: topic is TURNS,
-    )
+RECORDED = (
+    *(each for each in TOPICS if each.queues.recorder is not None and each is not TURNS),
+    TURNS,
 )
 """What a recorder subscribes to, in this order."""
 # Samples of these topics keep the order of their publisher: an update changes the map before it.

@@ -11,7 +11,7 @@ import time
 from collections.abc import Generator, Iterator, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -243,17 +243,17 @@ def _row(run: PeerRun) -> tuple[str, ...]:
 
 
 def _goals(samples: Sequence[PeerRun]) -> Iterator[Goal]:
-    ours = {run.building: run for run in samples if run.planner == OURS}
+    ours = {
+        run.building: run.s_m2 for run in samples if run.planner == OURS and run.s_m2 is not None
+    }
     for name in OTHERS:
-        pairs: list[tuple[Any, Any]] = [
-            (ours[run.building], run)
+        ratios = [
+            ours[run.building] / run.s_m2
             for run in samples
             if run.planner == name and run.s_m2 is not None and run.building in ours
         ]
-        if pairs:
-            ratios = [mine.s_m2 / other.s_m2 for mine, other in pairs if mine.s_m2 is not None]
-            if ratios:
-                yield Goal(f"s/m2 to {name}, median", round(statistics.median(ratios), 4), 1.0)
+        if ratios:
+            yield Goal(f"s/m2 to {name}, median", round(statistics.median(ratios), 4), 1.0)
 
 
 PEERS = Benchmark(

@@ -126,3 +126,12 @@ def test_a_line_through_cells_is_searched_for_until_the_end():
     ground, path, xy = planned(room(1), 1, pauses, line=CELLS)
     assert pauses.count == 300
     assert xy[0] == pytest.approx(ground.lattice.centres(path.cells[:1])[0])
+
+
+def test_a_share_that_is_asked_for_is_worked_on_whatever_the_budget():
+    """The price of floor is found in three stages; a budget once ended after the first."""
+    grid, shares = fe.load_map("office"), []
+    for swept in (None, 0.995):
+        plan = fe.plan(grid, ROBOT, search=fe.Search(budget_s=0.01, swept=swept))
+        shares.append(plan.swept_share)
+    assert shares[1] >= 0.994 > shares[0]

@@ -137,7 +137,7 @@ def test_a_share_that_is_asked_for_is_swept_in_the_least_time(planned):
 
 
 def test_a_share_is_reached_within_few_stages(planned):
-    """A budget of two seconds has three stages on a floor of 50 m2."""
+    """A plan that asks for a share completes three, whatever its budget."""
     _, floor, stands, walk = planned
     config = LineConfig(moves_m2=1000, swept=0.995)
     search = LineSearch(walk, stands, floor, config, is_end_fixed=False)

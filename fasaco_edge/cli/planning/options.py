@@ -286,8 +286,8 @@ def _add_planner(group: argparse._ArgumentGroup) -> None:
         "--swept",
         type=float,
         metavar="SHARE",
-        help="share of the reachable floor that the line is to sweep, in the least time; takes a "
-        "larger --budget (default: as much as pays)",
+        help="share of the reachable floor that the line is to sweep, in the least time; takes "
+        "longer than the default --budget (default: as much as pays)",
     )
     group.add_argument(
         "--target-gap",
