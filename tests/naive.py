@@ -250,6 +250,7 @@ def walk_us(walk: list[Cell], cost: CoverageCost) -> int:
         DIRECTIONS.index(_difference(here, there)) for here, there in itertools.pairwise(walk)
     ]
     total = len(headings) * cost.step_us
+    total += sum(cost.col_us if heading % 2 else cost.row_us for heading in headings)
     for before, after in itertools.pairwise(headings):
         to_left = (after - before) % 4
         total += min(to_left, 4 - to_left) * cost.quarter_turn_us

@@ -1,9 +1,13 @@
-"""Cost of a walk, in seconds for steps and quarter-turns; and counts of a search's work."""
+"""Cost of a walk, in seconds for steps and quarter-turns; and counts of a search's work.
+
+A search that prefers lanes in one direction adds a price to each step across them: its walks then
+cost more than their seconds, and ``seconds`` is the cost without that price.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +21,14 @@ MICROSECONDS = 1_000_000
 # A step below a millisecond would lose precision in whole microseconds; the cost of a walk of 10^8
 # steps of an hour each still fits into 64 bits of microseconds.
 SHORTEST_STEP_S, LONGEST_S = 1e-3, 3600.0
+
+# Lanes along the rows of the lattice, along its columns, or in any direction.
+Lanes = Literal["", "rows", "columns"]
+ANY_LANES: Lanes = ""
+ROWS: Lanes = "rows"
+COLUMNS: Lanes = "columns"
+# Price of a step across the lanes, as a share of the time of a step and a quarter-turn.
+ACROSS = 0.6
 
 
 class Turns(NamedTuple):
@@ -36,14 +48,20 @@ class CoverageCost:
     Attributes:
         step_s: a step to a neighbouring cell [s].
         quarter_turn_s: a turn by 90 degrees on the spot [s].
+        row_s, col_s: added to a step along a row, along a column, so that lanes in the other
+            direction are preferred [s].
     """
 
     step_s: float = 1.0
     quarter_turn_s: float = 0.0
+    row_s: float = 0.0
+    col_s: float = 0.0
 
     def __post_init__(self) -> None:
         _require("step_s", self.step_s, SHORTEST_STEP_S, LONGEST_S, "s")
         _require("quarter_turn_s", self.quarter_turn_s, 0.0, LONGEST_S, "s")
+        _require("row_s", self.row_s, 0.0, 2 * LONGEST_S, "s")
+        _require("col_s", self.col_s, 0.0, 2 * LONGEST_S, "s")
 
     @classmethod
     def for_robot(cls, cell_m: float, speed_m_s: float, quarter_turn_s: float) -> Self:
@@ -59,6 +77,22 @@ class CoverageCost:
         _require("cell_m / speed_m_s", step_s, SHORTEST_STEP_S, LONGEST_S, "s")
         return cls(step_s, quarter_turn_s)
 
+    def along(self, lanes: Lanes) -> Self:
+        """Return this cost with a preference for lanes in a direction."""
+        across_s = ACROSS * (self.step_s + self.quarter_turn_s)
+        row_s, col_s = across_s * (lanes == COLUMNS), across_s * (lanes == ROWS)
+        return replace(self, row_s=row_s, col_s=col_s)
+
+    @property
+    def seconds(self) -> Self:
+        """This cost without a preference for lanes."""
+        return self.along(ANY_LANES)
+
+    @property
+    def has_lanes(self) -> bool:
+        """Whether lanes in one direction are preferred."""
+        return self.row_s != self.col_s
+
     @property
     def step_us(self) -> int:
         """Cost of a step in whole microseconds."""
@@ -68,6 +102,16 @@ class CoverageCost:
     def quarter_turn_us(self) -> int:
         """Cost of a quarter-turn in whole microseconds."""
         return round(self.quarter_turn_s * MICROSECONDS)
+
+    @property
+    def row_us(self) -> int:
+        """What is added to a step along a row, in whole microseconds."""
+        return round(self.row_s * MICROSECONDS)
+
+    @property
+    def col_us(self) -> int:
+        """What is added to a step along a column, in whole microseconds."""
+        return round(self.col_s * MICROSECONDS)
 
     def quality(self, cells: int, cost_us: int) -> float:
         """Return delta phi of equation (8): the cost of one step per cell over the cost [us]."""
@@ -89,7 +133,11 @@ class CoverageCost:
         turns = count_turns(cells)
         steps = max(len(cells) - 1, 0)
         quarters = turns.quarter + 2 * turns.half
-        return steps * self.step_us + quarters * self.quarter_turn_us
+        added_us = 0
+        if self.has_lanes:
+            in_rows = steps_in_rows(cells)
+            added_us = in_rows * self.row_us + (steps - in_rows) * self.col_us
+        return steps * self.step_us + quarters * self.quarter_turn_us + added_us
 
 
 def count_turns(cells: NDArray[np.int32]) -> Turns:
@@ -98,6 +146,11 @@ def count_turns(cells: NDArray[np.int32]) -> Turns:
     up, right = np.diff(cells[:, 0]), np.diff(cells[:, 1])
     along = up[1:] * up[:-1] + right[1:] * right[:-1]
     return Turns(int(np.count_nonzero(along == 0)), int(np.count_nonzero(along < 0)))
+
+
+def steps_in_rows(cells: NDArray[np.int32]) -> int:
+    """Count the steps along rows of a walk, int32 (n, 2), cells (row, col) joined by steps."""
+    return int(np.count_nonzero(np.diff(cells[:, 1])))
 
 
 def _require(name: str, value: float, least: float, most: float, unit: str) -> None:

@@ -172,8 +172,19 @@ class CoverageProblem:
         return np.column_stack((rows + window.row0, cols + window.col0)).astype(np.int32)
 
     def cost_us(self, walk: NDArray[np.int32]) -> int:
-        """Return the cost of a walk of flat or framed indices, int32 (n,) [us]."""
-        return int(walk_cost(walk, self.cost.step_us, self.cost.quarter_turn_us))
+        """Return the price of a walk of flat or framed indices, int32 (n,) [us]."""
+        cost = self.cost
+        return int(walk_cost(walk, cost.step_us, cost.quarter_turn_us)) + self._added_us(walk)
+
+    def _added_us(self, walk: NDArray[np.int32]) -> int:
+        """Return what is added to the price of a walk's steps by their direction [us]."""
+        cost, steps = self.cost, walk.size - 1
+        if not cost.has_lanes:
+            return 0
+        # With one column, a step north is a difference of 1, too.
+        has_rows = self.lattice.window.cols > 1
+        in_rows = int(np.count_nonzero(np.abs(np.diff(walk)) == 1)) if has_rows else 0
+        return in_rows * cost.row_us + (steps - in_rows) * cost.col_us
 
     def led_to_end(self, walk: NDArray[np.int32]) -> NDArray[np.int32]:
         """Return a walk of flat indices, int32 (n,), extended to the end by a shortest path."""
@@ -258,7 +269,13 @@ class FramedGround:
         offsets = np.array([1, width, -1, -width], np.int64)
         ground = Ground(steps.ravel(), needed.ravel(), offsets, steps.size)
         cost = problem.cost
-        prices = Prices(cost.step_us, cost.quarter_turn_us, problem.end is None)
+        prices = Prices(
+            cost.step_us,
+            cost.quarter_turn_us,
+            problem.end is None,
+            row_us=cost.row_us,
+            col_us=cost.col_us,
+        )
         return cls(rows, cols, ground, prices)
 
     @property

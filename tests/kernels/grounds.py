@@ -36,6 +36,8 @@ PRICES = (
     Prices(700_000, 1_100_000, True),
     Prices(700_000, 1_100_000, False),
     Prices(1_000, 3_600_000_000, True),
+    Prices(700_000, 1_100_000, True, row_us=900_000),
+    Prices(1_000_000, 0, False, col_us=300_000),
 )
 
 

@@ -31,6 +31,7 @@ from fasaco_edge.kernels.local_search.walk_array import (
     Ground,
     recount,
 )
+from tests import naive
 from tests.kernels.grounds import (
     PRICES,
     Task,
@@ -207,8 +208,12 @@ def test_whatever_is_done_in_a_region_the_whole_is_a_walk(seed, prices, hot, per
             assert_whole_walk(task, region, region.put_back())
         if not prices.quarter_turn_us:
             # Turns at the rim are priced otherwise in the region; steps are not.
-            gain = walk_cost(region.cells, *prices[:2]) - walk_cost(region.put_back(), *prices[:2])
+            gain = price_of(task, region.cells, prices) - price_of(task, region.put_back(), prices)
             assert gain == before - region.walk.counts[COST]
+
+
+def price_of(task, cells, prices):
+    return naive.walk_us([task.unframed(cell) for cell in cells.tolist()], prices)
 
 
 def corridor(*cols, cols_inside, prices=PRICES[0], **room):

@@ -1,12 +1,14 @@
 """Windows of a walk against least costs, and the walk's soundness after each of them."""
 
+from typing import get_args
+
 import numpy as np
 import pytest
 
 from fasaco_edge.grid.lattice import CoverageLattice
 from fasaco_edge.kernels.windows.order import LINES, PLACES
 from fasaco_edge.planners.bound import THOROUGH, LowerBound
-from fasaco_edge.planners.cost import CoverageCost
+from fasaco_edge.planners.cost import CoverageCost, Lanes
 from fasaco_edge.planners.paper.baselines import first_walks
 from fasaco_edge.planners.problem import CoverageProblem, FramedGround, graph_of
 from fasaco_edge.planners.search.walk_region import stream_of
@@ -15,6 +17,7 @@ from tests.benchmarks.judge import check_walk
 from tests.campaigns.turn_bound import drawn_problem, least_cost_us
 
 PLENTY = 5_000
+LANES = get_args(Lanes)
 
 
 def search_of(problem):
@@ -94,9 +97,10 @@ def test_a_narrow_beam_finds_another_walk_from_each_corner():
     assert len(set(costs)) == 4
 
 
+@pytest.mark.parametrize("lanes", LANES)
 @pytest.mark.parametrize("price", [0.5, 1.25, 5.0, 50.0])
 @pytest.mark.parametrize("kind", ["anywhere", "home", "elsewhere", "half covered"])
-def test_windows_leave_a_whole_walk_and_find_better_ones(kind, price):
+def test_windows_leave_a_whole_walk_and_find_better_ones(kind, price, lanes):
     random = np.random.default_rng(5)
     floor = random.random((14, 17)) < 0.9
     floor[0, 0] = floor[0, 1] = True
@@ -106,7 +110,7 @@ def test_windows_leave_a_whole_walk_and_find_better_ones(kind, price):
     end = {"home": (0, 0), "elsewhere": last}.get(kind)
     covered = np.zeros(floor.shape, bool)
     covered[:7] = kind == "half covered"
-    cost = CoverageCost(1.0, price)
+    cost = CoverageCost(1.0, price).along(lanes)
     problem = CoverageProblem.of(ground, (0, 0), covered=covered, end=end, cost=cost)
     search, framed, walk = search_of(problem)
     assert search.load(walk)

@@ -8,8 +8,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fasaco_edge.errors import BadConfiguration
+from fasaco_edge.grid.lattice import CoverageLattice
 from fasaco_edge.kernels.ants.colony import walk_cost
-from fasaco_edge.planners.cost import CoverageCost
+from fasaco_edge.planners.cost import ACROSS, COLUMNS, ROWS, CoverageCost
+from fasaco_edge.planners.problem import CoverageProblem, FramedGround
 from tests import naive
 from tests.support.examples import examples
 
@@ -32,6 +34,26 @@ def test_twin_counts_the_same_cost(headings, cost):
     assert cost.of_walk(np.array(walk, np.int32)) == counted / 1e6
     flat = np.array([row * 150 + col for row, col in walk], np.int32)
     assert walk_cost(flat, cost.step_us, cost.quarter_turn_us) == counted
+
+
+@examples(100)
+@given(headings=WALKS, cost=COSTS, lanes=st.sampled_from((ROWS, COLUMNS)))
+def test_twin_counts_the_same_price_of_steps_across_lanes(headings, cost, lanes):
+    walk, laned = walk_along(headings), cost.along(lanes)
+    assert laned.of_walk_us(np.array(walk, np.int32)) == naive.walk_us(walk, laned)
+    across = sum(bool(col) == (lanes == COLUMNS) for _, col in headings)
+    added = laned.row_us or laned.col_us
+    assert naive.walk_us(walk, laned) == naive.walk_us(walk, cost) + across * added
+    assert laned.seconds == cost
+
+
+def test_in_a_single_column_each_step_is_along_it():
+    ground = CoverageLattice.from_free(np.ones((4, 1), bool))
+    for lanes, added_s in ((ROWS, ACROSS), (COLUMNS, 0.0)):
+        problem = CoverageProblem.of(ground, (0, 0), cost=CoverageCost().along(lanes))
+        flat = np.arange(4, dtype=np.int32)
+        framed = FramedGround.of(problem).framed(flat)
+        assert problem.cost_us(flat) == problem.cost_us(framed) == 3_000_000 * (1.0 + added_s)
 
 
 @examples(100)

@@ -10,7 +10,14 @@ from hypothesis import strategies as st
 
 from fasaco_edge.grid.lattice import CoverageLattice
 from fasaco_edge.kernels.local_search.walk_array import FRAME
-from fasaco_edge.planners.cost import STEPS_ALONE, CoverageCost
+from fasaco_edge.planners.cost import (
+    COLUMNS,
+    ROWS,
+    STEPS_ALONE,
+    CoverageCost,
+    SearchWork,
+    steps_in_rows,
+)
 from fasaco_edge.planners.paper.colony import ColonyConfig
 from fasaco_edge.planners.planner import AnyOf, GapReached, Interrupt, WorkLimit, never
 from fasaco_edge.planners.problem import CoverageProblem, FramedGround
@@ -206,3 +213,27 @@ def test_who_observes_sees_the_trail_and_changes_nothing():
     assert snapshot.ants == path.work.ants
     walked = tuple(path.cells[1:-1].T)
     assert snapshot.trail[walked].min() > config.tau0
+
+
+@pytest.mark.parametrize("lanes", [ROWS, COLUMNS])
+def test_lanes_run_in_the_direction_that_is_preferred(lanes):
+    """On an open floor; what the path says it costs are its seconds."""
+    ground = CoverageLattice.from_free(np.ones((14, 14), bool))
+    cost = CoverageCost(1.0, 1.25)
+    for start in ((0, 0), (7, 6)):
+        problem = CoverageProblem.of(ground, start, cost=cost.along(lanes))
+        path = NearOptimal().plan(problem, WorkLimit(SearchWork(proposals=400_000)))
+        rows = steps_in_rows(path.cells)
+        along = rows if lanes == ROWS else path.steps - rows
+        assert along >= 0.85 * path.steps
+        assert path.cost_s == cost.of_walk(path.cells)
+        assert path.lower_bound_cost_s <= path.cost_s
+
+
+def test_without_a_price_on_turns_lanes_run_in_that_direction_too():
+    """The walk of the fewest steps is known at once; that it runs along lanes is not."""
+    ground = CoverageLattice.from_free(np.ones((10, 10), bool))
+    problem = CoverageProblem.of(ground, (0, 0), cost=CoverageCost().along(COLUMNS))
+    path = NearOptimal().plan(problem, WorkLimit(SearchWork(proposals=200_000)))
+    assert path.steps == path.cost_s == 99
+    assert steps_in_rows(path.cells) == 9

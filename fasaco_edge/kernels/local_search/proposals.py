@@ -33,6 +33,7 @@ from fasaco_edge.kernels.local_search.walk_array import (
     Ground,
     Prices,
     Walk,
+    added,
     drop,
     insert_two,
     is_at,
@@ -110,8 +111,9 @@ def _propose_drop(state: _State, index: int, visits: int, delta: int) -> None:
 def _drop_end(state: _State) -> None:
     """Leave out the last visit."""
     last = state.walk.counts[LENGTH] - 1
-    prices = state.prices
+    prices, cells = state.prices, state.walk.cells
     delta = -prices.step_us - _turn_at(state.walk, last - 1, prices.quarter_turn_us)
+    delta -= added(prices, cells[last - 1], cells[last])
     _propose_drop(state, last, 1, delta)
 
 
@@ -120,6 +122,7 @@ def _drop_spike(state: _State, index: int) -> None:
     """Leave out visit ``index`` between two visits of one cell, and the second of these."""
     walk, turn = state.walk, state.prices.quarter_turn_us
     delta = -2 * state.prices.step_us
+    delta -= 2 * added(state.prices, walk.cells[index - 1], walk.cells[index])
     if turn:
         delta -= 2 * turn + _turn_at(walk, index - 1, turn) + _turn_at(walk, index + 1, turn)
         delta += _turn_in(walk, index - 2, walk.cells[index - 1], index + 2, turn)
@@ -127,10 +130,20 @@ def _drop_spike(state: _State, index: int) -> None:
 
 
 @inlined
+def _added_by(state: _State, first: int, last: int) -> int:
+    """Return what is added to the prices of the steps from visit ``first`` to ``last`` [us]."""
+    total, cells = 0, state.walk.cells
+    for index in range(first, last):
+        total += added(state.prices, cells[index], cells[index + 1])
+    return total
+
+
+@inlined
 def _drop_detour(state: _State, index: int) -> None:
     """Leave out visits ``index`` and ``index + 1``, whose neighbours are beside each other."""
     walk, turn = state.walk, state.prices.quarter_turn_us
-    delta = -2 * state.prices.step_us
+    delta = -2 * state.prices.step_us - _added_by(state, index - 1, index + 2)
+    delta += added(state.prices, walk.cells[index - 1], walk.cells[index + 2])
     if turn:
         for place in range(index - 1, index + 3):
             delta -= _turn_at(walk, place, turn)
@@ -150,10 +163,9 @@ def _takes_flip(state: _State, first: int, delta: int) -> bool:
     """
     if delta >= 0 and first < state.prices.held:
         return False
-    if state.prices.quarter_turn_us:
-        if not accepts(delta, state.temperature_us, state.random):
-            return False
-        state.walk.counts[COST] += delta
+    if not accepts(delta, state.temperature_us, state.random):
+        return False
+    state.walk.counts[COST] += delta
     return True
 
 
@@ -222,6 +234,18 @@ def _turns_of_flip(walk: Walk, first: int, last: int, turn: int) -> int:
 
 
 @inlined
+def _added_by_flip(prices: Prices, walk: Walk, first: int, last: int) -> int:
+    """Return the change in what is added to steps if visits ``first + 1`` to ``last`` reverse."""
+    cells = walk.cells
+    near, after, far = cells[first], cells[first + 1], cells[last]
+    delta = added(prices, near, far) - added(prices, near, after)
+    if last + 1 < walk.counts[LENGTH]:
+        beyond = cells[last + 1]
+        delta += added(prices, after, beyond) - added(prices, far, beyond)
+    return int(delta)
+
+
+@inlined
 def _is_flip(ground: Ground, walk: Walk, first: int, last: int, back: int, free_end: bool) -> bool:
     """Return whether visits ``first + 1`` to ``last`` can be reversed.
 
@@ -255,6 +279,7 @@ def _flip_square(state: _State, index: int, direction: int, choice: int) -> None
         return
     turn = prices.quarter_turn_us
     delta = _turns_of_flip(walk, first, last, turn) if turn else 0
+    delta += _added_by_flip(prices, walk, first, last)
     if _takes_flip(state, first + 1, delta):
         reverse(walk, first + 1, last)
 
@@ -285,6 +310,8 @@ def _add_detour(state: _State, index: int, direction: int, choice: int) -> None:
         delta -= _turn_at(walk, index + 1, turn)
         if index + 2 < length:
             delta += turning(back, after, cells[index + 2], turn)
+    delta += added(prices, here, aside) + added(prices, aside, back)
+    delta += added(prices, back, after) - added(prices, here, after)
     if accepts(delta, state.temperature_us, state.random):
         insert_two(ground, walk, index + 1, aside, back)
         walk.counts[COST] += delta

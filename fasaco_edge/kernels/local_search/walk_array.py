@@ -70,12 +70,15 @@ class Prices(NamedTuple):
         step_us, quarter_turn_us: [us]; a half turn is two quarter-turns.
         free_end: whether the walk may end anywhere.
         held: this many first visits change only for a gain.
+        row_us, col_us: added to the price of a step along a row, along a column [us].
     """
 
     step_us: int
     quarter_turn_us: int
     free_end: bool
     held: int = 0
+    row_us: int = 0
+    col_us: int = 0
 
 
 @inlined
@@ -104,6 +107,12 @@ def leads(ground: Ground, here: int, there: int) -> bool:
 def axis_of(one: int, other: int) -> int:
     """Return 0 for two cells side by side in a row, 1 in a column."""
     return 0 if abs(one - other) == 1 else 1
+
+
+@inlined
+def added(prices: Prices, one: int, other: int) -> int:
+    """Return what is added to the price of a step between two cells [us]."""
+    return prices.col_us if axis_of(one, other) else prices.row_us
 
 
 @inlined
@@ -149,7 +158,15 @@ def recount(ground: Ground, walk: Walk, length: int, prices: Prices) -> None:
         cell = walk.cells[index]
         add_visit(ground, walk, cell)
         walk.place[cell] = index
-    walk.counts[COST] = walk_cost(walk.cells[:length], prices.step_us, prices.quarter_turn_us)
+    cost = walk_cost(walk.cells[:length], prices.step_us, prices.quarter_turn_us)
+    for index in range(1, length):
+        gap = abs(walk.cells[index] - walk.cells[index - 1])
+        # Jumps have no direction.
+        if gap == 1:
+            cost += prices.row_us
+        elif gap == ground.offsets[1]:
+            cost += prices.col_us
+    walk.counts[COST] = cost
 
 
 @inlined

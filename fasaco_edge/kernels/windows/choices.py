@@ -170,6 +170,14 @@ def _sort(keys: NDArray[np.int64], size: int) -> None:
         gap //= 3
 
 
+@inlined
+def _added(terms: Terms, side: int) -> int:
+    """Return what is added to half a step through a side; nothing at the walk's ends."""
+    if side >= WALK_BEGINS:
+        return 0
+    return terms.col if side & 1 else terms.row
+
+
 @lean_kernel
 def real_cost(passages: Passages, terms: Terms, program: Program, count: int) -> int:
     """Return the cost of the window's passages, without prices."""
@@ -179,5 +187,7 @@ def real_cost(passages: Passages, terms: Terms, program: Program, count: int) ->
         for slot in range(SLOTS):
             other = passages.partner[cell, slot]
             if other != NONE and other > slot:
-                total += passage_cost(side_of(slot), side_of(other), terms.step, terms.turn)
+                one, two = side_of(slot), side_of(other)
+                total += passage_cost(one, two, terms.step, terms.turn)
+                total += _added(terms, one) + _added(terms, two)
     return total

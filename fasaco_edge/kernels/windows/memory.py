@@ -138,9 +138,11 @@ class Terms(NamedTuple):
 
     Attributes:
         step, turn: a step and a quarter-turn [half us].
-        prices: int64 (n, 4), additional price at a side of a cell, by direction.
+        prices: int64 (n, 4), additional price at a side of a cell, by direction, with ``row``
+            and ``col``.
         begin_price, end_price: additional price of its first and its last visit.
         free_end: whether it may end in any cell to cover.
+        row, col: added to half a step along a row, along a column [half us].
     """
 
     step: int
@@ -149,6 +151,8 @@ class Terms(NamedTuple):
     begin_price: int
     end_price: int
     free_end: bool
+    row: int = 0
+    col: int = 0
 
 
 class Window(NamedTuple):

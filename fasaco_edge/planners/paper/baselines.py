@@ -36,6 +36,8 @@ from fasaco_edge.planners.problem import CoverageProblem, graph_of, scratch_for
 RIGHT_HAND = (3, 0, 1, 2)
 # Absolute directions, along the rows first: west, east, south, north.
 ROWS_FIRST = (2, 0, 3, 1)
+# Along the columns first: south, north, west, east.
+COLUMNS_FIRST = (3, 1, 2, 0)
 # An ant of this velocity goes straight on for as long as possible.
 STRAIGHT_ON = 64
 
@@ -62,7 +64,7 @@ class FixedRule:
             cells,
             planner=self.name,
             seed=0,
-            cost_s=problem.cost.of_walk(cells),
+            cost_s=problem.cost.seconds.of_walk(cells),
             first_walk_s=time.perf_counter() - began,
         )
 
@@ -121,13 +123,17 @@ def first_walks(problem: CoverageProblem, graph: Graph) -> Iterator[NDArray[np.i
 
     The first is that of an ant that always takes the cell with the fewest open neighbours,
     Warnsdorff's rule. Where turns cost, an ant that goes straight on, the spiral, the zigzag and
-    the walk around a spanning tree follow: each is best on some grids.
+    the walk around a spanning tree follow: each is best on some grids. So does a zigzag in
+    the direction of the lanes, if one is preferred.
     """
     yield _ant(problem, graph, velocity=1)
     if problem.cost.quarter_turn_us:
         yield _ant(problem, graph, velocity=STRAIGHT_ON)
         for rule in (spiral_stc(), zigzag(), stc()):
             yield rule.walk(problem, graph)
+    if problem.cost.has_lanes:
+        order = COLUMNS_FIRST if problem.cost.row_s else ROWS_FIRST
+        yield _sweep(order, False, problem, graph)
 
 
 def _ant(problem: CoverageProblem, graph: Graph, velocity: int) -> NDArray[np.int32]:

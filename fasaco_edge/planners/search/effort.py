@@ -39,7 +39,7 @@ def effort_for(cost: CoverageCost) -> Effort:
     With free turns, proposals at temperature 0 all over the walk work best; otherwise the
     surroundings of a perturbation are annealed.
     """
-    if not cost.quarter_turn_us:
+    if not (cost.quarter_turn_us or cost.has_lanes):
         rules = PerturbationRules(
             limit=EVERY_CELL,
             proposals=25,
@@ -99,7 +99,7 @@ def repair_for(cost: CoverageCost) -> RepairEffort:
         steady=True,
         strict=True,
     )
-    if not cost.quarter_turn_us:
+    if not (cost.quarter_turn_us or cost.has_lanes):
         return RepairEffort(rules, 30_000, 24_000, 0)
     unit = (cost.step_us + cost.quarter_turn_us) * 2 // 5
     rules = rules._replace(proposals=40, radius=5, temperature_us=unit * 3 // 2, loops_of_256=128)

@@ -72,7 +72,10 @@ class NearOptimal:
         walks until stopped; it starts from the previous walk if that costs no more than the first
         simple walk.
         """
-        return _with_lead(problem, self._plan(problem, stop, observe))
+        path = _with_lead(problem, self._plan(problem, stop, observe))
+        if not problem.cost.has_lanes:
+            return path
+        return replace(path, cost_s=problem.cost.seconds.of_walk(path.cells))
 
     def _plan(
         self, problem: CoverageProblem, stop: StoppingCriterion, observe: Observer

@@ -60,10 +60,8 @@ class Restarts:
         self._cohort, self._velocity = 0, settings.colony.velocities[0]
         self.ants = 0
 
-    def next_walk(
-        self, best: NDArray[np.int32], best_us: int
-    ) -> tuple[NDArray[np.int32], int] | None:
-        """Let the next group walk; return its cheapest walk and cost [us]; None without ants.
+    def next_walk(self, best: NDArray[np.int32], best_us: int) -> NDArray[np.int32] | None:
+        """Let the next group walk; return its walk of the fewest seconds; None without ants.
 
         Args:
             best: the best walk so far, flat cells int32 (n,).
@@ -78,7 +76,8 @@ class Restarts:
             colony.strengthen()
         self._cohort, self._velocity = group.cohort, group.velocity
         self.ants += len(group.streams)
-        return colony.walk(group.velocity, group.streams)
+        walk, _ = colony.walk(group.velocity, group.streams)
+        return walk
 
     def snapshot(self, best: NDArray[np.int32], best_us: int, ants: int) -> ColonySnapshot:
         """Return the trail at the end of a search, strengthened along the best walk.

@@ -168,8 +168,9 @@ class Search:
             return False
         if self._walk.least_us <= self._bound.cost_us:
             return True
-        turns_cost = self._framed.prices.quarter_turn_us
-        return not turns_cost and self.progress().steps == self._bound.steps
+        cost = self._problem.cost
+        only_steps = not (cost.quarter_turn_us or cost.has_lanes)
+        return only_steps and self.progress().steps == self._bound.steps
 
     def _tighten(self, work: int) -> LowerBound:
         """Return the lower bound after this much more work on it."""
@@ -275,8 +276,8 @@ class Search:
             return False
         if self._before_ants_us is None:
             self._before_ants_us = best_us
-        walk, cost_us = found
-        self._walk.restart(self._framed.framed(walk), cost_us)
+        walk = self._framed.framed(found)
+        self._walk.restart(walk, self._problem.cost_us(walk))
         return True
 
     def show(self) -> None:

@@ -223,6 +223,9 @@ def _terms(
     """Return the terms, and the reachable cells, framed, in row order."""
     flat, priced, is_wanted = bound.side_prices()
     cells = framed.framed(flat)
+    # Half a step is priced at each of the two cells.
+    row, col = problem.cost.row_us, problem.cost.col_us
+    priced = priced + np.array([row, col, row, col], np.int64)
     prices = np.zeros((framed.ground.bound, 4), np.int64)
     prices[cells] = priced
     step, turn = 2 * problem.cost.step_us, 2 * problem.cost.quarter_turn_us
@@ -232,7 +235,8 @@ def _terms(
     ends = is_wanted if problem.end is None else flat == problem.flat_end
     begin_price = -(step // 2 + int(sides[flat == problem.flat_start].min()))
     end_price = -(step // 2 + int(sides[ends].min()))
-    return Terms(step, turn, prices, begin_price, end_price, problem.end is None), cells
+    is_free = problem.end is None
+    return Terms(step, turn, prices, begin_price, end_price, is_free, row, col), cells
 
 
 def _program(size: int, beam: int, cells: int) -> Program:
