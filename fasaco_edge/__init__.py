@@ -25,6 +25,7 @@ _PLACES = {
     "Search": "offline.settings:Search",
     "load_map": "offline.maps:load_map",
     "plan": "offline.plan:plan",
+    "plan_passes": "offline.passes:plan_passes",
 }
 
 

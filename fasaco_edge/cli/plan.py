@@ -45,9 +45,15 @@ def run(args: argparse.Namespace) -> int:
         [*map_sources(find_map(args.map)), *request.sources],
     )
     if args.robots or args.robots_xy:
+        if args.passes is not None:
+            raise BadConfiguration("--passes is for one robot, not with --robots and --robots-xy")
         from fasaco_edge.fleet.cli.plan import plan_fleet
 
         return plan_fleet(args, request)
+    if args.passes is not None:
+        from fasaco_edge.cli.planning.passes import plan_in_passes
+
+        return plan_in_passes(args, request)
     if args.pheromone_png and (request.own or search.planner not in WITH_PHEROMONE):
         raise BadConfiguration(
             "--pheromone-png: the planner leaves no pheromone",

@@ -13,12 +13,14 @@ from numpy.typing import NDArray
 
 from fasaco_edge.config.robot import RobotConfig
 from fasaco_edge.errors import EndBlocked, MapTooFar, MapTooLarge
-from fasaco_edge.grid.fine_raster import RobotDiscs, map_to_raster
+from fasaco_edge.grid.fine_raster import RobotDiscs, map_to_raster, stand_placement
 from fasaco_edge.grid.floor import Floor, StandLattice
 from fasaco_edge.grid.lattice import Cell, CoverageLattice
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.grid.rotation import rotated_geometry
 from fasaco_edge.grid.walls import wall_direction
+from fasaco_edge.kernels.floor.bits import packed, unpacked
+from fasaco_edge.kernels.floor.places import keep_in_cells
 from fasaco_edge.offline.settings import AXES, HOME, WALLS
 from fasaco_edge.planners.line import LINES, LineSearch
 
@@ -106,6 +108,24 @@ class Ground:
             raise EndBlocked(f"end cell {end} is out of reach, or the robot does not fit there")
         window = self.stands.lattice.window
         return row + window.row0, col + window.col0
+
+    def only(self, cells: NDArray[np.bool_], *, beyond: bool) -> Ground:
+        """Return this ground with no more floor to sweep than lies in some cells.
+
+        Args:
+            cells: bool (rows, cols) of the lattice.
+            beyond: whether floor in cells without a stand, as along walls, is to be swept, too.
+        """
+        if self.floor is None:
+            return self
+        floor, window = self.floor, self.lattice.window
+        below = rotated_geometry(floor.geometry, -self.lattice_deg)
+        placement = stand_placement(below, self.lattice.cell_m, floor.discs.radius_m)
+        kept = packed(floor.reachable, beyond=False)
+        chosen = cells | ~self.lattice.coverable if beyond else cells
+        keep_in_cells(kept, placement, chosen, (window.row0, window.col0), (0, 0))
+        reachable = unpacked(kept, floor.geometry.cols)
+        return replace(self, floor=replace(floor, reachable=reachable))
 
     def line_search(
         self,

@@ -7,6 +7,7 @@ import operator
 import time
 from collections.abc import Callable
 from dataclasses import replace
+from typing import get_args
 
 import msgspec
 import numpy as np
@@ -31,8 +32,10 @@ from fasaco_edge.offline.settings import (
 )
 from fasaco_edge.planners.bound import lower_bound_of
 from fasaco_edge.planners.compiling import compile_missing
+from fasaco_edge.planners.cost import ANY_LANES, Lanes
 from fasaco_edge.planners.line import LINES
 from fasaco_edge.planners.own.loading import UserCode, user_code
+from fasaco_edge.planners.passes import Covers, wanted_by
 from fasaco_edge.planners.planner import (
     Observer,
     SearchProgress,
@@ -56,6 +59,8 @@ def plan(
     end: str | Cell = ANYWHERE,
     line: str | None = None,
     align: str | float | None = None,
+    covers: Covers = "all",
+    lanes: Lanes = ANY_LANES,
     search: Search | None = None,
     planner: object = None,
     stop: StoppingCriterion | None = None,
@@ -78,6 +83,9 @@ def plan(
             and for "cells" on a coverage grid or without local search.
         align: what the rows of cells are parallel to, with a line over the floor: "walls", "axes"
             or an angle [deg]; None for walls.
+        covers: "all" cells; "edge", those along walls and furniture; or "rest", all others.
+        lanes: preferred direction of the walk: along the "rows" of cells, or the "columns"; "" for
+            what is cheapest.
         search: settings of the search; None for the defaults.
         planner: a planner of your own instead of a search: a function that takes a ``GridProblem``
             and returns the walk's cells (row, col) in order; or a class, or an object, with such a
@@ -110,9 +118,18 @@ def plan(
         own = planner if isinstance(planner, UserCode) else user_code(planner)
         search = replace(search, local_search=False)
     line = line or default_line(search, has_floor=map.grid is not None)
+    require(covers in get_args(Covers), "covers", "be all, edge or rest", covers)
+    require(lanes in get_args(Lanes), "lanes", "be rows, columns or empty", lanes)
+    if lanes and not search.has_local_search:
+        raise BadConfiguration(
+            f"lanes {lanes}: only the search has a direction of its lanes",
+            hint="plan with local search, by fasaco",
+        )
     compile_missing(stages=stages_of_plan(search.planner))
     ground = _ground(map, robot, start, start_xy, line, align)
-    problem = _problem(ground, robot, end)
+    problem = _problem(ground, robot, end, covers, lanes)
+    if covers != "all":
+        ground = ground.only(problem.to_cover, beyond=covers == "edge")
     bound = None if search.has_local_search else lower_bound_of(problem)
     budget = None if search.most_s is None else TimeBudget(search.most_s)
     ending = Ending(search, stop, budget, watch, bound)
@@ -200,7 +217,18 @@ def _ground(
     return Ground.of_floor(map.grid, robot, start_xy, WALLS if align is None else align)
 
 
-def _problem(ground: Ground, robot: RobotConfig, end: str | Cell) -> CoverageProblem:
-    cost = robot.cost(ground.lattice.cell_m)
+def _problem(
+    ground: Ground,
+    robot: RobotConfig,
+    end: str | Cell,
+    covers: Covers = "all",
+    lanes: Lanes = ANY_LANES,
+) -> CoverageProblem:
+    lattice, start = ground.lattice, ground.start
+    cost = robot.cost(lattice.cell_m).along(lanes)
     to = ground.end(end, robot.tool_width_m)
-    return CoverageProblem.of(ground.lattice, ground.start, end=to, cost=cost)
+    problem = CoverageProblem.of(lattice, start, end=to, cost=cost)
+    if covers == "all":
+        return problem
+    others = problem.to_cover & ~wanted_by(covers, lattice.steps, problem.to_cover)
+    return CoverageProblem.of(lattice, start, covered=others, end=to, cost=cost)

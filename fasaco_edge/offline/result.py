@@ -236,8 +236,8 @@ def velocities_of(plan: Plan) -> str | None:
     return {"fasaco": plan.search.velocities, "aco": "1"}.get(plan.path.planner)
 
 
-def picture_of(plan: Plan) -> Image.Image:
-    """Return a picture, RGB, of a plan."""
+def picture_of(plan: Plan, of: str = "") -> Image.Image:
+    """Return a picture, RGB, of a plan; its title begins with ``of``."""
     path, ground, judged = plan.path, plan.ground, plan.judged
     has_search = plan.search.has_local_search
     search = f", {path.work.perturbations} perturbations" if has_search else ""
@@ -256,7 +256,7 @@ def picture_of(plan: Plan) -> Image.Image:
         ground.lattice,
         path.cells,
         grid=ground.grid,
-        title=path.planner + _colony(plan) + search,
+        title=of + path.planner + _colony(plan) + search,
         lines=lines,
         line_xy=plan.xy,
         swept=MapLayer(judged.geometry, judged.swept) if judged and shows_floor else None,

@@ -28,7 +28,7 @@ COLONY = fe.Search(local_search=False, ants=64, seed=3)
 
 
 def test_each_example_of_the_guide_runs(tmp_path):
-    assert len(EXAMPLES) == 4
+    assert len(EXAMPLES) == 5
     said = [
         subprocess.run(
             [sys.executable, "-c", example],
@@ -50,6 +50,7 @@ def test_each_example_of_the_guide_runs(tmp_path):
         *("fasaco", "aco", "spiral-stc", "zigzag")
     ]
     assert said[3].count("gap") == 3
+    assert [row.split()[0] for row in said[4].splitlines()] == ["edge", "auto", "cross"]
 
 
 def test_a_plan_is_that_of_the_command(tmp_path, capsys):

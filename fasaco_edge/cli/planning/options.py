@@ -7,6 +7,7 @@ import math
 from pathlib import Path
 
 from fasaco_edge.cli.console.arguments import add_json, pair_of_floats, pair_of_ints
+from fasaco_edge.cli.planning.passes import add_passes
 from fasaco_edge.cli.planning.request import add_turning
 from fasaco_edge.config.robot import RobotConfig
 from fasaco_edge.offline.settings import (
@@ -35,6 +36,7 @@ your building and robot:
   fasaco-edge plan scan.png --resolution 0.05 --unknown-free --png line.png
   fasaco-edge plan site.yaml --line quick --align axes --xy-out line.csv
   fasaco-edge plan site.yaml --swept 0.995 --budget 10 --png line.png
+  fasaco-edge plan site.yaml --passes edge,auto,cross --png passes.png
   fasaco-edge plan office --turn-s 2 --budget 0.1 --end 12,3
   fasaco-edge plan office --robots 0,0 10,5 5,8 --end home --png fleet.png
 the paper's planners, and your own:
@@ -57,6 +59,10 @@ figures:
                    the time of driving that area once at the tool's width; patches larger
                    than 4 dm2 not swept, the largest; illegal_share, the part of
                    the line where the robot would touch what is not known to be free
+
+figures of several passes: sums, and for each pass its own
+  along_share      share of its line's length along its lanes, within 15 degrees; null if
+                   no direction is preferred
 
 figures of several robots:
   makespan_steps   steps of the longest walk; makespan_s seconds of the costliest
@@ -179,6 +185,7 @@ def _add_problem(group: argparse._ArgumentGroup) -> None:
         default=argparse.SUPPRESS,
         help="short for --end home",
     )
+    add_passes(group)
     group.add_argument(
         "--speed-m-s",
         type=float,

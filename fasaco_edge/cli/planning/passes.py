@@ -1,0 +1,130 @@
+"""``plan --passes``: several passes over a map, one after the other."""
+
+from __future__ import annotations
+
+import argparse
+import logging
+import signal
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fasaco_edge.cli.console import terminal
+from fasaco_edge.cli.console.arguments import Exit, writing
+from fasaco_edge.cli.console.streams import print_json
+from fasaco_edge.cli.planning.request import PlanRequest, require_frame, watching
+from fasaco_edge.cli.warmup import compile_kernels
+from fasaco_edge.errors import BadConfiguration
+from fasaco_edge.host.processes import first_signal_calls
+from fasaco_edge.planners.passes import Pass, check_passes, read_pass
+from fasaco_edge.planners.planner import Interrupt
+from fasaco_edge.planners.stages import stages_of_plan
+
+LOG = logging.getLogger(__name__)
+
+
+def add_passes(group: argparse._ArgumentGroup) -> None:
+    """Add the option."""
+    group.add_argument(
+        "--passes",
+        type=_passes,
+        metavar="PASS,...",
+        help="several passes, each from where the one before ends: auto (lanes as they are "
+        "cheapest), cross (lanes across those of the pass before), an angle of the lanes [degrees "
+        "counter-clockwise to the map's x axis], edge (only the cells along walls and furniture), "
+        "rest (the others, after edge), rest:cross; with @0.15 at that speed [m/s], at most the "
+        "robot's.; the budget is for each pass",
+    )
+
+
+def _passes(text: str) -> list[Pass]:
+    """Read passes."""
+    try:
+        return [read_pass(each) for each in text.split(",")]
+    except BadConfiguration as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
+
+
+def plan_in_passes(args: argparse.Namespace, request: PlanRequest) -> int:
+    """Plan the passes, print their figures, and write the requested files.
+
+    Raises:
+        BadConfiguration: an option does not go with ``--passes``, or a pass not with those before.
+    """
+    search = request.search
+    check_passes(args.passes, "--passes")
+    if request.own or not search.has_local_search:
+        raise BadConfiguration(
+            "--passes: only the search has passes", hint="plan with local search, by fasaco"
+        )
+    if args.pheromone_png:
+        raise BadConfiguration("--pheromone-png: several passes leave no single trail")
+    compile_kernels(stages_of_plan(search.planner))
+    # Imported only now, as these modules import the compiler.
+    from fasaco_edge.offline.maps import load_map
+    from fasaco_edge.offline.passes import plan_passes
+
+    map = load_map(args.map, resolution_m=args.resolution, unknown_free=args.unknown_free)
+    require_frame(map, args.xy_out)
+    asked, total = Interrupt(), search.most_s
+    total = None if total is None else total * len(args.passes)
+    with first_signal_calls(signal.SIGINT, asked.asked.set), watching(total) as show:
+        planned = plan_passes(
+            map,
+            request.robot,
+            args.passes,
+            start=args.start,
+            start_xy=args.start_xy,
+            end=args.end,
+            line=request.line,
+            align=args.align,
+            search=search,
+            stop=asked,
+            watch=show,
+        )
+    if args.path_out is not None:
+        with writing(args.path_out) as file:
+            walks = [plan.cells for plan in planned.plans]
+            np.savetxt(file, _numbered(walks), "%d", ",", header="pass,row,col", comments="")
+    if args.xy_out is not None:
+        with writing(args.xy_out) as file:
+            rows = _numbered([plan.xy for plan in planned.plans])
+            form = ("%d", "%.6f", "%.6f")
+            np.savetxt(file, rows, form, ",", header="pass,x_m,y_m", comments="")
+    if args.png is not None:
+        with writing(args.png) as file:
+            planned.plot(file)
+    figures = planned.figures | {"map": str(args.map)}
+    if args.json:
+        print_json(figures)
+    else:
+        _print(args, figures, str(planned.floor or "not known of a coverage grid"))
+    return Exit.INTERRUPTED if asked.asked.is_set() else Exit.OK
+
+
+def _numbered(tables: Sequence[NDArray[np.generic]]) -> NDArray[np.generic]:
+    """Return tables (n, 2) as one, each row with the number of its pass, from 1."""
+    return np.vstack(
+        [np.column_stack((np.full(len(rows), at), rows)) for at, rows in enumerate(tables, 1)]
+    )
+
+
+def _print(args: argparse.Namespace, figures: dict[str, Any], floor: str) -> None:
+    """Print the sums as a table, and a line for each pass."""
+    passes = figures.pop("passes")
+    figures["floor"] = floor
+    rows = [(name.replace("_", " "), str(value)) for name, value in figures.items()]
+    terminal.out().print(terminal.figures(rows))
+    for number, each in enumerate(passes, 1):
+        share, gap = each["along_share"], each["gap"]
+        words = "" if share is None else f", {share:.0%} of the line along its lanes"
+        words += "" if gap is None else f", at most {gap:.1%} above the bound"
+        terminal.out().print(
+            f"pass {number}, {each['pass']}: {each['cells']} cells, {each['steps']} steps, "
+            f"{each['cost_s']:.1f} s{words}"
+        )
+    for file in (args.path_out, args.xy_out, args.png):
+        if file is not None:
+            terminal.out().print(f"wrote {file}")

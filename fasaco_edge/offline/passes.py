@@ -1,0 +1,213 @@
+"""Plans of several passes over a map, each from where the one before ends, and their figures."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, replace
+from functools import cached_property
+from pathlib import Path
+
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+from fasaco_edge.config.robot import RobotConfig
+from fasaco_edge.errors import BadConfiguration
+from fasaco_edge.grid.lattice import Cell
+from fasaco_edge.host.outputs import whole
+from fasaco_edge.offline.ground import Line
+from fasaco_edge.offline.maps import Map
+from fasaco_edge.offline.plan import plan
+from fasaco_edge.offline.result import Plan, PlannedFloor, judged_floor, picture_of
+from fasaco_edge.offline.settings import ANYWHERE, CELLS, HOME, Search
+from fasaco_edge.planners.passes import Pass, laid, read_pass
+from fasaco_edge.planners.planner import SearchProgress, StoppingCriterion
+
+# A segment of a line runs along the lanes if it is turned against them by no more than this [deg].
+ALONG_DEG = 15.0
+
+
+@dataclass(frozen=True)
+class PassPlans:
+    """Passes over a map, one plan each.
+
+    Attributes:
+        passes: what was asked for.
+        plans: their plans, in order.
+    """
+
+    passes: tuple[Pass, ...]
+    plans: tuple[Plan, ...]
+
+    @property
+    def names(self) -> list[str]:
+        """What is special about each pass, as text."""
+        return [each.name or "auto" for each in self.passes]
+
+    @cached_property
+    def xy(self) -> Line:
+        """The line over all passes, float64 (n, 2): points (x, y) [m] in the map frame."""
+        return np.concatenate([plan.xy for plan in self.plans])
+
+    @property
+    def cost_s(self) -> float:
+        """Time to drive and turn along the cells of all passes [s]."""
+        return math.fsum(plan.cost_s for plan in self.plans)
+
+    @cached_property
+    def floor(self) -> PlannedFloor | None:
+        """Figures of the floor that the whole line sweeps; None for a coverage grid."""
+        first = self.plans[0]
+        judged = judged_floor(first.map.grid, self.xy, first.robot)
+        if judged is None:
+            return None
+        # The least time is that of one pass.
+        return replace(PlannedFloor.of(judged.figures), gap=None)
+
+    @property
+    def figures(self) -> dict[str, object]:
+        """All figures, as values that JSON has too: those of ``fasaco-edge plan --json``."""
+        first = self.plans[0]
+        return {
+            "map": first.map.name,
+            "line": first.line,
+            "steps": sum(plan.steps for plan in self.plans),
+            "length_m": round(math.fsum(length_m(plan.xy) for plan in self.plans), 3),
+            "cost_s": self.cost_s,
+            "wall_s": round(math.fsum(plan.wall_s for plan in self.plans), 6),
+            "floor": asdict(self.floor) if self.floor else None,
+            "passes": [
+                {"pass": name, "along_share": _along(plan)} | plan.figures
+                for name, plan in zip(self.names, self.plans, strict=True)
+            ],
+        }
+
+    def plot(self, file: str | Path | None = None) -> Image.Image:
+        """Return a picture, RGB, with the passes side by side; as PNG, too."""
+        count, pairs = len(self.plans), zip(self.names, self.plans, strict=True)
+        pictures = [
+            picture_of(plan, f"pass {number} of {count}, {name}: ")
+            for number, (name, plan) in enumerate(pairs, 1)
+        ]
+        size = sum(each.width for each in pictures), max(each.height for each in pictures)
+        picture, left = Image.new("RGB", size, "white"), 0
+        for each in pictures:
+            picture.paste(each, (left, 0))
+            left += each.width
+        if file is not None:
+            with whole(Path(file)) as new:
+                picture.save(new, "PNG")
+        return picture
+
+
+def plan_passes(
+    map: Map,
+    robot: RobotConfig | None = None,
+    passes: Sequence[str | Pass] = ("auto",),
+    *,
+    start: Cell | None = None,
+    start_xy: tuple[float, float] | None = None,
+    end: str | Cell = ANYWHERE,
+    line: str | None = None,
+    align: str | float | None = None,
+    search: Search | None = None,
+    stop: StoppingCriterion | None = None,
+    watch: Callable[[SearchProgress], None] = lambda _: None,
+) -> PassPlans:
+    """Plan several passes over a map, each from where the one before ends.
+
+    Args:
+        map, robot, start, start_xy, line, align, search, stop, watch: see ``plan``; the budget is
+            that of each pass.
+        passes: what each covers, and the direction of its lanes: "edge", "rest", "auto", "cross",
+            an angle [deg] as text, "rest:cross", "cross@0.15" with a speed [m/s]; or a ``Pass``.
+        end: where the last pass ends: "anywhere", "home", or a cell.
+
+    Raises:
+        BadConfiguration: a value is impossible, also those that ``plan`` raises.
+    """
+    robot = RobotConfig() if robot is None else robot
+    asked = tuple(read_pass(each) if isinstance(each, str) else each for each in passes)
+    plans: list[Plan] = []
+    for index, (each, lay) in enumerate(zip(asked, laid(asked), strict=True)):
+        is_last = index == len(asked) - 1
+        if plans and line == CELLS:
+            row, col = plans[-1].cells[-1].tolist()
+            start, start_xy = (row, col), None
+        elif plans:
+            x, y = plans[-1].xy[-1].tolist()
+            start, start_xy = None, (x, y)
+        planned = plan(
+            map,
+            _at_speed(robot, each.speed_m_s),
+            start=start,
+            start_xy=start_xy,
+            end=_end(end, plans) if is_last else ANYWHERE,
+            line=line,
+            align=align if lay.angle_deg is None else lay.angle_deg,
+            covers=lay.covers,
+            lanes=lay.lanes,
+            search=search,
+            stop=stop,
+            watch=watch,
+        )
+        plans.append(planned)
+        line = planned.line
+    return PassPlans(asked, tuple(plans))
+
+
+def _at_speed(robot: RobotConfig, speed_m_s: float | None) -> RobotConfig:
+    """Return a robot that drives at a speed [m/s].
+
+    Raises:
+        BadConfiguration: it cannot drive so fast.
+    """
+    if speed_m_s is None:
+        return robot
+    if speed_m_s > robot.speed_m_s:
+        raise BadConfiguration(
+            f"a pass at {speed_m_s:g} m/s is faster than the robot, {robot.speed_m_s:g} m/s"
+        )
+    return msgspec.structs.replace(robot, speed_m_s=speed_m_s)
+
+
+def _end(end: str | Cell, plans: Sequence[Plan]) -> str | Cell:
+    """Return the end of the last pass: home is where the first one began."""
+    if end != HOME or not plans:
+        return end
+    first = plans[0]
+    if first.line == CELLS:
+        return first.problem.start
+    x, y = first.xy[0] // first.robot.tool_width_m
+    return int(y), int(x)
+
+
+def length_m(xy: NDArray[np.float64]) -> float:
+    """Return the length of a line, float64 (n, 2) [m]."""
+    return float(np.hypot(*np.diff(xy, axis=0).T).sum())
+
+
+def along_share(xy: NDArray[np.float64], angle_deg: float) -> float | None:
+    """Return the share of a line's length that runs at an angle; None without length.
+
+    Args:
+        xy: float64 (n, 2), points (x, y) [m].
+        angle_deg: angle to the x axis [deg].
+    """
+    x, y = np.diff(xy, axis=0).T
+    lengths = np.hypot(x, y)
+    aside = np.abs((np.degrees(np.arctan2(y, x)) - angle_deg + 90.0) % 180.0 - 90.0)
+    total = float(lengths.sum())
+    return float(lengths[aside <= ALONG_DEG].sum()) / total if total else None
+
+
+def _along(plan: Plan) -> float | None:
+    """Return the share of a plan's line along its lanes; None without a preferred direction."""
+    cost = plan.problem.cost
+    if not cost.has_lanes:
+        return None
+    across_rows = cost.row_us > 0
+    share = along_share(plan.xy, plan.ground.lattice_deg + 90.0 * across_rows)
+    return None if share is None else round(share, 4)

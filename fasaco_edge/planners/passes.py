@@ -1,0 +1,174 @@
+"""Passes over a floor: which cells each one covers, and in which direction its lanes run.
+
+A direction is an angle of the lattice, and lanes along its rows or its columns: lanes across those
+of the pass before need no other lattice.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Literal, NamedTuple, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fasaco_edge.errors import BadConfiguration
+from fasaco_edge.kernels import EAST, NORTH, SOUTH, WEST
+from fasaco_edge.planners.cost import ANY_LANES, COLUMNS, ROWS, Lanes
+
+# All cells; those along walls and furniture; those that the pass before has left.
+Covers = Literal["all", "edge", "rest"]
+# Lanes as they are cheapest; across those of the pass before.
+Direction = Literal["auto", "cross"]
+MOST_PASSES = 100
+MOST_ANGLE_DEG = 360.0
+# Steps in all directions.
+_OPEN = 1 << EAST | 1 << NORTH | 1 << WEST | 1 << SOUTH
+
+
+@dataclass(frozen=True, slots=True)
+class Pass:
+    """A pass over the floor.
+
+    Attributes:
+        covers: which cells: all, those along edges, or the rest after the pass before.
+        lanes: their direction: auto or cross.
+        angle_deg: their angle to the x axis of the map frame in place of ``lanes`` [deg].
+        speed_m_s: speed of the robot [m/s]; None for its usual one.
+    """
+
+    covers: Covers = "all"
+    lanes: Direction = "auto"
+    angle_deg: float | None = None
+    speed_m_s: float | None = None
+
+    @property
+    def name(self) -> str:
+        """What is special about it, as text; "" for nothing."""
+        angle = "cross" if self.lanes == "cross" else ""
+        if self.angle_deg is not None:
+            angle = f"{self.angle_deg:g} degrees"
+        covers = "" if self.covers == "all" else self.covers
+        return " ".join(filter(None, (covers, angle)))
+
+
+class Laid(NamedTuple):
+    """A pass on a lattice.
+
+    Attributes:
+        covers: as ``Pass.covers``.
+        lanes: direction of its lanes on the lattice.
+        angle_deg: angle of the lattice's rows to the x axis of the map frame [deg]; None for the
+            usual one.
+    """
+
+    covers: Covers = "all"
+    lanes: Lanes = ANY_LANES
+    angle_deg: float | None = None
+
+
+def laid(passes: Sequence[Pass]) -> list[Laid]:
+    """Return passes on lattices.
+
+    Lanes that others are to cross run along the rows; an edge has no lanes to cross.
+
+    Raises:
+        BadConfiguration: see ``check_passes``.
+    """
+    check_passes(passes)
+    found: list[Laid] = []
+    before = Laid()
+    for index, each in enumerate(passes):
+        if each.covers == "edge":
+            found.append(Laid("edge"))
+            continue
+        if each.lanes == "cross":
+            lanes, angle_deg = (ROWS if before.lanes == COLUMNS else COLUMNS), before.angle_deg
+        else:
+            is_laned = each.angle_deg is not None or _is_crossed(passes[index + 1 :])
+            lanes, angle_deg = (ROWS if is_laned else ANY_LANES), each.angle_deg
+        before = Laid(each.covers, lanes, angle_deg)
+        found.append(before)
+    return found
+
+
+def _is_crossed(after: Iterable[Pass]) -> bool:
+    """Return whether the first of some passes that has lanes crosses those before."""
+    return next((each.lanes == "cross" for each in after if each.covers != "edge"), False)
+
+
+def check_passes(passes: Sequence[Pass], name: str = "passes") -> None:
+    """Check what a pass takes from those before it.
+
+    Raises:
+        BadConfiguration: there is no pass that it could cross, or leave cells to it; or the passes
+            are edges alone.
+    """
+    if not 1 <= len(passes) <= MOST_PASSES:
+        raise BadConfiguration(f"{name} must be 1 to {MOST_PASSES}, got {len(passes)}")
+    crossed = False
+    for index, each in enumerate(passes):
+        where = f"{name}[{index}]"
+        if each.lanes == "cross" and not crossed:
+            raise BadConfiguration(f"{where}: cross goes after a pass with lanes, which is missing")
+        if each.covers == "rest" and (not index or passes[index - 1].covers != "edge"):
+            raise BadConfiguration(f"{where}: rest goes after edge, which leaves cells over")
+        if each.covers == "edge" and (each.lanes == "cross" or each.angle_deg is not None):
+            raise BadConfiguration(f"{where}: edge follows the walls, and has no lanes")
+        crossed = crossed or each.covers != "edge"
+    if not crossed:
+        raise BadConfiguration(f"{name}: edge alone leaves most of the floor; add auto or rest")
+
+
+def read_pass(text: str) -> Pass:
+    """Return the pass in a text as edge, rest, auto, cross, 30, rest:cross or cross@0.15.
+
+    Raises:
+        BadConfiguration: it is none.
+    """
+    what, at, speed = text.partition("@")
+    has_cells = what.partition(":")[0] in get_args(Covers)
+    covers, _, lanes = (what if has_cells else f"all:{what}").partition(":")
+    lanes = "auto" if what == covers else lanes
+    angle_deg = None if lanes in get_args(Direction) else _number(lanes)
+    speed_m_s = _number(speed) if at else None
+    is_angle = angle_deg is None or abs(angle_deg) <= MOST_ANGLE_DEG
+    is_speed = speed_m_s is None or 0.0 < speed_m_s <= 10.0
+    if not (is_angle and is_speed):
+        raise BadConfiguration(
+            f"a pass is edge, rest, auto, cross or an angle up to {MOST_ANGLE_DEG:g} degrees, "
+            f"rest:cross, or cross@0.15 with a speed up to 10 m/s, got {text!r}"
+        )
+    direction: Direction = "cross" if lanes == "cross" else "auto"
+    return Pass(covers, direction, angle_deg, speed_m_s)  # type: ignore[arg-type]
+
+
+def _number(text: str) -> float:
+    """Return a number; NaN for other texts."""
+    try:
+        return float(text)
+    except ValueError:
+        return math.nan
+
+
+def edge_cells(steps: NDArray[np.uint8], reachable: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Return which reachable cells miss a step to one of the four cells beside them.
+
+    Args:
+        steps: uint8 (rows, cols), step masks of a lattice.
+        reachable: bool (rows, cols).
+    """
+    edge: NDArray[np.bool_] = reachable & (steps != _OPEN)
+    return edge
+
+
+def wanted_by(
+    covers: Covers, steps: NDArray[np.uint8], reachable: NDArray[np.bool_]
+) -> NDArray[np.bool_]:
+    """Return which reachable cells a pass covers; the arrays are as in ``edge_cells``."""
+    if covers == "all":
+        return reachable
+    edge = edge_cells(steps, reachable)
+    return edge if covers == "edge" else reachable & ~edge
