@@ -47,7 +47,8 @@ def stage(mission: MissionReport) -> str:
     if mission.stage != "covering":
         return one_line(mission.stage)
     what = f"zone {one_line(mission.zone)}" if mission.zone else "everything reachable"
-    return f"{what}, pass {mission.pass_number} of {mission.passes}"
+    kind = f", {one_line(mission.pass_kind)}" if mission.pass_kind else ""
+    return f"{what}, pass {mission.pass_number} of {mission.passes}{kind}"
 
 
 def zone_progress(zone: ZoneReport) -> tuple[str, str]:

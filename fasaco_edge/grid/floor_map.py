@@ -36,7 +36,7 @@ from fasaco_edge.grid.lattice import (
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.grid.reach import REACH_CELLS, REACH_PX, Reach
 from fasaco_edge.grid.tool_reach import tool_reach, tool_steps
-from fasaco_edge.kernels.floor.bits import WORD, Bits, unpacked
+from fasaco_edge.kernels.floor.bits import WORD, Bits, packed, unpacked
 from fasaco_edge.kernels.floor.places import (
     disc_rows,
     keep_in_cells,
@@ -215,6 +215,19 @@ class FloorMap:
         blocked = self.blocked[around.row0 : around.row1, first:end]
         reached = unpacked(tool_reach(found, blocked, radius, tool), words.cols)
         return reached[part.slices_in(words)]
+
+    def lying_in(self, cells: NDArray[np.bool_], part: Window) -> NDArray[np.bool_]:
+        """Return the pixels in a window of the raster that lie in cells, bool (rows, cols).
+
+        Args:
+            cells: bool (rows, cols) of the lattice.
+            part: window of the raster.
+        """
+        window = self.stands.lattice.window
+        found = packed(np.ones((part.rows, part.cols), np.bool_), beyond=False)
+        first, corner = (window.row0, window.col0), (part.row0, part.col0)
+        keep_in_cells(found, self.placement, cells, first, corner)
+        return unpacked(found, part.cols)
 
     def pixels_of(self, cells: NDArray[np.bool_]) -> Window | None:
         """Return a window of the pixels that the tool reaches from some cells; None without any.

@@ -122,7 +122,7 @@ def plan_passes(
         map, robot, start, start_xy, line, align, search, stop, watch: see ``plan``; the budget is
             that of each pass.
         passes: what each covers, and the direction of its lanes: "edge", "rest", "auto", "cross",
-            an angle [deg] as text, "rest:cross", "cross@0.15" with a speed [m/s]; or a ``Pass``.
+            an angle as "30deg", "rest:cross", "cross@0.15" with a speed [m/s]; or a ``Pass``.
         end: where the last pass ends: "anywhere", "home", or a cell.
 
     Raises:

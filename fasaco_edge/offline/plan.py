@@ -24,7 +24,6 @@ from fasaco_edge.offline.settings import (
     AXES,
     CELLS,
     HOME,
-    MOST_ANGLE_DEG,
     WALLS,
     Search,
     default_line,
@@ -35,7 +34,7 @@ from fasaco_edge.planners.compiling import compile_missing
 from fasaco_edge.planners.cost import ANY_LANES, Lanes
 from fasaco_edge.planners.line import LINES
 from fasaco_edge.planners.own.loading import UserCode, user_code
-from fasaco_edge.planners.passes import Covers, wanted_by
+from fasaco_edge.planners.passes import MOST_ANGLE_DEG, Covers, wanted_by
 from fasaco_edge.planners.planner import (
     Observer,
     SearchProgress,

@@ -16,7 +16,6 @@ ANYWHERE, HOME = "anywhere", "home"
 CELLS, THOROUGH = "cells", "thorough"
 # What the rows of cells are parallel to, for a line over the floor; or an angle [deg].
 WALLS, AXES = "walls", "axes"
-MOST_ANGLE_DEG = 360.0
 # Default time budget of a search [s], and the colony's settings that suit local search best. The
 # colony alone has the paper's settings, and walks to its end.
 BUDGET_S = 2.0

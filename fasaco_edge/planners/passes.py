@@ -18,7 +18,7 @@ from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.kernels import EAST, NORTH, SOUTH, WEST
 from fasaco_edge.planners.cost import ANY_LANES, COLUMNS, ROWS, Lanes
 
-# All cells; those along walls and furniture; those that the pass before has left.
+# All cells; those along walls and furniture; the others.
 Covers = Literal["all", "edge", "rest"]
 # Lanes as they are cheapest; across those of the pass before.
 Direction = Literal["auto", "cross"]
@@ -33,7 +33,7 @@ class Pass:
     """A pass over the floor.
 
     Attributes:
-        covers: which cells: all, those along edges, or the rest after the pass before.
+        covers: which cells: all, those along edges, or the rest, once edges are covered.
         lanes: their direction: auto or cross.
         angle_deg: their angle to the x axis of the map frame in place of ``lanes`` [deg].
         speed_m_s: speed of the robot [m/s]; None for its usual one.
@@ -113,8 +113,10 @@ def check_passes(passes: Sequence[Pass], name: str = "passes") -> None:
         where = f"{name}[{index}]"
         if each.lanes == "cross" and not crossed:
             raise BadConfiguration(f"{where}: cross goes after a pass with lanes, which is missing")
-        if each.covers == "rest" and (not index or passes[index - 1].covers != "edge"):
-            raise BadConfiguration(f"{where}: rest goes after edge, which leaves cells over")
+        if each.covers == "rest" and all(other.covers != "edge" for other in passes[:index]):
+            raise BadConfiguration(f"{where}: rest goes after an edge, which is missing")
+        if each.lanes == "cross" and each.angle_deg is not None:
+            raise BadConfiguration(f"{where}: cross is an angle, got another one beside it")
         if each.covers == "edge" and (each.lanes == "cross" or each.angle_deg is not None):
             raise BadConfiguration(f"{where}: edge follows the walls, and has no lanes")
         crossed = crossed or each.covers != "edge"
@@ -123,7 +125,7 @@ def check_passes(passes: Sequence[Pass], name: str = "passes") -> None:
 
 
 def read_pass(text: str) -> Pass:
-    """Return the pass in a text as edge, rest, auto, cross, 30, rest:cross or cross@0.15.
+    """Return the pass in a text as edge, rest, auto, cross, 30deg, rest:cross or cross@0.15.
 
     Raises:
         BadConfiguration: it is none.
@@ -132,17 +134,28 @@ def read_pass(text: str) -> Pass:
     has_cells = what.partition(":")[0] in get_args(Covers)
     covers, _, lanes = (what if has_cells else f"all:{what}").partition(":")
     lanes = "auto" if what == covers else lanes
-    angle_deg = None if lanes in get_args(Direction) else _number(lanes)
+    angle_deg = None if lanes in get_args(Direction) else _number(lanes.removesuffix("deg"))
     speed_m_s = _number(speed) if at else None
-    is_angle = angle_deg is None or abs(angle_deg) <= MOST_ANGLE_DEG
+    is_angle = angle_deg is None or (lanes.endswith("deg") and abs(angle_deg) <= MOST_ANGLE_DEG)
     is_speed = speed_m_s is None or 0.0 < speed_m_s <= 10.0
     if not (is_angle and is_speed):
         raise BadConfiguration(
-            f"a pass is edge, rest, auto, cross or an angle up to {MOST_ANGLE_DEG:g} degrees, "
+            f"a pass is edge, rest, auto, cross, an angle as 30deg up to {MOST_ANGLE_DEG:g}, "
             f"rest:cross, or cross@0.15 with a speed up to 10 m/s, got {text!r}"
         )
     direction: Direction = "cross" if lanes == "cross" else "auto"
     return Pass(covers, direction, angle_deg, speed_m_s)  # type: ignore[arg-type]
+
+
+def read_passes(text: str) -> tuple[Pass, ...]:
+    """Return the passes in a text: their number, or one text for each, with commas between.
+
+    Raises:
+        BadConfiguration: it is neither.
+    """
+    if text.isdecimal() and int(text) <= MOST_PASSES:
+        return (Pass(),) * int(text)
+    return tuple(read_pass(each) for each in text.split(","))
 
 
 def _number(text: str) -> float:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.mission.orders.order import MissionOrder, OrderDocument, order_document
+from fasaco_edge.mission.orders.passes import passes_words
 from fasaco_edge.review.moments import Span
 from fasaco_edge.review.run_data import RunData, StatusSample
 from fasaco_edge.wire.documents.replies import UnreachedArea
@@ -79,10 +80,9 @@ def command_words(name: str, order: MissionOrder) -> str:
 
 def order_words(order: OrderDocument) -> str:
     """Return an order in words."""
-    asked = [
-        f"zone {zone.name}" + (f" {zone.passes} times" if (zone.passes or 1) > 1 else "")
-        for zone in order.zones
-    ] or ["everything" + (f" {order.passes} times" if order.passes > 1 else "")]
+    asked = [f"zone {zone.name}" + passes_words(zone.passes or 1) for zone in order.zones] or [
+        "everything" + passes_words(order.passes)
+    ]
     if order.keep_out:
         corners = "; ".join(
             " ".join(f"({x:g}, {y:g})" for x, y in polygon) for polygon in order.keep_out

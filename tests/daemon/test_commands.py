@@ -381,3 +381,13 @@ def test_words_nobody_understands_are_named(capsys, words, said):
     with pytest.raises(SystemExit, match="2"):
         main(["mission", *words])
     assert said in capsys.readouterr().err
+
+
+def test_the_answer_says_what_is_special_about_a_pass(outsider, daemon):
+    passes = ["edge", {"angle_deg": 30}, "cross"]
+    answer = command(outsider, "start", {"zones": [KITCHEN], "passes": passes})
+    assert (answer["mission"]["pass_kind"], answer["mission"]["passes"]) == ("edge", 3)
+    said = command(outsider, "start", {"passes": ["cross"]})
+    assert said["code"] == "bad_order"
+    assert "passes[0]: cross goes after a pass with lanes" in said["message"]
+    assert command(outsider, "start", {"passes": 2})["mission"]["pass_kind"] is None

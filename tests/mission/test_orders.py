@@ -24,6 +24,7 @@ from fasaco_edge.mission.orders.order import (
 )
 from fasaco_edge.mission.orders.order_state import OrderState, Stage
 from fasaco_edge.mission.orders.reached_cells import ReachedCells
+from fasaco_edge.planners.passes import Pass
 from tests.support.examples import examples
 
 SQUARE = [[0, 0], [2, 0], [2, 2], [0, 2]]
@@ -59,6 +60,33 @@ def test_an_order_with_all_there_is():
     assert read_order(json.loads(json.dumps(order_document(order)))) == order
 
 
+def test_each_pass_may_have_its_cells_lanes_and_speed():
+    listed = ["edge", {"covers": "rest", "lanes": "cross"}, "auto", {"lanes": "cross"}]
+    with pytest.raises(OrderError, match=r"passes\[1\]: cross goes after a pass with lanes"):
+        read_order({"passes": listed})
+    listed[1] = {"covers": "rest", "angle_deg": -30.0, "speed_m_s": 0.1}
+    order = read_order({"passes": listed, "zones": [KITCHEN, {"name": "hall", "passes": 2}]})
+    kitchen, hall = order.zones
+    assert (kitchen.passes, hall.passes, hall.kinds) == (4, 2, ())
+    assert kitchen.kinds == (
+        Pass("edge"),
+        Pass("rest", "auto", -30.0, 0.1),
+        Pass(),
+        Pass(lanes="cross"),
+    )
+    assert [kitchen.laid(number).lanes for number in (1, 2, 3, 4)] == [
+        "",
+        "rows",
+        "rows",
+        "columns",
+    ]
+    document = json.loads(json.dumps(order_document(order)))
+    assert document["zones"][0]["passes"] == [*listed[:3], "cross"]
+    assert read_order(document) == order
+    # As many equal ones are a number, as older daemons know it.
+    assert order_document(read_order({"passes": ["auto", "auto"]}))["passes"] == 2
+
+
 @pytest.mark.parametrize(
     ("document", "said"),
     [
@@ -73,8 +101,21 @@ def test_an_order_with_all_there_is():
         ({"zones": [KITCHEN, KITCHEN]}, "zones[1].name: there is a zone 'kitchen' already"),
         ({"zones": [{**KITCHEN, "passes": 0}]}, "zones[0].passes: expected int >= 1, got 0"),
         ({"passes": 101}, "passes: expected int <= 100, got 101"),
-        ({"passes": True}, "passes: expected int, got True"),
-        ({"passes": 1.5}, "passes: expected int, got 1.5"),
+        ({"passes": True}, "passes: expected int | array, got True"),
+        ({"passes": 1.5}, "passes: expected int | array, got 1.5"),
+        ({"passes": []}, "passes: expected array of length >= 1, got []"),
+        ({"passes": ["auto"] * 101}, "passes: expected array of length <= 100"),
+        ({"passes": ["x"]}, "passes[0]: expected auto, cross, edge, rest, got 'x'"),
+        ({"passes": [30]}, "passes[0]: expected str | object, got 30"),
+        ({"passes": [{"lanes": "x"}]}, "passes[0].lanes: expected auto, cross, got 'x'"),
+        ({"passes": [{"covers": 1}]}, "passes[0].covers: expected str, got 1"),
+        ({"passes": [{"angle_deg": 361}]}, "passes[0].angle_deg: expected float <= 360.0, got 361"),
+        ({"passes": [{"speed_m_s": 0}]}, "passes[0].speed_m_s: expected float > 0.0, got 0"),
+        ({"passes": ["edge"]}, "passes: edge alone leaves most of the floor"),
+        (
+            {"zones": [{**KITCHEN, "passes": ["edge", "cross"]}]},
+            "zones[0].passes[1]: cross goes after a pass with lanes, which is missing",
+        ),
         ({"return_home": "yes"}, "return_home: expected bool, got 'yes'"),
         (zones([[0, 0], [1, 0]]), "zones[0].polygon: expected array of length >= 3"),
         (zones([[0, 0], [1, 0], [1]]), "zones[0].polygon[2]: expected array of length 2, got [1]"),

@@ -71,7 +71,7 @@ def test_figures_are_sums_and_those_of_each_pass(flat, tmp_path):
 
 
 def test_lanes_run_at_an_angle_of_the_map_frame_and_across_it():
-    plans = planned(fe.load_map("office"), "30", "cross", line="quick").plans
+    plans = planned(fe.load_map("office"), "30deg", "cross", line="quick").plans
     for plan, angle_deg in zip(plans, (30.0, 120.0), strict=True):
         assert plan.ground.lattice_deg == 30.0
         assert along_share(plan.xy, angle_deg) > 0.5
@@ -101,7 +101,7 @@ def test_a_slow_pass_takes_longer():
         ("--passes auto --no-local-search", "--passes: only the search has passes"),
         ("--passes auto --pheromone-png p.png", "leave no single trail"),
         ("--passes auto --robots 0,0 1,1", "--passes is for one robot"),
-        ("--passes 30 --line cells", "the centres of cells lie along the axes"),
+        ("--passes 30deg --line cells", "the centres of cells lie along the axes"),
     ],
 )
 def test_what_passes_cannot_be_is_said(capsys, words, said):

@@ -18,8 +18,8 @@ from fasaco_edge.planners.passes import Laid, Pass, edge_cells, laid, read_pass,
         ("edge", Pass("edge"), "edge"),
         ("rest", Pass("rest"), "rest"),
         ("rest:cross", Pass("rest", "cross"), "rest cross"),
-        ("-30", Pass(angle_deg=-30.0), "-30 degrees"),
-        ("rest:22.5@0.2", Pass("rest", "auto", 22.5, 0.2), "rest 22.5 degrees"),
+        ("-30deg", Pass(angle_deg=-30.0), "-30 degrees"),
+        ("rest:22.5deg@0.2", Pass("rest", "auto", 22.5, 0.2), "rest 22.5 degrees"),
         ("edge@0.1", Pass("edge", speed_m_s=0.1), "edge"),
     ],
 )
@@ -29,7 +29,20 @@ def test_a_text_is_a_pass(text, read, name):
 
 
 @pytest.mark.parametrize(
-    "text", ["", "corner", ":cross", "361", "nan", "cross@0", "cross@fast", "cross@nan", "walls:30"]
+    "text",
+    [
+        "",
+        "corner",
+        ":cross",
+        "30",
+        "361deg",
+        "nandeg",
+        "deg",
+        "cross@0",
+        "cross@fast",
+        "cross@nan",
+        "walls:30",
+    ],
 )
 def test_other_texts_are_refused_by_name(text):
     with pytest.raises(BadConfiguration, match="a pass is edge, rest, auto"):
@@ -45,7 +58,7 @@ def test_other_texts_are_refused_by_name(text):
         ("edge,rest,cross", [Laid("edge"), Laid("rest", ROWS), Laid("all", COLUMNS)]),
         ("auto,edge,cross", [Laid("all", ROWS), Laid("edge"), Laid("all", COLUMNS)]),
         ("auto,cross,cross", [Laid("all", ROWS), Laid("all", COLUMNS), Laid("all", ROWS)]),
-        ("30,cross,auto", [Laid("all", ROWS, 30.0), Laid("all", COLUMNS, 30.0), Laid()]),
+        ("30deg,cross,auto", [Laid("all", ROWS, 30.0), Laid("all", COLUMNS, 30.0), Laid()]),
     ],
 )
 def test_a_cross_pass_lies_across_the_last_lanes(passes, lie):
@@ -60,8 +73,9 @@ def test_a_cross_pass_lies_across_the_last_lanes(passes, lie):
         ([Pass()] * 101, "passes must be 1 to 100, got 101"),
         ([Pass(lanes="cross")], r"passes\[0\]: cross goes after a pass with lanes"),
         ([Pass("edge"), Pass(lanes="cross")], r"passes\[1\]: cross goes after a pass with lanes"),
-        ([Pass("rest")], r"passes\[0\]: rest goes after edge"),
-        ([Pass(), Pass("rest")], r"passes\[1\]: rest goes after edge"),
+        ([Pass("rest")], r"passes\[0\]: rest goes after an edge"),
+        ([Pass(), Pass("rest"), Pass("edge")], r"passes\[1\]: rest goes after an edge"),
+        ([Pass(), Pass("all", "cross", 9.0)], r"passes\[1\]: cross is an angle"),
         ([Pass("edge")], "edge alone leaves most of the floor"),
         ([Pass(), Pass("edge", angle_deg=30.0)], r"passes\[1\]: edge follows the walls"),
     ],

@@ -130,11 +130,17 @@ def test_it_says_how_far_an_order_is():
         {"name": "hall", "passes": 1, "pass": 0},
     ]
     order = {"ordered": "command", "stage": "covering", "zone": "kitchen", "pass": 1, "passes": 2}
-    more = {"zones": zones, "keep_out": 3, "return_home": True, "unreached": {"cells": 5}}
+    more = {
+        "pass_kind": "cross",
+        "zones": zones,
+        "keep_out": 3,
+        "return_home": True,
+        "unreached": {"cells": 5},
+    }
     tell(view, "status", status(mission=order | more))
     page = page_of(view, 120, 40)
     for said in (
-        "zone kitchen, pass 1 of 2",
+        "zone kitchen, pass 1 of 2, cross",
         "kitchen   pass 1 of 2, 25.0 %: 15 of 60 cells",
         "hall      to come",
         "keep-out zones: 3, returns home",

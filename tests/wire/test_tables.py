@@ -13,7 +13,7 @@ from fasaco_edge.daemon.loop.answers import REPLAN_PERIOD_S
 from fasaco_edge.errors import FasacoError
 from fasaco_edge.mission.coverage.ledger import MOST_TILES
 from fasaco_edge.mission.coverage.swept_floor import MOST_FLOOR_TILES
-from fasaco_edge.mission.orders import keep_outs, order
+from fasaco_edge.mission.orders import keep_outs, order, passes
 from fasaco_edge.wire import limits
 from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.topic_types import VOLATILE
@@ -129,7 +129,7 @@ def test_limits_are_those_of_the_code():
         **upper(limits),
         **{
             name: value
-            for module in (order, keep_outs)
+            for module in (order, keep_outs, passes)
             for name, value in upper(module).items()
             if isinstance(value, int | float)
         },

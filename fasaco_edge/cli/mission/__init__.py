@@ -11,12 +11,14 @@ import msgspec
 
 from fasaco_edge.cli.ask import RefusedError, add_question, ask, show_mission
 from fasaco_edge.cli.console.arguments import Command, Exit, add_common
+from fasaco_edge.cli.console.pass_option import WORDS, add_passes
 from fasaco_edge.cli.console.streams import print_json
 from fasaco_edge.cli.console.terminal import agrees, err, may_ask
 from fasaco_edge.cli.mission.keep_outs import add_actions, asked_by, names_of, show_keep_outs
 from fasaco_edge.errors import OrderError, WouldForget
 from fasaco_edge.host.plain_yaml import load, read_bounded
 from fasaco_edge.mission.orders.order import FORGETFUL, order_document, read_order
+from fasaco_edge.mission.orders.passes import passes_document
 from fasaco_edge.wire.documents.json_text import decode_json, decode_tolerant, encode_json
 from fasaco_edge.wire.documents.replies import Reply
 
@@ -30,6 +32,7 @@ examples:
   fasaco-edge mission status
   fasaco-edge mission start                         everything the robot can reach
   fasaco-edge mission start --passes 2 --return-home
+  fasaco-edge mission start --passes edge,auto,cross@0.15   a lap along walls, lanes, lanes across
   fasaco-edge mission start --zone "kitchen:0,0;4,0;4,3;0,3" --zone "hall:4,0;6,0;6,9;4,9"
   fasaco-edge mission start --zone kitchen          a zone of the daemon's configuration
   fasaco-edge mission start --keep-out "1,1;2,1;2,2;1,2"
@@ -46,11 +49,13 @@ evening.yaml, or the same as JSON; all lengths in metres in the frame of the map
     - name: hall              # without a polygon: mission.zones of the configuration has it
   keep_out:                   # the robot must not touch these, nor mission.keep_out
     - [[1, 1], [2, 1], [2, 2], [1, 2]]
-  passes: 1                   # of zones without passes, and of everything
+  passes: 1                   # of zones without passes, and of everything; or one item a pass:
+                              # [edge, auto, cross, {angle_deg: 30, speed_m_s: 0.15}]
   return_home: true           # at the end: mission.home, mission.dock, or where the mission began
   keep_covered: false         # true: skip what is already covered in the first pass
 
-Each pass starts from zero: what was covered before is covered again. An order, its progress, and
+Each pass starts from zero: what was covered before is covered again; a rest leaves out what an
+edge has covered. An order, its progress, and
 whether it is paused survive a restart of the daemon. A daemon without an order covers everything
 by itself (mission.autostart of its configuration).
 
@@ -134,7 +139,7 @@ def _add_order(parser: argparse.ArgumentParser) -> None:
         help="area the robot must not touch, beside those of the daemon's configuration; may be "
         "repeated",
     )
-    parser.add_argument("--passes", type=int, metavar="N", help="how often to cover (default: 1)")
+    add_passes(parser, f"how often to cover, or for each pass {WORDS} (default: 1)")
     parser.add_argument(
         "--return-home", action="store_true", help="at the end drive home, or to where it began"
     )
@@ -192,7 +197,7 @@ def _order(args: argparse.Namespace) -> dict[str, object]:
     options = {
         "zones": args.zone,
         "keep_out": args.keep_out,
-        "passes": args.passes,
+        "passes": None if args.passes is None else passes_document(len(args.passes), args.passes),
         "return_home": args.return_home,
         "keep_covered": args.keep_covered,
     }

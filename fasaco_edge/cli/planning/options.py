@@ -7,7 +7,7 @@ import math
 from pathlib import Path
 
 from fasaco_edge.cli.console.arguments import add_json, pair_of_floats, pair_of_ints
-from fasaco_edge.cli.planning.passes import add_passes
+from fasaco_edge.cli.console.pass_option import WORDS, add_passes
 from fasaco_edge.cli.planning.request import add_turning
 from fasaco_edge.config.robot import RobotConfig
 from fasaco_edge.offline.settings import (
@@ -16,7 +16,6 @@ from fasaco_edge.offline.settings import (
     BUDGET_S,
     CELLS,
     HOME,
-    MOST_ANGLE_DEG,
     PAPER_Q0,
     PAPER_VISIBILITY,
     SEARCH_Q0,
@@ -27,6 +26,7 @@ from fasaco_edge.offline.settings import (
 )
 from fasaco_edge.planners.own.loading import SHAPE, is_place
 from fasaco_edge.planners.paper.colony import VISIBILITIES
+from fasaco_edge.planners.passes import MOST_ANGLE_DEG
 from fasaco_edge.planners.registry import PLANNER_NAMES, PLANNERS
 
 EPILOG = """\
@@ -185,7 +185,11 @@ def _add_problem(group: argparse._ArgumentGroup) -> None:
         default=argparse.SUPPRESS,
         help="short for --end home",
     )
-    add_passes(group)
+    add_passes(
+        group,
+        f"several passes, each from where the one before ends: their number, or for each {WORDS}. "
+        "The budget is for each pass",
+    )
     group.add_argument(
         "--speed-m-s",
         type=float,

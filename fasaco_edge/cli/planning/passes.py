@@ -18,33 +18,11 @@ from fasaco_edge.cli.planning.request import PlanRequest, require_frame, watchin
 from fasaco_edge.cli.warmup import compile_kernels
 from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.host.processes import first_signal_calls
-from fasaco_edge.planners.passes import Pass, check_passes, read_pass
+from fasaco_edge.planners.passes import check_passes
 from fasaco_edge.planners.planner import Interrupt
 from fasaco_edge.planners.stages import stages_of_plan
 
 LOG = logging.getLogger(__name__)
-
-
-def add_passes(group: argparse._ArgumentGroup) -> None:
-    """Add the option."""
-    group.add_argument(
-        "--passes",
-        type=_passes,
-        metavar="PASS,...",
-        help="several passes, each from where the one before ends: auto (lanes as they are "
-        "cheapest), cross (lanes across those of the pass before), an angle of the lanes [degrees "
-        "counter-clockwise to the map's x axis], edge (only the cells along walls and furniture), "
-        "rest (the others, after edge), rest:cross; with @0.15 at that speed [m/s], at most the "
-        "robot's.; the budget is for each pass",
-    )
-
-
-def _passes(text: str) -> list[Pass]:
-    """Read passes."""
-    try:
-        return [read_pass(each) for each in text.split(",")]
-    except BadConfiguration as error:
-        raise argparse.ArgumentTypeError(str(error)) from None
 
 
 def plan_in_passes(args: argparse.Namespace, request: PlanRequest) -> int:

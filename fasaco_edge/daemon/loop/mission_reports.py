@@ -174,6 +174,7 @@ def mission_report(
         zone=None if zone is None or zone.polygon is None else zone.name,
         pass_number=None if zone is None else order_state.pass_number,
         passes=None if zone is None else zone.passes,
+        pass_kind=(zone.kind(order_state.pass_number).name or None) if zone else None,
         zones=_zones(mission, order_state),
         keep_out=len(keep_outs) + standing,
         return_home=bool(order and order.return_home),

@@ -177,6 +177,7 @@ def path_attachment(path: PublishedPath) -> PathAttachment:
         steps=path.steps,
         plan_ms=round(1e3 * path.plan_s, 3),
         changed=changed,
+        speed_m_s=path.speed_m_s,
     )
 
 

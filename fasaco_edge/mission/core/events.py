@@ -268,6 +268,7 @@ class PathUpdate:
         xy: float64 (m, 2), x, y [m]: the line to drive; None for the centres of the cells.
         end_yaw: heading at the end [rad]; None for the heading of the last segment.
         may_wait: whether the robot can drive on along the previous path as long as both are equal.
+        speed_m_s: speed to drive it at [m/s]; None for the robot's usual one.
     """
 
     revision: int
@@ -279,6 +280,7 @@ class PathUpdate:
     xy: NDArray[np.float64] | None = None
     end_yaw: float | None = None
     may_wait: bool = False
+    speed_m_s: float | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,7 +1,8 @@
 """Lattice angle: the angle of the cells' rows to the map frame, and when it changes.
 
 Without a configured angle, rows are parallel to the axes of the map frame at first, and to the
-walls once their direction is certain; to the axes again if a map does not fit otherwise.
+walls once their direction is certain; to the axes again if a map does not fit otherwise. For a
+pass whose lanes have an angle they are at that angle, until another pass begins.
 
 The wall direction is estimated once and then fixes the lattice's rotation. The map frame's axes
 come from the robot's initial heading, so walls are rotated against them. In six buildings rotated
@@ -105,7 +106,9 @@ class LatticeAngle:
     """
 
     def __init__(self, config: MissionConfig) -> None:
-        self.deg = config.lattice_deg or 0.0
+        self.deg = self._usual_deg = config.lattice_deg or 0.0
+        # That of a ledger from before a restart.
+        self._resumed_deg: float | None = None
         self._is_given = config.lattice_deg is not None
         self._cell_m, self._most_cells = config.footprint.cell_m, config.max_lattice_cells
         self._walls = WallWatch()
@@ -116,8 +119,27 @@ class LatticeAngle:
         """Keep the angle of a ledger from before a restart; return whether that changes it."""
         if self._is_given or not deg:
             return False
-        self.deg = deg
+        self.deg = self._usual_deg = self._resumed_deg = deg
         self._walls.end()
+        return True
+
+    def rotates_to_pass(self, deg: float | None, grid: OccupancyGrid) -> bool:
+        """Return whether the angle changes to that of the lanes of a pass; None for the usual one.
+
+        Args:
+            deg: angle of the pass [deg].
+            grid: the newest map.
+        """
+        if self._resumed_deg is not None and self._resumed_deg == deg:
+            # It was that of the pass: the usual one is not known.
+            self._usual_deg = 0.0
+            self._walls.begin()
+        self._resumed_deg = None
+        wanted = self._usual_deg if deg is None else deg
+        # As for walls: the map may grow.
+        if wanted == self.deg or not self._fits(grid, wanted, share=0.5):
+            return False
+        self.deg = wanted
         return True
 
     def note_faults(self, faults: Iterable[FasacoError]) -> None:
@@ -129,7 +151,7 @@ class LatticeAngle:
     @property
     def is_settled(self) -> bool:
         """Whether no later map will rotate the lattice to its walls."""
-        return self._walls.is_over
+        return self._walls.is_over or self.deg != self._usual_deg
 
     def rotates_to_walls(self, grid: OccupancyGrid, pose: StampedPose) -> bool:
         """Evaluate the walls of the newest map; return whether the angle has changed."""
@@ -137,16 +159,19 @@ class LatticeAngle:
         # A rotated lattice spans up to twice as many cells, and the map may grow.
         if deg is None or deg == self.deg or not self._fits(grid, deg, share=0.5):
             return False
-        self.deg = deg
+        self.deg = self._usual_deg = deg
         return True
 
     def rotates_back_for(self, maps: Iterable[OccupancyGrid]) -> bool:
         """Return whether the angle changes to 0, because one of the maps does not fit otherwise."""
-        if self._is_given or not self.deg:
+        is_usual = self.deg == self._usual_deg
+        if (self._is_given and is_usual) or not self.deg:
             return False
         if all(self._fits(grid, self.deg) or not self._fits(grid, 0.0) for grid in maps):
             return False
-        self.deg = 0.0
+        if is_usual:
+            self._usual_deg = 0.0
+        self.deg = self._usual_deg
         return True
 
     def _fits(self, grid: OccupancyGrid, deg: float, share: float = 1.0) -> bool:

@@ -108,7 +108,10 @@ class Mission:
         self._trail = TrailLayer(config, self._map, self.route)
         self.charging = Charging(config, self._map, self._orders, self.route, self._gauge)
         ordered = self._map, self._ledger, self._orders, self.route, self._line
-        self._changes = OrderChanges(*ordered, config.policy, self._rotation.deg)
+        is_alone = self._kind is ALONE
+        self._changes = OrderChanges(
+            *(*ordered, config.policy, self._rotation.deg, is_alone, config.speed_m_s)
+        )
         way_out = WayOut(self._map, self.route)
         blocked = BlockedFollower()
         measured = self._drive, self.company, self._gauge, way_out, blocked
@@ -180,7 +183,7 @@ class Mission:
         """
         events = list(events)
         begun = self._make_room(events, now)
-        happened = self._along_walls(self._handle(events, now), now)
+        happened = self._along_lanes(self._handle(events, now), now)
         decided = self._executive.decide(now)
         self.state, self.reason = self._executive.status()
         stop = self.route.stop(self.reason, now) if self.state.is_at_rest else None
@@ -190,10 +193,23 @@ class Mission:
         self.state, self.reason = self._executive.status()
         if path is not None:
             path = self._rotation.path(path, self.lattice)
+            path = replace(path, speed_m_s=self.order_state.speed_m_s)
         return replace(happened, plan=decided.plan, path=path)
 
     def _handle(self, events: Iterable[Event], now: float) -> Decision:
         return self._handler.handle(map(self._rotation.event, events), now)
+
+    def _along_lanes(self, happened: Decision, now: float) -> Decision:
+        """Rotate the lattice to a pass's lanes, or to the walls; return the combined decision."""
+        state, grid = self.order_state, self.grid
+        is_busy = state.current_zone is None or bool(state.errand) or self.is_in_doubt
+        if is_busy or grid is None or self.pose is None:
+            return self._along_walls(happened, now)
+        if not self._angle.rotates_to_pass(state.current_pass.angle_deg, grid):
+            return self._along_walls(happened, now)
+        why = f"cells lie along the lanes of the pass, at {self._angle.deg:.1f} degrees to the map"
+        stop = self._rotate_lattice(f"{why} frame", now)
+        return replace(happened, path=stop or happened.path)
 
     def _along_walls(self, happened: Decision, now: float) -> Decision:
         """Rotate the lattice to the walls once these are certain; return the combined decision."""

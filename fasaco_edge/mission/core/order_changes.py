@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from fasaco_edge.errors import CommandError, FasacoError
+from fasaco_edge.errors import CommandError, FasacoError, OrderError
 from fasaco_edge.grid.geometry import Polygon
 from fasaco_edge.grid.rotation import rotated_polygon
 from fasaco_edge.mission.config import MissionPolicy
@@ -15,7 +15,7 @@ from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
 from fasaco_edge.mission.line.layer import LineLayer
 from fasaco_edge.mission.map.map_state import MapState
 from fasaco_edge.mission.orders.mask import mask_polygons
-from fasaco_edge.mission.orders.order import rotated_order
+from fasaco_edge.mission.orders.order import MissionOrder, rotated_order
 from fasaco_edge.mission.orders.order_state import OrderState, Stage
 from fasaco_edge.mission.orders.sequencer import Sequencer
 
@@ -32,6 +32,10 @@ class OrderChanges:
     policy: MissionPolicy
     # Angle of the cells' rows to the x axis of the map frame [deg].
     lattice_deg: float = 0.0
+    # Whether there is no fleet, whose robots share cells.
+    is_alone: bool = True
+    # Speed of the robot [m/s]; 0 if not known.
+    speed_m_s: float = 0.0
     # Keep-out polygons of every order.
     _standing: tuple[Polygon, ...] = field(default=(), init=False)
 
@@ -74,6 +78,7 @@ class OrderChanges:
             order = rotated_order(self.map.places.located(event.order), -self.lattice_deg)
             if event.command == "start":
                 self.map.check_zones(order)
+                self._check_passes(order)
             asked = event.asked._replace(order=order)
             has_home = self.map.places.place("home") is not None
             after = before.commanded(asked, has_home=has_home)
@@ -83,6 +88,21 @@ class OrderChanges:
         except FasacoError as error:
             return Answer(event.number, error), None
         return Answer(event.number, plan=plan), after
+
+    def _check_passes(self, order: MissionOrder) -> None:
+        """Raise OrderError if passes of a fleet have angles, or one is faster than the robot."""
+        kinds = [kind for zone in order.zones for kind in zone.kinds]
+        fastest = max((kind.speed_m_s or 0.0 for kind in kinds), default=0.0)
+        if self.speed_m_s and fastest > self.speed_m_s:
+            raise OrderError(
+                f"passes: speed_m_s: expected at most robot.speed_m_s, {self.speed_m_s:g}, "
+                f"got {fastest:g}"
+            )
+        if not self.is_alone and any(kind.angle_deg is not None for kind in kinds):
+            raise OrderError(
+                "passes: angle_deg is for a robot alone; robots of a fleet share cells",
+                hint="leave angle_deg out: auto and cross run along the cells",
+            )
 
     def change_to(self, after: OrderState, now: float) -> PathUpdate | None:
         """Change to the state that follows a command at ``now`` [s]; return the path, if any."""

@@ -59,6 +59,7 @@ class PublishedPath:
     plan: CoveragePath | None = None
     plan_s: float = 0.0
     changed: Bounds | None = None
+    speed_m_s: float | None = None
 
     @classmethod
     def of(cls, mission: Mission, update: PathUpdate) -> PublishedPath:
@@ -81,6 +82,7 @@ class PublishedPath:
             plan=update.plan,
             plan_s=update.plan_s,
             changed=changed,
+            speed_m_s=update.speed_m_s,
         )
 
     @property

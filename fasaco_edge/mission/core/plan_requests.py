@@ -89,7 +89,7 @@ class PlanRequests:
     def request_plan(self, problem: CoverageProblem) -> PlanRequest:
         """Request the wanted plan."""
         changed = self._changed if self._is_by_map and not self._full else None
-        problem = replace(problem, is_full=bool(self._full))
+        problem = replace(problem, is_full=bool(self._full) or problem.is_full)
         request = self._request(problem, self._full or self.wanted, changed)
         self.drop()
         return request

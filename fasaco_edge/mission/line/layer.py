@@ -245,6 +245,9 @@ class LineLayer:
             return ""
         asked, pose = self._orders.cells.asked_of_me(self._map.area), stamped.pose
         cut_off = self._orders.known(self._map.area.lattice) & ~self._map.area.reachable
+        if self._ahead is not None:
+            # Of the whole order, not of its last part.
+            self._take_floor()
         thinner_m = grid.geometry.resolution
         self._possible_m2 = possible_m2(floor, thinner_m, (pose.x, pose.y), asked, cut_off)
         found = self.to_sweep
@@ -366,6 +369,10 @@ class LineLayer:
             self._unexplained = Window.around(self._unexplained, part)
             for strip in strips(part):
                 wanted = floor.reached(self._asked[1], strip)
+                if self._orders.cells.is_at_edge:
+                    # The tool also reaches floor of the cells within, which is not asked for.
+                    within = self._asked[2] & ~self._asked[1]
+                    wanted &= ~floor.lying_in(within, strip)
                 ahead.tally.set_open(strip, wanted, swept.swept_on(floor.geometry, strip))
         driven = pixels_under(news, floor.geometry).intersection(whole) if news else None
         if driven is not None and driven != part:

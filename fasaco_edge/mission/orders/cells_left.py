@@ -20,6 +20,7 @@ from fasaco_edge.mission.map.reachable_area import ReachableArea
 from fasaco_edge.mission.orders.exploration import Exploration, frontier, is_in_reach
 from fasaco_edge.mission.orders.order import MissionOrder, Zone
 from fasaco_edge.mission.orders.zones import cells_inside, in_zones
+from fasaco_edge.planners.passes import Covers, edge_cells
 
 
 class CellsLeft:
@@ -28,6 +29,7 @@ class CellsLeft:
     Args:
         config, map_state, ledger, company: the sources of the cells.
         zones: the zones of the order that are due; None without an order.
+        covers: which of their cells are due.
         exploration: the viewpoints.
     """
 
@@ -38,10 +40,13 @@ class CellsLeft:
         ledger: MissionLedger,
         company: Company,
         zones: Callable[[], tuple[Zone, ...] | None],
+        covers: Callable[[], Covers],
         exploration: Callable[[], Exploration],
     ) -> None:
         self._config, self._map, self._ledger, self._company = config, map_state, ledger, company
-        self._zones, self._exploration = zones, exploration
+        self._zones, self._covers, self._exploration = zones, covers, exploration
+        # The edge of an area.
+        self._edge: tuple[ReachableArea | None, NDArray[np.bool_]] = None, np.empty((0, 0), bool)
 
     def open_cells(self, window: Window) -> NDArray[np.bool_]:
         """Return which cells of ``window`` still need a visit, coverable or not."""
@@ -85,8 +90,35 @@ class CellsLeft:
     def asked_for(self, window: Window) -> NDArray[np.bool_]:
         """Return which cells of ``window`` this robot has to cover, covered or not."""
         inside = in_zones(self._zones() or (), window, self._config.footprint.cell_m)
+        if self.is_at_edge:
+            inside = inside & self.edge(window)
         shared = self._ledger.shared
         return inside & ~shared.swept(window) if shared.version else inside
+
+    @property
+    def is_at_edge(self) -> bool:
+        """Whether only cells along walls and furniture are due."""
+        return self._covers() == "edge"
+
+    def edge(self, window: Window) -> NDArray[np.bool_]:
+        """Return which cells of ``window`` lie along walls and furniture, bool (rows, cols)."""
+        area = self._map.area
+        if area is None:
+            return np.zeros((window.rows, window.cols), bool)
+        if self._edge[0] is not area:
+            self._edge = area, edge_cells(area.lattice.steps, area.reachable)
+        return carried(self._edge[1], area.lattice.window, window)
+
+    def edge_in(self, window: Window, square_m: float) -> NDArray[np.bool_]:
+        """Return which squares of a window, ``square_m`` wide [m], have their centre in an edge."""
+        share = square_m / self._config.footprint.cell_m
+        rows, cols = (
+            np.floor((np.arange(first, end) + 0.5) * share).astype(np.int64)
+            for first, end in ((window.row0, window.row1), (window.col0, window.col1))
+        )
+        around = Window(int(rows[0]), int(cols[0]), int(rows[-1]) + 1, int(cols[-1]) + 1)
+        edge: NDArray[np.bool_] = self.edge(around)[np.ix_(rows - rows[0], cols - cols[0])]
+        return edge
 
     @property
     def keeps_passed(self) -> bool:

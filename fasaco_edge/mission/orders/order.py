@@ -26,9 +26,10 @@ from fasaco_edge.mission.orders.keep_outs import (
     keep_out_document,
     keep_out_of,
 )
+from fasaco_edge.mission.orders.passes import Passes, PassWord, passes_document, passes_of
+from fasaco_edge.planners.passes import Covers, Direction, Laid, Pass, laid
 
 MOST_ZONES = 100
-MOST_PASSES = 100
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,11 +41,21 @@ class Zone:
         polygon: corners (x, y) [m] in the map frame, the last joined to the first; None for
             everything reachable, or, before ``located``, for a standing zone of that name.
         passes: number of passes.
+        kinds: what is special about each pass; () if nothing is.
     """
 
     name: str
     polygon: Polygon | None
     passes: int = 1
+    kinds: tuple[Pass, ...] = ()
+
+    def kind(self, number: int) -> Pass:
+        """Return what is special about a pass, from 1."""
+        return self.kinds[number - 1] if self.kinds else Pass()
+
+    def laid(self, number: int) -> Laid:
+        """Return a pass, from 1, on a lattice."""
+        return laid(self.kinds)[number - 1] if self.kinds else Laid()
 
 
 EVERYTHING = "everything"
@@ -111,9 +122,6 @@ class Command(NamedTuple):
     discard: bool = False
 
 
-_Passes = Annotated[int, Meta(ge=1, le=MOST_PASSES, description="how often to cover")]
-
-
 class _Document(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Unknown members are errors."""
 
@@ -130,7 +138,7 @@ class ZoneDocument(_Document, frozen=True):
 
     name: PlaceName
     polygon: Corners | None = None
-    passes: _Passes | None = None
+    passes: Passes | None = None
 
 
 class OrderDocument(_Document, frozen=True):
@@ -138,7 +146,7 @@ class OrderDocument(_Document, frozen=True):
 
     zones: Annotated[list[ZoneDocument], Meta(max_length=MOST_ZONES)] = []
     keep_out: Annotated[list[Corners], Meta(max_length=MOST_KEEP_OUT)] = []
-    passes: _Passes = 1
+    passes: Passes = 1
     return_home: bool = False
     keep_covered: bool = False
 
@@ -160,6 +168,8 @@ class CommandDocument(_Document, frozen=True):
 
 
 _Read = TypeVar("_Read", bound=_Document)
+# The words of members other than ``command``.
+_WORDS: dict[str, object] = {"passes": PassWord, "covers": Covers, "lanes": Direction}
 
 
 def read_order(document: object) -> MissionOrder:
@@ -213,9 +223,9 @@ def order_document(order: MissionOrder) -> dict[str, object]:
     }
     first = order.zones[0]
     if first.polygon is None:
-        return {"passes": first.passes, **rest}
+        return {"passes": passes_document(first.passes, first.kinds), **rest}
     zones = [
-        {"name": zone.name, "passes": zone.passes}
+        {"name": zone.name, "passes": passes_document(zone.passes, zone.kinds)}
         | ({"polygon": zone.polygon} if zone.polygon else {})
         for zone in order.zones
     ]
@@ -280,12 +290,17 @@ def order_of(document: OrderDocument) -> MissionOrder:
     Raises:
         OrderError: naming the member, what is wrong with it, and what is allowed.
     """
+    usual = passes_of(document.passes, "passes")
     zones = tuple(
-        Zone(zone.name, tuple(zone.polygon or ()), zone.passes or document.passes)
-        for zone in document.zones
+        Zone(
+            zone.name,
+            tuple(zone.polygon or ()),
+            *(passes_of(zone.passes, f"zones[{index}].passes") if zone.passes else usual),
+        )
+        for index, zone in enumerate(document.zones)
     )
     order = MissionOrder(
-        zones or (Zone(EVERYTHING, None, document.passes),),
+        zones or (Zone(EVERYTHING, None, *usual),),
         tuple(map(tuple, document.keep_out)),
         document.return_home,
         document.keep_covered,
@@ -324,5 +339,6 @@ def _explained(message: str, document: object) -> str:
     for name, index in re.findall(r"\.(\w+)|\[(\d+)\]", where):
         value = value[name] if name else value[int(index)]
     if what.startswith("invalid enum value"):
-        what = f"expected {', '.join(get_args(CommandName))}"
+        member = re.sub(r"\[\d+\]$", "", where).rpartition(".")[2]
+        what = f"expected {', '.join(get_args(_WORDS.get(member, CommandName)))}"
     return f"{where.lstrip('.') or 'the order'}: {what}, got {value!r:.60}"

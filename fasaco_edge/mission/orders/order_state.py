@@ -33,6 +33,7 @@ from fasaco_edge.mission.orders.order import (
     order_of,
 )
 from fasaco_edge.mission.orders.reached_cells import ReachedCells
+from fasaco_edge.planners.passes import Laid
 
 # Reason of being idle without autostart.
 NO_ORDER = "no order yet: start a mission"
@@ -128,13 +129,26 @@ class OrderState:
         return self.order.zones[self.zone]
 
     @property
+    def current_pass(self) -> Laid:
+        """The pass being made, on a lattice."""
+        zone = self.current_zone
+        return Laid() if zone is None else zone.laid(self.pass_number)
+
+    @property
+    def speed_m_s(self) -> float | None:
+        """Speed to drive at [m/s]; None for the robot's usual one."""
+        zone = self.current_zone
+        return None if zone is None or self.errand else zone.kind(self.pass_number).speed_m_s
+
+    @property
     def title(self) -> str:
         """Zone and pass as text."""
         zone = self.current_zone
         if zone is None:
             return str(self.stage)
         name = "everything reachable" if zone.polygon is None else f"zone {zone.name!r}"
-        return name if zone.passes == 1 else f"{name}, pass {self.pass_number} of {zone.passes}"
+        number = "" if zone.passes == 1 else f"pass {self.pass_number} of {zone.passes}"
+        return ", ".join(filter(None, (name, number, zone.kind(self.pass_number).name)))
 
     @property
     def returns_home_next(self) -> bool:

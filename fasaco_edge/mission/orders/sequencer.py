@@ -23,6 +23,7 @@ from fasaco_edge.mission.orders.order import Errand, Zone
 from fasaco_edge.mission.orders.order_state import NO_ORDER, OrderState, Stage
 from fasaco_edge.mission.orders.reached_cells import ReachedCells
 from fasaco_edge.mission.orders.zones import in_zones
+from fasaco_edge.planners.cost import CoverageCost
 from fasaco_edge.planners.problem import CoverageProblem
 
 # After this many paths in a row that cover no further cell, the cells left wait for the retry: the
@@ -46,6 +47,7 @@ class _Run:
         left_behind: floor that opens while the robot is on its way home.
         retry_at: time of the next retry [s]; None if nothing waits.
         ending: how the order ended.
+        is_laid_anew: whether the next plan is the first of a pass of its own kind.
     """
 
     exploration: Exploration = field(default_factory=Exploration)
@@ -54,6 +56,7 @@ class _Run:
     left_behind: LeftBehind = field(default_factory=LeftBehind)
     retry_at: float | None = None
     ending: str = "the order was carried out"
+    is_laid_anew: bool = False
 
 
 class Sequencer:
@@ -76,7 +79,9 @@ class Sequencer:
         # Returns at the end of an order how much floor was swept, as text; "" for no text.
         self._sum_up: Callable[[], str] = str
         self.cells = CellsLeft(
-            config, map_state, ledger, company, self._zones, lambda: self._run.exploration
+            *(config, map_state, ledger, company, self._zones),
+            covers=lambda: self.order_state.current_pass.covers,
+            exploration=lambda: self._run.exploration,
         )
         self._unreached = UnreachedFinder(map_state, ledger)
         # Cached result: whether a retry is worthwhile, for a given map and ledger.
@@ -216,13 +221,27 @@ class Sequencer:
             return ""
         zone = state.current_zone
         if zone is not None and not (state.order.keep_covered and state.pass_number == 1):
-            self._ledger.forget(partial(in_zones, (zone,)))
+            self._forget(zone, state)
+        run.is_laid_anew = zone is not None and bool(zone.kinds)
         self.order_state = replace(state, begun=True, home=state.home or cell)
         run.done, run.in_vain = -1, 0
         self._company.try_again()
         if state.pass_number == 1:
             run.exploration.begin()
         return "" if state.automatic else state.title
+
+    def _forget(self, zone: Zone, state: OrderState) -> None:
+        """Forget what the pass that begins is to cover again."""
+        number, covers = state.pass_number, state.current_pass.covers
+        if number == 1 or covers == "all":
+            self._ledger.forget(partial(in_zones, (zone,)))
+        elif covers == "edge" or zone.kind(number - 1).covers != "edge":
+            self._ledger.forget(
+                lambda window, square_m: (
+                    in_zones((zone,), window, square_m)
+                    & (self.cells.edge_in(window, square_m) == (covers == "edge"))
+                )
+            )
 
     def problem(
         self, cell: Cell, before: NDArray[np.int32], *, attempt: int = 0
@@ -244,17 +263,27 @@ class Sequencer:
         self._run.exploration.end_if_reached(state.current_zone, area)
         ends_home = home is not None and state.returns_home_next and area.contains(home)
         ends_home = ends_home and home is not None and bool(reachable[lattice.local(home)])
-        return CoverageProblem.of(
+        problem = CoverageProblem.of(
             lattice,
             cell,
             covered=~self.cells.open_to_me(area),
             end=home if ends_home else None,
-            cost=self._config.cost,
+            cost=self._cost(state),
             before=before,
             attempt=attempt,
             # An attempt starts on the path, which the robot may have left for another area.
             reachable=reachable if area.contains(cell) else None,
         )
+        # The walk of another pass has other lanes: a repair would keep them.
+        is_full, self._run.is_laid_anew = self._run.is_laid_anew, False
+        return replace(problem, is_full=is_full)
+
+    def _cost(self, state: OrderState) -> CoverageCost:
+        """Return the cost of paths in the present pass, by its lanes and its speed."""
+        cost, usual_m_s = self._config.cost, self._config.speed_m_s
+        if state.speed_m_s and usual_m_s:
+            cost = replace(cost, step_s=cost.step_s * usual_m_s / state.speed_m_s)
+        return cost.along(state.current_pass.lanes)
 
     def passable(self, area: ReachableArea, cell: Cell) -> ReachableArea:
         """Return an area as a robot in ``cell`` can drive it: around robots in the way."""

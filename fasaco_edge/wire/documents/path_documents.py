@@ -112,6 +112,7 @@ class PathAttachment(PlanFigures, frozen=True):
         plan_ms: duration of planning; 0 if no plan was needed.
         changed: rectangle of the map in which cells appeared, vanished or have other neighbours;
             null if that is not the reason.
+        speed_m_s: speed to drive it at, below the robot's usual one [m/s]; null for that.
     """
 
     daemon: Annotated[str, allowed(pattern="^[0-9a-f]{1,32}$")] = ""
@@ -122,6 +123,7 @@ class PathAttachment(PlanFigures, frozen=True):
     steps: Count = 0
     plan_ms: Amount = 0.0
     changed: Rectangle | None = None
+    speed_m_s: Amount | None = None
 
 
 class TrailAttachment(Document, frozen=True):

@@ -156,6 +156,8 @@ class MissionReport(Document, frozen=True):
         zone: the zone being covered; null for everything reachable.
         pass: number of the present pass; null without an order.
         passes: number of all passes.
+        pass_kind: what is special about the present pass, as text: edge, rest, cross, 30 degrees;
+            null if nothing is.
         keep_out: number of keep-out zones, with those of the configuration; a mask counts as one.
         keep_outs: the keep-out zones in force, without those of the configuration.
         home: position the robot returns to; by default where the first order began since a reset.
@@ -171,6 +173,7 @@ class MissionReport(Document, frozen=True):
     zone: str | None = None
     pass_number: Ordinal | None = msgspec.field(name="pass", default=None)
     passes: Ordinal | None = None
+    pass_kind: Annotated[str, allowed(maxLength=64)] | None = None
     zones: tuple[ZoneReport, ...] = ()
     keep_out: Count = 0
     return_home: bool = False
