@@ -52,6 +52,7 @@ class News:
         status_at: arrival of its newest status [s]; None without a new one.
         path: its newest path; None without a new one.
         revision: of the newest path; 0 if unknown.
+        speed_m_s: limit of the speed on the newest path; infinity without one [m/s].
         unnamed: newest path that names no daemon; None without a new one.
     """
 
@@ -59,6 +60,7 @@ class News:
     status_at: float | None = None
     path: Sample | None = None
     revision: int = 0
+    speed_m_s: float = math.inf
     unnamed: Sample | None = None
 
 
@@ -70,6 +72,7 @@ class _Daemon:
     state: str = ""
     path: Sample | None = None
     revision: int = 0
+    speed_m_s: float = math.inf
 
 
 class Daemons:
@@ -113,10 +116,12 @@ class Daemons:
         """Take in a path."""
         attachment = _object(sample.attachment)
         own, revision = attachment.get("daemon"), attachment.get("revision")
+        speed = attachment.get("speed_m_s")
         with self._lock:
             if _is_id(own):
                 daemon = self._daemon(own)
                 daemon.path, daemon.revision = sample, revision if _is_count(revision) else 0
+                daemon.speed_m_s = speed if _is_speed(speed) else math.inf
             else:
                 self._unnamed = sample
 
@@ -128,7 +133,7 @@ class Daemons:
             if (daemon := self._daemons.get(news.planner)) is not None:
                 news.status_at, daemon.status_at = daemon.status_at, None
                 news.path, daemon.path = daemon.path, None
-                news.revision = daemon.revision
+                news.revision, news.speed_m_s = daemon.revision, daemon.speed_m_s
             return news
 
     @property
@@ -155,6 +160,10 @@ def _is_id(value: object) -> TypeGuard[str]:
 
 def _is_count(value: object) -> TypeGuard[int]:
     return type(value) is int and 0 <= value <= MAX_JSON_INTEGER
+
+
+def _is_speed(value: object) -> TypeGuard[float]:
+    return type(value) in (int, float) and 0.0 < value < math.inf  # type: ignore[operator]
 
 
 def _object(payload: bytes) -> dict[str, Any]:

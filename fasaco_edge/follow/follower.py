@@ -144,7 +144,8 @@ class Follower(Supervision):
             self.state, self.detail = State.OFF_PATH, f"by {off:.2f} m"
             return None
         limit = self._limit(pose, self._route)
-        command = self._pursuit.steer(pose, self._route, limit.speed)
+        most = min(limit.speed, self._path_most_m_s)
+        command = self._pursuit.steer(pose, self._route, most)
         if self._route.leg is None:
             self.state = State.DRIVEN
             return None

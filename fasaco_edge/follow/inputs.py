@@ -172,7 +172,7 @@ class Inputs:
                 follower.heard_link(link)
         self._warn(self._publisher.conflict(time.monotonic()))
         if news.path is not None:
-            follower.take_path(news.path.payload)
+            follower.take_path(news.path.payload, news.speed_m_s)
         if news.unnamed is not None:
             follower.take_unnamed_path(news.unnamed.payload)
 

@@ -93,7 +93,7 @@ class Supervision:
         self._repeats = False
         self._link: Link | None = None
         self._pose_fault: FasacoError | None = None
-        self._path_frame = ""
+        self._path_frame, self._path_most_m_s = "", math.inf
         self._path_state = State.NO_PATH
         self._path_detail = ""
         self._planner = ""
@@ -118,9 +118,12 @@ class Supervision:
         """Stop for a malformed pose, until the next one."""
         self._pose_fault = error
 
-    def take_path(self, payload: bytes) -> None:
-        """Follow another path of the planner; an empty or malformed one stops the robot."""
-        self._path_of = self._planner
+    def take_path(self, payload: bytes, most_m_s: float = math.inf) -> None:
+        """Follow another path of the planner; an empty or malformed one stops the robot.
+
+        ``most_m_s``: the speed to follow it at, if that is below the robot's [m/s].
+        """
+        self._path_of, self._path_most_m_s = self._planner, most_m_s
         try:
             points = PathPoints(payload)
         except MalformedMessage as error:

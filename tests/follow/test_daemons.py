@@ -1,5 +1,7 @@
 """Of all that a robot's daemons send, the follower takes what the one that plans sends."""
 
+import math
+
 import pytest
 
 from fasaco_edge.bus.arrival import Sample
@@ -118,3 +120,18 @@ def test_nothing_is_kept_by_an_id_that_is_none(daemons, own):
     assert daemons._daemons == {}
     # As one of a daemon that does not name itself: it may be the planner's, and stops the robot.
     assert daemons.news().unnamed is not None
+
+
+@pytest.mark.parametrize(
+    ("said", "speed_m_s"),
+    [
+        *(("0.15", 0.15), ("1", 1), ("null", math.inf), ("0", math.inf), ("-1", math.inf)),
+        *(("true", math.inf), ('"fast"', math.inf), ("1e999", math.inf)),
+    ],
+)
+def test_the_speed_of_a_path_is_a_number_above_zero_or_none(daemons, said, speed_m_s):
+    attachment = f'{{"daemon":"{A}","revision":1,"speed_m_s":{said}}}'.encode()
+    daemons.take_path(Sample("path", b"path", attachment=attachment))
+    assert daemons.news().speed_m_s == speed_m_s
+    daemons.take_path(path(A))
+    assert daemons.news().speed_m_s == math.inf

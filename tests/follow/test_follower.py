@@ -54,6 +54,11 @@ class Told:
             self.follower.heard_status(self.now)
         return self.follower.step(self.now)
 
+    def speed_after(self, seconds):
+        self.drive(seconds)
+        self.pose()
+        return self.step().speed
+
     def drive(self, seconds):
         for _ in range(round(seconds / PERIOD_S)):
             self.pose()
@@ -366,3 +371,11 @@ def test_commands_keep_the_limits(told):
             assert change <= LIMITS.turn_acceleration * PERIOD_S + 1e-9
         last, where = command, moved(where, command, PERIOD_S)
     assert told.follower.state is State.DRIVEN
+
+
+def test_a_path_with_a_speed_is_followed_no_faster(told):
+    told.follower.take_path(path_message(AHEAD), 0.4 * LIMITS.speed)
+    speeds = [told.speed_after(1.0)]
+    told.follower.take_path(path_message(AHEAD))
+    speeds.append(told.speed_after(1.0))
+    assert speeds == pytest.approx([0.4 * LIMITS.speed, LIMITS.speed])
