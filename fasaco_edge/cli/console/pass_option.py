@@ -8,10 +8,10 @@ from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.planners.passes import Pass, read_passes
 
 WORDS = (
-    "auto (lanes as they are cheapest), cross (lanes across those of the pass before), 30deg "
-    "(lanes at an angle to the map's x axis, counter-clockwise), edge (only the cells along walls "
-    "and furniture), rest (the others, after an edge) or rest:cross; with @0.15 at that speed, at "
-    "most the robot's [m/s]"
+    "auto (lanes as they are cheapest, or along the cells' rows if a cross follows), cross (lanes "
+    "across those of the pass before), 30deg (lanes at an angle to the map's x axis, "
+    "counter-clockwise), edge (only the cells along walls and furniture), rest (the others, after "
+    "an edge) or rest:cross; with @0.15 at that speed, at most the robot's [m/s]"
 )
 
 
