@@ -101,8 +101,10 @@ class PlannerConfig(Section, frozen=True):
     While the robot drives, ``spare_share`` of a processor core goes into making the rest of its
     path better; fasaco with local search alone can do that.
 
-    ``local_search`` is for planners that have it (``planners.registry``), which is fasaco alone;
-    without it a plan may end before its budget.
+    ``local_search`` is for planners that have it (``planners.registry``), which is fasaco alone:
+    ants then rebuild parts of the walk, as many as fit into the budget, and look for the fewest
+    seconds; ``ants``, ``visibility`` and ``threads`` are for the colony alone. Without it a plan
+    may end before its budget.
 
     ``velocities`` is ``8:1`` for cohorts from 8 down to 1, ``1:8``, ``4`` or ``8,4,1``.
     The paper's ants see no further than their neighbours; a robot's see what will soon
@@ -116,7 +118,7 @@ class PlannerConfig(Section, frozen=True):
     local_search: bool = True
     ants: Annotated[int, Meta(ge=1, le=1_000_000)] = 200
     velocities: str = "8:1"
-    q0: Annotated[float, Meta(ge=0, le=1)] = 0.98
+    q0: Annotated[float, Meta(ge=0, le=1)] = 0.9
     alpha: Annotated[float, Meta(gt=0, le=1)] = 0.1
     tau0: Annotated[float, Meta(ge=1e-12, le=1e6)] = 0.1
     visibility: Literal["neighbour", "distance", "fewest-open"] = "fewest-open"

@@ -19,7 +19,7 @@ WALLS, AXES = "walls", "axes"
 # Default time budget of a search [s], and the colony's settings that suit local search best. The
 # colony alone has the paper's settings, and walks to its end.
 BUDGET_S = 2.0
-SEARCH_Q0, PAPER_Q0 = 0.98, 0.7
+SEARCH_Q0, PAPER_Q0 = 0.9, 0.7
 SEARCH_VISIBILITY, PAPER_VISIBILITY = "fewest-open", "neighbour"
 
 

@@ -1,14 +1,14 @@
 """Living trail: pheromone on every step of the lattice, kept during a whole mission.
 
-The equations are those of Carr and Wang 2022 (``kernels.ants.colony``), with the mission's
-successive paths in place of ants:
+The ants of each plan and of each attempt in spare time start from it, and leave it as they have
+changed it to the next ones. The equations are those of Carr and Wang 2022:
 
-* equation (8), global update: each published plan strengthens the steps of its path;
-* equation (7), local update: the other steps at the path's cells fade, and so do steps that the map
-  has changed; a driven step loses half at once.
+* equation (7), local update: by each ant (``kernels.ants``), and where the map has changed; a
+  driven step loses half at once;
+* equation (8), global update: by the ants along what they rebuilt, and by each published plan along
+  its path, while the other steps at its cells fade by (7).
 
-Deviations: the paper evaporates per ant (about 1000 per plan); here each published path counts as
-one ant. Delta phi = (distinct cells x step cost) / path cost, about 1 at best, as in
+Delta phi = (distinct cells x step cost) / path cost, about 1 at best, as in
 ``planners.paper.fasaco``; a step that a path takes twice is strengthened once.
 
 A trail spans a window of cells of the map frame that follows the lattice's; new steps begin at
@@ -90,11 +90,12 @@ class LivingTrail:
 
     Attributes:
         changes: counter of changes.
+        ants: number of ants that have walked on it.
     """
 
     def __init__(self, rules: TrailRules, before: TrailSnapshot = NO_TRAIL) -> None:
         """Start with the trail ``before``."""
-        self.changes = 0
+        self.changes = self.ants = 0
         self._rules = rules
         self._window, self._tau = before.window, before.tau
 
@@ -131,6 +132,15 @@ class LivingTrail:
         after = np.where(then > 0, self._faded(then, self._rules.alpha), tau0)
         after *= _legal(steps.ravel().take(places))
         flat[places] = after
+
+    def take(self, walked: TrailSnapshot, ants: int) -> None:
+        """Take over the pheromone where so many ants have walked; removed steps stay removed."""
+        self.ants += ants
+        common = self._window.intersection(walked.window)
+        if common is None:
+            return
+        held, found = self._writable()[common.slices_in(self._window)], walked.on(common)
+        np.copyto(held, found, where=(held > 0) & (found > 0))
 
     def strengthen(self, cells: NDArray[np.int32], amount: float) -> None:
         """Strengthen a path's steps by equation (8); the other steps at its cells fade by (7).

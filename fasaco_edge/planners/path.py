@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from fasaco_edge.grid.lattice import CoverageLattice
 from fasaco_edge.kernels.lattice.reach import shortest_walk
 from fasaco_edge.planners.cost import NO_WORK, SearchWork, count_turns, gap_to
+from fasaco_edge.planners.living_trail import TrailSnapshot
 
 # Number of rows that are compared first, as two walks may differ early.
 FIRST_PIECE = 256
@@ -45,6 +46,7 @@ class CoveragePath:
             unknown.
         lower_bound_cost_s: lower bound on the cost [s]; 0 if unknown.
         saved: savings of ants and of local search against the first walk.
+        trail: pheromone where ants have walked; None for planners without ants, or if none has.
         first_walk_s: time to the first complete walk [s]: measured, so the only value that is
             not reproduced.
     """
@@ -58,6 +60,7 @@ class CoveragePath:
     lower_bound_cost_s: float = 0.0
     first_walk_s: float = 0.0
     saved: Saved = NOTHING_SAVED
+    trail: TrailSnapshot | None = None
 
     def __post_init__(self) -> None:
         self.cells.flags.writeable = False

@@ -39,6 +39,7 @@ from fasaco_edge.planners.search.effort import effort_for
 from fasaco_edge.planners.search.near_optimal import NearOptimal
 from fasaco_edge.planners.search.regions import regions_of
 from fasaco_edge.planners.search.repair import repaired
+from fasaco_edge.planners.search.search_trail import SearchTrail
 from fasaco_edge.planners.search.walk_region import WalkRegion, stream_of
 from fasaco_edge.planners.search.windows import WindowSearch
 from fasaco_edge.planners.stages import (
@@ -54,6 +55,8 @@ from fasaco_edge.planners.stages import (
     WALKS,
     WINDOWS,
 )
+
+_ANTS = ColonyConfig(ants=1, velocities=(1,))
 
 
 def run_stage(stage: str, room: TinyRoom) -> None:
@@ -85,7 +88,7 @@ class TinyRoom:
 
     @cached_property
     def path(self) -> CoveragePath:
-        search = NearOptimal(ColonyConfig(ants=1, velocities=(1,)))
+        search = NearOptimal(_ANTS)
         return search.plan(self.costly, _perturbed, ignore)
 
     def framed(self) -> tuple[FramedGround, NDArray[np.int32]]:
@@ -120,7 +123,7 @@ def _take_areas(room: TinyRoom) -> None:
 def _take_local_search(room: TinyRoom) -> None:
     """Improve and perturb a walk even if it is proven optimal, which no search does."""
     framed, walk = room.framed()
-    region = WalkRegion(framed.rows, framed.cols, 4 * walk.size, 1)
+    region = WalkRegion(framed.rows, framed.cols, 4 * walk.size, 1, SearchTrail(room.costly, _ANTS))
     (box,) = regions_of(framed, room.costly.cells, 0)
     is_loaded = region.load(framed, walk, box)
     assert is_loaded
@@ -148,7 +151,7 @@ def _take_shares(room: TinyRoom) -> None:
 
 def _take_repair(room: TinyRoom) -> None:
     problem = replace(room.costly, before=room.path.cells[2:])
-    repaired(problem, room.path.planner, 0, _perturbed)
+    repaired(problem, room.path.planner, _ANTS, _perturbed)
 
 
 def _take_line(room: TinyRoom) -> None:
@@ -174,7 +177,7 @@ def _take_line(room: TinyRoom) -> None:
 
 
 def _plan_with(name: str, room: TinyRoom) -> None:
-    planner_of(name, ColonyConfig(ants=1, velocities=(1,))).plan(room.problem, never, ignore)
+    planner_of(name, _ANTS).plan(room.problem, never, ignore)
 
 
 def _perturbed(progress: SearchProgress) -> bool:

@@ -14,7 +14,6 @@ from fasaco_edge.planners.paper.colony import ColonyConfig
 from fasaco_edge.planners.path import CoveragePath
 from fasaco_edge.planners.problem import CoverageProblem
 from fasaco_edge.planners.search.near_optimal import NearOptimal
-from fasaco_edge.planners.search.restarts import ANTS
 from tests.benchmarks.judge import WalkVerdict, check_walk
 
 Number = TypeVar("Number", int, float)
@@ -24,10 +23,15 @@ class WrongWalkError(Exception):
     """A planner returned a walk that is not what it was asked for, or says it is another."""
 
 
-def planner_for(seed: int, restarts: str = ANTS) -> NearOptimal:
-    """Return FaSACO with local search on one thread; ``restarts`` as in ``NearOptimal``."""
-    colony = ColonyConfig(seed=seed, visibility="fewest-open", q0=0.98)
-    return NearOptimal(colony, threads=1, restarts=restarts)
+# Weight of new pheromone, so small that a trail stays uniform.
+NO_WEIGHT = 1e-12
+
+
+def planner_for(seed: int, variant: str = "ants") -> NearOptimal:
+    """Return the planner of missions: with "ants", ants on a "flat" trail, or "none"."""
+    alpha = NO_WEIGHT if variant == "flat" else 0.1
+    colony = ColonyConfig(seed=seed, alpha=alpha, q0=0.9)
+    return NearOptimal(colony, has_ants=variant != "none")
 
 
 def judged(problem: CoverageProblem, path: CoveragePath) -> WalkVerdict:

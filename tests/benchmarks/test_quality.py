@@ -188,7 +188,7 @@ def test_goals_of_other_budgets(budget_s, most):
 
 
 def test_goals_are_of_ants_alone():
-    never = replace(OPEN, variant="never")
+    never = replace(OPEN, variant="none")
     assert goals_of([run_of(setting=never, known=Known(best_steps=100))]) == {}
 
 
@@ -241,7 +241,7 @@ def test_overshoot_is_that_of_the_slowest_run():
 
 
 def test_variants_stand_side_by_side():
-    settings = [replace(OPEN, variant=variant) for variant in ("ants", "flat", "never")]
+    settings = [replace(OPEN, variant=variant) for variant in ("ants", "flat", "none")]
     known = Known(best_steps=100)
     runs = [
         run_of(setting=setting, known=known, steps=101 + index)
@@ -330,7 +330,8 @@ def test_grid_of_one_cell_is_refused(room):
 
 def test_planner_walks_on_one_thread():
     planner = planner_for(7, "flat")
-    assert (planner.config.seed, planner.threads, planner.restarts) == (7, 1, "flat")
+    assert (planner.config.seed, planner.has_ants) == (7, True)
+    assert not planner_for(7, "none").has_ants
 
 
 def test_axes():

@@ -12,6 +12,7 @@ import numpy as np
 from hypothesis import strategies as st
 
 from fasaco_edge.grid.lattice import CoverageLattice
+from fasaco_edge.kernels.ants.disc import AntRules, Colony
 from fasaco_edge.kernels.local_search.holes import rays
 from fasaco_edge.kernels.local_search.parity import Tally
 from fasaco_edge.kernels.local_search.perturbation import Memory
@@ -25,6 +26,7 @@ from fasaco_edge.kernels.local_search.walk_array import (
     Walk,
     recount,
 )
+from fasaco_edge.planners.search.search_trail import colony_for
 from tests import naive
 from tests.support.grids import with_passages_closed
 
@@ -175,6 +177,19 @@ def memory_on(ground, room):
         area=guarded(size, np.int32),
         marked=guarded(size, np.int32),
         work=guarded(2, np.int64),
+    )
+
+
+def colony_on(ground, prices, ants=4, radius=(1, 4)):
+    """Memory for ants on a ground, whose arrays know when something was written beside them."""
+    eta = prices.step_us / (prices.step_us + np.arange(5) * prices.quarter_turn_us)
+    rules = AntRules(0.9, 0.1, 0.1, eta**2.0, ants, radius, np.array([8, 2, 1]), 1.0)
+    plain = colony_for(ground.steps.size, rules)._asdict()
+    return Colony(
+        **{
+            name: guarded(it.shape, it.dtype, it) if isinstance(it, np.ndarray) else it
+            for name, it in plain.items()
+        }
     )
 
 

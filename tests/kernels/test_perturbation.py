@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from fasaco_edge.kernels.ants.disc import NOTHING
 from fasaco_edge.kernels.local_search.perturbation import (
     COOLING,
     PERTURBATIONS,
@@ -24,6 +25,7 @@ from tests.kernels.grounds import (
     assert_guards_hold,
     assert_sound,
     cells_of,
+    colony_on,
     drawn_task,
     memory_on,
     stream,
@@ -42,12 +44,12 @@ EVERY_CELL = 1 << 30
 
 def rules_for(
     prices, radius, proposals=10, loops_of_256=256, limit=EVERY_CELL, patience=0.4, steady=False,
-    strict=False,
+    strict=False, ants_of_256=0,
 ):  # fmt: skip
     unit = (prices.step_us + prices.quarter_turn_us) * 2 // 5
     patience_us = int(unit * patience)
     return PerturbationRules(
-        limit, proposals, radius, unit, patience_us, loops_of_256, steady, strict
+        limit, proposals, radius, unit, patience_us, loops_of_256, ants_of_256, steady, strict
     )
 
 
@@ -56,7 +58,7 @@ def set_up(task, prices, room=None):
     walk = walk_on(ground, task.cells(), prices, room or 4 * len(task.walk) + 300)
     tally, memory = tally_on(ground, walk.cells.size), memory_on(ground, walk.cells.size)
     remember(walk, memory)
-    return Search(ground, walk, prices, tally, memory)
+    return Search(ground, walk, prices, tally, memory, colony_on(ground, prices))
 
 
 def best_of(memory):
@@ -75,6 +77,7 @@ def assert_best_is_sound(task, ground, memory, prices):
     prices=st.sampled_from(PRICES),
     radius=st.sampled_from((-1, 0, 2, 8)),
     loops_of_256=st.sampled_from((0, 64, 256)),
+    ants_of_256=st.sampled_from((0, 192)),
     limit=st.sampled_from((1, 6, EVERY_CELL)),
     room=st.sampled_from((0, 3, 300)),
     steady=st.booleans(),
@@ -82,11 +85,20 @@ def assert_best_is_sound(task, ground, memory, prices):
     seed=st.integers(0, 2**32),
 )
 def test_perturbations_leave_a_sound_walk_and_remember_the_best(
-    task, prices, radius, loops_of_256, limit, room, steady, strict, seed
+    task, prices, radius, loops_of_256, ants_of_256, limit, room, steady, strict, seed
 ):
     search = set_up(task, prices, len(task.walk) + room)
-    ground, walk, _, tally, memory = search
-    rules = rules_for(prices, radius, 5, loops_of_256, limit, steady=steady, strict=strict)
+    ground, walk, _, tally, memory, colony = search
+    rules = rules_for(
+        prices,
+        radius,
+        5,
+        loops_of_256,
+        limit,
+        steady=steady,
+        strict=strict,
+        ants_of_256=ants_of_256,
+    )
     random = stream(seed)
     seen = [walk.counts[COST]]
     for number in range(1, 25):
@@ -98,11 +110,14 @@ def test_perturbations_leave_a_sound_walk_and_remember_the_best(
         assert not strict or cells_of(walk) == best_of(memory)
         # At the end of the search the lists of jumps and steps are as at its beginning.
         assert (tally.links == -1).all()
+        assert not colony.is_open.any()
+        assert (colony.first_end == NOTHING).all()
+        assert (colony.trail > 0.0).all()
     assert_best_is_sound(task, ground, memory, prices)
     recall(search)
     assert cells_of(walk) == best_of(memory)
     assert_sound(task, ground, walk, prices)
-    assert_guards_hold(walk, tally, memory)
+    assert_guards_hold(walk, tally, memory, colony)
 
 
 @pytest.mark.parametrize("prices", PRICES, ids=str)
@@ -184,7 +199,7 @@ def test_a_spots_surroundings_are_improved_at_each_temperature(radius):
 @given(task=tasks(), prices=st.sampled_from(PRICES), seed=st.integers(0, 2**32))
 def test_touching_up_a_spot_makes_the_walk_better_or_leaves_it(task, prices, seed):
     search = set_up(task, prices)
-    ground, walk, _, _, memory = search
+    ground, walk, _, _, memory, _ = search
     random = stream(seed)
     for number in range(1, 15):
         before, cost = cells_of(walk), walk.counts[COST]

@@ -40,6 +40,7 @@ from tests.kernels.grounds import (
     assert_legal,
     assert_sound,
     cells_of,
+    colony_on,
     drawn_task,
     guarded,
     memory_on,
@@ -116,7 +117,13 @@ def cut(task, box, cells=None, prices=PRICES[0], jumps=200, room=None):
     recount(ground, walk, length, prices)
     rays(ground, tally.rays)
     remember(walk, memory)
-    return Cut(whole, cells, box, Search(ground, walk, prices, tally, memory), cut_out)
+    return Cut(
+        whole,
+        cells,
+        box,
+        Search(ground, walk, prices, tally, memory, colony_on(ground, prices)),
+        cut_out,
+    )
 
 
 def labels_for(random, shape):
@@ -196,7 +203,8 @@ def test_whatever_is_done_in_a_region_the_whole_is_a_walk(seed, prices, hot, per
     if region is None:
         return
     random, temperature_us = stream(seed), hot * 2 * (prices.step_us + prices.quarter_turn_us)
-    rules, before = rules_for(prices, 3 if hot else -1), region.walk.counts[COST]
+    rules = rules_for(prices, 3 if hot else -1, loops_of_256=128, ants_of_256=128)
+    before = region.walk.counts[COST]
     for _ in range(4):
         improve(region.ground, region.walk, region.prices, EVERYWHERE, temperature_us, 300, random)
         assert_counts(region.ground, region.walk)
@@ -298,7 +306,7 @@ def test_sections_are_passed_in_either_direction():
         task, region = drawn_cut(seed, prices)
         if region is None or not region.tally.counts[JUMPS]:
             continue
-        rules = rules_for(prices, 0, proposals=0, patience=1e4)
+        rules = rules_for(prices, 0, proposals=0, patience=1e4, loops_of_256=128, ants_of_256=128)
         perturb(region.search, rules, 3, stream(seed))
         after = region.put_back().tolist()
         for first, last in region.sections[: region.tally.counts[JUMPS]].tolist():

@@ -28,9 +28,9 @@ def after(perturbations=0, proposals=0, ants=0):
     return WorkLimit(SearchWork(ants=ants, perturbations=perturbations, proposals=proposals))
 
 
-def plan(problem, stop=never, config=FEW_ANTS, threads=1):
+def plan(problem, stop=never, config=FEW_ANTS):
     """Plan, let an independent judge look at the walk, and recount what comes with it."""
-    path = NearOptimal(config, threads).plan(problem, stop)
+    path = NearOptimal(config).plan(problem, stop)
     ground, window = problem.lattice, problem.lattice.window
     walk = path.cells - (window.row0, window.col0)
     end = None if problem.end is None else ground.local(problem.end)

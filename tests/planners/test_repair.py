@@ -121,7 +121,7 @@ def test_a_repaired_walk_costs_no_more_than_the_completed_one(seed, change, home
     framed = FramedGround.of(problem)
     flat = framed.unframed(completed(problem, framed, problem.before, HELD_CELLS))
     only_completed = np.column_stack(np.divmod(flat, framed.cols)).astype(np.int32)
-    path = repaired(problem, "fasaco", 0, never)
+    path = repaired(problem, "fasaco", ColonyConfig(), never)
     verdict = judge(problem, path.cells)
     assert path.cost_s == cost.of_walk(path.cells)
     assert path.cost_s <= cost.of_walk(only_completed)
@@ -137,7 +137,7 @@ def test_a_repair_is_worth_its_while():
         problem = driven_halfway(seed, change=0.05)
         framed = FramedGround.of(problem)
         gains.append(len(completed(problem, framed, problem.before)) - 1)
-        gains[-1] -= repaired(problem, "fasaco", 0, never).steps
+        gains[-1] -= repaired(problem, "fasaco", ColonyConfig(), never).steps
     assert np.mean(gains) > 5
 
 
@@ -146,8 +146,10 @@ def test_a_repair_is_worth_its_while():
 def test_the_same_work_repairs_the_same_way(seed, pieces):
     problem = driven_halfway(seed, change=0.1, cost=TURNS)
     asked = iter(range(pieces))
-    first = repaired(problem, "fasaco", 3, lambda progress: next(asked, None) is None)
-    again = repaired(problem, "fasaco", 3, WorkLimit(first.work))
+    first = repaired(
+        problem, "fasaco", ColonyConfig(seed=3), lambda progress: next(asked, None) is None
+    )
+    again = repaired(problem, "fasaco", ColonyConfig(seed=3), WorkLimit(first.work))
     assert again.work == first.work
     assert np.array_equal(again.cells, first.cells)
 
@@ -198,7 +200,7 @@ def test_many_changes_on_a_large_ground_are_all_repaired():
     problem = CoverageProblem.of(CoverageLattice.from_free(changed), (0, 0), before=walk)
     framed = FramedGround.of(problem)
     only_completed = len(completed(problem, framed, walk)) - 1
-    path = repaired(problem, "fasaco", 0, never)
+    path = repaired(problem, "fasaco", ColonyConfig(), never)
     judge(problem, path.cells)
     assert path.work.proposals > 2 * repair_for(problem.cost).proposals
     assert path.lower_bound_steps == 0  # to find one would take longer than the repair
@@ -257,5 +259,5 @@ def test_a_search_of_the_rest_keeps_its_start_and_beats_repair():
         assert verdict.complete
         assert np.array_equal(found.cells[:HELD_CELLS], cut.cells[:HELD_CELLS])
         assert found.cost_s == TURNS.of_walk(found.cells)
-    better = NearOptimal().plan(full, enough)
+    better = NearOptimal().plan(full, WorkLimit(SearchWork(proposals=2_000_000)))
     assert better.cost_s < 0.99 * NearOptimal().plan(rest, enough).cost_s

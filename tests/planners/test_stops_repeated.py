@@ -5,6 +5,7 @@ import pytest
 
 from fasaco_edge.grid.lattice import CoverageLattice
 from fasaco_edge.planners.cost import CoverageCost, SearchWork
+from fasaco_edge.planners.paper.colony import ColonyConfig
 from fasaco_edge.planners.paper.fasaco import Fasaco
 from fasaco_edge.planners.planner import StopAt, StopRecorder, WorkLimit, never
 from fasaco_edge.planners.problem import CoverageProblem
@@ -42,7 +43,7 @@ def stopping_at(*questions):
 def test_a_stopped_repair_and_the_search_after_it_are_repeatable():
     """The path's work omits the repair: repeated by work alone, another path comes out."""
     problem = poor_problem()
-    assert is_poor(problem, repaired(problem, "fasaco", 0, lambda progress: True))
+    assert is_poor(problem, repaired(problem, "fasaco", ColonyConfig(), lambda progress: True))
     stop = stopping_at(1, 3)
     path = NearOptimal().plan(problem, stop)
     assert stop.stops == [1, 3]
@@ -86,7 +87,7 @@ def test_the_search_after_a_poor_repair_is_short():
     share = CoverageProblem.of(lattice, start, covered=free & ~west, cost=cost)
     before = NearOptimal().plan(share, WorkLimit(SearchWork(proposals=100_000))).cells
     other = CoverageProblem.of(lattice, start, covered=free & west, cost=cost, before=before)
-    assert is_poor(other, repaired(other, "fasaco", 0, never))
+    assert is_poor(other, repaired(other, "fasaco", ColonyConfig(), never))
     path = NearOptimal().plan(other, WorkLimit(SearchWork(proposals=2_000_000)))
     most = SHORT_SEARCH + SHORT_SEARCH_PER_CELL * other.cells
     assert most <= path.work.proposals < most + 2 * PROPOSALS_AT_ONCE

@@ -1,9 +1,9 @@
 """Perturbations: change the walk in ways local search cannot, improve it, then keep or revert it.
 
-Three kinds: the free end moves; a loop around a hole is added (see ``parity``);
-or, if turns count, only the temperature rises at a spot. If only steps count, proposals
-are then made all over the walk, as spare visits must travel to meet. If turns count, the
-surroundings are annealed.
+Four kinds: ants rebuild a disc (``kernels.ants.disc``); the free end moves; a loop around a hole
+is added (see ``parity``); or, if turns count, only the temperature rises at a spot. If only steps
+count, proposals are then made all over the walk, as spare visits must travel to meet. If turns
+count, the surroundings are annealed.
 """
 
 from typing import NamedTuple
@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from fasaco_edge.kernels.ants.disc import SAVED_US, Colony, rebuild_disc, strengthen
 from fasaco_edge.kernels.jit import as_value, inlined, lean_kernel
 from fasaco_edge.kernels.local_search.parity import (
     Tally,
@@ -40,6 +41,8 @@ from fasaco_edge.kernels.random import draw, index_of
 # Entries of ``Memory.work``.
 PROPOSALS, PERTURBATIONS = 0, 1
 
+# Steps from a disc that ants have rebuilt to the rim of what is improved.
+AROUND_DISC = 2
 # Temperatures of an annealing, from 1 down to 1 / 5, in units of 1 / 1024.
 COOLING = np.round(1024 * 0.2 ** (np.arange(8) / 7)).astype(np.int64)
 
@@ -55,6 +58,7 @@ class PerturbationRules(NamedTuple):
         temperature_us: temperature that an annealing begins with [us].
         acceptance_us: temperature at which a worse walk is kept [us].
         loops_of_256: number of 256 perturbations that change the end or add a loop.
+        ants_of_256: number of 256 perturbations in which ants rebuild a disc.
         steady: whether unchanged parts of the walk keep their order.
         strict: whether a walk of equal cost is reverted.
     """
@@ -65,6 +69,7 @@ class PerturbationRules(NamedTuple):
     temperature_us: int
     acceptance_us: int
     loops_of_256: int
+    ants_of_256: int = 0
     steady: bool = False
     strict: bool = False
 
@@ -92,7 +97,7 @@ class Memory(NamedTuple):
 
 
 class Search(NamedTuple):
-    """A local search: where the walk goes, the walk, its prices, and working memory.
+    """A local search: where the walk goes, the walk, its prices, working memory, and ants.
 
     The walk is changed in place; a worse one than ``memory.best`` may be left behind.
     """
@@ -102,6 +107,7 @@ class Search(NamedTuple):
     prices: Prices
     tally: Tally
     memory: Memory
+    colony: Colony
 
 
 @lean_kernel
@@ -193,18 +199,24 @@ def _change_parity(search: Search, rules: PerturbationRules, random: NDArray[np.
 
 @lean_kernel
 def _settle(
-    search: Search, rules: PerturbationRules, touched: int, random: NDArray[np.uint64]
+    search: Search, rules: PerturbationRules, touched: int, radius: int, random: NDArray[np.uint64]
 ) -> None:
-    """Improve the walk after a perturbation: all of it, or the surroundings, cooling down."""
+    """Improve the walk after a perturbation: all of it, or the surroundings, cooling down.
+
+    Args:
+        search, rules, random: as for ``perturb``.
+        touched: number of cells in ``memory.touched``.
+        radius: steps from these to the rim of the surroundings; -1 for the whole walk.
+    """
     ground, walk, prices, memory = search.ground, search.walk, search.prices, search.memory
-    if rules.radius < 0:
+    if radius < 0:
         proposals = rules.proposals * walk.counts[LENGTH]
         improve(ground, walk, prices, memory.area[:0], as_value(0), proposals, random)
         memory.work[PROPOSALS] += proposals
         return
     number = memory.work[PERTURBATIONS] + 1
     around = memory.touched[:touched]
-    size = neighbourhood(ground, around, rules.radius, memory.marked, number, memory.area)
+    size = neighbourhood(ground, around, radius, memory.marked, number, memory.area)
     proposals = rules.proposals * size // COOLING.size
     for level in COOLING:
         temperature_us = rules.temperature_us * level >> 10
@@ -223,12 +235,21 @@ def touch_up(
     walk, memory = search.walk, search.memory
     length, cost = walk.counts[LENGTH], walk.counts[COST]
     copy(walk.cells, memory.saved, length)
-    _settle(search, rules, touched, random)
+    _settle(search, rules, touched, rules.radius, random)
     memory.work[PERTURBATIONS] += 1
     if walk.counts[COST] < cost:
         remember(walk, memory)
     else:
         _load(search, memory.saved, length)
+
+
+@lean_kernel
+def _let_ants_rebuild(search: Search, random: NDArray[np.uint64]) -> int:
+    """Let ants rebuild a disc; return how many cells were touched, 0 if nothing was."""
+    ground, walk, prices, _, memory, colony = search
+    touched = rebuild_disc(ground, walk, prices, colony, memory.saved, random)
+    copy(colony.area, memory.touched, touched)
+    return touched
 
 
 @lean_kernel
@@ -247,19 +268,26 @@ def perturb(
     for _ in range(times):
         length, cost = walk.counts[LENGTH], walk.counts[COST]
         copy(walk.cells, memory.saved, length)
-        if draw(random) & 255 < rules.loops_of_256:
+        kind = draw(random) & 255
+        touched = by_ants = as_value(0)
+        if kind < rules.loops_of_256:
             touched = _change_parity(search, rules, random)
-        else:
-            touched = 0
+        elif kind < rules.loops_of_256 + rules.ants_of_256:
+            touched = by_ants = _let_ants_rebuild(search, random)
         if touched == 0:
             # Nothing to change there: anneal around a spot.
             spot = walk.cells[index_of(draw(random), walk.counts[LENGTH])]
             if spot < search.ground.bound:
                 memory.touched[0] = spot
                 touched = 1
-        _settle(search, rules, touched, random)
+        radius = AROUND_DISC if by_ants else rules.radius
+        _settle(search, rules, touched, radius, random)
         memory.work[PERTURBATIONS] += 1
         if walk.counts[COST] < memory.best_counts[COST]:
+            if by_ants:
+                search.colony.counts[SAVED_US] += memory.best_counts[COST] - walk.counts[COST]
             remember(walk, memory)
         elif rules.strict or not accepts(walk.counts[COST] - cost, rules.acceptance_us, random):
             _load(search, memory.saved, length)
+        if by_ants:
+            strengthen(search.ground, walk, search.colony)

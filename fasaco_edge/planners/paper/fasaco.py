@@ -30,7 +30,7 @@ from numpy.typing import NDArray
 from fasaco_edge.kernels.ants.colony import ColonyState, Rules, deposit, settle, walk_ants
 from fasaco_edge.kernels.ants.graph import Graph
 from fasaco_edge.planners.cost import MICROSECONDS, SearchWork
-from fasaco_edge.planners.living_trail import mean_into
+from fasaco_edge.planners.living_trail import TrailSnapshot, mean_into
 from fasaco_edge.planners.paper.colony import VISIBILITIES, ColonyConfig
 from fasaco_edge.planners.path import CoveragePath, Saved
 from fasaco_edge.planners.planner import (
@@ -225,11 +225,16 @@ def snapshot_of(
     steps: int,
 ) -> ColonySnapshot:
     """Return the observer's view after this many ants; ``trail`` is float64 (n, 4)."""
-    lattice = problem.lattice
-    legal = (lattice.steps[..., np.newaxis] >> np.arange(4, dtype=np.uint8)) & np.uint8(1)
-    tau = trail.reshape(legal.shape) * legal
-    mean, ways = mean_into(tau), tau.astype(np.float32)
+    lattice, ways = problem.lattice, _legal_trail(problem, trail)
+    mean = mean_into(ways)
     return ColonySnapshot(lattice.window, lattice.cell_m, mean, cohort, velocity, ants, steps, ways)
+
+
+def _legal_trail(problem: CoverageProblem, trail: NDArray[np.float64]) -> NDArray[np.float32]:
+    """Return a trail, float64 (n, 4), as float32 (rows, cols, 4); 0 where there is no step."""
+    steps = problem.lattice.steps[..., np.newaxis]
+    legal = (steps >> np.arange(4, dtype=np.uint8)) & np.uint8(1)
+    return (trail.reshape(legal.shape) * legal).astype(np.float32)
 
 
 @dataclass(frozen=True, slots=True)
@@ -275,6 +280,7 @@ class Fasaco:
             cost_s=progress.cost_s,
             first_walk_s=first_walk_s,
             saved=Saved(ants=(first_us - colony.best_us) / MICROSECONDS),
+            trail=TrailSnapshot(problem.lattice.window, _legal_trail(problem, colony.trail)),
         )
 
 

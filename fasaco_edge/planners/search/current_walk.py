@@ -15,6 +15,7 @@ from fasaco_edge.planners.bound import LowerBound
 from fasaco_edge.planners.cost import SearchWork
 from fasaco_edge.planners.problem import CoverageProblem, FramedGround
 from fasaco_edge.planners.search.regions import EDGE, is_one_region, regions_of
+from fasaco_edge.planners.search.search_trail import SearchTrail
 from fasaco_edge.planners.search.walk_region import WalkRegion
 from fasaco_edge.planners.search.windows import WindowSearch
 
@@ -38,13 +39,13 @@ class CurrentWalk:
         since_gain: perturbations since the last gain.
     """
 
-    def __init__(self, problem: CoverageProblem, framed: FramedGround) -> None:
-        self._problem, self._framed = problem, framed
+    def __init__(self, problem: CoverageProblem, framed: FramedGround, trail: SearchTrail) -> None:
+        self._problem, self._framed, self._trail = problem, framed, trail
         self.is_whole = is_one_region(framed.rows, framed.cols, problem.cells)
         self._walk, self.cost_us = np.empty(0, np.int32), 0
         self.best, self.best_us = self._walk, 0
         self.held = self.since_gain = 0
-        self.region = WalkRegion(0, 0, 0, 0)
+        self.region = WalkRegion(0, 0, 0, 0, trail)
         self.windows: WindowSearch | None = None
         # Windows of the walk are being solved, and not put back yet.
         self._in_windows = False
@@ -54,11 +55,6 @@ class CurrentWalk:
         """Start with a walk of this cost [us], the best so far."""
         self._walk, self.cost_us = walk, cost_us
         self.best, self.best_us = walk, cost_us
-
-    def restart(self, walk: NDArray[np.int32], cost_us: int) -> None:
-        """Continue from another walk of this cost [us], which may be worse than the best."""
-        self._walk, self.cost_us = walk, cost_us
-        self.since_gain = self.held = 0
 
     def _accept(self, walk: NDArray[np.int32], cost_us: int) -> None:
         """Continue from a walk if it costs no more."""
@@ -114,9 +110,9 @@ class CurrentWalk:
         if self.is_whole:
             # A few cells may lie far apart: then most of the walk is between them.
             visits = max(VISITS_PER_CELL * cells, 2 * self._walk.size)
-            self.region = WalkRegion(framed.rows, framed.cols, visits, 1)
+            self.region = WalkRegion(framed.rows, framed.cols, visits, 1, self._trail)
         else:
-            self.region = WalkRegion(EDGE, EDGE, VISITS_PER_CELL * EDGE * EDGE, JUMPS)
+            self.region = WalkRegion(EDGE, EDGE, VISITS_PER_CELL * EDGE * EDGE, JUMPS, self._trail)
 
     def regions(self) -> Iterator[WalkRegion]:
         """Load each region of the next pass in turn; put it back afterwards."""

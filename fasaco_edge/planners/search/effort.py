@@ -14,6 +14,8 @@ LEVELS = tuple(1.5 * (0.2 / 1.5) ** (level / 15) for level in range(16))
 
 WHOLE_WALK = -1
 EVERY_CELL = 1 << 30
+# Number of 256 perturbations in which ants rebuild a disc.
+BY_ANTS = 128
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,7 +26,7 @@ class Effort:
         temperatures_us: temperatures of the first improvement, in order [us].
         proposals: proposals per visit in it, over all temperatures.
         rules: rules of perturbations.
-        patience: perturbations without gain after which the search restarts.
+        patience: perturbations without gain that are a part of the patience of a search.
     """
 
     temperatures_us: tuple[int, ...]
@@ -33,12 +35,13 @@ class Effort:
     patience: int
 
 
-def effort_for(cost: CoverageCost) -> Effort:
+def effort_for(cost: CoverageCost, *, has_ants: bool = True) -> Effort:
     """Return the search parameters for a cost.
 
     With free turns, proposals at temperature 0 all over the walk work best; otherwise the
     surroundings of a perturbation are annealed.
     """
+    by_ants = BY_ANTS if has_ants else 0
     if not (cost.quarter_turn_us or cost.has_lanes):
         rules = PerturbationRules(
             limit=EVERY_CELL,
@@ -46,7 +49,8 @@ def effort_for(cost: CoverageCost) -> Effort:
             radius=WHOLE_WALK,
             temperature_us=0,
             acceptance_us=cost.step_us * 2 // 5,
-            loops_of_256=256,
+            loops_of_256=256 - by_ants,
+            ants_of_256=by_ants,
         )
         return Effort((0,), 200, rules, 100)
     # The parameters were tuned at turns of 1.5 steps; their temperatures are in steps.
@@ -57,7 +61,8 @@ def effort_for(cost: CoverageCost) -> Effort:
         radius=8,
         temperature_us=unit,
         acceptance_us=unit * 3 // 10,
-        loops_of_256=64,
+        loops_of_256=(256 - by_ants) // 4,
+        ants_of_256=by_ants,
         steady=True,
     )
     temperatures_us = tuple(int(np.rint(unit * level)) for level in LEVELS)
@@ -95,12 +100,13 @@ def repair_for(cost: CoverageCost) -> RepairEffort:
         radius=WHOLE_WALK,
         temperature_us=0,
         acceptance_us=0,
-        loops_of_256=256,
+        loops_of_256=256 - BY_ANTS,
+        ants_of_256=BY_ANTS,
         steady=True,
         strict=True,
     )
     if not (cost.quarter_turn_us or cost.has_lanes):
         return RepairEffort(rules, 30_000, 24_000, 0)
     unit = (cost.step_us + cost.quarter_turn_us) * 2 // 5
-    rules = rules._replace(proposals=40, radius=5, temperature_us=unit * 3 // 2, loops_of_256=128)
+    rules = rules._replace(proposals=40, radius=5, temperature_us=unit * 3 // 2, loops_of_256=64)
     return RepairEffort(rules, 95_000, 70_000, 2 * cost.step_us)

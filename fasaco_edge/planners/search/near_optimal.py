@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -24,7 +23,6 @@ from fasaco_edge.planners.planner import (
 )
 from fasaco_edge.planners.problem import CoverageProblem
 from fasaco_edge.planners.search.repair import repaired
-from fasaco_edge.planners.search.restarts import ANTS, SearchSettings
 from fasaco_edge.planners.search.search import Search
 from fasaco_edge.planners.walk_before import can_repair
 
@@ -47,16 +45,15 @@ def is_poor(problem: CoverageProblem, path: CoveragePath) -> bool:
 
 @dataclass(frozen=True, slots=True)
 class NearOptimal:
-    """The colony with local search; ants walk on ``threads`` threads.
+    """Local search in which ants make every second perturbation; one thread is used.
 
     Attributes:
-        restarts: source of restarts, see ``restarts.py``; others than the default measure the
-            benefit of ants and trail.
+        has_ants: False measures what a search is worth without ants.
     """
 
     config: ColonyConfig = field(default_factory=ColonyConfig)
     threads: int = 1
-    restarts: str = ANTS
+    has_ants: bool = True
     name: str = "fasaco"
 
     def plan(
@@ -82,7 +79,7 @@ class NearOptimal:
     ) -> CoveragePath:
         if not can_repair(problem):
             return self._search(problem, stop, observe)
-        path = repaired(problem, self.name, self.config.seed, stop)
+        path = repaired(problem, self.name, self.config, stop)
         if problem.only_better or not is_poor(problem, path):
             return path
         proposals = SHORT_SEARCH + SHORT_SEARCH_PER_CELL * problem.cells
@@ -93,16 +90,14 @@ class NearOptimal:
     def _search(
         self, problem: CoverageProblem, stop: StoppingCriterion, observe: Observer
     ) -> CoveragePath:
-        with ThreadPoolExecutor(self.threads) as pool:
-            settings = SearchSettings(self.name, self.config, self.threads, self.restarts)
-            search = Search(settings, problem, pool, observe)
-            for _ in search.run():
-                if stop(search.progress()):
-                    break
-            path = search.path()
-            if observe is not ignore:
-                search.show()
-            return path
+        search = Search(self.name, self.config, problem, observe, has_ants=self.has_ants)
+        for _ in search.run():
+            if stop(search.progress()):
+                break
+        path = search.path()
+        if observe is not ignore:
+            search.show()
+        return path
 
 
 def _with_lead(problem: CoverageProblem, path: CoveragePath) -> CoveragePath:

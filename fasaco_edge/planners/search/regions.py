@@ -21,6 +21,7 @@ from fasaco_edge.kernels.local_search.walk_array import (
     FRAME,
 )
 from fasaco_edge.planners.problem import FramedGround
+from fasaco_edge.planners.search.search_trail import SearchTrail
 from fasaco_edge.planners.search.walk_region import WalkRegion
 
 # A ground with up to this many cells to cover, on a lattice that is not too large, is one region.
@@ -95,12 +96,12 @@ class Neighbourhood:
     changed: NDArray[np.int32]
     is_first: bool
 
-    def walk_region(self, walk: NDArray[np.int32]) -> WalkRegion:
+    def walk_region(self, walk: NDArray[np.int32], trail: SearchTrail) -> WalkRegion:
         """Return memory for the region, and for the parts of a walk, framed cells, in it."""
         inside = self.box.labels[walk] == self.box.label
         jumps = int(np.count_nonzero(np.diff(inside))) // 2 + 1
         visits = int(np.count_nonzero(inside)) + 4 * jumps + SPARE_VISITS
-        return WalkRegion(self.box.rows, self.box.cols, visits, jumps)
+        return WalkRegion(self.box.rows, self.box.cols, visits, jumps, trail)
 
 
 def neighbourhoods(

@@ -21,11 +21,13 @@ from fasaco_edge.errors import NothingToCover
 from fasaco_edge.kernels.local_search.regions import changed_cells
 from fasaco_edge.planners.bound import GLANCE, lower_bound_of
 from fasaco_edge.planners.cost import MICROSECONDS, NO_WORK, SearchWork
+from fasaco_edge.planners.paper.colony import ColonyConfig
 from fasaco_edge.planners.path import CoveragePath, Saved, common_beginning
 from fasaco_edge.planners.planner import SearchProgress, StoppingCriterion
 from fasaco_edge.planners.problem import CoverageProblem, FramedGround
 from fasaco_edge.planners.search.effort import RepairEffort, repair_for
 from fasaco_edge.planners.search.regions import Neighbourhood, neighbourhoods, spot
+from fasaco_edge.planners.search.search_trail import SearchTrail
 from fasaco_edge.planners.search.walk_region import WalkRegion, stream_of
 from fasaco_edge.planners.walk_before import HELD_CELLS, completed_from, framed_cells
 
@@ -47,18 +49,19 @@ BOUNDED_CELLS = 2_000
 
 
 def repaired(
-    problem: CoverageProblem, name: str, seed: int, stop: StoppingCriterion
+    problem: CoverageProblem, name: str, config: ColonyConfig, stop: StoppingCriterion
 ) -> CoveragePath:
     """Return a complete walk that keeps the valid parts of ``problem.before``, without its lead.
 
     Args:
         problem: with a walk ``before``, see ``can_repair``.
-        name, seed: name and seed of the planner.
+        name: of the planner.
+        config: seed, and constants of the ants.
         stop: stopping criterion.
     """
-    repair = _Repair(problem, seed, repair_for(problem.cost))
+    repair = _Repair(problem, config, repair_for(problem.cost))
     is_stopped = _run(repair, stop)
-    path = repair.path(name, seed)
+    path = repair.path(name, config.seed)
     if problem.whole is not None:
         return path
     assert problem.before is not None
@@ -67,7 +70,7 @@ def repaired(
     is_large = problem.cells > BOUNDED_CELLS
     if is_stopped or is_large or common_beginning(next_cells, path.cells) >= held:
         return path
-    return _steady(problem, path, held - 1, repair.completed_us, stop)
+    return _steady(problem, config, path, held - 1, repair.completed_us, stop)
 
 
 def _run(repair: _Repair, stop: StoppingCriterion) -> bool:
@@ -77,6 +80,7 @@ def _run(repair: _Repair, stop: StoppingCriterion) -> bool:
 
 def _steady(
     problem: CoverageProblem,
+    config: ColonyConfig,
     path: CoveragePath,
     held: int,
     completed_us: int,
@@ -96,7 +100,7 @@ def _steady(
         return path
     effort = repair_for(problem.cost)
     few = replace(effort, proposals=int(FEW * effort.proposals), held=0)
-    repair = _Repair(rest, path.seed, few, path.work)
+    repair = _Repair(rest, config, few, path.work)
     _run(repair, stop)
     other = repair.path(path.planner, path.seed)
     cells = np.concatenate((problem.before[:held], other.cells))
@@ -119,13 +123,13 @@ class _Repair:
     def __init__(
         self,
         problem: CoverageProblem,
-        seed: int,
+        config: ColonyConfig,
         effort: RepairEffort,
         work: SearchWork = NO_WORK,
     ) -> None:
         assert problem.before is not None
         began = time.perf_counter()
-        self._problem = problem
+        self._problem, self._trail = problem, SearchTrail(problem, config)
         self._framed = FramedGround.of(problem)
         self._effort = effort
         before = framed_cells(problem, self._framed, problem.before)
@@ -136,15 +140,16 @@ class _Repair:
         self.completed_us = self._cost_us = problem.cost_us(self._walk)
         has_bound = problem.only_better or problem.cells <= BOUNDED_CELLS
         self._bound = lower_bound_of(problem, GLANCE) if has_bound else None
-        self._random = stream_of(seed, len(self._walk))
+        self._random = stream_of(config.seed, len(self._walk))
         # Work on earlier regions, and the region that is being improved.
         self._work = work
         self._region: WalkRegion | None = None
+        self._saved_by_ants_us = 0
 
     def run(self) -> Iterator[None]:
         """Improve the walk, one neighbourhood after the other; pause after each piece of work."""
         for place in self._places():
-            region = place.walk_region(self._walk)
+            region = place.walk_region(self._walk, self._trail)
             if region.load(self._framed, self._walk, place.box):
                 self._region = region
                 yield from self._improve(region, place)
@@ -197,6 +202,7 @@ class _Repair:
             return
         self._walk, self._work = self._region.put_back(), self._work + self._region.work
         self._cost_us = self._problem.cost_us(self._walk)
+        self._saved_by_ants_us += self._region.saved_by_ants_us
         self._region = None
 
     def progress(self) -> SearchProgress:
@@ -225,8 +231,14 @@ class _Repair:
             lower_bound_steps=0 if self._bound is None else self._bound.steps,
             lower_bound_cost_s=self._least_s,
             first_walk_s=self._first_walk_s,
-            saved=Saved(local_search=(self.completed_us - self._cost_us) / MICROSECONDS),
+            saved=self._saved(),
+            trail=self._trail.changed(),
         )
+
+    def _saved(self) -> Saved:
+        saved_us = self.completed_us - self._cost_us
+        ants_us = min(self._saved_by_ants_us, max(saved_us, 0))
+        return Saved(ants_us / MICROSECONDS, (saved_us - ants_us) / MICROSECONDS)
 
 
 def _changed(

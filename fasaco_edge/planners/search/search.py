@@ -4,33 +4,30 @@
    (``first_walks``). A previous walk is completed, and kept if it is as good: then the cells
    just ahead of the robot change only for a gain.
 2. Local search improves it, region by region on a large ground.
-3. Perturbations, each followed by local search, continue from there; where turns cost, windows of
-   the walk are solved again in between (``windows``), most of the time if turns are expensive.
-4. When perturbations gain nothing, the next ants of the colony walk; their best walk goes through
-   2 and 3, and the trail is strengthened along the best walk of all, by equation (8): ants start
-   from good solutions.
+3. Perturbations, each followed by local search, continue from there: ants rebuild a disc in every
+   second one. Where turns cost, windows of the walk are solved again in between (``windows``), most
+   of the time if turns are expensive.
 
-The search ends when it is stopped, when the walk meets its lower bound, when all ants have walked,
-or, on a large ground, which has no restarts, when perturbations gain nothing. Its work is counted;
-the same counts give the same walk.
+The search ends when it is stopped, when the walk meets its lower bound, or when perturbations gain
+nothing for long. Its work is counted; the same counts give the same walk.
 """
 
 from __future__ import annotations
 
 import time
 from collections.abc import Iterator
-from concurrent.futures import ThreadPoolExecutor
 
 from fasaco_edge.kernels.windows.order import LINES, PLACES
 from fasaco_edge.planners.bound import GLANCE, THOROUGH, LowerBound
 from fasaco_edge.planners.cost import MICROSECONDS, SearchWork
 from fasaco_edge.planners.paper.baselines import first_walks
+from fasaco_edge.planners.paper.colony import ColonyConfig
 from fasaco_edge.planners.path import CoveragePath, Saved
 from fasaco_edge.planners.planner import Observer, SearchProgress
 from fasaco_edge.planners.problem import CoverageProblem, FramedGround, graph_of
 from fasaco_edge.planners.search.current_walk import CurrentWalk
 from fasaco_edge.planners.search.effort import effort_for
-from fasaco_edge.planners.search.restarts import NEVER, Restarts, SearchSettings
+from fasaco_edge.planners.search.search_trail import SearchTrail
 from fasaco_edge.planners.search.walk_region import stream_of
 from fasaco_edge.planners.search.windows import WindowSearch, is_dear, pays_whole, suits
 from fasaco_edge.planners.walk_before import HELD_CELLS, completed, has_walk
@@ -41,8 +38,9 @@ PROPOSALS_AT_ONCE = 30_000
 # Perturbations of each region in a pass, with several regions.
 PERTURBATIONS_IN_PASS = 8
 
-# With several regions the search ends after this many passes without gain.
-GAINLESS_PASSES = 10
+# The search ends after this many passes without gain with several regions; and with one region,
+# after this many times the patience of its effort.
+GAINLESS_PASSES, GAINLESS = 10, 30
 
 # Perturbations between two evaluations of the whole walk, with one region.
 PERTURBATIONS_IN_VISIT = 64
@@ -72,24 +70,26 @@ class Search:
 
     def __init__(
         self,
-        settings: SearchSettings,
+        name: str,
+        config: ColonyConfig,
         problem: CoverageProblem,
-        pool: ThreadPoolExecutor,
         observe: Observer,
+        *,
+        has_ants: bool,
     ) -> None:
         self._began = time.perf_counter()
-        self._settings, self._problem, self._observe = settings, problem, observe
+        self._name, self._seed = name, config.seed
+        self._problem, self._observe = problem, observe
         self._graph = graph_of(problem)
         self._framed = FramedGround.of(problem)
-        self._effort = effort_for(problem.cost)
-        self._random = stream_of(settings.colony.seed, LOCAL_SEARCH)
-        self._walk = CurrentWalk(problem, self._framed)
-        self._restarts = Restarts(settings, problem, self._graph, pool)
+        self._effort = effort_for(problem.cost, has_ants=has_ants)
+        self._random = stream_of(config.seed, LOCAL_SEARCH)
+        self._trail = SearchTrail(problem, config)
+        self._walk = CurrentWalk(problem, self._framed, self._trail)
         self._first_walks = 0
         self._first_walk_s = 0.0
-        # Cost of the first walk; best cost when ants first walked.
+        # Cost of the first walk [us].
         self._first_us = 0
-        self._before_ants_us: int | None = None
         self._bound: LowerBound | None = None
         # Whether improvement has begun; number of cells that the bound may solve in bands.
         self._has_begun, self._owed = False, 0
@@ -111,20 +111,16 @@ class Search:
             yield from self._begin_better()
         self._has_begun = True
         walk = self._walk
-        may_restart = walk.is_whole and self._settings.restarts != NEVER
         while not self._is_proven():
             before = self._work
             yield from self._perturb()
             yield from self._solve_windows()
-            # The walk exceeds its memory, or lies in no region: nothing can be perturbed.
-            stuck = self._work == before
-            if not walk.is_whole and walk.since_gain >= GAINLESS_PASSES * self._perturbed_in_pass:
+            most = GAINLESS_PASSES * self._perturbed_in_pass
+            if walk.is_whole:
+                most = GAINLESS * self._effort.patience
+            # Without work the walk exceeds its memory, or lies in no region.
+            if walk.since_gain >= most or self._work == before:
                 return
-            if stuck or (walk.since_gain >= self._effort.patience and may_restart):
-                if not (may_restart and self._restart()):
-                    return
-                yield
-                yield from self._improve()
 
     def progress(self) -> SearchProgress:
         """Return the progress."""
@@ -139,28 +135,25 @@ class Search:
         bound = self._bound or self._tighten(GLANCE)
         return CoveragePath(
             self._problem.cells_of(self._framed.unframed(self._walk.best)),
-            planner=self._settings.planner,
-            seed=self._settings.colony.seed,
+            planner=self._name,
+            seed=self._seed,
             work=self._work,
             cost_s=self._walk.best_us / MICROSECONDS,
             lower_bound_steps=bound.steps,
             lower_bound_cost_s=bound.cost_s,
             first_walk_s=self._first_walk_s,
             saved=self._saved(),
+            trail=self._trail.changed(),
         )
 
     def _saved(self) -> Saved:
-        last_us = self._walk.best_us
-        first_us = self._first_us or last_us
-        between_us = last_us if self._before_ants_us is None else self._before_ants_us
-        return Saved(
-            ants=(between_us - last_us) / MICROSECONDS,
-            local_search=(first_us - between_us) / MICROSECONDS,
-        )
+        saved_us = (self._first_us or self._walk.best_us) - self._walk.best_us
+        ants_us = min(self._walk.region.saved_by_ants_us, saved_us)
+        return Saved(ants_us / MICROSECONDS, (saved_us - ants_us) / MICROSECONDS)
 
     @property
     def _work(self) -> SearchWork:
-        return self._walk.work + SearchWork(ants=self._first_walks + self._restarts.ants)
+        return self._walk.work + SearchWork(ants=self._first_walks)
 
     def _is_proven(self) -> bool:
         """Return whether the walk is proven optimal."""
@@ -268,22 +261,9 @@ class Search:
             return self._walk.open_windows(self._tighten(THOROUGH))
         return self._walk.windows
 
-    def _restart(self) -> bool:
-        """Continue from a walk of the next ants; return False if none are left."""
-        best_us = self._walk.best_us
-        found = self._restarts.next_walk(self._framed.unframed(self._walk.best), best_us)
-        if found is None:
-            return False
-        if self._before_ants_us is None:
-            self._before_ants_us = best_us
-        walk = self._framed.framed(found)
-        self._walk.restart(walk, self._problem.cost_us(walk))
-        return True
-
     def show(self) -> None:
-        """Show the observer the trail, strengthened along the best walk; the search is over."""
-        best, ants = self._framed.unframed(self._walk.best), self._work.ants
-        self._observe(self._restarts.snapshot(best, self._walk.best_us, ants))
+        """Show the observer the trail; the search is over."""
+        self._observe(self._trail.seen(self._work.ants, self._walk.best.size - 1))
 
 
 def _pieces(total: int, largest: int) -> Iterator[int]:

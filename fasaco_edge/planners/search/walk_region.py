@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from fasaco_edge.kernels.ants.disc import ANTS, SAVED_US
 from fasaco_edge.kernels.local_search.holes import rays
 from fasaco_edge.kernels.local_search.parity import JUMPS, Tally
 from fasaco_edge.kernels.local_search.perturbation import (
@@ -42,6 +43,7 @@ from fasaco_edge.kernels.local_search.walk_array import (
 )
 from fasaco_edge.planners.cost import SearchWork
 from fasaco_edge.planners.problem import FramedGround
+from fasaco_edge.planners.search.search_trail import SearchTrail, colony_for
 
 EVERYWHERE = np.empty(0, np.int32)
 
@@ -56,9 +58,10 @@ class WalkRegion:
         rows, cols: size of the largest region.
         visits: visits of its longest walk.
         jumps: limit on the times that the walk leaves it and comes back.
+        trail: the pheromone that its ants read and change.
     """
 
-    def __init__(self, rows: int, cols: int, visits: int, jumps: int) -> None:
+    def __init__(self, rows: int, cols: int, visits: int, jumps: int, trail: SearchTrail) -> None:
         size = (rows + 2 * FRAME) * (cols + 2 * FRAME)
         both, capacity = size + jumps, 2 * visits + 4 * jumps + 64
         ground = Ground(
@@ -82,7 +85,9 @@ class WalkRegion:
             marked=np.zeros(size, np.int32),
             work=np.zeros(2, np.int64),
         )
-        self._search = Search(ground, walk, Prices(1, 0, False), tally, self._memory)
+        colony = colony_for(both, trail.rules)
+        self._search = Search(ground, walk, Prices(1, 0, False), tally, self._memory, colony)
+        self._trail = trail
         self._jumps = Jumps(tally.jump_ends, np.empty((jumps, 2), np.int32), np.zeros(2, np.int64))
         self._loaded_us = self._loaded_length = 0
         # The whole ground and walk, and the box of the loaded region.
@@ -97,7 +102,7 @@ class WalkRegion:
             box: the region, not larger than this memory.
         """
         ground, prices = framed.ground, framed.prices
-        _, walk, _, tally, _ = self._search
+        _, walk, _, tally, _, colony = self._search
         width = box.cols + 2 * FRAME
         region = self._search.ground._replace(bound=(box.rows + 2 * FRAME) * width)
         region.offsets[:] = (1, width, -1, -width)
@@ -117,6 +122,10 @@ class WalkRegion:
         remember(walk, self._memory)
         self._loaded_us, self._loaded_length = int(walk.counts[COST]), length
         self._whole = ground, cells, box
+        self._trail.cut(box, colony.trail)
+        steps_us = prices.step_us * int(np.count_nonzero(region.needed == 1))
+        ants = colony.rules._replace(amount=steps_us / max(self._loaded_us, 1))
+        self._search = self._search._replace(colony=colony._replace(rules=ants))
         return True
 
     @property
@@ -147,12 +156,17 @@ class WalkRegion:
     @property
     def work(self) -> SearchWork:
         """Work in this region and those before it."""
-        work = self._memory.work
-        return SearchWork(perturbations=int(work[PERTURBATIONS]), proposals=int(work[PROPOSALS]))
+        work, ants = self._memory.work, self._search.colony.counts[ANTS]
+        return SearchWork(int(ants), int(work[PERTURBATIONS]), int(work[PROPOSALS]))
+
+    @property
+    def saved_by_ants_us(self) -> int:
+        """What perturbations by ants have saved here [us]."""
+        return int(self._search.colony.counts[SAVED_US])
 
     def improve(self, temperature_us: int, proposals: int, random: NDArray[np.uint64]) -> None:
         """Make proposals all over the region at one temperature."""
-        ground, walk, prices, _, memory = self._search
+        ground, walk, prices, _, memory, _ = self._search
         improve(ground, walk, prices, EVERYWHERE, temperature_us, proposals, random)
         memory.work[PROPOSALS] += proposals
         if walk.counts[COST] <= memory.best_counts[COST]:
@@ -178,6 +192,7 @@ class WalkRegion:
         assert self._whole is not None
         ground, cells, box = self._whole
         self._whole = None
+        self._trail.paste(box, self._search.colony.trail)
         best = self._memory.best[: self.best_length]
         out = np.empty(cells.size + best.size, np.int32)
         return out[: put_back(ground, box, cells, best, self._jumps, out)]

@@ -70,10 +70,10 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
     _add_choice(
         parser,
         "--variants",
-        ("ants", "flat", "never"),
+        ("ants", "flat", "none"),
         ["ants"],
-        "what the search restarts from where perturbations gain nothing any more: the colony's "
-        "next ants; ants on a trail that nothing strengthens; or the same walk",
+        "what perturbs the walk: ants on their trail in half of the perturbations; ants on a "
+        "uniform trail; or none",
     )
     parser.add_argument("--plot", type=Path, metavar="FILE.png", help="draw ratios over budgets")
 
@@ -294,6 +294,6 @@ examples:
   python -m tests.benchmarks quality --maps office --budgets 0.02 0.1 1 10 --cost steps
   python -m tests.benchmarks quality --grids *.npy --results results.json --plot quality.png
   python -m tests.benchmarks quality --end home --cost steps --budgets 1 --json
-  python -m tests.benchmarks quality --variants ants flat never
+  python -m tests.benchmarks quality --variants ants flat none
 """,
 )

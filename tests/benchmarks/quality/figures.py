@@ -16,11 +16,11 @@ from fasaco_edge.drawing.spread import Spread
 from tests.benchmarks.quality.runs import Known, QualityRun, Setting
 from tests.benchmarks.table1.paper import paper_map
 
-# What the search goes on from, as the tables have it.
+# What perturbs, as the tables have it.
 VARIANTS = {
     "ants": "with ants",
-    "flat": "restarts without pheromone",
-    "never": "without ants",
+    "flat": "ants on a uniform trail",
+    "none": "without ants",
 }
 
 

@@ -147,7 +147,7 @@ class Setting:
     Attributes:
         end: "anywhere" or "home".
         cost: "steps", turns being free, or "turns".
-        variant: what the search goes on from, as ``NearOptimal.restarts``.
+        variant: what perturbs, see ``harness.planner_for``.
     """
 
     end: str
