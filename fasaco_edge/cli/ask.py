@@ -43,7 +43,6 @@ examples:
   fasaco-edge ask status
   fasaco-edge ask path                      its length, and the reason for it
   fasaco-edge ask pheromone                 the living trail, and how distinct its directions are
-  fasaco-edge ask pheromone --param cohort=0
   fasaco-edge ask replan                    a full new plan, now
   fasaco-edge ask config --json
 
@@ -248,15 +247,14 @@ def _coverage_figures(reply: Reply) -> dict[str, object]:
 
 def _trail_figures(reply: Reply) -> dict[str, object]:
     trail = decode_pheromone(reply.payload)
-    # The living trail comes with an attachment; its message has no cohort.
-    colony = {"cohort": trail.cohort, "velocity": trail.velocity, "ants": trail.ants}
-    about = decode_json(reply.attachment) if reply.attachment else colony
+    about = decode_json(reply.attachment) if reply.attachment else {}
     return {
         "frame": trail.frame,
         "rows": trail.geometry.rows,
         "cols": trail.geometry.cols,
         "cell_m": trail.geometry.resolution,
         **about,
+        "ants": trail.ants,
         "best_steps": trail.best_steps,
         "trail_min": trail.trail_min,
         "trail_max": trail.trail_max,

@@ -25,7 +25,8 @@ A keep-out mask is read while no map is decoded, and may take as much as two of 
 Larger messages are dropped on arrival, by their size alone. Nothing else grows with the
 pixels: kernels read a map tile by tile, and a tile is bounded, see ``grid.lattice``. Of the memory
 per cell the path takes most: some 80 bytes a pose, twice while it is sent. The living trail takes
-16 bytes a cell, as much again while a copy is planned on or written, and 8 in the ledger's file.
+16 bytes a cell, as much again while a copy is planned on or written, and 8 in the ledger's file;
+what the ants of a plan leave spans the regions they walked on.
 The rest of the ledger takes 4 bytes a cell, with the copy being written; swept floor takes a bit a
 pixel of 2.5 cm, 18 bytes a cell of 0.3 m, and as much again where it changed since that copy. The
 ledger is bounded on its own: 34 MB of cells and twice 13 MB of floor, if jumping poses fill it.
@@ -96,10 +97,9 @@ def queues(max_pixels: int) -> dict[str, Queue]:
     """Return the queue of each kind."""
     sizes = dict.fromkeys(("map", "map_update"), map_bytes(max_pixels))
     sizes["blocked"] = QUEUE_LENGTHS["blocked"] * MAX_BLOCKED_BYTES
-    rooms = {
+    return {
         kind: Queue(length, sizes.get(kind, QUEUED_BYTES)) for kind, length in QUEUE_LENGTHS.items()
     }
-    return {**rooms, "snapshot": Queue(8)}
 
 
 def needed_bytes(config: DaemonConfig) -> int:

@@ -136,8 +136,7 @@ FLOOR = Topic(
 PHEROMONE = Topic(
     name="pheromone",
     direction="out",
-    when="the trail has changed, twice a second at most, or a cohort has walked; only while "
-    "someone listens",
+    when="the trail has changed, twice a second at most, only while someone listens",
     speaker="robot",
     listeners=("viewer",),
     schemas=(schemas.PHEROMONE_GRID,),
@@ -306,13 +305,7 @@ QUERIES = (
     Query("path", ("viewer",), schema=schemas.PATH, errors=("not_yet",)),
     Query("status", ("viewer",), json="status.json"),
     Query("coverage", ("viewer",), schema=schemas.OCCUPANCY_GRID, errors=("not_yet",)),
-    Query(
-        "pheromone",
-        ("viewer",),
-        schema=schemas.PHEROMONE_GRID,
-        parameters=("cohort",),
-        errors=("not_yet",),
-    ),
+    Query("pheromone", ("viewer",), schema=schemas.PHEROMONE_GRID, errors=("not_yet",)),
     Query("config", ("viewer",), json="config.json"),
     Query("version", ("viewer",), json="version.json"),
     # These queries are commands.

@@ -349,7 +349,7 @@ class Senseless:
             name = self._rng.choice(QUERIES)
             parameters = ""
             if name == "pheromone" or self._rng.random() < 0.05:
-                parameters = self._rng.choice(["", "cohort=0", "cohort=7", "cohort=-1", "what=1"])
+                parameters = self._rng.choice(["", "cohort=0", "what=1"])
             yield {"do": "ask", "name": name, "parameters": parameters}
 
     # What happens to processes and links.

@@ -56,10 +56,10 @@ def test_a_program_gets_json(endpoint, capsys):
         return json.loads(capsys.readouterr().out)
 
     path, version = told("path"), told("version")
-    trail = told("pheromone", "--param", "cohort=0")
+    trail = told("pheromone")
     assert path["poses"] == path["steps"] + 1
     assert path["length_m"] == pytest.approx(0.3 * path["steps"])
-    assert (trail["cohort"], trail["rows"] * trail["cols"]) == (0, 100)
+    assert trail["rows"] * trail["cols"] == 100
     assert version["package"] == "fasaco-edge"
 
 
@@ -67,9 +67,8 @@ def test_what_is_wrong_is_told(endpoint, capsys):
     words = ("pheromone", "--param", "cohort=77", "--json")
     assert main(["ask", *words, "--connect", endpoint]) == 1
     told = capsys.readouterr()
-    assert json.loads(told.out)["code"] == "not_yet"
-    assert "no trail of cohort 77" in told.err
-    assert "\n  hint: ask for newest, 0, or leave cohort out" in told.err
+    assert json.loads(told.out)["code"] == "bad_query"
+    assert "cohort" in told.err
     assert main(["ask", "status", "--robot", "other", "--connect", endpoint]) == 1
     assert "there are robot: give one as --robot" in capsys.readouterr().err
     for words in (("ask", "colour"), ("ask", "path", "--param", "colour"), ("ask",)):

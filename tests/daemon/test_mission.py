@@ -420,7 +420,7 @@ def test_the_living_trail_is_sent_with_how_decided_it_is(fresh):
     fresh.put("pose", pose_bytes(*START))
     first = receiver.wait(lambda heard: bool(heard.attachment) and about(heard)["revision"] == 1)
     trail, told = decode_pheromone(first.payload), about(first)
-    assert (trail.velocity, trail.ants, trail.cohort) == (0, 0, 0)
+    assert (trail.velocity, trail.cohort) == (0, 0)
     assert told["cells"] == np.count_nonzero(trail.levels)
     assert 1.0 <= told["branching"] < 2.0
     # What was driven fades: the robot goes on along its path, and no new one comes.

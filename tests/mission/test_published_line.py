@@ -87,9 +87,14 @@ def test_the_published_line_is_held_as_far_as_it_is_polished():
 
 def test_pixels_that_flicker_far_ahead_change_nothing_yet():
     """Each of them brought a path, and the next map another one: 71 in these two minutes."""
+    assert sum(changes_nearby(seed) for seed in (1, 2, 3)) <= 3 * 4
+
+
+def changes_nearby(seed):
+    """Return how often the next metres changed in two minutes of flicker."""
     pixels = np.full((80, 120), 100, np.int8)
     pixels[1:-1, 1:-1] = 0
-    random = np.random.default_rng(1)
+    random = np.random.default_rng(seed)
     robot = LineRobot(pixels, (1.0, 1.0))
     robot.wait(3.0, lambda robot: False)
     seen, changes = len(robot.paths), 0
@@ -103,8 +108,8 @@ def test_pixels_that_flicker_far_ahead_change_nothing_yet():
             seen = len(robot.paths)
             after = PathAhead(np.array([(robot.x, robot.y), *robot.path]))
             changes += differs(before.ahead(), after.ahead())
-    assert changes <= 4
     assert len(robot.paths) <= 24
+    return changes
 
 
 def test_a_robot_that_stands_gets_a_new_path_at_once():

@@ -150,10 +150,11 @@ def test_a_loop_closure_takes_it_along(together):
     np.testing.assert_array_equal(tau, before)
 
 
-def test_only_a_planner_that_uses_the_trail_gets_it():
+def test_a_plan_starts_from_the_trail():
     first = MapReceived(building(*ROOMS)), pose_at(0, 0)
-    assert Drive((0, 0), *first).request.problem.trail is None
-    drive = Drive((0, 0), *first, config=replace(CONFIG, plans_on_trail=True))
+    flat = Drive((0, 0), *first, config=replace(CONFIG, plans_on_trail=False))
+    assert flat.request.problem.trail is None
+    drive = Drive((0, 0), *first)
     np.testing.assert_array_equal(drive.request.problem.trail.tau, tau_of(drive))
     drive.plan()
     seen = drive.request
@@ -169,7 +170,6 @@ def test_a_colony_that_goes_on_comes_to_the_same_mission_again():
             (0, 0),
             MapReceived(building(*(row[:5] for row in ROOMS))),
             pose_at(0, 0),
-            config=replace(CONFIG, plans_on_trail=True),
         )
         drive.plan()
         drive.go(MapReceived(building(*ROOMS)))

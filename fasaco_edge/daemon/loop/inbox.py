@@ -39,7 +39,6 @@ from fasaco_edge.wire.schemas import TF_MESSAGE
 
 if TYPE_CHECKING:
     from fasaco_edge.daemon.fleet_wing import MessagesOfOthers
-    from fasaco_edge.planners.planner import ColonySnapshot
 
 MAPS = ("map", "map_update")
 # Inputs that only one publisher may send, and their plurals in reports.
@@ -73,14 +72,6 @@ class Oversized:
     most: int
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class PlanSnapshot:
-    """A snapshot of the search of plan ``plan``."""
-
-    plan: int
-    snapshot: ColonySnapshot
-
-
 @dataclass(slots=True)
 class Batch:
     """The input of one cycle.
@@ -90,7 +81,6 @@ class Batch:
         oversized: samples dropped by their size alone.
         questions: commands that wait for a reply.
         plans: results of the planning thread, good or not.
-        snapshots: snapshots of the search from the planning thread.
         updates_lost: map updates dropped by the full queue.
     """
 
@@ -98,7 +88,6 @@ class Batch:
     oversized: list[Oversized] = field(default_factory=list)
     questions: list[Question] = field(default_factory=list)
     plans: list[PlanReady | PlanBroken] = field(default_factory=list)
-    snapshots: list[PlanSnapshot] = field(default_factory=list)
     updates_lost: int = 0
 
 
@@ -117,8 +106,6 @@ def take_batch(mailbox: Mailbox[object], timeout_s: float) -> Batch:
                 batch.questions.append(item)
             case PlanReady() | PlanBroken():
                 batch.plans.append(item)
-            case PlanSnapshot():
-                batch.snapshots.append(item)
             case Oversized():
                 batch.oversized.append(item)
             case BaseException():

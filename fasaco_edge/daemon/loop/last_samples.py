@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import threading
 from dataclasses import dataclass
 from functools import partial
@@ -12,7 +11,7 @@ import numpy as np
 from fasaco_edge.bus.queries import Reply, Request
 from fasaco_edge.bus.session import Bus
 from fasaco_edge.daemon.loop.answers import Said, answering, check
-from fasaco_edge.errors import BadQuery, NotYet
+from fasaco_edge.errors import NotYet
 from fasaco_edge.grid.geometry import GridGeometry
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.grid.rotation import rotated_geometry
@@ -30,9 +29,6 @@ from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.messages.maps import direction_values, encode_occupancy_grid
 from fasaco_edge.wire.messages.pheromone import encode_pheromone
 
-# The value of ``cohort`` for the last cohort.
-NEWEST = "newest"
-
 
 class LastSamples:
     """Keeps the last sample of some topics, and replies with it.
@@ -43,9 +39,6 @@ class LastSamples:
     def __init__(self, bus: Bus, keys: Keys) -> None:
         self._lock = threading.Lock()
         self._last: dict[str, Said] = {}
-        # Fields of the newest full plan: by cohort, and the newest; and the number of its request.
-        self._trails: dict[str, Said] = {}
-        self._plan = 0
         self._living: ShownTrail | None = None
         for topic in (topics.PATH, topics.STATUS, topics.COVERAGE):
             answer = answering(partial(self._answer, topic.name))
@@ -58,13 +51,6 @@ class LastSamples:
         """Keep a sample of ``topic``."""
         with self._lock:
             self._last[topic] = reply
-
-    def keep_trail(self, plan: int, cohort: int, reply: Said) -> None:
-        """Keep the trail that ``cohort`` of plan ``plan`` has left."""
-        with self._lock:
-            if plan != self._plan:
-                self._plan, self._trails = plan, {}
-            self._trails[str(cohort)] = self._trails[NEWEST] = reply
 
     def keep_living(self, shown: ShownTrail) -> None:
         """Keep the living trail."""
@@ -80,27 +66,7 @@ class LastSamples:
         return reply
 
     def _trail(self, request: Request) -> Said:
-        check(request, "cohort")
-        cohort = request.parameters.get("cohort")
-        if cohort is None:
-            return self._living_trail()
-        if cohort != NEWEST:
-            if not re.fullmatch("[0-9]{1,9}", cohort):
-                raise BadQuery(f"cohort must be a whole number from 0, got {cohort!r}")
-            cohort = str(int(cohort))
-        with self._lock:
-            reply = self._trails.get(cohort)
-            kept = [name for name in self._trails if name != NEWEST]
-        if reply is not None:
-            return reply
-        if not kept:
-            raise NotYet("no cohort has walked yet: no full plan was made")
-        raise NotYet(
-            f"the newest full plan has no trail of cohort {cohort}",
-            hint=f"ask for {NEWEST}, {', '.join(kept)}, or leave cohort out for the living trail",
-        )
-
-    def _living_trail(self) -> Said:
+        check(request)
         with self._lock:
             living = self._living
         if living is None:
@@ -115,6 +81,7 @@ class ShownTrail:
 
     Attributes:
         held: the trail.
+        ants: number of ants that have walked on it so far.
         cell_m: edge of a cell [m].
         frame: of the map.
         revision: of the path in force.
@@ -124,6 +91,7 @@ class ShownTrail:
     """
 
     held: TrailSnapshot
+    ants: int
     cell_m: float
     frame: str
     revision: int
@@ -140,7 +108,7 @@ class ShownTrail:
             cells=int(np.count_nonzero(field)),
             branching=round(branching(tau), 4),
         )
-        seen = ColonySnapshot(self.held.window, self.cell_m, field, 0, 0, 0, self.steps)
+        seen = ColonySnapshot(self.held.window, self.cell_m, field, 0, 0, self.ants, self.steps)
         payload = encode_pheromone(seen, self.frame, self.stamp_ns, self.lattice_deg)
         return payload, encode_json(about)
 

@@ -232,11 +232,8 @@ class Loop:
         return self._bus.inbox.conflicts(now) + (mask.conflicts(now) if mask else [])
 
     def _note(self, batch: Batch) -> None:
-        """Take data besides the mission's: snapshots of the search, and times."""
+        """Take the times of plans and maps."""
         mission = self._runner.mission
-        frame = self._runner.map_frame or DEFAULT_FRAME
-        for seen in batch.snapshots:
-            self._bus.outbox.pheromone(seen, frame, mission.rotation.deg if mission else 0.0)
         for plan in batch.plans:
             if isinstance(plan, PlanReady) and not (mission and mission.route.is_improving):
                 self._status.plan_s = plan.seconds

@@ -19,7 +19,6 @@ from numpy.typing import NDArray
 from fasaco_edge.bus.queries import Reply, Shared
 from fasaco_edge.bus.session import Bus
 from fasaco_edge.daemon.figures import log_fault
-from fasaco_edge.daemon.loop.inbox import PlanSnapshot
 from fasaco_edge.daemon.loop.last_samples import LastSamples, ShownTrail
 from fasaco_edge.daemon.ros_bridge import RosBridge
 from fasaco_edge.errors import FasacoError, NotPublished
@@ -33,7 +32,6 @@ from fasaco_edge.wire.documents.status import Status
 from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.messages.maps import coverage_values, encode_occupancy_grid
 from fasaco_edge.wire.messages.paths import encode_path
-from fasaco_edge.wire.messages.pheromone import encode_pheromone
 
 if TYPE_CHECKING:
     from fasaco_edge.mission.core.mission import Mission
@@ -143,17 +141,6 @@ class Outbox:
     def keep_trail(self, shown: ShownTrail) -> None:
         """Keep the living trail for queries."""
         self._last.keep_living(shown)
-
-    def pheromone(self, seen: PlanSnapshot, frame: str, lattice_deg: float) -> None:
-        """Keep the pheromone field, and publish it if it has subscribers."""
-        self.guard.attempt("pheromone", lambda: self._say_pheromone(seen, frame, lattice_deg))
-
-    def _say_pheromone(self, seen: PlanSnapshot, frame: str, lattice_deg: float) -> None:
-        payload = encode_pheromone(seen.snapshot, frame, time.time_ns(), lattice_deg)
-        reply = Reply(payload, schemas.PHEROMONE_GRID)
-        self._last.keep_trail(seen.plan, seen.snapshot.cohort, reply)
-        if self.shows_pheromone:
-            self._pheromone.put(payload)
 
 
 def headings(xy: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -310,7 +297,13 @@ class TrailPublisher:
         steps = max(len(mission.route.path.ahead) - 1, 0)
         of_path = mission.route.revision, steps
         shown = ShownTrail(
-            held, lattice.cell_m, grid.frame, *of_path, time.time_ns(), mission.rotation.deg
+            held,
+            trail.ants,
+            lattice.cell_m,
+            grid.frame,
+            *of_path,
+            time.time_ns(),
+            mission.rotation.deg,
         )
         self._kept = key
         self._outbox.keep_trail(shown)

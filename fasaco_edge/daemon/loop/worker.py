@@ -6,19 +6,15 @@ import logging
 import threading
 import time
 from collections.abc import Callable
-from functools import partial
 
 from fasaco_edge.bus.mailbox import LatestSlot
-from fasaco_edge.daemon.loop.inbox import PlanSnapshot
 from fasaco_edge.errors import PlanFailed
 from fasaco_edge.mission.core.events import PlanBroken, PlanReady, PlanRequest
 from fasaco_edge.mission.core.spare_time import most_s
 from fasaco_edge.planners.planner import (
     AnyOf,
-    ColonySnapshot,
     CoveragePlanner,
     Interrupt,
-    Observer,
     SearchProgress,
     StopRecorder,
     TimeBudget,
@@ -85,15 +81,12 @@ class PlanningWorker:
         self._interrupt.clear()
         if self._stopping.is_set():
             return
-        observe: Observer = partial(self._observe, request.number)
-        budget_s, problem = self._budget_s, request.problem
-        if problem.only_better:
-            # Only the trail of needed plans is shown.
-            budget_s, observe = most_s(problem), ignore
+        problem = request.problem
+        budget_s = most_s(problem) if problem.only_better else self._budget_s
         stop = StopRecorder(AnyOf(self._count, TimeBudget(budget_s), Interrupt(self._interrupt)))
         try:
             # This takes some percent of a full plan, nothing for a repair.
-            path = self._planner.plan(problem, stop, observe)
+            path = self._planner.plan(problem, stop, ignore)
         except Exception as error:
             # The same map comes again after a restart: exiting would not help.
             LOG.exception("plan %d", request.number, extra={"event": "plan_failed"})
@@ -108,7 +101,3 @@ class PlanningWorker:
     def _count(self, progress: SearchProgress) -> bool:
         self.progress += 1
         return False
-
-    def _observe(self, plan: int, snapshot: ColonySnapshot) -> None:
-        if not self._stopping.is_set():
-            self._post("snapshot", PlanSnapshot(plan, snapshot))

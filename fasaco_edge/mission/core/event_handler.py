@@ -319,6 +319,8 @@ class EventHandler:
 
     def _take_plan(self, event: PlanReady) -> None:
         request = self.route.pending
+        if request is not None and request.number == event.number:
+            self.trail.take(event.path)
         self._path = self.route.accept(event, self._now) or self._path
         if request is not None and self.route.pending is None and not self.route.wanted:
             self.monitor.note_plan(request.number)

@@ -19,7 +19,6 @@ from fasaco_edge.mission.core.resting import Resting
 from fasaco_edge.mission.core.route import Route
 from fasaco_edge.mission.core.shut_in import ShutIn
 from fasaco_edge.mission.core.standing import Standing
-from fasaco_edge.mission.core.trail_layer import TrailLayer
 from fasaco_edge.mission.core.trouble import DRIVING, Troubles
 from fasaco_edge.mission.core.way_out import WayOut
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
@@ -48,7 +47,6 @@ class Executive:
     orders: Sequencer
     route: Route
     line: LineLayer
-    trail: TrailLayer
     company: Company
     charging: Charging
     giving_way: Waiting
@@ -79,7 +77,7 @@ class Executive:
         self._resting = Resting(self.map, self.orders, self.charging, self.dock, self.mask_frame)
         self._shut_in = shut_in = ShutIn(self.map, self.orders, self.route, self.way_out)
         self._errands = Errands(*driven, self.charging, standing, self._resting, shut_in)
-        self._work = OrderWork(*driven, self.line, self.trail, self.company, self._errands, shut_in)
+        self._work = OrderWork(*driven, self.line, self.company, self._errands, shut_in)
         self.troubles = Troubles(
             self.map,
             self.monitor,

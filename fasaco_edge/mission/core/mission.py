@@ -117,7 +117,7 @@ class Mission:
         measured = self._drive, self.company, self._gauge, way_out, blocked
         self._handler = EventHandler(*owners, self._line, self._trail, *measured, self._changes)
         self.giving_way = self._kind.waiting(config, self._map, self.route, self.company)
-        decided_by = self._line, self._trail, self.company, self.charging, self.giving_way
+        decided_by = self._line, self.company, self.charging, self.giving_way
         in_dock = InDock(self._map, self._gauge)
         mask = mask_frame(self._config.policy.keep_out_mask)
         self._executive = Executive(*owners, *decided_by, in_dock, way_out, blocked, mask)
@@ -194,7 +194,8 @@ class Mission:
         if path is not None:
             path = self._rotation.path(path, self.lattice)
             path = replace(path, speed_m_s=self.order_state.speed_m_s)
-        return replace(happened, plan=decided.plan, path=path)
+        plan = decided.plan and self._trail.posed(decided.plan)
+        return replace(happened, plan=plan, path=path)
 
     def _handle(self, events: Iterable[Event], now: float) -> Decision:
         return self._handler.handle(map(self._rotation.event, events), now)

@@ -14,7 +14,6 @@ from fasaco_edge.mission.core.errands import NO_WAY, Errands
 from fasaco_edge.mission.core.events import PathUpdate, State
 from fasaco_edge.mission.core.route import Route
 from fasaco_edge.mission.core.shut_in import ShutIn
-from fasaco_edge.mission.core.trail_layer import TrailLayer
 from fasaco_edge.mission.line.layer import LineLayer
 from fasaco_edge.mission.map.inputs import InputMonitor
 from fasaco_edge.mission.map.map_state import MapState
@@ -31,7 +30,6 @@ class OrderWork:
     orders: Sequencer
     route: Route
     line: LineLayer
-    trail: TrailLayer
     company: Company
     errands: Errands
     shut_in: ShutIn
@@ -59,7 +57,7 @@ class OrderWork:
                 if ended := self._go_on_elsewhere(cell, update, now):
                     return ended
                 continue
-            request = route.request_plan(self.trail.posed(problem))
+            request = route.request_plan(problem)
             self.monitor.note_request(request.number)
             state = State.COVERING if len(route.path.cells) else State.PLANNING
             return Doing(state, request.reason, update, request)

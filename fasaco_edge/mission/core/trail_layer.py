@@ -1,4 +1,4 @@
-"""Trail layer: updates the living trail with maps, paths and driving."""
+"""Trail layer: the living trail, changed by ants, maps, paths and driving."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ from numpy.typing import NDArray
 
 from fasaco_edge.grid.lattice import CoverageLattice
 from fasaco_edge.mission.config import MissionConfig
-from fasaco_edge.mission.core.events import PathUpdate
+from fasaco_edge.mission.core.events import PathUpdate, PlanRequest
 from fasaco_edge.mission.core.route import NO_CELLS, Route
 from fasaco_edge.mission.map.loop_closure import Motion
 from fasaco_edge.mission.map.map_state import MapState
 from fasaco_edge.planners.living_trail import LivingTrail, TrailSnapshot
-from fasaco_edge.planners.problem import CoverageProblem
+from fasaco_edge.planners.path import CoveragePath
 
 
 class TrailLayer:
-    """Owns the living trail and passes changes of map and route on to it."""
+    """Owns the living trail: each plan starts from it, and changes it."""
 
     def __init__(self, config: MissionConfig, map_state: MapState, route: Route) -> None:
         self._config = config
@@ -43,9 +43,17 @@ class TrailLayer:
         self._follow_map()
         return self._trail.snapshot()
 
-    def posed(self, problem: CoverageProblem) -> CoverageProblem:
-        """Return a problem with the trail, if the planner's ants start from it."""
-        return replace(problem, trail=self.snapshot()) if self._config.plans_on_trail else problem
+    def posed(self, request: PlanRequest) -> PlanRequest:
+        """Return a request with the trail from which its ants start."""
+        if not self._config.plans_on_trail:
+            return request
+        return replace(request, problem=replace(request.problem, trail=self.snapshot()))
+
+    def take(self, plan: CoveragePath) -> None:
+        """Take over what the ants of a plan have left, whether it is driven or not."""
+        self._follow_map()
+        if plan.trail is not None:
+            self._trail.take(plan.trail, plan.work.ants)
 
     def resume(self, before: TrailSnapshot) -> None:
         """Continue with the trail from before a restart."""

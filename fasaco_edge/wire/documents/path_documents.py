@@ -129,7 +129,7 @@ class PathAttachment(PlanFigures, frozen=True):
 class TrailAttachment(Document, frozen=True):
     """The Zenoh attachment of each field of the living trail.
 
-    A field without one is that of a cohort of ants.
+    In old recordings a field without one is that of a cohort of ants.
 
     Attributes:
         revision: of the path in force.
