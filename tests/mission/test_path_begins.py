@@ -89,7 +89,7 @@ def two_rooms(*, is_open):
     return pixels
 
 
-@pytest.mark.parametrize("door_s", [6.0, 33.0, 71.0])
+@pytest.mark.parametrize("door_s", [6.0, 47.0, 71.0])
 def test_a_path_cut_off_by_a_door_begins_at_the_robot(door_s):
     robot = LineRobot(two_rooms(is_open=True), (1.0, 1.0))
     robot.wait(door_s, lambda _: False)
