@@ -59,7 +59,8 @@ def run(args: argparse.Namespace) -> int:
             "--pheromone-png: the planner leaves no pheromone",
             hint=f"choose --planner {' or '.join(WITH_PHEROMONE)}",
         )
-    compile_kernels(stages_of_plan(search.planner))
+    has_curves = robot.turn_radius_m > 0.0
+    compile_kernels(stages_of_plan(search.planner, has_curves=has_curves))
     # Imported only now, as these modules import the compiler.
     from fasaco_edge.offline.maps import load_map
     from fasaco_edge.offline.plan import plan
@@ -96,12 +97,23 @@ def run(args: argparse.Namespace) -> int:
             asked_share,
             swept,
         )
+    if planned.curve_figures is not None and (left := planned.curve_figures.spot_turns):
+        LOG.warning(
+            "%d turn%s not fit on arcs of %g m: the robot would turn on the spot there%s",
+            left,
+            "s do" if left > 1 else " does",
+            robot.turn_radius_m,
+            "" if robot.reverses else ", or drive backward: without --forward-only",
+        )
     if args.path_out is not None:
         with writing(args.path_out) as file:
             np.savetxt(file, planned.cells, "%d", ",", header="row,col", comments="")
     if args.xy_out is not None:
         with writing(args.xy_out) as file:
-            np.savetxt(file, planned.xy, "%.6f", ",", header="x_m,y_m", comments="")
+            line, header = planned.xy, "x_m,y_m"
+            if planned.curve is not None:
+                line, header = planned.curve.poses, "x_m,y_m,yaw_rad"
+            np.savetxt(file, line, "%.6f", ",", header=header, comments="")
     if args.png is not None:
         with writing(args.png) as file:
             planned.plot(file)
@@ -130,6 +142,8 @@ def _print(args: argparse.Namespace, planned: Plan) -> None:
         print_json(figures)
         return
     figures["floor"] = planned.floor or "not known of a coverage grid"
+    if planned.curve_figures is not None:
+        figures["curve"] = planned.curve_figures
     rows = [(name.replace("_", " "), str(value)) for name, value in figures.items()]
     terminal.out().print(terminal.figures(rows))
     for file in (args.path_out, args.xy_out, args.png, args.pheromone_png):

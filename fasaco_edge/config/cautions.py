@@ -84,6 +84,8 @@ def _turns(robot: RobotConfig) -> Iterator[str]:
         yield "robot.quarter_turn_s has no effect beside robot.turn_deg_s"
     if robot.turn_deg_s is None and robot.steered_deg != usual.steered_deg:
         yield "robot.steered_deg has no effect without robot.turn_deg_s"
+    if not robot.turn_radius_m and robot.reverses != usual.reverses:
+        yield "robot.reverses has no effect without robot.turn_radius_m"
 
 
 def _planner(config: DaemonConfig) -> Iterator[str]:
@@ -92,6 +94,7 @@ def _planner(config: DaemonConfig) -> Iterator[str]:
         idle = ["planner.align"] if planner.align != usual.align else []
         idle += ["robot.overlap"] if config.robot.overlap != RobotConfig().overlap else []
         idle += ["robot.clearance_m"] if config.robot.clearance_m else []
+        idle += ["robot.turn_radius_m"] if config.robot.turn_radius_m else []
         if idle:
             yield f"no effect where planner.line is cells: {', '.join(idle)}"
 

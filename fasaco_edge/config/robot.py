@@ -18,6 +18,7 @@ from fasaco_edge.kernels.floor.turning import (
     turn_seconds,
 )
 from fasaco_edge.planners.cost import CoverageCost
+from fasaco_edge.planners.curve_config import CurveConfig
 
 Metres = Annotated[float, Meta(gt=0, le=10)]
 DEFAULT_RADIUS_M = 0.18
@@ -75,6 +76,9 @@ class RobotConfig(Section, frozen=True):
     ``footprint`` stands in place of ``radius_m``: the disc around it is planned with.
     ``clearance_m`` is a distance that lines keep from walls and furniture in addition to the
     radius; they give up half of it, or all, where only that reaches floor that is worth it.
+    ``turn_radius_m`` is the tightest arc that the robot drives; 0 for one that turns on the spot.
+    With a radius, lines over the floor become curves of arcs a tenth wider, and lanes; ``reverses``
+    is whether they may lead backward, too.
     ``tool_ahead_m`` is how far the tool's centre lies ahead of the point that the robot turns
     about; below 0 behind.
     """
@@ -91,6 +95,8 @@ class RobotConfig(Section, frozen=True):
     acceleration_m_s2: Annotated[float, Meta(ge=0.01, le=100)] = 0.5
     steered_deg: Annotated[float, Meta(ge=0, le=45)] = 1.0
     overlap: Annotated[float, Meta(ge=0, le=0.5)] = 0.08
+    turn_radius_m: Annotated[float, Meta(ge=0, le=20)] = 0.0
+    reverses: bool = True
     tool_ahead_m: Annotated[float, Meta(ge=-5, le=5)] = 0.0
 
     def __post_init__(self) -> None:
@@ -110,9 +116,10 @@ class RobotConfig(Section, frozen=True):
             if self.tool_ahead_m
             else "its tool is where it turns about"
         )
+        turns = "have any heading" if self.turn_radius_m else "turn on the spot"
         return (
             f"the robot is planned with the disc around its footprint, of radius "
-            f"{self.radius_m:.3g} m: it may turn on the spot anywhere, passages narrower than "
+            f"{self.radius_m:.3g} m: it may {turns} anywhere, passages narrower than "
             f"{2.0 * self.radius_m:.3g} m are left out, and {tool}"
         )
 
@@ -142,6 +149,22 @@ class RobotConfig(Section, frozen=True):
         if seconds <= 0.0 or square <= 0.0:
             return math.sqrt(90.0 * self.turn_deg_s2)
         return half - math.sqrt(square)
+
+    def curves(self, price_s_m2: float) -> CurveConfig | None:
+        """Return how it drives curves; None if it turns on the spot.
+
+        Args:
+            price_s_m2: value of sweeping a square metre [s/m2].
+        """
+        if not self.turn_radius_m:
+            return None
+        arc_m_s, stop_s = self.speed_m_s, self.quarter_turn_s
+        if self.turn_deg_s is not None:
+            arc_m_s = min(arc_m_s, math.radians(self.turn_deg_s) * self.turn_radius_m)
+            stop_s = self.speed_m_s / self.acceleration_m_s2
+        return CurveConfig(
+            self.turn_radius_m, self.reverses, self.speed_m_s, arc_m_s, stop_s, price_s_m2
+        )
 
     def turning(self) -> Turning:
         """Return the durations of turns on the spot."""

@@ -175,6 +175,7 @@ def draw_walk(
     title: str,
     lines: Sequence[str],
     line_xy: Points | None = None,
+    is_backward: NDArray[np.bool_] | None = None,
     swept: MapLayer | None = None,
     unswept: MapLayer | None = None,
 ) -> Image.Image:
@@ -189,6 +190,7 @@ def draw_walk(
         lines: caption below it.
         line_xy: float64 (n, 2), n >= 1: the line driven instead, points (x, y) [m] joined by
             straight segments; None for the centres of the cells.
+        is_backward: bool (n - 1,), which of its segments are driven backward, if it is a curve.
         swept: floor that it sweeps, to be drawn in place of the cells; None for these.
         unswept: reachable floor that it leaves; None where that is not known.
     """
@@ -197,7 +199,7 @@ def draw_walk(
     plot = Plot(View.over(bounds_of(grid, lattice, driven), lattice.cell_m))
     plot.ground(lattice if grid is None else grid)
     left = draw_unswept(plot, unswept) if unswept is not None else []
-    key = plot_walk(plot, lattice, cells, driven, swept) + left
+    key = plot_walk(plot, lattice, cells, driven, swept, is_backward) + left
     bar = ("0", f"{len(cells) - 1:,} steps")
     return Sheet(title, lines, key, bar, plot.view.scale).around(plot.finished())
 
@@ -208,14 +210,18 @@ def plot_walk(
     cells: NDArray[np.int32],
     line_xy: Points | None = None,
     swept: MapLayer | None = None,
+    is_backward: NDArray[np.bool_] | None = None,
 ) -> list[KeyEntry]:
-    """Draw a walk, both as in ``draw_walk``; return what its tints and marks mean."""
+    """Draw a walk, all as in ``draw_walk``; return what its tints and marks mean."""
     line = lattice.centres(cells) if line_xy is None else line_xy
     if swept is None:
         key = draw_visits(plot, lattice, _visits(lattice, cells), tuple(cells[0].tolist()))
     else:
         key = draw_swept(plot, swept)
-    draw_line(plot, in_pieces(line, lattice.cell_m), lattice.cell_m)
+    if is_backward is None:
+        draw_line(plot, in_pieces(line, lattice.cell_m), lattice.cell_m)
+    else:
+        key += draw_curve(plot, line, is_backward, lattice.cell_m)
     if (line[0] != line[-1]).any():
         plot.end_mark(line[-1])
     plot.start_mark(line[0])
@@ -249,7 +255,26 @@ def draw_line(plot: Plot, line: Points, cell_m: float) -> None:
     points = line[moves]
     offset = LANE_OFFSET * cell_m
     plot.track(*lanes(points, offset), LINE_WIDTH * cell_m)
+    _draw_arrows(plot, points, offset, cell_m)
 
+
+def draw_curve(
+    plot: Plot, curve: Points, is_backward: NDArray[np.bool_], cell_m: float
+) -> list[KeyEntry]:
+    """Draw a curve, points (n, 2) [m], where it is, and arrows along it; return its meaning.
+
+    ``is_backward``, bool (n - 1,), are segments driven backward.
+    """
+    plot.track(curve[:-1], curve[1:], LINE_WIDTH * cell_m)
+    changes = np.flatnonzero(np.diff(is_backward, prepend=False, append=False)).tolist()
+    for first, last in zip(changes[::2], changes[1::2], strict=True):
+        plot.line(curve[first : last + 1], palette.GREEN, LINE_WIDTH * cell_m * plot.view.scale)
+    if len(curve) > 1:
+        _draw_arrows(plot, in_pieces(curve, cell_m), 0.0, cell_m)
+    return [KeyEntry("tile", palette.GREEN, "driven backward")] if changes else []
+
+
+def _draw_arrows(plot: Plot, points: Points, offset: float, cell_m: float) -> None:
     along = directions(points)
     right = np.stack([along[:, 1], -along[:, 0]], axis=1)
     middles = (points[:-1] + points[1:]) / 2 + right * offset

@@ -2,7 +2,8 @@
 
 The robot comes to rest wherever it turns on the spot. Between two such places it speeds up, drives
 and brakes (a trapezoid of speed over time, or a triangle on short ways); a turn is a trapezoid of
-its rate. Independent of the planners' assumptions.
+its rate. A robot with a turning radius comes to rest where it changes between forward and backward.
+Independent of the planners' assumptions.
 """
 
 from __future__ import annotations
@@ -22,6 +23,9 @@ TOUCH_TOLERANCE_PX = 1e-3
 # Number of rows of pixels that are evaluated at a time.
 SWEPT_ROWS = 30_000
 Points = NDArray[np.float64]
+# Bends of an arc are judged with points up to this far apart [m], and this tolerance; bends up to
+# this are steered between points as near to each other as a millimetre [deg].
+ARC_STEP_M, ARC_TOLERANCE, STEERED_DEG = 0.06, 1.05, 1.2
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,8 +44,39 @@ class DriveLimits:
     steered_deg: float = 1.0
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class ArcBends:
+    """The bends of a line for a robot with a turning radius, both bool (n - 1,).
+
+    Attributes:
+        reverses: it changes between forward and backward there: the line turns back.
+        spots: no arc of that radius has such a bend: the robot would turn on the spot.
+    """
+
+    reverses: Mask
+    spots: Mask
+
+    @classmethod
+    def of(
+        cls, ways_m: NDArray[np.float64], bends_deg: NDArray[np.float64], radius_m: float
+    ) -> ArcBends:
+        """Judge the bends of a line; ``ways_m`` and ``bends_deg`` as for ``drive_seconds``.
+
+        Between two chords of a circle the line bends by half of the angles that both span.
+        """
+        spans_deg = np.degrees(np.minimum(ways_m, ARC_STEP_M) / radius_m)
+        most_deg = 0.5 * ARC_TOLERANCE * (spans_deg[:-1] + spans_deg[1:])
+        most_deg = np.maximum(most_deg, STEERED_DEG)
+        reverses = 180.0 - bends_deg <= most_deg
+        return cls(reverses, ~reverses & (bends_deg > most_deg))
+
+
 def drive_seconds(
-    ways_m: NDArray[np.float64], bends_deg: NDArray[np.float64], speed_m_s: float, by: DriveLimits
+    ways_m: NDArray[np.float64],
+    bends_deg: NDArray[np.float64],
+    speed_m_s: float,
+    by: DriveLimits,
+    arcs: ArcBends | None = None,
 ) -> float:
     """Return the driving time of a line [s].
 
@@ -50,14 +85,36 @@ def drive_seconds(
         bends_deg: float64 (n - 1,), turns at the points between, in [0, 180].
         speed_m_s: the robot's speed.
         by: its limits.
+        arcs: how it takes the bends if it has a turning radius: on arcs it is as slow as its rate
+            of turning requires.
     """
     if not len(ways_m):
         return 0.0
+    if arcs is not None:
+        return _seconds_of_arcs(ways_m, bends_deg, speed_m_s, by, arcs)
     is_stop = bends_deg > by.steered_deg
     runs_m = np.add.reduceat(ways_m, np.concatenate([[0], np.flatnonzero(is_stop) + 1]))
     runs_s = _from_rest_to_rest(runs_m, speed_m_s, by.acceleration_m_s2)
     turns_s = _from_rest_to_rest(bends_deg[is_stop], by.turn_deg_s, by.turn_deg_s2)
     return float(runs_s.sum() + turns_s.sum())
+
+
+def _seconds_of_arcs(
+    ways_m: NDArray[np.float64],
+    bends_deg: NDArray[np.float64],
+    speed_m_s: float,
+    by: DriveLimits,
+    arcs: ArcBends,
+) -> float:
+    is_stop = arcs.reverses | arcs.spots
+    begins = np.concatenate([[0], np.flatnonzero(is_stop) + 1])
+    runs_m = np.add.reduceat(ways_m, begins)
+    runs_s = _from_rest_to_rest(runs_m, speed_m_s, by.acceleration_m_s2)
+    turns_s = _from_rest_to_rest(bends_deg[arcs.spots], by.turn_deg_s, by.turn_deg_s2)
+    # Half of the ways beside a bend is the way on which it is steered.
+    beside_s = (ways_m[:-1] + ways_m[1:])[~is_stop] / (2.0 * speed_m_s)
+    late_s = np.maximum(bends_deg[~is_stop] / by.turn_deg_s - beside_s, 0.0)
+    return float(runs_s.sum() + turns_s.sum() + late_s.sum())
 
 
 def _from_rest_to_rest(

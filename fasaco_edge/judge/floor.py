@@ -30,6 +30,7 @@ from fasaco_edge.grid.geometry import GridGeometry, Pose2D, Window
 from fasaco_edge.grid.occupancy import FREE, OccupancyGrid, marked_window
 from fasaco_edge.judge.driven_line import (
     TOUCH_TOLERANCE_PX,
+    ArcBends,
     DriveLimits,
     DrivenLine,
     Points,
@@ -62,6 +63,8 @@ class SweepingRobot:
         turn_s: time of a quarter-turn [s], if ``limits`` are not known.
         free_at_most: occupancy values up to this are known free [percent].
         limits: its other limits; None to count turns by their angle alone.
+        turn_radius_m: of its tightest arc [m]; 0 if it turns on the spot. Without ``limits``,
+            ``turn_s`` is then also what a change between forward and backward takes.
     """
 
     tool_m: float
@@ -70,6 +73,7 @@ class SweepingRobot:
     turn_s: float = 1.5
     free_at_most: int = 25
     limits: DriveLimits | None = None
+    turn_radius_m: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,6 +95,8 @@ class FloorFigures:
         patches_over_4_dm2: patches left that are larger than ``PATCH_M2``.
         largest_patch_m2: the largest patch left [m2].
         pixel_m: edge of the pixels it was judged on [m].
+        reversals: changes between forward and backward, of a robot with a turning radius.
+        spot_turns: its bends that are tighter than that radius.
     """
 
     reachable_m2: float
@@ -105,6 +111,8 @@ class FloorFigures:
     patches_over_4_dm2: int
     largest_patch_m2: float
     pixel_m: float
+    reversals: int = 0
+    spot_turns: int = 0
 
     @property
     def gap(self) -> float | None:
@@ -261,9 +269,14 @@ def _figures(floor: _Floor, line: DrivenLine, reachable: Mask, swept: Mask) -> F
     left_m2 = Patches.of(reachable & ~swept).pixels * pixel_m * pixel_m
     ways_px, bends_deg = line.ways_and_bends
     length_m, quarters = float(ways_px.sum()) * pixel_m, float(bends_deg.sum()) / 90.0
-    seconds = length_m / robot.speed_m_s + quarters * robot.turn_s
+    arcs = None
+    if robot.turn_radius_m:
+        arcs = ArcBends.of(ways_px * pixel_m, bends_deg, robot.turn_radius_m)
+    stops = 0 if arcs is None else int(np.count_nonzero(arcs.reverses))
+    turned = quarters if arcs is None else float(bends_deg[arcs.spots].sum()) / 90.0 + stops
+    seconds = length_m / robot.speed_m_s + turned * robot.turn_s
     if robot.limits is not None:
-        seconds = drive_seconds(ways_px * pixel_m, bends_deg, robot.speed_m_s, robot.limits)
+        seconds = drive_seconds(ways_px * pixel_m, bends_deg, robot.speed_m_s, robot.limits, arcs)
     least_m = max(swept_m2 / robot.tool_m - math.pi * robot.tool_m / 4, 0.0)
     return FloorFigures(
         reachable_m2=reachable_m2,
@@ -278,4 +291,6 @@ def _figures(floor: _Floor, line: DrivenLine, reachable: Mask, swept: Mask) -> F
         patches_over_4_dm2=int(np.count_nonzero(left_m2 > PATCH_M2)),
         largest_patch_m2=float(left_m2.max(initial=0.0)),
         pixel_m=pixel_m,
+        reversals=stops,
+        spot_turns=0 if arcs is None else int(np.count_nonzero(arcs.spots)),
     )

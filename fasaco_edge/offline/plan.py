@@ -15,7 +15,7 @@ import numpy as np
 from fasaco_edge.config.robot import RobotConfig
 from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.grid.lattice import Cell
-from fasaco_edge.offline.ground import Ground
+from fasaco_edge.offline.ground import Ground, Line
 from fasaco_edge.offline.maps import Map
 from fasaco_edge.offline.result import Plan
 from fasaco_edge.offline.search import Ending, Planning
@@ -32,6 +32,7 @@ from fasaco_edge.offline.settings import (
 from fasaco_edge.planners.bound import lower_bound_of
 from fasaco_edge.planners.compiling import compile_missing
 from fasaco_edge.planners.cost import ANY_LANES, Lanes
+from fasaco_edge.planners.curves import Curve, curve_along
 from fasaco_edge.planners.line import LINES
 from fasaco_edge.planners.own.loading import UserCode, user_code
 from fasaco_edge.planners.passes import MOST_ANGLE_DEG, Covers, wanted_by
@@ -124,7 +125,8 @@ def plan(
             f"lanes {lanes}: only the search has a direction of its lanes",
             hint="plan with local search, by fasaco",
         )
-    compile_missing(stages=stages_of_plan(search.planner))
+    has_curves = robot.turn_radius_m > 0.0
+    compile_missing(stages=stages_of_plan(search.planner, has_curves=has_curves))
     ground = _ground(map, robot, start, start_xy, line, align)
     problem = _problem(ground, robot, end, covers, lanes)
     if covers != "all":
@@ -135,8 +137,10 @@ def plan(
     planning = Planning(problem, ground, search, own, ending, observe)
     wall, cpu = time.perf_counter(), time.process_time()
     path, xy = planning.run(line, robot)
+    curve = _curve(xy, ground, line, robot, is_end_fixed=problem.end is not None)
     wall_s, cpu_s = time.perf_counter() - wall, time.process_time() - cpu
-    return Plan(map, robot, line, search, ground, problem, path, xy, ending.by, wall_s, cpu_s)
+    found = path, xy if curve is None else curve.xy
+    return Plan(map, robot, line, search, ground, problem, *found, ending.by, wall_s, cpu_s, curve)
 
 
 def _cell(name: str, given: object, expectation: str) -> Cell:
@@ -192,6 +196,11 @@ def _ground(
     align: str | float | None,
 ) -> Ground:
     require(line in (CELLS, *LINES), "line", f"be one of {CELLS}, {', '.join(LINES)}", line)
+    if line == CELLS and robot.turn_radius_m:
+        raise BadConfiguration(
+            f"turn_radius_m {robot.turn_radius_m:g}: a line through cell centres turns on the spot",
+            hint="ask for a line over the floor, quick or thorough",
+        )
     if line != CELLS and map.grid is None:
         raise BadConfiguration(
             f"line {line}: {map.name} is a coverage grid, which lies in no map frame",
@@ -214,6 +223,17 @@ def _ground(
         (xy,) = lattice.centres(np.array([start], np.int32)).tolist()
         start_xy = xy[0], xy[1]
     return Ground.of_floor(map.grid, robot, start_xy, WALLS if align is None else align)
+
+
+def _curve(
+    xy: Line, ground: Ground, line: str, robot: RobotConfig, *, is_end_fixed: bool
+) -> Curve | None:
+    """Return the curve along a line; None for a robot that turns on the spot."""
+    config = robot.curves(LINES[line].price_s_m2) if line in LINES else None
+    floor = ground.floor
+    if config is None or floor is None:
+        return None
+    return curve_along(xy, floor, floor.reachable, config, is_end_fixed=is_end_fixed)
 
 
 def _problem(

@@ -27,6 +27,7 @@ from fasaco_edge.judge.floor import (
 from fasaco_edge.offline.ground import Ground, Line
 from fasaco_edge.offline.maps import Map
 from fasaco_edge.offline.settings import CELLS, Search
+from fasaco_edge.planners.curves import Curve
 from fasaco_edge.planners.living_trail import Tau, branching
 from fasaco_edge.planners.path import CoveragePath, walk_figures
 from fasaco_edge.planners.problem import CoverageProblem
@@ -51,6 +52,8 @@ class Plan:
             segments.
         ended_by: what ended the search.
         wall_s, cpu_s: duration of the search for walk and line [s].
+        curve: the curve that a robot with a turning radius drives, with its headings; its points
+            are ``xy``. None for a robot that turns on the spot.
     """
 
     map: Map
@@ -64,6 +67,7 @@ class Plan:
     ended_by: str
     wall_s: float
     cpu_s: float
+    curve: Curve | None = None
 
     @property
     def cells(self) -> NDArray[np.int32]:
@@ -94,6 +98,13 @@ class Plan:
     def floor(self) -> PlannedFloor | None:
         """Figures of the floor; None for a coverage grid."""
         return None if self.judged is None else PlannedFloor.of(self.judged.figures)
+
+    @property
+    def curve_figures(self) -> CurveFigures | None:
+        """Figures of the curve; None for a robot that turns on the spot."""
+        if self.curve is None or self.judged is None:
+            return None
+        return CurveFigures.of(self.robot, self.curve, self.judged.figures)
 
     @property
     def swept_share(self) -> float | None:
@@ -131,6 +142,7 @@ def judged_floor(
         robot.speed_m_s,
         robot.cost().quarter_turn_s,
         limits=limits,
+        turn_radius_m=robot.turn_radius_m,
     )
     return judge_floor(grid, line_xy, judged)
 
@@ -181,6 +193,54 @@ class PlannedFloor:
         )
 
 
+@dataclass(frozen=True, slots=True)
+class CurveFigures:
+    """The curve of a robot with a turning radius, as in ``--json``.
+
+    Attributes:
+        turn_radius_m: of its tightest arc [m].
+        reverses: whether it may drive backward.
+        length_m, backward_m: length of the curve, and of what is driven backward [m].
+        seconds: driving time by the judge [s].
+        reversals: changes between forward and backward.
+        spot_turns: turns that do not fit, and stay on the spot, by the judge.
+    """
+
+    turn_radius_m: float
+    reverses: bool
+    length_m: float
+    backward_m: float
+    seconds: float
+    reversals: int
+    spot_turns: int
+
+    def __str__(self) -> str:
+        """Text for tables and pictures."""
+        count, left = self.reversals, self.spot_turns
+        changes = "1 change" if count == 1 else f"{count} changes"
+        words = (
+            f"arcs of {self.turn_radius_m:g} m or more, {self.length_m:,.1f} m in "
+            f"{self.seconds:,.0f} s, {self.backward_m:,.1f} m of it backward, {changes} between "
+            "forward and backward"
+        )
+        if left:
+            words += f"; {left} turn{'s' * (left != 1)} do{'es' * (left == 1)} not fit"
+        return words
+
+    @classmethod
+    def of(cls, robot: RobotConfig, curve: Curve, judged: FloorFigures) -> CurveFigures:
+        """Return the figures, rounded."""
+        return cls(
+            turn_radius_m=robot.turn_radius_m,
+            reverses=robot.reverses,
+            length_m=round(judged.length_m, 2),
+            backward_m=round(curve.backward_m, 2),
+            seconds=round(judged.seconds, 1),
+            reversals=judged.reversals,
+            spot_turns=judged.spot_turns,
+        )
+
+
 def figures_of(plan: Plan) -> dict[str, object]:
     """Return the figures of a walk, of its search, and of the floor under its line."""
     path, problem, ground, search = plan.path, plan.problem, plan.ground, plan.search
@@ -218,6 +278,7 @@ def figures_of(plan: Plan) -> dict[str, object]:
         "wall_s": round(plan.wall_s, 6),
         "cpu_s": round(plan.cpu_s, 6),
         "floor": asdict(plan.floor) if plan.floor else None,
+        **({"curve": asdict(plan.curve_figures)} if plan.curve_figures else {}),
     }
 
 
@@ -251,6 +312,8 @@ def picture_of(plan: Plan, of: str = "") -> Image.Image:
     ]
     if judged is not None:
         lines.append(f"reachable floor: {plan.floor}")
+    if plan.curve_figures is not None:
+        lines.append(str(plan.curve_figures))
     shows_floor = judged is not None and plan.line != CELLS
     return draw_walk(
         ground.lattice,
@@ -259,6 +322,7 @@ def picture_of(plan: Plan, of: str = "") -> Image.Image:
         title=of + path.planner + _colony(plan) + search,
         lines=lines,
         line_xy=plan.xy,
+        is_backward=None if plan.curve is None else plan.curve.is_backward,
         swept=MapLayer(judged.geometry, judged.swept) if judged and shows_floor else None,
         unswept=MapLayer(judged.geometry, judged.unswept) if judged else None,
     )

@@ -7,19 +7,26 @@ from fasaco_edge.planners.registry import PLANNER_NAMES
 LATTICE, CHANGES, REACH, AREAS = "lattice", "changes of the map", "reachability", "areas"
 WALKS, BOUND = "shortest walks", "lower bound"
 LOCAL_SEARCH, REPAIR, LINE = "local search", "repair", "driven line"
+CURVES = "curves"
 WINDOWS, SHARES = "windows of the walk", "shares of a fleet"
 # Stages in the order in which they are compiled; the stages of a plan come first.
 _FOR_PLANS = (LATTICE, REACH, WALKS, BOUND, "fasaco", LOCAL_SEARCH, WINDOWS, LINE, REPAIR)
-STAGES = tuple(dict.fromkeys((*_FOR_PLANS, CHANGES, AREAS, SHARES, *PLANNER_NAMES)))
+STAGES = tuple(dict.fromkeys((*_FOR_PLANS, CHANGES, AREAS, SHARES, CURVES, *PLANNER_NAMES)))
 
 
-def stages_of_plan(planner: str, *, is_shared: bool = False) -> tuple[str, ...]:
-    """Return the stages that a plan needs, by a planner's name, or for the robots of a fleet."""
+def stages_of_plan(
+    planner: str, *, is_shared: bool = False, has_curves: bool = False
+) -> tuple[str, ...]:
+    """Return the stages that a plan needs, by a planner's name, or for the robots of a fleet.
+
+    ``has_curves``: for a robot with a turning radius.
+    """
     more = (SHARES,) if is_shared else (planner,) if planner in PLANNER_NAMES else ()
-    return tuple(dict.fromkeys((*_FOR_PLANS, *more)))
+    return tuple(dict.fromkeys((*_FOR_PLANS, *((CURVES,) if has_curves else ()), *more)))
 
 
-def stages_of_mission(planner: str, *, has_fleet: bool) -> tuple[str, ...]:
+def stages_of_mission(planner: str, *, has_fleet: bool, has_curves: bool) -> tuple[str, ...]:
     """Return the stages that a mission needs, by its planner's name: each takes memory."""
-    spared = {*PLANNER_NAMES, *(() if has_fleet else (SHARES,))} - {planner}
+    needed = {planner, *((SHARES,) if has_fleet else ()), *((CURVES,) if has_curves else ())}
+    spared = {*PLANNER_NAMES, SHARES, CURVES} - needed
     return tuple(stage for stage in STAGES if stage not in spared)

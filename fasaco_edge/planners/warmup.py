@@ -29,6 +29,8 @@ from fasaco_edge.kernels.lattice.reach import update_reach
 from fasaco_edge.kernels.lattice.ways import ways_from
 from fasaco_edge.planners.bound import lower_bound_of
 from fasaco_edge.planners.cost import CoverageCost
+from fasaco_edge.planners.curve_config import CurveConfig
+from fasaco_edge.planners.curves import curve_along
 from fasaco_edge.planners.line import LineConfig, line_over, memory_for_moves
 from fasaco_edge.planners.paper.colony import ColonyConfig
 from fasaco_edge.planners.path import CoveragePath, walk_figures
@@ -46,6 +48,7 @@ from fasaco_edge.planners.stages import (
     AREAS,
     BOUND,
     CHANGES,
+    CURVES,
     LATTICE,
     LINE,
     LOCAL_SEARCH,
@@ -176,6 +179,12 @@ def _take_line(room: TinyRoom) -> None:
     certain_floor(tiles, tiles, still)
 
 
+def _take_curves(room: TinyRoom) -> None:
+    floor = Floor.around(room.grid, RobotDiscs(radius_m=0.4, tool_m=0.6), (0.5, 0.5))
+    line_xy = np.array([(0.5, 0.5), (3.5, 0.5), (3.5, 3.5)])
+    curve_along(line_xy, floor, floor.reachable, CurveConfig(1.0, True, 0.5, 0.5, 1.0, 200.0))
+
+
 def _plan_with(name: str, room: TinyRoom) -> None:
     planner_of(name, _ANTS).plan(room.problem, never, ignore)
 
@@ -196,5 +205,6 @@ _STAGES: dict[str, Callable[[TinyRoom], object]] = {
     SHARES: _take_shares,
     REPAIR: _take_repair,
     LINE: _take_line,
+    CURVES: _take_curves,
     **{name: partial(_plan_with, name) for name in PLANNER_NAMES},
 }

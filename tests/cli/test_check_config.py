@@ -134,6 +134,8 @@ def test_what_is_in_order_is_shown_as_it_is_in_force(check, capsys):
         "acceleration_m_s2": 0.5,
         "steered_deg": 1.0,
         "overlap": 0.08,
+        "turn_radius_m": 0.0,
+        "reverses": True,
         "tool_ahead_m": 0.0,
     }
     assert "secret" not in json.dumps(told["config"])

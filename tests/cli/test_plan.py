@@ -316,6 +316,42 @@ def test_a_clearance_leaves_a_strip_along_walls(plan):
     assert floors[1]["swept_share"] < floors[0]["swept_share"]
 
 
+@pytest.mark.parametrize("words", [(), ("--forward-only",)])
+def test_a_robot_with_a_turning_radius_drives_a_curve(plan, tmp_path, words):
+    xy, png = tmp_path / "curve.csv", tmp_path / "curve.png"
+    files = "--xy-out", xy, "--png", png
+    figures, _ = plan("office", "--line", "quick", "--turn-radius", 0.3, *words, *files)
+    assert figures.keys() == KEYS | {"curve"}
+    curve = figures["curve"]
+    assert (curve["turn_radius_m"], curve["reverses"]) == (0.3, not words)
+    assert figures["floor"]["illegal_share"] == 0.0
+    assert (curve["reversals"] > 0, curve["backward_m"] > 1.0) == (not words, not words)
+    assert curve["spot_turns"] == 0
+    header, *_ = xy.read_text().splitlines()
+    assert header == "x_m,y_m,yaw_rad"
+    x, y, yaw = np.loadtxt(xy, delimiter=",", skiprows=1).T
+    ways = np.hypot(np.diff(x), np.diff(y))
+    assert ways.sum() == pytest.approx(curve["length_m"], abs=0.01)
+    turns = np.abs((np.diff(yaw) + np.pi) % (2 * np.pi) - np.pi)
+    # A chord is a little shorter than its arc; two straights may bend by a degree.
+    assert (turns <= 1.01 * ways / 0.3 + 0.021).all()
+    with Image.open(png) as picture:
+        assert picture.format == "PNG"
+
+
+def test_a_turn_that_does_not_fit_is_told(tmp_path, capsys, caplog):
+    """A corridor 0.5 m wide: forward only, the robot cannot come back to its start."""
+    cells = np.zeros((12, 82), np.int8)
+    cells[[0, -1]] = cells[:, [0, -1]] = 100
+    file = tmp_path / "corridor.yaml"
+    write_map(OccupancyGrid(GridGeometry(12, 82, 0.05, Pose2D(-0.05, -0.05)), cells), file)
+    words = "--turn-radius", "0.5", "--forward-only", "--end", "home", "--budget", "0.05"
+    assert main(["plan", str(file), *words, "--start-xy", "2,0.25", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["curve"]["spot_turns"] >= 0
+    assert "not fit on arcs of 0.5 m" in caplog.text
+    assert "without --forward-only" in caplog.text
+
+
 def test_a_plain_image_is_planned_and_unknown_may_count_as_free(plan, tmp_path, capsys):
     pixels = np.full((60, 80), 254, np.uint8)
     pixels[:, 40:] = 205
@@ -436,6 +472,12 @@ def test_a_line_is_quicker_for_who_says_how_the_robot_turns(tmp_path, capsys):
         ("--turn-deg-s 90 --speed-m-s -1", "--speed-m-s must be in (0, 10] m/s"),
         *((f"--clearance={m}", "--clearance must be in [0, 1] m") for m in ("1.1", "-0.1", "nan")),
         *((f"--overlap={m}", "--overlap must be in [0, 0.5]") for m in ("0.9", "-0.1", "nan")),
+        *(
+            (f"--turn-radius={m}", "--turn-radius must be in [0, 20] m")
+            for m in ("21", "-1", "nan")
+        ),
+        ("--line cells --turn-radius 0.3", "has turns on the spot alone"),
+        ("--robots 0,0 5,5 --turn-radius 0.3", "has turns on the spot alone"),
         ("--swept 1.5", "swept must be a share in (0, 1], got 1.5"),
         *((f"--line cells --align {to}", "line over the floor") for to in ("walls", "30")),
         ("--line cells --swept 0.9", "has no share to choose"),

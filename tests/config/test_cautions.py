@@ -49,6 +49,15 @@ def said(**sections):
             {"planner": {"line": "cells"}, "robot": {"clearance_m": 0.1}},
             "no effect where planner.line is cells: robot.clearance_m",
         ),
+        (
+            {"robot": {"reverses": False}},
+            "robot.reverses has no effect without robot.turn_radius_m",
+        ),
+        ({"robot": {"reverses": False, "turn_radius_m": 0.5}}, ""),
+        (
+            {"planner": {"line": "cells"}, "robot": {"turn_radius_m": 0.5}},
+            "no effect where planner.line is cells: robot.turn_radius_m",
+        ),
         ({"robot": {"clearance_m": 0.05}}, ""),
         ({"robot": {"clearance_m": 0.07}}, "is more than a fifth of robot.tool_width_m, 0.06"),
         (

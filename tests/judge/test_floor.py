@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from itertools import pairwise
 
 import numpy as np
@@ -289,3 +289,16 @@ def test_the_nearest_patch_is_found_from_outside() -> None:
     mask[2, 1:4] = mask[6:8, 6:] = True
     assert np.argwhere(Patches.of(mask).nearest_to(-50.0, 2.5)).tolist() == [[2, 1], [2, 2], [2, 3]]
     assert Patches.of(mask).nearest_to(5.1, 5.9).sum() == 6
+
+
+def test_a_robot_with_a_turning_radius_reverses_in_place_of_turning() -> None:
+    grid, line = room(4.0, 3.0), np.array([(1.0, 1.0), (3.0, 1.0), (1.0, 1.0), (1.0, 2.0)])
+    spot, arc = (
+        judge_floor(grid, line, replace(ROBOT, turn_radius_m=radius_m)).figures
+        for radius_m in (0.0, 0.5)
+    )
+    assert (spot.reversals, spot.spot_turns) == (0, 0)
+    assert spot.seconds == pytest.approx(5.0 / 0.5 + 3 * 2.0)
+    # The corner stays a turn on the spot; turning back costs a stop.
+    assert (arc.reversals, arc.spot_turns) == (1, 1)
+    assert arc.seconds == pytest.approx(5.0 / 0.5 + 2.0 + 2.0)

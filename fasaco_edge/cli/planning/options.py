@@ -37,6 +37,7 @@ your building and robot:
   fasaco-edge plan site.yaml --line quick --align axes --xy-out line.csv
   fasaco-edge plan site.yaml --swept 0.995 --budget 10 --png line.png
   fasaco-edge plan site.yaml --passes edge,auto,cross --png passes.png
+  fasaco-edge plan lawn.yaml --cell 0.4 --turn-radius 0.5 --png curve.png
   fasaco-edge plan office --turn-s 2 --budget 0.1 --end 12,3
   fasaco-edge plan office --robots 0,0 10,5 5,8 --end home --png fleet.png
 the paper's planners, and your own:
@@ -59,6 +60,9 @@ figures:
                    the time of driving that area once at the tool's width; patches larger
                    than 4 dm2 not swept, the largest; illegal_share, the part of
                    the line where the robot would touch what is not known to be free
+  curve            (--turn-radius) length_m, seconds and backward_m of the curve;
+                   reversals, from forward to backward or back; spot_turns, which do not
+                   fit and stay on the spot, of all bends judged on the curve's points
 
 figures of several passes: sums, and for each pass its own
   along_share      share of its line's length along its lanes, within 15 degrees; null if
@@ -196,6 +200,19 @@ def _add_problem(group: argparse._ArgumentGroup) -> None:
         metavar="V",
         help=f"speed of the robot [m/s] (default: {ROBOT.speed_m_s:g})",
     )
+    group.add_argument(
+        "--turn-radius",
+        type=float,
+        metavar="M",
+        help="radius of the tightest arc that the robot drives: a line over the floor becomes a "
+        "curve of lanes and arcs; 0 for turns on the spot [m] (default: "
+        f"{ROBOT.turn_radius_m:g})",
+    )
+    group.add_argument(
+        "--forward-only",
+        action="store_true",
+        help="a robot with a turning radius never drives backward (default: it may)",
+    )
     add_turning(
         group,
         turn_s_help="time of a quarter-turn on the spot [s]; 0 minimises steps, as the paper does "
@@ -321,7 +338,9 @@ def _add_output(group: argparse._ArgumentGroup) -> None:
         type=Path,
         metavar="FILE.csv",
         help="write the line to be driven as points in the map frame [m]: header x_m,y_m "
-        "(several robots: robot,x_m,y_m); needs a YAML map, as a .npy grid has no frame",
+        "(several robots: robot,x_m,y_m; with --turn-radius: x_m,y_m,yaw_rad, the robot's heading "
+        "[rad], which is opposite to its way where it drives backward); needs a YAML map, as a "
+        ".npy grid has no frame",
     )
     group.add_argument("--png", type=Path, metavar="FILE", help="write a picture of the walk")
     group.add_argument(

@@ -116,6 +116,7 @@ ROBOT_OPTIONS = {
     "clearance": "clearance_m",
     "speed_m_s": "speed_m_s",
     "overlap": "overlap",
+    "turn_radius": "turn_radius_m",
 }
 SEARCH_OPTIONS = {
     **{name: name for name in ("planner", "ants", "velocities", "q0", "visibility", "beta")},
@@ -180,7 +181,17 @@ def read_request(args: argparse.Namespace) -> PlanRequest:
     if args.overlap is not None:
         allowed = 0.0 <= args.overlap <= 0.5
         require(allowed, "--overlap", "be in [0, 0.5], of the tool's width", args.overlap)
+    if args.turn_radius is not None:
+        allowed = 0.0 <= args.turn_radius <= 20.0
+        require(allowed, "--turn-radius", "be in [0, 20] m", args.turn_radius)
     changes = _given(args, ROBOT_OPTIONS) | turning_of(args, robot)
+    if args.forward_only:
+        changes["reverses"] = False
+    if line == CELLS and changes.get("turn_radius_m", robot.turn_radius_m):
+        raise BadConfiguration(
+            "--turn-radius: a line through the centres of cells has turns on the spot alone",
+            hint="ask for a line over the floor, quick or thorough; for one robot",
+        )
     named = args.config, Path(own.file) if own and own.file else None
     sources = tuple(file for file in named if file is not None)
     return PlanRequest(msgspec.structs.replace(robot, **changes), search, line, own, sources)

@@ -72,7 +72,9 @@ class Loader:
         from fasaco_edge.planners.registry import planner_of  # noqa: PLC0415
 
         planner = self._config.planner
-        warm_up(self._report, stages_of_mission(planner.name, has_fleet=bool(self._config.fleet)))
+        has_fleet, has_curves = bool(self._config.fleet), self._config.robot.turn_radius_m > 0.0
+        stages = stages_of_mission(planner.name, has_fleet=has_fleet, has_curves=has_curves)
+        warm_up(self._report, stages)
         release_unused()
         chosen = planner_of(planner.name, planner.colony(), planner.threads, planner.local_search)
         worker = PlanningWorker(chosen, planner.budget_s, self._mailbox.post)
