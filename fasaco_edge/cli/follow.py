@@ -31,9 +31,12 @@ STDIN = 0
 NEAR_SHARE = 0.75
 EPILOG = """\
 Speeds and accelerations are those of the configuration: robot.speed_m_s, acceleration_m_s2,
-turn_deg_s, turn_deg_s2 and steered_deg. Where the configuration has a block ros2, poses come from
-its topics and velocities go to ros2.topics.cmd_vel; else by the keys `pose` and `cmd_vel`.
+turn_deg_s, turn_deg_s2, steered_deg and turn_radius_m. Where the configuration has a block ros2,
+poses come from its topics and velocities go to ros2.topics.cmd_vel; else by the keys `pose` and
+`cmd_vel`.
 Corners up to 135 degrees are rounded in motion, within 2 cm; at sharper ones it turns on the spot.
+With robot.turn_radius_m it never does: it steers along curves, and comes to rest only where these
+change between forward and backward, which it drives where the path's heading is opposite to it.
 
 It stops the robot within 0.2 s, and keeps it standing, while
   the newest pose is older than --pose-age, missing, malformed, or has jumped; with poses from tf,
@@ -176,6 +179,7 @@ def settings_of(args: argparse.Namespace) -> FollowSettings:
         turn_deg_s=robot.turning_deg_s(),
         turn_deg_s2=robot.turn_deg_s2,
         steered_deg=robot.steered_deg,
+        turn_radius_m=robot.turn_radius_m,
         pose_schema=config.pose.schema,
         pose_age_s=args.pose_age,
         poses=_ros_poses(ros) if ros else poses,

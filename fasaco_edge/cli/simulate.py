@@ -18,6 +18,7 @@ from fasaco_edge.cli.console.arguments import (
     writing,
 )
 from fasaco_edge.cli.console.terminal import ProgressLines
+from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.grid.geometry import Pose2D
 from fasaco_edge.grid.map_files import find_map, map_sources, read_map
 
@@ -58,6 +59,14 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         "(default: %(default)g)",
     )
     parser.add_argument(
+        "--turn-radius",
+        type=float,
+        default=0.0,
+        metavar="M",
+        help="tightest arc of the base [m], forward and backward; 0: it turns on the spot. "
+        "With --driver follow (default: %(default)g)",
+    )
+    parser.add_argument(
         "--meets-others",
         action="store_true",
         help="stop before other robots on the bus; all have the same size",
@@ -82,7 +91,10 @@ def run(args: argparse.Namespace) -> int:
         range_m=args.range,
         map_hz=args.map_hz,
         battery_min=args.battery_min,
+        turn_radius_m=args.turn_radius,
     )
+    if args.turn_radius and args.driver == "ideal":
+        raise BadConfiguration("--turn-radius counts only with --driver follow")
     truth = read_map(path)
     x, y = args.start_xy or start_point(path, truth, args.robot_radius)
     world = World(truth, Pose2D(x, y), config)

@@ -48,6 +48,7 @@ class Limits:
         turn_rate: on the spot [rad/s].
         turn_acceleration: [rad/s^2].
         steered: largest bend that is steered while driving [rad].
+        turn_radius: of the tightest arc [m]; 0 if it turns on the spot.
     """
 
     speed: float
@@ -55,6 +56,7 @@ class Limits:
     turn_rate: float
     turn_acceleration: float
     steered: float
+    turn_radius: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,7 +64,7 @@ class Command:
     """A velocity.
 
     Attributes:
-        speed: forward [m/s].
+        speed: forward [m/s]; below 0 backward.
         turn_rate: counter-clockwise [rad/s].
     """
 

@@ -8,6 +8,8 @@ from __future__ import annotations
 import math
 
 from fasaco_edge.errors import MalformedMessage
+from fasaco_edge.follow.curve_pursuit import CurvePursuit
+from fasaco_edge.follow.curve_route import CurveRoute
 from fasaco_edge.follow.estimate import STAND, Command, Limits, PoseEstimate
 from fasaco_edge.follow.grip import Grip
 from fasaco_edge.follow.pursuit import Pursuit
@@ -53,7 +55,7 @@ class Follower(Supervision):
         self._moves = moves
         self._sight, self._radius = sight, radius
         self._estimate = PoseEstimate(limits)
-        self._pursuit = Pursuit(limits, 1.0 / RATE_HZ)
+        self._pursuit = (CurvePursuit if limits.turn_radius else Pursuit)(limits, 1.0 / RATE_HZ)
         self._grip = Grip()
         self._route: Route | None = None
         # The route driven until a new path is joined.
@@ -101,7 +103,10 @@ class Follower(Supervision):
     def _have(self, points: PathPoints) -> None:
         if not self._is_new:
             self._before = self._route
-        self._route = Route(points.take, self._limits)
+        if self._limits.turn_radius:
+            self._route = CurveRoute(points.take_poses, self._limits)
+        else:
+            self._route = Route(points.take, self._limits)
         self._is_new = True
 
     def _withdraw(self) -> None:
@@ -126,7 +131,9 @@ class Follower(Supervision):
         pose = self._estimate.at(now)
         here = (pose.x, pose.y)
         if self._is_new:
-            heading = pose.yaw if self._estimate.speed > 0.0 else None
+            heading = None
+            if self._estimate.speed:
+                heading = pose.yaw if self._estimate.speed > 0.0 else pose.yaw + math.pi
             joining = self._route.join(here, heading, self._before)
             if joining is Joining.AT_REST:
                 return self._pursuit.brake()
@@ -149,7 +156,9 @@ class Follower(Supervision):
         if self._route.leg is None:
             self.state = State.DRIVEN
             return None
-        if limit.speed == 0.0 and command == STAND and not self._pursuit.is_turning:
+        if self._pursuit.is_lost:
+            self.state, self.detail = State.OFF_PATH, "it leads where the base cannot steer"
+        elif limit.speed == 0.0 and command == STAND and not self._pursuit.is_turning:
             self.state, self.detail = State.OBSTACLE, limit.why
             self.ahead = self._sight.around(limit.thing) if self._sight is not None else ()
         return command
@@ -159,4 +168,6 @@ class Follower(Supervision):
         if self._sight is None or not self._sight.things:
             return Limit(math.inf)
         line = route.line_ahead((pose.x, pose.y), AHEAD_M)
+        if route.leg is not None and route.leg.is_back:
+            pose = Pose2D(pose.x, pose.y, pose.yaw + math.pi)
         return self._sight.limit(pose, line, self._limits.acceleration, 1.0 / RATE_HZ)

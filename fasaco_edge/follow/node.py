@@ -158,6 +158,7 @@ class FollowerNode:
                 math.radians(settings.turn_deg_s),
                 math.radians(settings.turn_deg_s2),
                 math.radians(settings.steered_deg),
+                settings.turn_radius_m,
             ),
             patience_of(settings),
             moves=not settings.dry_run,

@@ -42,12 +42,15 @@ class Pursuit:
     Args:
         limits: of the base.
         period: from one command to the next [s].
+
+    Attributes:
+        is_lost: whether the route leads where the robot cannot turn to.
     """
 
     def __init__(self, limits: Limits, period: float) -> None:
         self._limits = limits
         self._period = period
-        self._is_turning = True
+        self._is_turning, self.is_lost = True, False
         # Time since the last command, and the delay to expect of the next one [s].
         self._seconds, self._late = period, 0.0
         self.last = STAND

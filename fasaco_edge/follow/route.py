@@ -57,6 +57,7 @@ class Leg:
         most: greatest speed at its end [m/s]: 0 where the robot has to come to rest, infinity where
             it just steers.
         early_s: how long before its end the robot begins to turn there, if it rounds a corner [s].
+        is_back: whether it is driven backward.
     """
 
     start: Point
@@ -66,6 +67,7 @@ class Leg:
     length: float
     most: float = 0.0
     early_s: float = 0.0
+    is_back: bool = False
 
     @property
     def stops(self) -> bool:
@@ -144,7 +146,7 @@ class Route:
         missed_by = math.dist(here, corner)
         if self._legs[0].distance(here) > MISSED_M and missed_by < before - MISSED_M:
             self._missed_by = missed_by
-            self._legs.insert(0, _leg(here, corner))
+            self._legs.insert(0, leg_between(here, corner))
 
     def pass_bends(self, here: Point) -> None:
         """Go on to the leg that ``here`` is on, past bends that are steered."""
@@ -262,7 +264,7 @@ class Route:
         elif math.dist(here, begin) > BEGINNING_M:
             return Joining.ELSEWHERE
         if math.dist(here, begin) >= LEAST_LEG_M:
-            self._legs.insert(0, _leg(here, begin))
+            self._legs.insert(0, leg_between(here, begin))
         return Joining.JOINED
 
     def _lead_to(self, point: Point, here: Point) -> list[Leg]:
@@ -280,7 +282,7 @@ class Route:
             on_leg = LEAST_LEG_M <= along <= leg.length + LEAST_LEG_M
             is_ahead = on_leg and LEAST_LEAD_M <= way + along <= LEAD_M
             if is_ahead and abs(aside) <= BESIDE_M:
-                return [*self._legs[:index], _leg(leg.start, leg.at(along))]
+                return [*self._legs[:index], leg_between(leg.start, leg.at(along))]
             way += leg.length
             index += 1
         return []
@@ -314,9 +316,9 @@ class Route:
         """Read until there are ``count`` legs, if the path has them."""
         while len(self._legs) < count and self._read():
             start, end = self._ahead[:2]
-            leg = _leg(start, end)
+            leg = leg_between(start, end)
             if len(self._ahead) > 2:
-                after = _leg(end, self._ahead[2])
+                after = leg_between(end, self._ahead[2])
                 turn = math.atan2(after.uy, after.ux) - math.atan2(leg.uy, leg.ux)
                 room = 0.5 * min(leg.length, after.length)
                 most, early_s = rounding(abs(math.remainder(turn, math.tau)), room, self._limits)
@@ -335,6 +337,7 @@ class Route:
         return len(self._ahead) >= 2
 
 
-def _leg(start: Point, end: Point) -> Leg:
+def leg_between(start: Point, end: Point) -> Leg:
+    """Return the leg from one point to another."""
     length = math.dist(start, end)
     return Leg(start, end, (end[0] - start[0]) / length, (end[1] - start[1]) / length, length)

@@ -38,6 +38,7 @@ class FollowSettings:
         secured: credentials, a part of Zenoh's configuration.
         speed_m_s, acceleration_m_s2: of driving.
         turn_deg_s, turn_deg_s2, steered_deg: of turning; the largest bend that is steered.
+        turn_radius_m: of the tightest arc; 0 if the base turns on the spot.
         pose_schema: message type of poses whose samples name none.
         pose_age_s: timeout of the newest pose.
         poses: keys of poses.
@@ -69,6 +70,7 @@ class FollowSettings:
     pose_schema: str
     poses: tuple[PoseSource, ...]
     cmd_key: str
+    turn_radius_m: float = 0.0
     pose_age_s: float = 0.5
     frames: tuple[str, str] | None = None
     schema: str = TWIST

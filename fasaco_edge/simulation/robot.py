@@ -66,6 +66,8 @@ class SimulationConfig:
         map_chunk_m: the published map grows by blocks of about this size [m].
         tick_s: the simulation's time step [s].
         scan_hz, map_hz, pose_hz: rates [Hz]; their periods are rounded to whole ticks.
+        turn_radius_m: of the tightest arc that the base drives when told velocities, forward or
+            backward [m]; 0 for a base that turns on the spot, and drives forward alone.
         battery_min: how long its battery lasts [min]; 0 for unlimited. It charges where the robot
             began.
     """
@@ -83,12 +85,18 @@ class SimulationConfig:
     scan_hz: float = 5.0
     map_hz: float = 2.0
     pose_hz: float = 10.0
+    turn_radius_m: float = 0.0
     battery_min: float = 0.0
 
     def __post_init__(self) -> None:
         for field in fields(self):
             value = getattr(self, field.name)
-            may_be_zero = field.name in ("padding_m", "free_at_most", "battery_min")
+            may_be_zero = field.name in (
+                "padding_m",
+                "free_at_most",
+                "turn_radius_m",
+                "battery_min",
+            )
             if not math.isfinite(value) or value < 0 or (value == 0 and not may_be_zero):
                 least = "at least 0" if may_be_zero else "above 0"
                 raise BadConfiguration(f"{field.name} must be {least}, got {value}")
@@ -119,7 +127,7 @@ class DriveState:
 
     Attributes:
         pose: in the map frame.
-        speed: forward [m/s], never negative.
+        speed: forward [m/s]; negative only with a turning radius.
         turn_rate: counter-clockwise [rad/s].
     """
 
@@ -163,10 +171,14 @@ def moved_by(
 ) -> DriveState:
     """Return the state a tick later, of a base that follows a velocity within its limits."""
     dt = config.tick_s
-    goal = min(max(speed_m_s, 0.0), config.speed_m_s)
+    slowest = -config.speed_m_s if config.turn_radius_m else 0.0
+    goal = min(max(speed_m_s, slowest), config.speed_m_s)
     turn_goal = min(max(turn_rad_s, -config.turn_rad_s), config.turn_rad_s)
     speed = limited(state.speed, goal, config.acceleration_m_s2 * dt)
     turn_rate = limited(state.turn_rate, turn_goal, config.turn_acceleration_rad_s2 * dt)
+    if config.turn_radius_m:
+        tightest = abs(speed) / config.turn_radius_m
+        turn_rate = min(max(turn_rate, -tightest), tightest)
     pose = state.pose
     heading = pose.yaw + 0.5 * turn_rate * dt
     way = speed * dt

@@ -367,7 +367,7 @@ class World:
             self._collide()
             return
         self._extend_track(ahead)
-        self.distance_m += ahead.speed * self.config.tick_s
+        self.distance_m += abs(ahead.speed) * self.config.tick_s
         self._drive = ahead
 
     def _collide(self) -> None:
@@ -389,7 +389,7 @@ class World:
         """Add the point the robot is about to leave, if the track does not have it."""
         here = (self.pose.x, self.pose.y)
         gone = math.dist(self._track[-1], here)
-        turns_off = ahead.speed > 0.0 and self._drive.speed == 0.0
+        turns_off = ahead.speed != 0.0 and self._drive.speed == 0.0
         if gone >= TRACK_SPACING_M or (gone > 0.0 and turns_off):
             self._track.append(here)
 

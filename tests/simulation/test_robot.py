@@ -15,6 +15,7 @@ from fasaco_edge.simulation.robot import (
     SimulationConfig,
     corners,
     driven,
+    moved_by,
     stopping_point,
 )
 from tests.support.examples import examples
@@ -96,3 +97,21 @@ def test_corners_keep_ends_turns_and_reversals():
 def test_an_impossible_value_is_named(change, named):
     with pytest.raises(BadConfiguration, match=named):
         SimulationConfig(**change)
+
+
+def test_a_base_with_a_turning_radius_drives_no_tighter_arc_and_backward():
+    config = SimulationConfig(turn_radius_m=0.4)
+    for told_m_s in (0.25, -0.25):
+        state = DriveState(Pose2D(0.0, 0.0))
+        for _ in range(200):
+            state = moved_by(state, told_m_s, 1.8, config)
+            assert abs(state.turn_rate) <= abs(state.speed) / 0.4 + 1e-12
+        assert state.speed == pytest.approx(told_m_s)
+        # On a circle of that radius: to its left, backward to its right.
+        centre_y = math.copysign(0.4, told_m_s)
+        far = math.hypot(state.pose.x, state.pose.y - centre_y)
+        assert far == pytest.approx(0.4, abs=0.02)
+    state = moved_by(DriveState(Pose2D(0.0, 0.0)), 0.0, 1.8, config)
+    assert not state.moving
+    # A base that turns on the spot does not drive backward.
+    assert not moved_by(DriveState(Pose2D(0.0, 0.0)), -0.25, 0.0, SimulationConfig()).moving

@@ -6,10 +6,10 @@ and the next path replaces it long before its end is driven.
 
 from __future__ import annotations
 
-from fasaco_edge.grid.geometry import Point
+from fasaco_edge.grid.geometry import Point, Pose2D
 from fasaco_edge.wire.limits import MAX_PATH_POSES
 from fasaco_edge.wire.messages.cdr import CdrReader, refuse
-from fasaco_edge.wire.messages.fields import POSE, check_pose, read_header
+from fasaco_edge.wire.messages.fields import POSE, check_pose, read_header, yaw_of
 from fasaco_edge.wire.schemas import PATH
 
 LEAST_POSE_BYTES = 72
@@ -40,15 +40,22 @@ class PathPoints:
         Raises:
             MalformedMessage: a pose is invalid or in another frame, or data follow the last one.
         """
-        points = []
+        return [(pose[0], pose[1]) for pose in self._take(most)]
+
+    def take_poses(self, most: int) -> list[Pose2D]:
+        """Return the next poses, at most ``most``; raises as ``take`` does."""
+        return [Pose2D(pose[0], pose[1], yaw_of(*pose[3:7])) for pose in self._take(most)]
+
+    def _take(self, most: int) -> list[tuple[float, ...]]:
+        poses = []
         for index in range(self._count - self.left, self._count)[:most]:
             pose = read_path_pose(self._reader, self.frame, index)
             check_pose(pose, PATH, f"poses[{index}].pose")
-            points.append((pose[0], pose[1]))
+            poses.append(pose)
             self.left -= 1
-        if not self.left and points:
+        if not self.left and poses:
             self._reader.end()
-        return points
+        return poses
 
 
 def read_pose_count(reader: CdrReader, max_poses: int) -> int:
