@@ -18,6 +18,7 @@ from fasaco_edge.planners.living_trail import PAPERS_RULES, TrailRules
 if TYPE_CHECKING:
     # Importing it at run time would load numba; the configuration needs only the policy from here.
     from fasaco_edge.grid.lattice import Footprint
+    from fasaco_edge.planners.curve_config import CurveConfig
     from fasaco_edge.planners.line import LineConfig
 
 LONGEST_FRAME = 255
@@ -124,6 +125,7 @@ class Sweeping:
         ahead_m: distance of the tool's centre ahead of the robot's centre of rotation [m]: swept
             floor is computed with it, lines are planned as if it were 0.
         clearance_m: distance of lines from walls and furniture in addition to the radius [m].
+        curves: of a robot with a turning radius; None for one that turns on the spot.
     """
 
     tool_m: float
@@ -131,6 +133,7 @@ class Sweeping:
     line: LineConfig
     ahead_m: float = 0.0
     clearance_m: float = 0.0
+    curves: CurveConfig | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -119,4 +119,11 @@ def _sweeping(config: DaemonConfig) -> Sweeping | None:
         return None
     line = replace(line, speed_m_s=robot.speed_m_s, turning=robot.turning())
     most_pixels = floor_pixels(config.map.max_pixels)
-    return Sweeping(robot.tool_width_m, most_pixels, line, robot.tool_ahead_m, robot.clearance_m)
+    return Sweeping(
+        robot.tool_width_m,
+        most_pixels,
+        line,
+        robot.tool_ahead_m,
+        robot.clearance_m,
+        robot.curves(line.price_s_m2),
+    )

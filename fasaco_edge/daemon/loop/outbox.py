@@ -67,11 +67,11 @@ class Outbox:
         self._command = bus.advertise(keys, topics.COMMAND)
 
     def path(self, path: PublishedPath) -> bool:
-        """Publish a path, facing along the way; return whether that succeeded."""
+        """Publish a path, by default facing along the way; return whether that succeeded."""
         return self.guard.attempt("path", lambda: self._put_path(path))
 
     def _put_path(self, path: PublishedPath) -> None:
-        yaw = headings(path.xy)
+        yaw = headings(path.xy) if path.yaw is None else path.yaw.copy()
         if len(yaw) and path.end_yaw is not None:
             yaw[-1] = path.end_yaw
         attachment = encode_json(structs.replace(path_attachment(path), daemon=self._id))

@@ -267,6 +267,7 @@ class PathUpdate:
         changed: window of the cells whose change is the reason; None for another reason.
         xy: float64 (m, 2), x, y [m]: the line to drive; None for the centres of the cells.
         end_yaw: heading at the end [rad]; None for the heading of the last segment.
+        yaw: float64 (m,), the robot's headings at ``xy`` [rad]; None for those along the line.
         may_wait: whether the robot can drive on along the previous path as long as both are equal.
         speed_m_s: speed to drive it at [m/s]; None for the robot's usual one.
     """
@@ -279,6 +280,7 @@ class PathUpdate:
     changed: Window | None = None
     xy: NDArray[np.float64] | None = None
     end_yaw: float | None = None
+    yaw: NDArray[np.float64] | None = None
     may_wait: bool = False
     speed_m_s: float | None = None
 

@@ -108,7 +108,8 @@ class LatticeRotation:
         xy = lattice.centres(update.cells) if update.xy is None else update.xy
         yaw = update.end_yaw
         yaw = None if yaw is None else math.remainder(yaw + math.radians(self.deg), math.tau)
-        return replace(update, xy=rotated_points(xy, self.deg), end_yaw=yaw)
+        yaws = None if update.yaw is None else update.yaw + math.radians(self.deg)
+        return replace(update, xy=rotated_points(xy, self.deg), end_yaw=yaw, yaw=yaws)
 
     def grid(self, grid: OccupancyGrid | None) -> OccupancyGrid | None:
         """Return a map of the mission in the map frame."""

@@ -42,6 +42,7 @@ class PublishedPath:
         xy: float64 (n, 2), x, y [m]; n = 0 stops the robot.
         steps: steps from cell to cell.
         end_yaw: heading at the end [rad]; None for the heading of the last segment.
+        yaw: float64 (n,), the robot's headings [rad]; None for those along the path.
         map_stamp_ns, map_revision: stamp [ns] and revision of the map it was planned on.
         plan: the plan that it comes from; None if none was needed.
         plan_s: planning time [s].
@@ -54,6 +55,7 @@ class PublishedPath:
     xy: NDArray[np.float64] = field(default_factory=no_points)
     steps: int = 0
     end_yaw: float | None = None
+    yaw: NDArray[np.float64] | None = None
     map_stamp_ns: int = 0
     map_revision: int = 0
     plan: CoveragePath | None = None
@@ -77,6 +79,7 @@ class PublishedPath:
             xy=lattice.centres(update.cells) if update.xy is None else update.xy,
             steps=max(len(update.cells) - 1, 0),
             end_yaw=update.end_yaw,
+            yaw=update.yaw,
             map_stamp_ns=grid.stamp_ns,
             map_revision=mission.map_revision,
             plan=update.plan,
@@ -150,7 +153,7 @@ class PathExit:
         if not publish(self._due):
             if self._due.stops:
                 return None
-            self._due = replace(self._due, xy=no_points(), steps=0, end_yaw=None)
+            self._due = replace(self._due, xy=no_points(), steps=0, end_yaw=None, yaw=None)
             if not publish(self._due):
                 return None
         self._sent, self._due = self._due, None

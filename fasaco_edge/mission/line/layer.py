@@ -23,10 +23,12 @@ from fasaco_edge.mission.core.route import Route
 from fasaco_edge.mission.coverage.floor_tiles import pixels_under
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
 from fasaco_edge.mission.coverage.swept_floor import ANYWHERE, NOWHERE, SweptFloor
+from fasaco_edge.mission.line.curver import Curver
 from fasaco_edge.mission.line.line_ahead import LineAhead
 from fasaco_edge.mission.line.missed_floor import REASONS, MissedFloor, causes_of
 from fasaco_edge.mission.line.offset import Offset
 from fasaco_edge.mission.line.polisher import Polisher
+from fasaco_edge.mission.line.polyline import CURVED
 from fasaco_edge.mission.line.published_line import Publication
 from fasaco_edge.mission.map.map_state import MapState
 from fasaco_edge.mission.orders.sequencer import Sequencer
@@ -87,6 +89,7 @@ class LineLayer:
         orders.ask_for_floor(self.sum_up)
         self.offset = Offset(sweeping.tool_m if sweeping else 0.0)
         self._polisher = Polisher(sweeping.line) if sweeping else None
+        self._curver = Curver(sweeping.curves) if sweeping and sweeping.curves else None
         self._publication = Publication(route, sweeping.line.speed_m_s if sweeping else 0.0)
         self._missed = MissedFloor.at(sweeping.line, WORTH_S) if sweeping else None
         price_s_m2 = sweeping.line.price_s_m2 if sweeping else 0.0
@@ -117,7 +120,7 @@ class LineLayer:
             return
         self._seen = floor, floor.revision
         if self._ahead is None:
-            self._ahead = LineAhead(floor)
+            self._ahead = LineAhead(floor, is_curved=self._curver is not None)
             self._asked, self._touched = None, None
             return
         before = self._ahead.tally
@@ -188,9 +191,26 @@ class LineLayer:
         may_change = (update is None or update.may_wait) and not reason and not is_further
         # On such a way the robot sweeps nothing beside its path.
         if may_change and not self._is_way:
+            held = max(held, ahead.line.first_below(CURVED)) if self._curver else held
             self._polisher.polish(ahead, self._map.floor, held, is_settled=self._is_settled)
             self._publication.look(ahead)
-        return self._publication.finish(ahead, update, reason, now, is_way=self._is_way)
+        if self._curver is None:
+            return self._publication.finish(ahead, update, reason, now, is_way=self._is_way)
+        reason = self._curve(self._curver, ahead, self._map.floor, stamped.pose) or reason
+        update = self._publication.finish(ahead, update, reason, now, is_way=self._is_way)
+        if update is None or update.xy is None:
+            return update
+        return replace(update, yaw=self._curver.yaw(update.xy, stamped.pose))
+
+    def _curve(self, curver: Curver, ahead: LineAhead, floor: FloorMap, pose: Pose2D) -> str:
+        """Make a curve of the line where it is due; return why to publish a way, or "".
+
+        On a way nothing waits for the robot to come near.
+        """
+        if not curver.curve(ahead, floor, pose):
+            return ""
+        self._publication.look(ahead)
+        return "curve further ahead" if self._is_way else ""
 
     @property
     def _is_way(self) -> bool:

@@ -29,6 +29,7 @@ from fasaco_edge.mission.line.place_on_line import (
     by_distance,
 )
 from fasaco_edge.mission.line.polyline import (
+    CURVED,
     NO_EDGES,
     POLISHED,
     Line,
@@ -54,13 +55,17 @@ class LineAhead:
         line: the rest of the line.
         tally: counts of its sweeps.
         cell: index of the robot's cell in the walk.
+
+    Args:
+        floor: the floor under it.
+        is_curved: whether the robot cannot turn on the spot, so that it is along the line.
     """
 
-    def __init__(self, floor: FloorMap) -> None:
+    def __init__(self, floor: FloorMap, *, is_curved: bool = False) -> None:
         self.line = Line()
         self.tally = SweepTally(floor)
         self.cell = 0
-        self._floor, self._geometry = floor, floor.geometry
+        self._floor, self._geometry, self._is_curved = floor, floor.geometry, is_curved
         self._walk: Walk = np.empty((0, 2), np.int32)
         # Number of published cells of a walk that was cut off, 0 after a stop; the rest is kept
         # until the next walk. None for a complete walk.
@@ -281,7 +286,11 @@ class LineAhead:
         """
         self._see(pose)
         look_m = max(LOOK_AHEAD_M, farthest_m)
-        number = self._place.find(self.line.points, self._tool, look_m / self.tally.unit_m)
+        along = None
+        if self._is_curved:
+            yaw = pose.yaw - self._floor.geometry.origin.yaw
+            along = np.array([math.sin(yaw), math.cos(yaw)])
+        number = self._place.find(self.line.points, self._tool, look_m / self.tally.unit_m, along)
         if number is None:
             return
         if number > 0:
@@ -306,6 +315,11 @@ class LineAhead:
         """The robot's position, x, y [m]."""
         row, col = self._place.here.tolist()
         return self._floor.geometry.to_map(col + 0.5, row + 0.5)
+
+    @property
+    def place(self) -> Points:
+        """The robot's position, (2,): y, x [pixels]."""
+        return self._place.here
 
     @property
     def beside(self) -> Beside | None:
@@ -385,6 +399,24 @@ class LineAhead:
         state = line.state[first:end].min(initial=POLISHED)
         part = Line(points, cells, np.full(len(points), state, np.uint8))
         self.line = line.part(0, first).joined(part, line.part(end))
+
+    def put_curve(self, first: int, end: int, xy: Points) -> None:
+        """Replace the points from ``first`` to ``end`` by a curve, float64 (n, 2): x, y [m].
+
+        From the first point on the curve begins at the robot.
+        """
+        line, geometry = self.line, self._floor.geometry
+        points = np.array([map_to_raster(geometry, x, y) for x, y in xy.tolist()])
+        begin, last = int(line.cells[first]), int(line.cells[end - 1])
+        cells = np.full(len(points), begin)
+        if len(points) > 1:
+            cells = begin + aligned(points, self._stands(begin, last + 1))
+        part = Line(points, cells, np.full(len(points), CURVED, np.uint8))
+        new = line.part(0, first).joined(part, line.part(end))
+        if not first:
+            self._place.along = 0.0
+        self.tally.exchange(edges_between(line.points), edges_between(new.points))
+        self.line = new
 
     def _nearest(self, begin: int, end: int) -> int:
         """Return the nearest cell of the walk from ``begin`` to ``end``.

@@ -28,6 +28,9 @@ LOOK_AHEAD_M = 0.8
 # Distance to the end of its line at which a robot has arrived [m]; it has also arrived if the tool
 # covers the end and this many poses come no nearer, as a robot may drive beside its line.
 ARRIVED_M, STANDING_POSES = 0.05, 10
+# Cosine of the largest angle between a robot that cannot turn on the spot and the edge it is on:
+# its curve crosses itself within the distance in which it is searched for.
+ALONG = math.cos(math.radians(40.0))
 
 
 class PlaceOnLine:
@@ -78,13 +81,16 @@ class PlaceOnLine:
         bend = math.remainder(math.atan2(ahead_y, ahead_x) - heading, math.tau)
         return Beside((dx * off_y - dy * off_x) / length * unit_m, heading, bend)
 
-    def find(self, points: Points, tool: float, look: float) -> int | None:
+    def find(
+        self, points: Points, tool: float, look: float, along: Points | None = None
+    ) -> int | None:
         """Search for the robot along the line, and update ``along``.
 
         Args:
             points: points of the line.
             tool: half of the tool's width, the greatest distance from the line.
             look: how far ahead it is searched for.
+            along: unit vector of its heading, (2,), if it is only on edges along that, either way.
 
         Returns:
             The index of the nearest edge; None if none is within that distance.
@@ -98,7 +104,8 @@ class PlaceOnLine:
             share = float(np.dot(self.here - points[number], edge)) / length**2
             share = min(max(share, low), high)
             apart = math.hypot(*(points[number] + share * edge - self.here))
-            if apart < nearest - 1e-6:
+            is_across = along is not None and abs(float(np.dot(edge, along))) < ALONG * length
+            if apart < nearest - 1e-6 and (number == 0 or not is_across):
                 nearest, at = apart, (number, share)
             look -= (high - low) * length
             if look <= 0.0:

@@ -14,8 +14,8 @@ Edges = NDArray[np.float64]
 Numbers = NDArray[np.int64]
 Walk = NDArray[np.int32]
 
-# States of points: at a stand; moved; polished with all moves.
-RAW, MOVED, POLISHED = range(3)
+# States of points: at a stand; moved; polished with all moves; on a curve.
+RAW, MOVED, POLISHED, CURVED = range(4)
 NO_EDGES = np.empty((0, 4))
 # Lengths are computed for this many points first, then for twice as many until they suffice.
 FIRST_POINTS = 128
@@ -28,7 +28,7 @@ class Line:
     Attributes:
         points: float64 (n, 2): y, x [pixels of the fine raster].
         cells: int64 (n,), ascending: index in the walk of each point's cell.
-        state: uint8 (n,): RAW, MOVED or POLISHED.
+        state: uint8 (n,): RAW, MOVED, POLISHED or CURVED.
     """
 
     points: Points = field(default_factory=lambda: np.empty((0, 2)))

@@ -44,6 +44,7 @@ OPTIONS = {
     "nudge_s": "a person helps a robot that stood for so long [s]; 0 for never",
     "speed_m_s": "speed of the robot [m/s]",
     "tool_m": "width of its tool [m]",
+    "turn_radius_m": "tightest arc of the own base [m]; 0 if it turns on the spot",
     "left_m": "how far the robot is to the left of where its follower takes it to be [m]",
 }
 

@@ -63,6 +63,7 @@ class OwnBase:
             scan_hz=settings.scan_hz,
             map_hz=1.0 / MAP_EVERY_S,
             pose_hz=1.0 / TICK_S,
+            turn_radius_m=settings.turn_radius_m,
         )
         noise = replace(NOISES[settings.own], seed=settings.seed)
         truth = OccupancyGrid(building.geometry, cells, FRAME)

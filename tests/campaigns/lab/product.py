@@ -154,7 +154,7 @@ class Product:
         runner.paths.send(self._publish)
 
     def _publish(self, path: PublishedPath) -> bool:
-        yaw = headings(path.xy)
+        yaw = headings(path.xy) if path.yaw is None else path.yaw.copy()
         if len(yaw) and path.end_yaw is not None:
             yaw[-1] = path.end_yaw
         payload = encode_path(path.xy, yaw, path.frame, path.map_stamp_ns)
@@ -215,6 +215,7 @@ def _follower(config: DaemonConfig, sight: Sight | None) -> Follower:
             math.radians(robot.turning_deg_s()),
             math.radians(robot.turn_deg_s2),
             math.radians(robot.steered_deg),
+            robot.turn_radius_m,
         ),
         sight=sight,
         radius=robot.radius_m,

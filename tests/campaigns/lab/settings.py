@@ -44,6 +44,7 @@ class LabSettings:
         speed_m_s, tool_m: speed of the robot, and width of its tool.
         own: noise of the project's own mapper, see ``own.NOISES``; "" for a simulator and a scan
             matcher of others.
+        turn_radius_m: of the base's tightest arc [m]; 0 if it turns on the spot. Of the own base.
         left_m: how far the robot is to the left of where its follower takes it to be [m].
     """
 
@@ -63,6 +64,7 @@ class LabSettings:
     speed_m_s: float = 0.35
     tool_m: float = 0.3
     own: str = ""
+    turn_radius_m: float = 0.0
     left_m: float = 0.0
 
     def __post_init__(self) -> None:
@@ -96,6 +98,7 @@ class LabSettings:
             acceleration_m_s2=0.5,
             turn_deg_s=80.0,
             turn_deg_s2=180.0,
+            turn_radius_m=self.turn_radius_m,
         )
 
     @property

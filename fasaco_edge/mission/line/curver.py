@@ -1,0 +1,178 @@
+"""Curver: makes a curve of the line just ahead of a robot that cannot turn on the spot.
+
+The line further ahead may still change, and becomes a curve when the robot comes near. A curve
+begins where the last one ends, with the heading there; after a change at the robot, with the
+robot's own pose. What is a curve is not polished any more.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fasaco_edge.grid.fine_raster import RobotDiscs, raster_to_map
+from fasaco_edge.grid.floor_map import FloorMap
+from fasaco_edge.grid.geometry import GridGeometry, Pose2D, Window
+from fasaco_edge.kernels.floor.bits import WORD, Bits, packed, unpacked
+from fasaco_edge.kernels.floor.sweeps import NEVER
+from fasaco_edge.mission.line.line_ahead import LineAhead
+from fasaco_edge.mission.line.polyline import CURVED, Points
+from fasaco_edge.planners.curve_config import CurveConfig
+from fasaco_edge.planners.curves import Curve, curve_along
+
+# Once less than this of the line ahead is a curve, a piece of this length becomes one [m]; beside
+# that of so many turning radii.
+AHEAD_M, PIECE_M, PIECE_RADII = 6.0, 6.0, 6.0
+# The last part of a piece is not kept: what follows decides how it is best driven.
+KEPT_SHARE = 0.6
+# If a turn does not fit at the end of the curve, it is made anew from this far ahead [m].
+AGAIN_M = 0.5
+# A robot that drives backward, too, changes its direction at a sharper bend [rad].
+REVERSAL_RAD = math.radians(120.0)
+# A curve keeps within this distance of its line [turning radii], and this more [m].
+BESIDE_RADII, BESIDE_M = 5.0, 1.0
+# A robot that stands where it does not fit, as by an error of its pose, may leave that place by
+# others as near as this [pixels].
+LEAVES_PX = 2
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Part:
+    """A part of a floor's raster, as ``planners.curves.Ground``, with the floor to sweep."""
+
+    geometry: GridGeometry
+    discs: RobotDiscs
+    blocked: Bits
+    places: Bits
+    to_sweep: NDArray[np.bool_]
+
+    @classmethod
+    def around(
+        cls, points: Points, floor: FloorMap, ahead: LineAhead, margin: float, *, leaves: bool
+    ) -> _Part:
+        """Return the part around points, float64 (n, 2): y, x [pixels].
+
+        ``leaves``: whether the first one is the robot's, who may leave it.
+        """
+        whole = floor.geometry
+        (row0, col0), (row1, col1) = points.min(axis=0) - margin, points.max(axis=0) + margin
+        box = Window(int(row0), int(col0) // WORD * WORD, int(row1) + 1, int(col1) + 1)
+        part = box.intersection(Window(0, 0, whole.rows, whole.cols))
+        assert part is not None
+        origin = Pose2D(*whole.to_map(float(part.col0), float(part.row0)), whole.origin.yaw)
+        geometry = GridGeometry(part.rows, part.cols, whole.resolution, origin)
+        rows = slice(part.row0, part.row1)
+        words = slice(part.col0 // WORD, -(-part.col1 // WORD))
+        counts = ahead.tally.sweeps.counts[rows, part.col0 : part.col1]
+        places = floor.places[rows, words].copy()
+        if leaves:
+            row, col = np.rint(points[0]).astype(int) - (part.row0, part.col0)
+            fits = unpacked(places, part.cols)
+            is_inside = 0 <= row < part.rows and 0 <= col < part.cols
+            if is_inside and not fits[row, col]:
+                near = slice(max(row - LEAVES_PX, 0), row + LEAVES_PX + 1)
+                fits[near, max(col - LEAVES_PX, 0) : col + LEAVES_PX + 1] = True
+                places = packed(fits, beyond=False)
+        blocked = floor.blocked[rows, words].copy()
+        return cls(geometry, floor.discs, blocked, places, counts < NEVER)
+
+
+class Curver:
+    """Replaces pieces of the line.
+
+    Args:
+        config: the robot.
+    """
+
+    def __init__(self, config: CurveConfig) -> None:
+        self._config = config
+
+    def curve(self, ahead: LineAhead, floor: FloorMap, pose: Pose2D) -> bool:
+        """Make a curve of the next piece, if it is due; return whether the line has changed.
+
+        Args:
+            ahead: the line.
+            floor: the floor under it.
+            pose: of the robot.
+        """
+        count = len(ahead.line)
+        curved = ahead.line.first_below(CURVED)
+        piece_m = PIECE_M + PIECE_RADII * self._config.radius_m
+        lengths = ahead.lengths(AHEAD_M + 2.0 * piece_m)
+        if (
+            count < 2
+            or curved == count
+            or (curved and lengths[min(curved, len(lengths)) - 1] > AHEAD_M)
+        ):
+            return False
+        # From the end of the curve; from further back, or from the robot, if a turn does not fit.
+        begins = [curved - 1] if curved > 1 else []
+        near = int(np.searchsorted(lengths, AGAIN_M))
+        begins += [near] if 1 < near < curved - 1 else []
+        best: tuple[int, int, Curve] | None = None
+        for first in (*begins, 0):
+            end = int(np.searchsorted(lengths, lengths[first] + piece_m)) + 1
+            end = min(max(end, first + 2), count)
+            curve = self._piece(ahead, floor, pose, first, end)
+            if best is None or curve.spots < best[2].spots:
+                best = first, end, curve
+            if not curve.spots:
+                break
+        assert best is not None
+        self._put(ahead, floor, *best)
+        return True
+
+    def yaw(self, xy: Points, pose: Pose2D) -> NDArray[np.float64]:
+        """Return the robot's heading at points of its line, float64 (n,) [rad].
+
+        Args:
+            xy: float64 (n, 2): x, y [m], from the robot on.
+            pose: of the robot.
+        """
+        if len(xy) < 2:
+            return np.full(len(xy), pose.yaw)
+        ways = np.diff(xy, axis=0)
+        along = np.arctan2(ways[:, 1], ways[:, 0])
+        is_back = np.zeros(len(ways), np.bool_)
+        if self._config.reverses:
+            bends = np.abs(np.remainder(np.diff(along) + np.pi, 2.0 * np.pi) - np.pi)
+            begins_back = math.cos(float(along[0]) - pose.yaw) < 0.0
+            changes = np.concatenate([[begins_back], bends > REVERSAL_RAD])
+            is_back = np.cumsum(changes) % 2 == 1
+        yaw = along + np.pi * is_back
+        return np.append(yaw, yaw[-1])
+
+    def _piece(
+        self, ahead: LineAhead, floor: FloorMap, pose: Pose2D, first: int, end: int
+    ) -> Curve:
+        """Return the curve along the points from ``first`` to ``end``."""
+        points = ahead.line.points[:end].copy()
+        if not first:
+            points[0] = ahead.place
+        xy = raster_to_map(floor.geometry, points)
+        yaw = pose.yaw
+        if first:
+            # Of the last way before it: the line may bend there.
+            yaw = float(self.yaw(xy[: first + 1], pose)[-1])
+        margin = (BESIDE_RADII * self._config.radius_m + BESIDE_M) / floor.geometry.resolution
+        part = _Part.around(points[first:], floor, ahead, margin, leaves=not first)
+        return curve_along(
+            xy[first:], part, part.to_sweep, self._config, start_yaw=yaw, is_end_fixed=True
+        )
+
+    def _put(self, ahead: LineAhead, floor: FloorMap, first: int, end: int, curve: Curve) -> None:
+        """Replace the points of a piece by its curve, except for the last part before the end."""
+        kept = len(curve.poses)
+        if end < len(ahead.line):
+            ways = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(curve.xy, axis=0).T))])
+            on_line = np.flatnonzero(curve.legs > 0)
+            early = on_line[ways[on_line] <= KEPT_SHARE * ways[-1]]
+            late = on_line[:1] if not len(early) else early[-1:]
+            if len(late):
+                kept = int(late[0]) + 1
+                # The rest of the straight on which the last kept pose lies.
+                end = first + int(curve.legs[kept - 1]) + 1
+        ahead.put_curve(first, end, curve.xy[:kept])
