@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from fasaco_edge.follow.pieces import STEP_M, Line, end_of_piece
+from fasaco_edge.follow.pieces import LEAST_M, STEP_M, Line, end_of_piece
 from fasaco_edge.grid.geometry import Point
 
 # The next goal is sent only if it extends the last one by this much [m].
@@ -82,6 +82,8 @@ class PathDriven:
             ahead: distance before its end at which the piece begins if possible [m].
             near: least distance of a piece to itself [m].
         """
+        if self.line.reversals(goal.end - LEAST_M, goal.end):
+            return math.inf  # the robot has to come to rest there
         for before_m in (*(share * ahead for share in SHARES), TIP_M, 0.0):
             start = max(goal.end - before_m, goal.start)
             # A goal that begins early ends sooner: it must last until the next one arrives.
@@ -94,8 +96,11 @@ class PathDriven:
         """Return the heading in which the line leads on after a goal [rad]; None at its end."""
         if self.line.length(goal.end + STEP_M) < goal.end + STEP_M:
             return None
+        if self.line.reversals(goal.end - LEAST_M, goal.end):
+            return None
         (x, y), (to_x, to_y) = self.line.at(goal.end), self.line.at(goal.end + STEP_M)
-        return math.atan2(to_y - y, to_x - x)
+        turned = math.pi if self.line.is_back(goal.end) else 0.0
+        return math.remainder(math.atan2(to_y - y, to_x - x) + turned, math.tau)
 
     def is_near_end(self, here: Point, goal: Goal, within: float) -> bool:
         """Return whether the robot is within a distance of the end of its goal [m].

@@ -4,7 +4,8 @@ A goal is a piece of the path that begins at the robot. The next one is sent bef
 reaches the end: Nav2 switches to it without a stop. Where the path returns to itself, that piece
 begins only shortly before the end: a controller continues at the nearest part of a path, and would
 skip the rest of the last goal. The last pose of a goal has the heading in which the path leads on:
-the robot turns while the next goal is under way. No clock, no session.
+the robot turns while the next goal is under way. A robot that cannot turn on the spot gets pieces
+of a curve, see ``follow/curve_pieces.py``. No clock, no session.
 """
 
 from __future__ import annotations
@@ -14,9 +15,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from fasaco_edge.errors import MalformedMessage
+from fasaco_edge.follow.curve_pieces import CurveLine
 from fasaco_edge.follow.goals import COAST_M, TIP_M, Goal, PathDriven
 from fasaco_edge.follow.nav2_requests import AskResult, Cancellations, Request, SendGoal
-from fasaco_edge.follow.pieces import STEP_M, Line, end_of_piece
+from fasaco_edge.follow.pieces import LEAST_M, STEP_M, Line, end_of_piece
 from fasaco_edge.follow.standstill import Tries, floor_ahead
 from fasaco_edge.follow.supervision import Patience, State, Supervision
 from fasaco_edge.grid.geometry import Point, Pose2D
@@ -78,6 +80,7 @@ class Nav2Follower(Supervision):
         new_id: makes the id of a goal.
         patience: timeouts of pose and status.
         radius: of the robot's disc [m]; 0 where that is not known.
+        is_curved: whether the robot cannot turn on the spot, so that paths are curves.
     """
 
     def __init__(
@@ -87,9 +90,11 @@ class Nav2Follower(Supervision):
         new_id: Callable[[], bytes],
         patience: Patience,
         radius: float = 0.0,
+        *,
+        is_curved: bool = False,
     ) -> None:
         super().__init__(patience)
-        self._radius = radius
+        self._radius, self._is_curved = radius, is_curved
         self.tally = Tally()
         self._near = near
         self._ahead = AHEAD_M + AHEAD_S * speed
@@ -253,7 +258,8 @@ class Nav2Follower(Supervision):
         self.tally.goals += 1
         points = path.line.poses(goal.start, goal.end)
         yaw = path.heading_after(goal)
-        self._requests.append(SendGoal(goal.id, points, self._path_frame, yaw))
+        is_back = path.line.is_back(start + LEAST_M)
+        self._requests.append(SendGoal(goal.id, points, self._path_frame, yaw, is_back))
 
     def _join(self, line: Line, now: float) -> bool:
         """Switch to a new path; if it is the same ahead, Nav2 keeps its goal.
@@ -339,7 +345,7 @@ class Nav2Follower(Supervision):
         self._here, self._came_at = here, now
 
     def _have(self, points: PathPoints) -> None:
-        self._next = Line(points.take)
+        self._next = CurveLine(points.take_poses) if self._is_curved else Line(points.take)
 
     def _withdraw(self) -> None:
         self._path = self._next = None

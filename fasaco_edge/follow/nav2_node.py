@@ -51,7 +51,12 @@ class Nav2Node:
         new_id = partial(os.urandom, GOAL_ID_BYTES)
         speed = settings.speed_m_s
         self._follower = Nav2Follower(
-            nav2["near_m"], speed, new_id, patience_of(settings), settings.radius_m
+            nav2["near_m"],
+            speed,
+            new_id,
+            patience_of(settings),
+            settings.radius_m,
+            is_curved=settings.turn_radius_m > 0.0,
         )
         self._inputs = Inputs(settings, bus)
         self._states = StateLog()
@@ -98,7 +103,13 @@ class Nav2Node:
                 return
             plugins = self._plugins[: RELEASES[release]]
             payload = encode_goal(
-                goal_id, request.points, request.frame, 0, plugins, request.end_yaw
+                goal_id,
+                request.points,
+                request.frame,
+                0,
+                plugins,
+                request.end_yaw,
+                is_back=request.is_back,
             )
         elif isinstance(request, AskResult):
             call, payload = "get_result", encode_goal_id(goal_id)

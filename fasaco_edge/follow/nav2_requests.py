@@ -19,13 +19,15 @@ class SendGoal:
     """A request to follow points [m] in a frame.
 
     Attributes:
-        end_yaw: heading at the last point [rad]; None for the direction in which the robot arrives.
+        end_yaw: heading at the last point [rad]; None for that with which the robot arrives.
+        is_back: whether it is driven backward: headings are opposite to the way.
     """
 
     id: bytes
     points: list[Point]
     frame: str
     end_yaw: float | None = None
+    is_back: bool = False
 
 
 @dataclass(frozen=True, slots=True)

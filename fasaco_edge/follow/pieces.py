@@ -86,6 +86,18 @@ class Line:
 
     def corners(self, start: float, stop: float) -> list[float]:
         """Return the arc lengths of sharp bends between two limits, in order [m]."""
+        return self.bends(start, stop, CORNER_RAD)
+
+    def reversals(self, start: float, stop: float) -> list[float]:
+        """Return the arc lengths where a piece must end; see ``CurveLine``. Here there are none."""
+        return []
+
+    def is_back(self, way: float) -> bool:
+        """Return whether the robot drives backward from an arc length on; see ``CurveLine``."""
+        return False
+
+    def bends(self, start: float, stop: float, least: float) -> list[float]:
+        """Return the arc lengths of bends of more than ``least`` [rad] between two limits [m]."""
         self.length(stop + LEAST_M)
         first = max(bisect_right(self._ways, start), 1)
         found = []
@@ -94,7 +106,7 @@ class Line:
                 break
             (ax, ay), (bx, by), (cx, cy) = self._points[index - 1 : index + 2]
             turn = math.atan2(cy - by, cx - bx) - math.atan2(by - ay, bx - ax)
-            if abs(math.remainder(turn, math.tau)) > CORNER_RAD:
+            if abs(math.remainder(turn, math.tau)) > least:
                 found.append(self._ways[index])
         return found
 
@@ -127,6 +139,7 @@ def end_of_piece(line: Line, start: float, near: float) -> float:
         near: least distance of the piece to itself [m].
     """
     stop = line.length(start + MOST_M)
+    stop = min([stop, *line.reversals(start + LEAST_M, stop)])
     ways = line.ways(start, stop)
     seen: dict[tuple[int, int], list[int]] = {}
     points = [line.at(way) for way in ways]

@@ -25,6 +25,7 @@ from fasaco_edge.wire.messages.follow_path import (
     TAKEN,
     UNKNOWN,
     Ending,
+    encode_goal,
 )
 from fasaco_edge.wire.messages.paths import encode_path
 
@@ -466,3 +467,61 @@ def test_end_cancels_what_there_is():
     drive = Drive(*LONG)
     goal = drive.begun()
     assert drive.follower.end() == [CancelGoal(goal.id)]
+
+
+class CurveDrive(Drive):
+    """A robot that cannot turn on the spot; poses of paths are x, y and heading."""
+
+    def __init__(self, *poses):
+        super().__init__()
+        ids = itertools.count(1)
+        self.follower = Nav2Follower(
+            NEAR,
+            SPEED,
+            lambda: next(ids).to_bytes(16, "big"),
+            Patience(status_s=1e9),
+            is_curved=True,
+        )
+        self.follower.take_planner("a1")
+        for _ in range(2):
+            self.follower.heard_status(0.0)
+        x, y, yaw = np.array(poses).T
+        self.follower.take_path(encode_path(np.stack([x, y], axis=1), yaw, "map", 1))
+
+
+def test_a_piece_ends_where_the_robot_turns_back_and_the_next_one_is_driven_backward():
+    drive = CurveDrive((0.0, 0.0, 0.0), (3.0, 0.0, 0.0), (1.0, 0.3, 0.0), (4.0, 0.6, 0.0))
+    goal = drive.begun()
+    assert (goal.points[-1], goal.is_back, goal.end_yaw) == ((3.0, 0.0), False, None)
+    # It waits for the end: Nav2 would switch before the robot is there.
+    for x in (1.0, 2.0, 2.6, 2.9, 2.99):
+        assert drive.step(x) == []
+    drive.end(goal, SUCCEEDED)
+    (back,) = drive.step(3.0)
+    assert (back.points[0], back.points[-1], back.is_back) == ((3.0, 0.0), (1.0, 0.3), True)
+    drive.accept(back)
+    drive.step(3.0)
+    drive.step(2.0, 0.15)
+    drive.step(1.0, 0.3)
+    drive.end(back, SUCCEEDED)
+    (ahead,) = drive.step(1.0, 0.3)
+    assert (ahead.points[0], ahead.points[-1], ahead.is_back) == ((1.0, 0.3), (4.0, 0.6), False)
+
+
+def test_a_path_may_begin_backward_and_lead_on_so():
+    drive = CurveDrive((3.0, 0.0, 0.0), (-20.0, 0.0, 0.0))
+    (goal,) = drive.step(3.0)
+    assert goal.is_back
+    # A piece is at most 20 m long: the next one goes on backward.
+    assert goal.points[-1] == (pytest.approx(-17.0), 0.0)
+    assert goal.end_yaw == pytest.approx(0.0)
+
+
+def test_poses_of_a_goal_driven_backward_face_away_from_their_way():
+    points = [(1.0, 0.0), (0.0, 0.0)]
+    facing = encode_goal(bytes(16), points, "map", 0, ())
+    away = encode_goal(bytes(16), points, "map", 0, (), is_back=True)
+    turned = encode_goal(bytes(16), points, "map", 0, (), end_yaw=0.0)
+    assert facing != away
+    # As of poses with yaw 0: both end with the same pose.
+    assert away[-56:] == turned[-56:]

@@ -67,16 +67,19 @@ def encode_goal(
     stamp_ns: int,
     plugins: Sequence[str],
     end_yaw: float | None = None,
+    *,
+    is_back: bool = False,
 ) -> bytes:
     """Return the request of ``send_goal``.
 
     Args:
         goal_id: ``GOAL_ID_BYTES`` unique bytes.
-        points: of the path [m], at least two; each pose faces the next one.
+        points: of the path [m], at least two; each pose faces the next one, or away from it.
         frame: of the points.
         stamp_ns: of the path [ns]; 0 for the newest transform.
         plugins: as many names as the server's release has, see ``ros_keys.RELEASES``.
         end_yaw: heading of the last pose [rad]; None for that of the one before it.
+        is_back: whether poses face away from the next one: the robot drives backward.
 
         Raises:
             MalformedMessage: one of them is not allowed in a message.
@@ -92,6 +95,7 @@ def encode_goal(
         if index + 1 < len(points):
             to = points[index + 1]
             yaw = math.atan2(to[1] - y, to[0] - x)
+            yaw = math.remainder(yaw + math.pi, math.tau) if is_back else yaw
         elif end_yaw is not None:
             yaw = end_yaw
         write_header(writer, frame, stamp_ns)
