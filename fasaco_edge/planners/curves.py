@@ -63,7 +63,8 @@ class Curve:
         poses: float64 (n, 3), n >= 1: x, y [m] in the map frame, and the robot's heading [rad];
             straight from one to the next.
         is_backward: bool (n - 1,): which of these ways are driven backward.
-        legs: int64 (n,): number of the line's straight that a pose lies on; below 0 for none.
+        legs: int64 (n,): number of the line's point before a pose on a straight of the line; below
+            0 for poses beside it.
         spots: number of turns that do not fit, and stay on the spot.
     """
 
@@ -167,7 +168,8 @@ class _Search:
         else:
             headings = np.array([start_yaw - self._yaw])
         self._starts = len(headings)
-        self._line = self._places(points[corners(points)], headings)
+        self._corners = corners(points)
+        self._line = self._places(points[self._corners], headings)
         self._is_free_to_start = start_yaw is None
 
     def curve(self) -> Curve:
@@ -312,8 +314,10 @@ class _Search:
     def _as_curve(
         self, poses: Floats, is_backward: NDArray[np.bool_], legs: Ints, spots: int
     ) -> Curve:
-        xy = raster_to_map(self._floor.geometry, poses[:, 1::-1])
+        xy, last = raster_to_map(self._floor.geometry, poses[:, 1::-1]), len(self._corners) - 1
         yaw = np.remainder(poses[:, 2] + self._yaw + np.pi, 2.0 * np.pi) - np.pi
+        # A straight may lead through further points of the line.
+        legs = np.where(legs < 0, legs, self._corners[np.minimum(legs + 1, last)] - 1)
         placed: Floats = np.column_stack([xy, yaw]).round(DECIMALS)
         return Curve(placed, is_backward, legs, spots)
 

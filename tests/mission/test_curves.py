@@ -3,20 +3,23 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 import pytest
 
 from fasaco_edge.follow.supervision import State as Following
+from fasaco_edge.grid.fine_raster import map_to_raster, raster_to_map
 from fasaco_edge.grid.geometry import Pose2D
 from fasaco_edge.judge.driven_line import ArcBends
 from fasaco_edge.judge.floor import SweepingRobot, judge_floor
 from fasaco_edge.mission.core.events import MapReceived, State
 from fasaco_edge.mission.line.curver import Curver
+from fasaco_edge.mission.line.polyline import CURVED, POLISHED, Line, edges_between
 from fasaco_edge.planners.curve_config import CurveConfig
 from fasaco_edge.planners.curves import STEP_M
-from tests.mission.curve_base import CONFIG, RADIUS_M, TOOL_M, TURN_M, CurvedMission
+from tests.mission.curve_base import CONFIG, RADIUS_M, TOOL_M, TURN_M, CurvedMission, configured
 from tests.simulation.rooms import building
 
 ROOM = building(4.5, 3.5)
@@ -105,3 +108,88 @@ def test_headings_turn_round_where_the_robot_changes_its_direction():
     told = ahead.yaw(xy, Pose2D(0.0, 0.0, 3.0))
     assert np.cos(told[[0, 1, 3, 4]] - [0.0, math.pi, 0.0, 0.0]) == pytest.approx(np.ones(4))
     assert both.yaw(xy[:1], Pose2D(0.0, 0.0, 0.3)).tolist() == [0.3]
+
+
+def laid(line_xy):
+    """A line ahead over the room, as of a robot at its beginning, and the floor."""
+    run = CurvedMission(ROOM, START)
+    run._step([MapReceived(ROOM)])
+    run._step([])
+    ahead, floor = run.mission._line._ahead, run.mission._map.floor
+    points = np.array([map_to_raster(floor.geometry, x, y) for x, y in line_xy])
+    numbers, state = np.zeros(len(points), np.int64), np.full(len(points), POLISHED, np.uint8)
+    ahead.tally.exchange(edges_between(ahead.line.points), edges_between(points))
+    ahead.line = Line(points, numbers, state)
+    ahead._see(Pose2D(*line_xy[0]))
+    return ahead, floor
+
+
+def bends_of(xy):
+    ways = np.diff(xy, axis=0)
+    along = np.arctan2(ways[:, 1], ways[:, 0])
+    bends = np.degrees(np.abs((np.diff(along) + np.pi) % (2.0 * np.pi) - np.pi))
+    return ArcBends.of(np.hypot(*ways.T), bends, TURN_M)
+
+
+# Lanes with points within them, one of them twice.
+LANES = [(0.6, 0.6), (2.0, 0.6), (3.9, 0.6), (3.9, 0.9), (2.5, 0.9), (2.5, 0.9), (0.6, 0.9)]
+LANES += [(0.6, 1.2), (3.9, 1.2), (3.9, 1.5), (0.6, 1.5), (0.6, 1.8), (3.9, 1.8), (3.9, 2.9)]
+
+
+def test_piece_by_piece_a_line_becomes_a_curve():
+    ahead, floor = laid(LANES)
+    curver = Curver(configured().sweeping.curves)
+    pose, pieces, end = Pose2D(0.6, 0.6), 0, ahead.line.points[-1]
+    assert curver.curve(ahead, floor, pose)
+    assert ahead.line.first_below(CURVED) < len(ahead.line)
+    assert curver.curve(ahead, floor, pose)
+    assert not curver.curve(ahead, floor, pose)  # that is far enough
+    assert ahead.line.first_below(CURVED) < len(ahead.line)
+    for _ in range(400):
+        # The robot drives along it.
+        xy = raster_to_map(floor.geometry, ahead.line.points)
+        number = 1 if math.dist(xy[1], (pose.x, pose.y)) > 1e-6 else 2
+        yaw = float(curver.yaw(xy[: number + 1], pose)[-1])
+        way = xy[number] - (pose.x, pose.y)
+        way *= min(0.3 / math.hypot(*way), 1.0)
+        pose = Pose2D(pose.x + way[0], pose.y + way[1], yaw)
+        ahead.drive(pose)
+        pieces += curver.curve(ahead, floor, pose)
+        if len(ahead.line) < 3:
+            break
+        near = int(np.searchsorted(ahead.lengths(), 2.0))
+        xy = raster_to_map(floor.geometry, ahead.line.points[1 : near + 1])
+        assert not bends_of(xy).spots.any() if len(xy) > 2 else True
+        assert (np.hypot(*np.diff(ahead.line.points, axis=0).T) > 1e-3).all()
+    assert pieces >= 1
+    assert len(ahead.line) < 3
+    assert ahead.line.points[-1] == pytest.approx(end, abs=1e-3)
+
+
+def test_a_curve_is_made_anew_from_a_robot_that_has_left_it():
+    ahead, floor = laid(LANES)
+    curver = Curver(configured().sweeping.curves)
+    while curver.curve(ahead, floor, Pose2D(0.6, 0.6)):
+        pass
+    astray = Pose2D(0.75, 0.62, 0.8)
+    ahead.drive(astray)
+    assert curver.curve(ahead, floor, astray)
+    xy = raster_to_map(floor.geometry, ahead.line.points[:3])
+    assert xy[0] == pytest.approx((0.75, 0.62), abs=1e-5)
+    assert abs(math.remainder(curver.yaw(xy, astray)[0] - 0.8, math.tau)) < 0.1
+    # Once, until it has moved: what is made then begins further ahead.
+    before = ahead.line.points[:20]
+    curver.curve(ahead, floor, replace(astray, yaw=0.2))
+    assert np.array_equal(before, ahead.line.points[:20])
+
+
+def test_a_robot_whose_disc_does_not_fit_may_leave_its_place():
+    """Its pose is 7 cm too near to the wall that it faces."""
+    line_xy = [(4.33, 0.6), (4.0, 2.0), (0.6, 2.0)]
+    ahead, floor = laid(line_xy)
+    curver = Curver(configured().sweeping.curves)
+    assert curver.curve(ahead, floor, Pose2D(4.33, 0.6))
+    xy = raster_to_map(floor.geometry, ahead.line.points)
+    assert math.cos(curver.yaw(xy, Pose2D(4.33, 0.6))[0]) > 0.99
+    assert xy[1, 0] < 4.33
+    assert not bends_of(xy).spots.any()

@@ -130,3 +130,23 @@ def test_a_line_of_one_point_is_a_curve_of_one_pose(line_xy):
     curve = curve_in(room(3.0, 3.0), np.array(line_xy), BOTH)
     assert curve.poses.shape == (1, 3)
     assert (curve.spots, curve.reversals, curve.backward_m) == (0, 0, 0.0)
+
+
+def test_poses_on_the_line_name_its_points():
+    """Points within a straight count, too: a piece of a longer line goes on behind them."""
+    line_xy = np.array(
+        [(0.5, 0.5), (1.5, 0.5), (1.5, 0.5), (3.0, 0.5), (5.0, 0.5), (5.0, 2.0), (5.0, 3.5)]
+    )
+    curve = curve_in(room(6.0, 4.0), line_xy, BOTH)
+    on_line = np.flatnonzero(curve.legs >= 0)
+    assert len(on_line) > 2
+    for number in on_line.tolist():
+        leg = int(curve.legs[number])
+        (ax, ay), (bx, by) = line_xy[leg : leg + 2]
+        x, y, _ = curve.poses[number]
+        apart = (bx - ax) * (y - ay) - (by - ay) * (x - ax)
+        assert apart == pytest.approx(0.0, abs=1e-4)
+    # The next point of the line lies behind the pose.
+    first = line_xy[curve.legs[on_line] + 1]
+    assert (first.sum(axis=1) >= curve.xy[on_line].sum(axis=1) - 1e-6).all()
+    assert set(curve.legs[on_line].tolist()) <= {3, 5}

@@ -17,7 +17,9 @@ from fasaco_edge.grid.fine_raster import RobotDiscs, raster_to_map
 from fasaco_edge.grid.floor_map import FloorMap
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D, Window
 from fasaco_edge.kernels.floor.bits import WORD, Bits, packed, unpacked
+from fasaco_edge.kernels.floor.places import disc_rows, places_of
 from fasaco_edge.kernels.floor.sweeps import NEVER
+from fasaco_edge.mission.line.lead_out import LEAST_SHARE, fitting_radius
 from fasaco_edge.mission.line.line_ahead import LineAhead
 from fasaco_edge.mission.line.polyline import CURVED, Points
 from fasaco_edge.planners.curve_config import CurveConfig
@@ -28,15 +30,21 @@ from fasaco_edge.planners.curves import Curve, curve_along
 AHEAD_M, PIECE_M, PIECE_RADII = 6.0, 6.0, 6.0
 # The last part of a piece is not kept: what follows decides how it is best driven.
 KEPT_SHARE = 0.6
-# If a turn does not fit at the end of the curve, it is made anew from this far ahead [m].
-AGAIN_M = 0.5
+# If a turn does not fit at the end of the curve, it is made anew from this far ahead; the way to
+# the end of a shorter curve has no certain direction [m].
+AGAIN_M, LEAST_M = 0.5, 0.1
+# A robot that is farther off the direction of its curve, or beside it, has left it [rad], [m]. The
+# curve is made anew from its pose, once until it has moved so far [m].
+ASTRAY_RAD, ASTRAY_M, MOVED_M = math.radians(35.0), 0.1, 0.05
+# Ways of the published line that are shorter have no direction of their own [m].
+SHORT_M = 2e-3
 # A robot that drives backward, too, changes its direction at a sharper bend [rad].
 REVERSAL_RAD = math.radians(120.0)
 # A curve keeps within this distance of its line [turning radii], and this more [m].
 BESIDE_RADII, BESIDE_M = 5.0, 1.0
-# A robot that stands where it does not fit, as by an error of its pose, may leave that place by
-# others as near as this [pixels].
-LEAVES_PX = 2
+# A robot that stands where its disc does not fit, as by an error of its pose, may leave by places
+# within this distance where the largest disc fits that fits at its own [m].
+LEAVES_M = 0.5
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -67,16 +75,14 @@ class _Part:
         rows = slice(part.row0, part.row1)
         words = slice(part.col0 // WORD, -(-part.col1 // WORD))
         counts = ahead.tally.sweeps.counts[rows, part.col0 : part.col1]
-        places = floor.places[rows, words].copy()
-        if leaves:
-            row, col = np.rint(points[0]).astype(int) - (part.row0, part.col0)
-            fits = unpacked(places, part.cols)
-            is_inside = 0 <= row < part.rows and 0 <= col < part.cols
-            if is_inside and not fits[row, col]:
-                near = slice(max(row - LEAVES_PX, 0), row + LEAVES_PX + 1)
-                fits[near, max(col - LEAVES_PX, 0) : col + LEAVES_PX + 1] = True
-                places = packed(fits, beyond=False)
-        blocked = floor.blocked[rows, words].copy()
+        places, blocked = floor.places[rows, words].copy(), floor.blocked[rows, words].copy()
+        radius = fitting_radius(floor, points[0]) if leaves else math.inf
+        if LEAST_SHARE * floor.discs.radius_m <= radius * whole.resolution < floor.discs.radius_m:
+            near = unpacked(places_of(blocked, disc_rows(radius)), part.cols)
+            away = np.arange(part.rows)[:, None] + part.row0, np.arange(part.cols) + part.col0
+            squares = (away[0] - points[0][0]) ** 2 + (away[1] - points[0][1]) ** 2
+            near &= squares * whole.resolution**2 <= LEAVES_M**2
+            places |= packed(near, beyond=False)
         return cls(geometry, floor.discs, blocked, places, counts < NEVER)
 
 
@@ -89,6 +95,8 @@ class Curver:
 
     def __init__(self, config: CurveConfig) -> None:
         self._config = config
+        # Where the robot was when it had left its curve, x, y [m].
+        self._astray_at = (math.inf, math.inf)
 
     def curve(self, ahead: LineAhead, floor: FloorMap, pose: Pose2D) -> bool:
         """Make a curve of the next piece, if it is due; return whether the line has changed.
@@ -100,6 +108,8 @@ class Curver:
         """
         count = len(ahead.line)
         curved = ahead.line.first_below(CURVED)
+        if curved > 1 and self._has_left(ahead, floor, pose):
+            curved = 0
         piece_m = PIECE_M + PIECE_RADII * self._config.radius_m
         lengths = ahead.lengths(AHEAD_M + 2.0 * piece_m)
         if (
@@ -109,7 +119,7 @@ class Curver:
         ):
             return False
         # From the end of the curve; from further back, or from the robot, if a turn does not fit.
-        begins = [curved - 1] if curved > 1 else []
+        begins = [curved - 1] if curved > 1 and lengths[curved - 1] >= LEAST_M else []
         near = int(np.searchsorted(lengths, AGAIN_M))
         begins += [near] if 1 < near < curved - 1 else []
         best: tuple[int, int, Curve] | None = None
@@ -136,6 +146,9 @@ class Curver:
             return np.full(len(xy), pose.yaw)
         ways = np.diff(xy, axis=0)
         along = np.arctan2(ways[:, 1], ways[:, 0])
+        # Short ways get the direction of the next one.
+        numbers = np.where(np.hypot(*ways.T) < SHORT_M, len(ways) - 1, np.arange(len(ways)))
+        along = along[np.minimum.accumulate(numbers[::-1])[::-1]]
         is_back = np.zeros(len(ways), np.bool_)
         if self._config.reverses:
             bends = np.abs(np.remainder(np.diff(along) + np.pi, 2.0 * np.pi) - np.pi)
@@ -144,6 +157,19 @@ class Curver:
             is_back = np.cumsum(changes) % 2 == 1
         yaw = along + np.pi * is_back
         return np.append(yaw, yaw[-1])
+
+    def _has_left(self, ahead: LineAhead, floor: FloorMap, pose: Pose2D) -> bool:
+        """Return whether the robot is not on its curve any more, and no curve was made since."""
+        beside, here = ahead.beside, (pose.x, pose.y)
+        edge_m = math.dist(*ahead.line.points[:2]) * floor.geometry.resolution
+        if beside is None or edge_m < SHORT_M or math.dist(here, self._astray_at) < MOVED_M:
+            return False
+        yaw = pose.yaw - floor.geometry.origin.yaw
+        turned = abs(math.remainder(beside.heading - yaw, math.pi))
+        has_left = turned > ASTRAY_RAD or abs(beside.left_m) > ASTRAY_M
+        if has_left:
+            self._astray_at = here
+        return has_left
 
     def _piece(
         self, ahead: LineAhead, floor: FloorMap, pose: Pose2D, first: int, end: int

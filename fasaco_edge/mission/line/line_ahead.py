@@ -412,6 +412,8 @@ class LineAhead:
         if len(points) > 1:
             cells = begin + aligned(points, self._stands(begin, last + 1))
         part = Line(points, cells, np.full(len(points), CURVED, np.uint8))
+        while end < len(line) and np.abs(points[-1] - line.points[end]).sum() < LEAST_EDGE:
+            end += 1
         new = line.part(0, first).joined(part, line.part(end))
         if not first:
             self._place.along = 0.0
