@@ -193,3 +193,11 @@ def test_a_robot_whose_disc_does_not_fit_may_leave_its_place():
     assert math.cos(curver.yaw(xy, Pose2D(4.33, 0.6))[0]) > 0.99
     assert xy[1, 0] < 4.33
     assert not bends_of(xy).spots.any()
+
+
+def test_a_line_beyond_its_walk_becomes_a_curve_too():
+    ahead, floor = laid(LANES)
+    ahead.line = ahead.line.renumbered(1000)
+    curver = Curver(configured().sweeping.curves)
+    assert curver.curve(ahead, floor, Pose2D(0.6, 0.6))
+    assert (ahead.line.cells == 1000).all()

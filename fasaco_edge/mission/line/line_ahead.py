@@ -408,9 +408,10 @@ class LineAhead:
         line, geometry = self.line, self._floor.geometry
         points = np.array([map_to_raster(geometry, x, y) for x, y in xy.tolist()])
         begin, last = int(line.cells[first]), int(line.cells[end - 1])
-        cells = np.full(len(points), begin)
-        if len(points) > 1:
-            cells = begin + aligned(points, self._stands(begin, last + 1))
+        cells, stands = np.full(len(points), begin), self._stands(begin, last + 1)
+        # A line may lead beyond a walk that was cut off.
+        if len(points) > 1 and len(stands):
+            cells = begin + aligned(points, stands)
         part = Line(points, cells, np.full(len(points), CURVED, np.uint8))
         while end < len(line) and np.abs(points[-1] - line.points[end]).sum() < LEAST_EDGE:
             end += 1
