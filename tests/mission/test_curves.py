@@ -15,6 +15,8 @@ from fasaco_edge.grid.geometry import Pose2D
 from fasaco_edge.judge.driven_line import ArcBends
 from fasaco_edge.judge.floor import SweepingRobot, judge_floor
 from fasaco_edge.mission.core.events import MapReceived, State
+from fasaco_edge.mission.core.lattice_rotation import LatticeRotation
+from fasaco_edge.mission.core.path_exit import PublishedPath
 from fasaco_edge.mission.line.curver import Curver
 from fasaco_edge.mission.line.polyline import CURVED, POLISHED, Line, edges_between
 from fasaco_edge.planners.curve_config import CurveConfig
@@ -201,3 +203,15 @@ def test_a_line_beyond_its_walk_becomes_a_curve_too():
     curver = Curver(configured().sweeping.curves)
     assert curver.curve(ahead, floor, Pose2D(0.6, 0.6))
     assert (ahead.line.cells == 1000).all()
+
+
+def test_headings_are_published_in_the_map_frame_as_the_points_are(driven):
+    _, update = driven.paths[0]
+    told = LatticeRotation(30.0).path(update, driven.mission.lattice)
+    ways, turned = np.diff(update.xy[:2], axis=0)[0], np.diff(told.xy[:2], axis=0)[0]
+    by = math.atan2(turned[1], turned[0]) - math.atan2(ways[1], ways[0])
+    assert math.remainder(by - math.radians(30.0), math.tau) == pytest.approx(0.0, abs=1e-6)
+    assert told.yaw == pytest.approx(update.yaw + math.radians(30.0))
+    path = PublishedPath.of(driven.mission, update)
+    assert np.array_equal(path.yaw, update.yaw)
+    assert path.withdrawn("paused").yaw is None
