@@ -129,6 +129,11 @@ def plan_passes(
         BadConfiguration: a value is impossible, also those that ``plan`` raises.
     """
     robot = RobotConfig() if robot is None else robot
+    if robot.turn_radius_m > 0.0:
+        raise BadConfiguration(
+            "several passes are planned for a robot that turns on the spot alone",
+            hint="plan each pass by itself, with the radius; a mission drives them in one go",
+        )
     asked = tuple(read_pass(each) if isinstance(each, str) else each for each in passes)
     plans: list[Plan] = []
     for index, (each, lay) in enumerate(zip(asked, laid(asked), strict=True)):
