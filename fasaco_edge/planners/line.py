@@ -93,6 +93,12 @@ class LineConfig:
             near_s=NEAR_SHARE * self.price_s_m2 * tool_m * unit_m,
         )
 
+    def seconds(self, points: NDArray[np.float64], unit_m: float) -> float:
+        """Return the time to drive along points, float64 (n, 2), in pixels ``unit_m`` wide [s]."""
+        count = len(points)
+        drive_s = unit_m / self.speed_m_s
+        return float(chain_s(points, 0, count - 1, count, drive_s, self.turning)) if count else 0.0
+
 
 LINES = {"quick": LineConfig(price_s_m2=45.0, patch_s=0.0), "thorough": LineConfig()}
 
@@ -232,8 +238,7 @@ class LineSearch:
     def _keep(self) -> None:
         """Keep the line as it is now, if it is better than the one kept."""
         points = straightened(self._line.points[numbers_along(self._line)])
-        drive_s, turning, count = self._price.drive_s, self._config.turning, len(points)
-        seconds = chain_s(points, 0, count - 1, count, drive_s, turning)
+        seconds = self._config.seconds(points, self._floor.geometry.resolution)
         xy, tried = self._floor.to_map(points), int(self._line.state[kernel.TRIED])
         line = DrivenLine(xy, self._swept_m2(), self._floor.reachable_m2, seconds, tried)
         if self.best is None or self._rank(line) < self._rank(self.best):

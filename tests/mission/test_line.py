@@ -189,6 +189,20 @@ def test_a_room_is_swept_to_its_rim():
     )
 
 
+def test_the_line_ahead_is_timed_and_bounded_from_below():
+    grid, robot = room(3.0, 2.4), Robot(Mission(CONFIG))
+    assert robot.mission.line_ahead() is None
+    robot.tell(MapReceived(grid))
+    robot.drive(3)
+    line = robot.mission.line_ahead()
+    judged = judge_floor(grid, np.array([robot.at, *robot.line]), ROBOT).figures
+    assert line.seconds == pytest.approx(judged.seconds, rel=0.02)
+    assert 0.8 * judged.least_s < line.least_s < judged.least_s
+    assert line.gap == pytest.approx(line.seconds / line.least_s - 1.0)
+    robot.finish()
+    assert robot.mission.line_ahead().gap is None
+
+
 def test_the_status_says_what_of_the_floor_is_left_and_why():
     robot = Robot(Mission(CONFIG))
     assert floor_report(robot.mission) == FloorReport(0.0)

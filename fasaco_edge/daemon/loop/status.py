@@ -197,11 +197,15 @@ def _path_report(path: PublishedPath | None, mission: Mission | None) -> PathRep
     """Return this part of the status; None before the first path of a mission."""
     if path is None or not path.revision or mission is None:
         return None
+    line = mission.line_ahead()
+    gap = None if line is None else line.gap
     return replace(
         PathReport.of(path.plan),
         revision=path.revision,
         steps=path.steps,
         remaining_steps=max(len(mission.route.path.ahead) - 1, 0),
+        line_s=None if line is None else round(line.seconds, 1),
+        line_gap=None if gap is None else round(gap, 4),
         reason=path.reason,
     )
 

@@ -47,7 +47,8 @@ from fasaco_edge.mission.coverage.rotated_ledger import rotated_ledger
 from fasaco_edge.mission.coverage.swept_floor import SweptFloor
 from fasaco_edge.mission.coverage.tool_sight import ToolSight
 from fasaco_edge.mission.coverage.unreached import Unreached
-from fasaco_edge.mission.line.layer import FloorToSweep, LineLayer
+from fasaco_edge.mission.line.figures import AheadFigures, FloorToSweep
+from fasaco_edge.mission.line.layer import LineLayer
 from fasaco_edge.mission.map.idle_places import IdlePlaces
 from fasaco_edge.mission.map.inputs import InputMonitor
 from fasaco_edge.mission.map.map_state import MapState
@@ -280,6 +281,10 @@ class Mission:
     def floor_to_sweep(self) -> FloorToSweep | None:
         """Return the areas of floor to sweep; None if cells are counted."""
         return self._line.to_sweep
+
+    def line_ahead(self) -> AheadFigures | None:
+        """Return figures of the line ahead; None if cells are counted."""
+        return self._line.ahead()
 
     def drive_times(self) -> DriveTimes:
         """Return speed and turn durations, measured from poses."""

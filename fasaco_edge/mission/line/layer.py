@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +23,7 @@ from fasaco_edge.mission.coverage.floor_tiles import pixels_under
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
 from fasaco_edge.mission.coverage.swept_floor import ANYWHERE, NOWHERE, SweptFloor
 from fasaco_edge.mission.line.curver import Curver
+from fasaco_edge.mission.line.figures import AheadFigures, FloorToSweep
 from fasaco_edge.mission.line.line_ahead import LineAhead
 from fasaco_edge.mission.line.missed_floor import REASONS, MissedFloor, causes_of
 from fasaco_edge.mission.line.offset import Offset
@@ -48,28 +48,6 @@ LEAST_MISSED = 0.05
 LEAST_TOLD_M2 = 0.05
 
 
-class FloorToSweep(NamedTuple):
-    """Areas of floor to sweep, on the newest map and for the present order.
-
-    Attributes:
-        asked_m2: reachable floor that is asked for, swept or not [m2].
-        ahead_m2: the unswept part of it that the line ahead sweeps [m2].
-        left_m2: the unswept part of it that the line ahead does not sweep [m2].
-        passed_m2: the rest of the unswept part: floor that the line has passed, and strips as
-            narrow as a pixel [m2].
-        beyond_m2: free floor out of the tool's reach, asked for or not, by cause [m2].
-        possible_m2: floor that would be reachable if walls were a pixel thinner than on the map
-            [m2]; None before the end of the order, or if not known.
-    """
-
-    asked_m2: float
-    ahead_m2: float
-    left_m2: float
-    passed_m2: float
-    beyond_m2: dict[str, float]
-    possible_m2: float | None
-
-
 class LineLayer:
     """Owns the line; inactive where cells are counted.
 
@@ -88,6 +66,7 @@ class LineLayer:
         self._map, self._ledger, self._orders, self._route = map_state, ledger, orders, route
         orders.ask_for_floor(self.sum_up)
         self.offset = Offset(sweeping.tool_m if sweeping else 0.0)
+        self._config = sweeping.line if sweeping else None
         self._polisher = Polisher(sweeping.line) if sweeping else None
         self._curver = Curver(sweeping.curves) if sweeping and sweeping.curves else None
         self._publication = Publication(route, sweeping.line.speed_m_s if sweeping else 0.0)
@@ -253,6 +232,16 @@ class LineLayer:
         return FloorToSweep(
             tally.wanted_m2, ahead_m2, left_m2, tally.passed_m2, beyond_m2, possible_m2
         )
+
+    def ahead(self) -> AheadFigures | None:
+        """Return figures of the line ahead; None where cells are counted, or without a line."""
+        to_sweep, floor = self.to_sweep, self._map.floor
+        if self._ahead is None or self._config is None or to_sweep is None or floor is None:
+            return None
+        seconds = self._config.seconds(self._ahead.line.points, self._ahead.tally.unit_m)
+        tool_m = floor.discs.tool_m
+        length_m = (to_sweep.ahead_m2 - math.pi * tool_m**2 / 4.0) / tool_m
+        return AheadFigures(seconds, max(length_m, 0.0) / self._config.speed_m_s)
 
     def sum_up(self) -> str:
         """Return at the end of an order how much floor was swept, as text that follows another.

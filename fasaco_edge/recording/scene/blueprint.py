@@ -113,8 +113,9 @@ def _figures() -> rrb.Vertical:
 
 
 def _plan() -> rrb.TimeSeriesView:
-    none = rrb.PlotLegend(visible=False)
-    return plot_view("Plan: time above the bound [share]", entities.GAP, none)
+    legend = rrb.PlotLegend(rrb.Corner2D.RightTop)
+    shown = tuple(f"/{gap}" for gap in (entities.GAP, entities.LINE_GAP))
+    return plot_view("Time above the bound [share]", "metrics/plan", legend, contents=shown)
 
 
 def _saved() -> rrb.TimeSeriesView:

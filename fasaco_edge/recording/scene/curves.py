@@ -34,7 +34,8 @@ CURVES: tuple[tuple[str, str, Colour], ...] = (
     (f"{entities.LATENCY}/map_to_path", "map to path", (245, 140, 40)),
     (entities.BEST_STEPS, "best walk", (250, 204, 21)),
     (entities.BRANCHING, "directions in reach of the strongest", (244, 114, 182)),
-    (entities.GAP, "gap of the plan", (250, 204, 21)),
+    (entities.GAP, "gap of the walk", (250, 204, 21)),
+    (entities.LINE_GAP, "gap of the line", (52, 211, 153)),
     (entities.SAVED_BY_ANTS, "ants", (244, 114, 182)),
     (entities.SAVED_BY_LOCAL_SEARCH, "local search", (56, 152, 222)),
     (f"{entities.MEMORY}/planner", "planner MB", (167, 139, 250)),
@@ -134,6 +135,8 @@ class StatusFigures:
             self._curves.draw(entities.SWEPT, status.floor.swept_m2, spacing_ns=COUNT_SPACING_NS)
         if status.path is not None:
             self._draw(entities.REMAINING_STEPS, status.path.remaining_steps)
+            if status.path.line_gap is not None:
+                self._curves.draw(entities.LINE_GAP, status.path.line_gap, NOISE)
         for name in PLANS:
             self._draw(f"{entities.PLANS}/{name}", getattr(status.plan, name))
         by_code = status.errors.by_code

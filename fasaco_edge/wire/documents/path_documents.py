@@ -76,12 +76,17 @@ class PathReport(PlanFigures, frozen=True):
         revision: counts the published paths.
         steps: as published.
         remaining_steps: still to drive.
+        line_s: seconds that the line ahead takes; null where cells are counted.
+        line_gap: how far that is above the least time of any line that sweeps as much floor, as a
+            share of it; null if it sweeps none.
         reason: why it replaced the previous one.
     """
 
     revision: Ordinal = 1
     steps: Count = 0
     remaining_steps: Count = 0
+    line_s: Amount | None = None
+    line_gap: Amount | None = None
     reason: str = ""
 
 
