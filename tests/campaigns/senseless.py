@@ -17,7 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.grid.geometry import FARTHEST_M
-from fasaco_edge.mission.orders.order import MOST_KEEP_OUT, MOST_PASSES, MOST_ZONES
+from fasaco_edge.mission.orders.order import MOST_KEEP_OUT, MOST_ZONES
+from fasaco_edge.planners.passes import MOST_PASSES
 from fasaco_edge.wire.limits import (
     MAX_COORDINATE_M,
     MAX_RESOLUTION_M,

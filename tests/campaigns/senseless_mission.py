@@ -282,7 +282,7 @@ class MissionTrial:
         held = self._mission.trail.snapshot()
         if not held.window.rows * held.window.cols:
             return b""
-        shown = ShownTrail(held, self._config.footprint.cell_m, "map", 1, 1, 1)
+        shown = ShownTrail(held, 1, self._config.footprint.cell_m, "map", 1, 1, 1)
         return b"".join(shown.field()) + shown.directions()
 
     def _say(self, what: str, encode: Callable[[], bytes]) -> bytes | None:

@@ -115,6 +115,7 @@ def test_a_path_is_judged_on_the_map_it_names(xy, holds):
         "map_revision": 1,
         "reason": "so",
         "changed": None,
+        "speed_m_s": None,
     }
     about |= {"steps": len(points) - 1, "plan_ms": 1.0}
     figures = ("planner", "seed", "ants", "kicks", "proposals", "planned_steps")

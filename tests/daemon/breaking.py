@@ -14,6 +14,7 @@ import numpy as np
 from fasaco_edge.daemon.loop.outbox import Outbox
 from fasaco_edge.mission.map.map_state import MapState
 from fasaco_edge.planners import registry
+from fasaco_edge.planners.living_trail import TrailSnapshot
 
 # Width of the map [m] that breaks each of them.
 PLANNER_M, PHEROMONE_M, MISSION_M = 4.6, 5.2, 5.8
@@ -23,7 +24,7 @@ UNSENT, MOST_UNSENT = "unsent", 3
 
 
 class BreakingPlanner:
-    """Breaks on lattices over one map, and tells an impossible pheromone over another."""
+    """Breaks on lattices over one map, and leaves an impossible trail over another."""
 
     def __init__(self, planner: Any) -> None:
         self._planner = planner
@@ -33,11 +34,11 @@ class BreakingPlanner:
         if cols == cells(PLANNER_M):
             raise IndexError("index 7 is out of bounds")
 
-        def observed(snapshot: Any) -> None:
-            trail = np.full_like(snapshot.trail, np.nan)
-            observe(replace(snapshot, trail=trail) if cols == cells(PHEROMONE_M) else snapshot)
-
-        return self._planner.plan(problem, stop, observed)
+        path = self._planner.plan(problem, stop, observe)
+        if cols != cells(PHEROMONE_M):
+            return path
+        endless = np.full((*problem.lattice.states.shape, 4), np.inf, np.float32)
+        return replace(path, trail=TrailSnapshot(problem.lattice.window, endless))
 
 
 def cells(width_m: float) -> int:

@@ -140,7 +140,7 @@ def test_the_living_trail_is_told_though_nobody_listens(covering):
         time.sleep(0.05)
     payload, note = told()
     trail = decode_pheromone(payload)
-    assert (trail.ants, trail.velocity) == (0, 0)
+    assert trail.ants > 0
     assert note["revision"] == revision
     assert note["cells"] == np.count_nonzero(trail.levels)
     assert 1.0 <= note["branching"] < 2.0
@@ -173,12 +173,11 @@ def test_a_path_that_was_asked_for_says_so(tmp_path):
         outsider.put("pose", pose_bytes(0.75, 0.75))
         path.wait(lambda heard: True)
         # Elsewhere the walk has another beginning.
-        outsider.put("pose", pose_bytes(1.05, 0.75))
-        outsider.wait_status(lambda status: (status["pose"] or {}).get("x") == 1.05)
+        outsider.put("pose", pose_bytes(0.75, 1.05))
+        outsider.wait_status(lambda status: (status["pose"] or {}).get("y") == 1.05)
         answer = outsider.ask("@rpc/replan").json()
         heard = path.wait(lambda heard: about(heard)["reason"] == "asked for")
-        assert planned(heard)[0][0].tolist() == pytest.approx([1.05, 0.75])
+        assert planned(heard)[0][0].tolist() == pytest.approx([0.75, 1.05])
         outsider.wait_status(lambda status: status["plan"]["plans"] >= answer["plan"])
         trail = decode_pheromone(outsider.ask("@rpc/pheromone").payload)
         assert trail.best_steps > 0
-        assert trail.ants > 0

@@ -96,6 +96,7 @@ def test_a_planner_that_breaks_costs_this_map_alone(breaking):
 
 def test_a_message_that_cannot_be_made_costs_this_message_alone(breaking):
     running, client = breaking
+    client.listen("pheromone", late=False)
     client.put("map", map_bytes(room(PHEROMONE_M, 3.0)))
     status = stand(client, lambda status: "not_published" in status["errors"]["by_code"])
     assert status["errors"]["last"].startswith("pheromone was not published: ")
