@@ -215,6 +215,9 @@ def test_the_status_says_all_there_is_to_know(path, pixels, outsider, daemon):
         "steps": note["steps"],
         "remaining_steps": note["steps"],
         "reason": "first plan",
+        # Cells are counted here: there is no line.
+        "line_s": None,
+        "line_gap": None,
         **{
             name: note[name]
             for name in (*figures, *saved, "lower_bound_steps", "lower_bound_cost_s", "gap")
