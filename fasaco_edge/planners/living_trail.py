@@ -119,7 +119,7 @@ class LivingTrail:
             self._window = window
             self.changes += 1
         if changed is None:
-            made = (self._tau > 0) != _legal(steps)
+            made = (self._tau > 0) != legal(steps)
             # The four directions of a cell as one word.
             places = np.flatnonzero(made.view(np.uint32))
         else:
@@ -130,11 +130,11 @@ class LivingTrail:
         flat, tau0 = self._writable().reshape(-1, 4), np.float32(self._rules.tau0)
         then = flat.take(places, axis=0)
         after = np.where(then > 0, self._faded(then, self._rules.alpha), tau0)
-        after *= _legal(steps.ravel().take(places))
+        after *= legal(steps.ravel().take(places))
         flat[places] = after
 
     def take(self, walked: TrailSnapshot, ants: int) -> None:
-        """Take over the pheromone where so many ants have walked; removed steps stay removed."""
+        """Take over the pheromone that a number of ants have left; removed steps stay removed."""
         self.ants += ants
         common = self._window.intersection(walked.window)
         if common is None:
@@ -227,7 +227,7 @@ class LivingTrail:
         return legal
 
 
-def _legal(steps: NDArray[np.uint8]) -> NDArray[np.bool_]:
+def legal(steps: NDArray[np.uint8]) -> NDArray[np.bool_]:
     """Return which directions of step masks are legal, bool (..., 4)."""
     return (steps[..., np.newaxis] & _BITS).astype(np.bool_)
 

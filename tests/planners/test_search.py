@@ -24,7 +24,6 @@ from fasaco_edge.planners.problem import CoverageProblem, FramedGround
 from fasaco_edge.planners.search import regions
 from fasaco_edge.planners.search.effort import effort_for
 from fasaco_edge.planners.search.near_optimal import NearOptimal
-from fasaco_edge.planners.search.search import GAINLESS
 from tests.benchmarks.buildings import building
 from tests.planners.searches import (
     FEW_ANTS,
@@ -112,8 +111,9 @@ def test_a_search_ends_by_itself_and_that_repeats_too(room, cost):
     path = plan(problem, watched)
     watched.assert_steady()
     # Proven to be the best, or nothing was gained for long.
-    gainless = GAINLESS * effort_for(cost).patience
-    assert path.work.perturbations >= gainless or path.steps == path.lower_bound_steps
+    assert (
+        path.work.perturbations >= effort_for(cost).patience or path.steps == path.lower_bound_steps
+    )
     assert_repeats(problem, path, FEW_ANTS)
 
 

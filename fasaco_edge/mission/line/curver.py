@@ -25,8 +25,8 @@ from fasaco_edge.mission.line.polyline import CURVED, Points
 from fasaco_edge.planners.curve_config import CurveConfig
 from fasaco_edge.planners.curves import Curve, curve_along
 
-# Once less than this of the line ahead is a curve, a piece of this length becomes one [m]; beside
-# that of so many turning radii.
+# Once less than this of the line ahead is a curve, a piece of this length becomes one [m], and
+# longer by some turning radii.
 AHEAD_M, PIECE_M, PIECE_RADII = 6.0, 6.0, 6.0
 # The last part of a piece is not kept: what follows decides how it is best driven.
 KEPT_SHARE = 0.6

@@ -30,7 +30,7 @@ from numpy.typing import NDArray
 from fasaco_edge.kernels.ants.colony import ColonyState, Rules, deposit, settle, walk_ants
 from fasaco_edge.kernels.ants.graph import Graph
 from fasaco_edge.planners.cost import MICROSECONDS, SearchWork
-from fasaco_edge.planners.living_trail import TrailSnapshot, mean_into
+from fasaco_edge.planners.living_trail import TrailSnapshot, legal, mean_into
 from fasaco_edge.planners.paper.colony import VISIBILITIES, ColonyConfig
 from fasaco_edge.planners.path import CoveragePath, Saved
 from fasaco_edge.planners.planner import (
@@ -232,9 +232,8 @@ def snapshot_of(
 
 def _legal_trail(problem: CoverageProblem, trail: NDArray[np.float64]) -> NDArray[np.float32]:
     """Return a trail, float64 (n, 4), as float32 (rows, cols, 4); 0 where there is no step."""
-    steps = problem.lattice.steps[..., np.newaxis]
-    legal = (steps >> np.arange(4, dtype=np.uint8)) & np.uint8(1)
-    return (trail.reshape(legal.shape) * legal).astype(np.float32)
+    steps = legal(problem.lattice.steps)
+    return (trail.reshape(steps.shape) * steps).astype(np.float32)
 
 
 @dataclass(frozen=True, slots=True)

@@ -26,7 +26,7 @@ class Effort:
         temperatures_us: temperatures of the first improvement, in order [us].
         proposals: proposals per visit in it, over all temperatures.
         rules: rules of perturbations.
-        patience: perturbations without gain that are a part of the patience of a search.
+        patience: perturbations without gain after which a search of one region ends.
     """
 
     temperatures_us: tuple[int, ...]
@@ -52,7 +52,7 @@ def effort_for(cost: CoverageCost, *, has_ants: bool = True) -> Effort:
             loops_of_256=256 - by_ants,
             ants_of_256=by_ants,
         )
-        return Effort((0,), 200, rules, 100)
+        return Effort((0,), 200, rules, 3_000)
     # The parameters were tuned at turns of 1.5 steps; their temperatures are in steps.
     unit = (cost.step_us + cost.quarter_turn_us) * 2 // 5
     rules = PerturbationRules(
@@ -66,7 +66,7 @@ def effort_for(cost: CoverageCost, *, has_ants: bool = True) -> Effort:
         steady=True,
     )
     temperatures_us = tuple(int(np.rint(unit * level)) for level in LEVELS)
-    return Effort(temperatures_us, 250, rules, 500)
+    return Effort(temperatures_us, 250, rules, 15_000)
 
 
 @dataclass(frozen=True, slots=True)

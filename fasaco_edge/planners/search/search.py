@@ -38,9 +38,8 @@ PROPOSALS_AT_ONCE = 30_000
 # Perturbations of each region in a pass, with several regions.
 PERTURBATIONS_IN_PASS = 8
 
-# The search ends after this many passes without gain with several regions; and with one region,
-# after this many times the patience of its effort.
-GAINLESS_PASSES, GAINLESS = 10, 30
+# With several regions the search ends after this many passes without gain.
+GAINLESS_PASSES = 10
 
 # Perturbations between two evaluations of the whole walk, with one region.
 PERTURBATIONS_IN_VISIT = 64
@@ -117,7 +116,7 @@ class Search:
             yield from self._solve_windows()
             most = GAINLESS_PASSES * self._perturbed_in_pass
             if walk.is_whole:
-                most = GAINLESS * self._effort.patience
+                most = self._effort.patience
             # Without work the walk exceeds its memory, or lies in no region.
             if walk.since_gain >= most or self._work == before:
                 return

@@ -22,7 +22,7 @@ from fasaco_edge.kernels.ants.disc import (
 from fasaco_edge.kernels.local_search.regions import Box
 from fasaco_edge.kernels.local_search.walk_array import FRAME
 from fasaco_edge.planners.cost import CoverageCost
-from fasaco_edge.planners.living_trail import NO_TRAIL, TrailSnapshot, mean_into
+from fasaco_edge.planners.living_trail import NO_TRAIL, TrailSnapshot, legal, mean_into
 from fasaco_edge.planners.paper.colony import ColonyConfig
 from fasaco_edge.planners.planner import ColonySnapshot
 from fasaco_edge.planners.problem import CoverageProblem
@@ -60,10 +60,9 @@ class SearchTrail:
         return None if self._window is None else TrailSnapshot(self._window, self._tau)
 
     def seen(self, ants: int, steps: int) -> ColonySnapshot:
-        """Return the observer's view after so many ants and a best walk of so many steps."""
+        """Return the observer's view: the trail, the number of ants, the steps of the best walk."""
         lattice = self._problem.lattice
-        legal = lattice.steps[..., np.newaxis] >> np.arange(4, dtype=np.uint8) & np.uint8(1)
-        tau = self._on(lattice.window) * legal
+        tau = self._on(lattice.window) * legal(lattice.steps)
         window, cell_m, mean = lattice.window, lattice.cell_m, mean_into(tau)
         return ColonySnapshot(window, cell_m, mean, 0, 0, ants, steps, tau)
 
