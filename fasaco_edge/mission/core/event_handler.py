@@ -286,7 +286,9 @@ class EventHandler:
                 self.monitor.driven.break_track()
             for driven in self.monitor.driven.take(stamped):
                 self._record(driven)
-        self.line.note_pose(stamped.pose, self.monitor.farthest_m)
+        self.line.note_pose(stamped.pose, self.monitor.on_line_m)
+        if has_jumped and self.line.is_followed:
+            self.monitor.clear_doubt()  # it has driven on unseen
         cell = self.map.robot_cell()
         if cell is None:
             return

@@ -272,6 +272,11 @@ class LineLayer:
         return f"{swept}, or of {possible:.1f} m2 if walls are a pixel thinner than on the map"
 
     @property
+    def is_followed(self) -> bool:
+        """Whether the robot is on the line; False if cells are counted."""
+        return self._ahead is not None and self._ahead.is_followed
+
+    @property
     def is_worth_driving(self) -> bool:
         """Whether the line ahead sweeps enough floor to drive it; False if cells are counted."""
         if self._ahead is None:

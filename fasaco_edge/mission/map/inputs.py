@@ -17,7 +17,7 @@ from fasaco_edge.errors import FasacoError, WrongFrame
 from fasaco_edge.grid.geometry import StampedPose
 from fasaco_edge.grid.occupancy import MapPatch, OccupancyGrid
 from fasaco_edge.mission.config import MissionConfig
-from fasaco_edge.mission.coverage.drive_meter import DrivenPoses
+from fasaco_edge.mission.coverage.drive_meter import SPEED_MARGIN, DrivenPoses
 from fasaco_edge.mission.coverage.ledger import JUMP_CELLS
 
 # Time for which map and poses must arrive in another frame alone before it becomes active [s].
@@ -26,6 +26,8 @@ PATIENCE_S = 10.0
 GAP_S = 3.0
 
 
+# A robot that was lost for longer is not looked for farther ahead on its line [s].
+LOST_ON_LINE_S = 10.0
 # Poses are too far apart if the track to half of this many last poses is unknown.
 LOOKED_BACK = 10
 
@@ -175,12 +177,14 @@ class InputMonitor:
         doubt_since: start of the doubt.
         farthest_m: longest possible drive between the last two poses, by their stamps and the
             robot's speed; 0 if not known [m].
+        on_line_m: the same also where the track between them is unknown: how far ahead on its line
+            the robot may be.
         driven: selects the poses used for swept floor.
     """
 
     def __init__(self, config: MissionConfig) -> None:
         self.doubt = ""
-        self.doubt_since = self.farthest_m = 0.0
+        self.doubt_since = self.farthest_m = self.on_line_m = 0.0
         self.driven = DrivenPoses(config.speed_m_s, config.footprint.cell_m)
         self._config = config
         # Whether the track to each of the newest poses is unknown.
@@ -222,13 +226,15 @@ class InputMonitor:
         """Note a pose; return whether the track from the last one is unknown."""
         last, lost, pose = self._pose, self.is_pose_lost(now), stamped.pose
         self._pose, self._pose_at, self._has_pose = stamped, now, True
-        self.farthest_m = 0.0
+        self.farthest_m = self.on_line_m = 0.0
         if last is None:
             return False
         if lost:
             self.driven.break_track()
         else:
             self.farthest_m = self.driven.farthest_m(last, stamped)
+        gap_s = min((stamped.stamp_ns - last.stamp_ns) * 1e-9, LOST_ON_LINE_S)
+        self.on_line_m = SPEED_MARGIN * self._config.speed_m_s * max(gap_s, 0.0)
         distance = math.hypot(pose.x - last.pose.x, pose.y - last.pose.y)
         # Consecutive poses may be some cells apart, or as far as the robot can have driven; after a
         # timeout half a cell is a gap.
