@@ -33,6 +33,12 @@ def index_of(bits: int, size: int) -> int:
     return ((bits >> 22) * size) >> INDEX_BITS
 
 
+@inlined
+def draw_share(random: NDArray[np.uint64]) -> float:
+    """Advance a stream as ``draw`` does; return a number in [0, 1)."""
+    return float(draw(random) >> 10) / 9007199254740992.0
+
+
 @lean_kernel
 def draw_unit(state: NDArray[np.int64]) -> float:
     """Advance a stream of four words of 32 bits, int64 (4,); return a number in [0, 1).

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from fasaco_edge.grid.lattice import CoverageLattice
 from fasaco_edge.kernels.lattice.reach import shortest_walk
-from fasaco_edge.planners.cost import NO_WORK, SearchWork, count_turns, gap_to
+from fasaco_edge.planners.cost import MICROSECONDS, NO_WORK, SearchWork, count_turns, gap_to
 from fasaco_edge.planners.living_trail import TrailSnapshot
 
 # Number of rows that are compared first, as two walks may differ early.
@@ -23,10 +23,26 @@ class Saved(NamedTuple):
     Attributes:
         ants: by walks of ants, including local search on these.
         local_search: by local search on the first walk, or on the rest of the previous walk.
+        by_velocity: what ``ants`` is the sum of: velocity of a cohort, and its savings.
     """
 
     ants: float = 0.0
     local_search: float = 0.0
+    by_velocity: tuple[tuple[int, float], ...] = ()
+
+    @classmethod
+    def of(cls, saved_us: int, velocities: NDArray[np.int64], ants_us: NDArray[np.int64]) -> Saved:
+        """Return the savings of a search in which ants have rebuilt discs.
+
+        Args:
+            saved_us: of the whole search [us].
+            velocities: int64 (cohorts,).
+            ants_us: savings of each cohort [us], int64 (cohorts,).
+        """
+        each = zip(velocities.tolist(), (ants_us / MICROSECONDS).tolist(), strict=True)
+        by_velocity = tuple((velocity, saved) for velocity, saved in each if saved > 0.0)
+        ants = float(ants_us.sum()) / MICROSECONDS
+        return cls(ants, saved_us / MICROSECONDS - ants, by_velocity)
 
 
 NOTHING_SAVED = Saved()

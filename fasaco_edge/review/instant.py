@@ -56,6 +56,23 @@ class PathThen(msgspec.Struct):
     changed: Rectangle | None
 
 
+class PlanThen(msgspec.Struct):
+    """The plan of a path: its time and reason, and what saved time against its first walk [s].
+
+    Attributes:
+        revision: the path with which it was published.
+        saved_by_velocity_s: savings of each cohort of ants, by its velocity.
+    """
+
+    at_s: float
+    revision: int
+    reason: str
+    planner: str
+    ants: int
+    saved_by_velocity_s: dict[str, float]
+    saved_by_local_search_s: float
+
+
 class MapThen(msgspec.Struct):
     """Changes of the map between two times [m2], and the rectangle around them."""
 
@@ -92,6 +109,7 @@ class Instant(msgspec.Struct):
     path_before: PathThen | None
     path: PathThen | None
     path_after: PathThen | None
+    plan: PlanThen | None
     map: MapThen | None
     command: CommandThen | None
     next_command: CommandThen | None
@@ -143,6 +161,7 @@ def scene_at(review: Review, at_s: float) -> Scene:
         path_before=before,
         path=path,
         path_after=after,
+        plan=_plan(data.paths[: index + 1]),
         map=change,
         command=past[-1] if past else None,
         next_command=next((each for each in commands if each.at_s > at_s), None),
@@ -203,6 +222,23 @@ def _path(
         None if leads is None else round(leads, 1),
         about.changed,
     )
+
+
+def _plan(paths: Sequence[PathSample]) -> PlanThen | None:
+    """Return the last plan of paths; the line was changed along it since."""
+    for sample in reversed(paths):
+        about = sample.about
+        if about.planner is not None:
+            return PlanThen(
+                round(sample.at_s, 3),
+                about.revision,
+                about.reason,
+                about.planner,
+                about.ants or 0,
+                about.saved_by_velocity_s or {},
+                about.saved_by_local_search_s or 0.0,
+            )
+    return None
 
 
 def heading_from(line: NDArray[np.float64], place: tuple[float, float]) -> float | None:

@@ -209,7 +209,7 @@ def test_the_status_says_all_there_is_to_know(path, pixels, outsider, daemon):
     assert status["floor"] == {"swept_m2": swept_m2} | unknown
     note = about(path)
     figures = ("planner", "seed", "ants", "kicks", "proposals", "planned_steps", "planned_cost_s")
-    saved = ("saved_by_ants_s", "saved_by_local_search_s")
+    saved = ("saved_by_ants_s", "saved_by_local_search_s", "saved_by_velocity_s")
     assert status["path"] == {
         "revision": 1,
         "steps": note["steps"],

@@ -12,7 +12,7 @@ import numpy as np
 from hypothesis import strategies as st
 
 from fasaco_edge.grid.lattice import CoverageLattice
-from fasaco_edge.kernels.ants.disc import AntRules, Colony
+from fasaco_edge.kernels.ants.fold import AntRules, Colony
 from fasaco_edge.kernels.local_search.holes import rays
 from fasaco_edge.kernels.local_search.parity import Tally
 from fasaco_edge.kernels.local_search.perturbation import Memory

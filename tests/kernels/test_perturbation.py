@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fasaco_edge.kernels.ants.disc import NOTHING
+from fasaco_edge.kernels.ants.fold import NOTHING
 from fasaco_edge.kernels.local_search.perturbation import (
     COOLING,
     PERTURBATIONS,

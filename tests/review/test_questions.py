@@ -69,7 +69,7 @@ def parts(tmp_path_factory):
 
             def path(revision, reason, xs, y=Y, **more):
                 xy = np.array([(x, y) for x in xs])
-                note = {"revision": revision, "reason": reason, "planner": "fasaco", "steps": 3}
+                note = {"revision": revision, "reason": reason, "planner": "aco", "steps": 3}
                 tell("path", encode_path(xy, np.zeros(len(xy)), "map", 1), note | more)
 
             def status(state, reason, **more):
@@ -80,7 +80,8 @@ def parts(tmp_path_factory):
             status("idle", "waits for an order")
             tell("command", encode_json({"command": "start", "order": ORDER}))
             status("covering", "path 1")
-            path(1, "first plan", [0.45, 2.0])
+            saved = {"saved_by_velocity_s": {"6": 14.0}, "saved_by_local_search_s": 2.0}
+            path(1, "first plan", [0.45, 2.0], ants=32, **saved)
             for x in np.arange(0.45, 1.4, 0.15):
                 tell("pose", pose_bytes(float(x), Y))
             tell("map", map_bytes(ground()))
@@ -134,6 +135,14 @@ def test_what_of_the_map_changed_and_which_commands_came(review):
     told = dict(instant_rows(instant))
     assert told["order"].startswith("zone a, keep out of")
     assert "seen for the first time" in told["map"]
+
+
+def test_what_found_the_path_is_said(review):
+    instant = scene_at(review, review.data.paths[0].at_s).instant
+    planned = dict(instant_rows(instant))["planned"]
+    assert planned.startswith("1 at 0:0")
+    found = "ants of velocity 6 saved 14.0 s, local search saved 2.0 s"
+    assert planned.endswith(f": first plan; aco, 32 ants; {found}")
 
 
 def test_before_anything_came_nothing_is_told(review):

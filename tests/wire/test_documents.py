@@ -153,6 +153,13 @@ def test_a_repair_that_costs_more_has_saved_nothing():
     assert (figures.saved_by_ants_s, figures.saved_by_local_search_s) == (0.5, 0.0)
 
 
+def test_savings_of_ants_are_told_by_their_velocity():
+    saved = Saved.of(9_000_000, np.array([8, 3, 1]), np.array([1_500_000, 0, 500_000]))
+    figures = PlanFigures.of(CoveragePath(np.zeros((1, 2), np.int32), "p", 1, saved=saved))
+    assert (figures.saved_by_ants_s, figures.saved_by_local_search_s) == (2.0, 7.0)
+    assert figures.saved_by_velocity_s == {"8": 1.5, "1": 0.5}
+
+
 def test_members_nobody_knows_may_be_nested_as_deep_as_json_may():
     deep: dict = {}
     for _ in range(900):

@@ -27,7 +27,7 @@ from fasaco_edge.kernels.floor.line import (
 from fasaco_edge.kernels.floor.polish import slide
 from fasaco_edge.kernels.floor.sweeps import BLOCK
 from fasaco_edge.kernels.jit import inlined, lean_kernel
-from fasaco_edge.kernels.random import draw
+from fasaco_edge.kernels.random import draw, draw_share
 
 # Initial temperature, as a share of the time to drive a tool's width.
 HOTTEST = 0.16
@@ -44,16 +44,10 @@ EXPONENTIAL = np.round(-np.log((np.arange(4096) + 0.5) / 4096) * 65536) / 65536
 
 
 @inlined
-def _unit(random: NDArray[np.uint64]) -> float:
-    """Return a random number in [0, 1)."""
-    return float(draw(random) >> 10) / 9007199254740992.0
-
-
-@inlined
 def _length(random: NDArray[np.uint64], farthest: float) -> float:
     """Return the signed length of a move: each octave below ``farthest`` is equally likely."""
     bits = draw(random)
-    size = farthest * (0.5 + 0.5 * _unit(random))
+    size = farthest * (0.5 + 0.5 * draw_share(random))
     for _ in range((bits >> 20) % OCTAVES):
         size *= 0.5
     return size if bits >> 40 & 1 else -size
@@ -68,7 +62,7 @@ def _move(line: Line, memory: Memory, random: NDArray[np.uint64], begin: int, fa
     size = _length(random, far)
     way = draw(random) >> 30 & 3
     if way < 2:
-        dy, dx = 2.0 * _unit(random) - 1.0, 2.0 * _unit(random) - 1.0
+        dy, dx = 2.0 * draw_share(random) - 1.0, 2.0 * draw_share(random) - 1.0
     else:
         other = begin if way == 2 or end == NONE else end
         dy, dx = points[other, 0] - points[middle, 0], points[other, 1] - points[middle, 1]
@@ -124,7 +118,7 @@ def _cut(line: Line, memory: Memory, random: NDArray[np.uint64], begin: int, far
     for number in range(2):
         other = begin if number == 0 else line.next[middle]
         dy, dx = points[other, 0] - points[middle, 0], points[other, 1] - points[middle, 1]
-        share = min(far * _unit(random) / np.sqrt(dy * dy + dx * dx), 1.0) * MOST_CUT
+        share = min(far * draw_share(random) / np.sqrt(dy * dy + dx * dx), 1.0) * MOST_CUT
         new[number, 0] = points[middle, 0] + share * dy
         new[number, 1] = points[middle, 1] + share * dx
     return 2
@@ -139,9 +133,9 @@ def _round_left(
     end = line.next[begin]
     ay, ax = points[begin, 0], points[begin, 1]
     dy, dx = points[end, 0] - ay, points[end, 1] - ax
-    share = _unit(random)
-    y = ay + share * dy + far * (2.0 * _unit(random) - 1.0)
-    x = ax + share * dx + far * (2.0 * _unit(random) - 1.0)
+    share = draw_share(random)
+    y = ay + share * dy + far * (2.0 * draw_share(random) - 1.0)
+    x = ax + share * dx + far * (2.0 * draw_share(random) - 1.0)
     i, j = int(y) >> BLOCK, int(x) >> BLOCK
     if not (0 <= i < left.shape[0] and 0 <= j < left.shape[1]) or left[i, j] < 2:
         return NO_MOVE
@@ -154,7 +148,7 @@ def _round_left(
     along = (place[0] - ay) * dy + (place[1] - ax) * dx
     spread = 0.0
     if draw(random) >> 30 & 3:
-        spread = 0.3 * floor.tool + 0.7 * far * _unit(random)
+        spread = 0.3 * floor.tool + 0.7 * far * draw_share(random)
     # A corner, or a bulge; the narrowest bulge goes there and back.
     if draw(random) >> 30 & 1 or along - spread < 1.0 or along + spread > length - 1.0:
         new[0, 0], new[0, 1] = place[0], place[1]

@@ -11,7 +11,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.kernels.ants.disc import SAVED_US, Colony, rebuild_disc, strengthen
+from fasaco_edge.kernels.ants.disc import cohort, rebuild_disc, strengthen
+from fasaco_edge.kernels.ants.fold import Colony
 from fasaco_edge.kernels.jit import as_value, inlined, lean_kernel
 from fasaco_edge.kernels.local_search.parity import (
     Tally,
@@ -84,7 +85,7 @@ class Memory(NamedTuple):
         touched: int32 (n,), cells where the perturbation changed something.
         area: int32 (n,), their surroundings.
         marked: int32 (n,), number of the last perturbation whose surroundings hold the cell.
-        work: int64 (2,), PROPOSALS and PERTURBATIONS so far.
+        work: int64 (2,), PROPOSALS, moves of ants among them, and PERTURBATIONS so far.
     """
 
     saved: NDArray[np.int32]
@@ -249,6 +250,7 @@ def _let_ants_rebuild(search: Search, random: NDArray[np.uint64]) -> int:
     ground, walk, prices, _, memory, colony = search
     touched = rebuild_disc(ground, walk, prices, colony, memory.saved, random)
     copy(colony.area, memory.touched, touched)
+    memory.work[PROPOSALS] += colony.rules.ants * touched
     return touched
 
 
@@ -285,7 +287,8 @@ def perturb(
         memory.work[PERTURBATIONS] += 1
         if walk.counts[COST] < memory.best_counts[COST]:
             if by_ants:
-                search.colony.counts[SAVED_US] += memory.best_counts[COST] - walk.counts[COST]
+                gain_us = memory.best_counts[COST] - walk.counts[COST]
+                search.colony.saved_us[cohort(search.colony)] += gain_us
             remember(walk, memory)
         elif rules.strict or not accepts(walk.counts[COST] - cost, rules.acceptance_us, random):
             _load(search, memory.saved, length)

@@ -144,7 +144,7 @@ class _Repair:
         # Work on earlier regions, and the region that is being improved.
         self._work = work
         self._region: WalkRegion | None = None
-        self._saved_by_ants_us = 0
+        self._saved_by_ants_us = np.zeros(len(config.velocities), np.int64)
 
     def run(self) -> Iterator[None]:
         """Improve the walk, one neighbourhood after the other; pause after each piece of work."""
@@ -237,8 +237,7 @@ class _Repair:
 
     def _saved(self) -> Saved:
         saved_us = self.completed_us - self._cost_us
-        ants_us = min(self._saved_by_ants_us, max(saved_us, 0))
-        return Saved(ants_us / MICROSECONDS, (saved_us - ants_us) / MICROSECONDS)
+        return Saved.of(saved_us, self._trail.rules.velocities, self._saved_by_ants_us)
 
 
 def _changed(

@@ -147,8 +147,7 @@ class Search:
 
     def _saved(self) -> Saved:
         saved_us = (self._first_us or self._walk.best_us) - self._walk.best_us
-        ants_us = min(self._walk.region.saved_by_ants_us, saved_us)
-        return Saved(ants_us / MICROSECONDS, (saved_us - ants_us) / MICROSECONDS)
+        return Saved.of(saved_us, self._trail.rules.velocities, self._walk.region.saved_by_ants_us)
 
     @property
     def _work(self) -> SearchWork:

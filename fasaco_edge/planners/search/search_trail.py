@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.grid.geometry import Window
-from fasaco_edge.kernels.ants.disc import (
+from fasaco_edge.kernels.ants.fold import (
     FARTHEST,
     MOST_CELLS,
     MOST_ITEMS,
@@ -131,6 +131,7 @@ def colony_for(size: int, rules: AntRules) -> Colony:
         seen=cells(size),
         came_from=np.zeros(size, np.int8),
         queue=cells(FARTHEST + 4),
-        counts=np.zeros(4, np.int64),
+        counts=np.zeros(3, np.int64),
+        saved_us=np.zeros(rules.velocities.size, np.int64),
         rules=rules,
     )

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.kernels.ants.disc import ANTS, SAVED_US
+from fasaco_edge.kernels.ants.fold import ANTS
 from fasaco_edge.kernels.local_search.holes import rays
 from fasaco_edge.kernels.local_search.parity import JUMPS, Tally
 from fasaco_edge.kernels.local_search.perturbation import (
@@ -160,9 +160,9 @@ class WalkRegion:
         return SearchWork(int(ants), int(work[PERTURBATIONS]), int(work[PROPOSALS]))
 
     @property
-    def saved_by_ants_us(self) -> int:
-        """What perturbations by ants have saved here [us]."""
-        return int(self._search.colony.counts[SAVED_US])
+    def saved_by_ants_us(self) -> NDArray[np.int64]:
+        """What discs rebuilt by each cohort have saved here [us], int64 (cohorts,)."""
+        return self._search.colony.saved_us
 
     def improve(self, temperature_us: int, proposals: int, random: NDArray[np.uint64]) -> None:
         """Make proposals all over the region at one temperature."""

@@ -10,7 +10,7 @@ from msgspec.structs import astuple
 from fasaco_edge.review.comparison import figures
 from fasaco_edge.review.document import ReviewDocument
 from fasaco_edge.review.drive import MILESTONES
-from fasaco_edge.review.instant import Instant, MapThen, PathThen, direction
+from fasaco_edge.review.instant import Instant, MapThen, PathThen, PlanThen, direction
 from fasaco_edge.review.orders import order_words
 from fasaco_edge.review.wording import NOT_KNOWN, amount, clock, count
 from fasaco_edge.wire.documents.path_documents import Rectangle
@@ -33,6 +33,8 @@ UNREACHED = ("order", "m2", "at", "why")
 LEFT = ("m2", "at", "why")
 """Columns of ``order_rows``, ``unreached_rows``, ``left_rows`` and ``command_rows``."""
 MOST_PLACES = 3
+# Less saved by a cohort or by local search is not shown [s].
+LEAST_SAVED_S = 0.05
 CHARGES = ("at", "for", "battery")
 
 
@@ -303,6 +305,8 @@ def instant_rows(instant: Instant) -> Iterator[tuple[str, str]]:
     ):
         if path is not None:
             yield name, _path_words(path, clock(path.at_s))
+    if (plan := instant.plan) is not None:
+        yield "planned", _plan_words(plan, clock(plan.at_s))
     if (change := instant.map) is not None:
         yield "map", _map_words(change, clock(change.since_s))
     for name, command in (("command", instant.command), ("next command", instant.next_command)):
@@ -315,6 +319,18 @@ def _path_words(path: PathThen, when: str) -> str:
     leads = "" if path.leads_deg is None else f"; leads {direction(path.leads_deg)} from there"
     where = "" if path.changed is None else f", map changed {_box_words(path.changed)}"
     return f"{path.revision} at {when}: {path.reason}{where}; {path.steps} steps{leads}"
+
+
+def _plan_words(plan: PlanThen, when: str) -> str:
+    found = [
+        f"ants of velocity {velocity} saved {saved_s:.1f} s"
+        for velocity, saved_s in plan.saved_by_velocity_s.items()
+        if saved_s >= LEAST_SAVED_S
+    ]
+    if plan.saved_by_local_search_s >= LEAST_SAVED_S:
+        found.append(f"local search saved {plan.saved_by_local_search_s:.1f} s")
+    why = ", ".join(found) or "nothing saved"
+    return f"{plan.revision} at {when}: {plan.reason}; {plan.planner}, {plan.ants} ants; {why}"
 
 
 def _map_words(change: MapThen, since: str) -> str:

@@ -31,6 +31,8 @@ class PlanFigures(Document, frozen=True):
             walks.
         saved_by_local_search_s: seconds saved by local search on the first walk, or on the one
             still to drive.
+        saved_by_velocity_s: what saved_by_ants_s is the sum of: seconds saved by each cohort, by
+            its velocity in cells a move; null if ants saved nothing.
     """
 
     planner: str | None = None
@@ -45,6 +47,12 @@ class PlanFigures(Document, frozen=True):
     gap: float | None = None
     saved_by_ants_s: Amount | None = None
     saved_by_local_search_s: Amount | None = None
+    saved_by_velocity_s: (
+        Annotated[
+            dict[str, Amount], allowed(propertyNames={"type": "string", "pattern": "^[0-9]+$"})
+        ]
+        | None
+    ) = None
 
     @classmethod
     def of(cls, plan: CoveragePath | None) -> Self:
@@ -66,6 +74,10 @@ class PlanFigures(Document, frozen=True):
             # A repair that keeps the path ahead may cost more than the walk before; it then saved
             # nothing.
             saved_by_local_search_s=round(max(plan.saved.local_search, 0.0), 3),
+            saved_by_velocity_s={
+                str(velocity): round(saved_s, 3) for velocity, saved_s in plan.saved.by_velocity
+            }
+            or None,
         )
 
 
