@@ -32,9 +32,8 @@ if TYPE_CHECKING:
     from fasaco_edge.planners.problem import CoverageProblem
 
 DEFAULT_MAPS = ("office", "flat")
-# The row of the planner that missions use: colony and local search.
-WITH_SEARCH = "fasaco + search"
-SEARCH_Q0, SEARCH_VISIBILITY = 0.98, "fewest-open"
+# Threshold of equation (4) for colony-search.
+SEARCH_Q0 = 0.98
 HEADER = ("planner", "steps", "revisits", "n_r_paper", "turns\n90", "CPU\n[s]")
 FIGURES = ("steps", "revisits", "recovered_cells", "n_r_paper", "turns_90")
 
@@ -73,7 +72,7 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         type=seconds_above_zero,
         default=1.0,
         metavar="S",
-        help=f"of {WITH_SEARCH} [s]; the others walk to their end (default: %(default)s)",
+        help="of colony-search [s]; the others walk to their end (default: %(default)s)",
     )
     parser.add_argument(
         "--end",
@@ -84,7 +83,7 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def _count(args: argparse.Namespace) -> int:
-    rows = len(args.planner) + len(REGISTRY) + 1
+    rows = len(args.planner) + len(REGISTRY)
     runs: int = args.seeds * rows
     return runs * len(grid_names(args, DEFAULT_MAPS))
 
@@ -120,11 +119,9 @@ def _rows(
 
     for code in own:
         yield code.name, OwnPlanner(code, colony.seed)
-    # The setting of missions: ants that see which cells would be cut off.
-    seeing = replace(colony, q0=SEARCH_Q0, visibility=SEARCH_VISIBILITY)
-    yield WITH_SEARCH, planner_of("fasaco", seeing, local_search=True)
-    for name in REGISTRY:
-        yield name, planner_of(name, colony)
+    for name, entry in REGISTRY.items():
+        q0 = SEARCH_Q0 if entry.has_local_search else colony.q0
+        yield name, planner_of(name, replace(colony, q0=q0))
 
 
 def _run(
@@ -138,7 +135,8 @@ def _run(
     from fasaco_edge.planners.path import walk_figures  # noqa: PLC0415
     from fasaco_edge.planners.planner import TimeBudget, ignore, never  # noqa: PLC0415
 
-    stop = TimeBudget(budget_s) if name == WITH_SEARCH else never
+    has_budget = name in REGISTRY and REGISTRY[name].has_local_search
+    stop = TimeBudget(budget_s) if has_budget else never
     cpu = time.thread_time()
     path = planner.plan(problem, stop, ignore)
     cpu_s = time.thread_time() - cpu
@@ -208,8 +206,8 @@ PLANNERS = Benchmark(
     name="planners",
     summary="the walks of all planners, and of your own, side by side",
     description="Plan with every planner, and with those of your own, on each grid with each "
-    "seed, on one thread with warm kernels. fasaco is the paper's colony, fasaco + search what "
-    "`plan` and missions use. A turn costs nothing, as the paper counts.",
+    "seed, on one thread with warm kernels. colony-search is what `plan` and missions use, fasaco "
+    "the paper's colony. A turn costs nothing, as the paper counts.",
     add_options=_add_options,
     count=_count,
     measure=_measure,

@@ -45,6 +45,9 @@ COMMANDS = {
 }
 """Each command, and its line in the list of them."""
 
+# Options of earlier releases, and their replacement.
+REMOVED = {"--no-local-search": "it was removed in this version: write --planner fasaco"}
+
 # A faulty or full disk, a computer without free files or memory. Its exit code differs from that of
 # an invalid configuration, so that a service is restarted.
 _PASSING = frozenset(
@@ -90,6 +93,7 @@ def run_command(parser: argparse.ArgumentParser, words: Sequence[str]) -> int:
     args, unknown = parser.parse_known_args(with_negative_pairs(words))
     if unknown:
         told = f"{parser.prog} {words[0]} --help lists what there is"
+        told = next((REMOVED[word] for word in unknown if word in REMOVED), told)
         parser.error(f"unrecognized arguments: {' '.join(unknown)}; {told}")
     begin_logging(args.log_level)
     if args.with_parent is not None:

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 LOG = logging.getLogger(__name__)
 
-WITH_PHEROMONE = ("fasaco", "aco")
+WITH_PHEROMONE = ("colony-search", "fasaco", "aco")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -57,7 +57,7 @@ def run(args: argparse.Namespace) -> int:
     if args.pheromone_png and (request.own or search.planner not in WITH_PHEROMONE):
         raise BadConfiguration(
             "--pheromone-png: the planner leaves no pheromone",
-            hint=f"choose --planner {' or '.join(WITH_PHEROMONE)}",
+            hint=f"choose --planner {', '.join(WITH_PHEROMONE[:-1])} or {WITH_PHEROMONE[-1]}",
         )
     has_curves = robot.turn_radius_m > 0.0
     compile_kernels(stages_of_plan(search.planner, has_curves=has_curves))
@@ -70,8 +70,8 @@ def run(args: argparse.Namespace) -> int:
     if request.line != CELLS and (caution := tool_caution(robot)):
         LOG.warning("%s", caution)
     asked = Interrupt()
-    total = search.most_s if search.has_local_search else search.ants
     counted = not search.has_local_search
+    total = search.ants if counted else search.most_s
     # A user's own planner has no request to end: Ctrl-C interrupts it.
     on_ctrl_c = nullcontext() if request.own else first_signal_calls(signal.SIGINT, asked.asked.set)
     trails: deque[ColonySnapshot] = deque(maxlen=1)

@@ -90,6 +90,11 @@ def _turns(robot: RobotConfig) -> Iterator[str]:
 
 def _planner(config: DaemonConfig) -> Iterator[str]:
     planner, usual = config.planner, PlannerConfig()
+    if planner.name == "fasaco":
+        yield (
+            "planner.name fasaco is the paper's colony, without local search; the default is "
+            "colony-search, which had that name before 1.0.0"
+        )
     if planner.line == "cells":
         idle = ["planner.align"] if planner.align != usual.align else []
         idle += ["robot.overlap"] if config.robot.overlap != RobotConfig().overlap else []

@@ -99,12 +99,10 @@ class PlannerConfig(Section, frozen=True):
     """The colony, see ``planners.paper.colony.ColonyConfig``; and the time one plan may take [s].
 
     While the robot drives, ``spare_share`` of a processor core goes into making the rest of its
-    path better; fasaco with local search alone can do that.
+    path better; colony-search alone can do that.
 
-    ``local_search`` is for planners that have it (``planners.registry``), which is fasaco alone:
-    ants then rebuild parts of the walk, as many as fit into the budget, and look for the fewest
-    seconds; ``ants``, ``visibility`` and ``threads`` are for the colony alone. Without it a plan
-    may end before its budget.
+    colony-search looks for the fewest seconds until the budget ends; ``ants``, ``visibility`` and
+    ``threads`` are for fasaco and aco, whose plans may end before it.
 
     ``velocities`` is ``8:1`` for cohorts from 8 down to 1, ``1:8``, ``4`` or ``8,4,1``.
     The paper's ants see no further than their neighbours; a robot's see what will soon
@@ -114,8 +112,7 @@ class PlannerConfig(Section, frozen=True):
     the map shows them for certain; the axes of the map frame; or an angle to these [deg].
     """
 
-    name: PlannerName = "fasaco"
-    local_search: bool = True
+    name: PlannerName = "colony-search"
     ants: Annotated[int, Meta(ge=1, le=1_000_000)] = 200
     velocities: str = "8:1"
     q0: Annotated[float, Meta(ge=0, le=1)] = 0.9

@@ -26,6 +26,11 @@ REMOVED = {
         "was removed in this version, the daemon plans with its own planners only",
         "delete the key; `fasaco-edge plan --planner MODULE:NAME` runs a planner of your own",
     ),
+    "planner.local_search": (
+        "was removed in this version, each planner has a name of its own",
+        "for true write name: colony-search, or leave the name out; for false write name: fasaco; "
+        "with another name delete the key",
+    ),
 }
 
 
@@ -72,7 +77,7 @@ def section_faults(
         path = f"{key}.{name}" if key else name
         if path in REMOVED:
             why, hint = REMOVED[path]
-            if value:
+            if value not in (None, ""):
                 yield Fault(path, BadConfiguration(f"{path} {why}", hint=hint))
         elif name not in fields:
             yield _fault(path, f"unknown key {path}{_meant(name, key, list(fields), root)}")
@@ -93,6 +98,20 @@ def without_removed(document: Mapping[str, object], key: str = "") -> dict[str, 
         if path not in REMOVED:
             kept[name] = without_removed(value, path) if isinstance(value, Mapping) else value
     return kept
+
+
+def renamed(config: Mapping[str, object]) -> dict[str, object]:
+    """Return a recorded configuration with this release's name of the planner.
+
+    ``planner.local_search`` made colony-search of fasaco.
+    """
+    planner = config.get("planner")
+    if not isinstance(planner, Mapping) or "local_search" not in planner:
+        return dict(config)
+    planner = dict(planner)
+    if planner.pop("local_search") and planner.get("name") == "fasaco":
+        planner["name"] = "colony-search"
+    return {**config, "planner": planner}
 
 
 def section_of(kind: object) -> type[Section] | None:

@@ -24,6 +24,7 @@ from fasaco_edge.offline.settings import (
     AXES,
     CELLS,
     HOME,
+    LIKE_OWN,
     WALLS,
     Search,
     default_line,
@@ -80,7 +81,7 @@ def plan(
         end: "anywhere", "home", or a cell.
         line: "cells": through their centres, as the paper's planners do; "quick" or "thorough":
             over the floor, with 60 or 180 s as the value of a square metre. None for "thorough",
-            and for "cells" on a coverage grid or without local search.
+            and for "cells" on a coverage grid or by a planner other than colony-search.
         align: what the rows of cells are parallel to, with a line over the floor: "walls", "axes"
             or an angle [deg]; None for walls.
         covers: "all" cells; "edge", those along walls and furniture; or "rest", all others.
@@ -93,7 +94,7 @@ def plan(
         stop: stopping criterion.
         watch: called with the progress of the search for a walk; a second walk begins anew.
         observe: called with the colony's pheromone: a ``ColonySnapshot`` after each cohort, or
-            once at the end of a search with local search; not by planners without pheromone.
+            once at the end of colony-search; not by planners without pheromone.
 
     Raises:
         BadConfiguration: a value is impossible.
@@ -116,14 +117,14 @@ def plan(
     own = None
     if planner is not None:
         own = planner if isinstance(planner, UserCode) else user_code(planner)
-        search = replace(search, local_search=False)
+        search = replace(search, planner=LIKE_OWN)
     line = line or default_line(search, has_floor=map.grid is not None)
     require(covers in get_args(Covers), "covers", "be all, edge or rest", covers)
     require(lanes in get_args(Lanes), "lanes", "be rows, columns or empty", lanes)
     if lanes and not search.has_local_search:
         raise BadConfiguration(
-            f"lanes {lanes}: only the search has a direction of its lanes",
-            hint="plan with local search, by fasaco",
+            f"lanes {lanes}: only colony-search has a direction of its lanes",
+            hint="plan by colony-search, the default",
         )
     has_curves = robot.turn_radius_m > 0.0
     compile_missing(stages=stages_of_plan(search.planner, has_curves=has_curves))

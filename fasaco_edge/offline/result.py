@@ -247,7 +247,6 @@ def figures_of(plan: Plan) -> dict[str, object]:
     cell_m = problem.lattice.cell_m
     return {
         "planner": path.planner,
-        "local_search": search.has_local_search,
         "seed": path.seed,
         "ants": path.work.ants,
         "kicks": path.work.perturbations,
@@ -294,7 +293,9 @@ def driving(robot: RobotConfig) -> dict[str, float | None]:
 
 def velocities_of(plan: Plan) -> str | None:
     """Return the velocities of the ants; None for a planner without ants."""
-    return {"fasaco": plan.search.velocities, "aco": "1"}.get(plan.path.planner)
+    velocities = plan.search.velocities
+    of_ants = {"colony-search": velocities, "fasaco": velocities, "aco": "1"}
+    return of_ants.get(plan.path.planner)
 
 
 def picture_of(plan: Plan, of: str = "") -> Image.Image:

@@ -219,11 +219,10 @@ class Planning:
     def _walk(self, seed: int, observe: Observer) -> CoveragePath:
         """Search for a walk; a planner without a lower bound is given one for its path."""
         search, bound = self._search, self._ending.bound
-        colony, has_local_search = replace(search.colony(), seed=seed), search.has_local_search
         planner: CoveragePlanner = (
             OwnPlanner(self._own, seed)
             if self._own
-            else planner_of(search.planner, colony, search.threads, has_local_search)
+            else planner_of(search.planner, replace(search.colony(), seed=seed), search.threads)
         )
         path = planner.plan(self._problem, self._ending.is_walk_over, observe)
         path = replace(path, seed=search.seed)

@@ -16,17 +16,16 @@ ANYWHERE, HOME = "anywhere", "home"
 CELLS, THOROUGH = "cells", "thorough"
 # What the rows of cells are parallel to, for a line over the floor; or an angle [deg].
 WALLS, AXES = "walls", "axes"
-# Default time budget of a search [s], and the colony's settings that suit local search best. The
-# colony alone has the paper's settings, and walks to its end.
+# Default time budget of a planner with local search [s], and the threshold of equation (4) that
+# suits it best. The others have the paper's, and walk to their end.
 BUDGET_S = 2.0
 SEARCH_Q0, PAPER_Q0 = 0.9, 0.7
-SEARCH_VISIBILITY, PAPER_VISIBILITY = "fewest-open", "neighbour"
-
+# Planner whose settings one of the user's own has.
+LIKE_OWN = "fasaco"
 
 # Type checks by annotation, including NumPy's numbers.
 _KINDS: dict[str, tuple[type, str]] = {
     "str": (str, "be a text"),
-    "bool": (bool, "be True or False"),
     "int": (Integral, "be a whole number"),
     "float": (Real, "be a number"),
 }
@@ -38,12 +37,9 @@ class Search:
 
     Attributes:
         planner: one of ``planners.registry``.
-        local_search: whether a planner that has local search uses it; False is the paper's
-            colony alone.
-        ants, velocities, beta, alpha, tau0, seed: of the colony, see ``ColonyConfig``; velocities
-            as text, like 8:1.
-        q0, visibility: likewise; None for the values that suit the search with or without local
-            search.
+        ants, velocities, visibility, beta, alpha, tau0, seed: of the colony, see
+            ``ColonyConfig``; velocities as text, like 8:1.
+        q0: likewise; None for the value that suits the planner.
         threads: number of threads of the ants; the walk is the same for any number.
         budget_s: time limit of the search for walks and the line along one [s]; with local search a
             first walk and line are always completed; None for 2 s, or without local search for no
@@ -57,12 +53,11 @@ class Search:
         BadConfiguration: a value is impossible.
     """
 
-    planner: str = "fasaco"
-    local_search: bool = True
+    planner: str = "colony-search"
     ants: int = 1000
     velocities: str = "8:1"
     q0: float | None = None
-    visibility: str | None = None
+    visibility: str = "neighbour"
     beta: float = 2.0
     alpha: float = 0.1
     tau0: float = 0.1
@@ -92,8 +87,8 @@ class Search:
 
     @property
     def has_local_search(self) -> bool:
-        """Whether walks are improved by local search."""
-        return self.local_search and bool(PLANNERS[self.planner].with_local_search)
+        """Whether the planner has local search."""
+        return PLANNERS[self.planner].has_local_search
 
     @property
     def most_s(self) -> float | None:
@@ -108,15 +103,13 @@ class Search:
         Raises:
             BadConfiguration: a value is impossible.
         """
-        q0, visibility = PAPER_Q0, PAPER_VISIBILITY
-        if self.has_local_search:
-            q0, visibility = SEARCH_Q0, SEARCH_VISIBILITY
+        q0 = SEARCH_Q0 if self.has_local_search else PAPER_Q0
         return ColonyConfig(
             ants=self.ants,
             velocities=parse_velocities(self.velocities),
             q0=q0 if self.q0 is None else self.q0,
             seed=self.seed,
-            visibility=self.visibility or visibility,
+            visibility=self.visibility,
             beta=self.beta,
             alpha=self.alpha,
             tau0=self.tau0,

@@ -18,25 +18,28 @@ Factory = Callable[[ColonyConfig, int], CoveragePlanner]
 
 
 class Entry(NamedTuple):
-    """Factories of a planner as "module:callable", the module in ``fasaco_edge.planners``.
-
-    Each takes the colony's configuration and a number of threads.
+    """Row of a planner.
 
     Attributes:
-        factory: the planner as published.
+        factory: "module:callable", the module in ``fasaco_edge.planners``; it takes the colony's
+            configuration and a number of threads.
         about: description for the command line's help.
-        with_local_search: the planner with local search; "" for none.
+        has_local_search: whether it searches until stopped, and has directions of lanes.
     """
 
     factory: str
     about: str
-    with_local_search: str = ""
+    has_local_search: bool = False
 
 
 PLANNERS = {
-    "fasaco": Entry(
-        "paper.fasaco:Fasaco", "ants", with_local_search="search.near_optimal:NearOptimal"
+    "colony-search": Entry(
+        "search.near_optimal:NearOptimal",
+        "local search with ants, which rebuild a part of the walk on the pheromone trail in every "
+        "second perturbation",
+        has_local_search=True,
     ),
+    "fasaco": Entry("paper.fasaco:Fasaco", "the paper's colony, without local search"),
     "aco": Entry("paper.fasaco:plain_aco", "fasaco at velocity 1"),
     "stc": Entry("paper.baselines:stc", "spanning-tree coverage"),
     "spiral-stc": Entry("paper.baselines:spiral_stc", "the paper's baseline"),
@@ -45,12 +48,8 @@ PLANNERS = {
 PLANNER_NAMES = tuple(PLANNERS)
 
 
-def planner_of(
-    name: str, colony: ColonyConfig, threads: int = 1, local_search: bool = False
-) -> CoveragePlanner:
-    """Return the planner ``name``; with local search if requested and available."""
-    entry = PLANNERS[name]
-    place = (local_search and entry.with_local_search) or entry.factory
-    module, _, factory = place.partition(":")
+def planner_of(name: str, colony: ColonyConfig, threads: int = 1) -> CoveragePlanner:
+    """Return the planner ``name``."""
+    module, _, factory = PLANNERS[name].factory.partition(":")
     make = cast(Factory, getattr(import_module(f"fasaco_edge.planners.{module}"), factory))
     return make(colony, threads)

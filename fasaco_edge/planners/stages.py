@@ -10,7 +10,7 @@ LOCAL_SEARCH, REPAIR, LINE = "local search", "repair", "driven line"
 CURVES = "curves"
 WINDOWS, SHARES = "windows of the walk", "shares of a fleet"
 # Stages in the order in which they are compiled; the stages of a plan come first.
-_FOR_PLANS = (LATTICE, REACH, WALKS, BOUND, "fasaco", LOCAL_SEARCH, WINDOWS, LINE, REPAIR)
+_FOR_PLANS = (LATTICE, REACH, WALKS, BOUND, LOCAL_SEARCH, WINDOWS, LINE, REPAIR)
 STAGES = tuple(dict.fromkeys((*_FOR_PLANS, CHANGES, AREAS, SHARES, CURVES, *PLANNER_NAMES)))
 
 

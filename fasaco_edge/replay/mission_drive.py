@@ -84,9 +84,7 @@ class MissionDrive:
             self.mailbox.take(LOAD_S)
         self.mission, worker = loaded
         worker.close(LOAD_S)
-        self.planner = planner_of(
-            planner.name, planner.colony(), planner.threads, planner.local_search
-        )
+        self.planner = planner_of(planner.name, planner.colony(), planner.threads)
         keeper = LedgerKeeper(_NoDisk(ledger), config.cell_m, autostart=config.mission.autostart)
         self._runner = MissionRunner(config, keeper, self.mailbox, lambda *_: loader)
         self.began: float | None = None

@@ -19,7 +19,7 @@ import msgspec
 
 from fasaco_edge.bus.arrival import Arrival
 from fasaco_edge.config.config import DaemonConfig
-from fasaco_edge.config.reading import without_removed
+from fasaco_edge.config.reading import renamed, without_removed
 from fasaco_edge.daemon.loop.inbox import Received, take_batch
 from fasaco_edge.daemon.loop.loop import TICK_S
 from fasaco_edge.errors import BadConfiguration, FasacoError, MalformedMessage
@@ -103,14 +103,14 @@ class RecordedRun:
         return own if isinstance(own, str) else ""
 
     def daemon_config(self) -> DaemonConfig:
-        """Return the configuration, without keys that were removed since.
+        """Return the configuration in the keys and names of this release.
 
         Raises:
             BadConfiguration: it is of a release whose settings this one does not know.
         """
         # Releases without lines drove through cells; those without lattice rotation, along the
         # axes.
-        config = without_removed(self.config)
+        config = without_removed(renamed(self.config))
         planner = config.get("planner", {})
         if isinstance(planner, Mapping):
             config["planner"] = {"line": "cells", "align": "axes", **planner}

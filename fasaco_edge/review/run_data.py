@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.bus.arrival import Arrival
+from fasaco_edge.config.reading import renamed
 from fasaco_edge.errors import BadConfiguration, FasacoError, MalformedMessage
 from fasaco_edge.grid.geometry import Polygon
 from fasaco_edge.grid.lattice import Footprint
@@ -316,7 +317,7 @@ class _SampleReader:
 
     def _status(self, arrival: Arrival) -> None:
         status, data = decode_tolerant(arrival.sample.payload, Status), self.data
-        data.config = status.config or data.config
+        data.config = renamed(status.config) or data.config
         data.version = status.version or data.version
         data.robot = status.robot or data.robot
         known = known_settings(data.config)

@@ -56,7 +56,7 @@ print(f"{ready:.1f} s to READY, {first:.1f} s from the first map to the first pa
 """
 # A fixed amount of work each: ants walk to their end, no clock decides.
 PLANS = {
-    "colony alone": ("basement", "--no-local-search", "--ants", "60", "--turn-s", "1.5"),
+    "colony alone": ("basement", "--planner", "fasaco", "--ants", "60", "--turn-s", "1.5"),
     "local search": ("flat", "--budget", "1e5", "--ants", "40", "--turn-s", "1.5"),
     "local search, larger": ("basement", "--budget", "1e5", "--ants", "8", "--turn-s", "1.5"),
     "spiral-stc": ("office", "--planner", "spiral-stc"),

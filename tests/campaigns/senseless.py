@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from fasaco_edge.grid.geometry import FARTHEST_M
 from fasaco_edge.mission.orders.order import MOST_KEEP_OUT, MOST_ZONES
 from fasaco_edge.planners.passes import MOST_PASSES
+from fasaco_edge.planners.registry import PLANNER_NAMES
 from fasaco_edge.wire.limits import (
     MAX_COORDINATE_M,
     MAX_RESOLUTION_M,
@@ -422,8 +423,7 @@ class Senseless:
         """Return sections of configuration that a reload can take up."""
         return {
             "planner": {
-                "name": self._rng.choice(["fasaco"] * 8 + ["stc", "spiral-stc", "zigzag", "aco"]),
-                "local_search": self._rng.random() < 0.8,
+                "name": self._rng.choice([*["colony-search"] * 6, *PLANNER_NAMES]),
                 "spare_share": self._rng.choice([0.0, 0.05]),
                 "seed": self._rng.randrange(2**63),
                 "budget_s": self._rng.choice([0.02, 0.1]),

@@ -135,7 +135,7 @@ class MissionTrial:
         known["map"] = {**known.get("map", {}), "max_lattice_cells": MOST_CELLS}
         config = msgspec.convert(known, DaemonConfig)
         planner = config.planner
-        self._planner = planner_of(planner.name, planner.colony(), 1, planner.local_search)
+        self._planner = planner_of(planner.name, planner.colony())
         self._config = mission_config(config, self._planner)
         mission = Mission(self._config, kind=company_of(config))
         self._poses = PoseDecoder(config.pose.schema)

@@ -26,7 +26,7 @@ from tests.support.processes import fasaco_edge
 from tests.support.rooms import coverable_cells, pillared_room
 
 NAMES = """
-planner local_search seed ants velocities map line tool_m cell_m lattice_deg start end cells
+planner seed ants velocities map line tool_m cell_m lattice_deg start end cells
 steps revisits recovered_cells n_r_paper turns_90 turns_180 length_m kicks proposals cost_s
 lower_bound_steps lower_bound_cost_s gap first_walk_ms unreachable_cells wall_s cpu_s
 ended_by speed_m_s turn_s turn_deg_s turn_deg_s2 acceleration_m_s2 steered_deg budget_s
@@ -42,7 +42,7 @@ def plan(tmp_path, capsys):
     def run(*words):
         csv = tmp_path / "walk.csv"
         words = [str(word) for word in words]
-        if "--budget" not in words and "--no-local-search" not in words:
+        if "--budget" not in words and "fasaco" not in words:
             words += ["--budget", "0.05"]
         assert main(["plan", *words, "--json", "--path-out", str(csv)]) == 0
         figures = json.loads(capsys.readouterr().out)
@@ -126,10 +126,10 @@ def cells_in(file):
 
 def test_the_figures_of_a_coverage_grid_are_right(plan, grid_file):
     options = ("--start", "2,5", "--ants", 40, "--seed", 3)
-    figures, walk = plan(grid_file, *options, "--no-local-search")
+    figures, walk = plan(grid_file, *options, "--planner", "fasaco")
     assert set(figures) == KEYS
     assert (figures["planner"], figures["seed"], figures["ants"]) == ("fasaco", 3, 40)
-    assert (figures["local_search"], figures["kicks"], figures["proposals"]) == (False, 0, 0)
+    assert (figures["kicks"], figures["proposals"]) == (0, 0)
     # Its cells are all there is of it.
     assert figures["floor"] is None
     check(figures, walk, cells_in(grid_file), (2, 5))
@@ -282,7 +282,7 @@ def test_a_map_gets_a_floor_line_unless_a_paper_planner_runs(plan, grid_file):
         words: plan(*words)[0]["line"]
         for words in (
             ("office",),
-            ("office", "--no-local-search", "--ants", "8"),
+            ("office", "--planner", "fasaco", "--ants", "8"),
             ("office", "--planner", "zigzag"),
             (str(grid_file),),
         )
@@ -297,7 +297,7 @@ def test_a_plan_is_for_the_robot_of_a_configuration(plan, tmp_path):
     file = tmp_path / "robot.yaml"
     file.write_text(
         "robot: {tool_width_m: 0.36, radius_m: 0.2, speed_m_s: 0.4, turn_deg_s: 60, overlap: 0.1}\n"
-        "planner: {line: quick, name: fasaco, ants: 50, seed: 9, tau0: 0.2}\n"
+        "planner: {line: quick, name: colony-search, ants: 50, seed: 9, tau0: 0.2}\n"
     )
     figures, _ = plan("office", "--config", file)
     assert (figures["line"], figures["seed"], figures["budget_s"]) == ("quick", 9, 0.05)
@@ -386,7 +386,7 @@ def test_without_a_start_the_larger_area_is_covered(plan, grid_file):
 def test_the_same_seed_gives_the_same_walk(plan):
     # Without a budget: where the clock ends a search, a busy computer gives another walk.
     (_, first), (_, again), (_, other) = (
-        plan("office", "--ants", 30, "--seed", seed, "--no-local-search") for seed in (5, 5, 6)
+        plan("office", "--ants", 30, "--seed", seed, "--planner", "fasaco") for seed in (5, 5, 6)
     )
     assert first == again
     assert first != other
@@ -401,7 +401,7 @@ def test_return_home_ends_at_the_start(plan, grid_file):
 
 def test_return_home_is_short_for_an_end_at_home(plan, grid_file):
     # The colony alone, which no clock ends: a busy machine gives each the same work.
-    options = ("--start", "8,0", "--ants", 40, "--no-local-search")
+    options = ("--start", "8,0", "--ants", 40, "--planner", "fasaco")
     _, short = plan(grid_file, *options, "--return-home")
     _, long = plan(grid_file, *options, "--end", "home")
     _, cell = plan(grid_file, *options, "--end", "8,0")
@@ -425,7 +425,7 @@ def test_anywhere_is_where_a_walk_ends_unless_asked(plan, grid_file):
 def test_turns_cost_what_they_take(plan, grid_file):
     cells = cells_in(grid_file)
     # Of ants alone: what a local search comes to in its time depends on the machine.
-    options = ("--ants", 400, "--velocities", 1, "--seed", 2, "--no-local-search")
+    options = ("--ants", 400, "--velocities", 1, "--seed", 2, "--planner", "fasaco")
     robot = ("--speed-m-s", 0.5, "--turn-s", 4)
     plain, walk = plan(grid_file, *options)
     check(plain, walk, cells, (0, 0))
@@ -508,7 +508,7 @@ def test_limits_are_those_of_the_configuration(name):
 
 def test_a_budget_ends_the_search_with_a_whole_walk(plan, grid_file):
     options = ("--ants", 1_000_000, "--budget", 0.05)
-    figures, walk = plan(grid_file, *options, "--no-local-search")
+    figures, walk = plan(grid_file, *options, "--planner", "fasaco")
     check(figures, walk, cells_in(grid_file), (0, 0))
     assert figures["ants"] < 1_000_000
     assert figures["ended_by"] == "budget"
@@ -527,7 +527,7 @@ def test_a_budget_ends_the_search_with_a_whole_walk(plan, grid_file):
 
 def test_a_target_gap_ends_the_search_at_the_first_good_walk(plan, grid_file):
     options = ("--start", "0,0", "--seed", 1, "--velocities", 1, "--visibility", "fewest-open")
-    options += ("--no-local-search",)
+    options += ("--planner", "fasaco")
     whole, _ = plan(grid_file, *options, "--ants", 4000)
     figures, walk = plan(grid_file, *options, "--ants", 4000, "--target-gap", whole["gap"])
     check(figures, walk, cells_in(grid_file), (0, 0))
@@ -559,7 +559,7 @@ def test_a_picture_is_a_png_whatever_its_name(grid_file, tmp_path, capsys, name)
         assert min(image.size) > 100
 
 
-@pytest.mark.parametrize("words", [("--budget", "0.05"), ("--no-local-search", "--ants", "16")])
+@pytest.mark.parametrize("words", [("--budget", "0.05"), ("--planner", "fasaco", "--ants", "16")])
 def test_the_trail_of_the_colony_is_drawn(plan, tmp_path, words):
     file = tmp_path / "trail.png"
     plan("office", *words, "--pheromone-png", file)

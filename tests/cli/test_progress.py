@@ -51,7 +51,7 @@ def recording(tmp_path):
     ("words", "shown", "first_line"),
     [
         (PLAN, "steps, [0-9.]+% above the bound ", "┌──.*"),
-        (("plan", "flat", "--ants", "40", "--no-local-search"), "ants ━* +0/40 ", "┌──.*"),
+        (("plan", "flat", "--ants", "40", "--planner", "fasaco"), "ants ━* +0/40 ", "┌──.*"),
         ((*PLAN, "--robots", "1,1", "2,2"), "steps ━", "┌──.*"),
         (("warmup",), "looking at the kernels ", "kernels ready after [0-9.]+ s in .*"),
         (

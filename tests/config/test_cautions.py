@@ -35,6 +35,8 @@ def said(**sections):
             "robot.quarter_turn_s has no effect beside robot.turn_deg_s",
         ),
         ({"robot": {"steered_deg": 5.0}}, "robot.steered_deg has no effect"),
+        ({"planner": {"name": "colony-search"}}, ""),
+        ({"planner": {"name": "fasaco"}}, "planner.name fasaco is the paper's colony"),
         ({"scan": {"x_m": 0.1}}, ""),
         ({"scan": {"x_m": 3.0, "y_m": 4.0}}, "the lidar is 5 m from the robot's middle"),
         (

@@ -79,12 +79,27 @@ def test_every_section_is_read(load):
     assert config.keys().prefix == "site/north/@v1/mower-2"
 
 
-def test_a_removed_key_is_an_error_that_says_what_to_do(load):
+COLONY_SEARCH = (
+    "for true write name: colony-search, or leave the name out; for false write name: fasaco"
+)
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "why", "hint"),
+    [
+        (
+            *("own", "lab.mine:Deep", "the daemon plans with its own planners only"),
+            "delete the key; `fasaco-edge plan --planner MODULE:NAME`",
+        ),
+        ("local_search", "true", "each planner has a name of its own", COLONY_SEARCH),
+        ("local_search", "false", "each planner has a name of its own", COLONY_SEARCH),
+    ],
+)
+def test_a_removed_key_is_an_error_that_says_what_to_do(load, key, value, why, hint):
     with pytest.raises(BadConfiguration) as caught:
-        load("planner:\n  name: zigzag\n  own: lab.mine:Deep\n")
-    assert "line 3: planner.own was removed" in str(caught.value)
-    assert "the daemon plans with its own planners only" in str(caught.value)
-    assert "delete the key; `fasaco-edge plan --planner MODULE:NAME`" in caught.value.hint
+        load(f"planner:\n  name: zigzag\n  {key}: {value}\n")
+    assert f"line 3: planner.{key} was removed in this version, {why}" in str(caught.value)
+    assert hint in caught.value.hint
 
 
 def test_a_removed_key_without_a_value_is_ignored(load):

@@ -125,7 +125,7 @@ def test_encoding_and_attachment_say_what_it_is(path):
     assert note["map_stamp_ns"] == 12_000_000_034
     assert note["reason"] == "first plan"
     assert note["steps"] == len(points) - 1
-    assert (note["planner"], note["seed"]) == ("fasaco", 0)
+    assert (note["planner"], note["seed"]) == ("colony-search", 0)
     assert note["ants"] > 0
     assert note["proposals"] > 0
     least_s = note["lower_bound_cost_s"]

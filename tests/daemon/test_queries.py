@@ -22,7 +22,7 @@ from tests.support.processes import daemon_process
 from tests.support.rooms import map_bytes, pillared_room, pose_bytes
 from tests.support.waiting import until
 
-ANTS = {"local_search": False, "ants": 24, "velocities": "8,4,1", "budget_s": 2.0}
+ANTS = {"name": "fasaco", "ants": 24, "velocities": "8,4,1", "budget_s": 2.0}
 
 
 def get(outsider: Outsider, name: str, payload: bytes | None = None) -> list[zenoh.Reply]:

@@ -46,7 +46,7 @@ def breaking(tmp_path, monkeypatch):
     monkeypatch.setattr(processes, "PROGRAM", program)
     # Pheromone is of full plans by the colony alone.
     with (
-        daemon_process(tmp_path, planner={"local_search": False}) as running,
+        daemon_process(tmp_path, planner={"name": "fasaco"}) as running,
         Outsider(running.endpoint) as client,
     ):
         yield running, client

@@ -11,7 +11,7 @@ from tests.deploy.robots import robot, swept_m2
 from tests.deploy.service import Service, wait_for
 from tests.support.processes import STOP_S
 
-ENDLESS = {"ants": 1_000_000, "budget_s": 3600.0, "local_search": False}
+ENDLESS = {"ants": 1_000_000, "budget_s": 3600.0, "name": "fasaco"}
 
 
 def test_a_hang_is_ended_and_the_mission_goes_on(service: Service):

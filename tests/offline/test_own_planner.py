@@ -115,10 +115,10 @@ def test_bench_has_it_as_a_row_beside_the_others(mine, capsys):
     assert main(["bench", "planners", "--planner", f"{mine}:depth_first", *words]) == 0
     (grid,) = json.loads(capsys.readouterr().out)["grids"]
     rows = {row["planner"]: row for row in grid["rows"]}
-    assert list(rows) == ["mine.py:depth_first", "fasaco + search", *PLANNER_NAMES]
+    assert list(rows) == ["mine.py:depth_first", *PLANNER_NAMES]
     # There and back along a tree over 20 cells; a closed walk over them.
     assert rows["mine.py:depth_first"]["steps"]["median"] == 38
-    assert rows["fasaco + search"]["steps"]["median"] == grid["bound_steps"] == 20
+    assert rows["colony-search"]["steps"]["median"] == grid["bound_steps"] == 20
     assert all(row["runs"] == 2 for row in rows.values())
     mine.write_text("def depth_first(problem):\n    return [problem.start]\n")
     assert main(["bench", "planners", "--planner", f"{mine}:depth_first", *words]) == 1

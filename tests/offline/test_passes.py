@@ -98,7 +98,7 @@ def test_a_slow_pass_takes_longer():
     [
         ("--passes cross", r"--passes\[0\]: cross goes after a pass with lanes"),
         ("--passes auto@2", "a pass at 2 m/s is faster than the robot, 0.25 m/s"),
-        ("--passes auto --no-local-search", "--passes: only the search has passes"),
+        ("--passes auto --planner fasaco", "--passes: only colony-search has passes"),
         ("--passes auto --pheromone-png p.png", "leave no single trail"),
         ("--passes auto --robots 0,0 1,1", "--passes is for one robot"),
         ("--passes 30deg --line cells", "the centres of cells lie along the axes"),
@@ -118,8 +118,8 @@ def test_a_pass_that_is_none_is_a_usage_error(capsys):
 
 
 def test_lanes_need_the_search():
-    with pytest.raises(BadConfiguration, match="only the search has a direction"):
-        fe.plan(fe.load_map("office"), lanes="rows", search=fe.Search(local_search=False))
+    with pytest.raises(BadConfiguration, match="only colony-search has a direction"):
+        fe.plan(fe.load_map("office"), lanes="rows", search=fe.Search(planner="fasaco"))
     for options in ({"lanes": "up"}, {"covers": "half"}):
         with pytest.raises(BadConfiguration, match=next(iter(options))):
             fe.plan(fe.load_map("office"), **options)

@@ -24,7 +24,7 @@ ROOT = Path(__file__).parents[2]
 )
 QUICK = fe.Search(budget_s=0.05)
 # Without local search no clock decides.
-COLONY = fe.Search(local_search=False, ants=64, seed=3)
+COLONY = fe.Search(planner="fasaco", ants=64, seed=3)
 
 
 def test_each_example_of_the_guide_runs(tmp_path):
@@ -55,7 +55,7 @@ def test_each_example_of_the_guide_runs(tmp_path):
 
 def test_a_plan_is_that_of_the_command(tmp_path, capsys):
     walk, line = tmp_path / "walk.csv", tmp_path / "line.csv"
-    words = ["--no-local-search", "--ants", "64", "--seed", "3", "--line", "quick", "--json"]
+    words = ["--planner", "fasaco", "--ants", "64", "--seed", "3", "--line", "quick", "--json"]
     files = ["--path-out", str(walk), "--xy-out", str(line)]
     assert main(["plan", "office", *words, *files]) == 0
     told = json.loads(capsys.readouterr().out)
@@ -173,7 +173,6 @@ def test_what_is_of_another_kind_is_named(words, said):
         ({"budget_s": "1"}, "budget_s must be a number, got 1"),
         ({"threads": None}, "threads must be a whole number, got None"),
         ({"velocities": 4}, "velocities must be a text, got 4"),
-        ({"local_search": "no"}, "local_search must be True or False, got no"),
     ],
 )
 def test_a_search_s_members_have_their_kinds(words, said):

@@ -110,7 +110,7 @@ def test_the_better_of_two_walks_goes_on_with_its_line(monkeypatch, better):
 def test_pheromone_is_shown_while_ants_alone_walk():
     ground = Ground.of_floor(room(0), ROBOT, (0.5, 0.5), WALLS)
     problem = _problem(ground, ROBOT, ANYWHERE)
-    search = fe.Search(local_search=False, ants=64)
+    search = fe.Search(planner="fasaco", ants=64)
     shown = []
     ending = Ending(search, None, None, lambda _: shown.append("walk"), lower_bound_of(problem))
     Planning(problem, ground, search, None, ending, lambda _: shown.append("ants")).run(

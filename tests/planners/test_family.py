@@ -6,17 +6,20 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from fasaco_edge.grid.lattice import CoverageLattice
-from fasaco_edge.planners.cost import CoverageCost
+from fasaco_edge.planners.cost import CoverageCost, SearchWork
 from fasaco_edge.planners.paper.baselines import spiral_stc, stc, zigzag
 from fasaco_edge.planners.paper.colony import ColonyConfig
 from fasaco_edge.planners.paper.fasaco import Fasaco
 from fasaco_edge.planners.path import walk_figures
-from fasaco_edge.planners.planner import ignore, never
+from fasaco_edge.planners.planner import WorkLimit, ignore, never
 from fasaco_edge.planners.problem import CoverageProblem
 from fasaco_edge.planners.registry import PLANNER_NAMES, planner_of
 from tests import naive
 from tests.support.examples import examples
 from tests.support.grids import ENDS, ROOMS, assert_answers, end_of, lattice, problems, reference
+
+# Ends the local search, which else goes on for long; the paper's planners make no proposals.
+ENOUGH = WorkLimit(SearchWork(proposals=20_000))
 
 
 @pytest.mark.parametrize("name", PLANNER_NAMES)
@@ -36,7 +39,7 @@ def test_every_planner_covers_all_and_ends_where_asked(name, ground, end, turn_s
     cost = CoverageCost(1.2, turn_s)
     problem = CoverageProblem.of(lattice, start, covered=done, end=end, cost=cost)
     planner = planner_of(name, ColonyConfig(ants=8, seed=seed))
-    path = planner.plan(problem, never, ignore)
+    path = planner.plan(problem, ENOUGH, ignore)
     assert path.planner == name
     assert_answers(problem, path)
 

@@ -133,7 +133,7 @@ from fasaco_edge.planners.stages import stages_of_plan
 from fasaco_edge.planners.warmup import TinyRoom, run_stage
 from tests.planners.test_warmup import compiled_signatures
 room = TinyRoom()
-for stage in stages_of_plan("fasaco"):
+for stage in stages_of_plan("colony-search"):
     run_stage(stage, room)
 before = compiled_signatures()
 fe.plan(fe.load_map("flat"))
@@ -143,7 +143,7 @@ print(*sorted(compiled_signatures() - before))
 
 def test_a_plan_needs_no_more_than_its_stages():
     """They are compiled first, so that the first plan comes soon."""
-    assert set(stages_of_plan("fasaco")) < set(STAGES)
+    assert set(stages_of_plan("colony-search")) < set(STAGES)
     words = [sys.executable, "-c", PLAN]
     done = subprocess.run(words, env=ENVIRONMENT, capture_output=True, text=True, check=False)
     assert (done.stdout, done.stderr) == ("\n", "")

@@ -18,7 +18,9 @@ import yaml
 
 from fasaco_edge.cli import main
 from fasaco_edge.config.loading import load_config
+from fasaco_edge.config.reading import renamed
 from fasaco_edge.daemon.ledger.file import LedgerFile
+from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.wire.documents.path_documents import digest
 
 pytest.importorskip("rerun")
@@ -152,8 +154,41 @@ def test_a_ledger_is_restored(tmp_path):
     assert (order["stage"], order["paused"], order["home"]) == ("covering", False, [2, 2])
 
 
-def test_a_configuration_is_read():
-    path = DATA / "config.yaml"
+@pytest.mark.parametrize(
+    ("name", "flag", "now"),
+    [
+        ("fasaco", True, "colony-search"),
+        ("fasaco", False, "fasaco"),
+        ("fasaco", None, "fasaco"),
+        ("zigzag", True, "zigzag"),
+    ],
+)
+def test_a_recorded_planner_has_its_present_name(name, flag, now):
+    planner = {"name": name, "seed": 3} | ({} if flag is None else {"local_search": flag})
+    config = {"robot": {"name": "r1"}, "planner": planner}
+    assert renamed(config) == {"robot": {"name": "r1"}, "planner": {"name": now, "seed": 3}}
+    assert RecordedRun(config).daemon_config().planner.name == now
+
+
+def test_a_recording_names_the_planner_of_its_mission(recording, capsys):
+    samples = RecordedSamples([Path(recording)])
+    run = read_run(samples)
+    assert (run.config["planner"]["name"], run.config["planner"]["local_search"]) == (
+        "fasaco",
+        True,
+    )
+    assert run.daemon_config().planner.name == "colony-search"
+    config = printed(capsys, "review", recording)["config"]
+    assert config["planner.name"] == "colony-search"
+    assert "planner.local_search" not in config
+
+
+def test_a_configuration_is_read_but_for_a_removed_key(tmp_path):
+    old, path = DATA / "config.yaml", tmp_path / "config.yaml"
+    with pytest.raises(BadConfiguration, match=r"line 23: planner\.local_search was removed"):
+        load_config(old)
+    text = old.read_text(encoding="utf-8")
+    path.write_text(text.replace("name: fasaco, local_search: true", "name: colony-search"))
     written = yaml.safe_load(path.read_text(encoding="utf-8"))
     read = msgspec.json.decode(msgspec.json.encode(load_config(path)))
     assert missing_in(read, written) == []

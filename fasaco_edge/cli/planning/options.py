@@ -17,9 +17,7 @@ from fasaco_edge.offline.settings import (
     CELLS,
     HOME,
     PAPER_Q0,
-    PAPER_VISIBILITY,
     SEARCH_Q0,
-    SEARCH_VISIBILITY,
     THOROUGH,
     WALLS,
     Search,
@@ -41,7 +39,7 @@ your building and robot:
   fasaco-edge plan office --turn-s 2 --budget 0.1 --end 12,3
   fasaco-edge plan office --robots 0,0 10,5 5,8 --end home --png fleet.png
 the paper's planners, and your own:
-  fasaco-edge plan basement --no-local-search --seed 7 --pheromone-png trail.png
+  fasaco-edge plan basement --planner fasaco --seed 7 --pheromone-png trail.png
   fasaco-edge plan grid.npy --start 8,8 --planner aco --end home --path-out path.csv
   fasaco-edge plan site.yaml --line cells --path-out path.csv
   fasaco-edge plan office --planner mine.py:depth_first --png mine.png
@@ -81,15 +79,16 @@ figures of several robots:
   rounds           pieces of the search, of all areas: of its annealing and, where turns
                    take time, of sharing two robots' walks anew
 
-fasaco searches until its budget ends, the walk is proven optimal, or all ants have
-walked: a complete walk within milliseconds, then better ones by local search, restarted
-from walks of the colony's ants (up to 8,000 cells; larger maps have local search only).
+colony-search searches until its budget ends, the walk is proven optimal, or nothing is
+gained for long: a complete walk within milliseconds, then better ones by local search.
+Perturbations lead it on, and in every second one ants rebuild a part of the walk.
 A line over the floor is laid along each of two walks, if the budget allows. What is left of
 the budget goes to the better line: each stage of its search takes twice as long as the one
 before. A larger budget gives no worse line, by its seconds and the price of floor that it
 leaves.
---no-local-search is the paper's colony alone. The colony's options apply to fasaco; aco
-takes all but the velocities, the other planners none; a planner of your own gets the seed.
+The colony's options apply to fasaco; aco takes all but the velocities, colony-search all
+but ants, visibility and threads, the other planners none; a planner of your own gets the
+seed.
 """
 
 ROBOT, SEARCH = RobotConfig(), Search()
@@ -142,7 +141,7 @@ def _add_problem(group: argparse._ArgumentGroup) -> None:
         metavar="R,C",
         help="start cells of several robots that share the floor: one walk each, the longest as "
         "short as possible; the walks are not timed against each other: robots that drive them "
-        "have to avoid one another. By fasaco with local search, through the centres of cells; "
+        "have to avoid one another. By colony-search, through the centres of cells; "
         "without --align, --overlap, --target-gap and --pheromone-png",
     )
     start.add_argument(
@@ -227,7 +226,7 @@ def _add_line(group: argparse._ArgumentGroup) -> None:
         help="cells: through the centres of the cells, as the paper's planners do; quick, "
         "thorough: off the centres where walls require it, and optimised for the floor that it "
         "sweeps, a square metre being worth 60 or 180 s; needs a YAML map (default: thorough; "
-        "cells for .npy grids, several robots, and planners without local search)",
+        "cells for .npy grids, several robots, and planners other than colony-search)",
     )
     group.add_argument(
         "--overlap",
@@ -270,15 +269,14 @@ def _add_planner(group: argparse._ArgumentGroup) -> None:
     group.add_argument(
         "--q0",
         type=float,
-        help=f"equation (4)'s threshold (default: {SEARCH_Q0}; {PAPER_Q0} without local search)",
+        help=f"equation (4)'s threshold (default: {SEARCH_Q0}; {PAPER_Q0} for fasaco and aco)",
     )
     group.add_argument(
         "--visibility",
         choices=VISIBILITIES,
         help="eta of equation (5) is the inverse of: the distance to the neighbour (1, as in the "
         "paper); the distance that an ant goes in this move; the neighbour's number of open "
-        "neighbours "
-        f"(default: {SEARCH_VISIBILITY}; {PAPER_VISIBILITY} without local search)",
+        f"neighbours (default: {SEARCH.visibility})",
     )
     for name, what in (
         ("beta", "weight of visibility"),
@@ -301,14 +299,11 @@ def _add_planner(group: argparse._ArgumentGroup) -> None:
         f"{SEARCH.threads})",
     )
     group.add_argument(
-        "--no-local-search", action="store_true", help="the paper's colony alone, no time budget"
-    )
-    group.add_argument(
         "--budget",
         type=float,
         metavar="S",
         help="time for the search of walks and of the line along one [s]; a first walk and line "
-        f"are always finished (default: {BUDGET_S:g}; none without local search)",
+        f"are always finished (default: {BUDGET_S:g}; none by planners other than colony-search)",
     )
     group.add_argument(
         "--swept",
@@ -348,7 +343,7 @@ def _add_output(group: argparse._ArgumentGroup) -> None:
         type=Path,
         metavar="FILE",
         help="write a picture of the trail that the colony leaves: where it points to from each "
-        "cell, and how decided it is (fasaco and aco)",
+        "cell, and how decided it is (colony-search, fasaco and aco)",
     )
     add_json(group, "the figures")
 

@@ -33,9 +33,9 @@ def plan_in_passes(args: argparse.Namespace, request: PlanRequest) -> int:
     """
     search = request.search
     check_passes(args.passes, "--passes")
-    if request.own or not search.has_local_search:
+    if not search.has_local_search:
         raise BadConfiguration(
-            "--passes: only the search has passes", hint="plan with local search, by fasaco"
+            "--passes: only colony-search has passes", hint="leave --planner out"
         )
     if args.pheromone_png:
         raise BadConfiguration("--pheromone-png: several passes leave no single trail")

@@ -17,7 +17,7 @@ from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.config.loading import load_config
 from fasaco_edge.config.robot import RobotConfig
 from fasaco_edge.errors import BadConfiguration
-from fasaco_edge.offline.settings import CELLS, Search, default_line, require
+from fasaco_edge.offline.settings import CELLS, LIKE_OWN, Search, default_line, require
 from fasaco_edge.planners.own.loading import UserCode, load
 from fasaco_edge.planners.planner import SearchProgress
 
@@ -155,10 +155,8 @@ def read_request(args: argparse.Namespace) -> PlanRequest:
     config = None if args.config is None else load_config(args.config)
     given, own = _given(args, SEARCH_OPTIONS), None
     if ":" in given.get("planner", ""):
-        own = load(given.pop("planner"))
+        own, given["planner"] = load(given["planner"]), LIKE_OWN
     search = replace(_search(config), **given)
-    if args.no_local_search or own:
-        search = replace(search, local_search=False)
     has_floor = not (args.robots or args.robots_xy) and Path(args.map).suffix != ".npy"
     line = args.line or default_line(search, has_floor=has_floor)
     if args.line is None and config is not None and line != CELLS:

@@ -76,7 +76,7 @@ class Loader:
         stages = stages_of_mission(planner.name, has_fleet=has_fleet, has_curves=has_curves)
         warm_up(self._report, stages)
         release_unused()
-        chosen = planner_of(planner.name, planner.colony(), planner.threads, planner.local_search)
+        chosen = planner_of(planner.name, planner.colony(), planner.threads)
         worker = PlanningWorker(chosen, planner.budget_s, self._mailbox.post)
         first = (
             OrderState.autostart() if self._config.mission.autostart else OrderState.idle(NO_ORDER)

@@ -78,10 +78,9 @@ def _check(args: argparse.Namespace, request: PlanRequest) -> None:
             f"--end {args.end[0]},{args.end[1]}: several robots cannot end in one cell",
             hint="choose --end anywhere or --end home",
         )
-    if not search.has_local_search or search.planner != "fasaco":
+    if not search.has_local_search:
         raise BadConfiguration(
-            "several robots are planned for by fasaco with local search",
-            hint="leave --planner and --no-local-search out",
+            "several robots are planned for by colony-search", hint="leave --planner out"
         )
     if request.line != CELLS:
         raise BadConfiguration(

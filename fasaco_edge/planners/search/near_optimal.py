@@ -1,4 +1,4 @@
-"""Planner of missions: FaSACO with local search, and repair of an existing walk.
+"""The planner colony-search: local search with ants, and repair of an existing walk.
 
 ``search`` finds a walk, ``repair`` repairs one.
 """
@@ -54,7 +54,7 @@ class NearOptimal:
     config: ColonyConfig = field(default_factory=ColonyConfig)
     threads: int = 1
     has_ants: bool = True
-    name: str = "fasaco"
+    name: str = "colony-search"
 
     def plan(
         self,

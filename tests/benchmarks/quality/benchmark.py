@@ -277,8 +277,8 @@ def _at(end: str) -> str:
 QUALITY = Benchmark(
     name="quality",
     summary="how near plans of so much time come to the best known walks",
-    description="Plan with FaSACO and local search on each grid, with each budget and seed, "
-    "kernels warm, on one thread; judge every walk by code that shares nothing with the "
+    description="Plan with colony-search on each grid, with each budget and seed, kernels "
+    "warm, on one thread; judge every walk by code that shares nothing with the "
     "planner, and compare it with the best walk known, the search's own lower bound, and the "
     "best of other planners by mission time. Reads: medians over the seeds, and below them the "
     "worst; a ratio of 1.005 is half a percent above the best known, one below 1 better than "

@@ -140,7 +140,7 @@ SCALE = Benchmark(
     name="scale",
     summary="how time, memory and quality of a plan grow with the building",
     description="Make synthetic buildings (rooms, corridors, furniture) of several sizes and plan "
-    "on each with FaSACO and local search, for steps alone, in a process of its own, kernels "
+    "on each with colony-search, for steps alone, in a process of its own, kernels "
     "warm, on one thread; judge every walk by code that shares nothing with the planner. Reads: "
     "how soon there is a complete walk, how soon one that is proven to be at most 5 or 3 % "
     "longer than the shortest, how near it comes in the end, and how much memory that takes; an "

@@ -51,9 +51,7 @@ class LockStepPlanning:
     """
 
     def __init__(self, config: PlannerConfig) -> None:
-        self.planner: CoveragePlanner = planner_of(
-            config.name, config.colony(), config.threads, config.local_search
-        )
+        self.planner: CoveragePlanner = planner_of(config.name, config.colony(), config.threads)
         self.plans = 0
         self._budget_s = config.budget_s
         # The plan that is under way, and when it is there [s].
