@@ -120,12 +120,13 @@ class CompilerProcess:
     def lines(self) -> Iterator[tuple[str, str]]:
         """Yield stages and reasons until it ends; log its warnings."""
         assert self._process.stdout is not None
-        for line in self._process.stdout:
-            word, _, text = line.rstrip("\n").partition("\t")
-            if word == WARNING:
-                LOG.warning("%s", text)
-            else:
-                yield word, text
+        with self._process.stdout as lines:
+            for line in lines:
+                word, _, text = line.rstrip("\n").partition("\t")
+                if word == WARNING:
+                    LOG.warning("%s", text)
+                else:
+                    yield word, text
 
     def has_ended(self) -> bool:
         """Return whether it has ended."""
