@@ -11,7 +11,13 @@ from numpy.typing import NDArray
 from fasaco_edge.config.robot import RobotConfig
 from fasaco_edge.errors import MapFileError
 from fasaco_edge.grid.lattice import Cell, CoverageLattice, Footprint
-from fasaco_edge.grid.map_files import find_map, read_bare_image, read_coverage_grid, read_map
+from fasaco_edge.grid.map_files import (
+    OF_A_GRID,
+    find_map,
+    read_bare_image,
+    read_coverage_grid,
+    read_map,
+)
 from fasaco_edge.grid.occupancy import FREE, UNKNOWN, OccupancyGrid
 from fasaco_edge.planners.grids import start_cell
 from fasaco_edge.text import shown
@@ -47,7 +53,7 @@ class Map:
 
     def start(self, lattice: CoverageLattice) -> Cell:
         """Return the default start, see ``planners.grids.start_cell``."""
-        return start_cell(lattice, self.file or Path(self.name))
+        return start_cell(lattice, self.file or Path(self.name), self.grid)
 
 
 def load_map(
@@ -72,14 +78,16 @@ def load_map(
         _without_pixels("the array", resolution_m, unknown_free)
         if source.dtype != np.bool_ or source.ndim != 2 or not source.size:
             raise MapFileError(
-                f"a coverage grid is bool (rows, cols), got {source.dtype} {source.shape}"
+                f"a coverage grid is bool (rows, cols), got {source.dtype} {source.shape}",
+                hint=OF_A_GRID,
             )
         free = source.copy()
         free.setflags(write=False)
         return Map("array", free=free)
     if not isinstance(source, str | Path):
         raise MapFileError(
-            f"a map is a file, the name of a built-in one or a NumPy array, got {shown(source)}"
+            f"a map is a file, the name of a built-in one or a NumPy array, got {shown(source)}",
+            hint="give a str, a Path or a bool array (rows, cols)",
         )
     file = find_map(source)
     if file.suffix == ".npy":
