@@ -23,7 +23,7 @@ from fasaco_edge.planners.grids import start_cell
 from fasaco_edge.text import shown
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Map:
     """Input map of a plan.
 
@@ -38,6 +38,15 @@ class Map:
     grid: OccupancyGrid | None = None
     free: NDArray[np.bool_] | None = None
     file: Path | None = None
+
+    def __repr__(self) -> str:
+        """Return the map in one line, without its pixels."""
+        if self.grid is not None:
+            rows, cols = self.grid.cells.shape
+            return f"<Map {self.name}: {rows} x {cols} pixels of {self.grid.geometry.resolution} m>"
+        assert self.free is not None
+        rows, cols = self.free.shape
+        return f"<Map {self.name}: {rows} x {cols} cells>"
 
     def lattice(self, robot: RobotConfig) -> CoverageLattice:
         """Return the lattice of cells as wide as the robot's tool.

@@ -221,7 +221,7 @@ class Planning:
         search, bound = self._search, self._ending.bound
         colony, has_local_search = replace(search.colony(), seed=seed), search.has_local_search
         planner: CoveragePlanner = (
-            OwnPlanner(self._own, seed)
+            OwnPlanner(self._own, seed, search.most_s)
             if self._own
             else planner_of(search.planner, colony, search.threads, has_local_search)
         )

@@ -308,7 +308,8 @@ def _add_planner(group: argparse._ArgumentGroup) -> None:
         type=float,
         metavar="S",
         help="time for the search of walks and of the line along one [s]; a first walk and line "
-        f"are always finished (default: {BUDGET_S:g}; none without local search)",
+        f"are always finished, a planner of your own is ended (default: {BUDGET_S:g}; none without "
+        "local search)",
     )
     group.add_argument(
         "--swept",
