@@ -9,7 +9,8 @@ from fasaco_edge.offline.settings import CELLS
 from fasaco_edge.planners.cost import count_turns
 
 if TYPE_CHECKING:
-    from fasaco_edge.offline.result import Plan
+    from fasaco_edge.offline.passes import PassPlans
+    from fasaco_edge.offline.result import Plan, PlannedFloor
 
 Rows = list[tuple[str, str]]
 
@@ -32,11 +33,8 @@ def rows_of(plan: Plan) -> Rows:
     metres, turns, seconds, gap = _drive(plan)
     path, floor = plan.path, plan.floor
     rows = [("map", f"{plan.map.name}, {plan.problem.cells} cells of {_metres(plan)}")]
-    if floor is not None and floor.swept_share is not None:
-        swept = f"{share_words(floor.swept_share)} of {floor.reachable_m2:,.1f} m2"
-        rows.append(("swept", f"{swept}; {_left(plan)}"))
-    elif floor is not None:
-        rows.append(("swept", "no floor is reachable"))
+    if floor is not None:
+        rows.append(("swept", _swept(floor)))
     time = duration(seconds)
     if floor is not None and floor.seconds_per_m2 is not None:
         time += f", {floor.seconds_per_m2:.1f} s a square metre"
@@ -56,6 +54,18 @@ def rows_of(plan: Plan) -> Rows:
     if count := int(plan.problem.unreachable.sum()):
         rows.append(("not reached", f"{count} cells that no walk from the start leads to"))
     rows.append(("search", f"{plan.wall_s:.1f} s, ended by {plan.ended_by}"))
+    return rows
+
+
+def rows_of_passes(plans: PassPlans) -> Rows:
+    """Return the same of several passes together."""
+    first, floor = plans.plans[0], plans.floor
+    metres = sum(_drive(plan)[0] for plan in plans.plans)
+    rows = [("map", f"{first.map.name}, {first.problem.cells} cells in the first pass")]
+    if floor is not None:
+        rows.append(("swept", _swept(floor)))
+    rows.append(("time", duration(sum(_drive(plan)[2] for plan in plans.plans))))
+    rows.append(("line", f"{metres:,.1f} m in {len(plans.plans)} passes"))
     return rows
 
 
@@ -83,11 +93,13 @@ def _metres(plan: Plan) -> str:
     return f"{plan.ground.lattice.cell_m:g} m" + (f" at {deg:g} degrees" if deg else "")
 
 
-def _left(plan: Plan) -> str:
-    """Return what the line leaves, in words."""
-    assert plan.floor is not None
-    count, largest = plan.floor.patches_over_4_dm2, plan.floor.largest_patch_m2
-    if not count:
-        return "no patch over 4 dm2 left"
-    patches = "1 patch" if count == 1 else f"{count} patches"
-    return f"{patches} over 4 dm2 left, the largest {largest:,.2f} m2"
+def _swept(floor: PlannedFloor) -> str:
+    """Return what a line sweeps and leaves, in words."""
+    if floor.swept_share is None:
+        return "no floor is reachable"
+    count = floor.patches_over_4_dm2
+    left = "no patch over 4 dm2 left"
+    if count:
+        patches = "1 patch" if count == 1 else f"{count} patches"
+        left = f"{patches} over 4 dm2 left, the largest {floor.largest_patch_m2:,.2f} m2"
+    return f"{share_words(floor.swept_share)} of {floor.reachable_m2:,.1f} m2; {left}"

@@ -50,9 +50,9 @@ def recording(tmp_path):
 @pytest.mark.parametrize(
     ("words", "shown", "first_line"),
     [
-        (PLAN, "steps, [0-9.]+% above the bound ", "┌──.*"),
-        (("plan", "flat", "--ants", "40", "--no-local-search"), "ants ━* +0/40 ", "┌──.*"),
-        ((*PLAN, "--robots", "1,1", "2,2"), "steps ━", "┌──.*"),
+        (PLAN, "steps, [0-9.]+% above the bound ", "map +.*"),
+        (("plan", "flat", "--ants", "40", "--no-local-search"), "ants ━* +0/40 ", "map +.*"),
+        ((*PLAN, "--robots", "1,1", "2,2"), "steps ━", "map +.*"),
         (("warmup",), "looking at the kernels ", "kernels ready after [0-9.]+ s in .*"),
         (
             ("bench", "latency", "--samples", "2"),

@@ -130,6 +130,16 @@ def figures(rows: Iterable[tuple[str, str]]) -> Table:
     return table
 
 
+def summary(rows: Iterable[tuple[str, str]]) -> Table:
+    """Return names and words of a few figures, without lines between them."""
+    table = Table(show_header=False, box=None, padding=(0, 2, 0, 0))
+    table.add_column(style="cyan", no_wrap=True)
+    table.add_column()
+    for name, words in rows:
+        table.add_row(name, words)
+    return table
+
+
 def may_ask() -> bool:
     """Return whether a person can read a question, and answer it."""
     return sys.stdin.isatty() and sys.stderr.isatty()

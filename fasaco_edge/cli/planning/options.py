@@ -351,7 +351,10 @@ def _add_output(group: argparse._ArgumentGroup) -> None:
         help="write a picture of the trail that the colony leaves: where it points to from each "
         "cell, and how decided it is (fasaco and aco)",
     )
-    add_json(group, "the figures")
+    group.add_argument(
+        "--long", action="store_true", help="print all figures, and not only those that matter"
+    )
+    add_json(group, "all figures")
 
 
 def _planner(text: str) -> str:
