@@ -234,7 +234,10 @@ def place_of(batch: bytes) -> Place:
         raise MalformedMessage(f"batch of samples: {len(batch)} bytes are none")
     kind, run, first = _HEAD.unpack_from(batch)
     if kind != FORMAT:
-        raise MalformedMessage(f"batch of samples: format must be {FORMAT}, got {kind}")
+        raise MalformedMessage(
+            f"batch of samples: format must be {FORMAT}, got {kind}",
+            hint="daemon and recorder are to be of the same release",
+        )
     return Place(run, first)
 
 

@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any, Generic, TypeVar
 
 from fasaco_edge import __version__
+from fasaco_edge.errors import FasacoError
 from fasaco_edge.planners.own.loading import SHAPE, is_place
 
 Sample = TypeVar("Sample")
@@ -76,6 +77,7 @@ class Report:
         goals: limits that judge the results.
         remarks: sentences below the table.
         further: tables after the first.
+        faults: what failed meanwhile; the rest was measured.
     """
 
     title: str
@@ -85,6 +87,7 @@ class Report:
     goals: tuple[Goal, ...] = ()
     remarks: tuple[str, ...] = ()
     further: tuple[ResultTable, ...] = ()
+    faults: tuple[FasacoError, ...] = ()
 
     @property
     def tables(self) -> tuple[ResultTable, ...]:

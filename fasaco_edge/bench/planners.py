@@ -21,6 +21,7 @@ from fasaco_edge.bench.benchmark import (
     seconds_above_zero,
 )
 from fasaco_edge.drawing.spread import Spread, document
+from fasaco_edge.errors import FasacoError, IllegalWalk, PlannerFailed
 from fasaco_edge.planners.own.loading import UserCode, load
 from fasaco_edge.planners.paper.colony import ColonyConfig, parse_velocities
 from fasaco_edge.planners.registry import PLANNERS as REGISTRY
@@ -46,17 +47,19 @@ class Run:
         grid: name of the grid.
         cells: cells to cover.
         planner: the row's name.
-        walk: figures of the walk.
+        walk: figures of the walk; None if the planner failed.
         cpu_s: time of the planning thread on a processor [s].
         bound_steps: lower bound on the steps.
+        fault: why a planner of the user's own failed.
     """
 
     grid: str
     cells: int
     planner: str
-    walk: WalkFigures
+    walk: WalkFigures | None
     cpu_s: float
     bound_steps: int
+    fault: FasacoError | None = None
 
 
 def _add_options(parser: argparse.ArgumentParser) -> None:
@@ -138,7 +141,11 @@ def _run(
     has_budget = name in REGISTRY and REGISTRY[name].has_local_search
     stop = TimeBudget(budget_s) if has_budget else never
     cpu = time.thread_time()
-    path = planner.plan(problem, stop, ignore)
+    try:
+        path = planner.plan(problem, stop, ignore)
+    except (PlannerFailed, IllegalWalk) as error:
+        # The others are measured all the same.
+        return Run(grid.name, problem.cells, name, None, 0.0, bound, error)
     cpu_s = time.thread_time() - cpu
     walk = walk_figures(grid.lattice, path.cells)
     return Run(grid.name, problem.cells, name, walk, cpu_s, bound)
@@ -166,6 +173,7 @@ def _report(args: argparse.Namespace, runs: Sequence[Run]) -> Report:
             "way home, as in the paper's Table I",
         ),
         further=tuple(others),
+        faults=tuple({str(run.fault): run.fault for run in runs if run.fault}.values()),
     )
 
 
@@ -174,10 +182,15 @@ def _figures(runs: Sequence[Run]) -> dict[str, Any]:
     rows = []
     for name in dict.fromkeys(run.planner for run in runs):
         mine = [run for run in runs if run.planner == name]
-        counts = {what: Spread.of([getattr(run.walk, what) for run in mine]) for what in FIGURES}
-        counts["cpu_s"] = Spread.of([run.cpu_s for run in mine])
-        spreads = {what: document(spread) for what, spread in counts.items()}
-        rows.append({"planner": name, "runs": len(mine), **spreads})
+        walks = [run.walk for run in mine if run.walk]
+        row: dict[str, Any] = {"planner": name, "runs": len(walks)}
+        if walks:
+            counts = {what: Spread.of([getattr(walk, what) for walk in walks]) for what in FIGURES}
+            counts["cpu_s"] = Spread.of([run.cpu_s for run in mine if run.walk])
+            row |= {what: document(spread) for what, spread in counts.items()}
+        if faults := [run.fault for run in mine if run.fault]:
+            row |= {"failed": len(faults), "why": str(faults[0]), "code": faults[0].code}
+        rows.append(row)
     return {
         "grid": runs[0].grid,
         "cells": runs[0].cells,
@@ -190,6 +203,8 @@ def _table(grid: dict[str, Any]) -> ResultTable:
     columns = ("steps", "revisits", "n_r_paper", "turns_90")
     rows = tuple(
         (row["planner"], *(_range(row[what]) for what in columns), f"{row['cpu_s']['median']:.3f}")
+        if row["runs"]
+        else (row["planner"], *("failed" if at == 0 else "-" for at in range(len(HEADER) - 1)))
         for row in grid["rows"]
     )
     name = Path(grid["grid"]).stem

@@ -20,6 +20,7 @@ from fasaco_edge.bench.planners import PLANNERS
 from fasaco_edge.bench.speed import SPEED
 from fasaco_edge.cli.console import terminal
 from fasaco_edge.cli.console.arguments import Command, Exit, add_common, add_json
+from fasaco_edge.cli.console.logs import say_why
 from fasaco_edge.cli.console.streams import print_json
 
 WIDTH = 80
@@ -82,12 +83,14 @@ def run(args: argparse.Namespace) -> int:
         print_json(document)
     else:
         _print(report, interrupted)
+    for fault in report.faults:
+        say_why(fault)
     for file in args.benchmark.write(args, samples):
         terminal.err().print(f"wrote {file}")
     if interrupted:
         return Exit.INTERRUPTED
     missed = any(goal.met is False for goal in report.goals)
-    return Exit.ERROR if args.check and missed else Exit.OK
+    return Exit.ERROR if report.faults or (args.check and missed) else Exit.OK
 
 
 def _measure(benchmark: Benchmark[Sample], args: argparse.Namespace) -> tuple[list[Sample], bool]:

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import argparse
 import sys
+from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 import yaml
 
@@ -25,10 +26,13 @@ from fasaco_edge.cli.console.arguments import (
 from fasaco_edge.cli.console.streams import print_json
 from fasaco_edge.cli.console.terminal import err, out
 from fasaco_edge.errors import BadConfiguration
+from fasaco_edge.text import shown
 
 if TYPE_CHECKING:
     from fasaco_edge.config.config import DaemonConfig
     from fasaco_edge.doctor.finding import Finding
+
+Value = TypeVar("Value")
 
 WAYS = {
     "zenoh": "plain Zenoh",
@@ -40,9 +44,9 @@ WAYS = {
 CLEARANCE_M = 0.02
 HEAD = "# Every key, with its default and what it means: deploy/fasaco-edge.yaml\n"
 EPILOG = """\
-What is not given is asked for at a terminal; elsewhere radius or size, the tool's width and
---map-by have to be given. The file has what differs from the defaults, and is checked as
-`check-config` does.
+What is not given is asked for at a terminal, again after a typing error; elsewhere radius or size,
+the tool's width and --map-by have to be given. The file has what differs from the defaults, and is
+checked as `check-config` does.
 
 examples:
   fasaco-edge init
@@ -179,7 +183,7 @@ def _ask(args: argparse.Namespace) -> None:
     """Ask for missing values if the terminal is interactive.
 
     Raises:
-        BadConfiguration: no person can answer, an answer is no number, or there is no answer.
+        BadConfiguration: no person can answer, or there is no answer.
     """
     needed = ("robot_radius", "tool_width", "map_by")
     missing = [name for name in needed if getattr(args, name) is None]
@@ -191,25 +195,54 @@ def _ask(args: argparse.Namespace) -> None:
         options = ", ".join(f"--{name.replace('_', '-')}" for name in missing)
         raise BadConfiguration(f"{options} must be given: there is no terminal to ask at")
     if args.robot_radius is None and args.robot_size is None:
-        args.robot_radius = _number("Radius of the disc around the robot [m]", DEFAULT_RADIUS_M)
+        question = "Radius of the disc around the robot [m]"
+        args.robot_radius = _asked(question, f"{DEFAULT_RADIUS_M:g}", _metres("radius_m"))
     if args.tool_width is None:
-        args.tool_width = _number("Width of its tool [m]", DEFAULT_CELL_M)
+        tool_width = _metres("tool_width_m")
+        args.tool_width = _asked("Width of its tool [m]", f"{DEFAULT_CELL_M:g}", tool_width)
     if args.map_by is None:
         ways = "; ".join(f"{way}: {what}" for way, what in WAYS.items())
-        args.map_by = _answer(f"How does the map come? {ways}", "zenoh")
-        if args.map_by not in WAYS:
-            raise BadConfiguration(f"the map comes by {', '.join(WAYS)}, got {args.map_by!r}")
+        args.map_by = _asked(f"How does the map come? {ways}", "zenoh", _way)
     if args.connect is None:
         question = f"Router to connect to, {DEFAULT_ENDPOINT} say; none: the daemon listens there"
-        args.connect = _answer(question, "")
+        args.connect = _asked(question, "", _router)
 
 
-def _number(question: str, default: float) -> float:
-    text = _answer(question, f"{default:g}")
-    try:
-        return float(text)
-    except ValueError as error:
-        raise BadConfiguration(f"{question} must be a number, got {text!r}") from error
+def _asked(question: str, default: str, read: Callable[[str], Value]) -> Value:
+    """Ask until ``read`` accepts the answer, and return what it makes of it."""
+    while True:
+        text = _answer(question, default)
+        try:
+            return read(text)
+        except BadConfiguration as error:
+            more = "" if error.hint == BadConfiguration.hint else f" ({error.hint})"
+            err().print(f"  {error}{more}", markup=False, highlight=False, soft_wrap=True)
+
+
+def _metres(key: str) -> Callable[[str], float]:
+    """Return what reads a length [m] of the robot's section, and checks it."""
+
+    def read(text: str) -> float:
+        try:
+            value = float(text)
+        except ValueError:
+            raise BadConfiguration(f"must be a number, got {shown(text)}") from None
+        _checked(yaml.safe_dump({"robot": {key: value}}))
+        return value
+
+    return read
+
+
+def _way(text: str) -> str:
+    if text not in WAYS:
+        raise BadConfiguration(f"must be {', '.join(WAYS)}, got {shown(text)}")
+    return text
+
+
+def _router(text: str) -> str:
+    if text:
+        _checked(yaml.safe_dump({"bus": {"mode": "client", "listen": [], "connect": [text]}}))
+    return text
 
 
 def _answer(question: str, default: str) -> str:

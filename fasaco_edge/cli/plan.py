@@ -17,7 +17,7 @@ from fasaco_edge.cli.console import terminal
 from fasaco_edge.cli.console.arguments import Command, Exit, check_outputs, writing
 from fasaco_edge.cli.console.streams import print_json
 from fasaco_edge.cli.planning.options import EPILOG, add_options
-from fasaco_edge.cli.planning.request import read_request, require_frame, watching
+from fasaco_edge.cli.planning.request import read_request, require_frame, say_written, watching
 from fasaco_edge.cli.warmup import compile_kernels
 from fasaco_edge.config.cautions import tool_caution
 from fasaco_edge.errors import BadConfiguration
@@ -136,19 +136,22 @@ def _draw_pheromone(file: Path, planned: Plan, trails: Sequence[ColonySnapshot])
 
 
 def _print(args: argparse.Namespace, planned: Plan) -> None:
-    """Print the figures as JSON or as a table."""
+    """Print the figures as JSON, those that matter in some lines, or all as a table."""
     figures = planned.figures | {"map": str(args.map)}
     if args.json:
         print_json(figures)
         return
-    figures["floor"] = planned.floor or "not known of a coverage grid"
-    if planned.curve_figures is not None:
-        figures["curve"] = planned.curve_figures
-    rows = [(name.replace("_", " "), str(value)) for name, value in figures.items()]
-    terminal.out().print(terminal.figures(rows))
-    for file in (args.path_out, args.xy_out, args.png, args.pheromone_png):
-        if file is not None:
-            terminal.out().print(f"wrote {file}")
+    if args.long:
+        figures["floor"] = planned.floor or "not known of a coverage grid"
+        if planned.curve_figures is not None:
+            figures["curve"] = planned.curve_figures
+        rows = [(name.replace("_", " "), str(value)) for name, value in figures.items()]
+        terminal.out().print(terminal.figures(rows))
+    else:
+        from fasaco_edge.offline.summary import rows_of
+
+        terminal.out().print(terminal.summary(rows_of(planned)))
+    say_written(args)
 
 
 COMMAND = Command(

@@ -15,7 +15,7 @@ from fasaco_edge.client.events import BAD, GOOD, ORDER, EventLog, differences
 from fasaco_edge.errors import FasacoError, MalformedMessage
 from fasaco_edge.grid.geometry import Pose2D
 from fasaco_edge.text import is_reported
-from fasaco_edge.wire.documents.json_text import decode_document, decode_json
+from fasaco_edge.wire.documents.json_text import OF_JSON, decode_document, decode_json
 from fasaco_edge.wire.documents.settings import KnownSettings, known_settings
 from fasaco_edge.wire.documents.status import Status
 from fasaco_edge.wire.limits import MAX_COORDINATE_M
@@ -128,7 +128,7 @@ class RobotState:
     def _read_status(self, sample: Sample, now: float) -> None:
         status = decode_document(sample.payload, Status)
         if not status.state:
-            raise MalformedMessage("status: it has no state")
+            raise MalformedMessage("status: it has no state", hint=OF_JSON)
         if status.claim.stand != "plans":
             # The sender may be a second daemon of this name, whose state is not the robot's.
             if status.claim.stand != "looks":

@@ -62,7 +62,10 @@ def read_certificate(files: TlsFiles, *, listens: bool = True) -> Certificate:
         assert said is not None
         chain: list[dict[str, Any]] = [said, *listening.get_ca_certs()]
     except ssl.SSLCertVerificationError as error:
-        raise BadConfiguration(f"{files.certificate}: {error.verify_message}") from error
+        raise BadConfiguration(
+            f"{files.certificate}: {error.verify_message}",
+            hint="name the CA that has signed it, or have it signed anew (protocol/security.md)",
+        ) from error
     except ssl.SSLError as error:
         # OpenSSL gives no reason where a file is not PEM, or the key is locked.
         reason = (error.reason or "not PEM, or a key with a password").lower().replace("_", " ")
@@ -84,7 +87,10 @@ def read_certificate(files: TlsFiles, *, listens: bool = True) -> Certificate:
             f"{files.certificate}, {begins:%Y-%m-%d %H:%M}: no connection can be made with it"
         )
     if now > ends:
-        raise BadConfiguration(f"{files.certificate}: certificate has expired, {ends:%Y-%m-%d}")
+        raise BadConfiguration(
+            f"{files.certificate}: certificate has expired, {ends:%Y-%m-%d}",
+            hint="have a new one signed (protocol/security.md), or check the clock with `date -u`",
+        )
     names = [value for part in said["subject"] for key, value in part if key == "commonName"]
     return Certificate(
         name=names[-1] if names else "",

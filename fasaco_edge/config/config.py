@@ -188,7 +188,9 @@ def _home(path: Path) -> Path:
     try:
         return path.expanduser()
     except RuntimeError as error:
-        raise BadConfiguration(f"mission.state_dir: {path}: there is no home folder") from error
+        raise BadConfiguration(
+            f"mission.state_dir: {path}: there is no home folder", hint="give a path from /"
+        ) from error
 
 
 class FleetConfig(Section, frozen=True):

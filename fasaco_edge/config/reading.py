@@ -83,6 +83,8 @@ def section_faults(
             yield _fault(path, f"unknown key {path}{_meant(name, key, list(fields), root)}")
         elif section := section_of(fields[name].type):
             yield from section_faults(section, value, path, root)
+        elif unknown := tuple(_unknown_keys(fields[name].type, value, path, root)):
+            yield from unknown
         elif fault := _value_fault(fields[name].type, value, path):
             yield fault
     for name, field in fields.items():
@@ -116,10 +118,26 @@ def renamed(config: Mapping[str, object]) -> dict[str, object]:
 
 def section_of(kind: object) -> type[Section] | None:
     """Return the section that a key of this type holds, also an optional one."""
-    for choice in (kind, *get_args(kind)):
-        if isinstance(choice, type) and issubclass(choice, Section):
-            return choice
-    return None
+    return next((each for each in _objects_of(kind, 1) if issubclass(each, Section)), None)
+
+
+def _objects_of(kind: object, depth: int = 3) -> Iterator[type[msgspec.Struct]]:
+    """Yield the objects that a value of this type is or holds, so many levels down."""
+    if isinstance(kind, type) and issubclass(kind, msgspec.Struct):
+        yield kind
+    for part in get_args(kind) if depth else ():
+        yield from _objects_of(part, depth - 1)
+
+
+def _unknown_keys(kind: object, value: object, key: str, root: type[Section]) -> Iterator[Fault]:
+    """Yield the unknown keys of an object, or of each in a list, such as a dock or zones."""
+    objects = {f"{key}[{at}]": each for at, each in enumerate(value if type(value) is list else ())}
+    for place, held in (objects or {key: value}).items():
+        for structure in _objects_of(kind) if isinstance(held, dict) else ():
+            names = [field.encode_name for field in msgspec.structs.fields(structure)]
+            for name in (str(each) for each in held if each not in names):
+                path = f"{place}.{name}"
+                yield _fault(path, f"unknown key {path}{_meant(name, place, names, root)}")
 
 
 def _value_fault(kind: object, value: object, key: str) -> Fault | None:
@@ -154,8 +172,12 @@ def _choices(kind: object) -> str:
 def _meant(name: str, key: str, names: list[str], root: type[Section]) -> str:
     """Return the key that was probably meant, or the existing keys."""
     before = f"{key}." if key else ""
-    if near := get_close_matches(name, names, 1):
-        return f"; did you mean {before}{near[0]}?"
+    # A name without its unit, or one that is spelt wrong.
+    near = [each for each in names if each.startswith(f"{name}_")] or (
+        get_close_matches(name, names, 1)
+    )
+    if near:
+        return f"; did you mean {' or '.join(before + each for each in near)}?"
     elsewhere = [path for path in _paths(root, "") if path.rpartition(".")[2] == name]
     if elsewhere:
         return f"; did you mean {' or '.join(elsewhere)}?"
@@ -209,7 +231,8 @@ def read_text(path: Path) -> ConfigText:
     except OSError as error:
         raise BadConfiguration(str(error.strerror)) from error
     except PlainYamlError as error:
-        raise BadConfiguration(f"not plain YAML: {error}") from error
+        hint = "correct the file at that place"
+        raise BadConfiguration(f"not plain YAML: {error}", hint=hint) from error
     lines: dict[str, int] = {}
     twice = []
     for key, line in _keys(node, ""):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 from PIL import Image, ImageDraw, ImageFont
 
@@ -23,7 +24,7 @@ COLOURS: tuple[Colour, ...] = (
 
 PANEL_PX = (430, 290)
 # Left, top, right, bottom: space for numbers and names around a panel's axes.
-BORDER_PX = (62, 52, 16, 46)
+BORDER_PX = (62, 64, 16, 46)
 MARGIN_PX = 20
 TITLE_PX, LABEL_PX, NUMBER_PX = 22, 14, 12
 DOT_PX, LINE_PX, GOAL_PX = 3.0, 2, 13
@@ -205,14 +206,44 @@ def _draw_panel(pen: _Pen, panel: Panel, left: float, top: float) -> None:
             pen.dot(x, y, DOT_PX, line.colour)
     for x, y in (place(*goal) for goal in panel.goals):
         pen.line([(x - GOAL_PX, y), (x + GOAL_PX, y)], palette.INK, LINE_PX)
-    _draw_key(pen, panel, x1 - 10, y0 + 10)
+    _draw_key(pen, panel, (x0, y0, x1, y1))
 
 
-def _draw_key(pen: _Pen, panel: Panel, right: float, top: float) -> None:
-    for row, line in enumerate(line for line in panel.lines if line.label):
-        y = top + row * (NUMBER_PX + 5)
-        pen.dot(right - 4, y, 4, line.colour)
-        pen.text(right - 14, y, line.label, NUMBER_PX, palette.INK, "rm")
+def _draw_key(pen: _Pen, panel: Panel, box: Box) -> None:
+    """Draw the names of the lines into the corner that the fewest points lie in."""
+    lines = [line for line in panel.lines if line.label]
+    if not lines:
+        return
+    font = ImageFont.load_default(NUMBER_PX)
+    wide = max(font.getlength(line.label) for line in lines) + 24
+    high = len(lines) * (NUMBER_PX + 5) + 5
+    x0, y0, x1, y1 = box
+    place = panel.placer(box)
+    drawn = [at for line in panel.lines for at in _along(line, place)]
+
+    def points_in(corner: tuple[float, float]) -> int:
+        left, top = corner
+        return sum(left <= x <= left + wide and top <= y <= top + high for x, y in drawn)
+
+    corners = [(left, top) for top in (y0, y1 - high) for left in (x1 - wide, x0)]
+    left, top = min(corners, key=points_in)
+    for row, line in enumerate(lines):
+        y = top + 10 + row * (NUMBER_PX + 5)
+        pen.dot(left + wide - 14, y, 4, line.colour)
+        pen.text(left + wide - 24, y, line.label, NUMBER_PX, palette.INK, "rm")
+
+
+def _along(line: Line, place: Placer) -> list[tuple[float, float]]:
+    """Return places along a line [px], of unjoined points those alone."""
+    places = [place(x, y) for x, y in line.points]
+    if not line.joined:
+        return places
+    between = [
+        (a + part / 8 * (c - a), b + part / 8 * (d - b))
+        for (a, b), (c, d) in pairwise(places)
+        for part in range(8)
+    ]
+    return between + places[-1:]
 
 
 def _pale(colour: Colour) -> Colour:

@@ -49,7 +49,11 @@ _ENDS = (KeyEntry("disc", palette.START, "start"), KeyEntry("square", palette.EN
 
 
 def draw_visits(
-    plot: Plot, lattice: CoverageLattice, visits: NDArray[np.integer], start: Cell
+    plot: Plot,
+    lattice: CoverageLattice,
+    visits: NDArray[np.integer],
+    start: Cell,
+    left_out_words: str = "not covered",
 ) -> list[KeyEntry]:
     """Tint the lattice's cells by number of visits; return the meaning of the tints.
 
@@ -58,6 +62,7 @@ def draw_visits(
         lattice: the planning grid.
         visits: shape of the lattice: how often each cell was visited.
         start: cell (row, col) from where the others can be reached or not.
+        left_out_words: what cells without a visit are called.
     """
     never = lattice.coverable & (visits == 0)
     reachable = _reachable(lattice, start)
@@ -71,7 +76,7 @@ def draw_visits(
 
     key = _visit_key(visits)
     if left_out.any():
-        key.append(_entry("tile", palette.LEFT_OUT, "not covered", left_out))
+        key.append(_entry("tile", palette.LEFT_OUT, left_out_words, left_out))
     if unreachable.any():
         key.append(_entry("hatch", palette.UNREACHABLE, "unreachable", unreachable))
     return key
@@ -302,6 +307,7 @@ def draw_mission(
     unswept: MapLayer | None = None,
     zones: Sequence[Polygon] = (),
     keep_out: Sequence[Polygon] = (),
+    left_out_words: str = "not covered",
 ) -> Image.Image:
     """Return a picture, RGB, of a mission's result.
 
@@ -317,12 +323,13 @@ def draw_mission(
         swept: reachable floor that was swept, shown in place of the cells; None to show these.
         unswept: reachable floor that was not swept; None where that is not known.
         zones, keep_out: polygons of the order [m].
+        left_out_words: what reachable cells without a visit are called.
     """
     plot = Plot(View.over(bounds_of(grid, lattice, driven_xy), lattice.cell_m, *space))
     plot.ground(grid)
     start = lattice.cell_at(*driven_xy[0].tolist())
     if swept is None:
-        key = draw_visits(plot, lattice, visits, start)
+        key = draw_visits(plot, lattice, visits, start, left_out_words)
     else:
         plot.paint(swept, palette.COVERED)
         label = f"reachable floor swept ({swept.area_m2:,.1f} m2)"

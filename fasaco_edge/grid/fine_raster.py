@@ -79,7 +79,9 @@ def fine_geometry(
                 x, y = part.to_map(-frame / parts, -frame / parts)
                 return GridGeometry(rows, cols, unit, Pose2D(x, y, coarse.origin.yaw)), parts
     raise MapTooLarge(
-        f"a raster of {rows} x {cols} pixels of {unit:g} m exceeds {most_pixels} pixels"
+        f"a raster of {rows} x {cols} pixels of {unit:g} m exceeds {most_pixels} pixels",
+        hint="check the map's resolution; save or publish the map with larger pixels, or the part "
+        "of it that is to be covered",
     )
 
 

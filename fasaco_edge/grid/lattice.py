@@ -162,7 +162,8 @@ def lattice_window(geometry: GridGeometry, cell_m: float, max_cells: int) -> Win
     if not rows * cols <= max_cells:
         raise MapTooLarge(
             f"a lattice of {rows:.0f} x {cols:.0f} cells of {cell_m} m over a map of "
-            f"{x1 - x0:.0f} x {y1 - y0:.0f} m exceeds {max_cells} cells"
+            f"{x1 - x0:.0f} x {y1 - y0:.0f} m exceeds {max_cells} cells",
+            hint="check the map's resolution; larger cells or map.max_lattice_cells may help",
         )
     x0, y0, x1, y1 = geometry.snapped().bounds()
     window = Window(
@@ -213,7 +214,8 @@ def placement_of(geometry: GridGeometry, footprint: Footprint) -> Placement:
         finest = geometry.resolution * reach / MOST_REACH_PX
         raise MapTooLarge(
             f"a map of pixels of {geometry.resolution:g} m: tool and robot reach over {reach:.0f} "
-            f"of them, more than {MOST_REACH_PX}; they must be {1.01 * finest:.2g} m or larger"
+            f"of them, more than {MOST_REACH_PX}; they must be {1.01 * finest:.2g} m or larger",
+            hint="check the map's resolution; save or publish the map with larger pixels",
         )
     return placement
 

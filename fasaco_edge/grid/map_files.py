@@ -45,13 +45,22 @@ FREE_THRESH, OCCUPIED_THRESH = 0.196, 0.65
 
 MODES = ("trinary", "scale", "raw")
 
+# What to do about a fault inside a file.
+OF_A_GRID = "give a bool array (rows, cols), True = coverable, as free.astype(bool)"
+_OF_YAML = "correct it: a map file that is not .npy is read as a map_server YAML file"
+_OF_KEYS = {
+    "image": "correct image in this file: a path from this file's folder, from / or from ~",
+    "resolution": "correct resolution in this file: the edge of a pixel in metres, as 0.05",
+    "free_thresh": "correct the thresholds in this file: map_saver writes 0.65 and 0.196 or 0.25",
+}
+
 
 def read_map(path: str | Path) -> OccupancyGrid:
     """Return the map described by a map_server YAML file.
 
     Args:
-        path: the YAML file; its ``image`` is relative to the YAML's folder. Missing thresholds are
-            ``FREE_THRESH`` and ``OCCUPIED_THRESH``.
+        path: the YAML file; its ``image`` is relative to the YAML's folder, ``~`` is a home folder.
+            Missing thresholds are ``FREE_THRESH`` and ``OCCUPIED_THRESH``.
 
     Raises:
         MapFileError: a file is missing, of another format or too large; a key is missing or its
@@ -180,13 +189,20 @@ def read_coverage_grid(path: str | Path) -> NDArray[np.bool_]:
         # Memory-mapped first: a header that claims a huge array costs nothing.
         array = np.load(path, mmap_mode="r", allow_pickle=False)
     except (OSError, ValueError, EOFError, OverflowError, TypeError) as error:
-        raise MapFileError(f"{path}: not readable as a .npy file: {error}") from error
+        raise MapFileError(
+            f"{path}: not readable as a .npy file: {error}",
+            hint="write it with numpy.save(file, free), and see that it may be read",
+        ) from error
     if not isinstance(array, np.ndarray):
         array.close()
-        raise MapFileError(f"{path}: expected one array (.npy), got an archive of arrays")
+        raise MapFileError(
+            f"{path}: expected one array (.npy), got an archive of arrays",
+            hint="write one array with numpy.save, not with numpy.savez",
+        )
     if array.ndim != 2 or array.dtype != np.bool_:
         raise MapFileError(
-            f"{path}: expected a bool array of two dimensions, got {array.dtype} {array.shape}"
+            f"{path}: expected a bool array of two dimensions, got {array.dtype} {array.shape}",
+            hint=OF_A_GRID,
         )
     check_size(path, array.shape[1], array.shape[0])
     # Another program may write any byte but 0 for True; kernels read only the lowest bit.
@@ -242,7 +258,8 @@ def _maps() -> Path:
     try:
         return folder("maps")
     except FileNotFoundError as error:
-        raise MapFileError(str(error)) from error
+        hint = "install the package again, or name a map file of your own"
+        raise MapFileError(str(error), hint=hint) from error
 
 
 def _index() -> dict[str, _BuiltIn]:
@@ -252,10 +269,16 @@ def _index() -> dict[str, _BuiltIn]:
 def _load_yaml(path: Path) -> dict[str, object]:
     try:
         loaded = load(read_bounded(path))
-    except (OSError, PlainYamlError) as error:
-        raise MapFileError(f"{path}: not readable as plain YAML: {error}") from error
+    except OSError as error:
+        raise MapFileError(
+            f"{path}: {error.strerror or error}", hint="name a file that exists and may be read"
+        ) from error
+    except PlainYamlError as error:
+        raise MapFileError(f"{path}: not readable as plain YAML: {error}", hint=_OF_YAML) from error
     if not isinstance(loaded, dict):
-        raise MapFileError(f"{path}: expected a mapping of keys, got {type(loaded).__name__}")
+        raise MapFileError(
+            f"{path}: expected a mapping of keys, got {type(loaded).__name__}", hint=_OF_YAML
+        )
     return loaded
 
 
@@ -266,7 +289,8 @@ class _YamlKeys:
 
     def error(self, key: str, expected: str) -> MapFileError:
         got = f"got {shown(self.values[key])}" if key in self.values else "the key is missing"
-        return MapFileError(f"{self.path}: {key} must be {expected}; {got}")
+        hint = _OF_KEYS.get(key, f"correct {key} in this file")
+        return MapFileError(f"{self.path}: {key} must be {expected}; {got}", hint=hint)
 
     def number(self, key: str, low: float, high: float, unit: str = "") -> float:
         number = self._finite(key, self.values.get(key), "a number")
@@ -312,7 +336,7 @@ class _YamlKeys:
         image = self.values.get("image")
         if not isinstance(image, str) or not image:
             raise self.error("image", "the name of an image file")
-        found = self.path.parent / image
+        found = self.path.parent / os.path.expanduser(image)
         if not os.path.isfile(found):
             raise self.error("image", f"an existing file, sought at {found}")
         return found

@@ -38,6 +38,8 @@ _COEFFICIENTS = 2
 # ten.
 SLOW_PIXELS = 1_000_000
 
+_OF_SIZE = "save the part of the map that is to be covered, or the map with larger pixels"
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Stripe:
@@ -115,17 +117,24 @@ def read_image(path: Path, most_bytes: int | None = None) -> MapImage:
                 _check_affordable(path, image, most_bytes)
             return _decoded(path, image)
     except Image.DecompressionBombError as error:
-        raise MapFileError(f"{path}: more than {MAX_PIXELS} pixels: {error}") from error
+        text = f"{path}: more than {MAX_PIXELS} pixels: {error}"
+        raise MapFileError(text, hint=_OF_SIZE) from error
     except UnidentifiedImageError as error:
-        raise MapFileError(f"{path}: not an image (PGM, PNG, BMP or JPEG)") from error
+        raise MapFileError(
+            f"{path}: not an image (PGM, PNG, BMP or JPEG)", hint="save it as PGM or PNG"
+        ) from error
     except (OSError, ValueError, SyntaxError) as error:
-        raise MapFileError(f"{path}: not readable as an image: {error}") from error
+        raise MapFileError(
+            f"{path}: not readable as an image: {error}",
+            hint="see that the file is whole and may be read; save or copy it again",
+        ) from error
 
 
 def check_size(path: str | Path, cols: int, rows: int) -> None:
     """Raise MapFileError unless there is at least one pixel and at most MAX_PIXELS."""
     if not 0 < rows * cols <= MAX_PIXELS:
-        raise MapFileError(f"{path}: expected 1 to {MAX_PIXELS} pixels, got {cols} x {rows}")
+        text = f"{path}: expected 1 to {MAX_PIXELS} pixels, got {cols} x {rows}"
+        raise MapFileError(text, hint=_OF_SIZE)
 
 
 def _check_affordable(path: Path, image: ImageFile, most_bytes: int) -> None:
@@ -155,7 +164,10 @@ def _decoded(path: Path, image: Image.Image) -> MapImage:
     is_grey = image.mode in ("1", "L") and "transparency" not in image.info
     white = 65535 if image.mode.startswith("I") else 255 if is_grey else 3 * 255
     if white == 3 * 255 and image.mode not in ("1", "L", "LA", "P", "RGB", "RGBA"):
-        raise MapFileError(f"{path}: expected grey, palette or RGB pixels, got {image.mode}")
+        raise MapFileError(
+            f"{path}: expected grey, palette or RGB pixels, got {image.mode}",
+            hint="save it as 8-bit grey",
+        )
     image.load()
     cols, rows = image.size
     return MapImage(rows, cols, white, image)

@@ -65,7 +65,8 @@ class OccupancyGrid:
         faults: list[FasacoError] = []
         for patch in patches:
             if why := self._misfit(patch):
-                faults.append(PatchWithoutBase(why))
+                hint = "publish the full map again when its size or frame changes, then updates"
+                faults.append(PatchWithoutBase(why, hint=hint))
             else:
                 fit.append(patch)
         if not fit:

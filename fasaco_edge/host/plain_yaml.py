@@ -78,9 +78,21 @@ def compose(text: str) -> tuple[yaml.Node | None, object]:
         raise
     except RecursionError as error:
         raise PlainYamlError("nested too deeply") from error
+    except yaml.MarkedYAMLError as error:
+        raise PlainYamlError(_said(error)) from error
     # Invalid UTF-8, an impossible date, or a number in base 60 that no float holds.
     except (yaml.YAMLError, ValueError, OverflowError) as error:
         raise PlainYamlError(str(error)) from error
+
+
+def _said(error: yaml.MarkedYAMLError) -> str:
+    """Return where a document is no YAML, and why, in one line."""
+    mark, began = error.problem_mark or error.context_mark, error.context_mark
+    where = "" if mark is None else f"line {mark.line + 1}, column {mark.column + 1}: "
+    context = error.context or ""
+    if began is not None and mark is not None and began.line != mark.line:
+        context += f" that begins in line {began.line + 1}"
+    return where + ", ".join(filter(None, (error.problem, context)))
 
 
 class _Loader(yaml.SafeLoader):

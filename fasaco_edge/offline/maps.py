@@ -11,13 +11,19 @@ from numpy.typing import NDArray
 from fasaco_edge.config.robot import RobotConfig
 from fasaco_edge.errors import MapFileError
 from fasaco_edge.grid.lattice import Cell, CoverageLattice, Footprint
-from fasaco_edge.grid.map_files import find_map, read_bare_image, read_coverage_grid, read_map
+from fasaco_edge.grid.map_files import (
+    OF_A_GRID,
+    find_map,
+    read_bare_image,
+    read_coverage_grid,
+    read_map,
+)
 from fasaco_edge.grid.occupancy import FREE, UNKNOWN, OccupancyGrid
 from fasaco_edge.planners.grids import start_cell
 from fasaco_edge.text import shown
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Map:
     """Input map of a plan.
 
@@ -33,6 +39,15 @@ class Map:
     free: NDArray[np.bool_] | None = None
     file: Path | None = None
 
+    def __repr__(self) -> str:
+        """Return the map in one line, without its pixels."""
+        if self.grid is not None:
+            rows, cols = self.grid.cells.shape
+            return f"<Map {self.name}: {rows} x {cols} pixels of {self.grid.geometry.resolution} m>"
+        assert self.free is not None
+        rows, cols = self.free.shape
+        return f"<Map {self.name}: {rows} x {cols} cells>"
+
     def lattice(self, robot: RobotConfig) -> CoverageLattice:
         """Return the lattice of cells as wide as the robot's tool.
 
@@ -47,7 +62,7 @@ class Map:
 
     def start(self, lattice: CoverageLattice) -> Cell:
         """Return the default start, see ``planners.grids.start_cell``."""
-        return start_cell(lattice, self.file or Path(self.name))
+        return start_cell(lattice, self.file or Path(self.name), self.grid)
 
 
 def load_map(
@@ -72,14 +87,16 @@ def load_map(
         _without_pixels("the array", resolution_m, unknown_free)
         if source.dtype != np.bool_ or source.ndim != 2 or not source.size:
             raise MapFileError(
-                f"a coverage grid is bool (rows, cols), got {source.dtype} {source.shape}"
+                f"a coverage grid is bool (rows, cols), got {source.dtype} {source.shape}",
+                hint=OF_A_GRID,
             )
         free = source.copy()
         free.setflags(write=False)
         return Map("array", free=free)
     if not isinstance(source, str | Path):
         raise MapFileError(
-            f"a map is a file, the name of a built-in one or a NumPy array, got {shown(source)}"
+            f"a map is a file, the name of a built-in one or a NumPy array, got {shown(source)}",
+            hint="give a str, a Path or a bool array (rows, cols)",
         )
     file = find_map(source)
     if file.suffix == ".npy":

@@ -20,8 +20,9 @@ from fasaco_edge.host.outputs import whole
 from fasaco_edge.offline.ground import Line
 from fasaco_edge.offline.maps import Map
 from fasaco_edge.offline.plan import plan
-from fasaco_edge.offline.result import Plan, PlannedFloor, judged_floor, picture_of
+from fasaco_edge.offline.result import Plan, PlannedFloor, judged_floor, picture_of, png_of
 from fasaco_edge.offline.settings import ANYWHERE, CELLS, HOME, Search
+from fasaco_edge.offline.summary import duration
 from fasaco_edge.planners.passes import Pass, laid, read_pass
 from fasaco_edge.planners.planner import SearchProgress, StoppingCriterion
 
@@ -29,7 +30,7 @@ from fasaco_edge.planners.planner import SearchProgress, StoppingCriterion
 ALONG_DEG = 15.0
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class PassPlans:
     """Passes over a map, one plan each.
 
@@ -40,6 +41,16 @@ class PassPlans:
 
     passes: tuple[Pass, ...]
     plans: tuple[Plan, ...]
+
+    def __repr__(self) -> str:
+        """Return the passes in one line, without their plans."""
+        swept = "" if self.floor is None else f": {self.floor}"
+        name = self.plans[0].map.name
+        return f"<PassPlans {name}, {', '.join(self.names)}{swept}, {duration(self.cost_s)}>"
+
+    def _repr_png_(self) -> bytes:
+        """Return the picture as PNG, as notebooks show it."""
+        return png_of(self.plot())
 
     @property
     def names(self) -> list[str]:

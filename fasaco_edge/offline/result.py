@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import asdict, dataclass
 from functools import cached_property
+from io import BytesIO
 from pathlib import Path
 
 import numpy as np
@@ -27,6 +28,7 @@ from fasaco_edge.judge.floor import (
 from fasaco_edge.offline.ground import Ground, Line
 from fasaco_edge.offline.maps import Map
 from fasaco_edge.offline.settings import CELLS, Search
+from fasaco_edge.offline.summary import line_of
 from fasaco_edge.planners.curves import Curve
 from fasaco_edge.planners.living_trail import Tau, branching
 from fasaco_edge.planners.path import CoveragePath, walk_figures
@@ -36,7 +38,7 @@ from fasaco_edge.planners.problem import CoverageProblem
 LIMITS = ("turn_deg_s", "turn_deg_s2", "acceleration_m_s2", "steered_deg")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Plan:
     """A walk over a map, and the line along it.
 
@@ -68,6 +70,14 @@ class Plan:
     wall_s: float
     cpu_s: float
     curve: Curve | None = None
+
+    def __repr__(self) -> str:
+        """Return the plan in one line."""
+        return f"<Plan {line_of(self)}>"
+
+    def _repr_png_(self) -> bytes:
+        """Return the picture as PNG, as notebooks show it."""
+        return png_of(self.plot())
 
     @property
     def cells(self) -> NDArray[np.int32]:
@@ -123,6 +133,13 @@ class Plan:
             with whole(Path(file)) as new:
                 picture.save(new, "PNG")
         return picture
+
+
+def png_of(picture: Image.Image) -> bytes:
+    """Return a picture as PNG."""
+    png = BytesIO()
+    picture.save(png, "PNG")
+    return png.getvalue()
 
 
 def judged_floor(

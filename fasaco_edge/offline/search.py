@@ -220,7 +220,7 @@ class Planning:
         """Search for a walk; a planner without a lower bound is given one for its path."""
         search, bound = self._search, self._ending.bound
         planner: CoveragePlanner = (
-            OwnPlanner(self._own, seed)
+            OwnPlanner(self._own, seed, search.most_s)
             if self._own
             else planner_of(search.planner, replace(search.colony(), seed=seed), search.threads)
         )

@@ -11,25 +11,29 @@ import numpy as np
 from fasaco_edge.errors import MapFileError, NothingToCover, StartBlocked
 from fasaco_edge.grid.lattice import Cell, CoverageLattice, Footprint
 from fasaco_edge.grid.map_files import find_map, read_coverage_grid, read_map, suggested_start
-from fasaco_edge.grid.occupancy import OccupancyGrid
+from fasaco_edge.grid.occupancy import FREE, UNKNOWN, OccupancyGrid
 from fasaco_edge.kernels.lattice.reach import reachable_from
 
 
-def start_cell(lattice: CoverageLattice, map_file: Path) -> Cell:
+def start_cell(lattice: CoverageLattice, map_file: Path, grid: OccupancyGrid | None = None) -> Cell:
     """Return the default start of a plan.
 
     A built-in map has its own; otherwise it is the cell of the largest connected area that is
-    nearest to the map frame's origin.
+    nearest to the map frame's origin. ``grid`` is the map below the lattice; None for a coverage
+    grid.
 
     Raises:
-        NothingToCover: no cell is coverable.
+        NothingToCover: no cell is coverable; the error says whether the map or the robot is why.
         StartBlocked: a built-in map's own start is not on the lattice.
     """
     suggested = suggested_start(map_file)
     if suggested is not None:
         cell = lattice.cell_at(*suggested)
         if not lattice.contains(cell):
-            raise StartBlocked(f"the map's suggested start {suggested} m is outside the lattice")
+            raise StartBlocked(
+                f"the map's suggested start {suggested} m is outside the lattice",
+                hint="choose a start, or smaller cells",
+            )
         return cell
     left = lattice.coverable
     largest = np.zeros_like(left)
@@ -40,11 +44,32 @@ def start_cell(lattice: CoverageLattice, map_file: Path) -> Cell:
         if np.count_nonzero(area) > np.count_nonzero(largest):
             largest = area
     if not largest.any():
-        raise NothingToCover("no cell of the map is coverable")
+        raise _nowhere(grid)
     window = lattice.window
     cells = np.argwhere(largest) + np.array((window.row0, window.col0))
     row, col = cells[np.argmin(((cells + 0.5) ** 2).sum(axis=1))]
     return int(row), int(col)
+
+
+def _nowhere(grid: OccupancyGrid | None) -> NothingToCover:
+    """Return the error for a lattice without a coverable cell."""
+    if grid is None:
+        return NothingToCover(
+            "no cell of the map is coverable", hint="give a grid with True in the free cells"
+        )
+    cells = grid.cells
+    free = np.count_nonzero((cells >= FREE) & (cells <= MAP_FOOTPRINT.free_at_most)) / cells.size
+    if free:
+        return NothingToCover(
+            f"no cell of the map is coverable: {100 * free:.2g} % of its pixels are free, but "
+            "the robot fits nowhere"
+        )
+    unknown = np.count_nonzero(cells == UNKNOWN) / cells.size
+    return NothingToCover(
+        f"no pixel of the map is free, {unknown:.0%} are unknown",
+        hint="check image, negate, mode and free_thresh of the map's YAML file: free pixels are "
+        "white" + ("; `plan --unknown-free` takes unknown ones for free" if unknown else ""),
+    )
 
 
 def start_point(map_file: Path, truth: OccupancyGrid, radius_m: float) -> tuple[float, float]:
@@ -62,7 +87,7 @@ def start_point(map_file: Path, truth: OccupancyGrid, radius_m: float) -> tuple[
     if 0 <= col < truth.geometry.cols and 0 <= row < truth.geometry.rows:
         return 0.0, 0.0
     lattice = CoverageLattice.from_map(truth, Footprint(2.0 * radius_m, radius_m))
-    row, col = start_cell(lattice, map_file)
+    row, col = start_cell(lattice, map_file, truth)
     return (col + 0.5) * lattice.cell_m, (row + 0.5) * lattice.cell_m
 
 
@@ -89,13 +114,14 @@ def read_grid(name_or_path: str | Path) -> NamedGrid:
         MapFileError: there is no such file, or it has none of these formats.
         NothingToCover: the grid has no free cell.
     """
-    file = find_map(name_or_path)
+    file, grid = find_map(name_or_path), None
     if file.suffix == ".npy":
         lattice = CoverageLattice.from_free(read_coverage_grid(file))
     else:
-        lattice = CoverageLattice.from_map(read_map(file), MAP_FOOTPRINT)
+        grid = read_map(file)
+        lattice = CoverageLattice.from_map(grid, MAP_FOOTPRINT)
     start = _start_beside(file.with_suffix(".json")) if file.suffix == ".npy" else None
-    return NamedGrid(str(name_or_path), lattice, start or start_cell(lattice, file))
+    return NamedGrid(str(name_or_path), lattice, start or start_cell(lattice, file, grid))
 
 
 def _start_beside(file: Path) -> Cell | None:
@@ -105,4 +131,7 @@ def _start_beside(file: Path) -> Cell | None:
         row, col = json.loads(file.read_text(encoding="utf-8"))["start"]
         return int(row), int(col)
     except (OSError, ValueError, KeyError, TypeError) as error:
-        raise MapFileError(f"{file}: expected an object with start: [row, col]") from error
+        raise MapFileError(
+            f"{file}: expected an object with start: [row, col]",
+            hint='write {"start": [0, 0]} with a free cell, or remove the file',
+        ) from error

@@ -107,7 +107,8 @@ class CoverageProblem:
         wanted = lattice.coverable if covered is None else lattice.coverable & ~covered
         to_cover, unreachable = wanted & reachable, wanted & ~reachable
         if not to_cover.any():
-            raise NothingToCover("every reachable cell is covered")
+            hint = "nothing is left to do: leave out what is covered, or start elsewhere"
+            raise NothingToCover("every reachable cell is covered", hint=hint)
         to_cover.flags.writeable = unreachable.flags.writeable = False
         return cls(lattice, start, to_cover, unreachable, end, cost, before, attempt)
 
@@ -212,8 +213,10 @@ def _check_cell(
         )
     state = lattice.states[lattice.local(cell)]
     if state != COVERABLE:
-        why = "is unknown" if state == UNKNOWN else "is blocked: the robot does not fit there"
-        raise blocked(f"{role} cell {cell} {why}")
+        if state == UNKNOWN:
+            hint = f"choose a known {role}; `plan --unknown-free` takes unknown ground for free"
+            raise blocked(f"{role} cell {cell} is unknown", hint=hint)
+        raise blocked(f"{role} cell {cell} is blocked: the robot does not fit there")
 
 
 def graph_of(problem: CoverageProblem) -> Graph:

@@ -247,7 +247,10 @@ class RobotOnBus:
     def _follow(self, sample: Sample) -> None:
         path = decode_path(sample.payload)
         if path.frame != self._world.frame:
-            raise WrongFrame(f"path in frame {path.frame!r}, map in {self._world.frame!r}")
+            raise WrongFrame(
+                f"path in frame {path.frame!r}, map in {self._world.frame!r}",
+                hint="let the daemon plan on the map of this robot",
+            )
         self._world.follow(path.xy)
 
     def _move(self, sample: Sample) -> None:

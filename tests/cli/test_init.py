@@ -101,6 +101,25 @@ def test_at_a_terminal_it_asks(tmp_path, typed):
     assert (config.ros2.kind, config.bus.mode) == ("bridge", "peer")
 
 
+def test_a_typing_error_is_asked_for_again(tmp_path, typed, capsys):
+    typed("0,25\n25\n0.25\nO.3\n0.3\nzeno\nzenoh\n127.0.0.1:7447\ntcp/127.0.0.1:7447\n")
+    file = tmp_path / "robot.yaml"
+    assert init(file) == 0
+    config = load_config(file)
+    assert (config.robot.radius_m, config.robot.tool_width_m) == (0.25, 0.3)
+    assert config.bus.connect == ("tcp/127.0.0.1:7447",)
+    asked = capsys.readouterr().err
+    for said in (
+        "must be a number, got '0,25'",
+        "robot.radius_m: expected float <= 10.0, got 25.0",
+        "must be a number, got 'O.3'",
+        "must be zenoh, rmw_zenoh, bridge, got 'zeno'",
+        "bus.connect: '127.0.0.1:7447': no protocol before the address (an endpoint is ",
+    ):
+        assert f"  {said}" in asked
+    assert asked.count("Radius of the disc") == 3
+
+
 def test_what_nobody_answers_is_not_written(tmp_path, typed, capsys):
     typed("0.25\n")
     file = tmp_path / "robot.yaml"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from collections import deque
 from itertools import pairwise
 
@@ -155,6 +156,8 @@ def test_the_figures_of_a_map_are_right(plan, tmp_path):
 
 def test_a_table_says_how_much_floor_is_swept(capsys):
     assert main(["plan", "office", "--budget", "0.05"]) == 0
+    assert " % of 40.9 m2; " in capsys.readouterr().out
+    assert main(["plan", "office", "--budget", "0.05", "--long"]) == 0
     said = " ".join(capsys.readouterr().out.replace("│", " ").split())
     assert " of 40.9 m2 (" in said
 
@@ -569,10 +572,40 @@ def test_the_trail_of_the_colony_is_drawn(plan, tmp_path, words):
 
 
 def test_figures_are_printed_for_people_too(grid_file):
-    ended = fasaco_edge("plan", grid_file, "--ants", 8)
+    ended = fasaco_edge("plan", grid_file, "--ants", 8, "--long")
     assert ended.code == 0
     for key in KEYS:
         assert key.replace("_", " ") in ended.out
+
+
+@pytest.mark.parametrize(
+    ("words", "names"),
+    [
+        ((), "map swept time gap line walk search"),
+        (("--turn-radius", "0.4"), "map swept time gap line curve walk search"),
+        (("--passes", "edge,auto"), "map swept time line pass pass"),
+        (("--robots", "1,1", "2,2"), "map time longest passed not robot robot"),
+    ],
+)
+def test_what_matters_fits_on_one_screen(words, names, tmp_path):
+    png = tmp_path / "plan.png"
+    ended = fasaco_edge("plan", "flat", "--budget", "0.1", "--png", png, *words)
+    lines = ended.out.splitlines()
+    assert ended.code == 0
+    assert len(lines) <= 14
+    rows = [line for line in lines if not line.startswith(" ")]
+    assert [row.split()[0] for row in rows] == [*names.split(), "wrote", "more:"]
+    assert f"wrote {png}" in lines
+    assert "None" not in ended.out
+    if "--robots" not in words:
+        assert re.search(r"^swept +9\d\.\d % of 49.4 m2; ", ended.out, re.MULTILINE)
+        assert re.search(r"^time +\d+ min \d\d s", ended.out, re.MULTILINE)
+
+
+def test_without_a_picture_it_is_said_how_to_have_one(grid_file):
+    ended = fasaco_edge("plan", grid_file, "--ants", 8)
+    assert ended.out.endswith("more: --long; a picture: --png FILE\n")
+    assert re.search(r"^time +1 min 20 s *$", ended.out, re.MULTILINE)
 
 
 def test_json_is_all_there_is_on_standard_output(grid_file):

@@ -50,9 +50,9 @@ def recording(tmp_path):
 @pytest.mark.parametrize(
     ("words", "shown", "first_line"),
     [
-        (PLAN, "steps, [0-9.]+% above the bound ", "┌──.*"),
-        (("plan", "flat", "--ants", "40", "--planner", "fasaco"), "ants ━* +0/40 ", "┌──.*"),
-        ((*PLAN, "--robots", "1,1", "2,2"), "steps ━", "┌──.*"),
+        (PLAN, "steps, [0-9.]+% above the bound ", "map +.*"),
+        (("plan", "flat", "--ants", "40", "--planner", "fasaco"), "ants ━* +0/40 ", "map +.*"),
+        ((*PLAN, "--robots", "1,1", "2,2"), "steps ━", "map +.*"),
         (("warmup",), "looking at the kernels ", "kernels ready after [0-9.]+ s in .*"),
         (
             ("bench", "latency", "--samples", "2"),
@@ -94,7 +94,7 @@ def test_the_demo_shows_its_robot_below_its_messages(tmp_path):
     with Terminal("demo", "--out", out) as shell:
         # In eighty columns nothing of it is left out but some figures.
         progress = re.compile(
-            r"^flat ━{16} +[1-9]\d* % of cells \d:\d\d:\d\d \w+: \d+/", re.MULTILINE
+            r"^flat ━{16} +[1-9]\d* % \d:\d\d:\d\d \w+: \d+/\d+ cells, ", re.MULTILINE
         )
         screen = shell.wait(lambda seen: progress.search(seen) is not None)
         no_escape_is_shown(shell)
@@ -102,10 +102,54 @@ def test_the_demo_shows_its_robot_below_its_messages(tmp_path):
         # Each in its line, the progress below them all, and that once.
         assert lines[0].startswith("kernels ready")
         assert "\nwatch it from another terminal" in screen
-        assert [line for line in lines if "of cells" in line] == lines[-1:]
+        assert [line for line in lines if " cells, " in line] == lines[-1:]
         shell.type("\x03")
         text = ended_well(shell, 130)
-        assert "of cells" not in text
+        assert " cells, " not in text
+
+
+# Run in a terminal: the lines of a demo, or a bar, with what is done as its arguments.
+LINES = r"""
+import sys, time
+from fasaco_edge.cli.console import streams, terminal
+from fasaco_edge.cli.demo.mission import DemoView
+from fasaco_edge.wire.documents.json_text import tolerant
+from fasaco_edge.wire.documents.status import Status
+kind, *titles = sys.argv[1:]
+streams.clean_streams()
+coverage = {"covered": 85, "coverable": 424, "fraction": 0.2}
+status = tolerant({"state": "covering", "coverage": coverage, "floor": {"swept_m2": 8.1}}, Status)
+with DemoView(titles) if kind == "demo" else terminal.progress() as bar:
+    for number, title in enumerate(titles):
+        if kind == "demo":
+            bar.show(number, status, 3.0)
+        else:
+            bar.add_task(title, total=100_000, completed=20_000)
+    time.sleep(0.5)
+"""
+
+
+@pytest.mark.parametrize(("columns", "lines"), [(60, 20), (80, 24), (200, 50)])
+@pytest.mark.parametrize("title", ["flat", "robot-1", "second_floor_of_the_hospital_in_the_north"])
+@pytest.mark.parametrize("kind", ["demo", "bar"])
+def test_bar_and_clock_are_whole(tmp_path, kind, columns, lines, title):
+    script = tmp_path / "lines.py"
+    script.write_text(LINES)
+    program = (sys.executable, str(script), kind, title, title)
+    with Terminal(program=program, columns=columns, lines=lines) as shell:
+        done = "covering: 85/424" if kind == "demo" else "20000/100000"
+        screen = shell.wait(lambda seen: seen.count(done) == 2)
+        assert shell.end() == 0
+    wide = 32 if kind == "bar" and columns >= 80 else 16
+    rows = [line for line in screen.splitlines() if "0:00:00" in line]
+    assert len(rows) == 2
+    for row in rows:
+        assert len(row) <= columns
+        assert sum(row.count(sign) for sign in BAR) == wide
+        name = re.split("[━╸╺]", row)[0].strip()
+        assert name == title or (title.startswith(name[:-1]) and name.endswith("…"))
+        if kind == "demo":
+            assert " 20 % 0:00:00 covering: 85/424" in row
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])

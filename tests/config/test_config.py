@@ -188,7 +188,16 @@ def test_a_removed_key_without_a_value_is_ignored(load):
         ),
         (
             "mission: {zones: [{name: hall, polygon: [[0, 0], [1, 0], [1, 1]], floor: 3}]}",
-            "mission.zones[0]: object contains unknown field floor",
+            "unknown key mission.zones[0].floor; there are name, polygon",
+        ),
+        (
+            "mission: {dock: {x_m: 1, y_m: 2, yaw: 3}}",
+            "unknown key mission.dock.yaw; did you mean mission.dock.yaw_deg?",
+        ),
+        ("scan: {x: 1}", "unknown key scan.x; did you mean scan.x_m?"),
+        (
+            "robot: {turn: 1}",
+            "did you mean robot.turn_deg_s or robot.turn_deg_s2 or robot.turn_radius_m?",
         ),
         (
             "mission: {zones: [{name: a, polygon: [[0, 0], [1, 0], [1, 1]]}, "
@@ -203,7 +212,11 @@ def test_a_removed_key_without_a_value_is_ignored(load):
         ("[1, 2]", "the file: expected object, got [1, 2]"),
         ("robot: {1: 2}", "robot: expected str as key, got {1: 2}"),
         ("1: 2", "the file: expected str as key, got {1: 2}"),
-        ("robot: {name: [unclosed", "not plain YAML"),
+        (
+            "robot:\n  name: [unclosed\nbus: 1",
+            "not plain YAML: line 3, column 4: expected ',' or ']', but got ':', while parsing a "
+            "flow sequence that begins in line 2",
+        ),
         ("robot:\n\tname: x", "not plain YAML"),
         ("robot: 2020-13-45", "not plain YAML: month must be in 1..12"),
         ("[" * 5000, "not plain YAML: line 1: nested deeper than 32 levels"),

@@ -5,11 +5,12 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+from contextlib import ExitStack
 
 import pytest
 
 from tests.support.outsider import Outsider
-from tests.support.processes import daemon_process
+from tests.support.processes import daemon_process, free_endpoint
 from tests.support.rooms import cells_of, coverable_cells, map_bytes, pose_bytes, room
 from tests.wire.contract_files import PROTOCOL, load
 from tests.wire.schemas import check
@@ -74,9 +75,35 @@ def test_the_recorder_says_what_its_schema_has(tmp_path):
             check("status.json", heard.json())
 
 
+def test_the_example_s_map_outlives_a_daemon(tmp_path):
+    """It puts its map once, and latched, as the contract says of mappers."""
+    endpoint = free_endpoint()
+    one, other = tmp_path / "one", tmp_path / "other"
+    one.mkdir()
+    other.mkdir()
+    command = [sys.executable, str(CLIENT), endpoint]
+    with ExitStack() as running:
+        first = running.enter_context(ExitStack())
+        first.enter_context(daemon_process(one, bus={"listen": [endpoint]}))
+        with Outsider(endpoint):
+            pass  # it is there
+        client = running.enter_context(
+            subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+        )
+        with Outsider(endpoint) as outsider:
+            outsider.wait_status(lambda status: status["coverage"] is not None)
+        first.close()
+        # Another one, which knows nothing of the first.
+        running.enter_context(daemon_process(other, bus={"listen": [endpoint]}))
+        with Outsider(endpoint) as outsider:
+            outsider.wait_status(lambda status: status["state"] == "waiting for pose")
+            client.communicate(input="", timeout=60.0)
+        assert client.returncode == 0
+
+
 def test_the_example_gets_a_path_over_every_cell(tmp_path):
     lines = [line for line in CLIENT.read_text().splitlines() if line.strip()]
-    assert len(lines) <= 30
+    assert len(lines) <= 40
     with daemon_process(tmp_path) as running:
         with Outsider(running.endpoint):
             pass  # it is there

@@ -7,6 +7,7 @@ import numpy as np
 from fasaco_edge.grid.geometry import Pose2D, StampedPose
 from fasaco_edge.mission.core.events import MapReceived, PoseReceived, State
 from fasaco_edge.mission.coverage.unreached import viewpoints
+from fasaco_edge.mission.orders.keep_outs import KeepOut
 from tests.mission.world import (
     CELL,
     CONFIG,
@@ -43,7 +44,7 @@ def test_a_room_with_a_shut_door_is_tried_again_later():
     assert drive.mission.reason == waits
     assert reasons(drive) == [
         (16, "closed off by obstacles"),
-        (1, "blocked by an obstacle that was not there before"),
+        (1, "no longer free on the map"),
     ]
     assert drive.tell(after=29.0).plan is None
     decision = drive.tell(after=2.0)
@@ -58,7 +59,7 @@ def test_a_room_with_a_shut_door_is_tried_again_later():
     drive.run(State.DONE)
     assert drive.mission.reason == (
         "48 % of 2.1 m2 covered; 1.1 m2 not reached: closed off by obstacles (1.0 m2), "
-        "blocked by an obstacle that was not there before (0.1 m2)"
+        "no longer free on the map (0.1 m2)"
     )
     coverage = drive.mission.coverage()
     assert (coverage.covered, coverage.coverable) == (16, 33)
@@ -106,7 +107,7 @@ def test_rows_left_along_a_wall_are_named_and_not_tried_again():
     drive.tell(patch("######", at=(4, 0)))
     drive.run(State.DONE)
     assert drive.now < 10.0
-    assert reasons(drive) == [(6, "blocked by an obstacle that was not there before")]
+    assert reasons(drive) == [(6, "no longer free on the map")]
 
 
 def test_what_was_covered_before_it_was_closed_is_no_loss():
@@ -204,3 +205,16 @@ def test_closed_areas_are_looked_at_from_beside_them():
     assert viewpoints(~reachable, reachable) == [(1, 3)]
     assert viewpoints(~reachable, np.zeros((6, 6), bool)) == []
     assert viewpoints(np.zeros((0, 0), bool), np.zeros((0, 0), bool)) == []
+
+
+def test_cells_beside_a_keep_out_are_not_blamed_on_an_obstacle():
+    """What is beside it and was reachable lies in the zone for the robot; a wall that the map
+    draws thicker meanwhile is no obstacle that has come."""
+    drive = drives(*["......"] * 5)
+    drive.command(
+        "keep_out_add", keep_out=KeepOut("stairs", tuple(map(tuple, rectangle(2, 2, 3, 4))))
+    )
+    drive.tell(patch("######", at=(4, 0)))
+    drive.run(State.DONE)
+    said = {reason for _, reason in reasons(drive)}
+    assert said == {"in a keep-out zone", "no longer free on the map"}

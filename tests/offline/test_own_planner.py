@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import re
+import signal
 import subprocess
 import sys
 
@@ -120,9 +122,23 @@ def test_bench_has_it_as_a_row_beside_the_others(mine, capsys):
     assert rows["mine.py:depth_first"]["steps"]["median"] == 38
     assert rows["colony-search"]["steps"]["median"] == grid["bound_steps"] == 20
     assert all(row["runs"] == 2 for row in rows.values())
-    mine.write_text("def depth_first(problem):\n    return [problem.start]\n")
-    assert main(["bench", "planners", "--planner", f"{mine}:depth_first", *words]) == 1
-    assert "its walk leaves 19 of 20 cells" in capsys.readouterr().err
+
+
+def test_bench_goes_on_where_one_planner_fails(mine, capsys):
+    np.save(mine.parent / "room.npy", np.ones((4, 5), bool))
+    mine.write_text("def short(problem):\n    return [problem.start]\n")
+    words = ["--grids", str(mine.parent / "room.npy"), "--seeds", "2", "--budget", "0.1"]
+    bench = ["bench", "planners", "--planner", f"{mine}:short", *words]
+    assert main([*bench, "--json"]) == 1
+    told = capsys.readouterr()
+    assert told.err.count("its walk leaves 19 of 20 cells") == 1
+    (grid,) = json.loads(told.out)["grids"]
+    failed, *others = grid["rows"]
+    assert (failed["runs"], failed["failed"], failed["code"]) == (0, 2, "illegal_walk")
+    assert [row["planner"] for row in others] == ["fasaco + search", *PLANNER_NAMES]
+    assert all(row["runs"] == 2 and "failed" not in row for row in others)
+    assert main(bench) == 1
+    assert re.search(r"mine\.py:short +failed +- ", capsys.readouterr().out)
 
 
 def test_an_own_planner_gets_a_read_only_and_correct_problem():
@@ -196,6 +212,54 @@ def test_a_planner_that_ends_everything_is_no_plan(mine, text, said, capsys):
     told = capsys.readouterr().err
     assert said in told
     assert "hint: the lines are those of your own file" in told
+
+
+ENDLESS = """
+import signal
+import time
+
+def loops(problem):
+    while True:
+        pass
+
+def sleeps(problem):
+    time.sleep(600)
+
+def yields(problem):
+    yield problem.start
+    while True:
+        pass
+
+def catches(problem):
+    try:
+        while True:
+            pass
+    except Exception:
+        return [problem.start]
+"""
+
+
+@pytest.mark.parametrize(
+    ("name", "line"), [("loops", 7), ("sleeps", 10), ("yields", 15), ("catches", 20)]
+)
+def test_a_budget_ends_a_planner_that_does_not_end(mine, name, line, capsys):
+    mine.write_text(ENDLESS)
+    assert main(["plan", "office", "--planner", f"{mine}:{name}", "--budget", "0.2"]) == 1
+    told = capsys.readouterr().err
+    assert f"planner mine.py:{name}: no walk after 0.2 s, its budget\n" in told
+    assert any(f"{mine}:{near}, in {name}: " in told for near in (line - 1, line))
+    # Nothing is left of the limit.
+    assert signal.getitimer(signal.ITIMER_REAL) == (0.0, 0.0)
+    assert signal.getsignal(signal.SIGALRM) is signal.SIG_DFL
+
+
+def test_a_program_s_own_timer_is_left_alone():
+    signal.setitimer(signal.ITIMER_REAL, 500.0)
+    try:
+        assert plan(lambda problem: WALK, search=fe.Search(budget_s=5.0)).steps == 4
+        assert 0.0 < signal.getitimer(signal.ITIMER_REAL)[0] <= 500.0
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
 
 
 @pytest.mark.parametrize(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import re
 import subprocess
@@ -200,3 +201,22 @@ def test_a_picture_that_cannot_be_written_is_named_in_the_error(tmp_path):
     planned = fe.plan(fe.load_map(np.ones((3, 3), bool)), search=fe.Search(budget_s=0.05))
     with pytest.raises(FileNotFoundError, match=r"nowhere/walk\.png"):
         planned.plot(tmp_path / "nowhere" / "walk.png")
+
+
+def test_a_plan_is_one_line_of_text_and_a_picture():
+    office = fe.load_map("office")
+    planned = fe.plan(office, search=QUICK)
+    free = fe.load_map(np.ones((4, 5), bool))
+    passes = fe.plan_passes(office, passes=["edge", "auto"], search=QUICK)
+    for shown in (office, free, planned, fe.plan(free, search=QUICK), passes):
+        assert "\n" not in repr(shown)
+        assert len(repr(shown)) < 160
+    assert re.fullmatch(
+        r"<Plan office.yaml, fasaco: 9\d\.\d % of 40.9 m2 swept, \d+ min \d\d s, [\d.]+ m, \d+ "
+        r"quarter-turns, at most \d+ % above the shortest time>",
+        repr(planned),
+    )
+    assert "40.9 m2 (" in repr(passes)
+    for drawn in (planned, passes):
+        with Image.open(io.BytesIO(drawn._repr_png_())) as picture:
+            assert picture.size == drawn.plot().size

@@ -27,7 +27,7 @@ from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.review.figures import document_of
 from fasaco_edge.review.moments import Span
 from fasaco_edge.review.output.export import FORMATS, export
-from fasaco_edge.review.output.pictures import SIZE, draw_review
+from fasaco_edge.review.output.pictures import SIZE, draw_review, left_out_words
 from fasaco_edge.review.output.rows import charge_rows, screen_rows
 from fasaco_edge.review.review import CoverageCounts, read_review, review_of
 from fasaco_edge.review.run_data import StatusSample
@@ -56,10 +56,34 @@ def review(parts):
 
 def test_the_picture_shows_map_and_trail(review):
     picture = draw_review(review)
-    assert picture.size == SIZE
+    assert picture.height == SIZE[1]
     colours = {colour for _, colour in picture.getcolors(maxcolors=1 << 20)}
     assert {palette.OCCUPIED, palette.COVERED, palette.RECOVERED[0], palette.START} <= colours
     assert palette.UNSWEPT in colours
+
+
+def test_the_picture_is_as_wide_as_what_it_shows(review):
+    pixels = np.asarray(draw_review(review).convert("RGB"))
+    is_blank = (pixels == palette.PAPER).all(axis=(0, 2))
+    edges = np.flatnonzero(np.diff(np.pad(is_blank, 1).astype(int)))
+    widest = max(end - begin for begin, end in zip(edges[::2], edges[1::2], strict=True))
+    assert widest < pixels.shape[1] / 8
+
+
+def test_a_line_over_the_floor_is_drawn_by_what_it_sweeps(review):
+    """Its track passes beside the centres of cells that the daemon counts as covered."""
+    config = {**review.data.config, "planner": {"line": "thorough"}}
+    line = replace(review, data=replace(review.data, config=config))
+    colours = {colour for _, colour in draw_review(line).getcolors(maxcolors=1 << 20)}
+    assert {palette.COVERED, palette.UNSWEPT} <= colours
+    assert not {palette.LEFT_OUT, *palette.RECOVERED} & colours
+
+
+def test_cells_that_the_daemon_has_counted_are_not_called_left(review):
+    assert left_out_words(review) == "not covered"
+    assert review.counts is not None
+    more = replace(review.counts, covered=review.drive.coverage.covered + 1)
+    assert left_out_words(replace(review, counts=more)) == "not passed while it was recorded"
 
 
 def test_without_map_and_poses_there_are_still_charts(review):
@@ -72,7 +96,7 @@ def test_without_map_and_poses_there_are_still_charts(review):
         walk=None,
         counts=None,
     )
-    assert draw_review(bare).size == SIZE
+    assert draw_review(bare).height == SIZE[1]
     told = document(bare)
     assert told["steps"] is told["covered_cells"] is None
     assert len(told["not_recorded"]) >= 2
@@ -187,7 +211,8 @@ def test_the_command_writes_them(parts, tmp_path):
     ended = fasaco_edge("review", *parts, "--png", picture, "--export", folder, "--json")
     assert ended.code == 0, ended.err
     with Image.open(picture) as image:
-        assert image.size == SIZE
+        assert image.height == SIZE[1]
+        assert image.width <= SIZE[0]
     names = {file.name for file in folder.iterdir()}
     assert names == {*(f"{name}.csv" for name in (*TABLES, "columns")), "end.npz"}
 

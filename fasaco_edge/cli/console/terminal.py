@@ -17,16 +17,24 @@ from rich.progress import (
     MofNCompleteColumn,
     Progress,
     ProgressColumn,
+    Task,
     TextColumn,
     TimeElapsedColumn,
 )
 from rich.segment import Segment
+from rich.style import StyleType
 from rich.table import Table
 from rich.text import Text
 
 from fasaco_edge.cli.console.streams import printed_by
 from fasaco_edge.host.processes import first_signal_calls
 from fasaco_edge.text import lines, one_line
+
+# Widths of the columns of progress, without the space before each [characters].
+USUAL_WIDTH, WIDE_BAR, NARROW_BAR, CLOCK, COUNT = 80, 32, 16, 7, 13
+LEAST_DESCRIPTION = 8
+# Room for the ``^C`` that a terminal adds.
+RIGHT_MARGIN = 2
 
 
 class CleanConsole(Console):
@@ -99,7 +107,7 @@ class ProgressLines(Progress):
 
     def get_renderable(self) -> RenderableType:
         """Return the text shown, with room beside it for the ``^C`` that a terminal adds."""
-        return Constrain(super().get_renderable(), max(err().width - 2, 1))
+        return Constrain(super().get_renderable(), max(err().width - RIGHT_MARGIN, 1))
 
     def _print_above(self, text: str) -> None:
         self.console.print(Text(text), soft_wrap=True)
@@ -109,12 +117,32 @@ class ProgressLines(Progress):
         os.kill(os.getpid(), signal.SIGTERM)
 
 
+class Description(TextColumn):
+    """What is done, cut where it would take the room of the columns beside it.
+
+    Rich would make these narrower instead: the bar, and the clock.
+    """
+
+    def __init__(self, beside: int, style: StyleType = "none") -> None:
+        """``beside`` is the width of the other columns, each with the space before it."""
+        super().__init__("{task.description}", style=style, markup=False)
+        self._beside = beside
+
+    def render(self, task: Task) -> Text:
+        """Return the text, cut."""
+        text = super().render(task)
+        room = err().width - RIGHT_MARGIN - self._beside
+        text.truncate(max(room, LEAST_DESCRIPTION), overflow="ellipsis")
+        return text
+
+
 def progress(*, counted: bool = True) -> Progress:
     """Return a progress bar; ``counted`` shows how much is done."""
     count = (MofNCompleteColumn(),) if counted else ()
+    bar = WIDE_BAR if err().width >= USUAL_WIDTH else NARROW_BAR
     return ProgressLines(
-        TextColumn("{task.description}", markup=False),
-        BarColumn(bar_width=32),
+        Description(beside=bar + CLOCK + 2 + (COUNT + 1 if counted else 0)),
+        BarColumn(bar_width=bar),
         *count,
         TimeElapsedColumn(),
     )
@@ -127,6 +155,16 @@ def figures(rows: Iterable[tuple[str, str]]) -> Table:
     table.add_column()
     for name, value in rows:
         table.add_row(name, value)
+    return table
+
+
+def summary(rows: Iterable[tuple[str, str]]) -> Table:
+    """Return names and words of a few figures, without lines between them."""
+    table = Table(show_header=False, box=None, padding=(0, 2, 0, 0))
+    table.add_column(style="cyan", no_wrap=True)
+    table.add_column()
+    for name, words in rows:
+        table.add_row(name, words)
     return table
 
 

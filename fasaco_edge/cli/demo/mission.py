@@ -21,7 +21,13 @@ from fasaco_edge.bus.arrival import Sample
 from fasaco_edge.bus.mailbox import LatestSlot
 from fasaco_edge.bus.session import Bus, open_bus
 from fasaco_edge.bus.settings import BusSettings
-from fasaco_edge.cli.console.terminal import ProgressLines, err
+from fasaco_edge.cli.console.terminal import (
+    CLOCK,
+    NARROW_BAR,
+    Description,
+    ProgressLines,
+    err,
+)
 from fasaco_edge.cli.demo.mishaps import Mishaps
 from fasaco_edge.cli.demo.robots import FLEET, DemoRobot, fleet_recorder
 from fasaco_edge.client import phrases
@@ -41,6 +47,8 @@ SETTLE_SIM_S = 3.0
 # Programs that subscribe to the robots, by the names of their logs.
 LAST = ("daemon", "fleet")
 AT_WORK = ("planning", "covering", "degraded")
+# Widths of a percentage, and of as many figures as a name of a robot leaves [characters].
+PERCENT, LEAST_FIGURES = 5, 24
 
 
 class DemoView:
@@ -48,9 +56,9 @@ class DemoView:
 
     def __init__(self, titles: Sequence[str]) -> None:
         self._bar = ProgressLines(
-            TextColumn("{task.description}", style="bold", markup=False),
-            BarColumn(bar_width=16),
-            TextColumn("{task.percentage:>3.0f} % of cells", markup=False),
+            Description(NARROW_BAR + PERCENT + CLOCK + LEAST_FIGURES + 4, style="bold"),
+            BarColumn(bar_width=NARROW_BAR),
+            TextColumn("{task.percentage:>3.0f} %", markup=False),
             TimeElapsedColumn(),
             # In a narrow terminal the figures are cut, and nothing else.
             TextColumn(
@@ -151,7 +159,7 @@ class DemoMission:
         plans: dict[tuple[int, int], float] = {}
         settle_s = max(SETTLE_SIM_S / self._args.speed, 1.5)
         names = [robot.name for robot in self._robots]
-        with DemoView(names if len(names) > 1 else [str(self._args.map)]) as view:
+        with DemoView(names if len(names) > 1 else [Path(self._args.map).stem]) as view:
             while (now := time.monotonic()) - started < self._args.timeout:
                 self._check_processes()
                 for number, newest in enumerate(self._newest):

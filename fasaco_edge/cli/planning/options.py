@@ -303,7 +303,8 @@ def _add_planner(group: argparse._ArgumentGroup) -> None:
         type=float,
         metavar="S",
         help="time for the search of walks and of the line along one [s]; a first walk and line "
-        f"are always finished (default: {BUDGET_S:g}; none by planners other than colony-search)",
+        f"are always finished, a planner of your own is ended (default: {BUDGET_S:g}; none by "
+        "planners other than colony-search)",
     )
     group.add_argument(
         "--swept",
@@ -345,7 +346,10 @@ def _add_output(group: argparse._ArgumentGroup) -> None:
         help="write a picture of the trail that the colony leaves: where it points to from each "
         "cell, and how decided it is (colony-search, fasaco and aco)",
     )
-    add_json(group, "the figures")
+    group.add_argument(
+        "--long", action="store_true", help="print all figures, and not only those that matter"
+    )
+    add_json(group, "all figures")
 
 
 def _planner(text: str) -> str:

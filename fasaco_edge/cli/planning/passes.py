@@ -6,7 +6,7 @@ import argparse
 import logging
 import signal
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,13 +14,16 @@ from numpy.typing import NDArray
 from fasaco_edge.cli.console import terminal
 from fasaco_edge.cli.console.arguments import Exit, writing
 from fasaco_edge.cli.console.streams import print_json
-from fasaco_edge.cli.planning.request import PlanRequest, require_frame, watching
+from fasaco_edge.cli.planning.request import PlanRequest, require_frame, say_written, watching
 from fasaco_edge.cli.warmup import compile_kernels
 from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.host.processes import first_signal_calls
 from fasaco_edge.planners.passes import check_passes
 from fasaco_edge.planners.planner import Interrupt
 from fasaco_edge.planners.stages import stages_of_plan
+
+if TYPE_CHECKING:
+    from fasaco_edge.offline.passes import PassPlans
 
 LOG = logging.getLogger(__name__)
 
@@ -78,7 +81,7 @@ def plan_in_passes(args: argparse.Namespace, request: PlanRequest) -> int:
     if args.json:
         print_json(figures)
     else:
-        _print(args, figures, str(planned.floor or "not known of a coverage grid"))
+        _print(args, planned, figures)
     return Exit.INTERRUPTED if asked.asked.is_set() else Exit.OK
 
 
@@ -89,12 +92,17 @@ def _numbered(tables: Sequence[NDArray[np.generic]]) -> NDArray[np.generic]:
     )
 
 
-def _print(args: argparse.Namespace, figures: dict[str, Any], floor: str) -> None:
-    """Print the sums as a table, and a line for each pass."""
+def _print(args: argparse.Namespace, planned: PassPlans, figures: dict[str, Any]) -> None:
+    """Print the sums, and a line for each pass."""
     passes = figures.pop("passes")
-    figures["floor"] = floor
-    rows = [(name.replace("_", " "), str(value)) for name, value in figures.items()]
-    terminal.out().print(terminal.figures(rows))
+    if args.long:
+        figures["floor"] = planned.floor or "not known of a coverage grid"
+        rows = [(name.replace("_", " "), str(value)) for name, value in figures.items()]
+        terminal.out().print(terminal.figures(rows))
+    else:
+        from fasaco_edge.offline.summary import rows_of_passes
+
+        terminal.out().print(terminal.summary(rows_of_passes(planned)))
     for number, each in enumerate(passes, 1):
         share, gap = each["along_share"], each["gap"]
         words = "" if share is None else f", {share:.0%} of the line along its lanes"
@@ -103,6 +111,4 @@ def _print(args: argparse.Namespace, figures: dict[str, Any], floor: str) -> Non
             f"pass {number}, {each['pass']}: {each['cells']} cells, {each['steps']} steps, "
             f"{each['cost_s']:.1f} s{words}"
         )
-    for file in (args.path_out, args.xy_out, args.png):
-        if file is not None:
-            terminal.out().print(f"wrote {file}")
+    say_written(args)

@@ -46,6 +46,8 @@ REPLAN_PERIOD_S = 1.0
 QUERY_BYTES = MAX_JSON_BYTES + 4096
 Said = Reply | Shared
 
+_NO_WILDCARD = "ask by the whole key, without *"
+
 
 def error_reply(error: FasacoError) -> Reply:
     """Return an error as a reply."""
@@ -154,7 +156,9 @@ class Commands:
         self._decided: list[Answer] = []
         self._replan_key = keys.rpc("replan")
         self._replanned_at = float("-inf")
-        too_long = error_reply(BadQuery(f"a query must have at most {QUERY_BYTES} bytes"))
+        too_long = error_reply(
+            BadQuery(f"a query must have at most {QUERY_BYTES} bytes", hint="send a shorter one")
+        )
         for name in ("mission", "replan"):
             post = partial(mailbox.post, "command")
             bus.take_questions(keys.rpc(name), post, QUERY_BYTES, too_long)
@@ -181,13 +185,13 @@ class Commands:
         if (triggered := self._services.get(question.key)) is not None:
             check_request(request.payload)
             if "*" in request.key:
-                raise BadQuery("a service has to be called by its name")
+                raise BadQuery("a service has to be called by its name", hint=_NO_WILDCARD)
             return Command(triggered)
         if question.key == self._replan_key:
             check(request)
             if request.key.endswith("*"):
                 # A wildcard query must change nothing.
-                raise BadQuery("replan has to be asked for by its name")
+                raise BadQuery("replan has to be asked for by its name", hint=_NO_WILDCARD)
             command = Command("replan")
         else:
             check(request, payload=True)

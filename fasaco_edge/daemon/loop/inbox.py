@@ -325,4 +325,7 @@ def _size_fault(dropped: Oversized) -> FasacoError:
     kind = dropped.kind.replace("_", " ")
     was = f"a {kind} message of {dropped.size} bytes was dropped"
     text = f"{was}: it may have at most {dropped.most}"
-    return MapTooLarge(text) if dropped.kind in MAPS else MalformedMessage(text)
+    if dropped.kind in MAPS:
+        hint = "publish the map with larger pixels, or raise map.max_pixels"
+        return MapTooLarge(text, hint=hint)
+    return MalformedMessage(text, hint="publish no larger message; another type may be sent there")

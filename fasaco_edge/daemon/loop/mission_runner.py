@@ -135,7 +135,8 @@ class MissionRunner:
             if not asked.discard and before.forgets(command, after):
                 self._keeper.check_loss(asked.command)
             if asked.command == "replan":
-                raise CommandError("nothing to plan: the first plan is still to come")
+                hint = "ask again once the daemon has planned"
+                raise CommandError("nothing to plan: the first plan is still to come", hint=hint)
             self._keeper.order_state = after
         except FasacoError as error:
             return error

@@ -8,7 +8,7 @@ import time
 from collections.abc import Sequence
 from itertools import combinations
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from fasaco_edge.cli.console import terminal
 from fasaco_edge.cli.console.arguments import Exit, writing
 from fasaco_edge.cli.console.streams import print_json
-from fasaco_edge.cli.planning.request import require_frame, watching
+from fasaco_edge.cli.planning.request import require_frame, say_written, watching
 from fasaco_edge.cli.warmup import compile_kernels
 from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.host.processes import first_signal_calls
@@ -216,6 +216,24 @@ def _write_rows(
     np.savetxt(file, np.vstack(numbered), form, ",", header=header, comments="")
 
 
+def _summary(figures: dict[str, Any], robots: int) -> list[tuple[str, str]]:
+    """Return the figures that matter, as names and words."""
+    from fasaco_edge.offline.summary import duration
+
+    gap = (
+        "" if figures["gap"] is None else f", at most {100 * figures['gap']:.1f} % above the least"
+    )
+    rows = [
+        ("map", f"{figures['map']}, {figures['cells']} cells of {figures['cell_m']:g} m"),
+        ("time", f"{duration(figures['makespan_s'])}, of the robot that takes longest"),
+        ("longest", f"{figures['makespan_steps']} of {figures['steps']} steps{gap}"),
+        ("passed", f"{figures['swept_twice']} cells by two or more of {robots} robots"),
+    ]
+    if count := figures["unreachable_cells"]:
+        rows.append(("not reached", f"{count} cells that no walk from a start leads to"))
+    return rows
+
+
 def _print(
     args: argparse.Namespace, figures: dict[str, object], robots: list[dict[str, object]]
 ) -> None:
@@ -223,13 +241,14 @@ def _print(
     if args.json:
         print_json(figures | {"robots": robots})
         return
-    rows = [(name.replace("_", " "), str(value)) for name, value in figures.items()]
-    terminal.out().print(terminal.figures(rows))
+    if args.long:
+        rows = [(name.replace("_", " "), str(value)) for name, value in figures.items()]
+        terminal.out().print(terminal.figures(rows))
+    else:
+        terminal.out().print(terminal.summary(_summary(figures, len(robots))))
     for number, robot in enumerate(robots, 1):
         terminal.out().print(
             f"robot {number}: from {robot['start']} to {robot['end']}, {robot['steps']} steps, "
             f"{robot['length_m']} m, {robot['cost_s']:.1f} s, {robot['turns_90']} quarter-turns"
         )
-    for file in (args.path_out, args.xy_out, args.png):
-        if file is not None:
-            terminal.out().print(f"wrote {file}")
+    say_written(args)

@@ -138,7 +138,10 @@ class EventHandler:
         if grid is None or event.revision not in (0, self.route.revision):
             return
         if event.frame != grid.frame:
-            raise WrongFrame(f"blocked in frame {event.frame!r}, map in {grid.frame!r}")
+            raise WrongFrame(
+                f"blocked in frame {event.frame!r}, map in {grid.frame!r}",
+                hint="let the follower report in the frame of the path that it drives",
+            )
         self.blocked.note(event, self._now)
         if self.map.obstacles.close(event.points, (event.x, event.y), self._now):
             self.map.draw_obstacles()

@@ -140,11 +140,13 @@ class OrderChanges:
     def _replan(self) -> int:
         """Want a full new plan; return its number, or raise CommandError if none can be made."""
         if self.map.lattice is None:
-            raise CommandError("nothing to plan: there is no map yet")
+            raise CommandError("nothing to plan: there is no map yet", hint="publish a map first")
         if self.map.pose is None:
-            raise CommandError("nothing to plan: there is no pose yet")
+            raise CommandError("nothing to plan: there is no pose yet", hint="publish a pose first")
         if self.map.area is None or self.map.robot_cell() is None:
-            raise CommandError(f"nothing to plan: {self.map.why_misplaced()}")
+            hint = "drive the robot to free floor, or check map, pose and robot radius"
+            raise CommandError(f"nothing to plan: {self.map.why_misplaced()}", hint=hint)
         if not self.orders.can_plan:
-            raise CommandError("nothing to plan: no reachable cell is left to cover")
+            hint = "the floor in reach is covered: `mission start` covers it again"
+            raise CommandError("nothing to plan: no reachable cell is left to cover", hint=hint)
         return self.route.want_full("asked for")

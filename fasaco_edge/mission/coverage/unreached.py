@@ -42,7 +42,8 @@ REASONS = {
     Cause.KEPT_OUT: "in a keep-out zone",
     Cause.BEHIND_KEEP_OUT: "closed off by a keep-out zone",
     Cause.BEHIND_OBSTACLES: "closed off by obstacles",
-    Cause.CLOSED: "blocked by an obstacle that was not there before",
+    # An obstacle, a wall that the map shows thicker by a pixel, or one that has moved: not known.
+    Cause.CLOSED: "no longer free on the map",
     Cause.UNKNOWN: "unknown to the map",
 }
 

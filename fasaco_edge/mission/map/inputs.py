@@ -75,7 +75,8 @@ class FrameSelector:
             updated = self._maps[frame].with_updates(p for p in patches if p.frame == frame)
             self._maps[frame] = updated.grid
             wrong = f"map update in frame {frame!r}, the mission's is {self.active!r}"
-            faults += [*updated.faults, *(WrongFrame(wrong) for _ in updated.windows)]
+            hint = f"publish map and updates in {self.active!r}; or `mission reset` to start over"
+            faults += [*updated.faults, *(WrongFrame(wrong, hint=hint) for _ in updated.windows)]
         return [patch for patch in patches if patch.frame not in others], faults
 
     def note_pose(self, stamped: StampedPose, now: float) -> bool:

@@ -104,7 +104,10 @@ class MapState:
             )
             is_active_now = self.frames.note_map(grid)
             if grid.frame != (active := self.frames.active):
-                raise WrongFrame(f"map in frame {grid.frame!r}, the mission's is {active!r}")
+                raise WrongFrame(
+                    f"map in frame {grid.frame!r}, the mission's is {active!r}",
+                    hint=f"publish the map in {active!r}; or `mission reset` to start over",
+                )
         try:
             self._take_map(grid)
         except (MapTooLarge, MapTooFar) as error:
@@ -259,7 +262,11 @@ class MapState:
         if self.grid is not None and pose.frame != self.grid.frame:
             raise WrongFrame(f"pose in frame {pose.frame!r}, map in {self.grid.frame!r}")
         if self.frames.active not in ("", pose.frame):
-            raise WrongFrame(f"pose in frame {pose.frame!r}, progress in {self.frames.active!r}")
+            active = self.frames.active
+            raise WrongFrame(
+                f"pose in frame {pose.frame!r}, progress in {active!r}",
+                hint=f"publish map and pose in {active!r}; or `mission reset` to start over",
+            )
         self.pose = pose
 
     def update_area(self) -> None:

@@ -38,6 +38,7 @@ from fasaco_edge.planners.passes import Laid
 # Reason of being idle without autostart.
 NO_ORDER = "no order yet: start a mission"
 AT_HOME = "at home"
+_START_AGAIN = "start the mission again; nothing is driven without an order"
 
 
 class Stage(StrEnum):
@@ -207,10 +208,12 @@ class OrderState:
             case "replan":
                 if self.errand:
                     to = "home" if self.errand == "home" else "to charge"
-                    raise CommandError(f"nothing to plan: the robot has gone {to}")
+                    hint = "resume or start the mission first"
+                    raise CommandError(f"nothing to plan: the robot has gone {to}", hint=hint)
                 if self.order is None or self.paused:
                     why = "the mission is paused" if self.paused else "there is no mission"
-                    raise CommandError(f"nothing to plan: {why}")
+                    hint = f"{'resume' if self.paused else 'start'} the mission first"
+                    raise CommandError(f"nothing to plan: {why}", hint=hint)
             case "cancel" | "reset":
                 return self._dropped(is_reset=command.name == "reset")
             case "keep_out_add" | "keep_out_remove":
@@ -305,15 +308,15 @@ class OrderState:
             kept = msgspec.json.decode(note, type=_Note)
         except (msgspec.DecodeError, UnicodeError) as error:
             raise OrderError(
-                f"the order kept with the ledger cannot be read: {error}",
-                hint="start the mission again; nothing is driven without an order",
+                f"the order kept with the ledger cannot be read: {error}", hint=_START_AGAIN
             ) from error
         order = None if kept.order is None else order_of(kept.order)
         if order is not None and not (
             kept.zone < len(order.zones) and kept.pass_number <= order.zones[kept.zone].passes
         ):
             raise OrderError(
-                f"the order kept has no zone {kept.zone} with a pass {kept.pass_number}"
+                f"the order kept has no zone {kept.zone} with a pass {kept.pass_number}",
+                hint=_START_AGAIN,
             )
         keep_out = tuple(map(keep_out_of, kept.keep_out))
         state = msgspec.structs.asdict(kept) | {"order": order, "keep_out": keep_out}

@@ -171,16 +171,29 @@ def failure(error: BaseException, name: str, file: str) -> PlannerFailed:
         file: the user's file.
     """
     if isinstance(error, SyntaxError) and error.filename == file:
-        where = [f"{file}:{error.lineno}: {(error.text or '').strip()}"]
+        lines = f"\n  {file}:{error.lineno}: {(error.text or '').strip()}"
     else:
-        frames = traceback.extract_tb(error.__traceback__)
-        own = [frame for frame in frames if frame.filename == file]
-        where = [f"{file}:{at.lineno}, in {at.name}: {at.line}" for at in reversed(own)]
+        lines = _lines_in(file, error)
     kind = type(error).__name__
     try:
         said = getattr(error, "msg", None) or str(error)
     except Exception:  # the user's exception class may itself fail
         said = "says nothing"
-    # A recursion would give a thousand equal lines.
-    lines = "".join(f"\n  {line}" for line in where[:5])
     return PlannerFailed(f"planner {name}: {kind}: {said}{lines}")
+
+
+def too_long(error: BaseException, name: str, file: str, most_s: float | None) -> PlannerFailed:
+    """Return as text for the user that a planner took longer than ``most_s`` [s], and where."""
+    return PlannerFailed(
+        f"planner {name}: no walk after {most_s:g} s, its budget{_lines_in(file, error)}",
+        hint="let it end; or give it a larger --budget, or none, which waits until it has ended",
+    )
+
+
+def _lines_in(file: str, error: BaseException) -> str:
+    """Return the lines of a file that an exception passed through, the innermost first."""
+    frames = traceback.extract_tb(error.__traceback__)
+    own = [frame for frame in frames if frame.filename == file]
+    where = [f"{file}:{at.lineno}, in {at.name}: {at.line}" for at in reversed(own)]
+    # A recursion would give a thousand equal lines.
+    return "".join(f"\n  {line}" for line in where[:5])

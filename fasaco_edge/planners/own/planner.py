@@ -21,22 +21,24 @@ class OwnPlanner:
     Attributes:
         code: the code.
         seed: passed to it.
+        most_s: time that it may take [s]; None for no limit.
     """
 
     code: UserCode
     seed: int = 0
+    most_s: float | None = None
 
     def plan(
         self, problem: CoverageProblem, stop: StoppingCriterion, observe: Observer
     ) -> CoveragePath:
-        """Return the code's walk; it is neither stopped nor observed.
+        """Return the code's walk; it is not observed, and stopped by ``most_s`` alone.
 
         Raises:
-            PlannerFailed: the code raised.
+            PlannerFailed: the code raised, or took longer.
             IllegalWalk: the result is not a walk, or does not solve the problem.
         """
         given, began = posed(problem, self.seed), time.perf_counter()
-        cells = walked(self.code, given)
+        cells = walked(self.code, given, self.most_s)
         taken_s = time.perf_counter() - began
         window = problem.lattice.window
         cells = cells + np.array((window.row0, window.col0), np.int32)

@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.errors import IllegalWalk
-from fasaco_edge.planners.own.loading import RAISED, UserCode, failure
+from fasaco_edge.planners.own.loading import RAISED, UserCode, failure, too_long
+from fasaco_edge.planners.own.time_limit import TookTooLongError, no_longer_than
 from fasaco_edge.text import shown
 
 if TYPE_CHECKING:
@@ -72,16 +73,21 @@ def posed(problem: CoverageProblem, seed: int) -> GridProblem:
     )
 
 
-def walked(code: UserCode, problem: GridProblem) -> NDArray[np.int32]:
+def walked(code: UserCode, problem: GridProblem, most_s: float | None = None) -> NDArray[np.int32]:
     """Return the walk of a planner of the user's own, int32 (n, 2).
 
+    ``most_s`` is the time that the code may take [s]; None for no limit.
+
     Raises:
-        PlannerFailed: the code raised.
+        PlannerFailed: the code raised, or took longer.
         IllegalWalk: the result is not a walk, or does not solve the problem.
     """
     try:
         # The user's code runs up to here, also inside the returned iterable.
-        walk = _in_bounds(code.walk(problem), MOST_STEPS_PER_CELL * problem.to_cover.size)
+        with no_longer_than(most_s):
+            walk = _in_bounds(code.walk(problem), MOST_STEPS_PER_CELL * problem.to_cover.size)
+    except TookTooLongError as error:
+        raise too_long(error, code.name, code.file, most_s) from error
     except RAISED as error:
         raise failure(error, code.name, code.file) from error
     return _checked(problem, walk, code.name)

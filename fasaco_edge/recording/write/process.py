@@ -125,5 +125,7 @@ def _repaired(folder: Path) -> list[str]:
     try:
         repairs = repair_folder(folder)
     except OSError as error:
-        raise BadConfiguration(f"cannot record into {folder}: {error}") from error
+        raise BadConfiguration(
+            f"cannot record into {folder}: {error}", hint="name a folder that may be written to"
+        ) from error
     return [str(repair) for repair in repairs]

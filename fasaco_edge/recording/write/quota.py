@@ -39,7 +39,9 @@ def next_run(folder: Path, robot: str, began: datetime) -> str:
     try:
         names = os.listdir(folder) if folder.is_dir() else []
     except OSError as error:
-        raise BadConfiguration(f"cannot record into {folder}: {error}") from error
+        raise BadConfiguration(
+            f"cannot record into {folder}: {error}", hint="name a folder that may be written to"
+        ) from error
     runs = [int(match[1]) for match in map(NUMBERED.fullmatch, names) if match]
     newest = max((number for number in runs if number < MOST_RUNS), default=0)
     return f"run{newest + 1:05}-{began:{TIME}}-{robot}"

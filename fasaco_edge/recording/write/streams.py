@@ -99,7 +99,10 @@ def _try_address(host: str, port: int) -> None:
             trial.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
             trial.bind((host, port))
     except OSError as error:
-        raise BadConfiguration(f"cannot serve at {host}:{port}: {error}") from error
+        raise BadConfiguration(
+            f"cannot serve at {host}:{port}: {error}",
+            hint="give an address of this computer, and a port that no program listens at",
+        ) from error
 
 
 def send_blueprint(stream: rr.RecordingStream, blueprint: rrb.Blueprint) -> None:

@@ -80,7 +80,10 @@ class RecordingWriter:
             self._begin_part()
         except OSError as error:
             if not self._abandoned:
-                raise BadConfiguration(f"cannot record into {folder}: {error}") from error
+                raise BadConfiguration(
+                    f"cannot record into {folder}: {error}",
+                    hint="name a folder that may be written to",
+                ) from error
             self._enter(WriterState.STALLED, f"no part: {error}")
 
     @property

@@ -21,7 +21,9 @@ from fasaco_edge.review.output.rows import instant_rows, spot_rows
 from fasaco_edge.review.review import Review
 from fasaco_edge.review.spot import Spot
 from fasaco_edge.review.wording import clock
+from fasaco_edge.wire.documents.settings import known_settings
 
+# The most that one review takes, and the height of all [px].
 SIZE = (1600, 900)
 # Space of title, caption and key beside the map.
 AROUND = (56, 210)
@@ -34,7 +36,7 @@ DONE = {True: "complete", False: "not complete", None: "recorded in part"}
 def draw_review(review: Review, other: Review | None = None) -> Image.Image:
     """Return a picture, RGB: map and charts; of two runs both maps, and their curves together.
 
-    One is of ``SIZE``, two are wider by a map.
+    It is as wide as it has to be: one is of ``SIZE`` at most, two are wider by a map.
     """
     reviews = [review] if other is None else [review, other]
     labels = ["left", "right"]
@@ -45,16 +47,18 @@ def draw_review(review: Review, other: Review | None = None) -> Image.Image:
     ]
     charts = draw_panels("", (), panels, columns=1)
     space = SIZE[0] - charts.width
-    sheet = Image.new("RGB", (space * len(reviews) + charts.width, SIZE[1]), palette.PAPER)
+    maps = [draw_map(each, (space - AROUND[0], SIZE[1] - AROUND[1])) for each in reviews]
+    missions = [each for each in maps if each is not None]
+    for mission in missions:
+        # A caption of many lines leaves less space for the map.
+        mission.thumbnail((space, SIZE[1]))
+    width = sum(mission.width for mission in missions) + charts.width
+    sheet, left = Image.new("RGB", (width, SIZE[1]), palette.PAPER), 0
+    for mission in missions:
+        sheet.paste(mission, (left, (SIZE[1] - mission.height) // 2))
+        left += mission.width
     # The empty title above the charts may be cut off.
-    sheet.paste(charts, (sheet.width - charts.width, SIZE[1] - charts.height))
-    for column, each in enumerate(reviews):
-        mission = draw_map(each, (space - AROUND[0], SIZE[1] - AROUND[1]))
-        if mission is not None:
-            # A caption of many lines leaves less space for the map.
-            mission.thumbnail((space, SIZE[1]))
-            left = column * space + (space - mission.width) // 2
-            sheet.paste(mission, (left, (SIZE[1] - mission.height) // 2))
+    sheet.paste(charts, (left, SIZE[1] - charts.height))
     return sheet
 
 
@@ -69,6 +73,8 @@ def draw_map(review: Review, space: tuple[int, int]) -> Image.Image | None:
     track = _thinned(review.data.track[:, :2])
     if grid is None or lattice is None or drive is None or not len(track):
         return None
+    # A line over the floor covers cells without passing their centres: visits would not show it.
+    is_line = known_settings(review.data.config).planner.line != "cells"
     return draw_mission(
         grid,
         lattice,
@@ -78,7 +84,9 @@ def draw_map(review: Review, space: tuple[int, int]) -> Image.Image | None:
         lines=_caption(review),
         space=space,
         jump_m=review.data.jump_m,
+        swept=MapLayer(floor.geometry, floor.swept) if floor and is_line else None,
         unswept=MapLayer(floor.geometry, floor.unswept) if floor else None,
+        left_out_words=left_out_words(review),
         zones=[zone.polygon for zone in review.data.zones if zone.polygon],
         keep_out=review.data.keep_out,
     )
@@ -176,6 +184,18 @@ def _caption(review: Review) -> list[str]:
             f"{slowest:.0f} ms at worst; {review.faults.total:,} messages refused"
         )
     return lines
+
+
+def left_out_words(review: Review) -> str:
+    """Return what cells are called that the track did not pass.
+
+    The daemon also counts what was covered before the recording began, or beside a track.
+    """
+    counts, drive = review.counts, review.drive
+    has_counted_more = (
+        counts is not None and drive is not None and (counts.covered > drive.coverage.covered)
+    )
+    return "not passed while it was recorded" if has_counted_more else "not covered"
 
 
 def _thinned(track: NDArray[np.float64]) -> NDArray[np.float64]:

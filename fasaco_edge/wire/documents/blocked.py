@@ -11,7 +11,13 @@ import msgspec
 from msgspec import Meta
 
 from fasaco_edge.errors import MalformedMessage
-from fasaco_edge.wire.documents.json_text import Amount, Count, allowed, decode_document
+from fasaco_edge.wire.documents.json_text import (
+    OF_JSON,
+    Amount,
+    Count,
+    allowed,
+    decode_document,
+)
 from fasaco_edge.wire.limits import MAX_BLOCKED_POINTS, MAX_COORDINATE_M, MAX_STRING_BYTES
 
 REASONS: Final = ("obstacle", "stuck", "elsewhere")
@@ -57,5 +63,6 @@ def decode_blocked(payload: bytes) -> Blocked:
     report = decode_document(payload, Blocked)
     if report.reason not in REASONS:
         expected = ", ".join(REASONS)
-        raise MalformedMessage(f"blocked: reason must be one of {expected}, got {report.reason!r}")
+        text = f"blocked: reason must be one of {expected}, got {report.reason!r}"
+        raise MalformedMessage(text, hint=OF_JSON)
     return report

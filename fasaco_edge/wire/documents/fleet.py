@@ -12,7 +12,7 @@ import msgspec
 from msgspec import Meta
 
 from fasaco_edge.errors import FleetError, MalformedMessage
-from fasaco_edge.wire.documents.json_text import Document
+from fasaco_edge.wire.documents.json_text import OF_JSON, Document
 from fasaco_edge.wire.limits import (
     MAX_COORDINATE_M,
     MAX_FLEET_INDEX,
@@ -147,13 +147,16 @@ def decode_member(payload: bytes, fleet: str) -> FleetMember | None:
         MalformedMessage: it is malformed.
     """
     if len(payload) > MAX_JSON_BYTES:
-        raise MalformedMessage(f"fleet: must have at most {MAX_JSON_BYTES} bytes")
+        raise MalformedMessage(f"fleet: must have at most {MAX_JSON_BYTES} bytes", hint=OF_JSON)
     try:
         head = msgspec.json.decode(payload, type=_Head)
         if head.fleet != fleet:
             return None
         if head.version != FLEET_VERSION:
-            raise FleetError(f"its messages are of version {head.version}, not {FLEET_VERSION}")
+            raise FleetError(
+                f"its messages are of version {head.version}, not {FLEET_VERSION}",
+                hint="install the same release on all robots of the fleet",
+            )
         return msgspec.json.decode(payload, type=FleetMember)
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
-        raise MalformedMessage(f"fleet: {error}") from error
+        raise MalformedMessage(f"fleet: {error}", hint=OF_JSON) from error

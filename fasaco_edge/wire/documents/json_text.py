@@ -28,6 +28,8 @@ from fasaco_edge.wire.limits import (
 
 # A tolerant reader cuts texts at this length.
 MAX_TEXT = 500
+# What to do about a document that is refused.
+OF_JSON = "send a JSON object as the schema of this key describes it (protocol/schema)"
 
 Struct = TypeVar("Struct", bound=msgspec.Struct)
 
@@ -71,13 +73,14 @@ def decode_json(payload: bytes) -> dict[str, object]:
             ``MAX_JSON_DEPTH``, of integers ``MAX_JSON_INTEGER``, of others ``MAX_JSON_NUMBER``.
     """
     if len(payload) > MAX_JSON_BYTES:
-        raise MalformedMessage(f"JSON must have at most {MAX_JSON_BYTES} bytes, got {len(payload)}")
+        text = f"JSON must have at most {MAX_JSON_BYTES} bytes, got {len(payload)}"
+        raise MalformedMessage(text, hint=OF_JSON)
     try:
         document = msgspec.json.decode(payload, type=dict[str, object])
     except (msgspec.DecodeError, UnicodeDecodeError) as error:
-        raise MalformedMessage(f"JSON object: {error}") from error
+        raise MalformedMessage(f"JSON object: {error}", hint=OF_JSON) from error
     except RecursionError as error:
-        raise MalformedMessage("JSON object: nested too deeply") from error
+        raise MalformedMessage("JSON object: nested too deeply", hint=OF_JSON) from error
     _check_limits(document, "JSON object")
     return document
 
@@ -91,7 +94,7 @@ def decode_document(payload: bytes, kind: type[Struct]) -> Struct:
     try:
         return msgspec.convert(decode_json(payload), kind)
     except msgspec.ValidationError as error:
-        raise MalformedMessage(f"{kind.__name__.lower()}: {error}") from error
+        raise MalformedMessage(f"{kind.__name__.lower()}: {error}", hint=OF_JSON) from error
 
 
 def decode_tolerant(payload: bytes, kind: type[Struct]) -> Struct:
@@ -183,16 +186,19 @@ def _check_limits(value: object, where: str, depth: int = 0) -> None:
     """
     if not _is_in_range(value):
         if isinstance(value, float) and not math.isfinite(value):
-            raise MalformedMessage(f"{_short(where)} must be finite in JSON, got {value}")
+            text = f"{_short(where)} must be finite in JSON, got {value}"
+            raise MalformedMessage(text, hint=OF_JSON)
         if isinstance(value, int):
             limit, shown = f"{MAX_JSON_INTEGER}", "an integer beyond that"
         else:
             limit, shown = f"{MAX_JSON_NUMBER:g}", f"{value:g}"
-        raise MalformedMessage(f"{_short(where)} must be from -{limit} to {limit}, got {shown}")
+        text = f"{_short(where)} must be from -{limit} to {limit}, got {shown}"
+        raise MalformedMessage(text, hint=OF_JSON)
     if isinstance(value, dict | list | tuple):
         if depth == MAX_JSON_DEPTH:
             raise MalformedMessage(
-                f"{_short(where)}: nested too deeply, {MAX_JSON_DEPTH} levels are the limit"
+                f"{_short(where)}: nested too deeply, {MAX_JSON_DEPTH} levels are the limit",
+                hint=OF_JSON,
             )
         if isinstance(value, dict):
             for key, item in value.items():

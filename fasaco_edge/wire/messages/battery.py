@@ -86,4 +86,6 @@ def decode_battery(payload: bytes) -> BatteryState:
 
 def _check(level: float) -> None:
     if not (math.isnan(level) or 0.0 <= level <= 1.0):
-        refuse(BATTERY_STATE, "percentage", "in 0..1, or NaN where it is not known", level)
+        expected = "in 0..1, or NaN where it is not known"
+        hint = "publish the charge as a share, 0 to 1: of a driver that gives percent, a hundredth"
+        refuse(BATTERY_STATE, "percentage", expected, level, hint)

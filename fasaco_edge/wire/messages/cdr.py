@@ -31,9 +31,18 @@ _RANGES: dict[str, tuple[float, float, str]] = {
 }
 
 
-def refuse(message: str, field: str, expected: str, got: object) -> NoReturn:
-    """Raise MalformedMessage: ``message: field must be expected, got got``."""
-    raise MalformedMessage(f"{message}: {field} must be {expected}, got {got}")
+# What to do about a value that its type allows and this project does not.
+OF_A_VALUE = "correct this field where it is published"
+
+
+def refuse(
+    message: str, field: str, expected: str, got: object, hint: str | None = OF_A_VALUE
+) -> NoReturn:
+    """Raise MalformedMessage: ``message: field must be expected, got got``.
+
+    ``hint`` says what to do; None where the bytes may be of another type or encoding.
+    """
+    raise MalformedMessage(f"{message}: {field} must be {expected}, got {got}", hint=hint)
 
 
 def encoded_string(value: str, message: str, field: str) -> bytes:
@@ -67,7 +76,7 @@ class CdrReader:
         size = len(payload)
         if size < HEADER_SIZE or payload[:3] != _FIXED_HEADER or payload[3] > MAX_PADDING:
             header = payload[:HEADER_SIZE].hex(" ") or "no bytes"
-            refuse(message, "encapsulation header", "00 01 00 00", header)
+            refuse(message, "encapsulation header", "00 01 00 00", header, None)
         self.message = message
         self._payload = payload
         self._size = size
@@ -125,15 +134,16 @@ class CdrReader:
     def text(self, length: int, field: str) -> str:
         """Read a string whose ``length`` with the NUL was read already."""
         if not 1 <= length <= MAX_STRING_BYTES + 1:
-            refuse(self.message, f"length of {field}", f"1..{MAX_STRING_BYTES + 1}", length)
+            expected = f"1..{MAX_STRING_BYTES + 1}"
+            refuse(self.message, f"length of {field}", expected, length, None)
         start = self.take(1, length, field)
         text = self._payload[start : self._offset]
         if text.find(0) != length - 1:
-            refuse(self.message, field, "a string with one NUL, at its end", repr(text))
+            refuse(self.message, field, "a string with one NUL, at its end", repr(text), None)
         try:
             return text[:-1].decode()
         except UnicodeDecodeError as error:
-            refuse(self.message, field, "UTF-8", f"{text!r} ({error.reason})")
+            refuse(self.message, field, "UTF-8", f"{text!r} ({error.reason})", None)
 
     def length(self, field: str, least_bytes: int) -> int:
         """Read the length of a sequence whose items take at least ``least_bytes`` each."""
@@ -144,6 +154,7 @@ class CdrReader:
                 f"length of {field}",
                 f"at most {self.remaining // least_bytes} in {self.remaining} bytes",
                 count,
+                None,
             )
         return count
 
@@ -168,11 +179,11 @@ class CdrReader:
             expected = (
                 f"at its end after {self._offset} bytes, or {counted} counted ones of padding"
             )
-            refuse(self.message, "payload", expected, f"{len(tail)} bytes more")
+            refuse(self.message, "payload", expected, f"{len(tail)} bytes more", None)
 
     def _cut(self, field: str, size: int, start: int) -> NoReturn:
         expected = f"{size} bytes at offset {start}"
-        refuse(self.message, field, expected, f"a payload of {self._size}")
+        refuse(self.message, field, expected, f"a payload of {self._size}", None)
 
 
 class CdrWriter:

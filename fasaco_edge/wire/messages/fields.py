@@ -13,6 +13,9 @@ from fasaco_edge.wire.limits import MAX_COORDINATE_M, MAX_STRING_BYTES, QUATERNI
 from fasaco_edge.wire.messages.cdr import CdrReader, CdrWriter, encoded_string, refuse
 
 SECOND_NS = 1_000_000_000
+# What to do about values that look like those of another unit or notation.
+IN_METRES = "publish positions in metres, in a frame whose origin is nearer"
+IN_QUATERNIONS = "publish the orientation as a quaternion x, y, z, w of length 1"
 POSE = struct.Struct("<7d")
 """A geometry_msgs/Pose: position x, y, z and quaternion x, y, z, w."""
 
@@ -86,8 +89,9 @@ def check_pose(pose: Sequence[float], message: str, field: str) -> None:
     for axis, value in zip("xyz", pose, strict=False):
         # A negated comparison also catches NaN.
         if not abs(value) <= far:
-            refuse(message, f"{field}.position.{axis}", f"within {far:g} m of 0", value)
-    refuse(message, f"norm of {field}.orientation", f"1 within {QUATERNION_TOLERANCE}", norm)
+            refuse(message, f"{field}.position.{axis}", f"within {far:g} m of 0", value, IN_METRES)
+    expected = f"1 within {QUATERNION_TOLERANCE}"
+    refuse(message, f"norm of {field}.orientation", expected, norm, IN_QUATERNIONS)
 
 
 def planar(pose: Sequence[float]) -> Pose2D:
@@ -98,4 +102,4 @@ def planar(pose: Sequence[float]) -> Pose2D:
 
 def refuse_nanosec(reader: CdrReader, field: str, nanosec: int) -> NoReturn:
     """Raise MalformedMessage for the nanoseconds of a time ``field``."""
-    refuse(reader.message, f"{field}.nanosec", f"less than {SECOND_NS}", nanosec)
+    refuse(reader.message, f"{field}.nanosec", f"less than {SECOND_NS}", nanosec, None)

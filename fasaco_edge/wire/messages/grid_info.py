@@ -106,4 +106,5 @@ def _shortest_decimal(value: float) -> float:
 def _check_resolution(resolution: float, message: str) -> None:
     if not MIN_RESOLUTION_M <= resolution <= MAX_RESOLUTION_M:
         expected = f"{MIN_RESOLUTION_M}..{MAX_RESOLUTION_M:g} m"
-        refuse(message, "info.resolution", expected, resolution)
+        hint = "publish the edge of a pixel in metres, as 0.05"
+        refuse(message, "info.resolution", expected, resolution, hint)

@@ -20,6 +20,8 @@ from fasaco_edge.wire.limits import (
 )
 from fasaco_edge.wire.messages.cdr import CdrReader, CdrWriter, refuse
 from fasaco_edge.wire.messages.fields import (
+    IN_METRES,
+    IN_QUATERNIONS,
     POSE,
     read_header,
     read_pose,
@@ -52,7 +54,10 @@ def decode_pose(payload: bytes, schema: str) -> StampedPose:
     """
     if schema not in _AFTER_POSE:
         known = ", ".join(_AFTER_POSE)
-        raise MalformedMessage(f"a pose must come as one of {known}, got {schema!r}")
+        raise MalformedMessage(
+            f"a pose must come as one of {known}, got {schema!r}",
+            hint="publish one of these types, and name it in the encoding",
+        )
     reader = CdrReader(payload, schema)
     frame, stamp_ns = read_header(reader)
     if schema == ODOMETRY:
@@ -113,12 +118,11 @@ class Transform:
         for axis, value in zip("xyz", (x, y, z), strict=True):
             if not abs(value) <= MAX_COORDINATE_M:
                 expected = f"within {MAX_COORDINATE_M:g} m of 0"
-                refuse(TF_MESSAGE, f"translation.{axis} {which}", expected, value)
+                refuse(TF_MESSAGE, f"translation.{axis} {which}", expected, value, IN_METRES)
         norm = math.hypot(*turn)
         if not abs(norm - 1.0) <= QUATERNION_TOLERANCE:
-            refuse(
-                TF_MESSAGE, f"norm of rotation {which}", f"1 within {QUATERNION_TOLERANCE}", norm
-            )
+            expected = f"1 within {QUATERNION_TOLERANCE}"
+            refuse(TF_MESSAGE, f"norm of rotation {which}", expected, norm, IN_QUATERNIONS)
         if max(abs(turn[0]), abs(turn[1])) > MAX_TRANSFORM_TILT:
             expected = f"a turn about z (x and y within {MAX_TRANSFORM_TILT})"
             refuse(TF_MESSAGE, f"rotation {which}", expected, turn)

@@ -22,6 +22,7 @@ _NAMES = (
 )
 # Indices of the numbers that are used.
 _FIRST, _STEP, _LEAST, _MOST = 0, 2, 5, 6
+_IN_RADIANS = "publish angles in radians, not in degrees"
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,11 +95,12 @@ def _check(floats: tuple[float, ...], count: int) -> None:
     if not 1 <= count <= MAX_SCAN_BEAMS:
         refuse(LASER_SCAN, "length of ranges", f"1..{MAX_SCAN_BEAMS}", count)
     if abs(floats[_FIRST]) > MAX_SCAN_SPAN_RAD:
-        refuse(LASER_SCAN, "angle_min", f"within {MAX_SCAN_SPAN_RAD:g} of 0", floats[_FIRST])
+        expected = f"within {MAX_SCAN_SPAN_RAD:g} of 0"
+        refuse(LASER_SCAN, "angle_min", expected, floats[_FIRST], _IN_RADIANS)
     span = abs(floats[_STEP]) * (count - 1)
     if span > MAX_SCAN_SPAN_RAD or (count > 1 and floats[_STEP] == 0.0):
         expected = f"not 0, and at most {MAX_SCAN_SPAN_RAD:g} over all beams"
-        refuse(LASER_SCAN, "angle_increment", expected, floats[_STEP])
+        refuse(LASER_SCAN, "angle_increment", expected, floats[_STEP], _IN_RADIANS)
     if not 0.0 <= floats[_LEAST] < floats[_MOST]:
         expected = f"at least 0 and below range_max, {floats[_MOST]:g}"
         refuse(LASER_SCAN, "range_min", expected, floats[_LEAST])

@@ -66,7 +66,10 @@ def decode_velocity(payload: bytes, schema: str = TWIST) -> Velocity:
 def _check_schema(schema: str) -> None:
     if schema not in TWIST_SCHEMAS:
         known = " or ".join(TWIST_SCHEMAS)
-        raise MalformedMessage(f"a velocity must come as {known}, got {schema!r}")
+        raise MalformedMessage(
+            f"a velocity must come as {known}, got {schema!r}",
+            hint="publish one of these types, and name it in the encoding",
+        )
 
 
 def _check(numbers: tuple[float, ...], schema: str) -> None:

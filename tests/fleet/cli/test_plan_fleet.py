@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 
 import numpy as np
 import pytest
@@ -135,9 +136,12 @@ def test_the_gap_excludes_turns_and_each_figure_is_explained(plan, grid, capsys)
 
 
 def test_without_json_it_prints_a_line_for_each_robot(plan, grid):
-    code, out, _ = plan(grid, "--robots", "0,0", "11,17", "--budget", 0.1)
+    code, out, _ = plan(grid, "--robots", "0,0", "11,17", "--budget", 0.1, "--long")
     assert code == 0
     assert "makespan steps" in out
+    assert "robot 2: from [11, 17]" in out
+    code, out, _ = plan(grid, "--robots", "0,0", "11,17", "--budget", 0.1)
+    assert re.search(r"^time +\d+ .*, of the robot that takes longest", out, re.MULTILINE)
     assert "robot 2: from [11, 17]" in out
 
 

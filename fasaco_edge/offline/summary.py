@@ -1,0 +1,105 @@
+"""Summary of a plan in words: a few rows for a screen, or one line."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from fasaco_edge.judge.floor import share_words
+from fasaco_edge.offline.settings import CELLS
+from fasaco_edge.planners.cost import count_turns
+
+if TYPE_CHECKING:
+    from fasaco_edge.offline.passes import PassPlans
+    from fasaco_edge.offline.result import Plan, PlannedFloor
+
+Rows = list[tuple[str, str]]
+
+
+def line_of(plan: Plan) -> str:
+    """Return a plan in one line: what of the floor, how long, how far, how good."""
+    metres, turns, seconds, gap = _drive(plan)
+    words = [f"{plan.problem.cells} cells", duration(seconds), f"{metres:,.1f} m"]
+    floor = plan.floor
+    if floor is not None and floor.swept_share is not None:
+        words[0] = f"{share_words(floor.swept_share)} of {floor.reachable_m2:,.1f} m2 swept"
+    words.append(f"{turns:,.0f} quarter-turns")
+    if gap is not None:
+        words.append(f"at most {100 * gap:.0f} % above the shortest time")
+    return f"{plan.map.name}, {plan.path.planner}: {', '.join(words)}"
+
+
+def rows_of(plan: Plan) -> Rows:
+    """Return the figures that matter, as names and words."""
+    metres, turns, seconds, gap = _drive(plan)
+    path, floor = plan.path, plan.floor
+    rows = [("map", f"{plan.map.name}, {plan.problem.cells} cells of {_metres(plan)}")]
+    if floor is not None:
+        rows.append(("swept", _swept(floor)))
+    time = duration(seconds)
+    if floor is not None and floor.seconds_per_m2 is not None:
+        time += f", {floor.seconds_per_m2:.1f} s a square metre"
+    rows.append(("time", time))
+    if gap is not None:
+        rows.append(("gap", f"at most {100 * gap:.1f} % above the shortest possible time"))
+    line = "through the centres of cells" if plan.line == CELLS else f"{plan.line}, over the floor"
+    rows.append(("line", f"{metres:,.1f} m, {turns:,.0f} quarter-turns, {line}"))
+    if plan.curve_figures is not None:
+        rows.append(("curve", str(plan.curve_figures)))
+    if floor is not None and floor.illegal_share:
+        rows.append(
+            ("caution", f"{100 * floor.illegal_share:.1f} % of the line is too close to obstacles")
+        )
+    above = "" if path.gap is None else f", at most {100 * path.gap:.1f} % above its bound"
+    rows.append(("walk", f"{path.steps} steps by {path.planner}, seed {path.seed}{above}"))
+    if count := int(plan.problem.unreachable.sum()):
+        rows.append(("not reached", f"{count} cells that no walk from the start leads to"))
+    rows.append(("search", f"{plan.wall_s:.1f} s, ended by {plan.ended_by}"))
+    return rows
+
+
+def rows_of_passes(plans: PassPlans) -> Rows:
+    """Return the same of several passes together."""
+    first, floor = plans.plans[0], plans.floor
+    metres = sum(_drive(plan)[0] for plan in plans.plans)
+    rows = [("map", f"{first.map.name}, {first.problem.cells} cells in the first pass")]
+    if floor is not None:
+        rows.append(("swept", _swept(floor)))
+    rows.append(("time", duration(sum(_drive(plan)[2] for plan in plans.plans))))
+    rows.append(("line", f"{metres:,.1f} m in {len(plans.plans)} passes"))
+    return rows
+
+
+def duration(seconds: float) -> str:
+    """Return a driving time in words."""
+    if seconds < 60.0:
+        return f"{seconds:.0f} s"
+    minutes, rest = divmod(round(seconds), 60)
+    hours, minutes = divmod(minutes, 60)
+    return f"{hours} h {minutes:02} min" if hours else f"{minutes} min {rest:02} s"
+
+
+def _drive(plan: Plan) -> tuple[float, float, float, float | None]:
+    """Return metres, quarter-turns, seconds and gap of the line; of a grid those of the walk."""
+    if plan.judged is not None:
+        judged = plan.judged.figures
+        return judged.length_m, judged.quarter_turns, judged.seconds, judged.gap
+    turns = count_turns(plan.cells)
+    metres = plan.steps * plan.problem.lattice.cell_m
+    return metres, turns.quarter + 2 * turns.half, plan.cost_s, plan.gap
+
+
+def _metres(plan: Plan) -> str:
+    deg = round(plan.ground.lattice_deg, 3)
+    return f"{plan.ground.lattice.cell_m:g} m" + (f" at {deg:g} degrees" if deg else "")
+
+
+def _swept(floor: PlannedFloor) -> str:
+    """Return what a line sweeps and leaves, in words."""
+    if floor.swept_share is None:
+        return "no floor is reachable"
+    count = floor.patches_over_4_dm2
+    left = "no patch over 4 dm2 left"
+    if count:
+        patches = "1 patch" if count == 1 else f"{count} patches"
+        left = f"{patches} over 4 dm2 left, the largest {floor.largest_patch_m2:,.2f} m2"
+    return f"{share_words(floor.swept_share)} of {floor.reachable_m2:,.1f} m2; {left}"
