@@ -23,7 +23,7 @@ Covers = Literal["all", "edge", "rest"]
 # Lanes as they are cheapest; across those of the pass before.
 Direction = Literal["auto", "cross"]
 MOST_PASSES = 100
-MOST_ANGLE_DEG = 360.0
+MOST_ANGLE_DEG = 360
 # Steps in all directions.
 _OPEN = 1 << EAST | 1 << NORTH | 1 << WEST | 1 << SOUTH
 

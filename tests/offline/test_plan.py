@@ -212,7 +212,7 @@ def test_a_plan_is_one_line_of_text_and_a_picture():
         assert "\n" not in repr(shown)
         assert len(repr(shown)) < 160
     assert re.fullmatch(
-        r"<Plan office.yaml, fasaco: 9\d\.\d % of 40.9 m2 swept, \d+ min \d\d s, [\d.]+ m, \d+ "
+        r"<Plan office.yaml, colony-search: 9\d\.\d % of 40.9 m2 swept, \d+ min \d\d s, [\d.]+ m, \d+ "
         r"quarter-turns, at most \d+ % above the shortest time>",
         repr(planned),
     )
