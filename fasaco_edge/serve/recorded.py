@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
+from msgspec.structs import replace
 from numpy.typing import NDArray
 
 from fasaco_edge.bus.arrival import Arrival, Sample
@@ -21,7 +22,7 @@ from fasaco_edge.serve.messages import framed, message_text
 from fasaco_edge.serve.served_view import MOST_POINTS, PERIODS_S, ServedView
 from fasaco_edge.wire.documents.json_text import decode_tolerant
 from fasaco_edge.wire.documents.path_documents import PATH_DIGEST, PathAttachment
-from fasaco_edge.wire.documents.status import Status
+from fasaco_edge.wire.documents.status import DriveReport, Status
 from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.messages.grid_octets import GridOctets
 from fasaco_edge.wire.messages.paths import encode_path
@@ -38,12 +39,18 @@ MOST_POSES = 5_000
 
 
 class RecordedView(ServedView):
-    """The newest samples of a recorded robot at one time."""
+    """The newest samples of a recorded robot at one time.
+
+    Args:
+        robot: its name.
+        scale: seconds of the robot per second.
+    """
 
     periods_s = dict.fromkeys(PERIODS_S, 0.0)
 
-    def __init__(self, robot: str) -> None:
+    def __init__(self, robot: str, scale: float = 1.0) -> None:
         super().__init__(Keys())
+        self._scale = scale
         self.robot, self.robots = robot, {robot}
         # Places of the drawn grids in the recording, to recognise newer ones.
         self._drawn: dict[str, Place] = {}
@@ -61,6 +68,13 @@ class RecordedView(ServedView):
     def _source(self, kind: str, now: float) -> object:
         # The time to go changes with the place on the path, too.
         return super()._source(kind, now), self.walk.revision, self.walk.at
+
+    def _read_status(self, sample: Sample, now: float) -> None:
+        super()._read_status(sample, now)
+        # The daemon measured the drive by its own clock.
+        if self.status is not None and self._scale != 1.0:
+            drive = by_robot(self.status.drive, self._scale)
+            self.status = replace(self.status, drive=drive)
 
     def has(self) -> list[str]:
         """Return the kinds of messages of which there is one."""
@@ -112,17 +126,17 @@ class Playback:
 
     def _rewind(self) -> None:
         """Go back to before the recording."""
-        self._view = RecordedView(self._robot)
+        self._view = RecordedView(self._robot, self._timeline.clock.scale)
         self._at_ns = 0
         self._path: Place | None = None
         self._abouts: dict[int, bytes] = {}
 
     def newest(self) -> list[tuple[str, int, str | bytes]]:
         """Return the messages for the whole recording: its description, and the driven track."""
-        began_s = 1e-9 * self._timeline.began_ns
-        seconds = 1e-9 * (self._timeline.ended_ns - self._timeline.began_ns)
-        names = [path.name for path in self._paths]
-        text = message_text("recording", files=names[:2], began_s=began_s, seconds=seconds)
+        clock, names = self._timeline.clock, [path.name for path in self._paths]
+        began_s, seconds = 1e-9 * clock.began_ns, clock.seconds(self._timeline.ended_ns)
+        about = {"files": names[:2], "began_s": began_s, "seconds": seconds, "clock": clock.words}
+        text = message_text("recording", **about)
         return [("recording", 1, text), ("track", 1, track_message(self._timeline))]
 
     def ask(self, query: str, payload: bytes, timeout_s: float) -> list[Reply]:
@@ -132,12 +146,14 @@ class Playback:
     def at(self, at_s: float) -> list[str | bytes]:
         """Return what changed since the time shown before, at a time since the recording began [s].
 
+        The time is the robot's.
+
         Raises:
             UnreadableRecording: it can no longer be read.
         """
-        timeline = self._timeline
-        at_s = min(max(at_s, 0.0), 1e-9 * (timeline.ended_ns - timeline.began_ns))
-        at_ns = timeline.began_ns + round(1e9 * at_s)
+        timeline, clock = self._timeline, self._timeline.clock
+        at_s = min(max(at_s, 0.0), clock.seconds(timeline.ended_ns))
+        at_ns = clock.wall_ns(at_s)
         if at_ns < self._at_ns:
             self._rewind()
         view, now, since_ns, self._at_ns = self._view, 1e-9 * at_ns, self._at_ns, at_ns
@@ -158,7 +174,9 @@ class Playback:
         view.drive(poses[:: -(-len(poses) // MOST_POSES) or 1], now)
         view.drive(timeline.poses_between(0, at_ns)[-1:], now)
         found |= view.news(now)
-        reported_s = round(view.reported_at - 1e-9 * timeline.began_ns, 3) if view.status else None
+        reported_s = None
+        if view.status:
+            reported_s = round(clock.seconds(round(1e9 * view.reported_at)), 3)
         ending = message_text("time", at=at_s, has=view.has(), status=reported_s)
         return [*found.values(), ending]
 
@@ -176,6 +194,14 @@ def _robot_of(sample: Sample) -> str:
         return decode_tolerant(sample.payload, Status).robot
     except FasacoError:
         return ""
+
+
+def by_robot(drive: DriveReport, scale: float) -> DriveReport:
+    """Return a drive that was measured by the daemon's clock, by that of a simulated robot."""
+    speed_m_s, turns_s = drive.speed_m_s, (drive.quarter_turn_s, drive.half_turn_s)
+    quarter_s, half_s = (None if turn_s is None else scale * turn_s for turn_s in turns_s)
+    speed_m_s = None if speed_m_s is None else speed_m_s / scale
+    return replace(drive, speed_m_s=speed_m_s, quarter_turn_s=quarter_s, half_turn_s=half_s)
 
 
 def stepped(corners: NDArray[np.float64], steps: int) -> NDArray[np.float64]:
@@ -203,7 +229,7 @@ def stepped(corners: NDArray[np.float64], steps: int) -> NDArray[np.float64]:
 
 def track_message(timeline: Timeline) -> bytes:
     """Return the driven track as a message: points (x, y) [m], and when each was driven [s]."""
-    poses, at_s = timeline.poses, 1e-9 * (timeline.pose_ns - timeline.began_ns)
+    poses, at_s = timeline.poses, timeline.clock.all_seconds(timeline.pose_ns)
     ways = np.hypot(*np.diff(poses[:, :2], axis=0, prepend=poses[:1, :2]).T)
     kept = np.diff(np.floor(np.cumsum(ways) / SPACING_M), prepend=-1.0) > 0
     points = np.column_stack((poses[:, :2], at_s))[kept]
