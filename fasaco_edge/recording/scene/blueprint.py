@@ -133,13 +133,14 @@ def _states() -> rrb.StateTimelineView:
 
 
 def log_view() -> rrb.TextLogView:
-    """Return a view of all logs."""
+    """Return a view of all logs, without the lines of level DEBUG."""
     # A column of times would be a digit wide; the cursor shows the time.
     columns = rrb.TextLogColumns(
         timeline_columns=[rrb.encodings.TimelineColumn(entities.WALL_CLOCK, visible=False)],
         text_log_columns=[rrb.encodings.TextLogColumn("Body")],
     )
-    return rrb.TextLogView(origin="/log", name="Log", columns=columns)
+    rows = rrb.TextLogRows(filter_by_log_level=["INFO", "WARN", "ERROR"])
+    return rrb.TextLogView(origin="/log", name="Log", columns=columns, rows=rows)
 
 
 def _card() -> rrb.TextDocumentView:

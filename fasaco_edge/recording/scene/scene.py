@@ -282,10 +282,12 @@ class Scene:
         self._layers.finish()
         self._driven.finish()
         self._curves.finish()
+        self._paths.catch_up()
         if self._known is not None and self._known != self._framed:
             self._writer.show(build_blueprint(self._known))
 
     def _draw(self, layer: str, size: int, draw_it: Callable[[], None]) -> None:
+        self._paths.finish()
         self._layers.draw(layer, size, draw_it, self._writer.wall_ns)
 
     def _anchored(self, place: Pose2D) -> Anchor:
