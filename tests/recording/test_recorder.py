@@ -157,6 +157,17 @@ def test_the_robot_stands_where_it_was_published(recorded):
     assert np.allclose(places[-1][0][:2], recorded.mission.walk[-1], atol=1e-5)
 
 
+def test_start_and_end_of_the_track_are_marked(recorded):
+    for entity, place, name in (
+        (entities.START, recorded.mission.walk[0], "start"),
+        (entities.END, recorded.mission.walk[-1], "end"),
+    ):
+        labels = read_column(recorded.path, entity, "Points3D:labels")
+        assert labels.values == [[name]]
+        (point,) = read_column(recorded.path, entity, "Points3D:positions").values[-1]
+        assert np.allclose(point[:2], place, atol=1e-5)
+
+
 def test_the_robot_is_as_large_as_its_configuration_says(recorded):
     (half_size,) = read_static(recorded.path, entities.ROBOT_BODY, "Ellipsoids3D:half_sizes")[-1]
     assert half_size[:2] == pytest.approx([RADIUS_M, RADIUS_M])

@@ -18,7 +18,6 @@ MARGIN, PHEROMONE_MARGIN = 1.1, 1.3
 FIELD_OF_VIEW_RAD = math.radians(55.0)
 VIEW_ASPECT, PHEROMONE_ASPECT = 1.12, 1.45
 COLUMNS = [11, 8, 9]
-TRAIL_S = 30.0
 CHANGE_S = 4.0
 
 MAP_BACKGROUND = [38, 41, 48]
@@ -57,7 +56,7 @@ def _map_view(bounds: Bounds) -> rrb.Spatial3DView:
         line_grid=False,
         background=MAP_BACKGROUND,
         overrides={
-            entities.DRIVEN_PATH: last_seconds(TRAIL_S),
+            entities.DRIVEN_PATH: so_far(),
             entities.MAP_CHANGE: last_seconds(CHANGE_S),
         },
     )
@@ -167,5 +166,14 @@ def last_seconds(seconds: float) -> rrb.VisibleTimeRanges:
     return rrb.VisibleTimeRanges(
         timeline=entities.WALL_CLOCK,
         start=rrb.TimeRangeBoundary.cursor_relative(seconds=-seconds),
+        end=rrb.TimeRangeBoundary.cursor_relative(),
+    )
+
+
+def so_far() -> rrb.VisibleTimeRanges:
+    """Return the range from the beginning up to the cursor."""
+    return rrb.VisibleTimeRanges(
+        timeline=entities.WALL_CLOCK,
+        start=rrb.TimeRangeBoundary.infinite(),
         end=rrb.TimeRangeBoundary.cursor_relative(),
     )

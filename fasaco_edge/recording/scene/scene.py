@@ -112,8 +112,14 @@ class Scene:
         """Move the robot, and draw its driven path."""
         pose = self._anchored(stamped.pose).pose(stamped.pose)
         self._writer.log(entities.ROBOT, draw.pose_archetype(pose), latched=True)
+        if self._robot is None:
+            self._mark(entities.START, pose, draw.START_COLOUR)
         self._robot = pose
         self._driven.add(pose.x, pose.y)
+
+    def _mark(self, entity: str, pose: Pose2D, colour: draw.Colour) -> None:
+        name = entity.rpartition("/")[2]
+        self._writer.log(entity, draw.mark_archetype(pose, name, colour), latched=True)
 
     def add_command(self, command: Command) -> None:
         """Log a command accepted by the mission; draw the zones of the new order."""
@@ -283,6 +289,8 @@ class Scene:
         self._driven.finish()
         self._curves.finish()
         self._paths.catch_up()
+        if self._robot is not None:
+            self._mark(entities.END, self._robot, draw.END_COLOUR)
         if self._known is not None and self._known != self._framed:
             self._writer.show(build_blueprint(self._known))
 
