@@ -232,7 +232,7 @@ def test_the_pheromone_is_neither_flat_nor_misplaced(recorded):
     best = recorded.mission.best_steps
     assert cohort == [f"cohort 3, 1 cell a move\n60 ants in all, best walk {best} steps"]
     path = f"path {recorded.mission.revision}"
-    decided = "12 cells, 1.03 directions in reach of the best"
+    decided = "12 cells, branching 1.03 (1 if all are decided)"
     assert trail == [f"living trail at {path}, {best} steps to drive\n{decided}"]
 
 

@@ -127,7 +127,7 @@ def trail_label(message: PheromoneMessage, about: TrailAttachment) -> rr.Points3
     """Return the label over the living trail: its path, and how decided it is."""
     text = (
         f"living trail at path {about.revision}, {message.best_steps} steps to drive\n"
-        f"{about.cells} cells, {about.branching:.2f} directions in reach of the best"
+        f"{about.cells} cells, branching {about.branching:.2f} (1 if all are decided)"
     )
     return label_archetype(message.geometry.bounds(), text, LABEL_ABOVE)
 

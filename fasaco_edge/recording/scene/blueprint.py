@@ -114,7 +114,7 @@ def _figures() -> rrb.Vertical:
 def _plan() -> rrb.TimeSeriesView:
     legend = rrb.PlotLegend(rrb.Corner2D.RightTop)
     shown = tuple(f"/{gap}" for gap in (entities.GAP, entities.LINE_GAP))
-    return plot_view("Time above the bound [share]", "metrics/plan", legend, contents=shown)
+    return plot_view("Gap to the lower bound [share]", "metrics/plan", legend, contents=shown)
 
 
 def _saved() -> rrb.TimeSeriesView:
@@ -124,7 +124,7 @@ def _saved() -> rrb.TimeSeriesView:
 
 def _branching() -> rrb.TimeSeriesView:
     none = rrb.PlotLegend(visible=False)
-    return plot_view("Trail: directions in reach of the best", entities.BRANCHING, none)
+    return plot_view("Branching of the living trail, 1 if decided", entities.BRANCHING, none)
 
 
 def _states() -> rrb.StateTimelineView:

@@ -282,20 +282,20 @@ class Scene:
         """Make the drawings that are due; call it often."""
         self._layers.catch_up(self._writer.wall_ns)
         self._driven.catch_up()
+        self._paths.catch_up()
 
     def finish(self) -> None:
         """Make all waiting drawings, and fit the view to the final map."""
         self._layers.finish()
+        self._paths.finish()
         self._driven.finish()
-        self._curves.finish()
-        self._paths.catch_up()
         if self._robot is not None:
             self._mark(entities.END, self._robot, draw.END_COLOUR)
+        self._curves.finish()
         if self._known is not None and self._known != self._framed:
             self._writer.show(build_blueprint(self._known))
 
     def _draw(self, layer: str, size: int, draw_it: Callable[[], None]) -> None:
-        self._paths.finish()
         self._layers.draw(layer, size, draw_it, self._writer.wall_ns)
 
     def _anchored(self, place: Pose2D) -> Anchor:
