@@ -79,6 +79,8 @@ def test_each_report_says_once_that_it_is_simulated(parts, tmp_path):
         assert ended.code == 0, ended.err
         text = " ".join(ended.out.split())
         assert text.count(WORDS) == 1, text
+    both = fasaco_edge("review", *parts, "--against", *parts)
+    assert both.out.count(WORDS) == 2
     ended = fasaco_edge("review", *parts, "--at", 3, "--json", "--png", tmp_path / "at.png")
     assert json.loads(ended.out)["time_scale"] == SCALE
 

@@ -109,7 +109,7 @@ def screen_rows(review: Review, document: ReviewDocument) -> list[tuple[str, str
     charges = [f"{at} for {seconds}, {levels}" for at, seconds, levels in charge_rows(document)]
     return [
         ("run", f"{_began(document.began)}, {sides}{planner}, {document.robot or 'robot'}"),
-        *_simulated(document),
+        *clock_rows(document),
         ("swept", by_name["reachable floor swept"] + _before(document)),
         ("covered", by_name["covered"]),
         ("cells after", ", ".join(reached)),
@@ -195,7 +195,7 @@ def card_rows(document: ReviewDocument) -> list[tuple[str, str]]:
         ("robot", document.robot or "not recorded"),
         ("began", _began(document.began)),
         ("duration", clock(document.duration_s)),
-        *_simulated(document),
+        *clock_rows(document),
         ("map", size),
         ("version", document.version or "not recorded"),
         ("settings", ", ".join(settings) or "not recorded"),
@@ -203,7 +203,8 @@ def card_rows(document: ReviewDocument) -> list[tuple[str, str]]:
     ]
 
 
-def _simulated(document: ReviewDocument) -> list[tuple[str, str]]:
+def clock_rows(document: ReviewDocument) -> list[tuple[str, str]]:
+    """Return the speed of a simulated robot; nothing for a real one."""
     words = scale_words(document.time_scale)
     return [("clock", f"the robot's, {words}")] if words else []
 
