@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-from msgspec.structs import replace
 from numpy.typing import NDArray
 
 from fasaco_edge.bus.arrival import Arrival, Sample
@@ -22,7 +21,7 @@ from fasaco_edge.serve.messages import framed, message_text
 from fasaco_edge.serve.served_view import MOST_POINTS, PERIODS_S, ServedView
 from fasaco_edge.wire.documents.json_text import decode_tolerant
 from fasaco_edge.wire.documents.path_documents import PATH_DIGEST, PathAttachment
-from fasaco_edge.wire.documents.status import DriveReport, Status
+from fasaco_edge.wire.documents.status import Status
 from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.messages.grid_octets import GridOctets
 from fasaco_edge.wire.messages.paths import encode_path
@@ -39,18 +38,12 @@ MOST_POSES = 5_000
 
 
 class RecordedView(ServedView):
-    """The newest samples of a recorded robot at one time.
-
-    Args:
-        robot: its name.
-        scale: seconds of the robot per second.
-    """
+    """The newest samples of a recorded robot at one time."""
 
     periods_s = dict.fromkeys(PERIODS_S, 0.0)
 
-    def __init__(self, robot: str, scale: float = 1.0) -> None:
+    def __init__(self, robot: str) -> None:
         super().__init__(Keys())
-        self._scale = scale
         self.robot, self.robots = robot, {robot}
         # Places of the drawn grids in the recording, to recognise newer ones.
         self._drawn: dict[str, Place] = {}
@@ -68,13 +61,6 @@ class RecordedView(ServedView):
     def _source(self, kind: str, now: float) -> object:
         # The time to go changes with the place on the path, too.
         return super()._source(kind, now), self.walk.revision, self.walk.at
-
-    def _read_status(self, sample: Sample, now: float) -> None:
-        super()._read_status(sample, now)
-        # The daemon measured the drive by its own clock.
-        if self.status is not None and self._scale != 1.0:
-            drive = by_robot(self.status.drive, self._scale)
-            self.status = replace(self.status, drive=drive)
 
     def has(self) -> list[str]:
         """Return the kinds of messages of which there is one."""
@@ -126,7 +112,7 @@ class Playback:
 
     def _rewind(self) -> None:
         """Go back to before the recording."""
-        self._view = RecordedView(self._robot, self._timeline.clock.scale)
+        self._view = RecordedView(self._robot)
         self._at_ns = 0
         self._path: Place | None = None
         self._abouts: dict[int, bytes] = {}
@@ -194,14 +180,6 @@ def _robot_of(sample: Sample) -> str:
         return decode_tolerant(sample.payload, Status).robot
     except FasacoError:
         return ""
-
-
-def by_robot(drive: DriveReport, scale: float) -> DriveReport:
-    """Return a drive that was measured by the daemon's clock, by that of a simulated robot."""
-    speed_m_s, turns_s = drive.speed_m_s, (drive.quarter_turn_s, drive.half_turn_s)
-    quarter_s, half_s = (None if turn_s is None else scale * turn_s for turn_s in turns_s)
-    speed_m_s = None if speed_m_s is None else speed_m_s / scale
-    return replace(drive, speed_m_s=speed_m_s, quarter_turn_s=quarter_s, half_turn_s=half_s)
 
 
 def stepped(corners: NDArray[np.float64], steps: int) -> NDArray[np.float64]:

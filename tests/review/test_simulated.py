@@ -40,8 +40,7 @@ def record(folder, scale):
         names = ("map", "pose", "status")
         put = {name: Sender(bus, getattr(topics, name.upper())) for name in names}
         put["map"].put(map_bytes(room(4.0, 3.0)))
-        drive = {"speed_m_s": SCALE * SPEED_M_S}
-        status = {"robot": "one", "state": "covering", "config": config, "drive": drive}
+        status = {"robot": "one", "state": "covering", "config": config}
         put["status"].put(encode_json(status))
         ticks = np.arange(0.0, DRIVES_S + 0.1, EVERY_S).tolist()
         for at_s in ticks:
@@ -95,7 +94,6 @@ def test_the_page_of_it_is_in_the_robots_time(parts):
         half = float(clock.robot_s[0]) + DRIVES_S / 2
         pose = next(m for m in playback.at(half) if '"kind":"pose"' in str(m))
         assert json.loads(pose)["x"] == pytest.approx(0.5 + SPEED_M_S * DRIVES_S / 2, abs=0.13)
-        assert playback._view.status.drive.speed_m_s == SPEED_M_S
 
 
 def test_without_a_scale_times_stay_the_recorders(tmp_path):
