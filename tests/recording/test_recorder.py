@@ -140,6 +140,10 @@ def test_the_summary_gives_the_last_figures(recorded):
     assert group == f"{more} more plans up to path {mission.revision}: the map grew"
     levels = read_column(recorded.path, entities.PATH_LOG, "TextLog:level").values
     assert levels == [["INFO"], ["INFO"], *[["DEBUG"]] * more, ["INFO"]]
+    # The plans of a mission are logged before its end, not with that of the recording.
+    states = read_column(recorded.path, entities.MISSION_STATE, "StateChange:state")
+    done_ns = states.wall_ns[states.values.index(["done"])]
+    assert read_column(recorded.path, entities.PATH_LOG, "TextLog:text").wall_ns[-1] <= done_ns
 
 
 def test_the_path_lies_where_it_was_published(recorded):

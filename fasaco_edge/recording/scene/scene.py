@@ -46,6 +46,8 @@ DEFAULT_RADIUS_M = 0.2
 # The view follows the growing map in steps of this fraction of its size: each blueprint
 # takes 120 kB.
 REFRAME_FRACTION = 0.15
+# States that alternate while plans come.
+UNDER_WAY = ("planning", "covering")
 # Distance above the robot of the label with the trail's direction.
 FORK_CELLS = 3.0
 
@@ -251,6 +253,9 @@ class Scene:
         if kept_out != self._kept_out:
             self._kept_out = kept_out
             self._draw_areas()
+        if status.state not in UNDER_WAY:
+            # The plans came before.
+            self._paths.finish()
         self.enter(entities.MISSION_STATE, status.state, status.reason)
         self.enter(entities.PLANNER_STATE, "planning" if status.plan.planning else "idle")
         self._add_troubles(status)
