@@ -29,7 +29,12 @@ if TYPE_CHECKING:
 def _add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("map", metavar="MAP", help="map_server YAML, or a name from `maps`")
     parser.add_argument(
-        "--speed", type=float, default=1.0, metavar="X", help="simulated seconds per second"
+        "--speed",
+        type=float,
+        default=1.0,
+        metavar="X",
+        help="simulated seconds per second; robot.time_scale of the daemon's configuration says it "
+        "to reports of a recording (default: %(default)g)",
     )
     parser.add_argument(
         "--driver",

@@ -81,6 +81,8 @@ class RobotConfig(Section, frozen=True):
     is whether they may lead backward, too.
     ``tool_ahead_m`` is how far the tool's centre lies ahead of the point that the robot turns
     about; below 0 behind.
+    ``time_scale`` is for a simulated robot: its seconds per second. The daemon's own timeouts are
+    real seconds whatever it is; reports of a recording have the robot's seconds.
     """
 
     name: str = "robot"
@@ -98,6 +100,7 @@ class RobotConfig(Section, frozen=True):
     turn_radius_m: Annotated[float, Meta(ge=0, le=20)] = 0.0
     reverses: bool = True
     tool_ahead_m: Annotated[float, Meta(ge=-5, le=5)] = 0.0
+    time_scale: Annotated[float, Meta(ge=0.01, le=1000)] = 1.0
 
     def __post_init__(self) -> None:
         """Set the radius to that of the disc around the footprint, if there is one."""

@@ -24,6 +24,7 @@ SETTINGS = {
     "turn rate": "robot.turn_deg_s",
     "turn acceleration": "robot.turn_deg_s2",
     "acceleration": "robot.acceleration_m_s2",
+    "simulated seconds per second": "robot.time_scale",
 }
 # If these differ, walks, cells and times belong to different problems.
 ANOTHER_PROBLEM = ("tool width", "robot radius", "line", "width of lanes", "building", "orders")

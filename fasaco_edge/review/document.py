@@ -96,7 +96,11 @@ class ReviewDocument(msgspec.Struct):
         robot, version, config: of the daemon, by its last status.
         map: the last one: rows, cols, resolution_m.
         began: when the recording began, UTC.
+        time_scale: seconds of the robot per second: 1, unless it was simulated faster or slower.
+            All times and durations in [s] are by the robot's clock, unless described otherwise;
+            those in [ms] are by the computer's.
         duration_s: from its first entry to its last [s].
+        recorded_s: the same by the computer's clock [s].
         state: last state of the mission.
         orders: each order: ordered (`command`, or `itself` for one that began without a command),
             at_s, until_s, ended_by (`start` of another, `cancel`, `reset`; null for the end of the
@@ -149,7 +153,8 @@ class ReviewDocument(msgspec.Struct):
             not, by the last status), branching (at the end: mean number of directions of a cell
             within reach of its strongest).
         memory_mb_max, recorder_memory_mb_max: most memory of daemon and recorder [MB].
-        processor_s, recorder_processor_s: total processor time of daemon and recorder [s].
+        processor_s, recorder_processor_s: total processor time of daemon and recorder, by the
+            computer's clock [s].
         processor_percent_max, threads_max: of the daemon: processor time over half a minute [% of a
             core], threads.
         restored_cells: cells that were covered before a restart.
@@ -176,7 +181,9 @@ class ReviewDocument(msgspec.Struct):
     config: dict[str, str | float] = {}
     map: MapSize | None = None
     began: str = ""
+    time_scale: float = 1.0
     duration_s: float = 0.0
+    recorded_s: float = 0.0
     state: str | None = None
     complete: bool | None = None
     orders: list[OrderChapter] = []

@@ -45,7 +45,9 @@ def document_of(review: Review) -> ReviewDocument:
         version=data.version or None,
         config=dict(flat_settings(data.config)),
         began=f"{began:%Y-%m-%dT%H:%M:%SZ}",
+        time_scale=record.clock.scale,
         duration_s=round(review.duration_s, 3),
+        recorded_s=round(1e-9 * (record.ended_ns - record.began_ns), 3),
         state=review.state or None,
         complete=review.complete,
         orders=[

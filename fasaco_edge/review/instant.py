@@ -95,7 +95,7 @@ class TurnThen(msgspec.Struct):
 
 
 class Instant(msgspec.Struct):
-    """The state at one moment; times are [s] since the recording began."""
+    """The state at one moment; times are the robot's [s] since the recording began."""
 
     at_s: float
     state: str | None
@@ -165,7 +165,7 @@ def scene_at(review: Review, at_s: float) -> Scene:
         map=change,
         command=past[-1] if past else None,
         next_command=next((each for each in commands if each.at_s > at_s), None),
-        trail=drawn.trail_at(record.began_ns + round(1e9 * at_s)),
+        trail=drawn.trail_at(record.clock.wall_ns(at_s)),
     )
     lines = (drawn.line_of(each.revision if each else 0) for each in (before, path, after))
     return Scene(instant, grid, *lines)
@@ -337,7 +337,7 @@ def _map_at(record: RunRecord, at_s: float) -> tuple[OccupancyGrid | None, MapTh
     since_s = max(at_s - MAP_S, 0.0)
     old: OccupancyGrid | None = None
     new: OccupancyGrid | None = None
-    for came_s, grid in maps_of(RecordedSamples.of(record.batches), record.began_ns):
+    for came_s, grid in maps_of(RecordedSamples.of(record.batches), record.clock):
         if came_s > at_s:
             break
         new = grid

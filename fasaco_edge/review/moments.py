@@ -27,7 +27,7 @@ AT_REST = (
     *("loading", "charging", "done", "silent"),
 )
 TROUBLES = ("degraded", "blocked", "silent")
-# The effect of a command is published at most this long after it [s].
+# The effect of a command is published at most this long after it, by the recorder's clock [s].
 COMMAND_S = 1.5
 RECORDER_IN_ORDER = ("recording", "stopping")
 # "path blocked at cell (2, 3)" has the kind "path blocked".
@@ -153,7 +153,10 @@ def longest_gap(what: str, at_s: Sequence[float], during: Span) -> Moment | None
 
 
 def largest_drop(
-    fractions: NDArray[np.float64], map_s: Sequence[float], command_s: Sequence[float] = ()
+    fractions: NDArray[np.float64],
+    map_s: Sequence[float],
+    command_s: Sequence[float] = (),
+    scale: float = 1.0,
 ) -> Moment | None:
     """Return the largest drop of the covered share that was caused by a new map.
 
@@ -161,17 +164,22 @@ def largest_drop(
         fractions: float64 (n, 2), times [s] and covered shares as published by the daemon.
         map_s: arrivals of maps and updates [s].
         command_s: arrivals of commands [s]: a drop at a command is not caused by a map.
+        scale: seconds of the robot, in which the times are, per second.
     """
-    drops = list(_drops(fractions, np.array(sorted(map_s)), np.array(sorted(command_s))))
+    arrivals = np.array(sorted(map_s)), np.array(sorted(command_s))
+    drops = list(_drops(fractions, *arrivals, scale * COMMAND_S))
     return max(drops, key=lambda drop: drop.value, default=None)
 
 
 def _drops(
-    fractions: NDArray[np.float64], map_s: NDArray[np.float64], command_s: NDArray[np.float64]
+    fractions: NDArray[np.float64],
+    map_s: NDArray[np.float64],
+    command_s: NDArray[np.float64],
+    late_s: float,
 ) -> Iterator[Moment]:
     for (since, before), (until, after) in pairwise(fractions.tolist()):
         maps = np.searchsorted(map_s, (since, until), side="right")
-        commands = np.searchsorted(command_s, (since - COMMAND_S, until), side="right")
+        commands = np.searchsorted(command_s, (since - late_s, until), side="right")
         if after < before and maps[1] > maps[0] and commands[1] == commands[0]:
             points = 100 * (before - after)
             note = f"from {100 * before:.1f} % to {100 * after:.1f} % of what was known"
@@ -264,7 +272,8 @@ def worst_moments(
     if slowest is not None and slowest.plan_ms is not None:
         reason = slowest.about.reason
         found.append(Moment("slowest replan", slowest.plan_ms, "ms", slowest.at_s, reason))
-    found.append(largest_drop(fractions, data.map_s, [at_s for at_s, _, _ in data.commands]))
+    command_s = [at_s for at_s, _, _ in data.commands]
+    found.append(largest_drop(fractions, data.map_s, command_s, data.time_scale))
     # A restarted mission has such moments several times: the worst one counts.
     worst: dict[str, Moment] = {}
     for moment in found:

@@ -15,7 +15,7 @@ from fasaco_edge.review.moments import Span
 from fasaco_edge.review.run_data import RunData, StatusSample
 from fasaco_edge.wire.documents.replies import UnreachedArea
 
-# Samples this soon after a status [s] are of the same step.
+# Samples this soon after a status are of the same step, by the recorder's clock [s].
 SAME_STEP_S = 1.5
 ENDS = ("cancel", "reset")
 # States in which an order is over, or there is none: the same order would start again.
@@ -178,7 +178,7 @@ def _chapter(
         if begin_s <= each.at_s < until and each.status.coverage is not None
     ]
     own = fractions[(fractions[:, 0] >= begin_s) & (fractions[:, 0] < until)]
-    last = counted[-1] if counted and is_still_true(counted[-1], own) else None
+    last = counted[-1] if counted and is_still_true(counted[-1], own, data.time_scale) else None
     coverage = last.status.coverage if last else None
     covered, coverable = (coverage.covered, coverage.coverable) if coverage else (None, None)
     complete: bool | None = None
@@ -211,14 +211,16 @@ def _chapter(
     )
 
 
-def is_still_true(sample: StatusSample, fractions: NDArray[np.float64]) -> bool:
+def is_still_true(sample: StatusSample, fractions: NDArray[np.float64], scale: float) -> bool:
     """Return whether the covered share has not changed since a status came.
 
     The curve is drawn up to two seconds late, its last point at the end of the recording: after the
-    end of an order, which covers no more, it says nothing.
+    end of an order, which covers no more, it says nothing. ``scale``: seconds of the robot, in
+    which the times are, per second.
     """
     if sample.status.state in OVER:
         return True
-    later = fractions[fractions[:, 0] > sample.at_s + SAME_STEP_S]
-    then = fractions[fractions[:, 0] <= sample.at_s + SAME_STEP_S]
+    until_s = sample.at_s + scale * SAME_STEP_S
+    later = fractions[fractions[:, 0] > until_s]
+    then = fractions[fractions[:, 0] <= until_s]
     return not len(later) or (len(then) > 0 and bool((later[:, 1] == then[-1, 1]).all()))

@@ -72,7 +72,7 @@ def read_review(paths: Sequence[Path], progress: Progress = lambda *_: None) -> 
     samples = RecordedSamples.of(record.batches)
     # Samples are numbered: the last batch shows their approximate number.
     about = max(batch.place.first for batch in record.batches) + 1
-    data = gather(_reported(samples, progress, "decoding", about), record.began_ns)
+    data = gather(_reported(samples, progress, "decoding", about), record.clock)
     progress("following the robot", 0, 1)
     return review_of(record, data, samples.missing)
 
@@ -101,7 +101,7 @@ class CoverageCounts:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Review:
-    """All figures of a recording; times are [s] since it began.
+    """All figures of a recording; times are the robot's [s] since it began.
 
     Attributes:
         record: its files, plots, states and log.
@@ -212,7 +212,8 @@ def review_of(record: RunRecord, data: RunData, missing: int) -> Review:
     """
     end_s = _end_s(record, data)
     lattice, no_lattice = _lattice(data)
-    lost_pose_s = known_settings(data.config).mission.lost_pose_s
+    # The daemon's timeout is in real seconds.
+    lost_pose_s = data.time_scale * known_settings(data.config).mission.lost_pose_s
     drive = drive_over(lattice, data.times, data.track, lost_pose_s) if lattice else None
     floor = swept_floor(data, lattice, lost_pose_s) if lattice else None
     states = spans_of(_mission_states(data, record), end_s)
@@ -261,7 +262,7 @@ def _lattice(data: RunData) -> tuple[CoverageLattice | None, str]:
 
 def _end_s(record: RunRecord, data: RunData) -> float:
     """Return when the recording ended [s]; samples are written before their drawings."""
-    return max(1e-9 * (record.ended_ns - record.began_ns), data.last_s)
+    return max(record.clock.seconds(record.ended_ns), data.last_s)
 
 
 def _mission_states(data: RunData, record: RunRecord) -> list[Entered]:
@@ -274,7 +275,7 @@ def _mission_states(data: RunData, record: RunRecord) -> list[Entered]:
 def _entered(record: RunRecord, entity: str, log: str) -> list[Entered]:
     lines = record.log.get(log, ())
     return [
-        (1e-9 * (at - record.began_ns), state, _reason(lines, at, state))
+        (record.clock.seconds(at), state, _reason(lines, at, state))
         for at, state in record.states.get(entity, ())
     ]
 
@@ -292,7 +293,7 @@ def _counts(
     """Return the daemon's counts if its last status still holds, else those of the track."""
     counted = [each for each in data.statuses if each.status.coverage is not None]
     own = counted[-1].status.coverage if counted else None
-    if own is not None and is_still_true(counted[-1], fractions):
+    if own is not None and is_still_true(counted[-1], fractions, data.time_scale):
         return CoverageCounts(
             own.covered, own.coverable, own.recovered, own.unreachable, source="status"
         )

@@ -22,6 +22,7 @@ from fasaco_edge.mission.core.events import BETTER, SPARE
 from fasaco_edge.mission.coverage.ledger import JUMP_CELLS
 from fasaco_edge.mission.orders.mask import mask_polygons
 from fasaco_edge.mission.orders.order import MissionOrder, Zone, read_command
+from fasaco_edge.recording.read.robot_clock import RobotClock
 from fasaco_edge.wire.documents.json_text import decode_json, decode_tolerant
 from fasaco_edge.wire.documents.path_documents import PATH_DIGEST, PathAttachment
 from fasaco_edge.wire.documents.replies import FloorReport
@@ -62,15 +63,15 @@ class PlanLog:
     plans: list[MadePlan] = field(default_factory=list)
     _asked: dict[int, str] = field(default_factory=dict)
 
-    def take(self, batch: TurnBatch, at_s: float) -> None:
-        """Take the turns of a batch that came at ``at_s`` [s]."""
+    def take(self, batch: TurnBatch, at_s: float, scale: float = 1.0) -> None:
+        """Take the turns of a batch that came at ``at_s`` [s]; ``scale``: of the robot's clock."""
         if batch.beginning is not None:
             self._asked = {}  # another daemon numbers from 1 again
         last = batch.times[-1] if batch.times else 0.0
         for turn in batch.turns:
             index = turn.number - batch.first
             ago_s = last - batch.times[index] if 0 <= index < len(batch.times) else 0.0
-            self._take(turn, max(at_s - ago_s, 0.0))
+            self._take(turn, max(at_s - scale * ago_s, 0.0))
 
     def _take(self, turn: Cycle, at_s: float) -> None:
         decided, ready = turn.decided, turn.plan
@@ -115,7 +116,7 @@ class StatusSample:
 
 @dataclass(slots=True)
 class RunData:
-    """All data in the samples; times are [s] since the recording began.
+    """All data in the samples; times are the robot's [s] since the recording began.
 
     Attributes:
         pose_s, poses: arrival of each pose, and its x [m], y [m], yaw [rad].
@@ -129,6 +130,7 @@ class RunData:
         config, version, robot: of the daemon, by its last status.
         undecodable: samples that could not be read, by topic.
         last_s: when the last sample came.
+        time_scale: seconds of the robot per second; 1 for a real one.
     """
 
     pose_s: list[float] = field(default_factory=list)
@@ -146,6 +148,7 @@ class RunData:
     robot: str = ""
     undecodable: Counter[str] = field(default_factory=Counter)
     last_s: float = 0.0
+    time_scale: float = 1.0
 
     @property
     def restored_cells(self) -> int:
@@ -239,17 +242,17 @@ def first_counted(statuses: Iterable[StatusSample]) -> NDArray[np.float64]:
     return np.array(at_s, np.float64)
 
 
-def gather(samples: Iterable[Arrival], began_ns: int) -> RunData:
+def gather(samples: Iterable[Arrival], clock: RobotClock) -> RunData:
     """Return the data of ``samples``, in order; one that cannot be decoded is only counted."""
-    reader = _SampleReader(RunData(), began_ns)
+    reader = _SampleReader(clock)
     for arrival in samples:
         reader.read(arrival)
     return reader.data
 
 
-def maps_of(samples: Iterable[Arrival], began_ns: int) -> Iterator[tuple[float, OccupancyGrid]]:
+def maps_of(samples: Iterable[Arrival], clock: RobotClock) -> Iterator[tuple[float, OccupancyGrid]]:
     """Yield each state of the map, and when it came, since the recording began [s]."""
-    reader = _SampleReader(RunData(), began_ns)
+    reader = _SampleReader(clock)
     for arrival in samples:
         if arrival.topic in ("map", "map_update"):
             reader.read(arrival)
@@ -260,9 +263,9 @@ def maps_of(samples: Iterable[Arrival], began_ns: int) -> Iterator[tuple[float, 
 class _SampleReader:
     """Adds the data of one sample after the other; holds one map at a time."""
 
-    def __init__(self, data: RunData, began_ns: int) -> None:
-        self.data = data
-        self._began_ns = began_ns
+    def __init__(self, clock: RobotClock) -> None:
+        self.data = RunData(time_scale=clock.scale)
+        self._clock = clock
         self._now = 0.0
         self._poses = PoseDecoder(POSE_STAMPED)
         self._readers: dict[str, Callable[[Arrival], None]] = {
@@ -278,7 +281,7 @@ class _SampleReader:
 
     def read(self, arrival: Arrival) -> None:
         # A part begins with the samples in force before it.
-        self._now = max(1e-9 * (arrival.wall_ns - self._began_ns), 0.0)
+        self._now = max(self._clock.seconds(arrival.wall_ns), 0.0)
         self.data.last_s = max(self.data.last_s, self._now)
         reader = self._readers.get(arrival.topic)
         if reader is None:
@@ -327,7 +330,8 @@ class _SampleReader:
         data.statuses.append(StatusSample(self._now, status))
 
     def _turns(self, arrival: Arrival) -> None:
-        self.data.plan_log.take(decode_turns(arrival.sample.payload), self._now)
+        turns = decode_turns(arrival.sample.payload)
+        self.data.plan_log.take(turns, self._now, self.data.time_scale)
 
     def _path(self, arrival: Arrival) -> None:
         about = decode_tolerant(arrival.sample.attachment, PathAttachment)

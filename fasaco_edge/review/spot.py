@@ -128,7 +128,7 @@ class _DrawnLater:
         record, footprint = self._review.record, self._review.data.footprint
         free_at_most = footprint.free_at_most if footprint else -1
         since: list[float | None] = [None] * len(self.places)
-        for at_s, grid in maps_of(RecordedSamples.of(record.batches), record.began_ns):
+        for at_s, grid in maps_of(RecordedSamples.of(record.batches), record.clock):
             for number, (x, y) in enumerate(self.places):
                 value = _value(grid.cells, grid.geometry, x, y)
                 is_free = value is not None and FREE <= value <= free_at_most

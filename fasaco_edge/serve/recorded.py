@@ -119,10 +119,10 @@ class Playback:
 
     def newest(self) -> list[tuple[str, int, str | bytes]]:
         """Return the messages for the whole recording: its description, and the driven track."""
-        began_s = 1e-9 * self._timeline.began_ns
-        seconds = 1e-9 * (self._timeline.ended_ns - self._timeline.began_ns)
-        names = [path.name for path in self._paths]
-        text = message_text("recording", files=names[:2], began_s=began_s, seconds=seconds)
+        clock, names = self._timeline.clock, [path.name for path in self._paths]
+        began_s, seconds = 1e-9 * clock.began_ns, clock.seconds(self._timeline.ended_ns)
+        about = {"files": names[:2], "began_s": began_s, "seconds": seconds, "clock": clock.words}
+        text = message_text("recording", **about)
         return [("recording", 1, text), ("track", 1, track_message(self._timeline))]
 
     def ask(self, query: str, payload: bytes, timeout_s: float) -> list[Reply]:
@@ -132,12 +132,14 @@ class Playback:
     def at(self, at_s: float) -> list[str | bytes]:
         """Return what changed since the time shown before, at a time since the recording began [s].
 
+        The time is the robot's.
+
         Raises:
             UnreadableRecording: it can no longer be read.
         """
-        timeline = self._timeline
-        at_s = min(max(at_s, 0.0), 1e-9 * (timeline.ended_ns - timeline.began_ns))
-        at_ns = timeline.began_ns + round(1e9 * at_s)
+        timeline, clock = self._timeline, self._timeline.clock
+        at_s = min(max(at_s, 0.0), clock.seconds(timeline.ended_ns))
+        at_ns = clock.wall_ns(at_s)
         if at_ns < self._at_ns:
             self._rewind()
         view, now, since_ns, self._at_ns = self._view, 1e-9 * at_ns, self._at_ns, at_ns
@@ -158,7 +160,9 @@ class Playback:
         view.drive(poses[:: -(-len(poses) // MOST_POSES) or 1], now)
         view.drive(timeline.poses_between(0, at_ns)[-1:], now)
         found |= view.news(now)
-        reported_s = round(view.reported_at - 1e-9 * timeline.began_ns, 3) if view.status else None
+        reported_s = None
+        if view.status:
+            reported_s = round(clock.seconds(round(1e9 * view.reported_at)), 3)
         ending = message_text("time", at=at_s, has=view.has(), status=reported_s)
         return [*found.values(), ending]
 
@@ -203,7 +207,7 @@ def stepped(corners: NDArray[np.float64], steps: int) -> NDArray[np.float64]:
 
 def track_message(timeline: Timeline) -> bytes:
     """Return the driven track as a message: points (x, y) [m], and when each was driven [s]."""
-    poses, at_s = timeline.poses, 1e-9 * (timeline.pose_ns - timeline.began_ns)
+    poses, at_s = timeline.poses, timeline.clock.all_seconds(timeline.pose_ns)
     ways = np.hypot(*np.diff(poses[:, :2], axis=0, prepend=poses[:1, :2]).T)
     kept = np.diff(np.floor(np.cumsum(ways) / SPACING_M), prepend=-1.0) > 0
     points = np.column_stack((poses[:, :2], at_s))[kept]

@@ -89,7 +89,13 @@ def test_a_demo_covers_every_cell_that_can_be_reached(tmp_path, building):
     check_clearance(grid, trail)
     # The recorder listens before the robot moves: nothing that it swept is missing.
     (recording,) = out.glob("*.rrd")
-    assert math.dist(read_review([recording]).data.track[0, :2], trail[0]) < 0.01
+    review = read_review([recording])
+    assert math.dist(review.data.track[0, :2], trail[0]) < 0.01
+    # Its times are those of the robot, whose straight lines take it at 0.25 m/s.
+    assert review.data.time_scale == 60
+    ways, steps_s = np.diff(review.data.track[:, :2], axis=0), np.diff(review.data.times)
+    moves = steps_s > 0
+    assert (np.hypot(*ways[moves].T) / steps_s[moves]).max() == pytest.approx(0.25, abs=0.01)
 
     assert summary["recording"]
     for file in summary["recording"]:

@@ -89,7 +89,7 @@ def recorded(tmp_path_factory):
 
 def test_everything_on_the_bus_becomes_an_entity(recorded):
     rows = recorded.summary.rows
-    assert rows[entities.PATH] == rows[entities.PATH_LOG] == recorded.mission.revision
+    assert rows[entities.PATH] == recorded.mission.revision
     # Fields that a busy machine brings together are more than the recorder has room for.
     assert 3 * recorded.mission.revision < rows[entities.PHEROMONE] <= 4 * recorded.mission.revision
     assert rows[entities.ROBOT] == FRAMES
@@ -132,8 +132,18 @@ def test_the_summary_gives_the_last_figures(recorded):
     assert recorded.summary.covered == pytest.approx(mission.covered, abs=1e-6)
     assert recorded.summary.recovered == pytest.approx(mission.recovered, abs=1e-6)
     assert recorded.summary.best_steps == mission.best_steps
-    assert recorded.summary.paths[0].startswith("path 1: first map (")
-    assert len(recorded.summary.paths) == mission.revision
+    *paths, group = recorded.summary.paths
+    assert paths[0].startswith("path 1: first map (")
+    assert len(paths) == mission.revision
+    # All came within a minute, for one reason: of them the layout shows the first and this line.
+    more = mission.revision - 2
+    assert group == f"{more} more plans up to path {mission.revision}: the map grew"
+    levels = read_column(recorded.path, entities.PATH_LOG, "TextLog:level").values
+    assert levels == [["INFO"], ["INFO"], *[["DEBUG"]] * more, ["INFO"]]
+    # The plans of a mission are logged before its end, not with that of the recording.
+    states = read_column(recorded.path, entities.MISSION_STATE, "StateChange:state")
+    done_ns = states.wall_ns[states.values.index(["done"])]
+    assert read_column(recorded.path, entities.PATH_LOG, "TextLog:text").wall_ns[-1] <= done_ns
 
 
 def test_the_path_lies_where_it_was_published(recorded):
@@ -149,6 +159,17 @@ def test_the_robot_stands_where_it_was_published(recorded):
     places = read_column(recorded.path, entities.ROBOT, "Transform3D:translation").values
     assert np.allclose(places[0][0][:2], recorded.mission.walk[0], atol=1e-5)
     assert np.allclose(places[-1][0][:2], recorded.mission.walk[-1], atol=1e-5)
+
+
+def test_start_and_end_of_the_track_are_marked(recorded):
+    for entity, place, name in (
+        (entities.START, recorded.mission.walk[0], "start"),
+        (entities.END, recorded.mission.walk[-1], "end"),
+    ):
+        labels = read_column(recorded.path, entity, "Points3D:labels")
+        assert labels.values == [[name]]
+        (point,) = read_column(recorded.path, entity, "Points3D:positions").values[-1]
+        assert np.allclose(point[:2], place, atol=1e-5)
 
 
 def test_the_robot_is_as_large_as_its_configuration_says(recorded):
@@ -215,7 +236,7 @@ def test_the_pheromone_is_neither_flat_nor_misplaced(recorded):
     best = recorded.mission.best_steps
     assert cohort == [f"cohort 3, 1 cell a move\n60 ants in all, best walk {best} steps"]
     path = f"path {recorded.mission.revision}"
-    decided = "12 cells, 1.03 directions in reach of the best"
+    decided = "12 cells, branching 1.03 (1 if all are decided)"
     assert trail == [f"living trail at {path}, {best} steps to drive\n{decided}"]
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from fasaco_edge.recording.read.robot_clock import RobotClock
 from fasaco_edge.recording.read.run import RunRecord
 from fasaco_edge.review.drive import milestones, walk_figures
 from fasaco_edge.review.moments import (
@@ -175,5 +176,5 @@ def test_counts_by_code_go_on_after_a_restart():
         "metrics/errors/wrong_frame": np.array([(0, 1), (1, 3), (2, 1), (3, 2)], np.float64),
         "metrics/latency/plan": np.array([(0, 9)], np.float64),
     }
-    record = RunRecord("", (), 0, 0, plots, {}, {}, (), ())
+    record = RunRecord("", (), 0, 0, RobotClock(0), plots, {}, {}, (), ())
     assert faults_of(RunData(), record).by_code == {"wrong_frame": 5}

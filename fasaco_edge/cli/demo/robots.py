@@ -56,6 +56,7 @@ class DemoRobot:
                 "turn_deg_s": math.degrees(simulated.turn_rad_s),
                 "turn_deg_s2": math.degrees(simulated.turn_acceleration_rad_s2),
                 "acceleration_m_s2": simulated.acceleration_m_s2,
+                "time_scale": args.speed,
             },
             "bus": {"mode": "client", "listen": [], "connect": [endpoint]},
             "planner": {"seed": args.seed, "line": args.line},

@@ -195,13 +195,16 @@ def _answer(args: argparse.Namespace, review: Review) -> int:
             f"--at: the recording is {clock(review.duration_s)} long",
             hint="times count from the beginning of the recording, as in its review",
         )
-    console = terminal.out()
+    console, clock_of_robot = terminal.out(), review.record.clock
     scene = None if args.at is None else scene_at(review, args.at)
     spots = explain(review, args.point or ())
     if args.json:
-        found = {"at": scene.instant if scene else None, "points": spots}
+        answers = {"at": scene.instant if scene else None, "points": spots}
+        found = answers | {"time_scale": clock_of_robot.scale}
         print_json(msgspec.to_builtins(found))
     else:
+        if clock_of_robot.words:
+            console.print(f"{clock_of_robot.words}: times are the robot's")
         if scene is not None:
             console.print(f"at {clock(args.at)}", style="bold")
             console.print(terminal.figures(rows.instant_rows(scene.instant)))
@@ -233,7 +236,10 @@ def _read(paths: Sequence[Path], name: str) -> Review:
 
 def _epilog() -> str:
     """Return a description of the JSON document: the same text for help and for readers."""
-    lines = [EXAMPLES, "the JSON document holds, with times in seconds since the recording began:"]
+    lines = [
+        EXAMPLES,
+        "the JSON document holds, with times in the robot's seconds since the recording began:",
+    ]
     for line in explanations():
         lines += textwrap.wrap(line, 96, initial_indent="  ", subsequent_indent="      ")
     lines += textwrap.wrap(

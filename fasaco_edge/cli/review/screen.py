@@ -99,6 +99,8 @@ def print_comparison(one: ReviewDocument, other: ReviewDocument) -> None:
     ]
     _print_table(console, "Reasons of replans", ("reason", *names, "difference"), counts)
     for document in (one, other):
+        for _, text in rows.clock_rows(document):
+            console.print(f"{document.recording}: its clock is {text}", soft_wrap=True)
         _print_remarks(console, document)
 
 

@@ -21,6 +21,7 @@ from fasaco_edge.recording import entities
 from fasaco_edge.recording.arrow import pa
 from fasaco_edge.recording.read.frames import Chunk, chunks, column, wall_ns
 from fasaco_edge.recording.read.repair import HINT, open_part
+from fasaco_edge.recording.read.robot_clock import RobotClock
 from fasaco_edge.samples import Place, SampleDecoder, place_of
 
 COMPONENT = f"{entities.INPUTS_ARCHETYPE}:{entities.INPUTS_COMPONENT}"
@@ -130,6 +131,7 @@ def _batches(path: Path) -> list[Batch]:
 
 SCALAR, STATE, TEXT = "Scalars:scalars", "StateChange:state", "TextLog:text"
 READ = ("metrics/", "state/", "log/")
+STATUSES, POSES = ("status",), ("pose", "tf_static")
 # Limit on the uncompressed data kept of a file: this many times its size, plus this many bytes.
 MOST_RATIO, LEAST_BYTES = 16, 16_000_000
 
@@ -156,7 +158,9 @@ class RunRecord:
         recording_id: the id common to all parts.
         parts: the files, by name.
         began_ns, ended_ns: first and last time on the timeline ``wall`` [ns].
-        plots: float64 (n, 2) of each plotted entity: time since ``began_ns`` [s], and value.
+        clock: the robot's time at any time on that timeline.
+        plots: float64 (n, 2) of each plotted entity: the robot's time since the beginning [s], and
+            value.
         states: times and names of the states of each state entity.
         log: times and texts of each log entity.
         field_ns: times of the drawings of the pheromone field.
@@ -167,6 +171,7 @@ class RunRecord:
     parts: tuple[PartFile, ...]
     began_ns: int
     ended_ns: int
+    clock: RobotClock
     plots: Mapping[str, NDArray[np.float64]]
     states: Mapping[str, tuple[TimedText, ...]]
     log: Mapping[str, tuple[TimedText, ...]]
@@ -260,23 +265,27 @@ class _RunReader:
         began = min(self.span, default=0)
         for rows in self.rows.values():
             rows.sort(key=lambda row: row[0])
+        statuses, poses = (RecordedSamples.of(self.batches, topics) for topics in (STATUSES, POSES))
+        clock = RobotClock.of(statuses, poses, began)
         return RunRecord(
             recording_id=next(iter(self.ids), ""),
             parts=tuple(self.parts),
             began_ns=began,
             ended_ns=max(self.span, default=0),
-            plots=dict(self._plots(began)),
+            clock=clock,
+            plots=dict(self._plots(clock)),
             states=self._texts("state/"),
             log=self._texts("log/"),
             field_ns=tuple(sorted(self.field_ns)),
             batches=tuple(self.batches),
         )
 
-    def _plots(self, began: int) -> Iterator[tuple[str, NDArray[np.float64]]]:
+    def _plots(self, clock: RobotClock) -> Iterator[tuple[str, NDArray[np.float64]]]:
         for entity, rows in self.rows.items():
             if entity.startswith("metrics/"):
-                seconds = [(1e-9 * (at - began), float(value)) for at, value in rows]
-                yield entity, np.array(seconds, np.float64).reshape(-1, 2)
+                at_ns = np.array([at for at, _ in rows], np.int64)
+                values = np.array([value for _, value in rows], np.float64)
+                yield entity, np.column_stack((clock.all_seconds(at_ns), values))
 
     def _texts(self, prefix: str) -> dict[str, tuple[TimedText, ...]]:
         return {

@@ -32,6 +32,7 @@ from fasaco_edge.recording.read.drawn import (
 )
 from fasaco_edge.recording.read.frames import BROKEN, Chunk, chunk_at, chunks, wall_ns
 from fasaco_edge.recording.read.repair import open_part
+from fasaco_edge.recording.read.robot_clock import RobotClock
 from fasaco_edge.recording.read.run import RecordedSamples, read_run_record
 from fasaco_edge.wire.documents.path_documents import PATH_DIGEST
 
@@ -57,12 +58,14 @@ class Timeline:
 
     Attributes:
         began_ns, ended_ns: of the recording, since the epoch [ns].
+        clock: the robot's time at any of these times.
         samples: statuses, commands and digests of paths.
         pose_ns, poses: times int64 (n,) [ns], and float64 (n, 3): x [m], y [m], yaw [rad].
     """
 
     began_ns: int
     ended_ns: int
+    clock: RobotClock
     samples: tuple[Arrival, ...]
     pose_ns: NDArray[np.int64]
     poses: NDArray[np.float64]
@@ -131,7 +134,7 @@ def open_timeline(paths: Sequence[Path]) -> Iterator[Timeline]:
                     left -= reader.take(chunk, descriptor) if chunk is not None else 0
                     if left < 0:
                         raise ValueError("holds more rows than its size allows")
-        yield reader.timeline(record.began_ns, record.ended_ns, tuple(samples))
+        yield reader.timeline(record.clock, record.ended_ns, tuple(samples))
 
 
 @dataclass(slots=True)
@@ -159,7 +162,7 @@ class _Reader:
             self.places[entity] += [Place(at, descriptor, chunk.offset, row) for row, at in rows]
         return len(times)
 
-    def timeline(self, began_ns: int, ended_ns: int, samples: tuple[Arrival, ...]) -> Timeline:
+    def timeline(self, clock: RobotClock, ended_ns: int, samples: tuple[Arrival, ...]) -> Timeline:
         """Return all of it, in order of time."""
         for places in self.places.values():
             places.sort(key=lambda place: place.at_ns)
@@ -169,8 +172,9 @@ class _Reader:
         order = np.argsort(pose_ns, kind="stable")
         last_ns = max((one.wall_ns for one in samples), default=0)
         return Timeline(
-            began_ns,
+            clock.began_ns,
             max(ended_ns, last_ns),
+            clock,
             samples,
             pose_ns[order],
             poses[order],

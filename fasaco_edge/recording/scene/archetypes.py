@@ -34,6 +34,9 @@ RECOVERED_COLOUR: Colour = (245, 140, 40)
 SWEPT_COLOUR: Colour = (45, 212, 191)
 BLOCKED_COLOUR: Colour = (120, 120, 130)
 LABEL_COLOUR: Colour = (255, 255, 255)
+# Bright, as their names are written in them on a dark ground.
+START_COLOUR: Colour = (74, 222, 128)
+END_COLOUR: Colour = (251, 113, 133)
 # Arrows along the trail stand out from its field, which goes from black over red to yellow.
 UNDECIDED_COLOUR: Colour = (70, 80, 130)
 DECIDED_COLOUR: Colour = (94, 234, 255)
@@ -42,6 +45,7 @@ DECIDED_COLOUR: Colour = (94, 234, 255)
 ARROW_Z, ROBOT_Z, LABEL_Z = 0.03, 0.06, 0.1
 # Sizes on the screen [points].
 ARROW_WIDTH = 1.0
+MARK_RADIUS = 5.0
 MAP_ORDER, FLOOR_ORDER, COVERAGE_ORDER = 0.0, 0.5, 1.0
 # Distance of a label above its field, as a share of the field's height.
 LABEL_ABOVE = 0.1
@@ -123,7 +127,7 @@ def trail_label(message: PheromoneMessage, about: TrailAttachment) -> rr.Points3
     """Return the label over the living trail: its path, and how decided it is."""
     text = (
         f"living trail at path {about.revision}, {message.best_steps} steps to drive\n"
-        f"{about.cells} cells, {about.branching:.2f} directions in reach of the best"
+        f"{about.cells} cells, branching {about.branching:.2f} (1 if all are decided)"
     )
     return label_archetype(message.geometry.bounds(), text, LABEL_ABOVE)
 
@@ -163,6 +167,12 @@ def words_archetype(pose: Pose2D, text: str, above_m: float) -> rr.Points3D:
     """Return text at a distance above a point."""
     place = (pose.x, pose.y + above_m, LABEL_Z)
     return rr.Points3D([place], radii=0.0, labels=[text], colors=LABEL_COLOUR, show_labels=True)
+
+
+def mark_archetype(pose: Pose2D, text: str, colour: Colour) -> rr.Points3D:
+    """Return a point with a name."""
+    place = (pose.x, pose.y, LABEL_Z)
+    return rr.Points3D([place], radii=-MARK_RADIUS, labels=[text], colors=colour, show_labels=True)
 
 
 def no_label_archetype() -> rr.Points3D:

@@ -18,7 +18,6 @@ MARGIN, PHEROMONE_MARGIN = 1.1, 1.3
 FIELD_OF_VIEW_RAD = math.radians(55.0)
 VIEW_ASPECT, PHEROMONE_ASPECT = 1.12, 1.45
 COLUMNS = [11, 8, 9]
-TRAIL_S = 30.0
 CHANGE_S = 4.0
 
 MAP_BACKGROUND = [38, 41, 48]
@@ -57,7 +56,7 @@ def _map_view(bounds: Bounds) -> rrb.Spatial3DView:
         line_grid=False,
         background=MAP_BACKGROUND,
         overrides={
-            entities.DRIVEN_PATH: last_seconds(TRAIL_S),
+            entities.DRIVEN_PATH: so_far(),
             entities.MAP_CHANGE: last_seconds(CHANGE_S),
         },
     )
@@ -115,7 +114,7 @@ def _figures() -> rrb.Vertical:
 def _plan() -> rrb.TimeSeriesView:
     legend = rrb.PlotLegend(rrb.Corner2D.RightTop)
     shown = tuple(f"/{gap}" for gap in (entities.GAP, entities.LINE_GAP))
-    return plot_view("Time above the bound [share]", "metrics/plan", legend, contents=shown)
+    return plot_view("Gap to the lower bound [share]", "metrics/plan", legend, contents=shown)
 
 
 def _saved() -> rrb.TimeSeriesView:
@@ -125,7 +124,7 @@ def _saved() -> rrb.TimeSeriesView:
 
 def _branching() -> rrb.TimeSeriesView:
     none = rrb.PlotLegend(visible=False)
-    return plot_view("Trail: directions in reach of the best", entities.BRANCHING, none)
+    return plot_view("Branching of the living trail, 1 if decided", entities.BRANCHING, none)
 
 
 def _states() -> rrb.StateTimelineView:
@@ -133,13 +132,14 @@ def _states() -> rrb.StateTimelineView:
 
 
 def log_view() -> rrb.TextLogView:
-    """Return a view of all logs."""
+    """Return a view of all logs, without the lines of level DEBUG."""
     # A column of times would be a digit wide; the cursor shows the time.
     columns = rrb.TextLogColumns(
         timeline_columns=[rrb.encodings.TimelineColumn(entities.WALL_CLOCK, visible=False)],
         text_log_columns=[rrb.encodings.TextLogColumn("Body")],
     )
-    return rrb.TextLogView(origin="/log", name="Log", columns=columns)
+    rows = rrb.TextLogRows(filter_by_log_level=["INFO", "WARN", "ERROR"])
+    return rrb.TextLogView(origin="/log", name="Log", columns=columns, rows=rows)
 
 
 def _card() -> rrb.TextDocumentView:
@@ -166,5 +166,14 @@ def last_seconds(seconds: float) -> rrb.VisibleTimeRanges:
     return rrb.VisibleTimeRanges(
         timeline=entities.WALL_CLOCK,
         start=rrb.TimeRangeBoundary.cursor_relative(seconds=-seconds),
+        end=rrb.TimeRangeBoundary.cursor_relative(),
+    )
+
+
+def so_far() -> rrb.VisibleTimeRanges:
+    """Return the range from the beginning up to the cursor."""
+    return rrb.VisibleTimeRanges(
+        timeline=entities.WALL_CLOCK,
+        start=rrb.TimeRangeBoundary.infinite(),
         end=rrb.TimeRangeBoundary.cursor_relative(),
     )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 from msgspec.structs import astuple
@@ -27,6 +28,8 @@ class PathDrawing:
     def __init__(self, writer: RecordingWriter, layers: Layers) -> None:
         self._writer = writer
         self._layers = layers
+        self._log = PathLog(writer)
+        self.catch_up, self.finish = self._log.catch_up, self._log.finish
         self._revision = 0
         self._count = 0
         self._has_window = False
@@ -39,8 +42,7 @@ class PathDrawing:
         if revision:
             self._writer.sequence(entities.REPLAN, revision)
         if not self._count or revision != self._revision:
-            line = rr.TextLog(_path_line(message, about), level="INFO")
-            self._writer.log(entities.PATH_LOG, line)
+            self._log.add(about, _path_line(message, about))
             self._draw_window(about.changed, about.reason)
             self._count += 1
         self._revision, count, line = revision, self._count, draw.corners(message.xy)
@@ -73,18 +75,73 @@ class PathDrawing:
         self._writer.log(entity, archetype, latched=True, size=line.nbytes)
 
 
+# Plans of one kind that follow each other for this long are one line of the log.
+GROUP_NS = 60_000_000_000
+
+
+@dataclass(slots=True)
+class _Group:
+    """Plans of one kind: when the first came [ns], how many came since, the newest revision."""
+
+    kind: str
+    since_ns: int
+    more: int = 0
+    newest: int = 0
+
+
+class PathLog:
+    """Logs paths: each planned path with a new kind of reason at once, those after it as a group.
+
+    Every path has a line. Those of a group, and of paths without a plan, such as a polished line,
+    have the level DEBUG, which the layout leaves out.
+    """
+
+    def __init__(self, writer: RecordingWriter) -> None:
+        self._writer = writer
+        self._group: _Group | None = None
+
+    def add(self, about: PathAttachment, line: str) -> None:
+        """Log a path."""
+        kind, group = about.reason.partition(":")[0], self._group
+        if not about.planner:
+            self._write(line, "DEBUG")
+        elif group is not None and group.kind == kind:
+            group.more, group.newest = group.more + 1, about.revision
+            self._write(line, "DEBUG")
+            self.catch_up()
+        else:
+            self.finish()
+            self._group = _Group(kind, self._writer.wall_ns)
+            self._write(line, "INFO")
+
+    def catch_up(self) -> None:
+        """Log a group that is old enough; call it often."""
+        if self._group is not None and self._writer.wall_ns - self._group.since_ns >= GROUP_NS:
+            self.finish()
+
+    def finish(self) -> None:
+        """Log the waiting group."""
+        group, self._group = self._group, None
+        if group is not None and group.more:
+            plans = f"{group.more} more plan{'s' * (group.more != 1)}"
+            why = "the map changed" if group.kind == "map" else group.kind
+            self._write(f"{plans} up to path {group.newest}: {why}", "INFO")
+
+    def _write(self, line: str, level: str) -> None:
+        self._writer.log(entities.PATH_LOG, rr.TextLog(line, level=level))
+
+
 def _path_line(message: PathMessage, about: PathAttachment) -> str:
     named = f"path {about.revision}" if about.revision else "path"
-    facts = [f"{max(len(message.xy) - 1, 0)} steps"]
+    # Of a plan its figures when it was made; part of the path may have been driven since.
+    planned = about.planned_steps
+    facts = [f"{max(len(message.xy) - 1, 0) if planned is None else planned} steps"]
     if about.planned_cost_s is not None:
-        facts.append(f"{about.planned_cost_s:.0f} s")
-    if about.gap is not None and about.planned_steps is not None:
-        # Figures of the plan when it was made; part of the path may have been driven since.
-        over = f"{100 * about.gap:.0f} % of time over the bound"
-        facts.append(f"planned {about.planned_steps} steps, {over}")
+        facts.append(f"{about.planned_cost_s:.0f} s to drive")
+    if about.gap is not None:
+        facts.append(f"gap {100 * about.gap:.0f} %")
     if about.planner:
-        facts.append(about.planner)
-    facts.append(f"{about.plan_ms:.0f} ms")
+        facts.append(f"{about.planner} took {about.plan_ms:.0f} ms")
     return f"{named}{': ' if about.reason else ''}{about.reason} ({', '.join(facts)})"
 
 

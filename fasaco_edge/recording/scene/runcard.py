@@ -27,7 +27,7 @@ MARK_UP = re.compile(r"[\\`\[\]<>!|]")
 LEGEND = """\
 - **Map** white free, black occupied, grey unknown
 - **Tint** blue covered, orange covered more than once
-- **Path** violet, the previous one pale; **driven** green
+- **Path** violet, the previous one pale; **track** green, from **start** to **end**
 - **Pink** the part of the map that led to this path, and its reason
 - **Cyan** an obstacle came or went
 - **Blue line** a zone of the order, **orange** a keep-out zone

@@ -46,6 +46,8 @@ DEFAULT_RADIUS_M = 0.2
 # The view follows the growing map in steps of this fraction of its size: each blueprint
 # takes 120 kB.
 REFRAME_FRACTION = 0.15
+# States that alternate while plans come.
+UNDER_WAY = ("planning", "covering")
 # Distance above the robot of the label with the trail's direction.
 FORK_CELLS = 3.0
 
@@ -112,8 +114,14 @@ class Scene:
         """Move the robot, and draw its driven path."""
         pose = self._anchored(stamped.pose).pose(stamped.pose)
         self._writer.log(entities.ROBOT, draw.pose_archetype(pose), latched=True)
+        if self._robot is None:
+            self._mark(entities.START, pose, draw.START_COLOUR)
         self._robot = pose
         self._driven.add(pose.x, pose.y)
+
+    def _mark(self, entity: str, pose: Pose2D, colour: draw.Colour) -> None:
+        name = entity.rpartition("/")[2]
+        self._writer.log(entity, draw.mark_archetype(pose, name, colour), latched=True)
 
     def add_command(self, command: Command) -> None:
         """Log a command accepted by the mission; draw the zones of the new order."""
@@ -245,6 +253,9 @@ class Scene:
         if kept_out != self._kept_out:
             self._kept_out = kept_out
             self._draw_areas()
+        if status.state not in UNDER_WAY:
+            # The plans came before.
+            self._paths.finish()
         self.enter(entities.MISSION_STATE, status.state, status.reason)
         self.enter(entities.PLANNER_STATE, "planning" if status.plan.planning else "idle")
         self._add_troubles(status)
@@ -276,11 +287,15 @@ class Scene:
         """Make the drawings that are due; call it often."""
         self._layers.catch_up(self._writer.wall_ns)
         self._driven.catch_up()
+        self._paths.catch_up()
 
     def finish(self) -> None:
         """Make all waiting drawings, and fit the view to the final map."""
         self._layers.finish()
+        self._paths.finish()
         self._driven.finish()
+        if self._robot is not None:
+            self._mark(entities.END, self._robot, draw.END_COLOUR)
         self._curves.finish()
         if self._known is not None and self._known != self._framed:
             self._writer.show(build_blueprint(self._known))

@@ -132,7 +132,7 @@ def draw_scene(review: Review, scene: Scene) -> Image.Image | None:
         place, along = np.array([instant.x, instant.y]), np.array([math.cos(yaw), math.sin(yaw)])
         plot.start_mark(place)
         plot.line(np.array([place, place + HEADING_M * along]), palette.INK, 4.0)
-    lines = [f"{name}: {text}" for name, text in instant_rows(instant)]
+    lines = [*_simulated(review), *(f"{name}: {text}" for name, text in instant_rows(instant))]
     bar = (f"{AROUND_S:.0f} s before", f"{AROUND_S:.0f} s after")
     title = f"{review.record.recording_id} at {clock(instant.at_s)}"
     return Sheet(title, lines, key, bar, plot.view.scale).around(plot.finished())
@@ -155,15 +155,21 @@ def draw_spots(review: Review, spots: Sequence[Spot]) -> Image.Image | None:
     for spot in spots:
         plot.end_mark(np.array([spot.x, spot.y]))
     key.append(KeyEntry("square", palette.END, "asked for"))
-    lines = [f"{name}: {text}" for spot in spots for name, text in spot_rows(spot)]
+    lines = _simulated(review)
+    lines += [f"{name}: {text}" for spot in spots for name, text in spot_rows(spot)]
     title = f"{review.record.recording_id}: one spot"
     bar = ("0:00", clock(review.duration_s))
     return Sheet(title, lines, key, bar, plot.view.scale).around(plot.finished())
 
 
+def _simulated(review: Review) -> list[str]:
+    words = review.record.clock.words
+    return [f"{words}: times are the robot's"] if words else []
+
+
 def _caption(review: Review) -> list[str]:
     counts, walk, replans = review.counts, review.walk, review.replans
-    lines = []
+    lines = _simulated(review)
     if counts is not None:
         lines.append(
             f"{counts.covered:,} of {counts.coverable:,} reachable cells covered; "

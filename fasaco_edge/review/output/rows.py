@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from msgspec.structs import astuple
 
+from fasaco_edge.recording.read.robot_clock import scale_words
 from fasaco_edge.review.comparison import figures
 from fasaco_edge.review.document import ReviewDocument
 from fasaco_edge.review.drive import MILESTONES
@@ -108,6 +109,7 @@ def screen_rows(review: Review, document: ReviewDocument) -> list[tuple[str, str
     charges = [f"{at} for {seconds}, {levels}" for at, seconds, levels in charge_rows(document)]
     return [
         ("run", f"{_began(document.began)}, {sides}{planner}, {document.robot or 'robot'}"),
+        *clock_rows(document),
         ("swept", by_name["reachable floor swept"] + _before(document)),
         ("covered", by_name["covered"]),
         ("cells after", ", ".join(reached)),
@@ -126,8 +128,8 @@ def screen_rows(review: Review, document: ReviewDocument) -> list[tuple[str, str
 def _processor(document: ReviewDocument) -> str:
     daemon, recorder = document.processor_s or 0.0, document.recorder_processor_s
     told = f"daemon {amount(daemon, 's')}"
-    if document.duration_s:
-        told += f" ({100 * daemon / document.duration_s:.1f} % of a core)"
+    if document.recorded_s:
+        told += f" ({100 * daemon / document.recorded_s:.1f} % of a core)"
     return told if recorder is None else f"{told}, recorder {amount(recorder, 's')}"
 
 
@@ -193,11 +195,18 @@ def card_rows(document: ReviewDocument) -> list[tuple[str, str]]:
         ("robot", document.robot or "not recorded"),
         ("began", _began(document.began)),
         ("duration", clock(document.duration_s)),
+        *clock_rows(document),
         ("map", size),
         ("version", document.version or "not recorded"),
         ("settings", ", ".join(settings) or "not recorded"),
         ("recording", f"{len(parts)} part{'s' * (len(parts) != 1)}, {megabytes:.1f} MB{state}"),
     ]
+
+
+def clock_rows(document: ReviewDocument) -> list[tuple[str, str]]:
+    """Return the speed of a simulated robot; nothing for a real one."""
+    words = scale_words(document.time_scale)
+    return [("clock", f"the robot's, {words}")] if words else []
 
 
 def figure_rows(document: ReviewDocument) -> list[tuple[str, str]]:

@@ -47,7 +47,7 @@ class Table:
     rows: Iterable[tuple[object, ...]]
 
 
-AT = Column("at_s", "float", "s", "when, since the recording began")
+AT = Column("at_s", "float", "s", "when, since the recording began, by the robot's clock")
 X = Column("x_m", "float", "m", "in the map frame")
 Y = Column("y_m", "float", "m", "in the map frame")
 REVISION = Column("revision", "int", "", "counts the published paths")
@@ -137,7 +137,7 @@ def _points(review: Review) -> Iterator[tuple[object, ...]]:
         # A part begins with the path that was in force before it.
         if isinstance(line, DrawnLine) and line.revision not in seen and len(line.xy):
             seen.add(line.revision)
-            at_s = round(1e-9 * (line.at_ns - record.began_ns), 6)
+            at_s = round(record.clock.seconds(line.at_ns), 6)
             for number, (x, y) in enumerate(line.xy.tolist()):
                 yield at_s, line.revision, number, round(x, 4), round(y, 4)
 
@@ -234,7 +234,7 @@ def _levels(review: Review) -> Iterator[tuple[object, ...]]:
         if not isinstance(field, DrawnGrid) or field.at_ns not in wanted:
             continue
         wanted.remove(field.at_ns)
-        at_s = round(1e-9 * (field.at_ns - record.began_ns), 6)
+        at_s = round(record.clock.seconds(field.at_ns), 6)
         rows, cols = np.nonzero(field.pixels)
         middles = cols.astype(np.float64) + 0.5, rows.astype(np.float64) + 0.5
         x, y = field.geometry.to_map(*middles)

@@ -34,9 +34,9 @@ function tick() {
 
 // A recording opens at its end; after a break of the link, where it was.
 function showRecording() {
-  const { files, began_s, seconds } = model.recording, isNew = find("timeline").hidden;
+  const { files, began_s, seconds, clock: simulated } = model.recording, isNew = find("timeline").hidden;
   find("timeline").hidden = false;
-  find("film").textContent = `Recording ${files[0]}${files.length > 1 ? " and on" : ""}, begun ${new Date(1000 * began_s).toLocaleString()}`;
+  find("film").textContent = `Recording ${files[0]}${files.length > 1 ? " and on" : ""}, begun ${new Date(1000 * began_s).toLocaleString()}${simulated ? `, ${simulated}` : ""}`;
   find("when").max = seconds;
   Object.assign(line, { asking: false, asked: -1 });
   goTo(isNew ? seconds : line.at);

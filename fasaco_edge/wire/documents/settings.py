@@ -9,12 +9,16 @@ Settings = dict[str, object]
 
 
 class RobotSettings(Document, frozen=True):
-    """Size of robot and tool [m], speed; 0 if not sent. Overlap of lanes as a share."""
+    """Size of robot and tool [m], speed; 0 if not sent. Overlap of lanes as a share.
+
+    ``time_scale``: simulated seconds per second.
+    """
 
     radius_m: float = 0.0
     tool_width_m: float = 0.0
     overlap: float = 0.0
     speed_m_s: float = 0.0
+    time_scale: float = 1.0
 
 
 class PlannerSettings(Document, frozen=True):

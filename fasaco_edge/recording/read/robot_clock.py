@@ -1,0 +1,124 @@
+"""The robot's clock in a recording: simulated seconds, where a robot was simulated.
+
+A recording has the times at which the recorder received the samples. A simulated robot may be
+faster than those (`robot.time_scale` of its configuration), and slower than intended on a busy
+computer: the stamps of its poses say what its time was. Before the first pose and after the last
+one, its seconds are as long as those of the recorder.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from contextlib import suppress
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fasaco_edge.bus.arrival import Arrival
+from fasaco_edge.errors import FasacoError
+from fasaco_edge.wire.documents.json_text import decode_tolerant
+from fasaco_edge.wire.documents.settings import KnownSettings, known_settings
+from fasaco_edge.wire.documents.status import Status
+from fasaco_edge.wire.messages.poses import PoseDecoder
+from fasaco_edge.wire.schemas import POSE_STAMPED
+
+Seconds = NDArray[np.float64]
+# Stamps that go back, or on by more than this many times the expected time and a second, are of
+# another simulation: the recorder's seconds count between them.
+MOST_TIMES = 10.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RobotClock:
+    """Converts the recorder's times into the robot's seconds since the recording began.
+
+    Attributes:
+        began_ns: beginning of the recording, by the recorder's clock [ns].
+        scale: intended seconds of the robot per second; 1 for a real robot.
+        recorder_s, robot_s: both times of each pose [s], float64 (n,), not decreasing; n is 0 for
+            a real robot, whose seconds are the recorder's.
+    """
+
+    began_ns: int
+    scale: float = 1.0
+    recorder_s: Seconds = field(default_factory=lambda: np.zeros(0))
+    robot_s: Seconds = field(default_factory=lambda: np.zeros(0))
+
+    @classmethod
+    def of(cls, statuses: Iterable[Arrival], poses: Iterable[Arrival], began_ns: int) -> RobotClock:
+        """Return the clock of a recording with these samples; poses of real robots are not read."""
+        known = next(filter(None, map(_settings, statuses)), KnownSettings())
+        scale = known.robot.time_scale
+        if scale == 1.0 or not 0.0 < scale < math.inf:
+            return cls(began_ns)
+        decoder = PoseDecoder(known.pose.schema or POSE_STAMPED)
+        if frames := known.ros2.frames:
+            decoder.follow((frames.map, frames.robot))
+        times = []
+        for arrival in poses:
+            sample, is_static = arrival.sample, arrival.topic == "tf_static"
+            with suppress(FasacoError):
+                pose = decoder.decode(sample.payload, sample.schema, is_static=is_static)
+                if pose is not None:
+                    times.append((arrival.wall_ns - began_ns, pose.stamp_ns))
+        if not times:
+            return cls(began_ns, scale)
+        came_s, stamps_s = 1e-9 * np.array(sorted(times), np.int64).T
+        return cls.by_stamps(began_ns, scale, came_s, stamps_s)
+
+    @classmethod
+    def by_stamps(
+        cls, began_ns: int, scale: float, came_s: Seconds, stamps_s: Seconds
+    ) -> RobotClock:
+        """Return the clock of poses, one or more: when each came, and its stamp [s], (n,)."""
+        passed_s, stamped_s = np.diff(came_s), np.diff(stamps_s)
+        is_valid = (stamped_s >= 0.0) & (stamped_s <= MOST_TIMES * scale * (passed_s + 1.0))
+        steps_s = np.where(is_valid, stamped_s, passed_s)
+        return cls(began_ns, scale, came_s, came_s[0] + np.cumsum([0.0, *steps_s]))
+
+    @property
+    def words(self) -> str:
+        """The simulation's speed in words; "" for a real robot."""
+        return scale_words(self.scale)
+
+    def seconds(self, at_ns: int) -> float:
+        """Return a time of the recorder [ns] in the robot's seconds since the beginning."""
+        recorder_s = 1e-9 * (at_ns - self.began_ns)
+        if not len(self.robot_s):
+            return recorder_s
+        return float(_converted(np.array([recorder_s]), self.recorder_s, self.robot_s)[0])
+
+    def all_seconds(self, at_ns: NDArray[np.int64]) -> Seconds:
+        """Return times of the recorder (n,) [ns] as ``seconds`` does, float64 (n,)."""
+        recorder_s: Seconds = 1e-9 * (at_ns - self.began_ns).astype(np.float64)
+        if not len(self.robot_s):
+            return recorder_s
+        return _converted(recorder_s, self.recorder_s, self.robot_s)
+
+    def wall_ns(self, robot_s: float) -> int:
+        """Return the recorder's time [ns] of the robot's seconds since the beginning."""
+        recorder_s = robot_s
+        if len(self.robot_s):
+            both = self.robot_s, self.recorder_s
+            recorder_s = float(_converted(np.array([robot_s]), *both)[0])
+        return self.began_ns + round(1e9 * recorder_s)
+
+
+def scale_words(scale: float) -> str:
+    """Return the speed of a simulation in words; "" for a real robot."""
+    return "" if scale == 1.0 else f"simulated at {scale:g} times real time"
+
+
+def _settings(arrival: Arrival) -> KnownSettings | None:
+    with suppress(FasacoError):
+        if config := decode_tolerant(arrival.sample.payload, Status).config:
+            return known_settings(config)
+    return None
+
+
+def _converted(at_s: Seconds, these: Seconds, those: Seconds) -> Seconds:
+    """Return times of one clock by another one; outside of the known times both run alike."""
+    before, after = np.minimum(at_s - these[0], 0.0), np.maximum(at_s - these[-1], 0.0)
+    return np.asarray(np.interp(at_s, these, those) + before + after, np.float64)
