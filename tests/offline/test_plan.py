@@ -212,8 +212,8 @@ def test_a_plan_is_one_line_of_text_and_a_picture():
         assert "\n" not in repr(shown)
         assert len(repr(shown)) < 160
     assert re.fullmatch(
-        r"<Plan office.yaml, colony-search: 9\d\.\d % of 40.9 m2 swept, \d+ min \d\d s, [\d.]+ m, \d+ "
-        r"quarter-turns, at most \d+ % above the shortest time>",
+        r"<Plan office.yaml, colony-search: 9\d\.\d % of 40.9 m2 swept, \d+ min \d\d s, "
+        r"[\d.]+ m, \d+ quarter-turns, at most \d+ % above the shortest time>",
         repr(planned),
     )
     assert "40.9 m2 (" in repr(passes)
