@@ -67,3 +67,12 @@ def _visible(match: re.Match[str]) -> str:
 def is_reported(count: int) -> bool:
     """Return whether occurrence number ``count`` of a fault gets a line: 1, 2, 4, 8 ..."""
     return count & (count - 1) == 0
+
+
+def duration(seconds: float) -> str:
+    """Return a driving time in words."""
+    if seconds < 60.0:
+        return f"{seconds:.0f} s"
+    minutes, rest = divmod(round(seconds), 60)
+    hours, minutes = divmod(minutes, 60)
+    return f"{hours} h {minutes:02} min" if hours else f"{minutes} min {rest:02} s"

@@ -22,9 +22,9 @@ from fasaco_edge.offline.maps import Map
 from fasaco_edge.offline.plan import plan
 from fasaco_edge.offline.result import Plan, PlannedFloor, judged_floor, picture_of, png_of
 from fasaco_edge.offline.settings import ANYWHERE, CELLS, HOME, Search
-from fasaco_edge.offline.summary import duration
 from fasaco_edge.planners.passes import Pass, laid, read_pass
 from fasaco_edge.planners.planner import SearchProgress, StoppingCriterion
+from fasaco_edge.text import duration
 
 # A segment of a line runs along the lanes if it is turned against them by no more than this [deg].
 ALONG_DEG = 15.0

@@ -6,6 +6,7 @@ from dataclasses import asdict, dataclass
 from functools import cached_property
 from io import BytesIO
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,19 +24,34 @@ from fasaco_edge.judge.floor import (
     JudgedFloor,
     SweepingRobot,
     judge_floor,
+    share_words,
     swept_words,
 )
 from fasaco_edge.offline.ground import Ground, Line
 from fasaco_edge.offline.maps import Map
 from fasaco_edge.offline.settings import CELLS, Search
-from fasaco_edge.offline.summary import line_of
+from fasaco_edge.planners.cost import count_turns
 from fasaco_edge.planners.curves import Curve
 from fasaco_edge.planners.living_trail import Tau, branching
 from fasaco_edge.planners.path import CoveragePath, walk_figures
 from fasaco_edge.planners.problem import CoverageProblem
+from fasaco_edge.text import duration
 
 # Members of ``RobotConfig``: the limits for timing bends of the line.
 LIMITS = ("turn_deg_s", "turn_deg_s2", "acceleration_m_s2", "steered_deg")
+
+
+class Drive(NamedTuple):
+    """What driving a line takes: its length [m], quarter-turns, and time [s].
+
+    Attributes:
+        gap: how far the time is above the least of any line, as a share of it; None if unknown.
+    """
+
+    metres: float
+    turns: float
+    seconds: float
+    gap: float | None
 
 
 @dataclass(frozen=True, repr=False)
@@ -73,11 +89,29 @@ class Plan:
 
     def __repr__(self) -> str:
         """Return the plan in one line."""
-        return f"<Plan {line_of(self)}>"
+        metres, turns, seconds, gap = self.drive
+        words = [f"{self.problem.cells} cells", duration(seconds), f"{metres:,.1f} m"]
+        floor = self.floor
+        if floor is not None and floor.swept_share is not None:
+            words[0] = f"{share_words(floor.swept_share)} of {floor.reachable_m2:,.1f} m2 swept"
+        words.append(f"{turns:,.0f} quarter-turns")
+        if gap is not None:
+            words.append(f"at most {100 * gap:.0f} % above the shortest time")
+        return f"<Plan {self.map.name}, {self.path.planner}: {', '.join(words)}>"
 
     def _repr_png_(self) -> bytes:
         """Return the picture as PNG, as notebooks show it."""
         return png_of(self.plot())
+
+    @property
+    def drive(self) -> Drive:
+        """What driving the line takes; of a grid the walk."""
+        if self.judged is not None:
+            judged = self.judged.figures
+            return Drive(judged.length_m, judged.quarter_turns, judged.seconds, judged.gap)
+        turns = count_turns(self.cells)
+        metres = self.steps * self.problem.lattice.cell_m
+        return Drive(metres, turns.quarter + 2 * turns.half, self.cost_s, self.gap)
 
     @property
     def cells(self) -> NDArray[np.int32]:

@@ -1,4 +1,4 @@
-"""Summary of a plan in words: a few rows for a screen, or one line."""
+"""Summary of a plan in words: a few rows for a screen."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from fasaco_edge.judge.floor import share_words
 from fasaco_edge.offline.settings import CELLS
-from fasaco_edge.planners.cost import count_turns
+from fasaco_edge.text import duration
 
 if TYPE_CHECKING:
     from fasaco_edge.offline.passes import PassPlans
@@ -15,22 +15,9 @@ if TYPE_CHECKING:
 Rows = list[tuple[str, str]]
 
 
-def line_of(plan: Plan) -> str:
-    """Return a plan in one line: what of the floor, how long, how far, how good."""
-    metres, turns, seconds, gap = _drive(plan)
-    words = [f"{plan.problem.cells} cells", duration(seconds), f"{metres:,.1f} m"]
-    floor = plan.floor
-    if floor is not None and floor.swept_share is not None:
-        words[0] = f"{share_words(floor.swept_share)} of {floor.reachable_m2:,.1f} m2 swept"
-    words.append(f"{turns:,.0f} quarter-turns")
-    if gap is not None:
-        words.append(f"at most {100 * gap:.0f} % above the shortest time")
-    return f"{plan.map.name}, {plan.path.planner}: {', '.join(words)}"
-
-
 def rows_of(plan: Plan) -> Rows:
     """Return the figures that matter, as names and words."""
-    metres, turns, seconds, gap = _drive(plan)
+    metres, turns, seconds, gap = plan.drive
     path, floor = plan.path, plan.floor
     rows = [("map", f"{plan.map.name}, {plan.problem.cells} cells of {_metres(plan)}")]
     if floor is not None:
@@ -60,32 +47,13 @@ def rows_of(plan: Plan) -> Rows:
 def rows_of_passes(plans: PassPlans) -> Rows:
     """Return the same of several passes together."""
     first, floor = plans.plans[0], plans.floor
-    metres = sum(_drive(plan)[0] for plan in plans.plans)
+    metres = sum(plan.drive.metres for plan in plans.plans)
     rows = [("map", f"{first.map.name}, {first.problem.cells} cells in the first pass")]
     if floor is not None:
         rows.append(("swept", _swept(floor)))
-    rows.append(("time", duration(sum(_drive(plan)[2] for plan in plans.plans))))
+    rows.append(("time", duration(sum(plan.drive.seconds for plan in plans.plans))))
     rows.append(("line", f"{metres:,.1f} m in {len(plans.plans)} passes"))
     return rows
-
-
-def duration(seconds: float) -> str:
-    """Return a driving time in words."""
-    if seconds < 60.0:
-        return f"{seconds:.0f} s"
-    minutes, rest = divmod(round(seconds), 60)
-    hours, minutes = divmod(minutes, 60)
-    return f"{hours} h {minutes:02} min" if hours else f"{minutes} min {rest:02} s"
-
-
-def _drive(plan: Plan) -> tuple[float, float, float, float | None]:
-    """Return metres, quarter-turns, seconds and gap of the line; of a grid those of the walk."""
-    if plan.judged is not None:
-        judged = plan.judged.figures
-        return judged.length_m, judged.quarter_turns, judged.seconds, judged.gap
-    turns = count_turns(plan.cells)
-    metres = plan.steps * plan.problem.lattice.cell_m
-    return metres, turns.quarter + 2 * turns.half, plan.cost_s, plan.gap
 
 
 def _metres(plan: Plan) -> str:

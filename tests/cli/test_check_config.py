@@ -137,6 +137,7 @@ def test_what_is_in_order_is_shown_as_it_is_in_force(check, capsys):
         "turn_radius_m": 0.0,
         "reverses": True,
         "tool_ahead_m": 0.0,
+        "time_scale": 1.0,
     }
     assert "secret" not in json.dumps(told["config"])
     assert main(["check-config", str(EXAMPLE), "--show"]) == 0

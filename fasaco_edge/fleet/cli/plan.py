@@ -218,7 +218,7 @@ def _write_rows(
 
 def _summary(figures: dict[str, Any], robots: int) -> list[tuple[str, str]]:
     """Return the figures that matter, as names and words."""
-    from fasaco_edge.offline.summary import duration
+    from fasaco_edge.text import duration
 
     gap = (
         "" if figures["gap"] is None else f", at most {100 * figures['gap']:.1f} % above the least"

@@ -31,8 +31,8 @@ LEGEND = """\
 - **Pink** the part of the map that led to this path, and its reason
 - **Cyan** an obstacle came or went
 - **Blue line** a zone of the order, **orange** a keep-out zone
-- **Pheromone** dark little, bright much, black none
-- **Arrows** direction of the trail, bright if decided; at the robot, its share there"""
+- **Pheromone** left by the planner's ants, for its next ants: dark little, bright much
+- **Arrows** where most pheromone leads, bright if one way has nearly all; at the robot its share"""
 
 # Each field has its own range, so that it is never flat.
 LEVELS = (
