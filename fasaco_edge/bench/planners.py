@@ -20,6 +20,7 @@ from fasaco_edge.bench.benchmark import (
     positive,
     seconds_above_zero,
 )
+from fasaco_edge.config.config import PlannerConfig
 from fasaco_edge.drawing.spread import Spread, document
 from fasaco_edge.errors import FasacoError, IllegalWalk, PlannerFailed
 from fasaco_edge.planners.own.loading import UserCode, load
@@ -33,8 +34,6 @@ if TYPE_CHECKING:
     from fasaco_edge.planners.problem import CoverageProblem
 
 DEFAULT_MAPS = ("office", "flat")
-# Threshold of equation (4) for colony-search.
-SEARCH_Q0 = 0.98
 HEADER = ("planner", "steps", "revisits", "n_r_paper", "turns\n90", "CPU\n[s]")
 FIGURES = ("steps", "revisits", "recovered_cells", "n_r_paper", "turns_90")
 
@@ -123,7 +122,8 @@ def _rows(
     for code in own:
         yield code.name, OwnPlanner(code, colony.seed)
     for name, entry in REGISTRY.items():
-        q0 = SEARCH_Q0 if entry.has_local_search else colony.q0
+        # The threshold of equation (4) that missions use, where they plan by it.
+        q0 = PlannerConfig().q0 if entry.has_local_search else colony.q0
         yield name, planner_of(name, replace(colony, q0=q0))
 
 

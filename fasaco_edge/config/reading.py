@@ -122,7 +122,7 @@ def section_of(kind: object) -> type[Section] | None:
 
 
 def _objects_of(kind: object, depth: int = 3) -> Iterator[type[msgspec.Struct]]:
-    """Yield the objects that a value of this type is or holds, so many levels down."""
+    """Yield the objects that a value of this type is or holds, ``depth`` levels down."""
     if isinstance(kind, type) and issubclass(kind, msgspec.Struct):
         yield kind
     for part in get_args(kind) if depth else ():

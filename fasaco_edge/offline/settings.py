@@ -20,7 +20,7 @@ WALLS, AXES = "walls", "axes"
 # suits it best. The others have the paper's, and walk to their end.
 BUDGET_S = 2.0
 SEARCH_Q0, PAPER_Q0 = 0.9, 0.7
-# Planner whose settings one of the user's own has.
+# A planner of the user's own has the settings of this one.
 LIKE_OWN = "fasaco"
 
 # Type checks by annotation, including NumPy's numbers.

@@ -24,9 +24,7 @@ from fasaco_edge.mission.coverage.ledger import JUMP_CELLS
 PATIENCE_S = 10.0
 # Longer gaps between poses restart that time [s].
 GAP_S = 3.0
-
-
-# A robot that was lost for longer is not looked for farther ahead on its line [s].
+# A lost robot is searched for as far ahead on its line as it drives in this time [s].
 LOST_ON_LINE_S = 10.0
 # Poses are too far apart if the track to half of this many last poses is unknown.
 LOOKED_BACK = 10

@@ -1,4 +1,4 @@
-"""A limit on the time of a user's code, which has no request to end."""
+"""Time limit of a user's planner, which cannot be asked to end."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from types import FrameType
 
-# A code that catches everything is interrupted again after this time [s].
+# Code that catches everything is interrupted again after this time [s].
 AGAIN_S = 0.1
 
 
