@@ -32,6 +32,7 @@ from fasaco_edge.kernels.manifest import (
     record,
     why_missing,
 )
+from fasaco_edge.planners.second_compiler import SecondCompiler
 from fasaco_edge.planners.stages import STAGES
 
 LOG = logging.getLogger(__name__)
@@ -202,11 +203,13 @@ def _compile(folder: Path, restarts: int, stages: list[str]) -> None:
         compile_into(folder, stay_small)
         from fasaco_edge.planners.warmup import TinyRoom, run_stage  # noqa: PLC0415
 
-        room = TinyRoom()
+        room, missing = TinyRoom(), [stage for stage in stages if stage not in manifest.stages]
         try:
-            for stage in stages:
-                if stage not in manifest.stages:
+            with SecondCompiler(folder, missing) as second:
+                for stage in missing:
                     _say(STAGE, stage)
+                    if stage in second.stages:
+                        second.hand_over()
                     run_stage(stage, room)
                     record(folder, manifest, stage)
         except OSError:

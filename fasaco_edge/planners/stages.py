@@ -10,8 +10,10 @@ LOCAL_SEARCH, REPAIR, LINE = "local search", "repair", "driven line"
 CURVES = "curves"
 WINDOWS, SHARES = "windows of the walk", "shares of a fleet"
 # Stages in the order in which they are compiled; the stages of a plan come first.
-_FOR_PLANS = (LATTICE, REACH, WALKS, BOUND, LOCAL_SEARCH, WINDOWS, LINE, REPAIR)
+_FOR_PLANS = (LATTICE, REACH, WALKS, BOUND, LOCAL_SEARCH, WINDOWS, REPAIR, LINE)
 STAGES = tuple(dict.fromkeys((*_FOR_PLANS, CHANGES, AREAS, SHARES, CURVES, *PLANNER_NAMES)))
+# Stages that share few kernels with the others: a second process compiles them.
+APART = (LINE, CHANGES, AREAS, SHARES, CURVES)
 
 
 def stages_of_plan(

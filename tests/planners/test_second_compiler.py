@@ -1,0 +1,50 @@
+"""Stages that a second process compiles at the same time are handed over to the first."""
+
+import os
+
+import pytest
+
+from fasaco_edge.planners import second_compiler
+from fasaco_edge.planners.second_compiler import SecondCompiler
+from fasaco_edge.planners.stages import AREAS, WALKS
+
+
+@pytest.fixture
+def two_cores(monkeypatch):
+    monkeypatch.setattr(os, "sched_getaffinity", lambda _: {0, 1})
+    monkeypatch.setattr(second_compiler, "TWO_MB", 0.0)
+
+
+def handed_over(folder, stages):
+    with SecondCompiler(folder, stages) as second:
+        second.hand_over()
+    assert not folder.with_name(f"{folder.name}.second").exists()
+    return {file.name for file in folder.iterdir()}
+
+
+def test_functions_that_the_first_lacks_are_moved(tmp_path, two_cores):
+    (tmp_path / "own").mkdir()
+    names = handed_over(tmp_path / "own", (WALKS, AREAS))
+    assert any(name.startswith("areas.find_areas-") and name.endswith(".nbc") for name in names)
+    (there,) = (tmp_path / "own").glob("areas.find_areas-*.nbi")
+    for file in (tmp_path / "own").iterdir():
+        file.unlink()
+    own = tmp_path / "own" / there.name
+    own.write_bytes(b"compiled by the first")
+    names = handed_over(tmp_path / "own", (WALKS, AREAS))
+    assert own.read_bytes() == b"compiled by the first"
+    assert not any(name.startswith(f"{own.stem}.") and name != own.name for name in names)
+    assert any(name.startswith("areas.cells_beside-") for name in names)
+
+
+def test_nothing_is_moved_of_one_that_failed(tmp_path, two_cores, monkeypatch):
+    monkeypatch.setattr(second_compiler, "APART", ("no stage",))
+    (tmp_path / "own").mkdir()
+    assert handed_over(tmp_path / "own", (WALKS, "no stage")) == set()
+
+
+@pytest.mark.parametrize(("cores", "needed_mb"), [(1, 0.0), (2, 1e9)])
+def test_one_core_or_little_memory_has_one_compiler(tmp_path, monkeypatch, cores, needed_mb):
+    monkeypatch.setattr(os, "sched_getaffinity", lambda _: set(range(cores)))
+    monkeypatch.setattr(second_compiler, "TWO_MB", needed_mb)
+    assert SecondCompiler(tmp_path / "own", (WALKS, AREAS)).stages == []
