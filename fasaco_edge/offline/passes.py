@@ -17,10 +17,11 @@ from fasaco_edge.config.robot import RobotConfig
 from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.grid.lattice import Cell
 from fasaco_edge.host.outputs import whole
+from fasaco_edge.offline.figures import PlannedFloor, judged_floor
 from fasaco_edge.offline.ground import Line
 from fasaco_edge.offline.maps import Map
 from fasaco_edge.offline.plan import plan
-from fasaco_edge.offline.result import Plan, PlannedFloor, judged_floor, picture_of, png_of
+from fasaco_edge.offline.result import Plan, picture_of, png_of
 from fasaco_edge.offline.settings import ANYWHERE, CELLS, HOME, Search
 from fasaco_edge.planners.passes import Pass, laid, read_pass
 from fasaco_edge.planners.planner import SearchProgress, StoppingCriterion

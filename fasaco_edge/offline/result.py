@@ -1,4 +1,4 @@
-"""Result of planning: a walk, the line along it, their figures of merit and pictures."""
+"""Result of planning: a walk, and the line along it, with all their figures and pictures."""
 
 from __future__ import annotations
 
@@ -16,17 +16,9 @@ from fasaco_edge.config.robot import RobotConfig
 from fasaco_edge.drawing.pictures import draw_walk
 from fasaco_edge.drawing.plot import MapLayer
 from fasaco_edge.drawing.trail import draw_trail
-from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.host.outputs import whole
-from fasaco_edge.judge.driven_line import DriveLimits
-from fasaco_edge.judge.floor import (
-    FloorFigures,
-    JudgedFloor,
-    SweepingRobot,
-    judge_floor,
-    share_words,
-    swept_words,
-)
+from fasaco_edge.judge.floor import JudgedFloor, share_words
+from fasaco_edge.offline.figures import CurveFigures, PlannedFloor, judged_floor
 from fasaco_edge.offline.ground import Ground, Line
 from fasaco_edge.offline.maps import Map
 from fasaco_edge.offline.settings import CELLS, Search
@@ -156,6 +148,13 @@ class Plan:
         return None if self.floor is None else self.floor.swept_share
 
     @property
+    def velocities(self) -> str | None:
+        """The velocities of the ants; None for a planner without ants."""
+        velocities = self.search.velocities
+        of_ants = {"colony-search": velocities, "fasaco": velocities, "aco": "1"}
+        return of_ants.get(self.path.planner)
+
+    @property
     def figures(self) -> dict[str, object]:
         """All figures, as values that JSON has too: those of ``fasaco-edge plan --json``."""
         return figures_of(self)
@@ -169,129 +168,6 @@ class Plan:
         return picture
 
 
-def png_of(picture: Image.Image) -> bytes:
-    """Return a picture as PNG."""
-    png = BytesIO()
-    picture.save(png, "PNG")
-    return png.getvalue()
-
-
-def judged_floor(
-    grid: OccupancyGrid | None, line_xy: Line, robot: RobotConfig
-) -> JudgedFloor | None:
-    """Return the swept and unswept floor of a line on a map; None for a coverage grid."""
-    if grid is None:
-        return None
-    limits = None
-    if robot.turn_deg_s is not None:
-        limits = DriveLimits(
-            robot.acceleration_m_s2, robot.turn_deg_s, robot.turn_deg_s2, robot.steered_deg
-        )
-    judged = SweepingRobot(
-        robot.tool_width_m,
-        robot.radius_m,
-        robot.speed_m_s,
-        robot.cost().quarter_turn_s,
-        limits=limits,
-        turn_radius_m=robot.turn_radius_m,
-    )
-    return judge_floor(grid, line_xy, judged)
-
-
-@dataclass(frozen=True, slots=True)
-class PlannedFloor:
-    """The floor that a plan sweeps, as in ``--json``; see ``FloorFigures``."""
-
-    reachable_m2: float
-    swept_share: float | None
-    seconds_per_m2: float | None
-    gap: float | None
-    patches_over_4_dm2: int
-    largest_patch_m2: float
-    illegal_share: float
-
-    def __str__(self) -> str:
-        """Text for tables and pictures."""
-        if self.swept_share is None:
-            return "none is reachable"
-        swept_m2 = self.swept_share * self.reachable_m2
-        words = f"{swept_words(swept_m2, self.reachable_m2)} swept"
-        if count := self.patches_over_4_dm2:
-            patches = "1 patch" if count == 1 else f"{count} patches"
-            words += f", {patches} over 4 dm2 left, the largest {self.largest_patch_m2:,.2f} m2"
-        if self.seconds_per_m2 is not None:
-            words += f", {self.seconds_per_m2:.1f} s/m2"
-        if self.gap is not None:
-            words += f", at most {100 * self.gap:.0f} % above the shortest possible time"
-        if self.illegal_share:
-            words += (
-                f"; {self.illegal_share:.1%} of the line is too close to obstacles or unknown floor"
-            )
-        return words
-
-    @classmethod
-    def of(cls, figures: FloorFigures) -> PlannedFloor:
-        """Return the figures, rounded."""
-        share, pace, gap = figures.swept_share, figures.seconds_per_m2, figures.gap
-        return cls(
-            reachable_m2=round(figures.reachable_m2, 2),
-            swept_share=None if share is None else round(share, 4),
-            seconds_per_m2=None if pace is None else round(pace, 3),
-            gap=None if gap is None else round(gap, 4),
-            patches_over_4_dm2=figures.patches_over_4_dm2,
-            largest_patch_m2=round(figures.largest_patch_m2, 3),
-            illegal_share=round(figures.illegal_share, 4),
-        )
-
-
-@dataclass(frozen=True, slots=True)
-class CurveFigures:
-    """The curve of a robot with a turning radius, as in ``--json``.
-
-    Attributes:
-        turn_radius_m: of its tightest arc [m].
-        reverses: whether it may drive backward.
-        length_m, backward_m: length of the curve, and of what is driven backward [m].
-        seconds: driving time by the judge [s].
-        reversals: changes between forward and backward.
-        spot_turns: turns that do not fit, and stay on the spot, by the judge.
-    """
-
-    turn_radius_m: float
-    reverses: bool
-    length_m: float
-    backward_m: float
-    seconds: float
-    reversals: int
-    spot_turns: int
-
-    def __str__(self) -> str:
-        """Text for tables and pictures."""
-        count, left = self.reversals, self.spot_turns
-        changes = "1 change" if count == 1 else f"{count} changes"
-        words = (
-            f"arcs of {self.turn_radius_m:g} m or more, {self.length_m:,.1f} m in "
-            f"{self.seconds:,.0f} s, {self.backward_m:,.1f} m of it backward, {changes} between "
-            "forward and backward"
-        )
-        if left:
-            words += f"; {left} turn{'s' * (left != 1)} do{'es' * (left == 1)} not fit"
-        return words
-
-    @classmethod
-    def of(cls, robot: RobotConfig, curve: Curve, judged: FloorFigures) -> CurveFigures:
-        """Return the figures, rounded."""
-        return cls(
-            turn_radius_m=robot.turn_radius_m,
-            reverses=robot.reverses,
-            length_m=round(judged.length_m, 2),
-            backward_m=round(curve.backward_m, 2),
-            seconds=round(judged.seconds, 1),
-            reversals=judged.reversals,
-            spot_turns=judged.spot_turns,
-        )
-
-
 def figures_of(plan: Plan) -> dict[str, object]:
     """Return the figures of a walk, of its search, and of the floor under its line."""
     path, problem, ground, search = plan.path, plan.problem, plan.ground, plan.search
@@ -302,7 +178,7 @@ def figures_of(plan: Plan) -> dict[str, object]:
         "ants": path.work.ants,
         "kicks": path.work.perturbations,
         "proposals": path.work.proposals,
-        "velocities": velocities_of(plan),
+        "velocities": plan.velocities,
         "map": plan.map.name,
         "line": plan.line,
         "tool_m": plan.robot.tool_width_m,
@@ -342,11 +218,11 @@ def driving(robot: RobotConfig) -> dict[str, float | None]:
     }
 
 
-def velocities_of(plan: Plan) -> str | None:
-    """Return the velocities of the ants; None for a planner without ants."""
-    velocities = plan.search.velocities
-    of_ants = {"colony-search": velocities, "fasaco": velocities, "aco": "1"}
-    return of_ants.get(plan.path.planner)
+def png_of(picture: Image.Image) -> bytes:
+    """Return a picture as PNG."""
+    png = BytesIO()
+    picture.save(png, "PNG")
+    return png.getvalue()
 
 
 def picture_of(plan: Plan, of: str = "") -> Image.Image:
@@ -406,4 +282,4 @@ def _colony(plan: Plan) -> str:
     """Return a description of the ants; "" for none."""
     ants = plan.path.work.ants
     counted = "1 ant" if ants == 1 else f"{ants} ants"
-    return f" {velocities_of(plan)}, {counted}, seed {plan.path.seed}" if ants else ""
+    return f" {plan.velocities}, {counted}, seed {plan.path.seed}" if ants else ""

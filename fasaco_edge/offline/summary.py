@@ -9,8 +9,9 @@ from fasaco_edge.offline.settings import CELLS
 from fasaco_edge.text import duration
 
 if TYPE_CHECKING:
+    from fasaco_edge.offline.figures import PlannedFloor
     from fasaco_edge.offline.passes import PassPlans
-    from fasaco_edge.offline.result import Plan, PlannedFloor
+    from fasaco_edge.offline.result import Plan
 
 Rows = list[tuple[str, str]]
 
