@@ -4,6 +4,7 @@ import faulthandler
 import os
 import signal
 from collections.abc import Callable, Iterator
+from zlib import crc32
 
 import pytest
 from hypothesis import settings
@@ -30,13 +31,13 @@ for number in (signal.SIGINT, signal.SIGHUP, signal.SIGQUIT, signal.SIGTERM):
         signal.signal(number, _go_on)
 
 
-# Each takes one worker half a minute, and would come near the end: the others had nothing to do.
-BEGUN_FIRST = ("tests/replay/test_replay.py", "tests/test_taint.py", "tests/watch/test_watch.py")
-
-
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Begin with some files; the order of the rest stays as it is."""
-    items.sort(key=lambda item: item.nodeid.partition("::")[0] not in BEGUN_FIRST)
+    """Run the files in an order without meaning, the same each time.
+
+    Files of one folder wait for processes, or compute, all alike: mixed, one uses the cores while
+    others wait.
+    """
+    items.sort(key=lambda item: crc32(item.nodeid.partition("::")[0].encode()))
 
 
 @pytest.fixture

@@ -39,8 +39,7 @@ def test_what_lies_between_poses_is_said_not_to_count():
     assert found.mission.state == "degraded"
 
 
-@pytest.mark.parametrize("every_s", [3.5, 5.0, 8.0])
-@pytest.mark.parametrize("size", [(40, 60), (50, 122)])
+@pytest.mark.parametrize(("size", "every_s"), [((40, 60), 3.5), ((50, 122), 5.0), ((40, 60), 8.0)])
 def test_a_robot_that_drives_on_unseen_is_not_led_back(size, every_s):
     found = robot(*size, every_s=every_s)
     assert found.wait(1500.0, lambda robot: robot.mission.state == "done")
