@@ -1,4 +1,4 @@
-"""Pictures of a fleet: its plan, tracks, floor swept by each robot, and floor swept again."""
+"""Pictures of a fleet: its plan, tracks and floor swept by robot, and floor swept again."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from fasaco_edge.drawing import palette
-from fasaco_edge.drawing.pictures import DRIVEN_WIDTH, draw_line, draw_unswept, in_pieces
+from fasaco_edge.drawing.pictures import draw_line, draw_unswept, in_pieces
 from fasaco_edge.drawing.plot import MapLayer, Plot, View, bounds_of
 from fasaco_edge.drawing.sheet import KeyEntry, Sheet
 from fasaco_edge.fleet.observer.cells import Cells, mask_of, together, window_of
@@ -21,6 +21,8 @@ from fasaco_edge.review.wording import clock
 
 # Opacity of the colour of a robot's cells; cells that two robots pass have none.
 TINT = 0.35
+# Width of a track.
+TRACK_PX = 1.6
 
 
 def draw_fleet(
@@ -96,13 +98,11 @@ def draw_fleet_mission(
     plot.paint(twice, palette.RULE)
     key.append(KeyEntry("tile", palette.RULE, f"by two or more ({twice.area_m2:,.1f} m2)"))
     key += draw_unswept(plot, unswept)
-    for trail in trails.values():
-        plot.track(trail[:-1], trail[1:], DRIVEN_WIDTH * lattice.cell_m)
+    for number, trail in enumerate(trails.values()):
+        plot.line(trail, _track_colour(number), TRACK_PX)
         plot.end_mark(trail[-1])
         plot.start_mark(trail[0])
-    longest_m = max(float(np.hypot(*np.diff(trail, axis=0).T).sum()) for trail in trails.values())
-    bar = ("0", f"{longest_m:,.0f} m driven")
-    return Sheet(title, lines, key, bar, plot.view.scale).around(plot.finished())
+    return Sheet(title, lines, key, None, plot.view.scale).around(plot.finished())
 
 
 def _tints(lattice: CoverageLattice, walks: Sequence[NDArray[np.int32]]) -> NDArray[np.uint8]:
@@ -120,9 +120,13 @@ def _tints(lattice: CoverageLattice, walks: Sequence[NDArray[np.int32]]) -> NDAr
 
 def robot_tint(number: int) -> palette.Colour:
     """Return the tint of the floor that the robot with a number sweeps."""
-    colour = np.array(palette.ROBOTS[number % len(palette.ROBOTS)][1])
+    colour = np.array(_track_colour(number))
     red, green, blue = np.rint(255 - TINT * (255 - colour)).astype(int).tolist()
     return red, green, blue
+
+
+def _track_colour(number: int) -> palette.Colour:
+    return palette.ROBOTS[number % len(palette.ROBOTS)][1]
 
 
 def _key(walks: Sequence[NDArray[np.int32]]) -> list[KeyEntry]:
@@ -133,7 +137,6 @@ def _key(walks: Sequence[NDArray[np.int32]]) -> list[KeyEntry]:
     return [*key, KeyEntry("tile", palette.RULE, "passed by two or more")]
 
 
-TRACK_PX = 1.6
 # Share from which a cell counts as swept again.
 MOSTLY = 0.5
 
@@ -169,8 +172,7 @@ def draw_fleet_review(review: FleetReview) -> Image.Image:
             [geometry.to_map(c - window.col0 + 0.5, r - window.row0 + 0.5)
              for r, c in zip(rows.tolist(), cols.tolist(), strict=True)]
         ).reshape(-1, 2)  # fmt: skip
-        colour = palette.ROBOTS[track.number % len(palette.ROBOTS)][1]
-        plot.line(points, colour, TRACK_PX)
+        plot.line(points, _track_colour(track.number), TRACK_PX)
         if len(points):
             plot.end_mark(points[-1])
             plot.start_mark(points[0])
