@@ -20,7 +20,7 @@ from tests.support.scripted_mission import Mission
 pytestmark = pytest.mark.skipif(not viewer.drivers(), reason="no software renderer")
 
 # The map view at 1280 x 720, without its title: left, top, right, bottom.
-MAP_VIEW = (2, 66, 500, 502)
+MAP_VIEW = (2, 95, 638, 573)
 
 
 @pytest.fixture(scope="module")
@@ -38,10 +38,10 @@ def shot(tmp_path_factory):
 
 def test_no_view_complains(shot):
     assert shot.complaints == ()
-    assert len(shot.views) == 11
+    assert len(shot.views) == 12
     assert {
-        "Map, coverage and path",
-        "Pheromone, where it points to",
+        "Map, swept floor, track and path",
+        "Pheromone of the ants, and where most of it leads",
         "States",
         "Log",
         "Run",

@@ -63,8 +63,8 @@ def test_a_cell_of_equal_directions_has_none():
 
 def test_where_it_leads_on_from_the_robot_is_told():
     field = of(["EN", "w."])
-    assert fork_at(*field, Pose2D(1.1, 2.1)) == "on east: 90 %"
-    assert fork_at(*field, Pose2D(1.1, 2.6)) == "on west: 40 %"
+    assert fork_at(*field, Pose2D(1.1, 2.1)) == "east: 90 %"
+    assert fork_at(*field, Pose2D(1.1, 2.6)) == "west: 40 %"
     # In a cell without steps, beyond the trail, or nobody knows where.
     assert fork_at(*field, Pose2D(1.6, 2.6)) == ""
     assert fork_at(*field, Pose2D(0.9, 2.1)) == ""

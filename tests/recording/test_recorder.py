@@ -236,8 +236,8 @@ def test_the_pheromone_is_neither_flat_nor_misplaced(recorded):
     best = recorded.mission.best_steps
     assert cohort == [f"cohort 3, 1 cell a move\n60 ants in all, best walk {best} steps"]
     path = f"path {recorded.mission.revision}"
-    decided = "12 cells, branching 1.03 (1 if all are decided)"
-    assert trail == [f"living trail at {path}, {best} steps to drive\n{decided}"]
+    decided = "branching factor 1.03 (1: one way in each cell, 4: none is preferred)"
+    assert trail == [f"pheromone at {path}, {best} steps to drive\n{decided}"]
 
 
 def test_how_decided_the_trail_is_is_a_curve(recorded):

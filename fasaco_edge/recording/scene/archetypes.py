@@ -88,11 +88,15 @@ def map_archetype(grid: OccupancyGrid) -> rr.GridMap:
     return grid_archetype(grid.geometry, pixels, rr.components.Colormap.RvizMap, MAP_ORDER)
 
 
-def coverage_archetype(grid: OccupancyGrid) -> rr.GridMap:
-    """Return a coverage grid as a layer over the map: covered, re-covered, blocked cells tinted."""
+def coverage_archetype(grid: OccupancyGrid, *, has_floor: bool) -> rr.GridMap:
+    """Return a coverage grid as a layer over the map: covered, re-covered, blocked cells tinted.
+
+    Covered cells have no tint with ``has_floor``: the swept floor is drawn, which they exceed.
+    """
     tints = np.zeros((256, 4), np.uint8)
-    tints[CoverageValue.COVERED] = (*COVERED_COLOUR, 120)
-    tints[CoverageValue.RECOVERED] = (*RECOVERED_COLOUR, 140)
+    if not has_floor:
+        tints[CoverageValue.COVERED] = (*COVERED_COLOUR, 120)
+        tints[CoverageValue.RECOVERED] = (*RECOVERED_COLOUR, 140)
     tints[CoverageValue.BLOCKED] = (*BLOCKED_COLOUR, 40)
     return grid_archetype(grid.geometry, tints[grid.cells.view(np.uint8)], None, COVERAGE_ORDER)
 
@@ -126,8 +130,8 @@ def cohort_archetype(message: PheromoneMessage) -> rr.Points3D:
 def trail_label(message: PheromoneMessage, about: TrailAttachment) -> rr.Points3D:
     """Return the label over the living trail: its path, and how decided it is."""
     text = (
-        f"living trail at path {about.revision}, {message.best_steps} steps to drive\n"
-        f"{about.cells} cells, branching {about.branching:.2f} (1 if all are decided)"
+        f"pheromone at path {about.revision}, {message.best_steps} steps to drive\n"
+        f"branching factor {about.branching:.2f} (1: one way in each cell, 4: none is preferred)"
     )
     return label_archetype(message.geometry.bounds(), text, LABEL_ABOVE)
 

@@ -1,4 +1,4 @@
-"""The blueprint of a recording: the map large, states below it, figures on the right."""
+"""The blueprint of a recording: a page of what happened, and a page of details."""
 
 from __future__ import annotations
 
@@ -16,9 +16,10 @@ MARGIN, PHEROMONE_MARGIN = 1.1, 1.3
 # Rerun's vertical field of view, and the shapes (width / height) that the spatial views have
 # in this layout at 1280 x 720.
 FIELD_OF_VIEW_RAD = math.radians(55.0)
-VIEW_ASPECT, PHEROMONE_ASPECT = 1.12, 1.45
-COLUMNS = [11, 8, 9]
+VIEW_ASPECT, PHEROMONE_ASPECT = 1.3, 2.2
 CHANGE_S = 4.0
+# The plot of the gap ends here: that of the last metres says nothing of the mission.
+MOST_GAP = 2.0
 
 MAP_BACKGROUND = [38, 41, 48]
 PHEROMONE_BACKGROUND = [10, 10, 14]
@@ -28,15 +29,18 @@ def build_blueprint(bounds: Bounds | None) -> rrb.Blueprint:
     """Return the layout, its eyes over ``bounds`` (x_min, y_min, x_max, y_max) [m]."""
     bounds = bounds or NO_MAP
     return rrb.Blueprint(
-        rrb.Horizontal(
-            rrb.Vertical(
-                _map_view(bounds), rrb.Horizontal(_states(), log_view()), row_shares=[5, 2]
+        rrb.Tabs(
+            rrb.Horizontal(
+                rrb.Vertical(_map_view(bounds), _states(), row_shares=[9, 2]),
+                rrb.Vertical(
+                    _pheromone_view(bounds),
+                    log_view(),
+                    rrb.Horizontal(_card(), _coverage(), column_shares=[3, 2]),
+                    row_shares=[6, 3, 4],
+                ),
+                name="Mission",
             ),
-            rrb.Vertical(
-                _pheromone_view(bounds), _branching(), _saved(), _plan(), row_shares=[10, 3, 3, 3]
-            ),
-            rrb.Vertical(_figures(), _card(), row_shares=[5, 2]),
-            column_shares=COLUMNS,
+            rrb.Grid(*_details(), grid_columns=2, name="Details"),
         ),
         rrb.TimePanel(state="collapsed", timeline=entities.WALL_CLOCK),
         rrb.BlueprintPanel(state="collapsed"),
@@ -50,7 +54,7 @@ def _map_view(bounds: Bounds) -> rrb.Spatial3DView:
     return rrb.Spatial3DView(
         # The parent entity may lie too far away for float32.
         origin=f"/{entities.WORLD}",
-        name="Map, coverage and path",
+        name="Map, swept floor, track and path",
         contents=["/world/**", f"- /{entities.PHEROMONE}/**", f"- /{entities.DIRECTIONS}/**"],
         eye_controls=eye_above(bounds, MARGIN, VIEW_ASPECT),
         line_grid=False,
@@ -65,10 +69,10 @@ def _map_view(bounds: Bounds) -> rrb.Spatial3DView:
 def _pheromone_view(bounds: Bounds) -> rrb.Spatial3DView:
     return rrb.Spatial3DView(
         origin=f"/{entities.WORLD}",
-        name="Pheromone, where it points to",
+        name="Pheromone of the ants, and where most of it leads",
         contents=[
             f"/{entities.PHEROMONE}/**",
-            f"/{entities.DIRECTIONS}/**",
+            f"/{entities.DIRECTIONS}",
             f"/{entities.ROBOT}/**",
         ],
         eye_controls=eye_above(bounds, PHEROMONE_MARGIN, PHEROMONE_ASPECT),
@@ -102,29 +106,31 @@ def plot_view(
     )
 
 
-def _figures() -> rrb.Vertical:
-    left, right = (rrb.PlotLegend(c) for c in (rrb.Corner2D.LeftTop, rrb.Corner2D.RightTop))
-    return rrb.Vertical(
-        plot_view("Coverage [share of the cells known]", "metrics/coverage", left, 1.1),
-        plot_view("Latency [ms]", entities.LATENCY, right),
-        plot_view("Memory [MB], processor [% of a core], battery [%]", "metrics/resources", right),
-    )
-
-
-def _plan() -> rrb.TimeSeriesView:
-    legend = rrb.PlotLegend(rrb.Corner2D.RightTop)
-    shown = tuple(f"/{gap}" for gap in (entities.GAP, entities.LINE_GAP))
-    return plot_view("Gap to the lower bound [share]", "metrics/plan", legend, contents=shown)
-
-
-def _saved() -> rrb.TimeSeriesView:
+def _coverage() -> rrb.TimeSeriesView:
     legend = rrb.PlotLegend(rrb.Corner2D.LeftTop)
-    return plot_view("Saved by search, all plans [s]", entities.SAVED, legend)
+    return plot_view("Cells covered [share]", "metrics/coverage", legend, 1.1)
 
 
-def _branching() -> rrb.TimeSeriesView:
-    none = rrb.PlotLegend(visible=False)
-    return plot_view("Branching of the living trail, 1 if decided", entities.BRANCHING, none)
+def _details() -> list[rrb.TimeSeriesView]:
+    left, right = (rrb.PlotLegend(c) for c in (rrb.Corner2D.LeftTop, rrb.Corner2D.RightTop))
+    gaps = tuple(f"/{gap}" for gap in (entities.GAP, entities.LINE_GAP))
+    used = tuple(f"/{share}" for share in (entities.PROCESSOR, entities.BATTERY))
+    return [
+        plot_view("Latency [ms]", entities.LATENCY, right),
+        plot_view(
+            "Time above the least possible, as a share of it", "metrics/plan", right, MOST_GAP, gaps
+        ),
+        plot_view("Driving time saved by search, summed over all plans [s]", entities.SAVED, left),
+        plot_view(
+            "Branching factor of the pheromone: 1 if each cell has one way, 4 if none is preferred",
+            entities.BRANCHING,
+            rrb.PlotLegend(visible=False),
+        ),
+        plot_view("Memory [MB]", entities.MEMORY, left),
+        plot_view(
+            "Processor [% of a core], battery [%]", "metrics/resources", right, contents=used
+        ),
+    ]
 
 
 def _states() -> rrb.StateTimelineView:

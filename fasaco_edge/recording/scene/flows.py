@@ -98,4 +98,4 @@ def fork_at(
     rows, cols = pointed.shape
     if not (0 <= row < rows and 0 <= col < cols) or pointed[row, col] < 0:
         return ""
-    return f"on {NAMES[pointed[row, col]]}: {100 * share[row, col]:.0f} %"
+    return f"{NAMES[pointed[row, col]]}: {100 * share[row, col]:.0f} %"

@@ -25,14 +25,14 @@ SLACK = 1.1
 MARK_UP = re.compile(r"[\\`\[\]<>!|]")
 
 LEGEND = """\
-- **Map** white free, black occupied, grey unknown
-- **Tint** blue covered, orange covered more than once
-- **Path** violet, the previous one pale; **track** green, from **start** to **end**
-- **Pink** the part of the map that led to this path, and its reason
-- **Cyan** an obstacle came or went
-- **Blue line** a zone of the order, **orange** a keep-out zone
+- **Map** white free, black occupied, grey unknown; **turquoise** swept floor
+- **Robot** red, its front yellow; its **track** green, from **start** to **end**
+- **Path** to drive violet, the previous one pale
+- **Pink frame** around all changes of the map that led to this path, and its reason
+- **Cyan frame** an obstacle came or went
+- **Blue line** a zone of the order, **orange line** a keep-out zone
 - **Pheromone** left by the planner's ants, for its next ants: dark little, bright much
-- **Arrows** where most pheromone leads, bright if one way has nearly all; at the robot its share"""
+- **Arrows** where most pheromone leads, bright if one way has nearly all"""
 
 # Each field has its own range, so that it is never flat.
 LEVELS = (
@@ -52,6 +52,7 @@ class RunDescription:
         config: its configuration from its status.
         pheromone_range: least and greatest pheromone of all fields; None while there is none.
         anchor: point (x, y) [m] of the map frame that is drawn at 0; None for 0 itself.
+        outcome: of the mission; "" while it is under way.
     """
 
     robot: str
@@ -60,6 +61,7 @@ class RunDescription:
     config: Settings = field(default_factory=dict)
     pheromone_range: tuple[float, float] | None = None
     anchor: tuple[float, float] | None = None
+    outcome: str = ""
 
     def with_pheromone(self, least: float, most: float) -> RunDescription:
         """Return it with the range widened by a field's least and greatest pheromone; 0 for none.
@@ -109,7 +111,8 @@ class RunDescription:
         table = "\n".join(
             f"| {markdown_cell(name)} | {markdown_cell(value)} |" for name, value in rows
         )
-        return f"{self._head()}\n\n{LEGEND}\n\n| setting | value |\n|---|---|\n{table}\n"
+        head = "\n\n".join(filter(None, (markdown_cell(self.outcome), self._head())))
+        return f"{head}\n\n{LEGEND}\n\n| setting | value |\n|---|---|\n{table}\n"
 
     def _head(self) -> str:
         """Return the most important settings in a line."""

@@ -31,6 +31,7 @@ from fasaco_edge.recording.scene.layers import (
     is_far_from,
     size_in_file,
 )
+from fasaco_edge.recording.scene.outcome import UNDER_WAY, Outcome
 from fasaco_edge.recording.scene.runcard import RunDescription
 from fasaco_edge.recording.sdk import rr
 from fasaco_edge.recording.write.writer import RecordingWriter
@@ -46,8 +47,6 @@ DEFAULT_RADIUS_M = 0.2
 # The view follows the growing map in steps of this fraction of its size: each blueprint
 # takes 120 kB.
 REFRAME_FRACTION = 0.15
-# States that alternate while plans come.
-UNDER_WAY = ("planning", "covering")
 # Distance above the robot of the label with the trail's direction.
 FORK_CELLS = 3.0
 
@@ -70,6 +69,8 @@ class Scene:
         self._order = EVERYTHING_ONCE
         self._kept_out: list[tuple[str, Polygon]] = []
         self._troubles: set[str] = set()
+        self._has_floor = False
+        self._outcome = Outcome()
         self._layers = Layers()
         self._curves = Curves(writer)
         self._driven = DrivenPathDrawing(writer)
@@ -116,6 +117,7 @@ class Scene:
         self._writer.log(entities.ROBOT, draw.pose_archetype(pose), latched=True)
         if self._robot is None:
             self._mark(entities.START, pose, draw.START_COLOUR)
+        self._outcome.add_pose(stamped)
         self._robot = pose
         self._driven.add(pose.x, pose.y)
 
@@ -164,7 +166,7 @@ class Scene:
         def draw_coverage() -> None:
             self._writer.log(
                 entities.COVERAGE,
-                draw.coverage_archetype(grid),
+                draw.coverage_archetype(grid, has_floor=self._has_floor),
                 latched=True,
                 size=4 * grid.cells.size,
             )
@@ -176,7 +178,8 @@ class Scene:
         self._curves.draw(entities.RECOVERED_FRACTION, recovered, spacing_ns=SHARE_SPACING_NS)
 
     def add_floor(self, grid: OccupancyGrid) -> None:
-        """Tint the swept floor."""
+        """Tint the swept floor; covered cells have no tint from then on."""
+        self._has_floor = True
         grid = self._anchored(grid.geometry.origin).grid(grid)
 
         def draw_floor() -> None:
@@ -243,6 +246,7 @@ class Scene:
     def add_status(self, status: Status) -> None:
         """Plot the planner's figures, show its states, log its errors."""
         self._figures.add(status)
+        self._outcome.add_status(status)
         self._add_configuration(status)
         self._add_restored(status.ledger.restored_cells)
         kept_out = [
@@ -254,8 +258,9 @@ class Scene:
             self._kept_out = kept_out
             self._draw_areas()
         if status.state not in UNDER_WAY:
-            # The plans came before.
+            # The plans came before, and a viewer orders lines of one time by entity.
             self._paths.finish()
+            self._writer.at(self._writer.wall_ns + 1)
         self.enter(entities.MISSION_STATE, status.state, status.reason)
         self.enter(entities.PLANNER_STATE, "planning" if status.plan.planning else "idle")
         self._add_troubles(status)
@@ -327,6 +332,7 @@ class Scene:
             self._run,
             version=status.version or self._run.version,
             config=status.config or self._run.config,
+            outcome=self._outcome.text,
         )
         if known == self._run:
             return
