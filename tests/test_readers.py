@@ -48,7 +48,7 @@ SHOWS = {
     "bench": r"colony-search",
     "mission": r"state +│ \w",
     "replay": r"equal bit for bit",
-    "review": r"swept +\d+\.\d of|│ at |difference|files in",
+    "review": r"swept +\d+\.\d of|│ at |difference",
 }
 REPEATED = ("ask", "mission")
 # Ends with 1 for each fault of this computer, such as a clock that is not set.
@@ -113,7 +113,7 @@ class Reader:
             pytest.fail(f"a block of {kind}")
 
     def _run(self, line: str) -> None:
-        if MARK in line:
+        if MARK in line or not words_of(line):
             return
         program, *words = shlex.split(self._here(shlex.join(words_of(line))))
         name = words[1] if program == "python" else words[0]
@@ -198,7 +198,6 @@ def integrated(tmp_path_factory):
 
 def test_an_integrator_s_page(integrated):
     assert integrated.ran >= 15
-    assert "troubles    none" in integrated.said["review"]
 
 
 def test_a_researcher_s_page(integrated, tmp_path, monkeypatch):
