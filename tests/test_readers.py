@@ -32,9 +32,12 @@ BLOCK = re.compile(r"^( *)```(\w*)\n(.*?)^\1```$", re.M | re.S)
 MARK = "# not run by the tests: "
 # Commands that go on until they are ended; `fasaco-edge review` reads what `run` has recorded.
 LASTING = ("run", "simulate", "follow", "serve", "watch")
+# What these say before anybody ends them; a simulated robot nothing, its daemon that it has a map.
+BEGUN = {"run": "(planning|covering|paused): ", "simulate": ""}
 # What makes a command quicker, or keeps it apart from other tests.
 BESIDE = {
     "bench": "--maps office --seeds 1 --ants 64 --budget 0.05",
+    "follow": "--speed 8",
     "init": "--listen 0.2",
     "plan": "--budget 0.05",
     "run": "--state state",
@@ -46,7 +49,7 @@ BESIDE = {
 SHOWS = {
     "ask": r"length_m +│ [1-9]",
     "bench": r"colony-search",
-    "mission": r"state +│ \w",
+    "mission status": r"floor swept +│ (\d*[1-9]|0\.[1-9]|\d+\.\d %: (\d*[1-9]|0\.[1-9]))",
     "replay": r"equal bit for bit",
     "review": r"swept +\d+\.\d of|│ at |difference",
 }
@@ -65,7 +68,7 @@ SAYS = {
     "pheromone.parquet": r"\d+ fields; the last has \d+ cells,\nthe strongest at \(.*\) m\n",
     "floor.parquet": r"monday (\{.*\})\ntuesday \1\n",
 }
-TIMEOUT_S = 300.0
+TIMEOUT_S = 120.0
 
 
 class Reader:
@@ -81,7 +84,7 @@ class Reader:
         self.folder = folder
         self.said: dict[str, str] = {}
         self.ran = 0
-        self._lasting: list[tuple[str, Forked]] = []
+        self._lasting: list[tuple[str, Forked, list[Path]]] = []
         self.instead = {port: str(free_port()) for port in ("7447", "8465")}
         self._environment = ENVIRONMENT | {"FASACO_CONNECT": self._here("tcp/127.0.0.1:7447")}
 
@@ -97,7 +100,7 @@ class Reader:
                 self._take(kind, dedent(indent + block))
             self._end()
         finally:
-            for _, process in self._lasting:
+            for _, process, _ in self._lasting:
                 process.kill()
 
     def _take(self, kind: str, block: str) -> None:
@@ -105,8 +108,10 @@ class Reader:
             for line in block.replace("\\\n", " ").splitlines():
                 self._run(line)
         elif kind == "yaml":
-            (self.folder / "block.yaml").write_text(block)
-            load_config(self.folder / "block.yaml")
+            file = self.folder / (_name_of(block) or "block.yaml")
+            file.write_text(block)
+            load_config(file)
+            self._listen_here(file)
         elif kind == "python":
             self._run_python(block)
         else:
@@ -145,27 +150,41 @@ class Reader:
         self.said[name] = out + err
         assert "Traceback" not in err, err
         is_right = code == 0 or (code == 1 and name in MAY_END_WITH_1)
-        is_right = is_right and re.search(SHOWS.get(name, ""), out) is not None
+        shows = [said for typed, said in SHOWS.items() if " ".join(words[2:]).startswith(typed)]
+        is_right = is_right and all(re.search(said, out) for said in shows)
         assert is_right or name in REPEATED, f"{words}: {code}\n{out}{err}"
         return is_right
 
     def _begin(self, name: str, words: list[str]) -> None:
-        files = [self.folder / f"{name}{len(self._lasting)}.{kind}" for kind in ("out", "err")]
+        """Begin what goes on; it ends the one of that name before."""
+        self._end(name)
+        files = [self.folder / f"{name}{self.ran}.{kind}" for kind in ("out", "err")]
         for file in files:
             file.touch()
         process = Forked(tuple(words), self._environment, *files, str(self.folder))
-        self._lasting.append((name, process))
         if name == "run":
-            until(lambda: "ready" in files[1].read_text(), TIMEOUT_S, why=files[1].read_text)
+            self._wait_for("ready", files[1])
+        if "--record" in words:
+            until(lambda: list(self.folder.glob("recordings/*.rrd")), TIMEOUT_S)
+        self._lasting.append((name, process, files))
 
     def _end(self, *names: str) -> None:
-        """End what goes on, as Ctrl-C does."""
-        for name, process in self._lasting[:]:
-            if not names or name in names:
+        """End what goes on, as Ctrl-C does once there is something to see."""
+        for name, process, files in self._lasting[:]:
+            if name in (names or LASTING):
+                self._wait_for(BEGUN.get(name, "."), *files)
                 assert process.poll() is None, f"{name} has ended by itself: {process.returncode}"
                 process.send_signal(signal.SIGINT)
                 assert process.wait(TIMEOUT_S) in (0, 130), name
-                self._lasting.remove((name, process))
+                self._lasting.remove((name, process, files))
+
+    def _wait_for(self, words: str, *files: Path) -> None:
+        """Wait until one of the files holds words, a regular expression."""
+        until(
+            lambda: any(re.search(words, file.read_text()) for file in files),
+            TIMEOUT_S,
+            why=lambda: [file.name for file in files],
+        )
 
     def _listen_here(self, file: Path) -> None:
         config = yaml.safe_load(file.read_text())
@@ -173,14 +192,20 @@ class Reader:
         file.write_text(yaml.safe_dump(config))
 
     def _run_python(self, block: str) -> None:
-        if named := re.match(r"# (\w+\.py)\n", block):
-            (self.folder / named[1]).write_text(block)
+        if name := _name_of(block):
+            (self.folder / name).write_text(block)
             return
         (expected,) = [regex for words, regex in SAYS.items() if words in block]
         said = io.StringIO()
         with contextlib.chdir(self.folder), contextlib.redirect_stdout(said):
             exec(compile(block, "example", "exec"), {})
         assert re.fullmatch(expected, said.getvalue()), said.getvalue()
+
+
+def _name_of(block: str) -> str:
+    """Return the name of the file that a block is, "" for none."""
+    named = re.match(r"# (\w+\.\w+)\n", block)
+    return named[1] if named else ""
 
 
 def page(name: str) -> str:
