@@ -47,9 +47,10 @@ BESIDE = {
 }
 # What commands show in the end; those that ask a daemon are repeated until they do.
 SHOWS = {
-    "ask": r"length_m +│ [1-9]",
+    "ask status": r'"state": ?"recording"',
+    "ask path": r"length_m +│ [1-9]",
     "bench": r"colony-search",
-    "mission status": r"floor swept +│ (\d*[1-9]|0\.[1-9]|\d+\.\d %: (\d*[1-9]|0\.[1-9]))",
+    "mission status": r"covered +│ .*: ([2-9]|\d\d+) of",
     "replay": r"equal bit for bit",
     "review": r"swept +\d+\.\d of|│ at |difference",
 }
@@ -156,8 +157,8 @@ class Reader:
         return is_right
 
     def _begin(self, name: str, words: list[str]) -> None:
-        """Begin what goes on; it ends the one of that name before."""
-        self._end(name)
+        """Begin what goes on; it ends the one of that name before, a new daemon all."""
+        self._end(*(LASTING if name == "run" else (name,)))
         files = [self.folder / f"{name}{self.ran}.{kind}" for kind in ("out", "err")]
         for file in files:
             file.touch()
@@ -165,7 +166,8 @@ class Reader:
         if name == "run":
             self._wait_for("ready", files[1])
         if "--record" in words:
-            until(lambda: list(self.folder.glob("recordings/*.rrd")), TIMEOUT_S)
+            asked = ["-m", "fasaco_edge", "ask", "status", "--json"]
+            until(lambda: self._succeeds("ask", asked), TIMEOUT_S)
         self._lasting.append((name, process, files))
 
     def _end(self, *names: str) -> None:
