@@ -28,6 +28,26 @@ COMMAND_LINE = re.compile(r"^\s*(?:\.venv/bin/)?fasaco-edge ((?:.*\\\n)*.*)$", r
 BENCHMARK_LINE = re.compile(r"^\s*python -m tests\.benchmarks ((?:.*\\\n)*.*)$", re.M)
 
 
+LINK = re.compile(r"\]\(([^)#\s]*)(?:#([^)\s]*))?\)")
+
+
+def places_of(page: Path) -> set[str]:
+    """Return the anchors of a page's headings."""
+    heads = re.findall(r"^#+ (.*)$", page.read_text(encoding="utf-8"), re.M)
+    return {re.sub(r"[^\w\- ]", "", head.lower()).replace(" ", "-") for head in heads}
+
+
+@pytest.mark.parametrize("page", sorted({*ROOT.glob("*.md"), *ROOT.glob("[a-z]*/**/*.md")}))
+def test_each_link_of_a_page_leads_somewhere(page):
+    for file, place in LINK.findall(page.read_text(encoding="utf-8")):
+        if file.startswith(("http:", "https:")):
+            continue
+        there = (page.parent / file).resolve() if file else page
+        assert there.exists(), f"{file}: there is none"
+        if place:
+            assert place in places_of(there), f"{file}#{place}: there is no such heading"
+
+
 def words_of(line: str) -> list[str]:
     """Return the words of a command line in a shell, without redirections and what follows it."""
     words = shlex.split(line.replace("\\\n", " "), comments=True)

@@ -183,7 +183,7 @@ def add_own_planners(parser: argparse.ArgumentParser) -> None:
         default=[],
         metavar="PLACE",
         help=f"planners of your own, {SHAPE}, as rows beside the others; they run with your "
-        "rights, see fasaco_edge/README.md",
+        "rights, see fasaco_edge/researcher.md",
     )
 
 

@@ -29,7 +29,7 @@ CANNOT_RUN = 77
 EXAMPLE = f"{PREFIX}/current/deploy/fasaco-edge.yaml"
 # A report of faults, and the faults that a lab has.
 MAY_END_WITH_1 = "fasaco-edge doctor"
-PROTOCOL = Path(__file__).parents[2] / "protocol" / "README.md"
+PROTOCOL = Path(__file__).parents[2] / "protocol" / "security.md"
 # What pip would find wrong with what is installed, and the largest of it.
 PACKAGES = f"{PREFIX}/current/lib/python3.*/site-packages"
 LARGEST = f"du --max-depth=1 -m {PACKAGES} | sort -rn | head -14; du -sm /var/cache/private/fasaco*"

@@ -11,7 +11,7 @@ from fasaco_edge.config.loading import load_config
 from tests.deploy.manual import MANUAL
 from tests.support.processes import PROGRAM
 
-PAGES = ("turtlebot.md", "bare-base.md")
+PAGES = ("turtlebot.md",)
 BLOCK = re.compile(r"^( *)```(\w+)\n(.*?)^\1```$", re.MULTILINE | re.DOTALL)
 
 

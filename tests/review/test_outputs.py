@@ -3,11 +3,8 @@
 from __future__ import annotations
 
 import csv
-import os
-import re
 import shutil
 import subprocess
-import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -261,27 +258,6 @@ def test_parquet_holds_the_same_as_csv_and_describes_itself(parts, tmp_path):
     points = parquet.read_table(tmp_path / "parquet" / "path_points.parquet").to_pydict()
     assert set(points["revision"]) <= {path.about.revision for path in review.data.paths}
     assert points["number"][:2] == [0, 1]
-
-
-def test_the_front_page_s_nights_are_read_by_pandas(parts, tmp_path):
-    pytest.importorskip("pandas")
-    review = read_review(parts)
-    for night in ("monday", "tuesday"):
-        export(review, tmp_path / night, "parquet")
-    (example,) = re.findall(r"```python\n(.*?)```", (ROOT / "README.md").read_text(), re.S)
-    said = subprocess.run(
-        [sys.executable, "-c", example],
-        cwd=tmp_path,
-        env=ENVIRONMENT | {"PYTHONPATH": os.pathsep.join(sys.path)},
-        capture_output=True,
-        text=True,
-        check=True,
-        timeout=600,
-    ).stdout
-    head, _, monday, tuesday = (line.split() for line in said.splitlines())
-    assert head == ["swept", "False", "True"]
-    assert monday[1:] == tuesday[1:]
-    assert float(monday[2]) == pytest.approx(review.floor.figures.swept_m2, abs=0.01)
 
 
 def _as_csv(value):

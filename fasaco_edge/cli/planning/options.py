@@ -254,7 +254,7 @@ def _add_planner(group: argparse._ArgumentGroup) -> None:
         metavar=f"{'|'.join(PLANNER_NAMES)}|FILE.py:NAME|MODULE:NAME",
         help="; ".join(f"{name}: {entry.about}" for name, entry in PLANNERS.items())
         + "; or a function or class of your own, in a file or an installed module, which is run "
-        + "with your rights, see fasaco_edge/README.md "
+        + "with your rights, see fasaco_edge/researcher.md "
         + f"(default: {SEARCH.planner})",
     )
     group.add_argument(
