@@ -8,7 +8,7 @@ from rich.console import Console
 from rich.text import Text
 
 from fasaco_edge.client.events import TROUBLED
-from fasaco_edge.client.phrases import age, clock, percent
+from fasaco_edge.client.phrases import age, clock, percent, time_to_go
 from fasaco_edge.text import one_line
 from fasaco_edge.watch import picture
 from fasaco_edge.watch.blocks import FAINT, Blocks, on_a_line
@@ -154,5 +154,6 @@ def headline(view: RobotView, now: float) -> Text:
         if status.coverage is not None:
             line.append(f"  {percent(status.coverage.fraction)} of cells")
         if status.path is not None:
-            line.append(f"  path {status.path.revision}")
+            to_go = time_to_go(status)
+            line.append(f"  path {status.path.revision}{f', {to_go} to go' if to_go else ''}")
     return on_a_line(line.append(f"   {clock(now)}   f trail   q quits", FAINT))
