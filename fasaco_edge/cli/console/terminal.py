@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import os
+import shlex
+import shutil
 import signal
 import sys
+import sysconfig
 from collections.abc import Iterable
 from contextlib import ExitStack
 from functools import cache
+from pathlib import Path
 from typing import Any
 
 from rich.console import Console, ConsoleOptions, RenderableType
@@ -67,6 +71,12 @@ def err() -> Console:
     return CleanConsole(stderr=True)
 
 
+def can_draw(console: Console) -> bool:
+    """Return whether a console is a terminal that can move its cursor."""
+    # If the environment asks for colour, Rich treats any stream as a terminal.
+    return console.is_interactive and console.file.isatty() and bool(os.environ.get("TERM"))
+
+
 class ProgressLines(Progress):
     """Lines at the lower end of the terminal that show progress, and leave nothing behind.
 
@@ -84,8 +94,7 @@ class ProgressLines(Progress):
             # Rich would put a stream of its own before ours, and then write escapes into ours.
             redirect_stdout=False,
             redirect_stderr=False,
-            # If the environment asks for colour, Rich treats any stream as a terminal.
-            disable=not (console.is_interactive and console.file.isatty()),
+            disable=not can_draw(console),
         )
         self._while_shown = ExitStack()
 
@@ -166,6 +175,15 @@ def summary(rows: Iterable[tuple[str, str]]) -> Table:
     for name, words in rows:
         table.add_row(name, words)
     return table
+
+
+def command(name: str = "fasaco-edge") -> str:
+    """Return what a person types in this folder to run a program of this installation."""
+    path, found = Path(sysconfig.get_path("scripts"), name), shutil.which(name)
+    if not path.exists() or (found is not None and path.samefile(found)):
+        return name
+    here = Path.cwd()
+    return shlex.quote(str(path.relative_to(here) if path.is_relative_to(here) else path))
 
 
 def may_ask() -> bool:
