@@ -90,7 +90,7 @@ def _path(path: PathReport, time: str) -> list[Row]:
     number = f"path {path.revision}"
     if not path.steps:
         return [(number, _text("stop")), ("", _text(path.reason))]
-    steps = f"{path.remaining_steps} of {path.steps} steps"
+    steps = f"{path.remaining_steps} steps"
     to_go = f"{time}, {steps}" if time else steps
     return [("to go", _text(to_go)), (number, _text(path.reason))]
 

@@ -45,7 +45,7 @@ def test_the_demo_is_a_live_map_and_then_a_summary(folder):
                 and all(sign in seen for sign in ("swept", "█", "▀"))
             )
         )
-        assert re.search(r"to go +[\d.]+ s, \d+ of \d+ steps", page)
+        assert re.search(r"to go +[\d.]+ s, \d+ steps", page)
         for columns, lines in ((30, 6), (100, 30)):
             shell.resize(columns, lines)
             shell.wait(lambda seen, lines=lines: seen.count("\n") == lines - 1)

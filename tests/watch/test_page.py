@@ -110,7 +110,7 @@ def test_it_says_how_it_stands():
         "25.0 % of cells",
         "swept     1.4 m2",
         "COVERING  25.0 % of cells  path 7, 63 s to go",
-        "to go     63 s, 30 of 30 steps",
+        "to go     63 s, 30 steps",
         "path 7    map: 2 cells more",
         "30 steps, bound 29",
         "everything reachable",
@@ -136,7 +136,7 @@ def test_the_time_to_go_is_by_the_clock(line_s, scale, said):
     tell(view, "status", status(path=reported, config={"robot": {"time_scale": scale}}))
     page = page_of(view)
     assert (f"path 7, {said} to go" in page) == bool(said)
-    assert f"to go     {said}{', ' if said else ''}30 of 30 steps" in page
+    assert f"to go     {said}{', ' if said else ''}30 steps" in page
 
 
 def test_it_says_how_far_an_order_is():

@@ -89,7 +89,7 @@ def print_comparison(one: ReviewDocument, other: ReviewDocument) -> None:
     """Print the figures of two documents side by side."""
     console = terminal.out()
     names = (one.recording, other.recording)
-    console.print(setup_words(one, other), style="bold", soft_wrap=True)
+    console.print(setup_words(one, other), style="bold")
     _print_table(console, "Set-up", ("", *names), setup_differences(one, other))
     compared = compared_rows(one, other)
     _print_table(console, "Two runs", ("", *names, "difference"), compared)
