@@ -22,7 +22,7 @@ from tests.support.screen import Screen
 # Nothing takes so long but on a machine that is busy with much else [s].
 TIMEOUT_S = 150.0
 # What a forked interpreter still takes from its environment.
-FORKABLE = {"TERM", "COLORTERM", "NO_COLOR", "DISPLAY"}
+FORKABLE = {"TERM", "COLORTERM", "NO_COLOR", "DISPLAY", "FASACO_CONNECT"}
 
 
 class Terminal:

@@ -46,6 +46,10 @@ class CleanConsole(Console):
 
     def __init__(self, *, stderr: bool = False) -> None:
         super().__init__(stderr=stderr, highlight=False, markup=False, emoji=False)
+        if self.is_dumb_terminal and self.file.isatty() and "COLUMNS" not in os.environ:
+            # Rich takes each of these for one of 80 columns.
+            size = os.get_terminal_size(self.file.fileno())
+            self.width, self.height = size.columns or self.width, size.lines or self.height
 
     def render_str(self, text: str, **options: Any) -> Text:  # noqa: ANN401 - as rich has them
         """Return a string as text; before it is laid out, so that its width is right."""
