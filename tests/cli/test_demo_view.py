@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import sys
 import time
@@ -74,6 +75,10 @@ def test_a_key_ends_it_and_leaves_the_terminal_as_it_was(folder, key, size, env)
     with Terminal(*words, columns=columns, lines=lines, **env) as shell:
         shell.wait_text("room ━" if columns < 60 else " lately ")
         assert not shell.is_clean()
+        # What is typed is for the demo alone: one that died of it first was a failure.
+        started = processes_of(folder)
+        assert started
+        assert shell.process.pid not in {os.getpgid(pid) for pid in started}
         shell.type(key)
         assert shell.end() == 130, shell.written[-2000:]
         assert shell.is_clean()

@@ -195,7 +195,9 @@ class DemoMission:
         program = python_program("fasaco_edge", *words)
         program += ["--with-parent", str(os.getpid())]
         with log.open("wb") as file:
-            process = subprocess.Popen(program, stdout=file, stderr=file)
+            # Ctrl-C in the terminal is for the demo, which ends them in order: one that dies of it
+            # first would be a failure.
+            process = subprocess.Popen(program, stdout=file, stderr=file, process_group=0)
         self._processes.append((log, process))
 
     def _check_processes(self) -> None:
