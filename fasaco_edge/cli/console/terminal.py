@@ -8,7 +8,7 @@ import shutil
 import signal
 import sys
 import sysconfig
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from contextlib import ExitStack
 from functools import cache
 from pathlib import Path
@@ -169,6 +169,17 @@ def figures(rows: Iterable[tuple[str, str]]) -> Table:
     for name, value in rows:
         table.add_row(name, value)
     return table
+
+
+def known(document: Mapping[str, object]) -> list[tuple[str, str]]:
+    """Return names and values of a document's members as text, without those that are null."""
+    return [
+        (name, ", ".join(f"{key} {part}" for key, part in value.items()))
+        if isinstance(value, Mapping)
+        else (name, str(value))
+        for name, value in document.items()
+        if value is not None
+    ]
 
 
 def summary(rows: Iterable[tuple[str, str]]) -> Table:
