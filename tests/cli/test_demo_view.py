@@ -130,3 +130,38 @@ def test_the_view_is_one_that_the_terminal_can_show(tmp_path):
             "no colour LiveView",
             "in the background LinesView",
         ]
+
+
+# Run in a terminal: what a demo says and what a log prints while the live map is shown.
+MEANWHILE = r"""
+import itertools, logging, sys
+from pathlib import Path
+from fasaco_edge.cli.console import logs, streams
+from fasaco_edge.cli.demo.live_view import LiveView
+streams.clean_streams()
+logs.begin_logging("info")
+steps = itertools.count()
+def step(timeout_s):
+    if next(steps) == 2:
+        view.say("r3 is killed")
+        logging.getLogger("bus").warning("no router, \x1b[31mred")
+    return Path(sys.argv[1]).exists()
+with LiveView(["robot"], "tcp/127.0.0.1:1") as view:
+    view.run(step)
+print("the end")
+"""
+
+
+def test_what_is_said_meanwhile_stands_on_the_page_and_after_it(tmp_path):
+    script, end = tmp_path / "meanwhile.py", tmp_path / "end"
+    script.write_text(MEANWHILE)
+    with Terminal(program=(sys.executable, str(script), str(end))) as shell:
+        page = shell.wait_text("WARNING bus: no router")
+        assert shell.shown.is_alternate
+        assert page.count("\n") == 23
+        assert re.search(r"\n\d\d:\d\d:\d\d r3 is killed +\n", page)
+        end.touch()
+        assert shell.end() == 0, shell.written
+        assert shell.is_clean()
+        said = ["r3 is killed", r"WARNING bus: no router, \x1b[31mred", "the end", ""]
+        assert shell.screen() == said
