@@ -11,13 +11,13 @@ import errno
 import logging
 import os
 import sys
-import textwrap
 from collections.abc import Sequence
 from importlib import import_module
 from typing import NoReturn
 
 from fasaco_edge import __version__
 from fasaco_edge.cli.console.arguments import Command, Exit, add_common, with_negative_pairs
+from fasaco_edge.cli.console.help import HelpText
 from fasaco_edge.cli.console.logs import begin_logging, say_why
 from fasaco_edge.cli.console.streams import clean_streams, open_missing_streams
 from fasaco_edge.errors import BadConfiguration, DiskFailed, FasacoError, PlannerFailed
@@ -125,14 +125,13 @@ def _parser(words: Sequence[str]) -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="fasaco-edge",
         description="Coverage path planning with fast-spanning ant colonies, on a robot.",
+        formatter_class=HelpText,
         epilog="Begin with `fasaco-edge demo`. Each command has --help.",
     )
     parser.add_argument("--version", action="version", version=f"fasaco-edge {__version__}")
     commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND")
     for name, about in COMMANDS.items():
-        described = commands.add_parser(
-            name, help=about, formatter_class=argparse.RawDescriptionHelpFormatter
-        )
+        described = commands.add_parser(name, help=about, formatter_class=HelpText)
         if name in words[:1]:
             module = import_module(f"fasaco_edge.cli.{name.replace('-', '_')}")
             _describe(described, module.COMMAND)
@@ -140,7 +139,7 @@ def _parser(words: Sequence[str]) -> argparse.ArgumentParser:
 
 
 def _describe(parser: argparse.ArgumentParser, command: Command) -> None:
-    parser.description, parser.epilog = textwrap.fill(command.description, 79), command.epilog
+    parser.description, parser.epilog = command.description, command.epilog
     parser.set_defaults(command=command.run)
     if not command.is_group:
         add_common(parser)

@@ -23,7 +23,7 @@ from fasaco_edge.cli.console.arguments import (
     seconds,
 )
 from fasaco_edge.cli.console.streams import print_json
-from fasaco_edge.cli.console.terminal import figures, out
+from fasaco_edge.cli.console.terminal import figures, known, out
 from fasaco_edge.client import phrases
 from fasaco_edge.errors import FasacoError, NobodyAnswersError
 from fasaco_edge.text import one_line
@@ -204,8 +204,7 @@ def show(name: str, reply: Reply) -> None:
     """Print the answer to question ``name``."""
     if reply.schema:
         # A path that does not come from a plan has no figures of a plan.
-        known = {title: value for title, value in _figures(reply).items() if value is not None}
-        out().print(figures([(title, str(value)) for title, value in known.items()]))
+        out().print(figures(known(_figures(reply))))
     elif name in ("status", "mission"):
         show_mission(reply)
     else:

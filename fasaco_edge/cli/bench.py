@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import textwrap
 from collections.abc import Sequence
 from contextlib import closing
 from typing import Any
@@ -20,10 +19,10 @@ from fasaco_edge.bench.planners import PLANNERS
 from fasaco_edge.bench.speed import SPEED
 from fasaco_edge.cli.console import terminal
 from fasaco_edge.cli.console.arguments import Command, Exit, add_common, add_json
+from fasaco_edge.cli.console.help import HelpText
 from fasaco_edge.cli.console.logs import say_why
 from fasaco_edge.cli.console.streams import print_json
 
-WIDTH = 80
 BENCHMARKS: tuple[Benchmark[Any], ...] = (PLANNERS, SPEED, FOOTPRINT, LATENCY, JITTER)
 
 EPILOG = """\
@@ -50,9 +49,9 @@ def add_benchmarks(
         words = commands.add_parser(
             benchmark.name,
             help=benchmark.summary,
-            description=textwrap.fill(benchmark.description, WIDTH),
+            description=benchmark.description,
             epilog=benchmark.epilog,
-            formatter_class=argparse.RawDescriptionHelpFormatter,
+            formatter_class=HelpText,
         )
         add_common(words)
         benchmark.add_options(words)

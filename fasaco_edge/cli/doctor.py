@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import os
 import sys
+import textwrap
 import threading
 from dataclasses import asdict
 from pathlib import Path
@@ -16,6 +17,7 @@ from fasaco_edge.cli.console.streams import print_json
 from fasaco_edge.cli.console.terminal import out
 from fasaco_edge.doctor.finding import Finding, Level
 from fasaco_edge.doctor.report import CHECKS, findings
+from fasaco_edge.text import one_line
 
 EPILOG = """\
 Nothing is started or changed: it joins the bus for a second, listens, and queries. Run it as the
@@ -44,6 +46,8 @@ examples:
   fasaco-edge doctor --config /etc/fasaco-edge.yaml
   fasaco-edge doctor --config robot.yaml --json | jq '.checks[] | select(.level != "ok")'
 """
+# Width of the texts, also in a narrower terminal [characters].
+LEAST_ROOM = 24
 COLOURS = {"ok": "green", "warn": "yellow", "fail": "red"}
 
 
@@ -85,13 +89,21 @@ def _print(found: list[tuple[str, Finding]]) -> None:
     console = out()
     wide = max(len(name) for name, _ in found)
     indent = " " * (wide + 8)
+    # A file keeps each line whole.
+    room = max(console.width - len(indent), LEAST_ROOM) if console.is_terminal else sys.maxsize
+
+    def fitted(text: str) -> str:
+        lines = textwrap.wrap(one_line(text), room, break_on_hyphens=False)
+        return f"\n{indent}".join(lines)
+
     for name, finding in found:
         level = Text(f"{finding.level:<4}", COLOURS[finding.level])
-        console.print(level, f" {name:<{wide}}  {finding.found}", soft_wrap=True)
+        text = level.append(f"  {name:<{wide}}  {fitted(finding.found)}", "default")
+        console.print(text, soft_wrap=True)
         for line in finding.details:
-            console.print(f"{indent}{line}", style="dim", soft_wrap=True)
+            console.print(Text(f"{indent}{fitted(line)}", "dim"), soft_wrap=True)
         if finding.to_do:
-            console.print(f"{indent}-> {finding.to_do}", soft_wrap=True)
+            console.print(Text(f"{indent}{fitted(f'-> {finding.to_do}')}"), soft_wrap=True)
 
 
 COMMAND = Command(

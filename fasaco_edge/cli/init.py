@@ -50,8 +50,8 @@ checked as `check-config` does.
 
 examples:
   fasaco-edge init
-  fasaco-edge init robot.yaml --robot-radius 0.22 --tool-width 0.3 --map-by rmw_zenoh \\
-      --connect tcp/127.0.0.1:7447
+  fasaco-edge init robot.yaml --robot-radius 0.22 --tool-width 0.3 \\
+      --map-by rmw_zenoh --connect tcp/127.0.0.1:7447
 exit codes: 0 written, whether or not maps were received; 78 not written (EX_CONFIG)
 """
 

@@ -145,7 +145,7 @@ def _print(args: argparse.Namespace, planned: Plan) -> None:
         figures["floor"] = planned.floor or "not known of a coverage grid"
         if planned.curve_figures is not None:
             figures["curve"] = planned.curve_figures
-        rows = [(name.replace("_", " "), str(value)) for name, value in figures.items()]
+        rows = [(name.replace("_", " "), text) for name, text in terminal.known(figures)]
         terminal.out().print(terminal.figures(rows))
     else:
         from fasaco_edge.offline.summary import rows_of

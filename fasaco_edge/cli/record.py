@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import msgspec
 
 from fasaco_edge.cli.console.arguments import Command, add_robot_on_bus, robot_on_bus
+from fasaco_edge.cli.console.terminal import err
 from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.wire.schemas import POSE_SCHEMAS, POSE_STAMPED
 
@@ -130,6 +131,18 @@ def run(args: argparse.Namespace) -> int:
             "--ros2: of a fleet's robots only the native keys are recorded",
             hint="leave --ros2 out, or record each robot",
         )
+    earlier = set(args.out.glob("*.rrd"))
+    is_watched = sys.stderr.isatty()
+    if is_watched:
+        err().print(f"records into {args.out}; Ctrl-C ends it")
+    code = _record(args)
+    if is_watched:
+        for file in sorted(set(args.out.glob("*.rrd")) - earlier):
+            err().print(str(file), soft_wrap=True)
+    return code
+
+
+def _record(args: argparse.Namespace) -> int:
     from fasaco_edge.recording.write.process import Output
     from fasaco_edge.recording.write.quota import budget_of
     from fasaco_edge.recording.write.recorder import run_recorder

@@ -17,7 +17,7 @@ from fasaco_edge.cli.console.arguments import (
     seconds,
 )
 from fasaco_edge.cli.console.logs import say_why
-from fasaco_edge.cli.console.terminal import out
+from fasaco_edge.cli.console.terminal import can_draw, out
 from fasaco_edge.client.phrases import steady_now
 from fasaco_edge.errors import BusUnavailable, FasacoError
 from fasaco_edge.watch import live
@@ -76,7 +76,7 @@ def run(args: argparse.Namespace) -> int:
         else:
             from fasaco_edge.fleet.cli.watch import fleet_on_bus
 
-            with fleet_on_bus(args.fleet, keys, bus) as (watched, no_answer):
+            with fleet_on_bus(args.fleet, keys, bus, out()) as (watched, no_answer):
                 _watch(args, watched, no_answer)
         sys.stdout.flush()
         code = Exit.OK
@@ -119,8 +119,8 @@ def _watch(
         _once(args, watched, no_answer)
     elif args.json:
         live.watch_as_json(watched)
-    elif sys.stdout.isatty() and os.environ.get("TERM", "dumb") not in ("dumb", "unknown"):
-        live.watch_on_screen(watched)
+    elif can_draw(out()):
+        live.watch_on_screen(watched, sys.stdout)
     else:
         live.watch_in_lines(watched)
 

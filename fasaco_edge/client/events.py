@@ -60,7 +60,8 @@ def differences(before: Status | None, after: Status) -> list[tuple[str, str]]:
     recorder = before.recorder.state if before is not None and before.recorder else ""
     if after.recorder and after.recorder.state != recorder:
         tone = PLAIN if after.recorder.state in ("recording", "starting") else BAD
-        found.append((f"recorder {after.recorder.state}: {after.recorder.reason or ''}", tone))
+        why = f": {after.recorder.reason}" if after.recorder.reason else ""
+        found.append((f"recorder {after.recorder.state}{why}", tone))
     return found
 
 

@@ -11,10 +11,13 @@ from fasaco_edge.wire.documents.replies import (
     MissionReport,
     ZoneReport,
 )
+from fasaco_edge.wire.documents.settings import known_settings
 from fasaco_edge.wire.documents.status import TROUBLES, DriveReport, Status
 
 # Offset of the wall clock from the monotonic one, when this module was imported [s].
 _OFFSET_S = time.time() - time.monotonic()
+# A longer time is none that a robot needs [s].
+LONGEST_S = 1e7
 
 
 def covered(coverage: CoverageReport) -> str:
@@ -56,6 +59,16 @@ def zone_progress(zone: ZoneReport) -> tuple[str, str]:
     at = f"{zone.pass_number} of {zone.passes}" if zone.pass_number else "to come"
     share = percent(zone.covered / zone.cells if zone.cells else 0.0)
     return at, f"{share}: {zone.covered} of {zone.cells} cells"
+
+
+def time_to_go(status: Status) -> str:
+    """Return how long the rest of the path takes by the clock; "" where that is not known."""
+    path = status.path
+    if path is None or path.line_s is None or not path.remaining_steps:
+        return ""
+    # A simulated robot may be faster than the clock.
+    scale = known_settings(status.config).robot.time_scale
+    return age(path.line_s / scale) if scale > path.line_s / LONGEST_S else ""
 
 
 def figures(status: Status) -> str:

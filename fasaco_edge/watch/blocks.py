@@ -67,6 +67,14 @@ class Blocks:
         return lines
 
 
+def with_keys(line: Text, width: int, *keys: str) -> Text:
+    """Return a headline with the keys there are, and with what else of these has room."""
+    for key in keys:
+        if line.cell_len + len(key) + 3 <= width:
+            line.append(f"   {key}", FAINT)
+    return on_a_line(line)
+
+
 def on_a_line(text: Text) -> Text:
     """Return a text that is cut to fit one line."""
     text.no_wrap, text.overflow = True, "crop"

@@ -10,6 +10,7 @@ import sys
 import termios
 import time
 import tty
+from collections.abc import Callable
 from types import FrameType
 from typing import Any, Protocol, Self, TextIO
 
@@ -68,15 +69,17 @@ class Watched(Protocol):
         """Return whether everything that a page shows is known."""
 
 
-def watch_on_screen(watched: Watched) -> None:
-    """Show pages until q is typed or a signal arrives.
+def watch_on_screen(
+    watched: Watched, terminal: TextIO, go_on: Callable[[], bool] = lambda: True
+) -> None:
+    """Show pages until q is typed, a signal arrives, or ``go_on``, called for each, returns False.
 
     Raises:
         OSError: the terminal is gone.
     """
     shown_at = (0, (0, 0), "")
-    with stop_event(*END_SIGNALS) as stop, Screen(sys.stdout) as screen:
-        while not stop.is_set():
+    with stop_event(*END_SIGNALS) as stop, Screen(terminal) as screen:
+        while not stop.is_set() and go_on():
             came = watched.take(0.0)
             now = phrases.steady_now()
             key = (int(now), screen.size(), watched.trouble)

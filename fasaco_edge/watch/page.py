@@ -8,10 +8,10 @@ from rich.console import Console
 from rich.text import Text
 
 from fasaco_edge.client.events import TROUBLED
-from fasaco_edge.client.phrases import age, clock, percent
+from fasaco_edge.client.phrases import age, clock, percent, time_to_go
 from fasaco_edge.text import one_line
 from fasaco_edge.watch import picture
-from fasaco_edge.watch.blocks import FAINT, Blocks, on_a_line
+from fasaco_edge.watch.blocks import FAINT, Blocks, with_keys
 from fasaco_edge.watch.picture import MissionPicture
 from fasaco_edge.watch.robot_view import RobotView
 from fasaco_edge.watch.status_table import figures, state_colour
@@ -77,7 +77,7 @@ class Page:
             width, height: size of the screen, each at least 1 [characters].
         """
         layout = Layout.of(width, height)
-        page = self._blocks.block(headline(view, now), width, 1)
+        page = self._blocks.block(headline(view, now, width), width, 1)
         if layout.lines:
             page += self._middle(view, layout)
             whole, field = self._picture.path_is_whole, self._picture.shows_field
@@ -130,8 +130,8 @@ class Page:
         return self._blocks.log(view.events, width, layout.entries, scale)
 
 
-def headline(view: RobotView, now: float) -> Text:
-    """Return the line that sums up the state."""
+def headline(view: RobotView, now: float, width: int) -> Text:
+    """Return the line that sums up the state, for a width."""
     line = Text().append(f" {view.robot} ", "bold reverse").append("  ")
     status, silent = view.status, view.silent_s(now)
     if view.trouble:
@@ -154,5 +154,6 @@ def headline(view: RobotView, now: float) -> Text:
         if status.coverage is not None:
             line.append(f"  {percent(status.coverage.fraction)} of cells")
         if status.path is not None:
-            line.append(f"  path {status.path.revision}")
-    return on_a_line(line.append(f"   {clock(now)}   f trail   q quits", FAINT))
+            to_go = time_to_go(status)
+            line.append(f"  path {status.path.revision}{f', {to_go} to go' if to_go else ''}")
+    return with_keys(line, width, "q quits", "f trail", clock(now))

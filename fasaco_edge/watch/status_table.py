@@ -54,10 +54,14 @@ def _rows(status: Status, width: int, glyphs: GlyphSet) -> list[Row]:
         rows += _coverage(
             status.coverage, glyphs.bar(status.coverage.fraction, min(width, LONGEST_BAR))
         )
+    if status.path is not None:
+        rows += _path(status.path, phrases.time_to_go(status))
+    if status.coverage is not None and status.coverage.recovered:
+        rows.append(("twice", _text(_cells(status.coverage.recovered))))
     if status.floor is not None:
         rows += _floor(status.floor)
     if status.path is not None:
-        rows += _path(status.path, width)
+        rows += _plan(status.path, width)
     rows += _mission(status.mission)
     rows += _fleet(status.fleet)
     rows += _running(status)
@@ -72,10 +76,7 @@ def state_colour(state: str) -> str:
 def _coverage(coverage: CoverageReport, bar: Text) -> list[Row]:
     share = Text(phrases.percent(coverage.fraction), "bold")
     share.append(f", {coverage.covered} of {coverage.coverable} cells", "not bold")
-    rows: list[Row] = [("covered", share), ("", bar)]
-    if coverage.recovered:
-        rows.append(("twice", _text(_cells(coverage.recovered))))
-    return rows
+    return [("covered", share), ("", bar)]
 
 
 def _floor(floor: FloorReport) -> list[Row]:
@@ -85,17 +86,24 @@ def _floor(floor: FloorReport) -> list[Row]:
     return [("swept", _text(phrases.swept(floor))), *rows]
 
 
-def _path(path: PathReport, width: int) -> list[Row]:
-    left = f"{path.remaining_steps} of {path.steps} steps to go" if path.steps else "stop"
-    rows: list[Row] = [(f"path {path.revision}", _text(left)), ("", _text(path.reason))]
-    if path.planned_steps is not None:
-        plan = f"{path.planned_steps} steps"
-        if path.lower_bound_steps is not None:
-            plan += f", bound {path.lower_bound_steps}"
-        if path.gap is not None and width >= WIDE:
-            plan += f", gap {100 * path.gap:.1f} % of time"
-        rows.append(("plan", _text(plan)))
-    return rows
+def _path(path: PathReport, time: str) -> list[Row]:
+    number = f"path {path.revision}"
+    if not path.steps:
+        return [(number, _text("stop")), ("", _text(path.reason))]
+    steps = f"{path.remaining_steps} steps"
+    to_go = f"{time}, {steps}" if time else steps
+    return [("to go", _text(to_go)), (number, _text(path.reason))]
+
+
+def _plan(path: PathReport, width: int) -> list[Row]:
+    if path.planned_steps is None:
+        return []
+    plan = f"{path.planned_steps} steps"
+    if path.lower_bound_steps is not None:
+        plan += f", bound {path.lower_bound_steps}"
+    if path.gap is not None and width >= WIDE:
+        plan += f", gap {100 * path.gap:.1f} % of time"
+    return [("plan", _text(plan))]
 
 
 def _mission(mission: MissionReport) -> list[Row]:

@@ -59,7 +59,11 @@ def test_the_robot_starts_once_its_recorder_listens(tmp_path, monkeypatch):
     COMMAND.add_options(parser)
     args = parser.parse_args(["--driver", "follow"])
     monkeypatch.setattr(DemoMission, "_spawn", lambda self, log, words: order.append(log.stem))
-    DemoMission(args, demo_robots(args, tmp_path))._start(SlowRecorder(order))
+    mission, bus = DemoMission(args, demo_robots(args, tmp_path)), SlowRecorder(order)
+    mission._start(bus)
+    for _ in range(5):
+        if mission._waiting:
+            mission._let_start(bus, now=0.0)
     assert order == ["daemon", "follower", *["asked"] * 3, "robot"]
 
 

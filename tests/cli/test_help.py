@@ -10,6 +10,7 @@ import pytest
 
 from fasaco_edge import __version__
 from fasaco_edge.cli import COMMANDS, main
+from fasaco_edge.cli.console.help import fitted
 
 
 @pytest.mark.parametrize("name", COMMANDS)
@@ -26,6 +27,76 @@ def test_help_explains(capsys, name):
     for entry in re.split(r"\n(?=  -)", options)[1:]:
         explained = re.split(r"\s{2,}|\n", entry.strip(), maxsplit=1)
         assert len(explained) == 2, f"not explained: {entry}"
+
+
+# Commands that have commands of their own.
+GROUPS = ("mission start", "mission keep-out", "bench footprint")
+
+
+@pytest.mark.parametrize("columns", [80, 200])
+def test_help_fits_the_terminal(capsys, monkeypatch, columns):
+    monkeypatch.setenv("COLUMNS", str(columns))
+    for words in ("", *COMMANDS, *GROUPS):
+        with pytest.raises(SystemExit, match="0"):
+            main([*words.split(), "--help"])
+        for line in capsys.readouterr().out.splitlines():
+            # But for a word that is as long itself.
+            words_in_it = line.strip(" []").split()
+            assert len(line) <= min(columns, 100) or len(words_in_it) == 1, f"{words}: {line}"
+
+
+ROWS = """\
+what was written
+in two lines:
+  run --quick            all that matters, and
+                         nothing else
+  fasaco-edge plan office --start 1,2 --png line.png | jq 'a b'
+  key: 1   # a comment that is long
+  a list item of some words
+    that goes on
+
+end
+"""
+
+
+def test_text_is_laid_out_for_a_width():
+    assert fitted(ROWS, 70) == ROWS.rstrip("\n")
+    assert fitted(ROWS, 50).split("\n") == [
+        "what was written",
+        "in two lines:",
+        "  run --quick            all that matters, and",
+        "                         nothing else",
+        "  fasaco-edge plan office --start 1,2 \\",
+        "    --png line.png | jq 'a b'",
+        "  key: 1   # a comment that is long",
+        "  a list item of some words",
+        "    that goes on",
+        "",
+        "end",
+    ]
+    assert fitted(ROWS, 32).split("\n") == [
+        "what was written",
+        "in two lines:",
+        "  run --quick",
+        "      all that matters, and",
+        "      nothing else",
+        "  fasaco-edge plan office \\",
+        "    --start 1,2 --png line.png \\",
+        "    | jq 'a b'",
+        "  key: 1",
+        "      # a comment that is long",
+        "  a list item of some words",
+        "    that goes on",
+        "",
+        "end",
+    ]
+    assert fitted("some words of a long sentence\nin prose", 20) == (
+        "some words of a long\nsentence in prose"
+    )
+    assert fitted("  key: 1   # a comment that is rather long", 36).split("\n") == [
+        "  key: 1   # a comment that is",
+        "           # rather long",
+    ]
 
 
 def test_help_names_every_command(capsys):

@@ -571,11 +571,15 @@ def test_the_trail_of_the_colony_is_drawn(plan, tmp_path, words):
     assert len(colours) > 20
 
 
-def test_figures_are_printed_for_people_too(grid_file):
-    ended = fasaco_edge("plan", grid_file, "--ants", 8, "--long")
-    assert ended.code == 0
+def test_figures_are_printed_for_people_too(grid_file, capsys):
+    assert main(["plan", str(grid_file), "--ants", "8", "--long"]) == 0
+    told = capsys.readouterr().out
+    assert main(["plan", str(grid_file), "--ants", "8", "--json"]) == 0
+    figures = json.loads(capsys.readouterr().out)
     for key in KEYS:
-        assert key.replace("_", " ") in ended.out
+        # But for what is null; why there is no floor is said.
+        is_told = figures[key] is not None or key == "floor"
+        assert (f"│ {key.replace('_', ' ')} " in told) == is_told
 
 
 @pytest.mark.parametrize(

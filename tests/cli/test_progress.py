@@ -11,7 +11,8 @@ from pathlib import Path
 import pytest
 
 from tests.support.processes import ENVIRONMENT, fasaco_edge, free_endpoint
-from tests.support.terminal import Terminal, seen
+from tests.support.screen import Screen
+from tests.support.terminal import Terminal
 
 COLOURS = re.compile(r"\x1b\[[0-9;]*m")
 RECORDING = Path(__file__).parents[1] / "data/mission.rrd.xz"
@@ -88,38 +89,18 @@ def test_the_simulation_shows_its_robot_in_one_line():
         assert "waits for" not in text.splitlines()[-1]
 
 
-def test_the_demo_shows_its_robot_below_its_messages(tmp_path):
-    pytest.importorskip("rerun")
-    out = tmp_path / "demo"
-    with Terminal("demo", "--out", out) as shell:
-        # In eighty columns nothing of it is left out but some figures.
-        progress = re.compile(
-            r"^flat ━{16} +[1-9]\d* % \d:\d\d:\d\d \w+: \d+/\d+ cells, ", re.MULTILINE
-        )
-        screen = shell.wait(lambda seen: progress.search(seen) is not None)
-        no_escape_is_shown(shell)
-        lines = screen.rstrip("\n").split("\n")
-        # Each in its line, the progress below them all, and that once.
-        assert lines[0].startswith("kernels ready")
-        assert "\nwatch it from another terminal" in screen
-        assert [line for line in lines if " cells, " in line] == lines[-1:]
-        shell.type("\x03")
-        text = ended_well(shell, 130)
-        assert " cells, " not in text
-
-
 # Run in a terminal: the lines of a demo, or a bar, with what is done as its arguments.
 LINES = r"""
 import sys, time
 from fasaco_edge.cli.console import streams, terminal
-from fasaco_edge.cli.demo.mission import DemoView
+from fasaco_edge.cli.demo.view import LinesView
 from fasaco_edge.wire.documents.json_text import tolerant
 from fasaco_edge.wire.documents.status import Status
 kind, *titles = sys.argv[1:]
 streams.clean_streams()
 coverage = {"covered": 85, "coverable": 424, "fraction": 0.2}
 status = tolerant({"state": "covering", "coverage": coverage, "floor": {"swept_m2": 8.1}}, Status)
-with DemoView(titles) if kind == "demo" else terminal.progress() as bar:
+with LinesView(titles) if kind == "demo" else terminal.progress() as bar:
     for number, title in enumerate(titles):
         if kind == "demo":
             bar.show(number, status, 3.0)
@@ -130,20 +111,19 @@ with DemoView(titles) if kind == "demo" else terminal.progress() as bar:
 
 
 @pytest.mark.parametrize(("columns", "lines"), [(60, 20), (80, 24), (200, 50)])
-@pytest.mark.parametrize("title", ["flat", "robot-1", "second_floor_of_the_hospital_in_the_north"])
 @pytest.mark.parametrize("kind", ["demo", "bar"])
-def test_bar_and_clock_are_whole(tmp_path, kind, columns, lines, title):
+def test_bar_and_clock_are_whole(tmp_path, kind, columns, lines):
     script = tmp_path / "lines.py"
     script.write_text(LINES)
-    program = (sys.executable, str(script), kind, title, title)
+    titles = ("flat", "robot-1", "second_floor_of_the_hospital_in_the_north")
+    program = (sys.executable, str(script), kind, *titles)
     with Terminal(program=program, columns=columns, lines=lines) as shell:
         done = "covering: 85/424" if kind == "demo" else "20000/100000"
-        screen = shell.wait(lambda seen: seen.count(done) == 2)
+        screen = shell.wait(lambda seen: seen.count(done) == 3)
         assert shell.end() == 0
     wide = 32 if kind == "bar" and columns >= 80 else 16
     rows = [line for line in screen.splitlines() if "0:00:00" in line]
-    assert len(rows) == 2
-    for row in rows:
+    for row, title in zip(rows, titles, strict=True):
         assert len(row) <= columns
         assert sum(row.count(sign) for sign in BAR) == wide
         name = re.split("[━╸╺]", row)[0].strip()
@@ -219,7 +199,9 @@ def test_what_is_printed_meanwhile_stands_above_the_progress(tmp_path):
             "begun in stdout",
         ]
         assert shell.screen() == [*told, "no line end", ""]
-        during = seen(shell.written.partition("no line end")[0].rpartition("\x1b[?25h")[0], 120)
+        screen = Screen(120)
+        screen.feed(shell.written.partition("no line end")[0].rpartition("\x1b[?25h")[0])
+        during = screen.lines()
         assert during[:4] == told
         assert during[4].startswith("at work ━")
         assert len([line for line in during if "at work" in line]) == 1

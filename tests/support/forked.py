@@ -54,6 +54,8 @@ class Forked:
         out, err: files that its outputs are written to.
         folder: its working folder; without one, this process's.
         umask: -1 leaves it as it is.
+
+    A terminal as ``out`` and ``err`` is that of a session of its own, and its input, too.
     """
 
     def __init__(
@@ -135,7 +137,7 @@ def run_forked(
 
 def _settings(environment: Mapping[str, str]) -> dict[str, str]:
     """Return what may decide which kernels a process has."""
-    others = ("COLUMNS", "NO_COLOR", *OF_MANAGER)
+    others = ("COLUMNS", "NO_COLOR", "TERM", "COLORTERM", *OF_MANAGER)
     return {k: v for k, v in environment.items() if k[:7] != "FASACO_" and k not in others}
 
 
@@ -225,10 +227,21 @@ def _run(
     umask: int,
 ) -> NoReturn:
     """Become what ``python`` would be with those words, in that folder and environment."""
+    is_terminal = outputs[0].startswith("/dev/pts/")
+    if is_terminal:
+        os.setsid()
     for descriptor, file in enumerate(outputs, start=1):
-        opened = os.open(file, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o600)
+        # The first terminal that the leader of a session opens becomes the session's.
+        flags = os.O_RDWR if is_terminal else os.O_WRONLY | os.O_CREAT | os.O_APPEND
+        opened = os.open(file, flags, 0o600)
         os.dup2(opened, descriptor)
         os.close(opened)
+    if is_terminal:
+        os.dup2(1, 0)
+        # The streams of the server are those of files: they would write after large blocks only.
+        sys.stdin = os.fdopen(0, closefd=False, encoding="utf-8")
+        sys.stdout = os.fdopen(1, "w", closefd=False, encoding="utf-8")
+        sys.stderr = os.fdopen(2, "w", closefd=False, encoding="utf-8", errors="backslashreplace")
     os.chdir(folder)
     if umask >= 0:
         os.umask(umask)

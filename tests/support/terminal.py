@@ -6,7 +6,6 @@ import codecs
 import fcntl
 import os
 import pty
-import re
 import select
 import signal
 import struct
@@ -16,16 +15,22 @@ import time
 from collections.abc import Callable, Sequence
 from typing import Any, Self
 
+from tests.support.forked import Forked
 from tests.support.processes import ENVIRONMENT, PROGRAM
+from tests.support.screen import Screen
 
 # Nothing takes so long but on a machine that is busy with much else [s].
 TIMEOUT_S = 150.0
-# What commands write that show progress; colours, and whether the cursor is shown.
-_ESCAPE = re.compile(r"\x1b\[([0-9;?]*)([A-Za-z])")
+# What a forked interpreter still takes from its environment.
+FORKABLE = {"TERM", "COLORTERM", "NO_COLOR", "DISPLAY", "FASACO_CONNECT"}
 
 
 class Terminal:
-    """A terminal with a command in it; closed, with the command ended, on every way out."""
+    """A terminal with a command in it; closed, with the command ended, on every way out.
+
+    The command is forked, see ``tests.support.forked``; unless it is to be ``executed``, is another
+    program, or has an environment that an interpreter looks at when it starts.
+    """
 
     def __init__(
         self,
@@ -33,23 +38,30 @@ class Terminal:
         columns: int = 80,
         lines: int = 24,
         program: Sequence[str] = PROGRAM,
+        executed: bool = False,
         **env: str,
     ) -> None:
         self.written = ""
-        self.columns = columns
+        self.shown = Screen(columns)
         # What is read may end within a character.
         self._decoder = codecs.getincrementaldecoder("utf-8")()
         self._master, self._slave = pty.openpty()
         self.resize(columns, lines)
         self.mode = self._mode()
         environment = {k: v for k, v in ENVIRONMENT.items() if k not in ("NO_COLOR", "COLUMNS")}
+        environment |= {"TERM": "xterm-256color", "COLORTERM": "truecolor"} | env
+        command, device = (*program, *map(str, words)), os.ttyname(self._slave)
+        self.process: subprocess.Popen[bytes] | Forked
+        if program == PROGRAM and not executed and set(env) <= FORKABLE:
+            self.process = Forked(command[1:], environment, device, device)
+            return
         self.process = subprocess.Popen(
             # In a session of its own, whose terminal this is: Ctrl-C is a signal then.
-            ["setsid", "--ctty", *program, *map(str, words)],
+            ["setsid", "--ctty", *command],
             stdin=self._slave,
             stdout=self._slave,
             stderr=self._slave,
-            env=environment | {"TERM": "xterm-256color", "COLORTERM": "truecolor"} | env,
+            env=environment,
         )
 
     def __enter__(self) -> Self:
@@ -70,6 +82,7 @@ class Terminal:
 
     def resize(self, columns: int, lines: int) -> None:
         """Give it another size."""
+        self.shown.columns = columns
         fcntl.ioctl(self._slave, termios.TIOCSWINSZ, struct.pack("HHHH", lines, columns, 0, 0))
 
     def type(self, keys: str) -> None:
@@ -79,7 +92,9 @@ class Terminal:
     def read(self, timeout_s: float = 0.05) -> None:
         """Take in what was written."""
         while select.select([self._master], [], [], timeout_s)[0]:
-            self.written += self._decoder.decode(os.read(self._master, 65536))
+            text = self._decoder.decode(os.read(self._master, 65536))
+            self.written += text
+            self.shown.feed(text)
 
     def wait(self, holds: Callable[[str], bool]) -> str:
         """Wait until the screen is such; return it, as it is seen."""
@@ -96,7 +111,7 @@ class Terminal:
 
     def screen(self) -> list[str]:
         """Return the lines that are seen now, also those above the screen."""
-        return seen(self.written, self.columns)
+        return self.shown.lines()
 
     def end(self, number: signal.Signals | None = None) -> int:
         """Send a signal; wait for the end, and return the exit code."""
@@ -110,47 +125,9 @@ class Terminal:
         return self.process.returncode
 
     def is_clean(self) -> bool:
-        """Tell whether the terminal is as it was before: its mode, and the cursor shown."""
-        hidden, shown = self.written.rfind("\x1b[?25l"), self.written.rfind("\x1b[?25h")
-        return hidden <= shown and self._mode() == self.mode
+        """Tell whether the terminal is as it was before: its mode, screen, and the cursor shown."""
+        shown = self.shown
+        return not (shown.hides_cursor or shown.is_alternate) and self._mode() == self.mode
 
     def _mode(self) -> list[Any]:
         return termios.tcgetattr(self._slave)
-
-
-def seen(written: str, columns: int) -> list[str]:
-    """Return the lines that a terminal of endless height shows of what was written to it.
-
-    Raises:
-        AssertionError: for an escape that no command which shows progress has a use for.
-    """
-    # As a terminal whose driver makes of a line end a carriage return as well.
-    rows, row, column, at = [""], 0, 0, 0
-    while at < len(written):
-        escape = _ESCAPE.match(written, at)
-        if escape is not None:
-            at = escape.end()
-            match escape.groups():
-                case (_, "m") | ("?25", "l" | "h"):
-                    pass
-                case (count, "A"):
-                    row = max(row - int(count or 1), 0)
-                case ("2", "K"):
-                    rows[row] = ""
-                case _:
-                    raise AssertionError(f"what is {escape[0]!r} for?")
-            continue
-        sign, at = written[at], at + 1
-        if sign == "\r":
-            column = 0
-        elif sign == "\n":
-            row += 1
-        else:
-            assert sign.isprintable(), f"what is {sign!r} for?"
-            if column == columns:
-                row, column = row + 1, 0
-            rows += [""] * (row + 1 - len(rows))
-            rows[row] = f"{rows[row]:{column}}"[:column] + sign + rows[row][column + 1 :]
-            column += 1
-        rows += [""] * (row + 1 - len(rows))
-    return [text.rstrip() for text in rows]

@@ -55,12 +55,13 @@ def status(**members: Any) -> bytes:
     """Return a status as a daemon writes it."""
     coverage = {"coverable": 40, "covered": 10, "recovered": 3, "remaining": 30}
     path = {"revision": 7, "reason": "map: 2 cells more", "steps": 30, "remaining_steps": 30}
+    plan = {"planned_steps": 30, "lower_bound_steps": 29, "gap": 0.0345}
     document = {
         "state": "covering",
         "reason": "path 7",
         "coverage": {**coverage, "fraction": 0.25, "covered_m2": 0.9, "to_cover_m2": 2.7},
         "floor": {"swept_m2": 1.44, "reachable_m2": None, "left": None, "out_of_reach": None},
-        "path": {**path, "planned_steps": 30, "lower_bound_steps": 29, "gap": 0.0345},
+        "path": {**path, **plan, "line_s": 63.0},
         "ledger": {"age_s": 0.4},
         "mission": {"stage": "covering", "ordered": "itself", "pass": 1, "passes": 1},
         "drive": {"speed_m_s": 0.248, "quarter_turn_s": 1.934, "half_turn_s": None, "turns": 9},

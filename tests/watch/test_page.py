@@ -109,7 +109,9 @@ def test_it_says_how_it_stands():
         "25.0 %, 10 of 40 cells",
         "25.0 % of cells",
         "swept     1.4 m2",
-        "map: 2 cells more",
+        "COVERING  25.0 % of cells  path 7, 63 s to go",
+        "to go     63 s, 30 steps",
+        "path 7    map: 2 cells more",
         "30 steps, bound 29",
         "everything reachable",
         "drive     0.25 m/s, 90 deg 1.93 s",
@@ -121,6 +123,20 @@ def test_it_says_how_it_stands():
         "┤ 1 m",
     ):
         assert said in page, page
+
+
+@pytest.mark.parametrize(
+    ("line_s", "scale", "said"),
+    [(630.0, 1, "10 min"), (630.0, 20, "32 s"), (63.0, 20, "3.1 s"), (0.0, 0, ""), (63.0, 0, ""),
+     (63.0, -1, ""), (63.0, 1e-9, ""), (1e15, 1, ""), (None, 1, "")],
+)  # fmt: skip
+def test_the_time_to_go_is_by_the_clock(line_s, scale, said):
+    view = mid_mission()
+    reported = {"revision": 7, "steps": 30, "remaining_steps": 30, "line_s": line_s}
+    tell(view, "status", status(path=reported, config={"robot": {"time_scale": scale}}))
+    page = page_of(view)
+    assert (f"path 7, {said} to go" in page) == bool(said)
+    assert f"to go     {said}{', ' if said else ''}30 steps" in page
 
 
 def test_it_says_how_far_an_order_is():

@@ -180,7 +180,7 @@ def test_a_journal_keeps_the_newest():
 def test_a_recorder_without_a_reason_is_shown_without_one():
     view = mid_mission()
     tell(view, "status", status(recorder={"state": "starting", "restarts": 0}))
-    assert texts(view)[-1] == "recorder starting: "
+    assert texts(view)[-1] == "recorder starting"
 
 
 def test_a_trouble_of_a_robot_at_rest_begins_and_ends():

@@ -40,7 +40,7 @@ def covering(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Daemon]:
 
 
 def test_it_shows_how_the_mission_stands(covering):
-    with Terminal("--connect", covering.endpoint) as terminal:
+    with Terminal("--connect", covering.endpoint, executed=True) as terminal:
         screen = terminal.wait(lambda seen: "COVERING" in seen and "→" in seen.split("robot", 2)[1])
         assert "of 234 cells" in screen
         assert "path " in screen
@@ -87,7 +87,7 @@ def test_ctrl_c_typed_ends_it(covering):
 
 
 def test_ctrl_z_gives_the_terminal_back_for_a_while(covering):
-    with Terminal("--connect", covering.endpoint) as terminal:
+    with Terminal("--connect", covering.endpoint, executed=True) as terminal:
         terminal.wait_text("COVERING")
         terminal.process.send_signal(signal.SIGTSTP)
         _, status = os.waitpid(terminal.process.pid, os.WUNTRACED)

@@ -71,7 +71,8 @@ def add_common(parser: argparse.ArgumentParser) -> None:
         "--log-level",
         choices=("debug", "info", "warning", "error"),
         default="info",
-        help="log level on standard error (default: %(default)s)",
+        metavar="LEVEL",
+        help="log on standard error: debug, info, warning or error (default: %(default)s)",
     )
     # Given to processes that other commands start, so that they end with their parent.
     parser.add_argument("--with-parent", type=int, metavar="PID", help=argparse.SUPPRESS)

@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import os
+import shlex
+import shutil
 import signal
 import sys
-from collections.abc import Iterable
+import sysconfig
+from collections.abc import Iterable, Mapping
 from contextlib import ExitStack
 from functools import cache
+from pathlib import Path
 from typing import Any
 
 from rich.console import Console, ConsoleOptions, RenderableType
@@ -42,6 +46,10 @@ class CleanConsole(Console):
 
     def __init__(self, *, stderr: bool = False) -> None:
         super().__init__(stderr=stderr, highlight=False, markup=False, emoji=False)
+        if self.is_dumb_terminal and self.file.isatty() and "COLUMNS" not in os.environ:
+            # Rich takes each of these for one of 80 columns.
+            size = os.get_terminal_size(self.file.fileno())
+            self.width, self.height = size.columns or self.width, size.lines or self.height
 
     def render_str(self, text: str, **options: Any) -> Text:  # noqa: ANN401 - as rich has them
         """Return a string as text; before it is laid out, so that its width is right."""
@@ -67,6 +75,12 @@ def err() -> Console:
     return CleanConsole(stderr=True)
 
 
+def can_draw(console: Console) -> bool:
+    """Return whether a console is a terminal that can move its cursor."""
+    # If the environment asks for colour, Rich treats any stream as a terminal.
+    return console.is_interactive and console.file.isatty() and bool(os.environ.get("TERM"))
+
+
 class ProgressLines(Progress):
     """Lines at the lower end of the terminal that show progress, and leave nothing behind.
 
@@ -84,8 +98,7 @@ class ProgressLines(Progress):
             # Rich would put a stream of its own before ours, and then write escapes into ours.
             redirect_stdout=False,
             redirect_stderr=False,
-            # If the environment asks for colour, Rich treats any stream as a terminal.
-            disable=not (console.is_interactive and console.file.isatty()),
+            disable=not can_draw(console),
         )
         self._while_shown = ExitStack()
 
@@ -158,6 +171,17 @@ def figures(rows: Iterable[tuple[str, str]]) -> Table:
     return table
 
 
+def known(document: Mapping[str, object]) -> list[tuple[str, str]]:
+    """Return names and values of a document's members as text, without those that are null."""
+    return [
+        (name, ", ".join(f"{key} {part}" for key, part in value.items()))
+        if isinstance(value, Mapping)
+        else (name, str(value))
+        for name, value in document.items()
+        if value is not None
+    ]
+
+
 def summary(rows: Iterable[tuple[str, str]]) -> Table:
     """Return names and words of a few figures, without lines between them."""
     table = Table(show_header=False, box=None, padding=(0, 2, 0, 0))
@@ -166,6 +190,15 @@ def summary(rows: Iterable[tuple[str, str]]) -> Table:
     for name, words in rows:
         table.add_row(name, words)
     return table
+
+
+def command(name: str = "fasaco-edge") -> str:
+    """Return what a person types in this folder to run a program of this installation."""
+    path, found = Path(sysconfig.get_path("scripts"), name), shutil.which(name)
+    if not path.exists() or (found is not None and path.samefile(found)):
+        return name
+    here = Path.cwd()
+    return shlex.quote(str(path.relative_to(here) if path.is_relative_to(here) else path))
 
 
 def may_ask() -> bool:

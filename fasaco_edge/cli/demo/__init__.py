@@ -140,7 +140,9 @@ def run(args: argparse.Namespace) -> int:
 COMMAND = Command(
     description="Start daemon, recorder and a simulated robot (or several of each) as processes "
     "of their own that talk Zenoh over loopback; show the mission; exit when every reachable cell "
-    "is covered. Writes a recording (.rrd), a picture and the figures to the output folder.",
+    "is covered. Writes a recording (.rrd), a picture and the figures to the output folder. In a "
+    "terminal of at least 60 x 20 characters it shows the mission as `fasaco-edge watch` does: f "
+    "toggles the pheromone trail, q or Ctrl-C quits.",
     run=run,
     add_options=_add_options,
 )

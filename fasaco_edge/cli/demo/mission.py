@@ -1,4 +1,4 @@
-"""The processes of the demo: daemons with recorders, and robots; watched in a terminal."""
+"""The processes of the demo: daemons with recorders, and robots; from their start to their end."""
 
 from __future__ import annotations
 
@@ -14,23 +14,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Self
 
-from rich.progress import BarColumn, TextColumn, TimeElapsedColumn
-from rich.table import Column
-
 from fasaco_edge.bus.arrival import Sample
 from fasaco_edge.bus.mailbox import LatestSlot
 from fasaco_edge.bus.session import Bus, open_bus
 from fasaco_edge.bus.settings import BusSettings
-from fasaco_edge.cli.console.terminal import (
-    CLOCK,
-    NARROW_BAR,
-    Description,
-    ProgressLines,
-    err,
-)
+from fasaco_edge.cli.console.terminal import command, err
 from fasaco_edge.cli.demo.mishaps import Mishaps
 from fasaco_edge.cli.demo.robots import FLEET, DemoRobot, fleet_recorder
-from fasaco_edge.client import phrases
+from fasaco_edge.cli.demo.view import demo_view
 from fasaco_edge.errors import ProcessEnded
 from fasaco_edge.host.addresses import free_port
 from fasaco_edge.host.processes import python_program
@@ -39,7 +30,6 @@ from fasaco_edge.wire.documents.json_text import decode_tolerant
 from fasaco_edge.wire.documents.status import Status
 from fasaco_edge.wire.keys import Keys
 
-PLAIN_LINE_EVERY_S = 5.0
 STOP_TIMEOUT_S = 8.0
 RECORDERS_WITHIN_S = 60.0
 # "Done" has to hold for some maps [simulated s]: the last one may still be on its way.
@@ -47,50 +37,6 @@ SETTLE_SIM_S = 3.0
 # Programs that subscribe to the robots, by the names of their logs.
 LAST = ("daemon", "fleet")
 AT_WORK = ("planning", "covering", "degraded")
-# Widths of a percentage, and of as many figures as a name of a robot leaves [characters].
-PERCENT, LEAST_FIGURES = 5, 24
-
-
-class DemoView:
-    """Shows the daemons' status as it comes in, a line a robot."""
-
-    def __init__(self, titles: Sequence[str]) -> None:
-        self._bar = ProgressLines(
-            Description(NARROW_BAR + PERCENT + CLOCK + LEAST_FIGURES + 4, style="bold"),
-            BarColumn(bar_width=NARROW_BAR),
-            TextColumn("{task.percentage:>3.0f} %", markup=False),
-            TimeElapsedColumn(),
-            # In a narrow terminal the figures are cut, and nothing else.
-            TextColumn(
-                "{task.fields[figures]}",
-                markup=False,
-                table_column=Column(ratio=1, no_wrap=True),
-            ),
-            expand=True,
-        )
-        self._titles = titles
-        self._tasks = [self._bar.add_task(text, total=1.0, figures="starting") for text in titles]
-        self._printed_at = [0.0] * len(titles)
-
-    def __enter__(self) -> Self:
-        self._bar.start()
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._bar.stop()
-
-    def show(self, robot: int, status: Status, elapsed_s: float) -> None:
-        """Show one status of the robot with this number."""
-        fraction = status.coverage.fraction if status.coverage else 0.0
-        text = phrases.figures(status)
-        self._bar.update(self._tasks[robot], completed=fraction, figures=text)
-        now = time.monotonic()
-        if not self._bar.disable or now - self._printed_at[robot] < PLAIN_LINE_EVERY_S:
-            return
-        self._printed_at[robot] = now
-        name = f"{self._titles[robot]}  " if len(self._tasks) > 1 else ""
-        line = f"{elapsed_s:6.1f} s  {name}{100 * fraction:5.1f} % of cells  {text}"
-        err().print(line, soft_wrap=True)
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,69 +70,91 @@ class DemoMission:
         self._far = self._endpoint
         if args.split_after is not None:
             self._far = f"tcp/127.0.0.1:{free_port()}"
+        self._view = demo_view(
+            Path(args.map).stem, [robot.name for robot in robots], self._endpoint
+        )
         self._mishaps = Mishaps(
-            args.kill_after, args.split_after, (self._endpoint, self._far), err().print
+            args.kill_after, args.split_after, (self._endpoint, self._far), self._view.say
         )
         self._killed = ""
         self._processes: list[tuple[Path, subprocess.Popen[bytes]]] = []
         self._stack = ExitStack()
+        # Robots that have not started: log and words of each; keys of recorders not heard yet.
+        self._waiting: list[tuple[Path, list[str]]] = []
+        self._silent: set[str] = set()
         self._newest = [LatestSlot[Sample]() for _ in robots]
+        self._statuses = [Status() for _ in robots]
+        self._plans: dict[tuple[int, int], float] = {}
+        self._worked_at: list[float] = []
+        self._started = 0.0
+        self._done_since: float | None = None
 
     def __enter__(self) -> Self:
         with ExitStack() as stack:
             # The router that connects all processes.
-            bus = stack.enter_context(open_bus(BusSettings("router", (), (self._endpoint,))))
+            self._bus = stack.enter_context(open_bus(BusSettings("router", (), (self._endpoint,))))
             if self._far != self._endpoint:
                 stack.enter_context(open_bus(BusSettings("router", (), (self._far,))))
             stack.enter_context(self._mishaps)
             stack.callback(self._stop)
-            self._start(bus)
+            self._start(self._bus)
             self._stack = stack.pop_all()
-        what = f"--fleet {FLEET}" if len(self._robots) > 1 else f"--robot {self._robots[0].name}"
-        watch = f"fasaco-edge watch {what} --connect {self._endpoint}"
-        err().print(f"watch it from another terminal: {watch}", soft_wrap=True)
+        what = f"--fleet {FLEET} " if len(self._robots) > 1 else ""
+        watch = f"{command()} watch {what}--connect {self._endpoint}"
+        err().print(f"in another terminal: {watch}", soft_wrap=True)
         return self
 
     def __exit__(self, *_: object) -> None:
         self._stack.close()
 
     def watch(self) -> Ending:
-        """Show the mission until all is covered; return how it ended."""
-        started = time.monotonic()
-        done_since: float | None = None
-        worked_at: list[float] = []
-        statuses = [Status() for _ in self._robots]
-        plans: dict[tuple[int, int], float] = {}
-        settle_s = max(SETTLE_SIM_S / self._args.speed, 1.5)
-        names = [robot.name for robot in self._robots]
-        with DemoView(names if len(names) > 1 else [Path(self._args.map).stem]) as view:
-            while (now := time.monotonic()) - started < self._args.timeout:
-                self._check_processes()
-                for number, newest in enumerate(self._newest):
-                    sample = newest.take(timeout_s=0.25 / len(names))
-                    if sample is not None:
-                        status = decode_tolerant(sample.payload, Status)
-                        if status.latency_ms.plan is not None:
-                            plans[number, status.plan.plans] = status.latency_ms.plan
-                        view.show(number, status, now - started)
-                        statuses[number] = status
-                        worked_at += [now] if status.state in AT_WORK else []
-                if worked_at:
-                    self._let_happen(now, worked_at[0])
-                done = all(
-                    status.state == "done" or robot.name == self._killed
-                    for robot, status in zip(self._robots, statuses, strict=True)
-                )
-                done_since = (done_since or now) if done else None
-                if done_since is not None and now - done_since >= settle_s:
-                    break
-        timed_out = done_since is None
-        wall_s = time.monotonic() - started
+        """Show the mission until all is covered; return how it ended.
+
+        Raises:
+            KeyboardInterrupt: the user quits.
+            ProcessEnded: one of the processes has ended.
+        """
+        self._started = time.monotonic()
+        with self._view:
+            self._view.run(self._step)
+        worked_at = self._worked_at
         worked_s = worked_at[-1] - worked_at[0] if worked_at else 0.0
         return Ending(
-            tuple(statuses), wall_s, tuple(plans.values()), timed_out,
-            makespan_s=worked_s * self._args.speed, killed=self._killed,
-        )  # fmt: skip
+            tuple(self._statuses),
+            time.monotonic() - self._started,
+            tuple(self._plans.values()),
+            timed_out=self._done_since is None,
+            makespan_s=worked_s * self._args.speed,
+            killed=self._killed,
+        )
+
+    def _step(self, timeout_s: float) -> bool:
+        """Take in statuses, waiting up to ``timeout_s`` [s]; return whether the mission is over."""
+        now = time.monotonic()
+        self._check_processes()
+        if self._waiting:
+            self._let_start(self._bus, now)
+        for number, newest in enumerate(self._newest):
+            sample = newest.take(timeout_s / len(self._robots))
+            if sample is not None:
+                status = decode_tolerant(sample.payload, Status)
+                if status.latency_ms.plan is not None:
+                    self._plans[number, status.plan.plans] = status.latency_ms.plan
+                self._statuses[number] = status
+                if not self._waiting:
+                    self._view.show(number, status, now - self._started)
+                self._worked_at += [now] if status.state in AT_WORK else []
+        if self._worked_at:
+            self._let_happen(now, self._worked_at[0])
+        is_done = all(
+            status.state == "done" or robot.name == self._killed
+            for robot, status in zip(self._robots, self._statuses, strict=True)
+        )
+        self._done_since = (self._done_since or now) if is_done else None
+        settle_s = max(SETTLE_SIM_S / self._args.speed, 1.5)
+        if self._done_since is not None and now - self._done_since >= settle_s:
+            return True
+        return not self._waiting and bool(now - self._started >= self._args.timeout)
 
     def _let_happen(self, now: float, began: float) -> None:
         """Carry out due mishaps; a process of the last robot that they end is no failure."""
@@ -194,10 +162,9 @@ class DemoMission:
         victim = [one for log, one in self._processes if log.parent == last.folder]
         if self._mishaps.step(now, (now - began) * self._args.speed, victim):
             self._killed = last.name
-            err().print(f"{last.name} is killed")
+            self._view.say(f"{last.name} is killed")
 
     def _start(self, bus: Bus) -> None:
-        robots: list[tuple[Path, list[str]]] = []
         for number, (robot, newest) in enumerate(zip(self._robots, self._newest, strict=True)):
             endpoint = self._far if number % 2 else self._endpoint
             robot.folder.mkdir(exist_ok=True)
@@ -206,31 +173,31 @@ class DemoMission:
             for name, words in robot.programs(self._args, endpoint):
                 log = robot.folder / f"{name}.log"
                 if name == "robot":
-                    robots.append((log, words))
+                    self._waiting.append((log, words))
                 else:
                     self._spawn(log, words)
         if len(self._robots) > 1:
             out = self._robots[0].folder.parent
             self._spawn(out / "fleet.log", fleet_recorder(out, self._endpoint))
         if self._args.record == "all":
-            self._await_recorders(bus)
-        for log, words in robots:
-            self._spawn(log, words)
+            self._silent = {Keys(robot.name).of(topics.RECORDER_ALIVE) for robot in self._robots}
 
-    def _await_recorders(self, bus: Bus) -> None:
-        """Wait for a while until all recorders listen: they start more slowly than a robot."""
-        keys = {Keys(robot.name).of(topics.RECORDER_ALIVE) for robot in self._robots}
-        until = time.monotonic() + RECORDERS_WITHIN_S
-        while keys and time.monotonic() < until:
-            self._check_processes()
-            keys = {key for key in keys if not bus.alive(key)}
-            time.sleep(0.05)
+    def _let_start(self, bus: Bus, now: float) -> None:
+        """Start the robots once all recorders listen, which start more slowly, or after a while."""
+        self._silent = {key for key in self._silent if not bus.alive(key)}
+        if self._silent and now - self._started < RECORDERS_WITHIN_S:
+            return
+        for log, words in self._waiting:
+            self._spawn(log, words)
+        self._waiting, self._started = [], now
 
     def _spawn(self, log: Path, words: list[str]) -> None:
         program = python_program("fasaco_edge", *words)
         program += ["--with-parent", str(os.getpid())]
         with log.open("wb") as file:
-            process = subprocess.Popen(program, stdout=file, stderr=file)
+            # Ctrl-C in the terminal is for the demo, which ends them in order: one that dies of it
+            # first would be a failure.
+            process = subprocess.Popen(program, stdout=file, stderr=file, process_group=0)
         self._processes.append((log, process))
 
     def _check_processes(self) -> None:

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import argparse
 import json
-from collections.abc import Sequence
+import os
+import shlex
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
@@ -157,15 +159,28 @@ def print_summary(summary: Summary, *, as_json: bool) -> None:
         return
     console = terminal.out()
     ending = "every reachable cell is covered" if summary.complete else "NOT ALL WAS COVERED"
-    console.print(f"{summary.map}: {ending}", style="bold")
+    console.print(f"{Path(summary.map).stem}: {ending}", style="bold")
     console.print(terminal.figures(_rows(summary)))
     for file in (*summary.recording, *summary.fleet_recording, summary.picture):
         console.print(file, soft_wrap=True)
-    if files := " ".join(summary.fleet_recording or summary.recording):
-        console.print(f"review it:   fasaco-edge review {files}", soft_wrap=True)
-        if not summary.fleet_recording:
-            console.print(f"look at it:  fasaco-edge serve {files}", soft_wrap=True)
-        console.print(f"in Rerun:    rerun {files}", soft_wrap=True)
+    for what, command in _openers(summary):
+        console.print(f"{what:12} {command}", soft_wrap=True)
+
+
+def _openers(summary: Summary) -> Iterator[tuple[str, str]]:
+    """Yield the commands that open the recording, and what each does."""
+    recordings = summary.fleet_recording or summary.recording
+    if not recordings:
+        return
+    # All recordings of a robot alone, or of the fleet, lie in this folder; no name is as short.
+    files = f"{shlex.quote(str(Path(recordings[0]).parent))}/*.rrd"
+    yield "review it:", f"{terminal.command()} review {files}"
+    if not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
+        yield "look at it:", f"copy {files} to a computer with a desktop"
+        return
+    if not summary.fleet_recording:
+        yield "in browser:", f"{terminal.command()} serve {files}"
+    yield "in Rerun:", f"{terminal.command('rerun')} {files}"
 
 
 def _rows(summary: Summary) -> list[tuple[str, str]]:

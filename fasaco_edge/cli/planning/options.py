@@ -251,10 +251,10 @@ def _add_planner(group: argparse._ArgumentGroup) -> None:
     group.add_argument(
         "--planner",
         type=_planner,
-        metavar=f"{'|'.join(PLANNER_NAMES)}|FILE.py:NAME|MODULE:NAME",
+        metavar="NAME",
         help="; ".join(f"{name}: {entry.about}" for name, entry in PLANNERS.items())
-        + "; or a function or class of your own, in a file or an installed module, which is run "
-        + "with your rights, see fasaco_edge/researcher.md "
+        + "; FILE.py:NAME or MODULE:NAME: a function or class of your own, in a file or an "
+        + "installed module, which is run with your rights, see fasaco_edge/researcher.md "
         + f"(default: {SEARCH.planner})",
     )
     group.add_argument(

@@ -97,7 +97,7 @@ def _print(args: argparse.Namespace, planned: PassPlans, figures: dict[str, Any]
     passes = figures.pop("passes")
     if args.long:
         figures["floor"] = planned.floor or "not known of a coverage grid"
-        rows = [(name.replace("_", " "), str(value)) for name, value in figures.items()]
+        rows = [(name.replace("_", " "), text) for name, text in terminal.known(figures)]
         terminal.out().print(terminal.figures(rows))
     else:
         from fasaco_edge.offline.summary import rows_of_passes

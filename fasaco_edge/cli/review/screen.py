@@ -89,7 +89,7 @@ def print_comparison(one: ReviewDocument, other: ReviewDocument) -> None:
     """Print the figures of two documents side by side."""
     console = terminal.out()
     names = (one.recording, other.recording)
-    console.print(setup_words(one, other), style="bold", soft_wrap=True)
+    _say(console, setup_words(one, other), style="bold")
     _print_table(console, "Set-up", ("", *names), setup_differences(one, other))
     compared = compared_rows(one, other)
     _print_table(console, "Two runs", ("", *names, "difference"), compared)
@@ -100,7 +100,7 @@ def print_comparison(one: ReviewDocument, other: ReviewDocument) -> None:
     _print_table(console, "Reasons of replans", ("reason", *names, "difference"), counts)
     for document in (one, other):
         for _, text in rows.clock_rows(document):
-            console.print(f"{document.recording}: its clock is {text}", soft_wrap=True)
+            _say(console, f"{document.recording}: its clock is {text}")
         _print_remarks(console, document)
 
 
@@ -124,9 +124,14 @@ def _print_remarks(console: Console, document: ReviewDocument) -> None:
             torn = f"torn, its last {part.torn_bytes} bytes are lost"
             console.print(f"{part.path}: {torn}", soft_wrap=True)
     for remark in document.remarks:
-        console.print(f"recorder: {remark}", soft_wrap=True)
+        _say(console, f"recorder: {remark}")
     for line in rows.unknown_lines(document):
-        console.print(line, soft_wrap=True)
+        _say(console, line)
+
+
+def _say(console: Console, text: str, style: str = "") -> None:
+    """Print a sentence; a file keeps it in one line."""
+    console.print(text, style=style, soft_wrap=not console.is_terminal)
 
 
 def _print_table(

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
+from rich.console import Console
+
 from fasaco_edge.bus.settings import BusSettings
 from fasaco_edge.cli.ask import nobody_answers
-from fasaco_edge.cli.console.terminal import out
 from fasaco_edge.errors import FasacoError, NobodyAnswersError
 from fasaco_edge.fleet.watch.feed import FleetFeed
 from fasaco_edge.fleet.watch.page import FleetWatch
@@ -18,12 +19,12 @@ from fasaco_edge.wire.keys import VERSION, Keys
 
 @contextmanager
 def fleet_on_bus(
-    fleet: str, keys: Keys, bus: BusSettings
+    fleet: str, keys: Keys, bus: BusSettings, console: Console
 ) -> Iterator[tuple[FleetWatch, Callable[[], FasacoError]]]:
     """Yield the watch of a fleet, and a function that returns the error for no robots."""
     view = FleetView(fleet)
     with FleetFeed(bus, keys) as feed:
-        yield FleetWatch(feed, view, out()), lambda: _no_robot(keys, feed, view)
+        yield FleetWatch(feed, view, console), lambda: _no_robot(keys, feed, view)
 
 
 def _no_robot(keys: Keys, feed: FleetFeed, view: FleetView) -> NobodyAnswersError:

@@ -19,7 +19,7 @@ from fasaco_edge.fleet.watch.floor import FleetFloor
 from fasaco_edge.fleet.watch.robot import FleetRobot, short
 from fasaco_edge.fleet.watch.view import FleetView
 from fasaco_edge.text import one_line
-from fasaco_edge.watch.blocks import FAINT, Blocks, on_a_line
+from fasaco_edge.watch.blocks import FAINT, Blocks, with_keys
 from fasaco_edge.watch.glyphs import GlyphSet
 from fasaco_edge.watch.page import Layout
 from fasaco_edge.watch.status_table import LONGEST_BAR, state_colour
@@ -109,7 +109,7 @@ class FleetPage:
             width, height: size of the screen, each at least 1 [characters].
         """
         blocks, robots, layout = self._blocks, view.robots(now), Layout.of(width, height)
-        page = blocks.block(headline(view, robots, now), width, 1)
+        page = blocks.block(headline(view, robots, now, width), width, 1)
         # The table takes the line of the legend.
         page += self._table(view, robots, now, width, min(layout.lines + 1, height - 1))
         if layout.entries:
@@ -133,8 +133,8 @@ class FleetPage:
         )
 
 
-def headline(view: FleetView, robots: Sequence[FleetRobot], now: float) -> Text:
-    """Return a line that sums up the fleet's activity."""
+def headline(view: FleetView, robots: Sequence[FleetRobot], now: float, width: int) -> Text:
+    """Return a line that sums up the fleet's activity, for a width."""
     line = Text().append(f" {short(view.fleet)} ", "bold reverse").append("  ")
     present = [robot for robot in robots if robot.silent_s is None]
     if view.trouble:
@@ -152,7 +152,7 @@ def headline(view: FleetView, robots: Sequence[FleetRobot], now: float) -> Text:
         line.append(f"{at_work} of {len(robots)} robots at work", "bold green" if at_work else "")
         if view.floor.fraction is not None:
             line.append(f"  {percent(view.floor.fraction)} of cells")
-    return on_a_line(line.append(f"   {clock(now)}   q quits", FAINT))
+    return with_keys(line, width, "q quits", clock(now))
 
 
 # Time to wait for the other robots after the first message [s]. Each robot sends its place and its

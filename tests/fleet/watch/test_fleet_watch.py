@@ -73,7 +73,8 @@ def hall() -> Iterator[tuple[Hall, str]]:
 
 def test_it_shows_all_robots(hall):
     robots, endpoint = hall
-    with Terminal("--fleet", "house", "--connect", endpoint, columns=100, lines=30) as terminal:
+    words = ("--fleet", "house", "--connect", endpoint)
+    with Terminal(*words, columns=100, lines=30, executed=True) as terminal:
         screen = terminal.wait(lambda seen: "2 of 2 robots at work" in seen and "% swept" in seen)
         assert "a joined: covering" in screen
         assert "stranger" not in screen

@@ -1,0 +1,167 @@
+"""The demo on a terminal: the live map while it goes, the summary after it, and what else fits."""
+
+from __future__ import annotations
+
+import os
+import re
+import sys
+import time
+
+import pytest
+
+from fasaco_edge.grid.geometry import GridGeometry, Pose2D
+from fasaco_edge.grid.occupancy import OccupancyGrid
+from maps.map_writer import write_map
+from tests.cli.test_demo import processes_of
+from tests.support.processes import is_running, slowness
+from tests.support.rooms import RESOLUTION_M, room
+from tests.support.terminal import Terminal
+
+# From the end of set-up to the first picture on a quiet machine [s].
+FIRST_PICTURE_S = 10.0
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """A working folder with a map of one room."""
+    monkeypatch.chdir(tmp_path)
+    pixels = room(2.4, 1.8)
+    geometry = GridGeometry(*pixels.shape, RESOLUTION_M, Pose2D(-1.0, -0.4))
+    write_map(OccupancyGrid(geometry, pixels), tmp_path / "room.yaml")
+    return tmp_path
+
+
+def test_the_demo_is_a_live_map_and_then_a_summary(folder):
+    pytest.importorskip("rerun")
+    words = ("demo", "--map", "room.yaml", "--speed", 30, "--out", "demo")
+    with Terminal(*words, DISPLAY=":0") as shell:
+        shell.wait_text("kernels ready")
+        began = time.monotonic()
+        page = shell.wait_text("q quits")
+        assert time.monotonic() - began < FIRST_PICTURE_S * slowness()
+        assert page.count("\n") == 23
+        page = shell.wait(
+            lambda seen: (
+                re.search(r" COVERING .* path \d+, [\d.]+ s to go ", seen) is not None
+                and all(sign in seen for sign in ("swept", "█", "▀"))
+            )
+        )
+        assert re.search(r"to go +[\d.]+ s, \d+ steps", page)
+        for columns, lines in ((30, 6), (100, 30)):
+            shell.resize(columns, lines)
+            shell.wait(lambda seen, lines=lines: seen.count("\n") == lines - 1)
+        assert shell.end() == 0, shell.written[-2000:]
+        assert shell.is_clean()
+        screen = "\n".join(shell.screen())
+    assert screen.startswith("kernels ready")
+    assert "q quits" not in screen
+    assert "\nroom: every reachable cell is covered\n" in screen
+    assert re.search(r"reachable floor swept +│ \d\.\d of \d\.\d m2", screen)
+    for program in ("fasaco-edge review", "fasaco-edge serve", "rerun"):
+        assert f"{program} demo/*.rrd\n" in screen
+    # Its length is that of where this is installed.
+    assert all(line.startswith("in another terminal: ") for line in shell.shown.wrapped)
+
+
+@pytest.mark.parametrize(
+    ("key", "size", "env"),
+    [("\x03", (60, 20), {"NO_COLOR": "1"}), ("q", (200, 50), {}), ("\x03", (59, 20), {})],
+    ids=["ctrl-c", "q", "ctrl-c in a small one"],
+)
+def test_a_key_ends_it_and_leaves_the_terminal_as_it_was(folder, key, size, env):
+    pytest.importorskip("rerun")
+    columns, lines = size
+    words = ("demo", "--map", "room.yaml", "--out", folder / "demo")
+    with Terminal(*words, columns=columns, lines=lines, **env) as shell:
+        shell.wait_text("room ━" if columns < 60 else " lately ")
+        assert not shell.is_clean()
+        # What is typed is for the demo alone: one that died of it first was a failure.
+        started = processes_of(folder)
+        assert started
+        assert shell.process.pid not in {os.getpgid(pid) for pid in started}
+        shell.type(key)
+        assert shell.end() == 130, shell.written[-2000:]
+        assert shell.is_clean()
+        screen = "\n".join(shell.screen())
+        assert "\nin another terminal: " in screen
+        assert "Traceback" not in screen
+        assert "\\x1b" not in shell.written
+        if env:
+            assert set(re.findall(r"\x1b\[([\d;]*)m", shell.written)) <= {"0"}
+    assert not [pid for pid in processes_of(folder) if is_running(pid)]
+
+
+# Run in a terminal: the kind of view for each size of it, and without some things.
+KINDS = r"""
+import os, sys, termios
+from fasaco_edge.cli.console import terminal
+from fasaco_edge.cli.demo.view import demo_view
+def kind(columns=60, lines=20, **environment):
+    termios.tcsetwinsize(2, (lines, columns))
+    before = dict(os.environ)
+    os.environ.update(environment)
+    terminal.err.cache_clear()
+    view = type(demo_view("flat", ["robot"], "tcp/127.0.0.1:1")).__name__
+    os.environ.clear(); os.environ.update(before)
+    return view
+sys.modules["fasaco_edge.watch"] = None
+print("without watch", kind())
+del sys.modules["fasaco_edge.watch"]
+print("with watch", kind(), kind(200, 50), kind(59), kind(60, 19), kind(0, 0))
+print("dumb", kind(TERM="dumb"), kind(TERM="unknown"), kind(TERM=""))
+print("no colour", kind(NO_COLOR="1"))
+if os.fork():
+    os.wait()
+else:
+    os.setpgid(0, 0)
+    os.write(1, f"in the background {kind()}\n".encode())
+"""
+
+
+def test_the_view_is_one_that_the_terminal_can_show(tmp_path):
+    script = tmp_path / "kinds.py"
+    script.write_text(KINDS)
+    with Terminal(program=(sys.executable, str(script))) as shell:
+        assert shell.end() == 0, shell.written
+        assert shell.screen()[:5] == [
+            "without watch LinesView",
+            "with watch LiveView LiveView LinesView LinesView LinesView",
+            "dumb LinesView LinesView LinesView",
+            "no colour LiveView",
+            "in the background LinesView",
+        ]
+
+
+# Run in a terminal: what a demo says and what a log prints while the live map is shown.
+MEANWHILE = r"""
+import itertools, logging, sys
+from pathlib import Path
+from fasaco_edge.cli.console import logs, streams
+from fasaco_edge.cli.demo.live_view import LiveView
+streams.clean_streams()
+logs.begin_logging("info")
+steps = itertools.count()
+def step(timeout_s):
+    if next(steps) == 2:
+        view.say("r3 is killed")
+        logging.getLogger("bus").warning("no router, \x1b[31mred")
+    return Path(sys.argv[1]).exists()
+with LiveView(["robot"], "tcp/127.0.0.1:1") as view:
+    view.run(step)
+print("the end")
+"""
+
+
+def test_what_is_said_meanwhile_stands_on_the_page_and_after_it(tmp_path):
+    script, end = tmp_path / "meanwhile.py", tmp_path / "end"
+    script.write_text(MEANWHILE)
+    with Terminal(program=(sys.executable, str(script), str(end))) as shell:
+        page = shell.wait_text("WARNING bus: no router")
+        assert shell.shown.is_alternate
+        assert page.count("\n") == 23
+        assert re.search(r"\n\d\d:\d\d:\d\d r3 is killed +\n", page)
+        end.touch()
+        assert shell.end() == 0, shell.written
+        assert shell.is_clean()
+        said = ["r3 is killed", r"WARNING bus: no router, \x1b[31mred", "the end", ""]
+        assert shell.screen() == said
