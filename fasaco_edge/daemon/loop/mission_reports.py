@@ -32,6 +32,8 @@ if TYPE_CHECKING:
     from fasaco_edge.planners.cost import CoverageCost
 
 PASSED = "passed, or in narrow strips, and not known to be swept"
+BESIDE = "beside the path, and not worth the way"
+ON_PATH, LATER = "on the path", ("to come", "not planned yet")
 
 
 def map_report(mission: Mission | None) -> MapReport | None:
@@ -118,10 +120,11 @@ def floor_report(mission: Mission | None) -> FloorReport | None:
     # Before the first path no floor has been judged; on the way home the line is set aside.
     order, is_planned = mission.order_state, mission.route.revision > 0
     is_aside = bool(order.errand) or (order.paused and not to_sweep.ahead_m2)
-    beside = "to come" if is_aside and order.is_open else "beside the path, and not worth the way"
-    beside = beside if is_planned else "not planned yet"
+    to_come, unplanned = LATER
+    beside = to_come if is_aside and order.is_open else BESIDE
+    beside = beside if is_planned else unplanned
     left = _largest_first(
-        (to_sweep.ahead_m2, "on the path"),
+        (to_sweep.ahead_m2, ON_PATH),
         (to_sweep.left_m2, beside),
         (to_sweep.passed_m2, PASSED),
     )
