@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from typing import Any
 
 from fasaco_edge.client import phrases
@@ -13,7 +13,6 @@ from fasaco_edge.serve import plain
 from fasaco_edge.serve.pace import Way
 from fasaco_edge.wire.documents.replies import (
     FloorReport,
-    KeepOutReport,
     MissionReport,
 )
 from fasaco_edge.wire.documents.settings import KnownSettings
@@ -166,16 +165,22 @@ def _fleet(fleet: FleetReport) -> list[Digest]:
     ]
 
 
-def areas(
-    settings: KnownSettings, order: dict[str, Any], keep_outs: Sequence[KeepOutReport]
-) -> Digest:
-    """Return standing zones, the zones of the order if it was received, and keep-outs in force."""
+def areas(settings: KnownSettings, order: dict[str, Any], report: MissionReport) -> Digest:
+    """Return standing zones, the zones of the order, and keep-outs in force.
+
+    ``order``: as received, for daemons whose reports have no corners of its zones.
+    """
     mission = settings.mission
+    reported = [
+        {"name": zone.name, "polygon": polygon, "is": "ordered"}
+        for zone in report.zones[:MOST_AREAS]
+        if (polygon := _polygon(list(map(list, zone.polygon))))
+    ]
     standing = [
         {"name": zone.name, "polygon": zone.polygon[:MOST_CORNERS], "is": "standing"}
         for zone in mission.zones[:MOST_AREAS]
     ]
-    ordered = [
+    ordered = reported or [
         {"name": str(zone.get("name", "")), "polygon": polygon, "is": "ordered"}
         for zone in _items(order.get("zones"))
         if isinstance(zone, dict) and (polygon := _polygon(zone.get("polygon")))
@@ -183,7 +188,7 @@ def areas(
     kept_out = [
         *(
             {"name": each.name, "polygon": polygon, "is": each.by}
-            for each in keep_outs[:MOST_KEEP_OUTS]
+            for each in report.keep_outs[:MOST_KEEP_OUTS]
             if (polygon := _polygon(list(map(list, each.polygon))))
         ),
         *({"polygon": each[:MOST_CORNERS], "is": "standing"} for each in mission.keep_out),

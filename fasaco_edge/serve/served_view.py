@@ -23,7 +23,7 @@ from fasaco_edge.serve.pace import Way
 from fasaco_edge.wire.documents.fleet import decode_member
 from fasaco_edge.wire.documents.json_text import decode_document
 from fasaco_edge.wire.documents.path_documents import PathAttachment
-from fasaco_edge.wire.documents.replies import KeepOutReport
+from fasaco_edge.wire.documents.replies import MissionReport
 from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.messages.grid_octets import GridOctets, read_field, read_grid, with_update
 from fasaco_edge.wire.messages.path_points import PathPoints
@@ -59,7 +59,7 @@ class ServedView(RobotState):
         super().__init__(keys.robot)
         self._keys = keys
         self._grids: dict[str, GridOctets] = {}
-        # The order, for the corners of its zones; the status only names them.
+        # The order as received: the status of an older daemon only names its zones.
         self._order: dict[str, object] = {}
         self._others: dict[str, tuple[float, float, float]] = {}
         self._path: Sample | None = None
@@ -81,7 +81,7 @@ class ServedView(RobotState):
             "pose": lambda _: self._pose_message(),
             "state": lambda now: message_text("state", **state(self, self._way, now)),
             "areas": lambda _: message_text(
-                "areas", **areas(self.settings, self._order, self._keep_outs)
+                "areas", **areas(self.settings, self._order, self._mission)
             ),
             "events": lambda _: message_text("events", entries=lately(self.events)),
             "map": lambda _: self._map_message(),
@@ -121,7 +121,7 @@ class ServedView(RobotState):
             "pose": (self.pose, self.walk, self.walk.at),
             "path": self._shown_path,
             "events": self.events.count,
-            "areas": (self.settings, self._order, self._keep_outs),
+            "areas": (self.settings, self._order, self._mission.zones, self._mission.keep_outs),
             "map": (self._grids.get("map", self._grids.get("coverage")), self.settings.map),
             "floor": self._grids.get("floor"),
             "field": self._grids.get("field"),
@@ -131,8 +131,8 @@ class ServedView(RobotState):
         return made_of.get(kind, now_too)
 
     @property
-    def _keep_outs(self) -> tuple[KeepOutReport, ...]:
-        return self.status.mission.keep_outs if self.status else ()
+    def _mission(self) -> MissionReport:
+        return self.status.mission if self.status else MissionReport()
 
     def _read_map(self, sample: Sample, _: float) -> None:
         self._grids["map"] = read_grid(sample.payload)

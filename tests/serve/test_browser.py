@@ -181,6 +181,8 @@ def test_a_mission_is_ordered_by_finger(tmp_path):
         until(lambda: tab.js("model.areas.zones.length") == 1)
         corners = json.loads(tab.js("JSON.stringify(model.areas.zones[0].polygon)"))
         assert np.abs(np.array(corners) - [[0.5, 0.5], [3, 0.5], [3, 3], [0.5, 3]]).max() < 0.1
+        until(lambda: tab.js("drafts.length") == 0)
+        draw_keep_out(tab, (1.0, 1.0), (1.4, 1.4))
         for size, scheme in itertools.product((PHONE, LAPTOP), ("light", "dark")):
             tab.size(size, scheme)
             # Robot and path in the colours of the style, once it is drawn anew.
@@ -195,7 +197,6 @@ def test_a_mission_is_ordered_by_finger(tmp_path):
         assert tab.js("find('does').textContent") == "Sweeps room 1"
         assert not TECHNICAL.search(tab.js("document.body.innerText"))
         # A pause, and a page opened anew, lose neither the path nor what is drawn.
-        draw_keep_out(tab, (1.0, 1.0), (1.4, 1.4))
         tab.click("pause")
         outsider.wait_status(lambda status: status["state"] == "paused")
         tab.call("Page.navigate", url=page.url)

@@ -56,6 +56,14 @@ def test_an_order_is_drawn_until_it_is_cancelled():
     assert heard(view, "areas", 2.0)["zones"] == []
 
 
+def test_the_zones_of_an_order_are_drawn_by_the_status_alone():
+    view = ServedView(Keys())
+    zones = [{"name": "hall", "polygon": CORNERS}, {"name": "of old"}]
+    tell(view, "status", {"state": "covering", "mission": {"zones": zones}}, 1.0)
+    drawn = [{"name": "hall", "polygon": CORNERS, "is": "ordered"}]
+    assert heard(view, "areas", 1.0)["zones"] == drawn
+
+
 def test_an_order_is_drawn_with_all_its_valid_corners():
     view = ServedView(Keys())
     many = [[float(index), float(index % 2)] for index in range(300)]
