@@ -48,7 +48,7 @@ NEEDS = {
     "stands": "It does not get on. Look what holds it: a cable, a carpet, furniture.",
     "beside_line": "It drives beside its path and may leave strips. Call service.",
     "two_publishers": "Two programs tell it different things. Call service.",
-    "no_effect": "A keep-out, its home or its dock lies where there is no floor. Check the map.",
+    "no_effect": "A keep-out, its home or its dock lies where it has seen no floor. Check the map.",
 }
 """What the owner can do, by the code of a trouble."""
 UNSAVED = "It cannot save what it has swept: after a power cut it would begin anew. Call service."
