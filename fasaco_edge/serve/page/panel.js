@@ -103,8 +103,8 @@ function showProgress(state) {
   find("share").textContent = share === null || share === undefined ? "–" : percent(share);
   find("area").textContent = floor ? squares(knows ? floor.reached_m2 : floor.swept_m2) : "–";
   find("area-of").textContent = knows ? `of ${squares(floor.reachable_m2)}` : "swept";
-  find("togo").textContent = state.to_go_s === null ? "–" : duration(state.to_go_s);
-  find("togo").parentElement.hidden = state.to_go_s === null && ["done", "idle"].includes(state.state);
+  find("togo").textContent = duration(state.to_go_s || 0);
+  find("togo").parentElement.hidden = state.to_go_s === null;
   find("togo-of").textContent = state.state === "returning" ? "to get there" : ends(state);
   find("bar").style.width = `${100 * Math.min(share || 0, 1)}%`;
   find("bar").parentElement.setAttribute("aria-valuenow", Math.round(100 * (share || 0)));
