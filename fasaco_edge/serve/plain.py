@@ -84,7 +84,7 @@ def does(status: Status) -> str:
     if status.state in DOES:
         return DOES[status.state]
     if status.state == "paused":
-        return "Paused at home" if _is_home(status) else "Paused, until you resume"
+        return "Paused at home" if _is_home(status) else "Paused: waits for Resume"
     if status.state == "charging":
         goes_on = mission.ordered is not None and mission.stage != "over"
         return "Charges, then goes on by itself" if goes_on else "Charges"
