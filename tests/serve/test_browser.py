@@ -39,7 +39,7 @@ PHONE, LAPTOP = (390, 844), (1280, 800)
 COVERED = """(() => {
   canvas.scrollIntoView();
   const { left, top, width, height } = canvas.getBoundingClientRect();
-  const shares = [0.02, 0.25, 0.5, 0.75, 0.98];
+  const shares = [...Array(24).keys()].map((i) => (i + 0.5) / 24);
   const places = shares.flatMap((x) => shares.map((y) => [left + x * width, top + y * height]));
   return places.filter((place) => document.elementFromPoint(...place) !== canvas).length;
 })()"""
