@@ -45,7 +45,7 @@ def state(view: RobotState, way: Way, now: float) -> Digest:
     return found | {
         "state": status.state,
         "word": plain.WORDS.get(status.state, status.state),
-        "does": plain.does(status),
+        "does": plain.last_seen(status) if absent else plain.does(status),
         "needs": plain.needs(status),
         "left": [
             {"m2": part.m2, "reason": part.reason, "places": part.places}
@@ -98,7 +98,7 @@ def _floor(floor: FloorReport) -> Digest:
 
 
 def _to_go_s(view: RobotState, status: Status, way: Way) -> int | None:
-    if status.state not in UNDERWAY:
+    if status.state not in UNDERWAY or view.gone_since is not None:
         return None
     path = status.path
     left_s = way.left_s(view.walk.at, view.settings.robot, status.drive, view.walk.beyond_m)

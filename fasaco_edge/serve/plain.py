@@ -94,6 +94,12 @@ def does(status: Status) -> str:
     return _sweeps(status) if path is None or path.steps else "Waits a moment"
 
 
+def last_seen(status: Status) -> str:
+    """Return what a robot did that nothing is known of now."""
+    did = does(status)
+    return f"When last seen: {did[:1].lower()}{did[1:]}"
+
+
 def _sweeps(status: Status) -> str:
     mission = status.mission
     if mission.stage == "retrying":

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from fasaco_edge.bus.arrival import Sample
+from fasaco_edge.client.robot_state import Token
 from fasaco_edge.serve import served_view
 from fasaco_edge.serve.served_view import OTHER_LASTS_S, ServedView
 from fasaco_edge.wire.documents.fleet import FleetMember
@@ -177,6 +178,18 @@ def test_a_paused_robot_keeps_its_path_and_its_time_to_go():
     # A viewer that joins while it is paused has no path, but the daemon's time.
     joined = walk_of(ServedView(Keys()), 0, 1.0, state="paused", path={"line_s": 90.4})
     assert joined["to_go_s"] == 90
+
+
+def test_of_a_robot_that_is_gone_the_last_is_said_as_such():
+    view = ServedView(Keys())
+    view.take("token", Token("robot", here=True), 1.0)
+    drives = walk_of(view, 4, 1.0, state="covering")
+    assert (drives["does"], drives["absent"]) == ("Sweeps everything it can reach", "")
+    view.take("token", Token("robot", here=False), 2.0)
+    gone = heard(view, "state", 2.0)
+    assert gone["does"] == "When last seen: sweeps everything it can reach"
+    assert gone["absent"].startswith("The robot has been gone")
+    assert gone["to_go_s"] is None
 
 
 def test_no_number_that_a_status_may_have_ends_the_page():
