@@ -62,7 +62,6 @@ def state(view: RobotState, way: Way, now: float) -> Digest:
         "faults": list(_faults(status)),
         "fleet": _fleet(status.fleet) if status.fleet else None,
         "radius_m": view.settings.robot.radius_m,
-        "tool_m": view.settings.robot.tool_width_m,
         "version": status.version,
     }
 
@@ -127,8 +126,6 @@ def _mission(mission: MissionReport) -> Digest:
             }
             for zone in mission.zones[:MOST_AREAS]
         ],
-        "keep_out": mission.keep_out,
-        "return_home": mission.return_home,
         "home": [mission.home.x, mission.home.y] if mission.home else None,
     }
 
