@@ -142,7 +142,11 @@ class RobotState:
         if status.path is None:
             # A restarted daemon has none of the old paths.
             self.walk = PathProgress()
-        elif status.path.revision == self.walk.revision:
+        # The steps of a line that is not driven from cell to cell are not those of its points.
+        elif (status.path.revision, status.path.steps) == (
+            self.walk.revision,
+            len(self.walk.xy) - 1,
+        ):
             self.walk.left(status.path.remaining_steps)
         pose = status.pose
         if pose is not None and now - self._posed_at > POSE_LASTS_S:
@@ -172,8 +176,11 @@ def _zones(order: object) -> list[dict[str, object]]:
     return [zone for zone in found if isinstance(zone, dict) and "name" in zone]
 
 
-# Poses are more frequent than steps: further ahead, a path may pass the position again.
-LOOK_AHEAD_STEPS = 8
+# Poses are frequent: further ahead on its way, a path may pass the position again [m].
+LOOK_AHEAD_M = 2.5
+# A robot farther than this from its path is not on it; of places equally near to within the second
+# value, the first one on the path counts [m].
+NEAR_M, EQUAL_M = 0.5, 0.02
 
 
 class PathProgress:
@@ -183,24 +190,50 @@ class PathProgress:
         xy: points (x, y) [m]; an array, float64 (n, 2), or a list.
         revision: number of the path.
         at: index of the last point reached.
+        beyond_m: how far the robot is beyond that point, along the path [m].
     """
 
     def __init__(self, xy: Points = (), revision: int = 0) -> None:
         self.xy = xy
         self.revision = revision
         self.at = 0
+        self.beyond_m = 0.0
 
     def left(self, steps: int) -> None:
-        """Note the daemon's number of remaining steps."""
-        self.at = max(self.at, len(self.xy) - 1 - max(steps, 0))
+        """Note the daemon's number of remaining steps, each from point to point."""
+        at = len(self.xy) - 1 - max(steps, 0)
+        if at > self.at:
+            self.at, self.beyond_m = at, 0.0
+
+    def join(self, pose: Pose2D) -> None:
+        """Note the robot's position on a path of which it may have driven a part before."""
+        if not self._find(pose, LOOK_AHEAD_M):
+            self._find(pose, math.inf)
 
     def passed(self, pose: Pose2D) -> None:
         """Note the robot's position; progress only grows."""
-        near = self.xy[self.at : self.at + LOOK_AHEAD_STEPS]
-        if len(near) < 2:
-            return
-        step_m = math.dist(near[0], near[1])
-        away = [math.hypot(x - pose.x, y - pose.y) for x, y in near]
-        closest = min(range(len(away)), key=away.__getitem__)
-        if away[closest] <= step_m:
-            self.at += closest
+        self._find(pose, LOOK_AHEAD_M)
+
+    def _find(self, pose: Pose2D, ahead_m: float) -> bool:
+        """Move on to the place nearest to a pose, up to a distance ahead; return whether it is."""
+        nearest_m, place, begin_m = NEAR_M, None, -self.beyond_m
+        for index in range(self.at, len(self.xy) - 1):
+            if begin_m > ahead_m:
+                break
+            (x0, y0), (x1, y1) = self.xy[index], self.xy[index + 1]
+            length_m = math.hypot(x1 - x0, y1 - y0)
+            if length_m:
+                along_m = ((pose.x - x0) * (x1 - x0) + (pose.y - y0) * (y1 - y0)) / length_m
+                along_m = min(max(along_m, -begin_m, 0.0), length_m, ahead_m - begin_m)
+                share = along_m / length_m
+                near = x0 + share * (x1 - x0), y0 + share * (y1 - y0)
+                away_m = math.hypot(near[0] - pose.x, near[1] - pose.y)
+                if away_m < nearest_m - (EQUAL_M if place else 0.0):
+                    nearest_m, place = away_m, (index, along_m, length_m)
+            begin_m += length_m
+        if place is None:
+            return False
+        index, along_m, length_m = place
+        is_end = length_m - along_m < EQUAL_M
+        self.at, self.beyond_m = (index + 1, 0.0) if is_end else (index, along_m)
+        return True

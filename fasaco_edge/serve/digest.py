@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from typing import Any
 
 from fasaco_edge.client import phrases
 from fasaco_edge.client.events import EventLog
 from fasaco_edge.client.robot_state import RobotState
+from fasaco_edge.serve import plain
 from fasaco_edge.serve.pace import Way
 from fasaco_edge.wire.documents.replies import (
-    FloorLeft,
     FloorReport,
-    KeepOutReport,
     MissionReport,
 )
 from fasaco_edge.wire.documents.settings import KnownSettings
@@ -38,27 +37,31 @@ def state(view: RobotState, way: Way, now: float) -> Digest:
     """Return the content of the newest status, and why there is none; ``way``: the path."""
     status = view.status
     others = sorted(view.robots - {view.robot})[:MOST_ROBOTS]
-    found: Digest = {"robot": view.robot, "absent": _absent(view, now), "others": others}
+    absent = _absent(view, now)
+    found: Digest = {"robot": view.robot, "absent": absent, "others": others, "bus": view.trouble}
     if status is None:
         return found
     mission, floor = status.mission, status.floor
     return found | {
         "state": status.state,
+        "word": plain.WORDS.get(status.state, status.state),
+        "does": plain.last_seen(status) if absent else plain.does(status),
+        "needs": plain.needs(status),
+        "left": [
+            {"m2": part.m2, "reason": part.reason, "places": part.places}
+            for part in plain.left(status)
+        ],
         "reason": _reason(status),
         "cells": status.coverage.fraction if status.coverage else None,
         "floor": _floor(floor) if floor else None,
         "to_go_s": _to_go_s(view, status, way),
+        "time_scale": view.settings.robot.time_scale,
         "mission": _mission(mission),
-        "unreached": [
-            {"x": area.x, "y": area.y, "m2": area.m2, "reason": area.reason}
-            for area in mission.unreached.areas
-        ],
         "battery": _battery(status),
         "in_trouble": bool(status.troubles),
         "faults": list(_faults(status)),
         "fleet": _fleet(status.fleet) if status.fleet else None,
         "radius_m": view.settings.robot.radius_m,
-        "tool_m": view.settings.robot.tool_width_m,
         "version": status.version,
     }
 
@@ -66,16 +69,16 @@ def state(view: RobotState, way: Way, now: float) -> Digest:
 def _absent(view: RobotState, now: float) -> str:
     """Return why there is nothing new to show; "" if there is."""
     if view.trouble:
-        return f"waiting for the bus at {view.trouble}"
+        return "No contact with the robot's network; trying again"
     if view.gone_since is not None:
         gone = phrases.age(round(now - view.gone_since))
-        return f"the daemon has been gone for {gone}; waiting for it to return"
+        return f"The robot has been gone for {gone}: is it switched on?"
     if not view.is_here:
-        return f"waiting for a daemon of the name {view.robot}"
+        return f"There is no robot of the name {view.robot} yet: is it switched on?"
     if view.status is None:
-        return "no status from the daemon yet"
+        return "The robot has said nothing yet"
     silent = view.silent_s(now)
-    return f"the daemon has been silent for {phrases.age(round(silent))}" if silent else ""
+    return f"The robot has been silent for {phrases.age(round(silent))}" if silent else ""
 
 
 def _reason(status: Status) -> str:
@@ -90,22 +93,20 @@ def _floor(floor: FloorReport) -> Digest:
         "swept_m2": floor.swept_m2,
         "reached_m2": floor.reached_m2,
         "reachable_m2": floor.reachable_m2,
-        "left": _parts(floor.left),
-        "out_of_reach": _parts(floor.out_of_reach),
     }
 
 
-def _parts(parts: tuple[FloorLeft, ...] | None) -> list[Digest]:
-    return [{"m2": part.m2, "reason": part.reason} for part in parts or ()]
-
-
 def _to_go_s(view: RobotState, status: Status, way: Way) -> int | None:
-    # A robot that is commanded to stand has no path: the rest of the way is unknown.
-    stands = status.path is not None and not status.path.steps
-    left_s = way.left_s(view.walk.at, view.settings.robot, status.drive)
-    if left_s is None or left_s > MOST_TO_GO_S or stands or status.state not in UNDERWAY:
+    if status.state not in UNDERWAY or view.gone_since is not None:
         return None
-    return round(left_s)
+    path = status.path
+    left_s = way.left_s(view.walk.at, view.settings.robot, status.drive, view.walk.beyond_m)
+    if path is not None and not path.steps:
+        # A paused robot goes on with the way that it has left. Without that way, as after a restart
+        # of this server, only the daemon knows how long it takes; else it stands by command.
+        is_paused = status.state == "paused"
+        left_s = (left_s or path.line_s or None) if is_paused else None
+    return None if left_s is None or left_s > MOST_TO_GO_S else round(left_s)
 
 
 def _mission(mission: MissionReport) -> Digest:
@@ -125,8 +126,6 @@ def _mission(mission: MissionReport) -> Digest:
             }
             for zone in mission.zones[:MOST_AREAS]
         ],
-        "keep_out": mission.keep_out,
-        "return_home": mission.return_home,
         "home": [mission.home.x, mission.home.y] if mission.home else None,
     }
 
@@ -139,7 +138,7 @@ def _battery(status: Status) -> Digest | None:
 
 
 def _faults(status: Status) -> Iterator[str]:
-    """Yield troubles and faults in words."""
+    """Yield troubles and faults in an engineer's words."""
     for what, to_do in phrases.troubles(status):
         yield f"{what}. {to_do[:1].upper()}{to_do[1:]}."
     if status.errors.total:
@@ -154,21 +153,31 @@ def _faults(status: Status) -> Iterator[str]:
 
 def _fleet(fleet: FleetReport) -> list[Digest]:
     return [
-        {"name": member.name, "state": member.state, "away": member.away}
+        {
+            "name": member.name,
+            "does": "away" if member.away else plain.WORDS.get(member.state, member.state),
+            "away": member.away,
+        }
         for member in fleet.members[:MOST_ROBOTS]
     ]
 
 
-def areas(
-    settings: KnownSettings, order: dict[str, Any], keep_outs: Sequence[KeepOutReport]
-) -> Digest:
-    """Return standing zones, the zones of the order if it was received, and keep-outs in force."""
+def areas(settings: KnownSettings, order: dict[str, Any], report: MissionReport) -> Digest:
+    """Return standing zones, the zones of the order, and keep-outs in force.
+
+    ``order``: as received, for daemons whose reports have no corners of its zones.
+    """
     mission = settings.mission
+    reported = [
+        {"name": zone.name, "polygon": polygon, "is": "ordered"}
+        for zone in report.zones[:MOST_AREAS]
+        if (polygon := _polygon(list(map(list, zone.polygon))))
+    ]
     standing = [
         {"name": zone.name, "polygon": zone.polygon[:MOST_CORNERS], "is": "standing"}
         for zone in mission.zones[:MOST_AREAS]
     ]
-    ordered = [
+    ordered = reported or [
         {"name": str(zone.get("name", "")), "polygon": polygon, "is": "ordered"}
         for zone in _items(order.get("zones"))
         if isinstance(zone, dict) and (polygon := _polygon(zone.get("polygon")))
@@ -176,7 +185,7 @@ def areas(
     kept_out = [
         *(
             {"name": each.name, "polygon": polygon, "is": each.by}
-            for each in keep_outs[:MOST_KEEP_OUTS]
+            for each in report.keep_outs[:MOST_KEEP_OUTS]
             if (polygon := _polygon(list(map(list, each.polygon))))
         ),
         *({"polygon": each[:MOST_CORNERS], "is": "standing"} for each in mission.keep_out),

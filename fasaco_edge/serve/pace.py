@@ -31,12 +31,17 @@ class Way:
             quarters.append(turns)
         self._lengths, self._quarters = lengths[::-1], quarters[::-1]
 
-    def left_s(self, at: int, robot: RobotSettings, drive: DriveReport) -> float | None:
-        """Return the remaining time from point ``at`` [s]; None if no speed is known."""
+    def left_s(
+        self, at: int, robot: RobotSettings, drive: DriveReport, beyond_m: float = 0.0
+    ) -> float | None:
+        """Return the remaining time from ``beyond_m`` [m] beyond point ``at`` [s].
+
+        None if no speed is known.
+        """
         speed_m_s = drive.speed_m_s or robot.speed_m_s
         if not speed_m_s > 0.0:
             return None
         if not 0 <= at < len(self._lengths):
             return 0.0
         turn_s = drive.quarter_turn_s or drive.planned_quarter_turn_s
-        return self._lengths[at] / speed_m_s + self._quarters[at] * turn_s
+        return max(self._lengths[at] - beyond_m, 0.0) / speed_m_s + self._quarters[at] * turn_s

@@ -60,7 +60,7 @@ class RecordedView(ServedView):
 
     def _source(self, kind: str, now: float) -> object:
         # The time to go changes with the place on the path, too.
-        return super()._source(kind, now), self.walk.revision, self.walk.at
+        return super()._source(kind, now), (self.walk.revision, self.walk.at, self.walk.beyond_m)
 
     def has(self) -> list[str]:
         """Return the kinds of messages of which there is one."""

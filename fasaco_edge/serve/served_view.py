@@ -23,7 +23,7 @@ from fasaco_edge.serve.pace import Way
 from fasaco_edge.wire.documents.fleet import decode_member
 from fasaco_edge.wire.documents.json_text import decode_document
 from fasaco_edge.wire.documents.path_documents import PathAttachment
-from fasaco_edge.wire.documents.replies import KeepOutReport
+from fasaco_edge.wire.documents.replies import MissionReport
 from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.messages.grid_octets import GridOctets, read_field, read_grid, with_update
 from fasaco_edge.wire.messages.path_points import PathPoints
@@ -59,10 +59,12 @@ class ServedView(RobotState):
         super().__init__(keys.robot)
         self._keys = keys
         self._grids: dict[str, GridOctets] = {}
-        # The order, for the corners of its zones; the status only names them.
+        # The order as received: the status of an older daemon only names its zones.
         self._order: dict[str, object] = {}
         self._others: dict[str, tuple[float, float, float]] = {}
         self._path: Sample | None = None
+        # The newest path that leads anywhere: a paused robot goes on with it.
+        self._to_drive: Sample | None = None
         self._way = Way()
         self._readers |= {
             "map": self._read_map,
@@ -74,11 +76,12 @@ class ServedView(RobotState):
             "fleet": self._read_fleet,
         }
         self._makers: dict[str, Callable[[float], str | bytes | None]] = {
+            # The path comes first: the place on it, and the time to go, are by the newest.
+            "path": self._path_message,
             "pose": lambda _: self._pose_message(),
             "state": lambda now: message_text("state", **state(self, self._way, now)),
-            "path": self._path_message,
             "areas": lambda _: message_text(
-                "areas", **areas(self.settings, self._order, self._keep_outs)
+                "areas", **areas(self.settings, self._order, self._mission)
             ),
             "events": lambda _: message_text("events", entries=lately(self.events)),
             "map": lambda _: self._map_message(),
@@ -116,20 +119,20 @@ class ServedView(RobotState):
         """Return the source of a message: an equal source makes an equal message."""
         made_of: dict[str, object] = {
             "pose": (self.pose, self.walk, self.walk.at),
-            "path": self._path,
+            "path": self._shown_path,
             "events": self.events.count,
-            "areas": (self.settings, self._order, self._keep_outs),
+            "areas": (self.settings, self._order, self._mission.zones, self._mission.keep_outs),
             "map": (self._grids.get("map", self._grids.get("coverage")), self.settings.map),
             "floor": self._grids.get("floor"),
             "field": self._grids.get("field"),
         }
-        # Messages of other kinds depend on the time, too.
-        now_too = self.document, self.trouble, len(self.robots), int(now)
+        # Messages of other kinds depend on the path and the time, too.
+        now_too = self.document, self.trouble, len(self.robots), self.walk, int(now)
         return made_of.get(kind, now_too)
 
     @property
-    def _keep_outs(self) -> tuple[KeepOutReport, ...]:
-        return self.status.mission.keep_outs if self.status else ()
+    def _mission(self) -> MissionReport:
+        return self.status.mission if self.status else MissionReport()
 
     def _read_map(self, sample: Sample, _: float) -> None:
         self._grids["map"] = read_grid(sample.payload)
@@ -150,9 +153,22 @@ class ServedView(RobotState):
         if sample.attachment:
             self._grids["field"] = read_field(sample.payload)
 
+    @property
+    def _shown_path(self) -> Sample | None:
+        """The newest path; of a paused robot, which has an empty one, that before the pause."""
+        is_paused = self.status is not None and self.status.state == "paused"
+        is_stopped = self._path is not None and self._path is not self._to_drive
+        return self._to_drive or self._path if is_paused and is_stopped else self._path
+
     def _read_path(self, sample: Sample, _: float) -> None:
         # Paths are frequent, so they are no events.
+        about = decode_document(sample.attachment or b"{}", PathAttachment)
+        leads_on = PathPoints(sample.payload).left > 0
         self._path = sample
+        if leads_on:
+            self._to_drive = sample
+        elif not about.revision:  # a daemon begins, and goes on with no path from before
+            self._to_drive = None
 
     def _read_fleet(self, sample: Sample, now: float) -> None:
         robot = self._keys.robot_of(sample.key)
@@ -185,16 +201,19 @@ class ServedView(RobotState):
         return message_text("pose", x=x, y=y, yaw=yaw, at=self.walk.at, path=self.walk.revision)
 
     def _path_message(self, now: float) -> bytes | None:
-        if self._path is None:
+        sample = self._shown_path
+        if sample is None:
             return None
         try:
-            about = decode_document(self._path.attachment or b"{}", PathAttachment)
-            points = PathPoints(self._path.payload)
+            about = decode_document(sample.attachment or b"{}", PathAttachment)
+            points = PathPoints(sample.payload)
             xy = points.take(MOST_POINTS)
         except FasacoError as error:
             self.note_unreadable("path", error, now)
             return None
         self.walk, self._way = PathProgress(xy, about.revision), Way(xy)
+        if self.pose is not None:
+            self.walk.join(self.pose)
         # Far from 0, float32 does not resolve centimetres.
         x, y = xy[0] if xy else (0.0, 0.0)
         flat = array("f", (value for px, py in xy for value in (px - x, py - y)))

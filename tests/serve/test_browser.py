@@ -26,6 +26,7 @@ pytest.importorskip("websockets")
 from websockets.sync.client import ClientConnection, connect
 
 from tests.serve.serving import served
+from tests.serve.test_plain import TECHNICAL
 from tests.support.outsider import TIMEOUT_S, Outsider
 from tests.support.processes import daemon_process
 from tests.support.rooms import HALL, begin, drive, lanes, map_bytes, pose_bytes
@@ -34,6 +35,14 @@ from tests.support.waiting import until
 BROWSER = shutil.which("chromium")
 needs_browser = pytest.mark.skipif(BROWSER is None, reason="needs chromium")
 PHONE, LAPTOP = (390, 844), (1280, 800)
+# How many of some places all over the map are covered by something else.
+COVERED = """(() => {
+  canvas.scrollIntoView();
+  const { left, top, width, height } = canvas.getBoundingClientRect();
+  const shares = [...Array(24).keys()].map((i) => (i + 0.5) / 24);
+  const places = shares.flatMap((x) => shares.map((y) => [left + x * width, top + y * height]));
+  return places.filter((place) => document.elementFromPoint(...place) !== canvas).length;
+})()"""
 
 
 @dataclass
@@ -153,8 +162,9 @@ def test_a_mission_is_ordered_by_finger(tmp_path):
         until(lambda: tab.js("model.role") == "operator")
         outsider.put("map", map_bytes(HALL))
         outsider.put("pose", pose_bytes(*lanes(1)[0]))
-        until(lambda: tab.js("find('state').textContent") == "idle")
+        until(lambda: tab.js("find('does').textContent") == "Ready to sweep")
         until(lambda: tab.js("Boolean(model.map && model.map.pixel === 0.05 && model.pose)"))
+        until(lambda: tab.js("view.scale > 0 && !waiting"))
         tab.js("find('plan').open = true")
         tab.click("draw-zone")
         (x0, y0), (x1, y1) = tab.on_screen(0.5, 0.5), tab.on_screen(3.0, 3.0)
@@ -171,6 +181,8 @@ def test_a_mission_is_ordered_by_finger(tmp_path):
         until(lambda: tab.js("model.areas.zones.length") == 1)
         corners = json.loads(tab.js("JSON.stringify(model.areas.zones[0].polygon)"))
         assert np.abs(np.array(corners) - [[0.5, 0.5], [3, 0.5], [3, 3], [0.5, 3]]).max() < 0.1
+        until(lambda: tab.js("drafts.length") == 0)
+        draw_keep_out(tab, (1.0, 1.0), (1.4, 1.4))
         for size, scheme in itertools.product((PHONE, LAPTOP), ("light", "dark")):
             tab.size(size, scheme)
             # Robot and path in the colours of the style, once it is drawn anew.
@@ -180,14 +192,28 @@ def test_a_mission_is_ordered_by_finger(tmp_path):
                 )
             )
             assert tab.js("document.documentElement.scrollWidth <= innerWidth")
+            assert tab.js(COVERED) == 0
+        tab.size(PHONE, "light")
+        assert tab.js("find('does').textContent") == "Sweeps room 1"
+        assert not TECHNICAL.search(tab.js("document.body.innerText"))
+        assert tab.js("find('technical').textContent").startswith("covering: ")
+        # A pause, and a page opened anew, lose neither the path nor what is drawn.
         tab.click("pause")
         outsider.wait_status(lambda status: status["state"] == "paused")
+        tab.call("Page.navigate", url=page.url)
+        until(lambda: tab.js("model.state && model.state.state") == "paused")
+        until(lambda: has(tab.picture(), tab.js("colours.ahead")))
+        until(lambda: tab.js("find('togo').offsetParent !== null"))
+        assert tab.js("drafts.map((draft) => draft.name).join()") == "keep-out 1"
+        assert not TECHNICAL.search(tab.js("document.body.innerText"))
+        tab.js("drafts.length = 0; showDrafts()")
         tab.click("resume")
         outsider.wait_status(lambda status: status["state"] == "covering")
         tab.click("cancel")
         assert outsider.ask_status()["mission"]["ordered"] == "command"
         # On a slow machine the second tap may be too late, and be a first one.
         until(lambda: canceled(tab, outsider))
+        tab.js("find('details').open = true")
         tab.click("trail")
         until(lambda: tab.js("Boolean(model.field)"))
         assert tab.complaints == []
@@ -221,7 +247,7 @@ def test_a_keep_out_applies_mid_mission_and_a_restart_asks_first(tmp_path):
             tab.click("order")
             until(lambda: tab.js("find('loss').open"))
             said = tab.js("find('losstext').textContent")
-            assert said.startswith("Start forgets 11 covered cells (1.0 m2), ")
+            assert said == "1.0 m² of it is swept already."
             photograph(tab, "question")
             press(tab, "Back")
             assert outsider.ask_status()["coverage"]["covered"] == 12
@@ -232,6 +258,8 @@ def test_a_keep_out_applies_mid_mission_and_a_restart_asks_first(tmp_path):
             outsider.wait_status(lambda status: status["mission"]["keep_out"] == 2)
             assert outsider.ask_status()["coverage"]["covered"] == 12
             until(lambda: tab.js("drafts.length") == 0)
+
+            show_what_is_left(tab)
 
             # Tapped on the map it can be removed; one of the order cannot.
             tab.js("canvas.scrollIntoView()")
@@ -249,6 +277,18 @@ def test_a_keep_out_applies_mid_mission_and_a_restart_asks_first(tmp_path):
             press(tab, "Forget it and start anew")
             outsider.wait_status(lambda status: status["coverage"]["covered"] == 1)
             assert tab.complaints == []
+
+
+def show_what_is_left(tab: Tab) -> None:
+    """Tap on a reason for which floor is not swept: the map shows where."""
+    until(lambda: tab.js("find('left-what').textContent") == "Left out so far")
+    assert not has(tab.picture(), tab.js("colours.left"))
+    tab.js("find('left').querySelector('button').click()")
+    until(lambda: has(tab.picture(), tab.js("colours.left")) > 100)
+    assert "in a keep-out" in tab.js("find('leftname').textContent")
+    assert not TECHNICAL.search(tab.js("document.body.innerText"))
+    photograph(tab, "not_swept")
+    tab.click("unleft")
 
 
 def draw_keep_out(tab: Tab, low: tuple[float, float], high: tuple[float, float]) -> None:

@@ -464,8 +464,7 @@ def hanging(page: Served) -> socket.socket:
 def test_it_outlives_the_daemon(tmp_path):
     endpoint = free_endpoint()
     with served(tmp_path, endpoint) as page, looking(page) as looker:
-        waiting = f"waiting for the bus at {endpoint}"
-        looker.wait("state", lambda state: waiting in state["absent"])
+        looker.wait("state", lambda state: endpoint in state["bus"] and state["absent"])
         with daemon_process(tmp_path, bus={"listen": [endpoint]}):
             looker.wait("state", lambda state: state.get("state") == "waiting for map")
         looker.wait("state", lambda state: "has been gone" in state["absent"])

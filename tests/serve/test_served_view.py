@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from fasaco_edge.bus.arrival import Sample
+from fasaco_edge.client.robot_state import Token
 from fasaco_edge.serve import served_view
 from fasaco_edge.serve.served_view import OTHER_LASTS_S, ServedView
 from fasaco_edge.wire.documents.fleet import FleetMember
@@ -54,6 +55,14 @@ def test_an_order_is_drawn_until_it_is_cancelled():
     assert [zone["name"] for zone in areas["zones"]] == ["hall"]
     tell(view, "command", {"command": "cancel"}, 2.0)
     assert heard(view, "areas", 2.0)["zones"] == []
+
+
+def test_the_zones_of_an_order_are_drawn_by_the_status_alone():
+    view = ServedView(Keys())
+    zones = [{"name": "hall", "polygon": CORNERS}, {"name": "of old"}]
+    tell(view, "status", {"state": "covering", "mission": {"zones": zones}}, 1.0)
+    drawn = [{"name": "hall", "polygon": CORNERS, "is": "ordered"}]
+    assert heard(view, "areas", 1.0)["zones"] == drawn
 
 
 def test_an_order_is_drawn_with_all_its_valid_corners():
@@ -135,24 +144,52 @@ def test_a_speed_of_next_to_nothing_leaves_no_end():
     xy = np.stack([1e4 * np.arange(5.0), np.zeros(5)], axis=-1)
     tell(view, "status", {"state": "covering", "drive": {"speed_m_s": 1e-308}}, 1.0)
     view.take("path", Sample("", encode_path(xy, np.zeros(5), "map", 1)), 1.0)
-    view.news(1.0)
-    tell(view, "status", {"state": "covering", "drive": {"speed_m_s": 1e-308}, "uptime_s": 2}, 2.0)
-    assert heard(view, "state", 2.0)["to_go_s"] is None
+    assert heard(view, "state", 1.0)["to_go_s"] is None
 
 
-def test_a_robot_that_was_told_to_stand_has_no_time_to_go():
+def walk_of(view: ServedView, steps: int, now: float, **more: Any) -> dict[str, Any]:
+    """Let a path of so many metres come, 0 to stand, and a status; return what is shown then."""
+    revision, count = steps + 1, steps + 1 if steps else 0
+    xy = np.stack([np.arange(count, dtype=float), np.zeros(count)], axis=-1)
+    note = encode_json({"revision": revision, "steps": steps, "reason": "test"})
+    path = {"revision": revision, "steps": steps, "remaining_steps": steps} | more.pop("path", {})
+    view.take("path", Sample("", encode_path(xy, np.zeros(len(xy)), "map", 1), "", note), now)
+    tell(view, "status", {"path": path, "drive": {"speed_m_s": 0.25}} | more, now)
+    news = view.news(now)
+    path, told = news.get("path"), news["state"]
+    assert isinstance(told, str)
+    found: dict[str, Any] = json.loads(told) | {"shown": None}
+    if isinstance(path, bytes):
+        found["shown"] = json.loads(path[4 : 4 + int.from_bytes(path[:4], "little")])["revision"]
+    return found
+
+
+def test_a_paused_robot_keeps_its_path_and_its_time_to_go():
+    """It is told to stand by an empty path, and goes on with the one before."""
     view = ServedView(Keys())
-    xy = np.stack([np.arange(5.0), np.zeros(5)], axis=-1)
-    status = {"state": "covering", "path": {"steps": 4}, "drive": {"speed_m_s": 0.25}}
-    tell(view, "status", status, 1.0)
-    view.take("path", Sample("", encode_path(xy, np.zeros(5), "map", 1)), 1.0)
-    view.news(1.0)
-    tell(view, "status", status | {"uptime_s": 1}, 2.0)
-    assert heard(view, "state", 2.0)["to_go_s"] > 10
-    view.take("path", Sample("", encode_path(xy[:0], np.zeros(0), "map", 2)), 3.0)
-    view.news(3.0)
-    tell(view, "status", status | {"state": "paused", "path": {"steps": 0}}, 4.0)
-    assert heard(view, "state", 4.0)["to_go_s"] is None
+    drives = walk_of(view, 4, 1.0, state="covering", pose={"x": 1.0})
+    assert (drives["to_go_s"], drives["shown"]) == (12, 5)
+    paused = walk_of(view, 0, 2.0, state="paused", pose={"x": 1.5})
+    assert (paused["to_go_s"], paused["shown"]) == (10, None)
+    assert len(view.walk.xy) == 5
+    # One that waits by itself has no path, and nobody knows for how long.
+    waits = walk_of(view, 0, 3.0, state="covering")
+    assert (waits["to_go_s"], waits["shown"]) == (None, 1)
+    # A viewer that joins while it is paused has no path, but the daemon's time.
+    joined = walk_of(ServedView(Keys()), 0, 1.0, state="paused", path={"line_s": 90.4})
+    assert joined["to_go_s"] == 90
+
+
+def test_of_a_robot_that_is_gone_the_last_is_said_as_such():
+    view = ServedView(Keys())
+    view.take("token", Token("robot", here=True), 1.0)
+    drives = walk_of(view, 4, 1.0, state="covering")
+    assert (drives["does"], drives["absent"]) == ("Sweeps everything it can reach", "")
+    view.take("token", Token("robot", here=False), 2.0)
+    gone = heard(view, "state", 2.0)
+    assert gone["does"] == "When last seen: sweeps everything it can reach"
+    assert gone["absent"].startswith("The robot has been gone")
+    assert gone["to_go_s"] is None
 
 
 def test_no_number_that_a_status_may_have_ends_the_page():
@@ -163,7 +200,7 @@ def test_no_number_that_a_status_may_have_ends_the_page():
         now += 10.0
         view.take("status", Sample("", payload), now)
         shown += "state" in view.news(now)
-    assert shown > 100
+    assert shown > 80
 
 
 @pytest.mark.parametrize("name", MALFORMED)

@@ -49,7 +49,8 @@ FULL: dict[str, Any] = {
                            [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]]}],
                            "keep_out": [[[2.0, 2.0], [3.0, 2.0], [3.0, 3.0]]]}},
     "mission": {"ordered": "ordered", "stage": "covering", "zone": "hall", "pass": 1, "passes": 2,
-                "zones": [{"name": "hall", "passes": 2, "pass": 1, "cells": 9, "covered": 3}],
+                "zones": [{"name": "hall", "passes": 2, "pass": 1, "cells": 9, "covered": 3,
+                           "polygon": [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]]}],
                 "keep_out": 1, "home": {"x": 1.0, "y": 1.0}, "tries": 1,
                 "unreached": {"cells": 2, "m2": 0.2, "areas_left_out": 1, "areas": [
                     {"cells": 2, "m2": 0.2, "x": 2.0, "y": 1.0, "reason": "narrow"}]}},

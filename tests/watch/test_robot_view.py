@@ -43,6 +43,27 @@ def test_a_path_that_passes_a_place_again_is_not_cut_there():
     assert walk.at == 5
 
 
+def test_progress_on_a_line_with_long_pieces_is_between_its_points():
+    """As of a way home, whose end is nearer to the robot than its next corner."""
+    walk = PathProgress([(0.0, 0.0), (0.0, 5.0), (1.0, 5.0), (1.0, 2.0), (0.6, 2.0)])
+    walk.passed(Pose2D(0.05, 1.5))
+    assert (walk.at, walk.beyond_m) == (0, 1.5)
+    walk.passed(Pose2D(0.05, 4.0))
+    assert (walk.at, walk.beyond_m) == (0, 4.0)
+    walk.passed(Pose2D(1.0, 5.0))
+    assert (walk.at, walk.beyond_m) == (2, 0.0)
+    later = PathProgress(walk.xy)
+    later.join(Pose2D(1.0, 3.0))
+    assert (later.at, later.beyond_m) == (2, 2.0)
+
+
+def test_steps_of_a_line_are_not_its_points():
+    view = mid_mission()
+    view.pose = None
+    tell(view, "status", status(path={"revision": 7, "remaining_steps": 2, "steps": 40}))
+    assert len(view.path_ahead) == 12
+
+
 def test_the_daemon_knows_how_much_is_left():
     view = mid_mission()
     view.pose = None

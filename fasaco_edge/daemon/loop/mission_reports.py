@@ -32,6 +32,8 @@ if TYPE_CHECKING:
     from fasaco_edge.planners.cost import CoverageCost
 
 PASSED = "passed, or in narrow strips, and not known to be swept"
+BESIDE = "beside the path, and not worth the way"
+ON_PATH, LATER = "on the path", ("to come", "not planned yet")
 
 
 def map_report(mission: Mission | None) -> MapReport | None:
@@ -118,10 +120,11 @@ def floor_report(mission: Mission | None) -> FloorReport | None:
     # Before the first path no floor has been judged; on the way home the line is set aside.
     order, is_planned = mission.order_state, mission.route.revision > 0
     is_aside = bool(order.errand) or (order.paused and not to_sweep.ahead_m2)
-    beside = "to come" if is_aside and order.is_open else "beside the path, and not worth the way"
-    beside = beside if is_planned else "not planned yet"
+    to_come, unplanned = LATER
+    beside = to_come if is_aside and order.is_open else BESIDE
+    beside = beside if is_planned else unplanned
     left = _largest_first(
-        (to_sweep.ahead_m2, "on the path"),
+        (to_sweep.ahead_m2, ON_PATH),
         (to_sweep.left_m2, beside),
         (to_sweep.passed_m2, PASSED),
     )
@@ -175,7 +178,7 @@ def mission_report(
         pass_number=None if zone is None else order_state.pass_number,
         passes=None if zone is None else zone.passes,
         pass_kind=(zone.kind(order_state.pass_number).name or None) if zone else None,
-        zones=_zones(mission, order_state),
+        zones=tuple(_zones(mission, order_state)),
         keep_out=len(keep_outs) + standing,
         return_home=bool(order and order.return_home),
         home=None if home is None or mission is None else _place(mission, home),
@@ -198,16 +201,17 @@ def _corners(polygon: Polygon) -> tuple[tuple[float, float], ...]:
     return tuple((round(x, 3), round(y, 3)) for x, y in polygon)
 
 
-def _zones(mission: Mission | None, order_state: OrderState) -> tuple[ZoneReport, ...]:
+def _zones(mission: Mission | None, order_state: OrderState) -> Iterator[ZoneReport]:
+    order = (mission.order_state if mission else order_state).order
+    given = order.as_given.zones if order else ()
+    zones = [(zone, _corners(zone.polygon)) for zone in given if zone.polygon]
     if mission is None:
-        zones = order_state.order.zones if order_state.order else ()
-        return tuple(
-            ZoneReport(zone.name, zone.passes) for zone in zones if zone.polygon is not None
-        )
-    return tuple(
-        ZoneReport(zone.name, zone.passes, zone.begun, zone.cells, zone.covered)
-        for zone in mission.zone_progress()
-    )
+        for zone, corners in zones:
+            yield ZoneReport(zone.name, zone.passes, polygon=corners)
+        return
+    for done, (_, corners) in zip(mission.zone_progress(), zones, strict=True):
+        counts = done.begun, done.cells, done.covered
+        yield ZoneReport(done.name, done.passes, *counts, polygon=corners)
 
 
 def _unreached(mission: Mission | None) -> UnreachedReport:

@@ -46,6 +46,7 @@ REASONS = {
     Cause.CLOSED: "no longer free on the map",
     Cause.UNKNOWN: "unknown to the map",
 }
+LEFT_OVER = "left over after"
 
 
 @dataclass(frozen=True, slots=True)
@@ -274,7 +275,7 @@ class UnreachedFinder:
     def _reason(self, cause: Cause) -> str:
         tries = "1 try" if self._failures == 1 else f"{self._failures} tries"
         why = f", {self._why_left}" if self._why_left else ""
-        return REASONS.get(cause, f"left over after {tries}{why}")
+        return REASONS.get(cause, f"{LEFT_OVER} {tries}{why}")
 
     def viewpoints(self, order: MissionOrder, area: ReachableArea) -> set[Cell]:
         """Return the cells (row, col) from which to look at areas that were closed."""

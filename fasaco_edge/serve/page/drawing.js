@@ -5,7 +5,7 @@ const TAP_PIXELS = 12, CLOSE_PIXELS = 24;
 
 function beginDrawing(kind) {
   Object.assign(drawing, { kind, corners: [], from: null, to: null });
-  if (kind) canvas.scrollIntoView({ block: "nearest" });
+  if (kind) document.querySelector("main").scrollIntoView({ block: "nearest" });
   showDrawing();
 }
 
@@ -63,28 +63,40 @@ function isInside([x, y], polygon) {
 function pick(at) {
   const area = keptOut().find((each) => each.name && isInside(toMap(...at), each.polygon));
   picked = area && model.role === "operator" ? area.name : "";
-  if (picked) canvas.scrollIntoView({ block: "nearest" });
+  if (picked) document.querySelector("main").scrollIntoView({ block: "nearest" });
   showPicked();
 }
 
 function showPicked() {
   if (!keptOut().some((area) => area.name === picked)) picked = "";
-  document.getElementById("pickbar").hidden = !picked;
   document.getElementById("pickname").textContent = picked;
+  showBars();
+}
+
+// Below the map is what is going on there: drawing, a keep-out, floor not swept, else the tools.
+function showBars() {
+  const bars = { drawbar: drawing.kind, pickbar: picked, leftbar: model.left, tools: true };
+  let taken = false;
+  for (const [name, wanted] of Object.entries(bars)) {
+    document.getElementById(name).hidden = taken || !wanted;
+    taken = taken || Boolean(wanted);
+  }
+  if (model.left) {
+    const { reason, places } = model.left, isOver = model.state.mission.stage === "over";
+    document.getElementById("leftname").textContent = `${isOver ? "not swept" : "not swept yet"}; ${places.length ? "ringed" : "among it"}: ${reason}`;
+  }
   redraw();
 }
 
 function showDrawing() {
-  const bar = document.getElementById("drawbar"), count = drawing.corners.length;
-  bar.hidden = !drawing.kind;
-  document.getElementById("tools").hidden = Boolean(drawing.kind);
+  const count = drawing.corners.length;
   const what = drawing.kind === "zone" ? "room" : "keep-out";
   document.getElementById("drawhint").textContent = count
     ? `${count} corner${count > 1 ? "s" : ""} of the ${what}; tap the next`
     : `Drag over the ${what}, or tap its corners`;
   document.getElementById("drawdone").hidden = count < 3;
   canvas.classList.toggle("draws", Boolean(drawing.kind));
-  redraw();
+  showBars();
 }
 
 function drawDrafts(context) {

@@ -22,11 +22,11 @@ const awaited = new Map();
 
 function command(name, members, then = {}) {
   if (!socket || socket.readyState !== WebSocket.OPEN) {
-    say("no connection to the server", "bad");
+    say("There is no connection: try again.", "bad");
     return;
   }
   asked += 1;
-  awaited.set(asked, then);
+  awaited.set(asked, { ...then, name });
   say("sent …", "");
   send({ kind: "command", id: asked, command: name, ...members });
 }
@@ -51,7 +51,7 @@ function join() {
     showLink(false, "no connection; trying again");
     if (event.code === 4401) return;
     if (!find("absent").textContent || find("absent").hidden) {
-      find("absent").textContent = "no connection to the server; trying again";
+      find("absent").textContent = "No connection; trying again";
       find("absent").hidden = false;
     }
     if (!document.hidden) setTimeout(rejoin, pause);
@@ -102,6 +102,7 @@ document.addEventListener("visibilitychange", () => {
 
 readColours();
 remembered();
+takeUpDrafts();
 showDrafts();
 redraw();
 join();

@@ -4,6 +4,8 @@ const model = {
   map: null, floor: null, field: null, path: null, role: "viewer",
   // Of a recording: what it is, the track driven in all of it, and the time shown.
   recording: null, track: null, at: 0,
+  // The part of the floor that is not swept, and shown on the map.
+  left: null,
 };
 
 async function inflate(bytes) {

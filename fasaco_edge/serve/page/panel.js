@@ -1,7 +1,6 @@
 // The panel: state, progress, commands and events, in words. Text is only ever set as text.
 const find = (id) => document.getElementById(id);
 const LOOKS = { covering: "go", returning: "go", planning: "go", charging: "go", done: "go", blocked: "bad", degraded: "bad", paused: "wait" };
-const WORDS = { covering: "sweeping", returning: "driving home", degraded: "in trouble" };
 
 function item(...parts) {
   const line = document.createElement("li");
@@ -26,44 +25,87 @@ function duration(seconds) {
   return minutes < 120 ? `${minutes} min` : `${Math.floor(minutes / 60)} h ${minutes % 60} min`;
 }
 
+// When a robot that drives will be done, by the clock.
+function ends(state) {
+  if (state.to_go_s === null || state.to_go_s < 60 || state.state === "paused" || model.recording || !(state.time_scale > 0)) return "to go";
+  const end = new Date(Date.now() + (1000 * state.to_go_s) / state.time_scale);
+  return `done at ${end.toLocaleTimeString([], { hour: "2-digit", minute: "2-digit", hour12: false })}`;
+}
+
 function showState() {
   const state = model.state;
   find("robot").textContent = state.robot;
-  document.title = `${state.robot} · ${state.state || "waiting"}`;
+  document.title = `${state.robot} · ${state.word || "waiting"}`;
   find("absent").hidden = !state.absent;
-  const others = state.others.length ? `; on this bus: ${state.others.join(", ")}` : "";
+  const others = state.others.length ? ` There are: ${state.others.join(", ")}.` : "";
   find("absent").textContent = state.absent && state.absent + (state.absent.includes("of the name") ? others : "");
   find("progress").hidden = !state.state;
   if (!state.state) {
     find("state").textContent = "waiting";
     find("state").className = "chip";
+    showList("technical", state.bus ? [item(`waits for the bus at ${state.bus}`)] : []);
     return;
   }
-  find("state").textContent = WORDS[state.state] || state.state;
+  find("state").textContent = state.word;
   find("state").className = `chip ${state.in_trouble ? "bad" : LOOKS[state.state] || ""}`;
-  find("reason").textContent = state.reason;
+  find("does").textContent = state.does;
+  showList("needs", state.needs.map((text) => item(text)));
   showProgress(state);
   showBattery(state.battery);
-  showList("faults", state.faults.map((text) => item(text)));
-  const floor = state.floor || { left: [], out_of_reach: [] };
-  showList("left", [
-    ...state.unreached.map((area) => item(["span", "m2", squares(area.m2)], `${area.reason}, at ${area.x.toFixed(1)}, ${area.y.toFixed(1)}`)),
-    ...floor.left.map((part) => item(["span", "m2", squares(part.m2)], part.reason)),
-    ...floor.out_of_reach.map((part) => item(["span", "m2", squares(part.m2)], `out of reach: ${part.reason}`)),
-  ]);
-  showList("fleet", (state.fleet || []).map((member) => item(["b", "", `${member.name} `], member.away ? `away: ${member.away}` : member.state)));
-  find("foot").textContent = `fasaco-edge ${state.version}`;
+  showLeft(state);
+  find("fleet").hidden = !state.fleet;
+  showList("robots", (state.fleet || []).map((member) => item(["b", "", `${member.name} `], member.does)));
+  showTechnical(state);
   showCommands();
 }
+
+// In an engineer's words, one tap away.
+function showTechnical(state) {
+  const away = (state.fleet || []).filter((member) => member.away).map((member) => `${member.name} is away: ${member.away}`);
+  const bus = state.bus ? [`waits for the bus at ${state.bus}`] : [];
+  const lines = [`${state.state}: ${state.reason || "no reason"}`, ...bus, ...state.faults, ...away];
+  showList("technical", lines.map((text) => item(text)));
+  find("foot").textContent = `fasaco-edge ${state.version}`;
+}
+
+// What is not swept: each line shows itself on the map; the list opens by itself at the end.
+let wasOver = null;
+function showLeft(state) {
+  const parts = state.left, isOver = state.mission.stage === "over";
+  find("left").hidden = !parts.length;
+  find("left-what").textContent = isOver ? "Not swept" : "Left out so far";
+  find("left-m2").textContent = squares(parts.reduce((sum, part) => sum + part.m2, 0));
+  find("left").querySelector("ul").replaceChildren(...parts.map((part) => {
+    const line = document.createElement("li"), show = action("", () => showOnMap(part));
+    show.append(...item(["span", "m2", squares(part.m2)], part.reason).childNodes);
+    line.append(show);
+    return line;
+  }));
+  if (isOver && !wasOver) find("left").open = true;
+  wasOver = isOver;
+  const shown = model.left && parts.find((part) => part.reason === model.left.reason);
+  if (model.left) { model.left = shown || null; showBars(); }
+}
+
+function showOnMap(part) {
+  model.left = part;
+  picked = "";
+  Object.assign(view, { fitted: true, follows: false });
+  showTools();
+  showBars();
+  document.querySelector("main").scrollIntoView({ block: "nearest" });
+}
+find("unleft").addEventListener("click", () => { model.left = null; showBars(); });
 
 function showProgress(state) {
   const floor = state.floor, knows = floor && floor.reachable_m2;
   const share = knows ? floor.reached_m2 / floor.reachable_m2 : state.cells;
   find("share").textContent = share === null || share === undefined ? "–" : percent(share);
-  find("share-of").textContent = state.mission.zone ? "of this room" : knows ? "of the floor in reach" : "of the cells in reach";
   find("area").textContent = floor ? squares(knows ? floor.reached_m2 : floor.swept_m2) : "–";
   find("area-of").textContent = knows ? `of ${squares(floor.reachable_m2)}` : "swept";
-  find("togo").textContent = state.to_go_s === null ? "–" : duration(state.to_go_s);
+  find("togo").textContent = duration(state.to_go_s || 0);
+  find("togo").parentElement.hidden = state.to_go_s === null;
+  find("togo-of").textContent = state.state === "returning" ? "to get there" : ends(state);
   find("bar").style.width = `${100 * Math.min(share || 0, 1)}%`;
   find("bar").parentElement.setAttribute("aria-valuenow", Math.round(100 * (share || 0)));
   const lines = state.mission.zones.map((zone) => {
@@ -81,12 +123,12 @@ function showBattery(battery) {
 
 function showList(id, lines) {
   find(id).hidden = !lines.length;
-  find(id).querySelector("ul").replaceChildren(...lines);
+  find(id).replaceChildren(...lines);
 }
 
 function showEvents() {
   const clock = (at) => new Date(1000 * at).toLocaleTimeString([], { hour12: false });
-  find("lately").querySelector("ol").replaceChildren(
+  find("lately").replaceChildren(
     ...model.events.map((entry) => item(["time", "", clock(entry.at_s)], ["span", entry.tone, entry.text])),
   );
 }
@@ -111,7 +153,7 @@ function showDrafts() {
     const line = item(["i", "", ""]), label = document.createElement("label"), box = document.createElement("input");
     box.type = "checkbox";
     box.checked = chosen.has(zone.name);
-    box.addEventListener("change", () => { (box.checked ? chosen.add(zone.name) : chosen.delete(zone.name)); showCommands(); });
+    box.addEventListener("change", () => { (box.checked ? chosen.add(zone.name) : chosen.delete(zone.name)); keepDrafts(); showCommands(); });
     label.className = "row name";
     label.append(box, zone.name);
     line.append(label);
@@ -126,14 +168,34 @@ function showDrafts() {
     name.value = draft.name;
     name.maxLength = 64;
     name.setAttribute("aria-label", isZone ? "name of the room" : "name of the keep-out");
-    name.addEventListener("input", () => { draft.name = name.value; redraw(); });
+    name.addEventListener("input", () => { draft.name = name.value; keepDrafts(); redraw(); });
     const remove = action("Remove", () => { drafts.splice(index, 1); showDrafts(); redraw(); });
     const now = isZone ? [] : [action("Apply now", () => apply(draft), "primary")];
     lines.push(draftLine(isZone ? "" : "out", name, ...now, remove));
   });
   find("drafts").replaceChildren(...lines);
+  keepDrafts();
   showCommands();
 }
+
+// What is drawn and chosen, and not ordered yet, outlives a reload of the page.
+function keepDrafts() {
+  const kept = { drafts, chosen: [...chosen], passes: find("passes").value, home: find("return").checked };
+  try { sessionStorage.setItem("drafts", JSON.stringify(kept)); } catch (error) { /* a browser that keeps nothing */ }
+}
+
+function takeUpDrafts() {
+  try {
+    const kept = JSON.parse(sessionStorage.getItem("drafts"));
+    if (!kept) return;
+    drafts.push(...kept.drafts);
+    kept.chosen.forEach((name) => chosen.add(name));
+    find("passes").value = kept.passes;
+    find("return").checked = kept.home;
+    find("plan").open = drafts.length > 0 || chosen.size > 0;
+  } catch (error) { /* nothing was kept */ }
+}
+for (const name of ["passes", "return"]) find(name).addEventListener("change", keepDrafts);
 
 function draftLine(kind, ...parts) {
   const line = item(["i", kind, ""]);
@@ -209,7 +271,8 @@ function start(what, discard = false) {
     refused: (answer) => {
       if (answer.code !== "would_forget") return;
       refused = what;
-      find("losstext").textContent = `${answer.text[0].toUpperCase()}${answer.text.slice(1)}.`;
+      const swept = answer.text.match(/\(([\d.]+) m2\)/);
+      find("losstext").textContent = `${swept ? `${swept[1]} m² of it` : "Some of it"} is swept already.`;
       say("", "");
       find("loss").showModal();
     },
@@ -236,15 +299,31 @@ function drop(name) {
 }
 find("unkeep").addEventListener("click", () => drop(picked));
 
-function say(text, tone) {
-  find("answer").textContent = text;
+// An answer is shown for a while; an engineer's words for it are a tap away.
+const SAID_MS = 8000;
+let forgetting = 0;
+function say(text, tone, why = "") {
+  clearTimeout(forgetting);
+  find("answer").textContent = why ? "" : text;
   find("answer").className = tone;
+  if (why) {
+    const details = document.createElement("details"), summary = document.createElement("summary");
+    summary.textContent = text;
+    details.append(summary, why);
+    find("answer").append(details);
+  } else forgetting = setTimeout(() => say("", ""), SAID_MS);
 }
 
+const TAKEN = {
+  start: "It begins.", pause: "It stops.", resume: "It goes on.", home: "It comes home.", cancel: "It has ended.",
+  keep_out_add: "It stays out of there.", keep_out_remove: "It may go there again.",
+};
+const REFUSED = { not_now: "That is not possible now.", bad_order: "It cannot do it like that." };
 function showAnswer(answer) {
   const then = awaited.get(answer.id) || {};
   awaited.delete(answer.id);
-  say(answer.hint ? `${answer.text} (${answer.hint})` : answer.text, answer.ok ? "good" : "bad");
+  if (answer.ok) say(TAKEN[then.name] || "", "good");
+  else say(REFUSED[answer.code] || "That did not work.", "bad", answer.hint ? `${answer.text} (${answer.hint})` : answer.text);
   const next = answer.ok ? then.taken : then.refused;
   if (next) next(answer);
 }
@@ -252,6 +331,7 @@ function showAnswer(answer) {
 find("trail").addEventListener("click", () => {
   showsField = !showsField;
   find("trail").setAttribute("aria-pressed", showsField);
+  find("trail").textContent = showsField ? "Hide the pheromone trail" : "Show the pheromone trail";
   find("legend").hidden = showsField;
   find("legend-trail").hidden = !showsField;
   wants();

@@ -4,7 +4,7 @@ const dark = window.matchMedia("(prefers-color-scheme: dark)");
 
 function readColours() {
   const style = getComputedStyle(document.documentElement);
-  for (const name of ["map", "free", "wall", "swept", "ahead", "driven", "robot", "keepout", "zone", "other", "ink", "card"]) {
+  for (const name of ["map", "free", "wall", "swept", "ahead", "driven", "robot", "keepout", "zone", "other", "left", "ink", "card"]) {
     colours[name] = style.getPropertyValue(`--${name}`).trim();
   }
   for (const kind of ["map", "floor", "field"]) if (model[kind]) model[kind].image = null;
@@ -29,14 +29,19 @@ function tints(kind) {
 }
 
 function imageOf(grid) {
-  if (grid.image) return grid.image;
+  if (!grid.image) grid.image = tinted(grid, tints(grid.kind));
+  return grid.image;
+}
+
+// A grid as an image, with the colour and opacity that a table has for each mark.
+function tinted(grid, table) {
   const image = document.createElement("canvas");
   [image.width, image.height] = [grid.cols, grid.rows];
   const context = image.getContext("2d"), pixels = context.createImageData(grid.cols, grid.rows);
-  const out = new Uint32Array(pixels.data.buffer), table = new Uint32Array(tints(grid.kind).buffer);
-  for (let i = 0; i < grid.marks.length; i++) out[i] = table[grid.marks[i]];
+  const out = new Uint32Array(pixels.data.buffer), colour = new Uint32Array(table.buffer);
+  for (let i = 0; i < grid.marks.length; i++) out[i] = colour[grid.marks[i]];
   context.putImageData(pixels, 0, 0);
-  return (grid.image = image);
+  return image;
 }
 
 function drawGrid(context, grid) {
@@ -50,6 +55,49 @@ function drawGrid(context, grid) {
   context.imageSmoothingEnabled = size < 1;
   context.drawImage(imageOf(grid), 0, 0);
   context.restore();
+}
+
+// Free floor that is not swept, of the order's rooms if it has some, in a colour of its own.
+const beside = document.createElement("canvas");
+function drawLeft(context, ratio) {
+  if (!model.left || !model.map) return;
+  [beside.width, beside.height] = [canvas.width, canvas.height];
+  const over = beside.getContext("2d");
+  over.setTransform(ratio, 0, 0, ratio, 0, 0);
+  const pixels = [["map", (mark) => (mark & 3) === 1], ["floor", (mark) => mark >= 8]];
+  for (const [kind, holds] of pixels) {
+    if (!model[kind]) continue;
+    over.globalCompositeOperation = kind === "map" ? "source-over" : "destination-out";
+    drawGrid(over, { ...model[kind], image: maskOf(model[kind], holds) });
+  }
+  const names = new Set(((model.state && model.state.mission) || { zones: [] }).zones.map((zone) => zone.name));
+  const rooms = ((model.areas && model.areas.zones) || []).filter((zone) => names.has(zone.name));
+  if (rooms.length) {
+    over.globalCompositeOperation = "destination-in";
+    over.beginPath();
+    for (const room of rooms) {
+      room.polygon.forEach(([x, y], i) => over[i ? "lineTo" : "moveTo"](...toScreen(x, y)));
+      over.closePath();
+    }
+    over.fill();
+  }
+  context.drawImage(beside, 0, 0, canvas.clientWidth, canvas.clientHeight);
+  context.lineWidth = 3;
+  context.strokeStyle = colours.ink;
+  for (const [x, y] of model.left.places) {
+    context.beginPath();
+    context.arc(...toScreen(x, y), 14, 0, 2 * Math.PI);
+    context.stroke();
+  }
+}
+
+// The pixels of a grid whose marks hold, as an image; kept with the grid.
+function maskOf(grid, holds) {
+  if (grid.mask && grid.maskColour === colours.left) return grid.mask;
+  const table = new Uint8ClampedArray(4 * 256);
+  for (let mark = 0; mark < 256; mark++) if (holds(mark)) table.set([...channels(colours.left), 255], 4 * mark);
+  [grid.mask, grid.maskColour] = [tinted(grid, table), colours.left];
+  return grid.mask;
 }
 
 function trace(context, points, closed) {
@@ -83,9 +131,12 @@ function drawLabel(context, text, px, py, colour) {
   context.textBaseline = "middle";
   context.lineWidth = 4;
   context.strokeStyle = colours.card;
-  context.strokeText(shown, px, py);
+  // All of a label is on the screen if its middle is.
+  const half = context.measureText(shown).width / 2 + 4, width = canvas.clientWidth;
+  const at = px < 0 || px > width ? px : Math.min(Math.max(px, half), Math.max(width - half, half));
+  context.strokeText(shown, at, py);
   context.fillStyle = colour;
-  context.fillText(shown, px, py);
+  context.fillText(shown, at, py);
 }
 
 function drawPath(context) {
@@ -216,6 +267,7 @@ function draw() {
   drawGrid(context, model.map);
   if (showsField) drawGrid(context, model.field);
   else drawGrid(context, model.floor);
+  drawLeft(context, ratio);
   for (const zone of (model.areas && model.areas.zones) || []) drawArea(context, zone.polygon, colours.zone, zone.name, zone.is === "standing", zone.is === "standing" ? 0.03 : 0.14);
   for (const area of (model.areas && model.areas.keep_out) || []) drawArea(context, area.polygon, colours.keepout, area.name || "", area.is === "standing", area.name && area.name === picked ? 0.4 : 0.14);
   if (!showsField) drawTrack(context);

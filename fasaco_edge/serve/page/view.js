@@ -16,10 +16,10 @@ function fit() {
   const bounds = knownBounds();
   if (!bounds || !canvas.clientWidth) return;
   const [x0, y0, x1, y1] = bounds;
-  const room = [canvas.clientWidth - 40, canvas.clientHeight - 64];
+  const room = [canvas.clientWidth - 24, canvas.clientHeight - 52];
   view.scale = Math.max(Math.min(room[0] / (x1 - x0), room[1] / (y1 - y0)), 0.01);
   view.x = (x0 + x1) / 2;
-  view.y = (y0 + y1) / 2 - 8 / view.scale;
+  view.y = (y0 + y1) / 2 - 14 / view.scale;  // below it is the scale
   if (view.follows && model.pose) [view.x, view.y] = [model.pose.x, model.pose.y];
 }
 

@@ -102,6 +102,7 @@ class ZoneReport(Document, frozen=True):
         pass: its newest pass; 0: not begun.
         cells: number of reachable cells.
         covered: cells covered in that pass.
+        polygon: corners x, y [m] in the frame of the map.
     """
 
     name: str = ""
@@ -109,6 +110,7 @@ class ZoneReport(Document, frozen=True):
     pass_number: Count = msgspec.field(name="pass", default=0)
     cells: Count = 0
     covered: Count = 0
+    polygon: Annotated[tuple[tuple[float, float], ...], allowed(maxItems=1000)] = ()
 
 
 class UnreachedArea(Document, frozen=True):

@@ -1,0 +1,164 @@
+"""The page's words for who owns the robot: what it does, needs and left unswept.
+
+Reasons of the mission are for engineers, and stay in the page's details.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+from fasaco_edge.wire.documents.status import Status
+
+WORDS = {
+    "idle": "ready",
+    "waiting for map": "starting",
+    "waiting for pose": "starting",
+    "loading": "starting",
+    "covering": "sweeping",
+    "returning": "driving home",
+    "blocked": "waiting",
+    "degraded": "needs help",
+}
+"""One word for each state that does not say it itself."""
+DOES = {
+    "idle": "Ready to sweep",
+    "waiting for map": "Waits for its map of the rooms",
+    "waiting for pose": "Finds out where it is",
+    "loading": "Starts up",
+    "planning": "Plans its way",
+    "done": "Done",
+    "blocked": "Cannot go on just now",
+}
+STUCK = "Something closes its way: open doors and clear the floor. It tries again by itself."
+NEEDS = {
+    "not_begun": "It cannot begin without its map. Switch it off and on; if that does not help, "
+    "call service.",
+    "no_pose": "It has lost its place. Put it where it started; if that does not help, "
+    "call service.",
+    "pose_jumped": "It finds its place again: wait a moment. If it goes on like this, "
+    "call service.",
+    "no_map": "It gets no new picture of the rooms. Switch it off and on; if that does not help, "
+    "call service.",
+    "no_battery": "It does not know how full its battery is. Call service.",
+    "no_dock": "Its dock is not on this floor: bring it back there to charge.",
+    "no_current": "It stands in its dock and does not charge. Check the plug, and how it stands.",
+    "shut_in": "It is shut in. Open the door, or move what is in its way.",
+    "blocked": "Something is in its way: clear it if you can. It sweeps elsewhere meanwhile.",
+    "stands": "It does not get on. Look what holds it: a cable, a carpet, furniture.",
+    "beside_line": "It drives beside its path and may leave strips. Call service.",
+    "two_publishers": "Two programs tell it different things. Call service.",
+    "no_effect": "A keep-out, its home or its dock lies where it has seen no floor. Check the map.",
+}
+"""What the owner can do, by the code of a trouble."""
+UNSAVED = "It cannot save what it has swept: after a power cut it would begin anew. Call service."
+
+# Floor that is still to come, in the words of ``floor.left``.
+TO_COME = ("on the path", "to come", "not planned yet")
+LEFT = {
+    "too narrow for the robot, or too near to a wall or to furniture": "too narrow for the robot, "
+    "or too close to a wall or furniture",
+    "closed off: no way leads there that the robot fits through": "no way in: a closed door, or "
+    "something in the way",
+    "in a keep-out zone, or too near to one": "in a keep-out, or close to one",
+    "passed, or in narrow strips, and not known to be swept": "thin strips that it may have missed",
+    "beside the path, and not worth the way": "small spots, not worth the way",
+    "in a keep-out zone": "in a keep-out, or close to one",
+    "closed off by a keep-out zone": "behind a keep-out",
+    "closed off by obstacles": "no way in: a closed door, or something in the way",
+    "no longer free on the map": "something stands there now",
+    "unknown to the map": "it has not seen that part",
+}
+"""Why floor was left, by the reason in the status."""
+TRIED, OTHERWISE = "left over after", "for another reason"
+NOT_REACHED = "it could not get there"
+# Less is not worth a line [m2].
+LEAST_M2 = 0.05
+# At home, the robot is this near to it [m].
+NEAR_M = 0.5
+
+
+def does(status: Status) -> str:
+    """Return what the robot does now."""
+    mission, path = status.mission, status.path
+    if status.state in DOES:
+        return DOES[status.state]
+    if status.state == "paused":
+        return "Paused at home" if _is_home(status) else "Paused: waits for Resume"
+    if status.state == "charging":
+        goes_on = mission.ordered is not None and mission.stage != "over"
+        return "Charges, then goes on by itself" if goes_on else "Charges"
+    if status.state == "returning" or mission.stage == "returning":
+        is_to_charge = status.battery is not None and status.battery.goes_on_at is not None
+        return "Drives to its dock to charge" if is_to_charge else "Drives home"
+    return _sweeps(status) if path is None or path.steps else "Waits a moment"
+
+
+def last_seen(status: Status) -> str:
+    """Return what a robot did that nothing is known of now."""
+    did = does(status)
+    return f"When last seen: {did[:1].lower()}{did[1:]}"
+
+
+def _sweeps(status: Status) -> str:
+    mission = status.mission
+    if mission.stage == "retrying":
+        return "Tries again where it could not get to"
+    zone, passes = mission.zone or "everything it can reach", mission.passes or 1
+    return f"Sweeps {zone}" + (f", pass {mission.pass_number} of {passes}" if passes > 1 else "")
+
+
+def _is_home(status: Status) -> bool:
+    home, pose = status.mission.home, status.pose
+    if home is None or pose is None:
+        return False
+    return math.hypot(home.x - pose.x, home.y - pose.y) < NEAR_M
+
+
+def needs(status: Status) -> list[str]:
+    """Return what the robot needs from its owner."""
+    found = [NEEDS.get(each.code, "Call service.") for each in status.troubles]
+    if status.state == "blocked" and not found:
+        found.append(STUCK)
+    return found + ([UNSAVED] if status.ledger.fault else [])
+
+
+@dataclass(slots=True)
+class LeftFloor:
+    """Floor that is not swept for one reason.
+
+    Attributes:
+        m2: its area [m2].
+        reason: why, in the owner's words.
+        places: where larger parts of it are (x, y) [m].
+    """
+
+    reason: str
+    m2: float = 0.0
+    places: list[tuple[float, float]] = field(default_factory=list)
+
+
+def left(status: Status) -> list[LeftFloor]:
+    """Return the floor of an order that is not swept, the largest part first."""
+    mission, floor = status.mission, status.floor
+    if mission.ordered is None:
+        return []
+    found: dict[str, LeftFloor] = {}
+    parts = (*(floor.left or ()), *(floor.out_of_reach or ())) if floor else ()
+    for part in parts:
+        if mission.stage == "over" or part.reason not in TO_COME:
+            _of(found, part.reason).m2 += part.m2
+    # Where the floor is known, its areas are those of the cells, more exactly.
+    are_counted = set(found)
+    for area in mission.unreached.areas:
+        kind = _of(found, area.reason)
+        kind.places.append((area.x, area.y))
+        if kind.reason not in are_counted:
+            kind.m2 += area.m2
+    told = (kind for kind in found.values() if kind.m2 >= LEAST_M2)
+    return sorted(told, key=lambda kind: -kind.m2)
+
+
+def _of(found: dict[str, LeftFloor], reason: str) -> LeftFloor:
+    plain = NOT_REACHED if reason.startswith(TRIED) else LEFT.get(reason, OTHERWISE)
+    return found.setdefault(plain, LeftFloor(plain))

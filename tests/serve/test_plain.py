@@ -1,0 +1,83 @@
+"""The page's words for an owner: there are some for all that a status can say."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+
+from fasaco_edge.daemon.loop import mission_reports
+from fasaco_edge.mission.coverage import unreached
+from fasaco_edge.mission.line import missed_floor
+from fasaco_edge.serve import plain
+from fasaco_edge.wire.documents.json_text import decode_tolerant, encode_json
+from fasaco_edge.wire.documents.replies import STATES
+from fasaco_edge.wire.documents.status import TROUBLES, Status
+from tests.support.statuses import FULL
+
+# An engineer's words.
+TECHNICAL = re.compile(
+    r"\b(cells?|line polished|revision|daemon|bus|topic|pose|localiser|pheromone|lattice|covered|"
+    r"coverable|configuration|order|zone|m2)\b|path \d|map:|_"
+)
+
+
+def status(**members: object) -> Status:
+    """Return a status with these members."""
+    return decode_tolerant(encode_json(FULL | members), Status)
+
+
+def told(of: Status) -> list[str]:
+    """Return all texts for an owner about a status."""
+    word = plain.WORDS.get(of.state, of.state)
+    return [word, plain.does(of), *plain.needs(of), *(part.reason for part in plain.left(of))]
+
+
+@pytest.mark.parametrize("state", STATES)
+def test_each_state_is_said_in_an_owners_words(state):
+    """Whatever the reasons and troubles are."""
+    troubles = [{"code": code, "text": "pose 3 covered", "do": "check it"} for code in TROUBLES]
+    for stage in ("covering", "retrying", "returning", "over", None):
+        for path in (FULL["path"], FULL["path"] | {"steps": 0}, None):
+            mission = FULL["mission"] | {"ordered": "command", "stage": stage}
+            of = status(state=state, reason="map: 3 cells", mission=mission, path=path)
+            assert not [text for text in told(of) if TECHNICAL.search(text)]
+    needs = plain.needs(status(state=state, troubles=troubles))
+    assert len(set(needs)) == len(TROUBLES)
+    assert not [text for text in needs if TECHNICAL.search(text)]
+
+
+def test_all_reasons_for_floor_left_have_an_owners_words():
+    reasons = {
+        *missed_floor.REASONS.values(),
+        *unreached.REASONS.values(),
+        mission_reports.PASSED,
+        mission_reports.BESIDE,
+    }
+    assert reasons == set(plain.LEFT)
+    assert {mission_reports.ON_PATH, *mission_reports.LATER} == set(plain.TO_COME)
+    assert unreached.LEFT_OVER.startswith(plain.TRIED)
+    assert not [text for text in plain.LEFT.values() if TECHNICAL.search(text)]
+
+
+def test_floor_left_is_listed_once_with_its_places():
+    """The floor's areas count before those of cells, which know the places."""
+    narrow, closed, *_ = plain.LEFT
+    floor = {
+        "left": [{"m2": 3.0, "reason": "on the path"}, {"m2": 0.01, "reason": narrow}],
+        "out_of_reach": [{"m2": 1.5, "reason": closed}],
+    }
+    areas = [
+        {"m2": 0.9, "x": 1.0, "y": 2.0, "reason": "closed off by obstacles"},
+        {"m2": 0.7, "x": 3.0, "y": 4.0, "reason": "left over after 2 tries, robot stands"},
+        {"m2": 0.2, "x": 5.0, "y": 6.0, "reason": "left over after 1 try"},
+    ]
+    mission = {"ordered": "command", "stage": "covering", "unreached": {"areas": areas}}
+    found = plain.left(status(floor=floor, mission=mission))
+    assert [(part.m2, part.places) for part in found] == [
+        (1.5, [(1.0, 2.0)]),
+        (pytest.approx(0.9), [(3.0, 4.0), (5.0, 6.0)]),
+    ]
+    assert plain.left(status(floor=floor, mission=mission | {"ordered": None})) == []
+    over = plain.left(status(floor=floor, mission=mission | {"stage": "over"}))
+    assert over[0].m2 == 3.0
