@@ -205,11 +205,13 @@ def try_scripts_dry(campaign: Campaign) -> None:
     release = releases.write_release(campaign.folder / "release", "1.0")
     environment = campaign.trap.environment
     _try_make(campaign)
+    # The release is for this interpreter's version, which may not be that of the system.
+    install = "--dry-run", "--no-start", "--python", os.path.realpath(sys.executable)
     for words in (
-        (release / "install.sh", "--dry-run", "--no-start"),
+        (release / "install.sh", *install),
         (release / "uninstall.sh", "--dry-run"),
         # From a source tree, whose wheels would be downloaded.
-        (installed.CHECKOUT / "deploy/install.sh", "--dry-run", "--no-start"),
+        (installed.CHECKOUT / "deploy/install.sh", *install),
     ):
         with campaign.judged(f"{words[0].name} {' '.join(words[1:])}"):
             done = subprocess.run(
