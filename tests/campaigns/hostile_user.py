@@ -205,13 +205,16 @@ def try_scripts_dry(campaign: Campaign) -> None:
     release = releases.write_release(campaign.folder / "release", "1.0")
     environment = campaign.trap.environment
     _try_make(campaign)
-    # The release is for this interpreter's version, which may not be that of the system.
-    install = "--dry-run", "--no-start", "--python", os.path.realpath(sys.executable)
-    for words in (
-        (release / "install.sh", *install),
-        (release / "uninstall.sh", "--dry-run"),
+    # A service runs on the system's Python, whose version may not be that of this release.
+    version = f"python{sys.version_info.major}.{sys.version_info.minor}"
+    installs = [
+        (release / "install.sh", "--dry-run", "--no-start"),
         # From a source tree, whose wheels would be downloaded.
-        (installed.CHECKOUT / "deploy/install.sh", *install),
+        (installed.CHECKOUT / "deploy/install.sh", "--dry-run", "--no-start"),
+    ]
+    for words in (
+        *(installs if Path("/usr/bin/python3").resolve().name == version else ()),
+        (release / "uninstall.sh", "--dry-run"),
     ):
         with campaign.judged(f"{words[0].name} {' '.join(words[1:])}"):
             done = subprocess.run(
