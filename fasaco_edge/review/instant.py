@@ -175,32 +175,28 @@ class _Drawn(msgspec.Struct):
     """Lines and labels of a run."""
 
     lines: dict[int, DrawnLine]
-    labels: dict[str, list[DrawnLabel]]
+    labels: list[DrawnLabel]
 
     @classmethod
     def read(cls, record: RunRecord) -> _Drawn:
         lines: dict[int, DrawnLine] = {}
-        labels: dict[str, list[DrawnLabel]] = {entities.COHORT: [], entities.HERE: []}
-        wanted = (entities.PATH, *labels)
-        for entity, one in drawings([part.path for part in record.parts], *wanted):
+        labels: list[DrawnLabel] = []
+        wanted = (entities.PATH, entities.COHORT)
+        for _, one in drawings([part.path for part in record.parts], *wanted):
             if isinstance(one, DrawnLine):
                 lines.setdefault(one.revision, one)
             elif isinstance(one, DrawnLabel):
-                labels[entity].append(one)
+                labels.append(one)
         return cls(lines, labels)
 
     def line_of(self, revision: int) -> DrawnLine | None:
         return self.lines.get(revision)
 
     def trail_at(self, at_ns: int) -> str:
-        """Return the text of the living trail's labels; "" if there were none."""
-        said = []
-        for lead, entity in (("", entities.COHORT), ("from the robot's cell ", entities.HERE)):
-            past = [one for one in self.labels[entity] if one.at_ns <= at_ns]
-            newest = max(past, key=lambda one: one.at_ns, default=None)
-            if newest is not None and newest.text:
-                said.append(lead + newest.text.replace("\n", "; "))
-        return "; ".join(said)
+        """Return the text of the living trail's label; "" if there was none."""
+        past = [one for one in self.labels if one.at_ns <= at_ns]
+        newest = max(past, key=lambda one: one.at_ns, default=None)
+        return newest.text.replace("\n", "; ") if newest is not None else ""
 
 
 def _path(

@@ -10,7 +10,7 @@ import pytest
 
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D
 from fasaco_edge.grid.rotation import rotated_points
-from fasaco_edge.recording.scene.flows import flows_of, fork_at
+from fasaco_edge.recording.scene.flows import flows_of
 
 EDGE = 0.5
 
@@ -59,13 +59,3 @@ def test_a_cell_of_equal_directions_has_none():
     share[0, 0] = 0.25
     assert len(flows_of(geometry, pointed, share).origins) == 1
     assert not len(flows_of(geometry, np.full((2, 2), -1, np.int8), np.zeros((2, 2))).origins)
-
-
-def test_where_it_leads_on_from_the_robot_is_told():
-    field = of(["EN", "w."])
-    assert fork_at(*field, Pose2D(1.1, 2.1)) == "east: 90 %"
-    assert fork_at(*field, Pose2D(1.1, 2.6)) == "west: 40 %"
-    # In a cell without steps, beyond the trail, or nobody knows where.
-    assert fork_at(*field, Pose2D(1.6, 2.6)) == ""
-    assert fork_at(*field, Pose2D(0.9, 2.1)) == ""
-    assert fork_at(*field, None) == ""

@@ -208,8 +208,6 @@ def test_arrows_show_where_the_trail_points_to(recorded):
     assert (spans.max(axis=0) >= (CELL_M - 1e-6, 10 * CELL_M)).all()
     assert np.count_nonzero(spans[:, 1]) > 10
     assert np.allclose(np.array(origins)[0, :2] / CELL_M % 1, 0.5)
-    (label,) = read_column(recorded.path, entities.HERE, "Points3D:labels").values[-1]
-    assert label.endswith(": 75 %")
 
 
 def test_the_map_is_not_mirrored(recorded):

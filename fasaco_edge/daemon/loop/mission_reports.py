@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 from fasaco_edge.grid.geometry import Polygon
@@ -197,6 +198,7 @@ def _keep_outs(order_state: OrderState) -> Iterator[KeepOutReport]:
             yield KeepOutReport(polygon=_corners(polygon), by="order")
 
 
+@lru_cache(maxsize=256)
 def _corners(polygon: Polygon) -> tuple[tuple[float, float], ...]:
     return tuple((round(x, 3), round(y, 3)) for x, y in polygon)
 

@@ -167,12 +167,6 @@ def label_archetype(bounds: Bounds, text: str, above: float = 0.0) -> rr.Points3
     return rr.Points3D([place], radii=0.0, labels=[text], colors=LABEL_COLOUR, show_labels=True)
 
 
-def words_archetype(pose: Pose2D, text: str, above_m: float) -> rr.Points3D:
-    """Return text at a distance above a point."""
-    place = (pose.x, pose.y + above_m, LABEL_Z)
-    return rr.Points3D([place], radii=0.0, labels=[text], colors=LABEL_COLOUR, show_labels=True)
-
-
 def mark_archetype(pose: Pose2D, text: str, colour: Colour) -> rr.Points3D:
     """Return a point with a name."""
     place = (pose.x, pose.y, LABEL_Z)

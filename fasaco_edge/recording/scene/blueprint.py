@@ -72,7 +72,7 @@ def _pheromone_view(bounds: Bounds) -> rrb.Spatial3DView:
         name="Pheromone of the ants, and where most of it leads",
         contents=[
             f"/{entities.PHEROMONE}/**",
-            f"/{entities.DIRECTIONS}",
+            f"/{entities.DIRECTIONS}/**",
             f"/{entities.ROBOT}/**",
         ],
         eye_controls=eye_above(bounds, PHEROMONE_MARGIN, PHEROMONE_ASPECT),

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.grid.geometry import GridGeometry, Pose2D
+from fasaco_edge.grid.geometry import GridGeometry
 from fasaco_edge.grid.rotation import rotated_points
 from fasaco_edge.kernels import COL_STEP, EAST, NORTH, ROW_STEP
 
@@ -16,7 +16,6 @@ from fasaco_edge.kernels import COL_STEP, EAST, NORTH, ROW_STEP
 DECIDED_APART = 0.2
 # Bytes of an arrow in the file: origin, vector, colour.
 ARROW_BYTES = 2 * 12 + 4
-NAMES = ("east", "north", "west", "south")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -79,23 +78,3 @@ def flows_of(
     centres = rotated_points((found[:, 1::-1] + 0.5) * edge, yaw_deg)
     centres += (origin.x, origin.y)
     return Flows(centres, rotated_points(found[:, 3:1:-1] * edge, yaw_deg), found[:, 4])
-
-
-def fork_at(
-    geometry: GridGeometry,
-    pointed: NDArray[np.int8],
-    share: NDArray[np.float32],
-    pose: Pose2D | None,
-) -> str:
-    """Return the trail's direction at the robot's cell as text, and its share of the pheromone.
-
-    "" if unknown.
-    """
-    if pose is None:
-        return ""
-    x, y = geometry.to_pixels(pose.x, pose.y)
-    row, col = int(np.floor(y)), int(np.floor(x))
-    rows, cols = pointed.shape
-    if not (0 <= row < rows and 0 <= col < cols) or pointed[row, col] < 0:
-        return ""
-    return f"{NAMES[pointed[row, col]]}: {100 * share[row, col]:.0f} %"

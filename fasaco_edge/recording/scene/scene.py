@@ -23,7 +23,7 @@ from fasaco_edge.recording.scene.curves import (
     StatusFigures,
 )
 from fasaco_edge.recording.scene.drawings import DrivenPathDrawing, PathDrawing
-from fasaco_edge.recording.scene.flows import flows_of, fork_at
+from fasaco_edge.recording.scene.flows import flows_of
 from fasaco_edge.recording.scene.layers import (
     Anchor,
     Layers,
@@ -47,8 +47,6 @@ DEFAULT_RADIUS_M = 0.2
 # The view follows the growing map in steps of this fraction of its size: each blueprint
 # takes 120 kB.
 REFRAME_FRACTION = 0.15
-# Distance above the robot of the label with the trail's direction.
-FORK_CELLS = 3.0
 
 
 class Scene:
@@ -226,21 +224,14 @@ class Scene:
             self._describe()
 
     def add_directions(self, grid: OccupancyGrid) -> None:
-        """Draw the directions of the living trail, and label how decided it is at the robot."""
+        """Draw the directions of the living trail."""
         grid = self._anchored(grid.geometry.origin).grid(grid)
-        pointed, share = directions_of(grid)
-        flows = flows_of(grid.geometry, pointed, share)
-        fork = fork_at(grid.geometry, pointed, share, self._robot)
-        robot = self._robot if fork else None
-        above_m = FORK_CELLS * grid.geometry.resolution
-        here = draw.words_archetype(robot, fork, above_m) if robot else draw.no_label_archetype()
+        flows = flows_of(grid.geometry, *directions_of(grid))
 
         def draw_directions() -> None:
             arrows = draw.arrows_archetype(flows)
             self._writer.log(entities.DIRECTIONS, arrows, latched=True, size=flows.size_bytes)
 
-        # Small, and for the robot's present pose: no rate limit, unlike the arrows.
-        self._writer.log(entities.HERE, here, latched=True)
         self._draw(entities.DIRECTIONS, flows.size_bytes, draw_directions)
 
     def add_status(self, status: Status) -> None:
