@@ -158,7 +158,9 @@ def print_summary(summary: Summary, *, as_json: bool) -> None:
         print_json(asdict(summary))
         return
     console = terminal.out()
-    ending = "every reachable cell is covered" if summary.complete else "NOT ALL WAS COVERED"
+    missing = summary.reachable_cells - summary.covered_cells
+    ending = "the time is up" if not missing else f"{missing} cell{'s' * (missing != 1)} left over"
+    ending = "every reachable cell is covered" if summary.complete else ending
     console.print(f"{Path(summary.map).stem}: {ending}", style="bold")
     console.print(terminal.figures(_rows(summary)))
     for file in (*summary.recording, *summary.fleet_recording, summary.picture):
