@@ -16,7 +16,7 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Callable, Iterable, Sequence
-from typing import TYPE_CHECKING, NamedTuple, Self
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
 
@@ -37,13 +37,19 @@ from fasaco_edge.mission.coverage.floor_tiles import (
     window_of,
 )
 from fasaco_edge.mission.coverage.floor_tiles import Place as TilePlace
+from fasaco_edge.mission.coverage.segments import (
+    TOUCH_M,
+    Segment,
+    segments_between,
+    span,
+    window_around,
+    within,
+)
 from fasaco_edge.mission.coverage.shared_tiles import SharedTiles
 from fasaco_edge.mission.coverage.steady_track import (
     SHORT_M,
     Place,
     SteadyTrack,
-    beside_m,
-    corner_between,
 )
 
 if TYPE_CHECKING:
@@ -65,24 +71,9 @@ MOST_TOGETHER = 1 << 16
 # Number of changes whose windows are remembered.
 REMEMBERED = 64
 ANYWHERE = Window(-(2**40), -(2**40), 2**40, 2**40)
-# Error of a heading [rad].
-YAW_RAD = math.radians(1.0)
-# Tolerance, so that rounding does not decide whether a pixel at the rim is swept [m].
-TOUCH_M = 1e-9
 # Grids are processed in blocks of BLOCK x BLOCK pixels of the floor; coarser grids in smaller
 # blocks.
 BLOCK = 256
-
-
-class Segment(NamedTuple):
-    """A segment from one place to the next, and the radius swept along it with certainty [m].
-
-    A radius of 0: nothing is swept with certainty.
-    """
-
-    start: Place
-    end: Place
-    reach_m: float
 
 
 class SweptFloor:
@@ -270,37 +261,10 @@ class SweptFloor:
     def _store(self, place: Place, after: Place | None) -> None:
         """Store the sweep to a place, after which the robot came to another."""
         start = self._kept_to
-        for segment in self._segments(self._before, start or place, place, after):
-            window = self._around(segment)
+        for segment in segments_between(self._before, start or place, place, after, self._tool_m):
+            window = window_around(segment)
             self._mark(window, np.packbits(self._under([segment], window), axis=1))
         self._before, self._kept_to = start, place
-
-    def _segments(
-        self, before: Place | None, start: Place, end: Place, after: Place | None
-    ) -> list[Segment]:
-        """Return the sweeps between two places: along the segment, or only at the places."""
-        away_m = beside_m(
-            start.point,
-            end.point,
-            before and before.point,
-            after and after.point,
-            end.farthest_m,
-            (start.yaw, end.yaw),
-        )
-        reach_m = 0.5 * self._tool_m - away_m
-        at_end = max(0.5 * self._tool_m - end.error_m, 0.25 * self._tool_m)
-        if reach_m >= at_end:
-            return [Segment(start, end, at_end)]
-        turned = corner_between(start.point, end.point, (start.yaw, end.yaw), end.farthest_m)
-        if turned is not None:
-            corner = Place(*turned, end.error_m)
-            beside = max(math.dist(turned, start.point), math.dist(turned, end.point)) * YAW_RAD
-            if at_end > beside:
-                reach_m = at_end - beside
-                round_it = Segment(start, corner, reach_m), Segment(corner, end, reach_m)
-                return [*round_it, Segment(end, end, at_end)]
-        way = [Segment(start, end, reach_m)] if reach_m > 0.0 else []
-        return [*way, Segment(end, end, at_end)]
 
     def _begin_ahead(self) -> None:
         """Set the window of the preliminary sweeps; they are computed on demand."""
@@ -314,8 +278,8 @@ class SweptFloor:
         if self._kept_to is not None:
             corners.append(self._kept_to.point)
         xs, ys = zip(*corners, strict=True)
-        rows = _span(min(ys), max(ys), 0.5 * self._tool_m + TOUCH_M, 1)
-        cols = _span(min(xs), max(xs), 0.5 * self._tool_m + TOUCH_M, 8)
+        rows = span(min(ys), max(ys), 0.5 * self._tool_m + TOUCH_M, 1)
+        cols = span(min(xs), max(xs), 0.5 * self._tool_m + TOUCH_M, 8)
         self._around_ahead = Window(rows[0], cols[0], rows[1], cols[1])
 
     def _swept_ahead(self) -> tuple[Window, Mask]:
@@ -323,7 +287,7 @@ class SweptFloor:
         if self._ahead is None:
             places = self._track.ahead()
             segments = self._segments_ahead([*filter(None, [self._waiting]), *places])
-            windows = [self._around(segment) for segment in segments]
+            windows = [window_around(segment) for segment in segments]
             whole = Window.around(*windows) or NOWHERE
             if whole.rows * whole.cols > MOST_AHEAD:
                 # Poses with so much noise are no drive, and a mask would take much memory.
@@ -348,39 +312,15 @@ class SweptFloor:
                 chain, chain[1:], chain[2:], chain[3:], strict=False
             )
             if start is not None and end is not None
-            for segment in self._segments(before, start, end, after)
+            for segment in segments_between(before, start, end, after, self._tool_m)
         ]
-
-    def _around(self, segment: Segment) -> Window:
-        """Return a window around a segment's sweep whose columns are whole bytes."""
-        start, end, reach = segment
-        row0, row1 = _span(start.y, end.y, reach, 1)
-        col0, col1 = _span(start.x, end.x, reach, 8)
-        return Window(row0, col0, row1, col1)
 
     def _under(self, segments: Sequence[Segment], window: Window) -> Mask:
         """Return which pixel centres of a window the tool passed with certainty."""
-        under = self._within(segments, window, math.inf)
+        under = within(segments, window)
         if self._sight is None:
             return under
-        return self._sight.of(under, self._within(segments, window, self._sight.radius_m), window)
-
-    def _within(self, segments: Sequence[Segment], window: Window, most_m: float) -> Mask:
-        """Return which pixel centres are within a distance of segments."""
-        values = []
-        for start, end, reach_m in segments:
-            # Relative to each start: far from the origin rounding would swamp differences.
-            far_y, far_x = end.y - start.y, end.x - start.x
-            length2 = far_x * far_x + far_y * far_y or 1.0
-            reach2 = (min(reach_m, most_m) + TOUCH_M) ** 2
-            values.append((start.y, start.x, far_y, far_x, length2, reach2))
-        y, x, dy, dx, lengths2, reaches2 = np.array(values).reshape(-1, 6, 1, 1).swapaxes(0, 1)
-        up = ((np.arange(window.row0, window.row1) + 0.5) * PIXEL_M)[:, np.newaxis] - y
-        right = (np.arange(window.col0, window.col1) + 0.5) * PIXEL_M - x
-        along = np.minimum(np.maximum((right * dx + up * dy) / lengths2, 0.0), 1.0)
-        right, up = right - along * dx, up - along * dy
-        under: Mask = (right * right + up * up <= reaches2).any(axis=0)
-        return under
+        return self._sight.of(under, within(segments, window, self._sight.radius_m), window)
 
     def _mark(self, window: Window, bits: Bits) -> None:
         """Mark pixels of a window whose columns are whole bytes."""
@@ -390,13 +330,13 @@ class SweptFloor:
             common = window.intersection(part)
             assert common is not None
             new = bits[_bytes_in(common, window)]
-            within = _bytes_in(common, part)
+            inside = _bytes_in(common, part)
             tile = self._tiles.get(place)
             if tile is not None:
-                new = new & ~tile[within]
+                new = new & ~tile[inside]
             if count := count_bits(new):
                 self._make_room(place)
-                self._tiles.writable(place)[within] |= new
+                self._tiles.writable(place)[inside] |= new
                 self.pixels += count
                 has_changed = True
         if has_changed:
@@ -413,13 +353,6 @@ class SweptFloor:
 
 def _apart(one: Pose2D, other: Pose2D) -> float:
     return math.hypot(one.x - other.x, one.y - other.y)
-
-
-def _span(one: float, other: float, reach: float, whole: int) -> tuple[int, int]:
-    """Return the range of pixels within reach, rounded outward to multiples of ``whole``."""
-    low = math.floor((min(one, other) - reach) / PIXEL_M)
-    high = math.floor((max(one, other) + reach) / PIXEL_M) + 1
-    return low // whole * whole, -(-high // whole) * whole
 
 
 def _bytes_in(part: Window, outer: Window) -> tuple[slice, slice]:

@@ -1,0 +1,99 @@
+"""Segments of the track: what of the floor the tool passes for certain from place to place."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from fasaco_edge.grid.geometry import Window
+from fasaco_edge.mission.coverage.floor_tiles import PIXEL_M, Mask
+from fasaco_edge.mission.coverage.steady_track import Place, beside_m, corner_between
+
+# Error of a heading [rad].
+YAW_RAD = math.radians(1.0)
+# Tolerance, so that rounding does not decide whether a pixel at the rim is swept [m].
+TOUCH_M = 1e-9
+
+
+class Segment(NamedTuple):
+    """A segment from one place to the next, and the radius swept along it with certainty [m].
+
+    A radius of 0: nothing is swept with certainty.
+    """
+
+    start: Place
+    end: Place
+    reach_m: float
+
+
+def segments_between(
+    before: Place | None, start: Place, end: Place, after: Place | None, tool_m: float
+) -> list[Segment]:
+    """Return the sweeps between two places: along the segment, or only at the places.
+
+    Args:
+        before, after: places before and after these; None if unknown.
+        start, end: the places.
+        tool_m: width of the tool [m].
+    """
+    away_m = beside_m(
+        start.point,
+        end.point,
+        before and before.point,
+        after and after.point,
+        end.farthest_m,
+        (start.yaw, end.yaw),
+    )
+    reach_m = 0.5 * tool_m - away_m
+    at_end = max(0.5 * tool_m - end.error_m, 0.25 * tool_m)
+    if reach_m >= at_end:
+        return [Segment(start, end, at_end)]
+    turned = corner_between(start.point, end.point, (start.yaw, end.yaw), end.farthest_m)
+    if turned is not None:
+        corner = Place(*turned, end.error_m)
+        beside = max(math.dist(turned, start.point), math.dist(turned, end.point)) * YAW_RAD
+        if at_end > beside:
+            reach_m = at_end - beside
+            round_it = Segment(start, corner, reach_m), Segment(corner, end, reach_m)
+            return [*round_it, Segment(end, end, at_end)]
+    way = [Segment(start, end, reach_m)] if reach_m > 0.0 else []
+    return [*way, Segment(end, end, at_end)]
+
+
+def window_around(segment: Segment) -> Window:
+    """Return a window around a segment's sweep whose columns are whole bytes."""
+    start, end, reach = segment
+    row0, row1 = span(start.y, end.y, reach, 1)
+    col0, col1 = span(start.x, end.x, reach, 8)
+    return Window(row0, col0, row1, col1)
+
+
+def within(segments: Sequence[Segment], window: Window, most_m: float = math.inf) -> Mask:
+    """Return which pixel centres of a window are swept along segments, bool (rows, cols).
+
+    ``most_m``: the most that counts of their radius [m].
+    """
+    values = []
+    for start, end, reach_m in segments:
+        # Relative to each start: far from the origin rounding would swamp differences.
+        far_y, far_x = end.y - start.y, end.x - start.x
+        length2 = far_x * far_x + far_y * far_y or 1.0
+        reach2 = (min(reach_m, most_m) + TOUCH_M) ** 2
+        values.append((start.y, start.x, far_y, far_x, length2, reach2))
+    y, x, dy, dx, lengths2, reaches2 = np.array(values).reshape(-1, 6, 1, 1).swapaxes(0, 1)
+    up = ((np.arange(window.row0, window.row1) + 0.5) * PIXEL_M)[:, np.newaxis] - y
+    right = (np.arange(window.col0, window.col1) + 0.5) * PIXEL_M - x
+    along = np.minimum(np.maximum((right * dx + up * dy) / lengths2, 0.0), 1.0)
+    right, up = right - along * dx, up - along * dy
+    under: Mask = (right * right + up * up <= reaches2).any(axis=0)
+    return under
+
+
+def span(one: float, other: float, reach: float, whole: int) -> tuple[int, int]:
+    """Return the range of pixels within reach [m], rounded outward to multiples of ``whole``."""
+    low = math.floor((min(one, other) - reach) / PIXEL_M)
+    high = math.floor((max(one, other) + reach) / PIXEL_M) + 1
+    return low // whole * whole, -(-high // whole) * whole
