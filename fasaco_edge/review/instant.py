@@ -181,7 +181,7 @@ class _Drawn(msgspec.Struct):
     def read(cls, record: RunRecord) -> _Drawn:
         lines: dict[int, DrawnLine] = {}
         labels: list[DrawnLabel] = []
-        wanted = (entities.PATH, entities.COHORT)
+        wanted = (entities.PATH, entities.TRAIL_LABEL)
         for _, one in drawings([part.path for part in record.parts], *wanted):
             if isinstance(one, DrawnLine):
                 lines.setdefault(one.revision, one)

@@ -35,7 +35,7 @@ from fasaco_edge.recording.write.input_log import InputLog
 from fasaco_edge.recording.write.quota import budget_of
 from fasaco_edge.recording.write.writer import RecordingWriter
 from fasaco_edge.wire.documents.json_text import decode_tolerant, encode_json
-from fasaco_edge.wire.documents.path_documents import PathAttachment
+from fasaco_edge.wire.documents.path_documents import PathAttachment, TrailAttachment
 from fasaco_edge.wire.documents.status import Recorder, Status
 from fasaco_edge.wire.messages.maps import decode_occupancy_grid, encode_occupancy_grid
 from fasaco_edge.wire.messages.paths import decode_path, encode_path
@@ -46,7 +46,7 @@ from fasaco_edge.wire.schemas import POSE_STAMPED
 SECOND_NS = 1_000_000_000
 BEGAN_NS = 1_700_000_000 * SECOND_NS
 SIDE, PIXELS_PER_CELL, CELL_M = 250, 6, 0.3
-POSES_HZ, SPEED_M_S, PLAN_EVERY_S, COHORTS = 20, 0.25, 30, 4
+POSES_HZ, SPEED_M_S, PLAN_EVERY_S = 20, 0.25, 30
 GOAL_RSS_MB, GOAL_MB_PER_HOUR = 150.0, 60.0
 
 
@@ -126,13 +126,11 @@ class Hall:
 
     def _plan(self, place: int) -> Iterator[tuple[float, str, bytes, bytes]]:
         self._plans += 1
-        for cohort in range(COHORTS):
-            trail = self._rng.gamma(1.0, 1.0, (SIDE, SIDE)).astype(np.float32)
-            trail[self._blocked] = 0.0
-            snapshot = ColonySnapshot(
-                Window(0, 0, SIDE, SIDE), CELL_M, trail, cohort, 1, 20, 60_000 - cohort
-            )
-            yield 0.0, "pheromone", encode_pheromone(snapshot, "map", 0), b""
+        trail = self._rng.gamma(1.0, 1.0, (SIDE, SIDE)).astype(np.float32)
+        trail[self._blocked] = 0.0
+        snapshot = ColonySnapshot(Window(0, 0, SIDE, SIDE), CELL_M, trail, 0, 0, 20, 60_000)
+        about = encode_json({"revision": self._plans, "cells": SIDE**2, "branching": 2.0})
+        yield 0.0, "pheromone", encode_pheromone(snapshot, "map", 0), about
         rest = CELL_M * (self._walk[place:, ::-1] + 0.5)
         changed = dict(
             zip(("x_min", "y_min", "x_max", "y_max"), (0, 0, 75, self._plans), strict=True)
@@ -201,7 +199,10 @@ class Desk:
                 decode_path(sample.payload), decode_tolerant(sample.attachment, PathAttachment)
             ),
             "coverage": lambda sample: scene.add_coverage(decode_occupancy_grid(sample.payload)),
-            "pheromone": lambda sample: scene.add_pheromone(decode_pheromone(sample.payload)),
+            "pheromone": lambda sample: scene.add_pheromone(
+                decode_pheromone(sample.payload),
+                decode_tolerant(sample.attachment, TrailAttachment),
+            ),
             "status": lambda sample: scene.add_status(decode_tolerant(sample.payload, Status)),
         }
 

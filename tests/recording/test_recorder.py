@@ -90,13 +90,12 @@ def recorded(tmp_path_factory):
 def test_everything_on_the_bus_becomes_an_entity(recorded):
     rows = recorded.summary.rows
     assert rows[entities.PATH] == recorded.mission.revision
-    # Fields that a busy machine brings together are more than the recorder has room for.
-    assert 3 * recorded.mission.revision < rows[entities.PHEROMONE] <= 4 * recorded.mission.revision
+    assert rows[entities.PHEROMONE] == recorded.mission.revision
     assert rows[entities.ROBOT] == FRAMES
     assert rows[entities.COVERAGE] == rows[entities.FLOOR] == FRAMES // 4
     assert {entities.MAP, entities.DRIVEN_PATH, f"{entities.LATENCY}/plan"} <= set(rows)
     assert rows[entities.MAP_CHANGE] == 1
-    assert recorded.summary.timelines == (entities.ITER, entities.REPLAN, entities.WALL_CLOCK)
+    assert recorded.summary.timelines == (entities.REPLAN, entities.WALL_CLOCK)
     assert 0.9 * FRAMES * FRAME_S < recorded.summary.duration_s < 300
 
 
@@ -131,7 +130,6 @@ def test_the_summary_gives_the_last_figures(recorded):
     mission = recorded.mission
     assert recorded.summary.covered == pytest.approx(mission.covered, abs=1e-6)
     assert recorded.summary.recovered == pytest.approx(mission.recovered, abs=1e-6)
-    assert recorded.summary.best_steps == mission.best_steps
     *paths, group = recorded.summary.paths
     assert paths[0].startswith("path 1: first map (")
     assert len(paths) == mission.revision
@@ -230,9 +228,8 @@ def test_the_pheromone_is_neither_flat_nor_misplaced(recorded):
     assert image[1:5, 24:26].all()
     cell = read_column(recorded.path, entities.PHEROMONE, "GridMap:cell_size").values[-1][0]
     assert cell == pytest.approx(CELL_M)
-    *_, cohort, trail = read_column(recorded.path, entities.COHORT, "Points3D:labels").values
+    *_, trail = read_column(recorded.path, entities.TRAIL_LABEL, "Points3D:labels").values
     best = recorded.mission.best_steps
-    assert cohort == [f"cohort 3, 1 cell a move\n60 ants in all, best walk {best} steps"]
     path = f"path {recorded.mission.revision}"
     decided = "branching factor 1.03 (1: one way in each cell, 4: none is preferred)"
     assert trail == [f"pheromone at {path}, {best} steps to drive\n{decided}"]

@@ -128,7 +128,6 @@ class RecordingSummary:
         complete: whether the recorder ended the file itself.
         covered: last fraction of the coverable cells that is covered; None if never told.
         recovered: last fraction of them that was visited again; None if never told.
-        best_steps: steps of the best walk at the last cohort; None without any.
         paths: lines on new paths, in order.
         states: states of the mission, in order.
     """
@@ -140,7 +139,6 @@ class RecordingSummary:
     complete: bool
     covered: float | None
     recovered: float | None
-    best_steps: float | None
     paths: tuple[str, ...]
     states: tuple[str, ...]
 
@@ -216,7 +214,6 @@ def read_summary(path: Path) -> RecordingSummary:
         complete=scan is not None and scan.has_footer,
         covered=_last_scalar(path, entities.COVERED_FRACTION),
         recovered=_last_scalar(path, entities.RECOVERED_FRACTION),
-        best_steps=_last_scalar(path, entities.BEST_STEPS),
         paths=_texts(path, entities.PATH_LOG, TEXT),
         states=_texts(path, entities.MISSION_STATE, STATE),
     )

@@ -96,11 +96,9 @@ class Mission:
         self._map.put(encode_occupancy_grid(occupancy(truth)))
 
     def replan(self, done: float, reason: str) -> None:
-        """Publish three cohorts, the living trail, and the walk they led to."""
+        """Publish the living trail, and the walk it led to."""
         self.revision += 1
         self.publish_status("planning", done, planning=True)
-        for cohort in range(3):
-            self.publish_cohort(cohort, done)
         self.publish_trail(done)
         self.rest = self.walk[round(done * (len(self.walk) - 1)) :]
         seen = cells(self.rest)[1] < self.seen_cells - 1
@@ -130,15 +128,11 @@ class Mission:
         x, y = ORIGIN[0] + RESOLUTION_M * known_columns(done), ORIGIN[1]
         return {"x_min": x - 0.75, "y_min": y + 0.5, "x_max": x - 0.25, "y_max": y + 5.0}
 
-    def publish_cohort(self, cohort: int, done: float) -> None:
-        """Publish pheromone that gathers along the walk."""
-        self.best_steps = round(len(self.walk) * (1.3 - 0.1 * cohort) - 40 * done)
-        self._pheromone.put(self._field(done, cohort, 1, 20 * (cohort + 1)))
-
     def publish_trail(self, done: float) -> None:
         """Publish the living trail, the more decided the later."""
+        self.best_steps = round(len(self.walk) * 1.1 - 40 * done)
         note = {"revision": self.revision, "cells": 12, "branching": 2.0 - done}
-        self._pheromone.put(self._field(done, 3, 0, 0), json.dumps(note).encode())
+        self._pheromone.put(self._field(done), json.dumps(note).encode())
 
         # It points along the walk, up and down its columns, and is sure of that.
         pointed = np.full((self.visits.shape[0], self.seen_cells), -1, np.int8)
@@ -157,16 +151,14 @@ class Mission:
         col, row = (round(at / CELL_M) for at in ORIGIN)
         return Window(0, 0, *shown.shape).moved(row, col)
 
-    def _field(self, done: float, cohort: int, velocity: int, ants: int) -> bytes:
+    def _field(self, done: float) -> bytes:
         trail = np.full(self.visits.shape, 0.1, np.float32)
         rows, cols = cells(self.walk)
         along = np.arange(len(rows)) / len(rows)
-        np.add.at(trail, (rows, cols), 5.0 * (cohort + 1) * (0.2 + along).astype(np.float32))
+        np.add.at(trail, (rows, cols), 20.0 * (0.2 + along).astype(np.float32))
         trail[blocked_cells(done)] = 0.0
         trail = trail[:, : self.seen_cells]
-        snapshot = ColonySnapshot(
-            self._window(trail), CELL_M, trail, cohort, velocity, ants, self.best_steps
-        )
+        snapshot = ColonySnapshot(self._window(trail), CELL_M, trail, 0, 0, 0, self.best_steps)
         return encode_pheromone(snapshot, "map", _stamp())
 
     def drive(self, done: float) -> None:

@@ -116,17 +116,6 @@ def pheromone_archetype(message: PheromoneMessage) -> rr.GridMap:
     )
 
 
-def cohort_archetype(message: PheromoneMessage) -> rr.Points3D:
-    """Return the label over a pheromone field: its cohort."""
-    cells = "cell" if message.velocity == 1 else "cells"
-    ants = "ant" if message.ants == 1 else "ants"
-    text = (
-        f"cohort {message.cohort + 1}, {message.velocity} {cells} a move\n"
-        f"{message.ants} {ants} in all, best walk {message.best_steps} steps"
-    )
-    return label_archetype(message.geometry.bounds(), text, LABEL_ABOVE)
-
-
 def trail_label(message: PheromoneMessage, about: TrailAttachment) -> rr.Points3D:
     """Return the label over the living trail: its path, and how decided it is."""
     text = (

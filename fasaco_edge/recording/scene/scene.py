@@ -60,7 +60,7 @@ class Scene:
         self._map: OccupancyGrid | None = None
         self._known: Bounds | None = None
         self._framed: Bounds | None = None
-        self._errors = self._restored = self._cohorts = 0
+        self._errors = self._restored = 0
         self._robot: Pose2D | None = None
         self._states: dict[str, str] = {}
         # The order, by the last command, and the operator's keep-outs, by the last status.
@@ -188,31 +188,17 @@ class Scene:
         # As for the coverage, drawn with four bytes a cell.
         self._draw(entities.FLOOR, 2 * size_in_file(grid.cells), draw_floor)
 
-    def add_pheromone(
-        self, message: PheromoneMessage, about: TrailAttachment | None = None
-    ) -> None:
-        """Draw the living trail, or the pheromone after a cohort; plot how decided it is.
-
-        All cohorts of a plan share one field. The effect of a cohort is the difference to the field
-        after the previous one: the timeline ``iter`` steps from cohort to cohort.
-        """
+    def add_pheromone(self, message: PheromoneMessage, about: TrailAttachment) -> None:
+        """Draw the living trail; plot how decided it is."""
         message = self._anchored(message.geometry.origin).grid(message)
-        if about is None:
-            self._cohorts += 1
-            self._writer.sequence(entities.ITER, self._cohorts)
-            self._curves.draw(entities.BEST_STEPS, message.best_steps)
-        else:
-            self._curves.draw(entities.BRANCHING, about.branching)
-            self._curves.draw(entities.TRAIL_CELLS, about.cells)
+        self._curves.draw(entities.BRANCHING, about.branching)
+        self._curves.draw(entities.TRAIL_CELLS, about.cells)
 
         def draw_pheromone() -> None:
             field = draw.pheromone_archetype(message)
             self._writer.log(entities.PHEROMONE, field, latched=True, size=message.levels.size)
-            if about is None:
-                label = draw.cohort_archetype(message)
-            else:
-                label = draw.trail_label(message, about)
-            self._writer.log(entities.COHORT, label, latched=True)
+            label = draw.trail_label(message, about)
+            self._writer.log(entities.TRAIL_LABEL, label, latched=True)
 
         self._draw(entities.PHEROMONE, size_in_file(message.levels), draw_pheromone)
         # The scale of the levels, to decode them into trails.

@@ -206,9 +206,8 @@ class Recorder:
         self._scene.add_path(decode_path(sample.payload), about)
 
     def _draw_pheromone(self, sample: Sample) -> None:
-        message, beside = decode_pheromone(sample.payload), sample.attachment
-        about = decode_tolerant(beside, TrailAttachment) if beside else None
-        self._scene.add_pheromone(message, about)
+        about = decode_tolerant(sample.attachment or b"{}", TrailAttachment)
+        self._scene.add_pheromone(decode_pheromone(sample.payload), about)
 
     def _draw_status(self, sample: Sample) -> None:
         self._scene.add_status(decode_tolerant(sample.payload, Status))
