@@ -149,9 +149,7 @@ class ServedView(RobotState):
         self._grids["floor"] = read_grid(sample.payload)
 
     def _read_field(self, sample: Sample, _: float) -> None:
-        # Without an attachment it is the field of a cohort.
-        if sample.attachment:
-            self._grids["field"] = read_field(sample.payload)
+        self._grids["field"] = read_field(sample.payload)
 
     @property
     def _shown_path(self) -> Sample | None:

@@ -69,8 +69,6 @@ class RobotView(RobotState):
         self.coverage = decode_occupancy_grid(sample.payload)
 
     def _read_field(self, sample: Sample, _: float) -> None:
-        # Without an attachment it is the field of a cohort.
-        if sample.attachment:
-            message = decode_pheromone(sample.payload)
-            levels = -(-message.levels.astype(np.int16) * FIELD_LEVELS // 255)
-            self.field = OccupancyGrid(message.geometry, levels.astype(np.int8), message.frame)
+        message = decode_pheromone(sample.payload)
+        levels = -(-message.levels.astype(np.int16) * FIELD_LEVELS // 255)
+        self.field = OccupancyGrid(message.geometry, levels.astype(np.int8), message.frame)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -86,9 +85,6 @@ def test_the_trail_takes_the_place_of_coverage_and_path():
     trail = np.full((8, 12), 0.1, np.float32)
     trail[2] = 1.0
     seen = ColonySnapshot(Window(0, 0, 8, 12), 0.5, trail, 0, 0, 0, 30)
-    # What a cohort has left is another field.
-    tell(view, "pheromone", encode_pheromone(replace(seen, trail=trail + 1), "map", 1))
-    assert view.field is None
     tell(view, "pheromone", encode_pheromone(seen, "map", 1), b"{}")
     before = page.lines(view, NOW, 80, 24)
     assert page.toggle_field()
