@@ -104,6 +104,6 @@ def _print(figures: FleetFigures) -> None:
     console.print(table)
     console.print(
         "through, again: m2 that another had swept. kB/s: messages to the fleet (most over 5 s). "
-        "plan ms: median, 99 %.",
+        "plan ms: median, 99 %. Times are by the recorder's clock, not by simulated robots'.",
         style="dim",
     )
