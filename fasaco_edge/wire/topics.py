@@ -125,7 +125,8 @@ COVERAGE = Topic(
 FLOOR = Topic(
     name="floor",
     direction="out",
-    when="floor was swept, every two seconds at most, and only while someone listens",
+    when="floor was swept, every two seconds at most; again after ten seconds; only while someone "
+    "listens",
     speaker="robot",
     listeners=("viewer",),
     schemas=(schemas.OCCUPANCY_GRID,),
@@ -136,7 +137,8 @@ FLOOR = Topic(
 PHEROMONE = Topic(
     name="pheromone",
     direction="out",
-    when="the trail has changed, twice a second at most, only while someone listens",
+    when="the trail has changed, twice a second at most; again after ten seconds; only while "
+    "someone listens",
     speaker="robot",
     listeners=("viewer",),
     schemas=(schemas.PHEROMONE_GRID,),

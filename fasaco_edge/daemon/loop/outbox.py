@@ -209,6 +209,9 @@ COVERAGE_PERIOD_S = 0.5
 # Least period of the swept floor [s], and limit on its squares: a large floor gets larger squares.
 FLOOR_PERIOD_S = 2.0
 MOST_SQUARES = 1_000_000
+# Period at which floor and trail are published again unchanged [s]: a listener that comes while
+# others listen is not noticed.
+REPEAT_S = 10.0
 # Least period of the trail [s]; a large one, which takes the loop some milliseconds per 100,000
 # cells, is published less often.
 PERIOD_S = 0.5
@@ -243,7 +246,7 @@ class CoveragePublisher:
 
 
 class FloorPublisher:
-    """Publishes the swept floor on change if it has subscribers, every two seconds."""
+    """Publishes the swept floor if it has subscribers: on change, every two seconds at most."""
 
     def __init__(self, outbox: Outbox) -> None:
         self._outbox = outbox
@@ -257,8 +260,8 @@ class FloorPublisher:
             return
         floor, grid = mission.floor, mission.grid
         key = (floor, floor.changes)
-        is_early = now - self._published_at < FLOOR_PERIOD_S
-        if key == self._key or is_early or grid is None:
+        least_s = REPEAT_S if key == self._key else FLOOR_PERIOD_S
+        if now - self._published_at < least_s or grid is None:
             return
         self._published_at, self._key = now, key
         shown = floor.snapshot().shown(MOST_SQUARES, grid.frame, grid.stamp_ns)
@@ -274,7 +277,7 @@ class TrailPublisher:
 
     def __init__(self, outbox: Outbox) -> None:
         self._outbox = outbox
-        self._due = float("-inf")
+        self._due = self._published_at = float("-inf")
         # The trail kept last, and the trail published last.
         self._kept: tuple[object, ...] = ()
         self._published: tuple[object, ...] = ()
@@ -286,7 +289,8 @@ class TrailPublisher:
             self._published = ()  # the next listener has not received it
         trail, lattice, grid = mission.trail, mission.lattice, mission.grid
         key = (trail, trail.changes)
-        is_known = key == self._kept and (not has_subscribers or key == self._published)
+        is_published = key == self._published and now - self._published_at < REPEAT_S
+        is_known = key == self._kept and (not has_subscribers or is_published)
         if is_known or now < self._due or grid is None or lattice is None:
             return
         held = trail.snapshot()
@@ -308,5 +312,5 @@ class TrailPublisher:
         self._kept = key
         self._outbox.keep_trail(shown)
         if has_subscribers:
-            self._published = key
+            self._published, self._published_at = key, now
             self._outbox.trail(shown)

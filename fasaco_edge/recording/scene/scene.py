@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fasaco_edge.errors import PatchWithoutBase
 from fasaco_edge.grid.geometry import Bounds, Polygon, Pose2D, StampedPose, union_bounds
@@ -67,7 +68,8 @@ class Scene:
         self._order = EVERYTHING_ONCE
         self._kept_out: list[tuple[str, Polygon]] = []
         self._troubles: set[str] = set()
-        self._has_floor = False
+        # What was drawn last of the grids that a daemon publishes again unchanged.
+        self._drawn: dict[str, object] = {}
         self._outcome = Outcome()
         self._layers = Layers()
         self._curves = Curves(writer)
@@ -164,7 +166,7 @@ class Scene:
         def draw_coverage() -> None:
             self._writer.log(
                 entities.COVERAGE,
-                draw.coverage_archetype(grid, has_floor=self._has_floor),
+                draw.coverage_archetype(grid, has_floor=entities.FLOOR in self._drawn),
                 latched=True,
                 size=4 * grid.cells.size,
             )
@@ -177,7 +179,8 @@ class Scene:
 
     def add_floor(self, grid: OccupancyGrid) -> None:
         """Tint the swept floor; covered cells have no tint from then on."""
-        self._has_floor = True
+        if self._comes_again(entities.FLOOR, grid.geometry, grid.cells):
+            return
         grid = self._anchored(grid.geometry.origin).grid(grid)
 
         def draw_floor() -> None:
@@ -190,6 +193,8 @@ class Scene:
 
     def add_pheromone(self, message: PheromoneMessage, about: TrailAttachment) -> None:
         """Draw the living trail; plot how decided it is."""
+        if self._comes_again(entities.PHEROMONE, (message.geometry, about), message.levels):
+            return
         message = self._anchored(message.geometry.origin).grid(message)
         self._curves.draw(entities.BRANCHING, about.branching)
         self._curves.draw(entities.TRAIL_CELLS, about.cells)
@@ -211,6 +216,8 @@ class Scene:
 
     def add_directions(self, grid: OccupancyGrid) -> None:
         """Draw the directions of the living trail."""
+        if self._comes_again(entities.DIRECTIONS, grid.geometry, grid.cells):
+            return
         grid = self._anchored(grid.geometry.origin).grid(grid)
         flows = flows_of(grid.geometry, *directions_of(grid))
 
@@ -284,6 +291,12 @@ class Scene:
 
     def _draw(self, layer: str, size: int, draw_it: Callable[[], None]) -> None:
         self._layers.draw(layer, size, draw_it, self._writer.wall_ns)
+
+    def _comes_again(self, entity: str, about: object, pixels: NDArray[np.generic]) -> bool:
+        """Return whether the newest grid of an entity is the one that was drawn last."""
+        before, newest = self._drawn.get(entity), (about, hash(pixels.tobytes()))
+        self._drawn[entity] = newest
+        return before == newest
 
     def _anchored(self, place: Pose2D) -> Anchor:
         """Return the origin of drawings, logged with the first pose if that is far from 0."""
