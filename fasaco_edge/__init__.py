@@ -34,3 +34,7 @@ def __getattr__(name: str) -> object:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     module, _, member = _PLACES[name].partition(":")
     return getattr(import_module(f"{__name__}.{module}"), member)
+
+
+def __dir__() -> list[str]:
+    return sorted((*globals(), *_PLACES))

@@ -178,7 +178,7 @@ def _tls(args: argparse.Namespace) -> ssl.SSLContext | None:
 
 
 def _say(address: Address, guard: Guard, tokens: Path | None, secured: bool) -> None:
-    page = f"{'https' if secured else 'http'}://{address.shown}/"
+    page = f"{'https' if secured else 'http'}://{address.reached}/"
     if tokens is not None:
         print(f"page at {page}; the tokens are in {one_line(str(tokens))}")
         if sys.stdout.isatty():

@@ -11,6 +11,9 @@ from fasaco_edge.errors import BadConfiguration
 
 _ADDRESS = re.compile(r"(?:\[(?P<six>[0-9a-fA-F:]+)\]|(?P<four>[\w.]+)):(?P<port>\d{1,5})")
 
+# Addresses for documentation (RFC 5737, RFC 3849): nobody has them.
+_ELSEWHERE = {socket.AF_INET: "192.0.2.1", socket.AF_INET6: "2001:db8::1"}
+
 
 class Address(NamedTuple):
     """Where a server listens: host, an address as text, and port."""
@@ -28,6 +31,21 @@ class Address(NamedTuple):
         """The address as in a URL."""
         host = f"[{self.host}]" if ":" in self.host else self.host
         return f"{host}:{self.port}"
+
+    @property
+    def reached(self) -> str:
+        """The address as in a URL for other computers: for any address, one that this one has."""
+        if not ipaddress.ip_address(self.host).is_unspecified:
+            return self.shown
+        family = socket.AF_INET6 if ":" in self.host else socket.AF_INET
+        with socket.socket(family, socket.SOCK_DGRAM) as probe:
+            try:
+                # Nothing is sent: the system says from which address it would be.
+                probe.connect((_ELSEWHERE[family], 9))
+                host = probe.getsockname()[0]
+            except OSError:  # no network
+                host = socket.gethostname()
+        return Address(host, self.port).shown
 
 
 def read_address(name: str, text: str, example: int) -> Address:

@@ -121,6 +121,7 @@ def test_to_import_the_package_loads_no_planner():
     assert (
         subprocess.run([sys.executable, "-c", code], env=ENVIRONMENT, check=False).returncode == 0
     )
+    assert {"plan", "load_map", "Search"} <= set(dir(fe))
     with pytest.raises(AttributeError, match="no attribute 'plot'"):
         _ = fe.plot
 
