@@ -11,7 +11,7 @@ from fasaco_edge.errors import BadConfiguration
 
 _ADDRESS = re.compile(r"(?:\[(?P<six>[0-9a-fA-F:]+)\]|(?P<four>[\w.]+)):(?P<port>\d{1,5})")
 
-# Addresses for documentation (RFC 5737, RFC 3849): nobody has them.
+# Addresses for documentation (RFC 5737, RFC 3849), used by no host.
 _ELSEWHERE = {socket.AF_INET: "192.0.2.1", socket.AF_INET6: "2001:db8::1"}
 
 

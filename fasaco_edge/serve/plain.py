@@ -155,8 +155,8 @@ def left(status: Status) -> list[LeftFloor]:
         kind.places.append((area.x, area.y))
         if kind.reason not in are_counted:
             kind.m2 += area.m2
-    told = (kind for kind in found.values() if kind.m2 >= LEAST_M2)
-    return sorted(told, key=lambda kind: -kind.m2)
+    larger = (kind for kind in found.values() if kind.m2 >= LEAST_M2)
+    return sorted(larger, key=lambda kind: -kind.m2)
 
 
 def _of(found: dict[str, LeftFloor], reason: str) -> LeftFloor:

@@ -79,7 +79,7 @@ class DemoMission:
         self._killed = ""
         self._processes: list[tuple[Path, subprocess.Popen[bytes]]] = []
         self._stack = ExitStack()
-        # Robots that have not started: log and words of each; keys of recorders not heard yet.
+        # Robots that have not started: log and words of each; keys of absent recorders.
         self._waiting: list[tuple[Path, list[str]]] = []
         self._silent: set[str] = set()
         self._newest = [LatestSlot[Sample]() for _ in robots]

@@ -88,15 +88,12 @@ def map_archetype(grid: OccupancyGrid) -> rr.GridMap:
     return grid_archetype(grid.geometry, pixels, rr.components.Colormap.RvizMap, MAP_ORDER)
 
 
-def coverage_archetype(grid: OccupancyGrid, *, has_floor: bool) -> rr.GridMap:
-    """Return a coverage grid as a layer over the map: covered, re-covered, blocked cells tinted.
+def coverage_archetype(grid: OccupancyGrid) -> rr.GridMap:
+    """Return a coverage grid as a layer over the map: blocked cells are tinted.
 
-    Covered cells have no tint with ``has_floor``: the swept floor is drawn, which they exceed.
+    What is covered is drawn as swept floor, which cells exceed.
     """
     tints = np.zeros((256, 4), np.uint8)
-    if not has_floor:
-        tints[CoverageValue.COVERED] = (*COVERED_COLOUR, 120)
-        tints[CoverageValue.RECOVERED] = (*RECOVERED_COLOUR, 140)
     tints[CoverageValue.BLOCKED] = (*BLOCKED_COLOUR, 40)
     return grid_archetype(grid.geometry, tints[grid.cells.view(np.uint8)], None, COVERAGE_ORDER)
 

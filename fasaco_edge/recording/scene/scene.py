@@ -160,13 +160,13 @@ class Scene:
         self._figures.add_path(about)
 
     def add_coverage(self, grid: OccupancyGrid) -> None:
-        """Tint the covered cells, and plot their share."""
+        """Tint the blocked cells, and plot the share of the covered ones."""
         grid = self._anchored(grid.geometry.origin).grid(grid)
 
         def draw_coverage() -> None:
             self._writer.log(
                 entities.COVERAGE,
-                draw.coverage_archetype(grid, has_floor=entities.FLOOR in self._drawn),
+                draw.coverage_archetype(grid),
                 latched=True,
                 size=4 * grid.cells.size,
             )
@@ -178,7 +178,7 @@ class Scene:
         self._curves.draw(entities.RECOVERED_FRACTION, recovered, spacing_ns=SHARE_SPACING_NS)
 
     def add_floor(self, grid: OccupancyGrid) -> None:
-        """Tint the swept floor; covered cells have no tint from then on."""
+        """Tint the swept floor."""
         if self._comes_again(entities.FLOOR, grid.geometry, grid.cells):
             return
         grid = self._anchored(grid.geometry.origin).grid(grid)
