@@ -1,0 +1,103 @@
+"""Room update: the regions of a new map, to the sheet of the building that it shows."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from fasaco_edge.grid.geometry import Window
+from fasaco_edge.mission.map.room_book import MOST_NUMBER, RoomBook, RoomSheet
+from fasaco_edge.mission.map.room_matching import Matching, common_counts, slots_of
+from fasaco_edge.mission.map.room_outline import joined, outline
+from fasaco_edge.mission.map.room_raster import MOST_SQUARES, Ids, RoomRaster, sampled
+
+if TYPE_CHECKING:
+    from fasaco_edge.grid.rooms import FoundRooms
+
+# Share of the floor in rooms that match from which a map shows the building of a sheet; region and
+# room match if they have this share of all their floor in common.
+ALIKE = MATCH = 0.5
+# Squares are as wide as the map's pixels, and not narrower than this [m].
+LEAST_SQUARE_M = 0.05
+
+
+def update(book: RoomBook, found: FoundRooms, frame: str) -> None:
+    """Take in the regions of the newest map, which is in ``frame``.
+
+    A map without regions, or too large for a raster, changes nothing.
+    """
+    if not found.count:
+        return
+    sheet = _sheet_for(book, found, frame)
+    coarser = round(found.geometry.resolution / sheet.raster.square_m)
+    if coarser > 1:
+        sheet.raster = sheet.raster.coarser(coarser)
+        sheet.gone = sheet.gone.coarser(coarser)
+        sheet.pending, sheet.regions = RoomRaster.empty(sheet.raster.square_m), {}
+    shown = sampled(found, sheet.raster.square_m)
+    if shown is None:
+        return
+    whole = Window.around(sheet.raster.window, shown[0])
+    assert whole is not None
+    if whole.rows * whole.cols > MOST_SQUARES:
+        return
+    book.turn_to(sheet)
+    before = sheet.raster.on(whole)
+    sheet.raster = replace(sheet.raster, window=whole, ids=before.copy())
+    Matching(book, sheet, *shown).apply(before)
+    refresh(book, _changed(before, sheet.raster.ids))
+
+
+def _sheet_for(book: RoomBook, found: FoundRooms, frame: str) -> RoomSheet:
+    """Return the sheet of the building that a map shows, perhaps a new one."""
+    in_use = book.sheet
+    if in_use is not None and in_use.frame == frame and not book.is_elsewhere:
+        return in_use
+    alike = [(_alike(sheet, found), sheet) for sheet in book.sheets if sheet.frame == frame]
+    share, best = max(alike, key=lambda each: each[0], default=(0.0, None))
+    if best is not None and share >= ALIKE:
+        return best
+    return RoomSheet.empty(frame, max(found.geometry.resolution, LEAST_SQUARE_M))
+
+
+def _alike(sheet: RoomSheet, found: FoundRooms) -> float:
+    """Return how much of the floor of map or sheet lies in regions and rooms that match."""
+    shown = sampled(found, sheet.raster.square_m)
+    if shown is None:
+        return 0.0
+    window, labels = shown
+    counts = common_counts(labels, slots_of(sheet.raster.on(window), sheet.rooms), len(sheet.rooms))
+    squares = np.bincount(sheet.raster.ids.ravel(), minlength=MOST_NUMBER + 1)[sorted(sheet.rooms)]
+    areas = counts[1:].sum(axis=1)
+    floor, common = min(int(areas.sum()), int(squares.sum())), counts[1:, 1:]
+    matches = common >= MATCH * (areas[:, np.newaxis] + squares - common)
+    return float(common[matches].sum()) / floor if floor else 0.0
+
+
+def _changed(before: Ids, after: Ids) -> set[int]:
+    """Return the numbers of the rooms whose squares have changed."""
+    other = before != after
+    return set(np.unique(np.concatenate((before[other], after[other]))).tolist()) - {0}
+
+
+def refresh(book: RoomBook, changed: Iterable[int]) -> None:
+    """Derive outline, area and neighbours anew of rooms whose squares have changed."""
+    sheet = book.sheet
+    rooms = set(changed)
+    if sheet is None or not rooms:
+        return
+    square_m = sheet.raster.square_m
+    beside = joined(sheet.raster.ids, square_m)
+    for room in book.rooms:
+        shape = replace(room, neighbours=beside.get(room.id, ()))
+        if room.id in rooms:
+            window, mask = sheet.raster.squares(room.id)
+            shape = replace(
+                shape,
+                outline=outline(window, mask, square_m) if mask.any() else (),
+                area_m2=round(int(np.count_nonzero(mask)) * square_m**2, 2),
+            )
+        book.put(shape)
