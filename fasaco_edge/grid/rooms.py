@@ -10,12 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.grid.geometry import GridGeometry, Point
-from fasaco_edge.grid.occupancy import FREE, OccupancyGrid
+from fasaco_edge.grid.occupancy import FREE, OccupancyGrid, coarser
 from fasaco_edge.kernels.lattice.areas import find_areas
 
 # A place is narrow where walls are nearer than this on both sides [m].
 NARROW_M = 0.5
 MOST_OCCUPIED = 50
+MOST_PIXELS = 500_000
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -35,6 +36,7 @@ class FoundRooms:
 
 def find_rooms(grid: OccupancyGrid, cuts: Sequence[tuple[Point, Point]] = ()) -> FoundRooms:
     """Return the rooms of a map; cuts are segments [m] in the map frame that count as walls."""
+    grid = coarser(grid, MOST_PIXELS)
     free = (grid.cells >= FREE) & (grid.cells < MOST_OCCUPIED)
     for (x0, y0), (x1, y1) in cuts:
         steps = 4 * math.ceil(math.hypot(x1 - x0, y1 - y0) / grid.geometry.resolution) + 1

@@ -239,7 +239,7 @@ def test_zones_of_the_configuration(tmp_path):
         commands = outsider.listen("command")
         told(running, "start", "--zone", "kitchen")
         heard = commands.wait(lambda heard: True)
-        assert json.loads(heard.payload)["order"]["zones"] == [{"name": "kitchen", "passes": 1}]
+        assert json.loads(heard.payload)["order"]["zones"] == [{"name": "kitchen"}]
         begin_idle(outsider)
         report = outsider.wait_status(lambda status: status["state"] == "covering")["mission"]
         assert [zone["name"] for zone in report["zones"]] == ["kitchen"]

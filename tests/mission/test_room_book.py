@@ -283,3 +283,19 @@ def test_another_building_gets_a_sheet_of_its_own_and_the_first_one_comes_back()
     assert book.room("kitchen").id == at(book, *KITCHEN)
     shown(book, FLAT, HOLD_CHANGE, frame="upstairs")
     assert min(room.id for room in book.rooms) == 7
+
+
+def test_a_large_building_gets_wider_squares_and_keeps_its_rooms():
+    book = known(FLAT)
+    book.name(at(book, *KITCHEN), "kitchen")
+    far = np.zeros((1500, 1500), np.int32)
+    far[: FLAT.labels.shape[0], : FLAT.labels.shape[1]] = FLAT.labels
+    far[1400:, 1400:] = 4
+    shown(book, replace(FLAT, geometry=GridGeometry(1500, 1500, SIDE_M, Pose2D(0, 0)), labels=far))
+    assert book.sheet.raster.square_m == 2 * SIDE_M
+    assert at(book, *KITCHEN) == book.room("kitchen").id
+    assert book.room("kitchen").area_m2 == pytest.approx(10.0, rel=0.1)
+    coarse = FoundRooms(GridGeometry(15, 15, 10 * SIDE_M, Pose2D(0, 0)), far[5::100, 5::100], 4)
+    shown(book, coarse)
+    assert book.sheet.raster.square_m == pytest.approx(1.0)
+    assert at(book, *KITCHEN) == book.room("kitchen").id

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Self
 
@@ -11,9 +11,11 @@ from numpy.typing import NDArray
 
 from fasaco_edge.grid.lattice import Cell, CoverageLattice, pixels_of, placement_on
 from fasaco_edge.grid.occupancy import OccupancyGrid
+from fasaco_edge.grid.rotation import rotated_polygon
 from fasaco_edge.kernels.lattice.pixels import count_free_beside
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
 from fasaco_edge.mission.map.reachable_area import ReachableArea
+from fasaco_edge.mission.map.room_book import Room
 from fasaco_edge.mission.orders.order_state import OrderState, Stage
 from fasaco_edge.mission.orders.zones import counts_in
 
@@ -216,3 +218,30 @@ def zone_progress(
         reached, done = counted
         found.append(ZoneProgress(zone.name, zone.passes, begun, reached, done if begun else 0))
     return found
+
+
+def room_progress(
+    rooms: Sequence[Room], lattice_deg: float, ground: ReachableArea | None, ledger: MissionLedger
+) -> dict[int, tuple[int, int]]:
+    """Return for each room, by its number, how many cells are reachable, and covered.
+
+    Args:
+        rooms: in the map frame.
+        lattice_deg: angle of the cells' rows to its x axis [deg].
+        ground: the reachable area.
+        ledger: the covered cells.
+    """
+    placed = [room for room in rooms if room.outline]
+    if ground is None or not placed:
+        return {}
+    outlines = tuple(
+        rotated_polygon(room.outline, -lattice_deg) if lattice_deg else room.outline
+        for room in placed
+    )
+    lattice, reachable = ground.lattice, ground.reachable
+    visited = reachable & (ledger.visits(lattice.window) > 0)
+    cells, covered = (
+        counts_in(outlines, lattice.window, lattice.cell_m, each) for each in (reachable, visited)
+    )
+    counts = zip(cells, covered, strict=True)
+    return {room.id: counted for room, counted in zip(placed, counts, strict=True)}

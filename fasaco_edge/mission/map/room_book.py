@@ -110,6 +110,25 @@ class RoomSheet:
         nothing = RoomRaster.empty(square_m)
         return cls(frame, nothing, nothing, nothing)
 
+    def lay(
+        self, raster: RoomRaster, gone: RoomRaster | None = None, pending: RoomRaster | None = None
+    ) -> None:
+        """Replace the squares of the rooms, of those that are gone, and of pending regions."""
+        self.raster, self.gone = raster, gone or self.gone
+        self.pending = pending or self.pending
+
+    def note(self, regions: dict[int, int], pending: RoomRaster) -> None:
+        """Replace the regions that are no rooms yet."""
+        self.regions, self.pending = regions, pending
+
+    def note_changes(self, changes: dict[tuple[str, int, int], int]) -> None:
+        """Replace the scores of changes."""
+        self.changes = changes
+
+    def cut(self, cuts: list[Cut]) -> None:
+        """Replace the cuts."""
+        self.cuts = cuts
+
     @property
     def is_settling(self) -> bool:
         """Whether a change is under way: the same map shown again would bring it about."""

@@ -58,8 +58,8 @@ def split(book: RoomBook, called: str | int, cut: Cut) -> None:
     place = window.slices_in(sheet.raster.window)
     after = sheet.raster.ids.copy()
     after[place][inside] = ids[inside]
-    sheet.raster = replace(sheet.raster, ids=after)
-    sheet.cuts.append(cut)
+    sheet.lay(replace(sheet.raster, ids=after))
+    sheet.cut([*sheet.cuts, cut])
     book.put(replace(room, is_by_hand=True))
     refresh(book, numbers)
 
@@ -88,8 +88,8 @@ def merge(book: RoomBook, called: Sequence[str | int], name: str = "") -> None:
     name = name or next((each.name for each in rooms if each.name), "")
     after = sheet.raster.ids.copy()
     after[np.isin(after, np.array(numbers, np.uint16))] = stays.id
-    sheet.raster = replace(sheet.raster, ids=after)
-    sheet.cuts = [cut for cut in sheet.cuts if not _is_inside(sheet.raster, cut, stays.id)]
+    sheet.lay(replace(sheet.raster, ids=after))
+    sheet.cut([cut for cut in sheet.cuts if not _is_inside(sheet.raster, cut, stays.id)])
     book.drop(numbers[1:])
     book.put(replace(stays, name=name, settings=settings, is_by_hand=True))
     refresh(book, [stays.id])
@@ -100,10 +100,9 @@ def move(book: RoomBook, motion: Motion) -> None:
     sheet = book.sheet
     if sheet is None or motion.is_still:
         return
-    sheet.raster, sheet.gone, sheet.pending = (
-        raster.moved(motion) for raster in (sheet.raster, sheet.gone, sheet.pending)
-    )
-    sheet.cuts = [(_moved(start, motion), _moved(end, motion)) for start, end in sheet.cuts]
+    rasters = sheet.raster, sheet.gone, sheet.pending
+    sheet.lay(*(raster.moved(motion) for raster in rasters))
+    sheet.cut([(_moved(start, motion), _moved(end, motion)) for start, end in sheet.cuts])
     refresh(book, sheet.rooms)
 
 

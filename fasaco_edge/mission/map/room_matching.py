@@ -16,7 +16,7 @@ by memory. Rooms that the map does not show stay as they are.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -31,6 +31,7 @@ from fasaco_edge.mission.map.room_book import (
     RoomSheet,
 )
 from fasaco_edge.mission.map.room_raster import (
+    BLOCK,
     Ids,
     RoomRaster,
     cut_window,
@@ -53,20 +54,29 @@ LEAST_SHOWN_M2, LEAST_SHARE = 0.5, 0.2
 WHOLE = 0.8
 
 
-def slots_of(ids: Ids, numbers: Iterable[int]) -> NDArray[np.int64]:
+def slots_of(ids: Ids, numbers: Iterable[int]) -> Ids:
     """Return squares with the place of their number among ``numbers``, from 1; 0 for none."""
-    places = np.zeros(MOST_NUMBER + 1, np.int64)
+    places = np.zeros(MOST_NUMBER + 1, np.uint16)
     ordered = np.array(sorted(numbers), np.int64)
     places[ordered] = np.arange(1, len(ordered) + 1)
     return places[ids]
 
 
-def common_counts(labels: Labels, slots: NDArray[np.integer], most: int) -> NDArray[np.int64]:
+def common_counts(labels: Labels, slots: Ids, most: int) -> NDArray[np.int64]:
     """Return how many squares each region and each slot have in common, int64 (n, most + 1)."""
-    wide = most + 1
-    keys = labels.astype(np.int64).ravel() * wide + slots.ravel()
-    regions = int(labels.max(initial=0)) + 1
-    return np.bincount(keys, minlength=regions * wide).reshape(regions, wide)
+    wide, regions = most + 1, int(labels.max(initial=0)) + 1
+    counts = np.zeros(regions * wide, np.int64)
+    for rows in _blocks(labels):
+        keys = labels[rows].astype(np.int64).ravel() * wide + slots[rows].ravel()
+        counts += np.bincount(keys, minlength=regions * wide)
+    return counts.reshape(regions, wide)
+
+
+def _blocks(squares: Labels) -> Iterator[slice]:
+    """Yield slices of rows that are worked on at once, which bounds memory."""
+    rows, cols = squares.shape
+    step = max(BLOCK // max(cols, 1), 1)
+    yield from (slice(first, first + step) for first in range(0, rows, step))
 
 
 @dataclass(slots=True)
@@ -125,7 +135,8 @@ class Matching:
             if what == "move":
                 label = self._shown_by[self._rooms.index(other)]
                 self._becomes[label, self._rooms.index(room)] = other
-        self._part[:] = self._becomes[self._labels, self._slots]
+        for rows in _blocks(self._labels):
+            self._part[rows] = self._becomes[self._labels[rows], self._slots[rows]]
         self._keep_cuts(before)
         for label in self._to_divide:
             self._divide(label)
@@ -213,7 +224,7 @@ class Matching:
         due = sorted(change for change, score in scores.items() if score >= HOLD_CHANGE)
         for change in due:
             del scores[change]
-        self._sheet.changes = dict(sorted(scores.items()))
+        self._sheet.note_changes(dict(sorted(scores.items())))
         return due
 
     def _divide(self, label: int) -> None:
@@ -256,9 +267,8 @@ class Matching:
         for label, score in places:
             scores[len(scores) + 1] = score
             here[self._labels == label] = len(scores)
-        sheet.regions = scores
         raster = replace(sheet.raster, ids=pending)
-        sheet.pending = raster.cropped() if scores else RoomRaster.empty(raster.square_m)
+        sheet.note(scores, raster.cropped() if scores else RoomRaster.empty(raster.square_m))
 
     def _make_room(self, label: int) -> bool:
         """Make a region a room; return False if there is no number for it."""
@@ -284,7 +294,7 @@ class Matching:
         squares = self._ids == room
         gone = self._sheet.gone.on(self._sheet.raster.window)
         gone[squares] = room
-        self._sheet.gone = replace(self._sheet.raster, ids=gone).cropped()
+        self._sheet.lay(self._sheet.raster, replace(self._sheet.raster, ids=gone).cropped())
         self._ids[squares] = other
         self._book.drop([room])
 

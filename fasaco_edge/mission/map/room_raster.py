@@ -13,14 +13,14 @@ from typing import TYPE_CHECKING, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.grid.geometry import Point, Window
+from fasaco_edge.grid.geometry import GridGeometry, Point, Window
 
 if TYPE_CHECKING:
     from fasaco_edge.grid.rooms import FoundRooms
     from fasaco_edge.mission.map.loop_closure import Motion
 
-# Limit on the squares of a raster.
-MOST_SQUARES = 4_000_000
+# Limit on the squares of a raster; a larger building gets wider squares.
+MOST_SQUARES = 1_000_000
 NOWHERE = Window(0, 0, 0, 0)
 # Squares worked on at once, which bounds memory.
 BLOCK = 1 << 18
@@ -123,16 +123,15 @@ def centres(window: Window, square_m: float) -> tuple[NDArray[np.float64], NDArr
     return (cols.ravel() + 0.5) * square_m, (rows.ravel() + 0.5) * square_m
 
 
-def sampled(found: FoundRooms, square_m: float) -> tuple[Window, NDArray[np.int32]] | None:
-    """Return the region at the centre of each square of a map, int32 (rows, cols), and the window.
-
-    None if there would be too many squares.
-    """
-    geometry = found.geometry
+def window_over(geometry: GridGeometry, square_m: float) -> Window:
+    """Return the window of squares over a grid."""
     x0, y0, x1, y1 = (edge / square_m for edge in geometry.bounds())
-    window = Window(math.floor(y0), math.floor(x0), math.ceil(y1), math.ceil(x1))
-    if not 0 < window.rows * window.cols <= MOST_SQUARES:
-        return None
+    return Window(math.floor(y0), math.floor(x0), math.ceil(y1), math.ceil(x1))
+
+
+def sampled(found: FoundRooms, window: Window, square_m: float) -> NDArray[np.int32]:
+    """Return the region at the centre of each square of a window, int32 (rows, cols)."""
+    geometry = found.geometry
     labels = np.zeros((window.rows, window.cols), np.int32)
     step = max(BLOCK // window.cols, 1)
     for first in range(0, window.rows, step):
@@ -144,7 +143,7 @@ def sampled(found: FoundRooms, square_m: float) -> tuple[Window, NDArray[np.int3
         values = np.zeros(len(rows), np.int32)
         values[inside] = found.labels[rows[inside], cols[inside]]
         labels[first : first + part.rows] = values.reshape(part.rows, part.cols)
-    return window, labels
+    return labels
 
 
 def spread(ids: Ids, allowed: NDArray[np.bool_]) -> None:

@@ -12,7 +12,13 @@ from fasaco_edge.grid.geometry import Window
 from fasaco_edge.mission.map.room_book import MOST_NUMBER, RoomBook, RoomSheet
 from fasaco_edge.mission.map.room_matching import Matching, common_counts, slots_of
 from fasaco_edge.mission.map.room_outline import joined, outline
-from fasaco_edge.mission.map.room_raster import MOST_SQUARES, Ids, RoomRaster, sampled
+from fasaco_edge.mission.map.room_raster import (
+    MOST_SQUARES,
+    Ids,
+    RoomRaster,
+    sampled,
+    window_over,
+)
 
 if TYPE_CHECKING:
     from fasaco_edge.grid.rooms import FoundRooms
@@ -27,28 +33,31 @@ LEAST_SQUARE_M = 0.05
 def update(book: RoomBook, found: FoundRooms, frame: str) -> None:
     """Take in the regions of the newest map, which is in ``frame``.
 
-    A map without regions, or too large for a raster, changes nothing.
+    A map without regions changes nothing.
     """
     if not found.count:
         return
     sheet = _sheet_for(book, found, frame)
-    coarser = round(found.geometry.resolution / sheet.raster.square_m)
-    if coarser > 1:
-        sheet.raster = sheet.raster.coarser(coarser)
-        sheet.gone = sheet.gone.coarser(coarser)
-        sheet.pending, sheet.regions = RoomRaster.empty(sheet.raster.square_m), {}
-    shown = sampled(found, sheet.raster.square_m)
-    if shown is None:
-        return
-    whole = Window.around(sheet.raster.window, shown[0])
-    assert whole is not None
-    if whole.rows * whole.cols > MOST_SQUARES:
-        return
+    _widen(sheet, round(found.geometry.resolution / sheet.raster.square_m))
+    while True:
+        window = window_over(found.geometry, sheet.raster.square_m)
+        whole = Window.around(sheet.raster.window, window) or window
+        if whole.rows * whole.cols <= MOST_SQUARES:
+            break
+        _widen(sheet, 2)
     book.turn_to(sheet)
     before = sheet.raster.on(whole)
-    sheet.raster = replace(sheet.raster, window=whole, ids=before.copy())
-    Matching(book, sheet, *shown).apply(before)
+    sheet.lay(replace(sheet.raster, window=whole, ids=before.copy()))
+    labels = sampled(found, window, sheet.raster.square_m)
+    Matching(book, sheet, window, labels).apply(before)
     refresh(book, _changed(before, sheet.raster.ids))
+
+
+def _widen(sheet: RoomSheet, factor: int) -> None:
+    """Make the squares of a sheet wider by a factor, if that is more than 1."""
+    if factor > 1:
+        sheet.lay(sheet.raster.coarser(factor), sheet.gone.coarser(factor))
+        sheet.note({}, RoomRaster.empty(sheet.raster.square_m))
 
 
 def _sheet_for(book: RoomBook, found: FoundRooms, frame: str) -> RoomSheet:
@@ -65,10 +74,10 @@ def _sheet_for(book: RoomBook, found: FoundRooms, frame: str) -> RoomSheet:
 
 def _alike(sheet: RoomSheet, found: FoundRooms) -> float:
     """Return how much of the floor of map or sheet lies in regions and rooms that match."""
-    shown = sampled(found, sheet.raster.square_m)
-    if shown is None:
+    window = window_over(found.geometry, sheet.raster.square_m)
+    if window.rows * window.cols > MOST_SQUARES:
         return 0.0
-    window, labels = shown
+    labels = sampled(found, window, sheet.raster.square_m)
     counts = common_counts(labels, slots_of(sheet.raster.on(window), sheet.rooms), len(sheet.rooms))
     squares = np.bincount(sheet.raster.ids.ravel(), minlength=MOST_NUMBER + 1)[sorted(sheet.rooms)]
     areas = counts[1:].sum(axis=1)

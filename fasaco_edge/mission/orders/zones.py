@@ -22,6 +22,9 @@ TOUCH_TOLERANCE_M = 1e-6
 def in_zones(zones: tuple[Zone, ...], window: Window, cell_m: float) -> NDArray[np.bool_]:
     """Return which cells of ``window`` lie in one of the zones, bool (rows, cols), read-only."""
     if any(zone.polygon is None for zone in zones):
+        left_out = tuple(polygon for zone in zones for _, polygon in zone.without)
+        if left_out:
+            return ~_inside_any(left_out, window, cell_m)
         return _everything(window)
     return _inside_any(tuple(zone.polygon for zone in zones if zone.polygon), window, cell_m)
 
@@ -94,8 +97,8 @@ def _inside_any(polygons: tuple[Polygon, ...], window: Window, cell_m: float) ->
     return cells
 
 
-# One bit per cell: a hundred zones take as much as a dozen masks.
-@lru_cache(maxsize=1)
+# One bit per cell: a hundred zones take as much as a dozen masks. For zones, and for rooms.
+@lru_cache(maxsize=2)
 def _planes(polygons: tuple[Polygon, ...], window: Window, cell_m: float) -> NDArray[np.uint8]:
     return np.stack([np.packbits(cells_inside(polygon, window, cell_m)) for polygon in polygons])
 
