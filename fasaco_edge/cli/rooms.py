@@ -4,18 +4,17 @@ from __future__ import annotations
 
 import argparse
 
-from rich.table import Table
-
 from fasaco_edge.cli.ask import add_question, ask
 from fasaco_edge.cli.console.arguments import Command, Exit, add_common
 from fasaco_edge.cli.console.help import HelpText
 from fasaco_edge.cli.console.pass_option import WORDS, add_passes
+from fasaco_edge.cli.console.rooms_table import show_rooms
 from fasaco_edge.cli.console.streams import print_json
 from fasaco_edge.cli.console.terminal import out
 from fasaco_edge.mission.orders.order import read_command
 from fasaco_edge.mission.orders.passes import passes_document
 from fasaco_edge.wire.documents.json_text import decode_json, decode_tolerant, encode_json
-from fasaco_edge.wire.documents.rooms import RoomReport, Rooms
+from fasaco_edge.wire.documents.rooms import Rooms
 
 EPILOG = """\
 examples:
@@ -113,7 +112,7 @@ def run(args: argparse.Namespace) -> int:
     if args.json:
         print_json(decode_json(reply.payload))
     else:
-        _show(decode_tolerant(reply.payload, Rooms))
+        show_rooms(decode_tolerant(reply.payload, Rooms))
     return Exit.OK
 
 
@@ -132,38 +131,6 @@ def _asked(args: argparse.Namespace) -> dict[str, object]:
             if args.skip is not None:
                 room["skip"] = args.skip
     return {"command": f"room_{args.rooms_action}", "room": room}
-
-
-def _show(rooms: Rooms) -> None:
-    if not rooms.rooms:
-        out().print("no rooms yet: they are found some seconds after the first map")
-        return
-    table = Table(
-        "room", "name", "m2", "swept", "beside", "settings", title="Rooms", title_justify="left"
-    )
-    for room in rooms.rooms:
-        beside = ", ".join(map(str, room.neighbours)) or "-"
-        swept = "-" if room.swept is None else f"{100 * room.swept:.0f} %"
-        table.add_row(
-            str(room.id), room.name or "-", f"{room.area_m2:.1f}", swept, beside, _settings(room)
-        )
-    out().print(table)
-
-
-def _settings(room: RoomReport) -> str:
-    """Return a room's settings as text."""
-    words = []
-    if isinstance(room.passes, int):
-        words.append(f"passes: {room.passes}")
-    elif room.passes:
-        each = (item if isinstance(item, str) else _pass(item) for item in room.passes)
-        words.append(f"passes: {', '.join(each)}")
-    words += ["skip"] * room.skip
-    return "; ".join(words) or "-"
-
-
-def _pass(members: dict[str, object]) -> str:
-    return " ".join(f"{name} {value}" for name, value in sorted(members.items()))
 
 
 COMMAND = Command(
