@@ -299,3 +299,12 @@ def test_a_large_building_gets_wider_squares_and_keeps_its_rooms():
     shown(book, coarse)
     assert book.sheet.raster.square_m == pytest.approx(1.0)
     assert at(book, *KITCHEN) == book.room("kitchen").id
+
+
+def test_a_room_within_another_one_is_no_part_of_it():
+    book = known(regions("aaaaa", "abbba", "abbba", "aaaaa"))
+    ring, inner = at(book, 0.5, 0.5), at(book, 2.5, 2.0)
+    assert book.room(ring).encloses == (inner,)
+    assert book.room(inner).encloses == ()
+    assert book.room(ring).area_m2 == pytest.approx(14.0)
+    assert book.holes(book.room(ring)) == (book.room(inner).outline,)

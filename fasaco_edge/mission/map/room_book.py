@@ -57,6 +57,7 @@ class Room:
         outline: corners (x, y) [m] in the map frame, without holes.
         area_m2: area of its squares [m2].
         neighbours: numbers of the rooms it is joined to, ascending.
+        encloses: numbers of the rooms that lie within its outline, as those in a ring of corridors.
     """
 
     id: int
@@ -66,6 +67,7 @@ class Room:
     outline: Polygon = ()
     area_m2: float = 0.0
     neighbours: tuple[int, ...] = ()
+    encloses: tuple[int, ...] = ()
 
     @property
     def is_kept(self) -> bool:
@@ -214,6 +216,11 @@ class RoomBook:
         room = self.room(called)
         self.check_name("room.name", name, room.id)
         self.put(replace(room, name=name))
+
+    def holes(self, room: Room) -> tuple[Polygon, ...]:
+        """Return the outlines of the rooms that lie within that of a room."""
+        rooms = {} if self.sheet is None else self.sheet.rooms
+        return tuple(rooms[each].outline for each in room.encloses if each in rooms)
 
     def check_name(self, where: str, name: str, *of: int) -> None:
         """Check a name for a room, which may be that of the rooms ``of`` now.

@@ -8,10 +8,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fasaco_edge.grid.geometry import Window
-from fasaco_edge.mission.map.room_book import MOST_NUMBER, RoomBook, RoomSheet
-from fasaco_edge.mission.map.room_matching import Matching, common_counts, slots_of
-from fasaco_edge.mission.map.room_outline import joined, outline
+from fasaco_edge.grid.geometry import Point, Window
+from fasaco_edge.grid.polygons import area_m2, is_near
+from fasaco_edge.kernels.lattice.areas import find_areas
+from fasaco_edge.mission.map.room_book import MOST_NUMBER, Room, RoomBook, RoomSheet
+from fasaco_edge.mission.map.room_matching import LEAST_M2, Matching, common_counts, slots_of
+from fasaco_edge.mission.map.room_outline import joined, largest_part, outline
 from fasaco_edge.mission.map.room_raster import (
     MOST_SQUARES,
     Ids,
@@ -99,9 +101,9 @@ def refresh(book: RoomBook, changed: Iterable[int]) -> None:
     if sheet is None or not rooms:
         return
     square_m = sheet.raster.square_m
-    beside = joined(sheet.raster.ids, square_m)
+    beside, shapes = joined(sheet.raster.ids, square_m), list[Room]()
     for room in book.rooms:
-        shape = replace(room, neighbours=beside.get(room.id, ()))
+        shape = replace(room, neighbours=beside.get(room.id, ()), encloses=())
         if room.id in rooms:
             window, mask = sheet.raster.squares(room.id)
             shape = replace(
@@ -109,4 +111,20 @@ def refresh(book: RoomBook, changed: Iterable[int]) -> None:
                 outline=outline(window, mask, square_m) if mask.any() else (),
                 area_m2=round(int(np.count_nonzero(mask)) * square_m**2, 2),
             )
-        book.put(shape)
+        shapes.append(shape)
+    inner = {room.id: _inner_point(sheet, room.id) for room in shapes if room.outline}
+    for room in shapes:
+        encloses: tuple[int, ...] = ()
+        # A hole that a room fits in.
+        if room.outline and area_m2(room.outline) > room.area_m2 + LEAST_M2:
+            inside = (at for at, point in inner.items() if is_near(room.outline, point, 0.0))
+            encloses = tuple(at for at in inside if at != room.id)
+        book.put(replace(room, encloses=encloses))
+
+
+def _inner_point(sheet: RoomSheet, room: int) -> Point:
+    """Return the centre of a square of a room, away from its border."""
+    window, mask = sheet.raster.squares(room)
+    row, col = find_areas(largest_part(mask).astype(np.uint8)).inner[0].tolist()
+    square_m = sheet.raster.square_m
+    return (window.col0 + col + 0.5) * square_m, (window.row0 + row + 0.5) * square_m
