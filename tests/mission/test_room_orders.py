@@ -219,14 +219,15 @@ def test_an_order_for_everything_leaves_a_skipped_room_out_and_says_so():
     assert drive.mission.order_state.order.zones[0].without == ()
 
 
+# A room of 12 x 12 cells, with a door in its eastern wall, within corridors 6 cells wide.
 RING = (
-    *([".................."] * 4),
-    *([".....########....."] * 1),
-    *([".....#......#....."] * 2),
-    *([".....#............"] * 2),
-    *([".....#......#....."] * 2),
-    *([".....########....."] * 1),
-    *([".................."] * 4),
+    *(["." * 26] * 6),
+    "......" + "#" * 14 + "......",
+    *(["......#" + "." * 12 + "#......"] * 5),
+    *(["......#" + "." * 19] * 2),
+    *(["......#" + "." * 12 + "#......"] * 5),
+    "......" + "#" * 14 + "......",
+    *(["." * 26] * 6),
 )
 
 
@@ -240,8 +241,8 @@ def test_a_ring_of_corridors_does_not_contain_the_room_within(deg):
     start(drive, ring.title)
     drive.plan()
     (zone,) = drive.mission.zone_progress()
-    within = {(row, col) for row in range(5, 11) for col in range(6, 12)}
-    assert 120 < zone.cells <= 18 * 14 - 48
+    within = {(row, col) for row in range(7, 19) for col in range(7, 19)}
+    assert 400 < zone.cells <= 26 * 26 - 14 * 14 + 2
     lattice = drive.mission.lattice
     asked = in_zones(drive.mission.order_state.order.zones, lattice.window, lattice.cell_m)
     assert not any(asked[lattice.local(cell)] for cell in within)
