@@ -196,7 +196,7 @@ def _sheet(note: SheetNote, next_id: int) -> RoomSheet:
     if max(_numbers(gone), default=0) >= next_id:
         raise ValueError("squares have numbers that are still to come")
     nothing = RoomRaster.empty(note.square_m)
-    return RoomSheet(note.frame, raster, gone, nothing, rooms, list(note.cuts))
+    return RoomSheet(note.frame, raster, gone, nothing, raster, rooms, list(note.cuts))
 
 
 def _numbers(raster: RoomRaster) -> set[int]:

@@ -12,7 +12,13 @@ from fasaco_edge.grid.geometry import Point, Window
 from fasaco_edge.grid.polygons import area_m2, is_near
 from fasaco_edge.kernels.lattice.areas import find_areas
 from fasaco_edge.mission.map.room_book import MOST_NUMBER, Room, RoomBook, RoomSheet
-from fasaco_edge.mission.map.room_matching import LEAST_M2, Matching, common_counts, slots_of
+from fasaco_edge.mission.map.room_matching import (
+    LEAST_M2,
+    SETTLED,
+    Matching,
+    common_counts,
+    slots_of,
+)
 from fasaco_edge.mission.map.room_outline import joined, largest_part, outline
 from fasaco_edge.mission.map.room_raster import (
     MOST_SQUARES,
@@ -48,6 +54,7 @@ def update(book: RoomBook, found: FoundRooms, frame: str) -> None:
             break
         _widen(sheet, 2)
     book.turn_to(sheet)
+    sheet.settle(SETTLED)
     before = sheet.raster.on(whole)
     sheet.lay(replace(sheet.raster, window=whole, ids=before.copy()))
     labels = sampled(found, window, sheet.raster.square_m)
