@@ -110,6 +110,8 @@ class RoomSheet:
     cuts: list[Cut] = field(default_factory=list)
     regions: dict[int, int] = field(default_factory=dict)
     changes: dict[tuple[str, int, int], int] = field(default_factory=dict)
+    # How many squares of each room have changed since its outline was drawn.
+    stale: dict[int, int] = field(default_factory=dict, init=False)
     # The squares since ``settled``, and how many updates there were in all.
     _between: RoomRaster | None = field(default=None, init=False)
     _updates: int = field(default=0, init=False)

@@ -34,6 +34,8 @@ if TYPE_CHECKING:
 # Share of the floor in rooms that match from which a map shows the building of a sheet; region and
 # room match if they have this share of all their floor in common.
 ALIKE = MATCH = 0.5
+# Outlines follow once so much has changed [m2]: pixels along walls flicker.
+STALE_M2 = 0.1
 # Squares are as wide as the map's pixels, and not narrower than this [m].
 LEAST_SQUARE_M = 0.05
 
@@ -59,7 +61,7 @@ def update(book: RoomBook, found: FoundRooms, frame: str) -> None:
     sheet.lay(replace(sheet.raster, window=whole, ids=before.copy()))
     labels = sampled(found, window, sheet.raster.square_m)
     Matching(book, sheet, window, labels).apply(before)
-    refresh(book, _changed(before, sheet.raster.ids))
+    refresh(book, _stale(sheet, before))
 
 
 def _widen(sheet: RoomSheet, factor: int) -> None:
@@ -95,10 +97,19 @@ def _alike(sheet: RoomSheet, found: FoundRooms) -> float:
     return float(common[matches].sum()) / floor if floor else 0.0
 
 
-def _changed(before: Ids, after: Ids) -> set[int]:
-    """Return the numbers of the rooms whose squares have changed."""
+def _stale(sheet: RoomSheet, before: Ids) -> list[int]:
+    """Return the rooms of which so many squares have changed that their outlines are outdated."""
+    after = sheet.raster.ids
     other = before != after
-    return set(np.unique(np.concatenate((before[other], after[other]))).tolist()) - {0}
+    changed = np.bincount(np.concatenate((before[other], after[other])), minlength=1)
+    for room in np.flatnonzero(changed).tolist():
+        sheet.stale[room] = sheet.stale.get(room, 0) + int(changed[room])
+    least = STALE_M2 / sheet.raster.square_m**2
+    return [
+        number
+        for number, room in sheet.rooms.items()
+        if sheet.stale.get(number, 0) >= least or not room.outline
+    ]
 
 
 def refresh(book: RoomBook, changed: Iterable[int]) -> None:
@@ -107,26 +118,32 @@ def refresh(book: RoomBook, changed: Iterable[int]) -> None:
     rooms = set(changed)
     if sheet is None or not rooms:
         return
+    for room in rooms:
+        sheet.stale.pop(room, None)
     square_m = sheet.raster.square_m
     beside, shapes = joined(sheet.raster.ids, square_m), list[Room]()
-    for room in book.rooms:
-        shape = replace(room, neighbours=beside.get(room.id, ()), encloses=())
-        if room.id in rooms:
-            window, mask = sheet.raster.squares(room.id)
+    for known in book.rooms:
+        shape = replace(known, neighbours=beside.get(known.id, ()), encloses=())
+        if known.id in rooms:
+            window, mask = sheet.raster.squares(known.id)
             shape = replace(
                 shape,
                 outline=outline(window, mask, square_m) if mask.any() else (),
                 area_m2=round(int(np.count_nonzero(mask)) * square_m**2, 2),
             )
         shapes.append(shape)
-    inner = {room.id: _inner_point(sheet, room.id) for room in shapes if room.outline}
-    for room in shapes:
-        encloses: tuple[int, ...] = ()
-        # A hole that a room fits in.
-        if room.outline and area_m2(room.outline) > room.area_m2 + LEAST_M2:
-            inside = (at for at, point in inner.items() if is_near(room.outline, point, 0.0))
-            encloses = tuple(at for at in inside if at != room.id)
-        book.put(replace(room, encloses=encloses))
+    # Outlines with a hole that a room fits in.
+    rings = {
+        each.id
+        for each in shapes
+        if each.outline and area_m2(each.outline) > each.area_m2 + LEAST_M2
+    }
+    inner = {each.id: _inner_point(sheet, each.id) for each in shapes if rings and each.outline}
+    for each in shapes:
+        encloses: list[int] = []
+        if each.id in rings:
+            encloses = [at for at, point in inner.items() if is_near(each.outline, point, 0.0)]
+        book.put(replace(each, encloses=tuple(at for at in encloses if at != each.id)))
 
 
 def _inner_point(sheet: RoomSheet, room: int) -> Point:
