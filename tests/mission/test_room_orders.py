@@ -115,7 +115,7 @@ def test_what_is_unknown_is_refused_with_what_there_is():
     start(drive, "rug", "attic")
     assert drive.refused.code == "bad_order"
     assert "zones[1].name: no zone 'attic'" in str(drive.refused)
-    assert "there are rug; and no room: there are " in str(drive.refused)
+    assert "there are rug; nor a room: there are " in str(drive.refused)
     assert "'kitchen'" in str(drive.refused)
     assert drive.mission.state is State.IDLE
     # A standing zone comes before a room of its name.
