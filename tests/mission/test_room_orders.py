@@ -99,6 +99,9 @@ def test_a_room_is_ordered_by_its_name_and_by_its_number():
     assert len(visited(drive, WEST_COLUMNS)) < 30
     (zone,) = drive.mission.zone_progress()
     assert (zone.name, zone.covered) == ("kitchen", zone.cells)
+    progress = drive.mission.room_progress()
+    assert progress[room_at(drive, *IN_EAST).id] == (zone.cells, zone.covered)
+    assert progress[room_at(drive, *IN_WEST).id][1] < 30
     start(drive, f"room {room_at(drive, *IN_WEST).id}")
     assert drive.refused is None
     drive.finish()
@@ -112,7 +115,7 @@ def test_what_is_unknown_is_refused_with_what_there_is():
     start(drive, "rug", "attic")
     assert drive.refused.code == "bad_order"
     assert "zones[1].name: no zone 'attic'" in str(drive.refused)
-    assert "there are rug; and no room: there are " in str(drive.refused)
+    assert "there are rug; nor a room: there are " in str(drive.refused)
     assert "'kitchen'" in str(drive.refused)
     assert drive.mission.state is State.IDLE
     # A standing zone comes before a room of its name.

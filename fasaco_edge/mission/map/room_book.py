@@ -220,9 +220,8 @@ class RoomBook:
         """
         room = self.find(called)
         if room is None:
-            shown = f"room {called}" if isinstance(called, int) else repr(called)
             raise OrderError(
-                f"room.id: no room {shown}; {self.listed()}",
+                f"room.id: there is no room {called!r}; {self.listed()}",
                 hint="name one of those, or its number",
             )
         return room
