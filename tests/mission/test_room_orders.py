@@ -13,6 +13,7 @@ from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.grid.polygons import is_near
 from fasaco_edge.grid.rotation import rotated_geometry, rotated_pose
 from fasaco_edge.mission.core.events import MapReceived, PoseReceived, State
+from fasaco_edge.mission.map.inputs import PATIENCE_S
 from fasaco_edge.mission.map.room_watch import PERIOD_S
 from fasaco_edge.mission.orders.order import (
     Command,
@@ -338,3 +339,26 @@ def test_what_is_wrong_with_a_request_is_named(document, said):
     with pytest.raises(OrderError) as refused:
         read_command(document)
     assert said in str(refused.value)
+
+
+def test_rooms_of_another_frame_are_not_known_on_this_map():
+    """Not even between its first map and the first look at it."""
+    drive = settled(*BOTH)
+    name(drive, room_at(drive, *IN_EAST).id, "kitchen")
+    upstairs = MapReceived(building(*BOTH, frame="upstairs"))
+    for _ in range(round(4 * PATIENCE_S)):
+        drive.tell(upstairs, pose_at(*IN_WEST, frame="upstairs"), after=0.5)
+        if drive.mission.grid.frame == "upstairs":
+            break
+    assert drive.mission.grid.frame == "upstairs"
+    start(drive, "kitchen")
+    assert drive.refused.code == "bad_order"
+    settle_in(drive, "upstairs")
+    assert len(drive.mission.rooms.rooms) == 2
+    start(drive, "kitchen")
+    assert "nor a room: there are room 3, room 4" in str(drive.refused)
+
+
+def settle_in(drive, frame):
+    for _ in range(8):
+        drive.tell(pose_at(*drive.cell, frame=frame), after=1.01 * PERIOD_S)

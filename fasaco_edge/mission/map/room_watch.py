@@ -45,8 +45,10 @@ class RoomWatch:
         A map that stays is shown to the book again until nothing more follows from it.
         """
         came, self._newest = grid is not self._newest, grid
+        if self.book.sheet is not None and self.book.frame != grid.frame:
+            self.book.leave_building()
         sheet = self.book.sheet
-        cuts = tuple(sheet.cuts) if sheet is not None and sheet.frame == grid.frame else ()
+        cuts = tuple(sheet.cuts) if sheet is not None else ()
         is_new = grid is not self._seen or cuts != self._cuts
         if now < self._due or not (is_new or (sheet is not None and sheet.is_settling)):
             return
@@ -61,6 +63,11 @@ class RoomWatch:
         update(self.book, self._found, grid.frame)
         if self.book.sheet is None or not self.book.sheet.is_settling:
             self._found = None
+
+    def on(self, grid: OccupancyGrid | None) -> RoomBook:
+        """Return the rooms as far as they are those of a map; all without one."""
+        is_here = grid is None or self.book.frame in ("", grid.frame)
+        return self.book if is_here else RoomBook()
 
     def move(self, motion: Motion, lattice_deg: float) -> None:
         """Move the rooms with the map; the motion is given in a frame at an angle [deg]."""
