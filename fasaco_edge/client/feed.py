@@ -18,7 +18,7 @@ from fasaco_edge.errors import BusUnavailable
 from fasaco_edge.wire.keys import VERSION, Keys
 from fasaco_edge.wire.limits import MAX_JSON_BYTES, MAX_MESSAGE_BYTES
 from fasaco_edge.wire.topic_types import NEWEST, Topic
-from fasaco_edge.wire.topics import FLEET, FLOOR, PHEROMONE, TOPICS
+from fasaco_edge.wire.topics import FLEET, FLOOR, PHEROMONE, TOPICS, UNSWEPT
 
 RETRY_S = 0.5
 # Timeout at the end for a host that does not answer.
@@ -77,7 +77,7 @@ class Joining(ABC):
 
 WATCHED = [topic for topic in TOPICS if topic.queues.watch is not None]
 # The daemon makes these only while a subscriber exists: they are requested.
-ON_REQUEST = (PHEROMONE, FLOOR)
+ON_REQUEST = (PHEROMONE, FLOOR, UNSWEPT)
 SUBSCRIBED = [topic for topic in WATCHED if topic not in ON_REQUEST]
 # Queue length of messages of a fleet's other robots.
 FLEET_WAITING = 64

@@ -33,8 +33,15 @@ MOST_M = 1e6
 UNDERWAY = ("planning", "covering", "returning", "degraded", "paused", "charging")
 
 
-def state(view: RobotState, way: Way, now: float) -> Digest:
-    """Return the content of the newest status, and why there is none; ``way``: the path."""
+def state(view: RobotState, way: Way, now: float, ordered: Status | None = None) -> Digest:
+    """Return the content of the newest status, and why there is none.
+
+    Args:
+        view: of the robot.
+        way: its path.
+        now: since the epoch [s].
+        ordered: the newest status with an order.
+    """
     status = view.status
     others = sorted(view.robots - {view.robot})[:MOST_ROBOTS]
     absent = _absent(view, now)
@@ -48,8 +55,8 @@ def state(view: RobotState, way: Way, now: float) -> Digest:
         "does": plain.last_seen(status) if absent else plain.does(status),
         "needs": plain.needs(status),
         "left": [
-            {"m2": part.m2, "reason": part.reason, "places": part.places}
-            for part in plain.left(status)
+            {"m2": part.m2, "reason": part.reason, "marks": part.marks, "places": part.places}
+            for part in plain.left(status, ordered)
         ],
         "reason": _reason(status),
         "cells": status.coverage.fraction if status.coverage else None,

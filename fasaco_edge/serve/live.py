@@ -8,7 +8,7 @@ from fasaco_edge.client.phrases import steady_now
 from fasaco_edge.serve.guard import Guard
 from fasaco_edge.serve.served_view import ServedView
 from fasaco_edge.serve.server import Server
-from fasaco_edge.wire.topics import FLOOR, PHEROMONE
+from fasaco_edge.wire.topics import FLOOR, PHEROMONE, UNSWEPT
 
 # Least period of messages to pages; without any, period of the check for viewers [s].
 FRAME_S, IDLE_S = 0.1, 0.2
@@ -51,6 +51,7 @@ class LiveServer(Server):
             self._view.trouble = self._feed.trouble
             viewers = tuple(self._viewers)
             self._feed.want(FLOOR, bool(viewers))
+            self._feed.want(UNSWEPT, any(viewer.wants_unswept for viewer in viewers))
             self._feed.want(PHEROMONE, any(viewer.wants_field for viewer in viewers))
             if viewers and (news := self._view.news(now)) and self._loop is not None:
                 self._loop.call_soon_threadsafe(self._publish, news)

@@ -55,11 +55,12 @@ class Viewer:
 
     Attributes:
         wants_field: whether it shows the pheromone field.
+        wants_unswept: whether it shows where floor is not swept.
         news: set when there is a newer message.
     """
 
     def __init__(self, socket: ServerConnection, source: Source, guard: Guard) -> None:
-        self.wants_field = False
+        self.wants_field = self.wants_unswept = False
         self.news = asyncio.Event()
         self._socket = socket
         self._source = source
@@ -87,8 +88,8 @@ class Viewer:
         try:
             async for text in self._socket:
                 match from_page(text):
-                    case Wants(field):
-                        self.wants_field = field
+                    case Wants(field, unswept):
+                        self.wants_field, self.wants_unswept = field, unswept
                         self.news.set()
                     case Seek(at_s):
                         for message in await asyncio.to_thread(self._source.at, at_s):
@@ -104,10 +105,11 @@ class Viewer:
 
     async def _send_news(self) -> None:
         sent: dict[str, int] = {}
+        asked = {"field": lambda: self.wants_field, "unswept": lambda: self.wants_unswept}
         while True:
             self.news.clear()
             for kind, number, message in self._source.newest():
-                if sent.get(kind) != number and (kind != "field" or self.wants_field):
+                if sent.get(kind) != number and (kind not in asked or asked[kind]()):
                     sent[kind] = number
                     await self._send(message)
             await self.news.wait()

@@ -134,6 +134,18 @@ FLOOR = Topic(
     queues=Queues(recorder=NEWEST, watch=NEWEST),
     limits=("max_grid_cells",),
 )
+UNSWEPT = Topic(
+    name="unswept",
+    direction="out",
+    when="floor was swept, or another reason holds for it, every two seconds at most; again after "
+    "ten seconds; only while someone listens",
+    speaker="robot",
+    listeners=("viewer",),
+    schemas=(schemas.OCCUPANCY_GRID,),
+    qos=Qos("data_low", why="for display: late joiners get it within two seconds"),
+    queues=Queues(watch=NEWEST),
+    limits=("max_grid_cells",),
+)
 PHEROMONE = Topic(
     name="pheromone",
     direction="out",

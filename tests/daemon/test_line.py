@@ -58,7 +58,14 @@ def test_by_default_the_path_is_a_line_that_sweeps_the_rims(tmp_path):
         assert ahead > 10 * beside
         way = [tuple(point) for point in points[:12].tolist()]
         drive(outsider, way)
-        outsider.wait_status(lambda status: status["floor"]["swept_m2"] > 0.3)
+        status = outsider.wait_status(lambda status: status["floor"]["swept_m2"] > 0.3)
+        # Only while someone listens: each pixel has the reason for which it is left.
+        heard = outsider.listen("unswept", late=False).wait(lambda heard: True)
+        grid = decode_occupancy_grid(heard.payload)
+        pixels = np.bincount(grid.cells.ravel(), minlength=7) * grid.geometry.resolution**2
+        narrow = sum(left["m2"] for left in status["floor"]["out_of_reach"])
+        assert pixels[1:4].sum() == pytest.approx(narrow, abs=0.01)
+        assert pixels[6] > 10 * pixels[5]
 
 
 def test_cells_at_an_angle_are_published_in_the_map_frame(tmp_path):

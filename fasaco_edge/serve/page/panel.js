@@ -71,7 +71,7 @@ function showTechnical(state) {
 // What is not swept: each line shows itself on the map; the list opens by itself at the end.
 let wasOver = null;
 function showLeft(state) {
-  const parts = state.left, isOver = state.mission.stage === "over";
+  const parts = state.left, isOver = ["over", null].includes(state.mission.stage);
   find("left").hidden = !parts.length;
   find("left-what").textContent = isOver ? "Not swept" : "Left out so far";
   find("left-m2").textContent = squares(parts.reduce((sum, part) => sum + part.m2, 0));
@@ -84,7 +84,7 @@ function showLeft(state) {
   if (isOver && !wasOver) find("left").open = true;
   wasOver = isOver;
   const shown = model.left && parts.find((part) => part.reason === model.left.reason);
-  if (model.left) { model.left = shown || null; showBars(); }
+  if (model.left) { model.left = shown || null; showBars(); if (!shown) wants(); }
 }
 
 function showOnMap(part) {
@@ -93,9 +93,10 @@ function showOnMap(part) {
   Object.assign(view, { fitted: true, follows: false });
   showTools();
   showBars();
+  wants();
   document.querySelector("main").scrollIntoView({ block: "nearest" });
 }
-find("unleft").addEventListener("click", () => { model.left = null; showBars(); });
+find("unleft").addEventListener("click", () => { model.left = null; showBars(); wants(); });
 
 function showProgress(state) {
   const floor = state.floor, knows = floor && floor.reachable_m2;
