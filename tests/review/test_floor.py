@@ -35,11 +35,14 @@ def told(poses, *, keep_out=(), yaw=0.0, lost_pose_s=0.0, at_s=None, **changes):
         ordered_keep_out=tuple(
             tuple(turned(geometry, *at) for at in polygon) for polygon in keep_out
         ),
-        config={"robot": {"tool_width_m": TOOL_M, "radius_m": RADIUS_M}},
+        config={
+            "robot": {"tool_width_m": TOOL_M, "radius_m": RADIUS_M},
+            "mission": {"lost_pose_s": lost_pose_s},
+        },
         **changes,
     )
     lattice = CoverageLattice.from_map(data.grid, data.footprint)
-    floor = swept_floor(data, lattice, lost_pose_s)
+    floor = swept_floor(data, lattice)
     return floor and floor.figures
 
 
