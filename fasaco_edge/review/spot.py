@@ -36,6 +36,7 @@ from fasaco_edge.review.drive import swept_floor
 from fasaco_edge.review.run_data import maps_of
 from fasaco_edge.review.wording import clock
 from fasaco_edge.wire.documents.settings import known_settings
+from fasaco_edge.wire.reasons import plain
 
 if TYPE_CHECKING:
     from fasaco_edge.review.review import Review
@@ -309,7 +310,7 @@ class _Judge:
         later = [p.about for p in self._data.paths if p.about.revision > over.revision]
         if not later:
             return "missed", f"{led}, and the robot did not get there"
-        words = f"{led}, until path {later[0].revision} took its place ({later[0].reason})"
+        words = f"{led}, until path {later[0].revision} took its place ({plain(later[0].reason)})"
         # A shorter line leaves floor that is not worth the distance.
         return "not worth it" if later[0].reason in (POLISHED, BETTER) else "missed", words
 

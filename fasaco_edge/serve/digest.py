@@ -17,6 +17,7 @@ from fasaco_edge.wire.documents.replies import (
 )
 from fasaco_edge.wire.documents.settings import KnownSettings
 from fasaco_edge.wire.documents.status import FleetReport, Status
+from fasaco_edge.wire.reasons import plain as plain_words
 
 Digest = dict[str, object]
 
@@ -91,8 +92,8 @@ def _absent(view: RobotState, now: float) -> str:
 def _reason(status: Status) -> str:
     path = status.path
     if path is not None and status.reason == f"path {path.revision}":
-        return path.reason if path.steps else ""
-    return status.reason
+        return plain_words(path.reason) if path.steps else ""
+    return plain_words(status.reason)
 
 
 def _floor(floor: FloorReport) -> Digest:

@@ -17,6 +17,7 @@ from fasaco_edge.text import one_line
 from fasaco_edge.wire.documents.json_text import decode_tolerant, encode_json
 from fasaco_edge.wire.documents.replies import Error
 from fasaco_edge.wire.documents.replies import Reply as Answer
+from fasaco_edge.wire.reasons import plain
 
 if TYPE_CHECKING:
     from websockets.asyncio.server import ServerConnection
@@ -144,7 +145,7 @@ class Viewer:
             answer = decode_tolerant(found[0].payload, Answer)
         except FasacoError as error:
             return message_text("answer", id=order.id, ok=False, text=str(error), hint=error.hint)
-        text = f"{answer.state}: {answer.reason}"
+        text = f"{answer.state}: {plain(answer.reason)}"
         return message_text("answer", id=order.id, ok=True, text=text, hint="")
 
 

@@ -56,7 +56,7 @@ def test_the_demo_is_a_live_map_and_then_a_summary(folder):
     assert screen.startswith("kernels ready")
     assert "q quits" not in screen
     assert "\nroom: every reachable cell is covered\n" in screen
-    assert re.search(r"reachable floor swept +│ \d\.\d of \d\.\d m2", screen)
+    assert re.search(r"floor swept +│ \d\.\d of \d\.\d m2", screen)
     for program in ("fasaco-edge review", "fasaco-edge serve", "rerun"):
         assert f"{program} demo/*.rrd\n" in screen
     # Its length is that of where this is installed.

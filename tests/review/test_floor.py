@@ -110,7 +110,7 @@ def test_what_the_ledger_had_last_is_told_beside():
     samples = [StatusSample(float(at), status) for at, status in enumerate(told)]
     assert RunData(statuses=samples).ledger_floor.swept_m2 == 3.5
     assert RunData(statuses=samples[2:]).ledger_floor is None
-    assert Figure("floor swept by the ledger", "3.5 m2", 3.5) in list(
+    assert Figure("floor swept, by the daemon", "3.5 m2", 3.5) in list(
         figures(ReviewDocument(ledger_swept_m2=3.5))
     )
 

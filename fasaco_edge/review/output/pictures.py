@@ -184,7 +184,7 @@ def _caption(review: Review) -> list[str]:
     if review.floor is not None:
         figures = review.floor.figures
         swept = swept_words(figures.swept_m2, figures.reachable_m2)
-        lines.append(f"reachable floor swept: {swept}")
+        lines.append(f"floor swept: {swept}, by recorded poses")
     if walk is not None:
         lines.append(
             f"{walk.steps:,} steps, {walk.revisits:,} revisits, {walk.turns_90:,} quarter-turns"
