@@ -76,6 +76,7 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--against",
         nargs="+",
+        action="extend",
         type=Path,
         metavar="FILE",
         help="the parts of another run to compare with",
