@@ -63,6 +63,7 @@ def state(view: RobotState, way: Way, now: float, ordered: Status | None = None)
         "cells": status.coverage.fraction if status.coverage else None,
         "floor": _floor(floor) if floor else None,
         "to_go_s": _to_go_s(view, status, way),
+        "grows": view.grows(now),
         "time_scale": view.settings.robot.time_scale,
         "mission": _mission(mission),
         "battery": _battery(status),

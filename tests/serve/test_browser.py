@@ -29,7 +29,7 @@ from tests.serve.serving import served
 from tests.serve.test_plain import TECHNICAL
 from tests.support.outsider import TIMEOUT_S, Outsider
 from tests.support.processes import daemon_process
-from tests.support.rooms import HALL, begin, drive, lanes, map_bytes, pose_bytes
+from tests.support.rooms import HALL, UNKNOWN, begin, drive, fill, lanes, map_bytes, pose_bytes
 from tests.support.waiting import until
 
 BROWSER = shutil.which("chromium")
@@ -290,7 +290,11 @@ def test_a_reason_shows_its_floor_on_the_map_and_nothing_else(tmp_path):
         browsing(page.url, tmp_path / "browser") as tab,
     ):
         until(lambda: tab.js("Boolean(model.state)"))
-        begin(outsider)
+        begin(outsider, fill(HALL, 3.0, 0.0, 6.0, 4.5, UNKNOWN))
+        until(lambda: "done at" in tab.js("find('togo-of').textContent"))
+        # While the map grows, nobody knows how much there is to do.
+        outsider.put("map", map_bytes(HALL))
+        until(lambda: "not before" in tab.js("find('togo-of').textContent"))
         drive(outsider, lanes(12))
         keep_out = {"name": "shelf", "polygon": [[2.0, 2.0], [2.6, 2.0], [2.6, 2.6], [2.0, 2.6]]}
         tab.js(f"command('keep_out_add', {{ keep_out: {json.dumps(keep_out)} }})")

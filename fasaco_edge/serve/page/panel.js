@@ -27,9 +27,10 @@ function duration(seconds) {
 
 // When a robot that drives will be done, by the clock.
 function ends(state) {
-  if (state.to_go_s === null || state.to_go_s < 60 || state.state === "paused" || model.recording || !(state.time_scale > 0)) return "to go";
+  if (state.to_go_s === null || state.to_go_s < 60 || state.state === "paused" || model.recording || !(state.time_scale > 0)) return state.grows ? "to go at least" : "to go";
   const end = new Date(Date.now() + (1000 * state.to_go_s) / state.time_scale);
-  return `done at ${end.toLocaleTimeString([], { hour: "2-digit", minute: "2-digit", hour12: false })}`;
+  // While it still finds rooms, there is more to do than it knows.
+  return `${state.grows ? "not before" : "done at"} ${end.toLocaleTimeString([], { hour: "2-digit", minute: "2-digit", hour12: false })}`;
 }
 
 function showState() {
