@@ -205,6 +205,8 @@ def test_floor_of_a_time_without_poses_is_not_called_missed(review):
         next(at for at, pose in zip(some.pose_s, some.poses, strict=True) if pose[0] > 1.3),
     )
     assert f"no pose came between {clock(first)} and {clock(end)}" in spot.words
+    assert dict(screen_rows(lost, document_of(lost)))["poses"].startswith("2 gaps over 2 m: floor")
+    assert "poses" not in dict(screen_rows(review, document_of(review)))
     # The picture does not show a drive there; and what lies far off is missed as before.
     colours = [
         {colour for _, colour in draw_spots(each, [spot]).getcolors(maxcolors=1 << 20)}

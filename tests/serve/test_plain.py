@@ -85,6 +85,13 @@ def test_floor_left_is_listed_once_with_its_marks():
     ]
     over = status(floor=floor, mission=mission | {"stage": "over"})
     assert told_left(over)[0] == (3.0, "for another reason", 32, [])
+    # Much that was passed, and is not known to be swept: poses were far apart.
+    for m2, said in ((0.4, plain.LEFT[mission_reports.PASSED]), (2.0, plain.SELDOM)):
+        parts = floor | {
+            "reachable_m2": 9.0,
+            "left": [{"m2": m2, "reason": mission_reports.PASSED}],
+        }
+        assert (m2, said, 8, []) in told_left(status(floor=parts, mission=mission))
     # Where only cells are counted, they tell it.
     counted = status(floor={"swept_m2": 9.0}, mission=mission)
     assert [m2 for m2, *_ in told_left(counted)] == [0.9, 0.7, 0.2]

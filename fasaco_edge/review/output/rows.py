@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
+import numpy as np
 from msgspec.structs import astuple
 
 from fasaco_edge.client.phrases import scale_words
@@ -37,6 +38,8 @@ LEFT = ("m2", "at", "why")
 MOST_PLACES = 3
 # Less saved by a cohort or by local search is not shown [s].
 LEAST_SAVED_S = 0.05
+# Nor is less of a way without poses [m].
+LEAST_LOST_M = 1.0
 CHARGES = ("at", "for", "battery")
 
 
@@ -121,9 +124,22 @@ def screen_rows(review: Review, document: ReviewDocument) -> list[tuple[str, str
         *([("processor", _processor(document))] if document.processor_s else []),
         ("commands", _some(commands)),
         *([("charges", _some(charges))] if charges else []),
+        *([("poses", lost)] if (lost := _lost_way(review)) else []),
         ("troubles", _some(troubles)),
         ("refused", f"{document.faults} messages; lost {count(document.recorder_lost, '')}"),
     ]
+
+
+def _lost_way(review: Review) -> str:
+    """Return over how much of its way the robot's poses are missing; "" over little."""
+    data = review.data
+    if len(data.poses) < 2:
+        return ""
+    ways_m = np.hypot(*np.diff(data.track[:, :2], axis=0).T)[~data.driven]
+    if ways_m.sum() < LEAST_LOST_M:
+        return ""
+    gaps = f"{len(ways_m)} gap{'s' * (len(ways_m) != 1)}"
+    return f"{gaps} over {ways_m.sum():.0f} m: floor between them does not count"
 
 
 def _processor(document: ReviewDocument) -> str:
