@@ -127,7 +127,7 @@ class Feed(Joining):
         """Query the robot's daemon; return all replies.
 
         Args:
-            query: name of the query.
+            query: name of the query, parameters after ``?``.
             payload: its JSON payload.
             timeout_s: how long to wait for a reply [s].
 
@@ -138,7 +138,8 @@ class Feed(Joining):
             bus = self._bus
         if bus is None:
             raise BusUnavailable(self.trouble or "not joined yet")
-        return bus.get(self._keys.rpc(query), timeout_s, payload)
+        name, mark, parameters = query.partition("?")
+        return bus.get(self._keys.rpc(name) + mark + parameters, timeout_s, payload)
 
     def _request(self, bus: Bus) -> None:
         for topic in self._wanted - self._requested.keys():

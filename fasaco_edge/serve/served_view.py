@@ -54,6 +54,7 @@ class ServedView(RobotState):
 
     Attributes:
         periods_s: least period of each message [s].
+        lacks_path: whether the robot is paused, and the path before that has not come.
     """
 
     periods_s: Mapping[str, float] = PERIODS_S
@@ -69,6 +70,7 @@ class ServedView(RobotState):
         # The newest path that leads anywhere: a paused robot goes on with it.
         self._to_drive: Sample | None = None
         self._way = Way()
+        self.lacks_path = False
         # The newest status with an order: what it left is shown after its end, too.
         self._ordered: Status | None = None
         self._readers |= {
@@ -145,9 +147,13 @@ class ServedView(RobotState):
         return self.status.mission if self.status else MissionReport()
 
     def _read_status(self, sample: Sample, now: float) -> None:
+        before = self.status
         super()._read_status(sample, now)
         if self.status is not None and self.status.mission.ordered is not None:
             self._ordered = self.status
+        if self.status is not None and self.status.state == "paused":
+            is_new = before is None or before.state != "paused"
+            self.lacks_path = self._to_drive is None and (is_new or self.lacks_path)
 
     def _read_map(self, sample: Sample, _: float) -> None:
         self._grids["map"] = read_grid(sample.payload)
@@ -173,7 +179,7 @@ class ServedView(RobotState):
     def _shown_path(self) -> Sample | None:
         """The newest path; of a paused robot, which has an empty one, that before the pause."""
         is_paused = self.status is not None and self.status.state == "paused"
-        is_stopped = self._path is not None and self._path is not self._to_drive
+        is_stopped = self._path is not self._to_drive
         return self._to_drive or self._path if is_paused and is_stopped else self._path
 
     def _read_path(self, sample: Sample, _: float) -> None:
@@ -185,6 +191,14 @@ class ServedView(RobotState):
             self._to_drive = sample
         elif not about.revision:  # a daemon begins, and goes on with no path from before
             self._to_drive = None
+
+    def take_path_before(self, sample: Sample, now: float) -> None:
+        """Take in the path before a stop."""
+        try:
+            if PathPoints(sample.payload).left:
+                self._to_drive = sample
+        except FasacoError as error:
+            self.note_unreadable("path", error, now)
 
     def _read_fleet(self, sample: Sample, now: float) -> None:
         robot = self._keys.robot_of(sample.key)

@@ -25,7 +25,7 @@ pytest.importorskip("websockets")
 
 from websockets.sync.client import ClientConnection, connect
 
-from tests.serve.serving import served
+from tests.serve.serving import looking, served
 from tests.serve.test_plain import TECHNICAL
 from tests.support.outsider import TIMEOUT_S, Outsider
 from tests.support.processes import daemon_process
@@ -209,6 +209,9 @@ def test_a_mission_is_ordered_by_finger(tmp_path):
         until(lambda: has(tab.picture(), tab.js("colours.ahead")))
         until(lambda: tab.js("find('togo').offsetParent !== null"))
         assert tab.js("drafts.map((draft) => draft.name).join()") == "keep-out 1"
+        # Nor does a server that begins in the pause: the daemon has sent an empty path since.
+        with served(tmp_path, daemon.endpoint) as again, looking(again) as looker:
+            assert looker.wait("path", lambda path: path["revision"])["body"]
         assert not TECHNICAL.search(tab.js("document.body.innerText"))
         tab.js("drafts.length = 0; showDrafts()")
         tab.click("resume")

@@ -79,7 +79,7 @@ class Outbox:
         attachment = encode_json(structs.replace(path_attachment(path), daemon=self._id))
         payload = encode_path(path.xy, yaw, path.frame, path.map_stamp_ns)
         message = Shared.of(payload, schemas.PATH, attachment)
-        self._last.keep("path", message)
+        self._last.keep_path(message, stops=path.stops)
         self._path.put(message.payload, attachment)
         if self._ros is not None:
             self._ros.path.put(message.payload)
