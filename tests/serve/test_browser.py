@@ -149,6 +149,12 @@ def channels(colour: str) -> list[int]:
     return [int(colour[at : at + 2], 16) for at in (1, 3, 5)]
 
 
+def another_server_shows_the_path(folder: Path, endpoint: str) -> bool:
+    """Tell whether the first path that a server shows which begins now leads anywhere."""
+    with served(folder, endpoint) as again, looking(again) as looker:
+        return bool(looker.wait("path", lambda path: path["revision"])["body"])
+
+
 def canceled(tab: Tab, outsider: Outsider) -> bool:
     """Tap on Cancel, seen or not; tell whether there is no order any more."""
     tab.js("find('cancel').click()")
@@ -210,8 +216,7 @@ def test_a_mission_is_ordered_by_finger(tmp_path):
         until(lambda: tab.js("find('togo').offsetParent !== null"))
         assert tab.js("drafts.map((draft) => draft.name).join()") == "keep-out 1"
         # Nor does a server that begins in the pause: the daemon has sent an empty path since.
-        with served(tmp_path, daemon.endpoint) as again, looking(again) as looker:
-            assert looker.wait("path", lambda path: path["revision"])["body"]
+        assert another_server_shows_the_path(tmp_path, daemon.endpoint)
         assert not TECHNICAL.search(tab.js("document.body.innerText"))
         tab.js("drafts.length = 0; showDrafts()")
         tab.click("resume")
