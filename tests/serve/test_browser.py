@@ -149,6 +149,14 @@ def channels(colour: str) -> list[int]:
     return [int(colour[at : at + 2], 16) for at in (1, 3, 5)]
 
 
+def pause_and_reload(tab: Tab, outsider: Outsider, url: str) -> None:
+    """Pause the mission, and open its page anew."""
+    tab.click("pause")
+    outsider.wait_status(lambda status: status["state"] == "paused")
+    tab.call("Page.navigate", url=url)
+    until(lambda: tab.js("model.state && model.state.state") == "paused")
+
+
 def another_server_shows_the_path(folder: Path, endpoint: str) -> bool:
     """Tell whether the first path that a server shows which begins now leads anywhere."""
     with served(folder, endpoint) as again, looking(again) as looker:
@@ -208,10 +216,7 @@ def test_a_mission_is_ordered_by_finger(tmp_path):
         assert not TECHNICAL.search(tab.js("document.body.innerText"))
         assert tab.js("find('technical').textContent").startswith("covering: ")
         # A pause, and a page opened anew, lose neither the path nor what is drawn.
-        tab.click("pause")
-        outsider.wait_status(lambda status: status["state"] == "paused")
-        tab.call("Page.navigate", url=page.url)
-        until(lambda: tab.js("model.state && model.state.state") == "paused")
+        pause_and_reload(tab, outsider, page.url)
         until(lambda: has(tab.picture(), tab.js("colours.ahead")))
         until(lambda: tab.js("find('togo').offsetParent !== null"))
         assert tab.js("drafts.map((draft) => draft.name).join()") == "keep-out 1"
