@@ -64,6 +64,7 @@ def state(view: RobotState, way: Way, now: float, ordered: Status | None = None)
         "floor": _floor(floor) if floor else None,
         "to_go_s": _to_go_s(view, status, way),
         "grows": view.grows(now),
+        "simulated": phrases.scale_words(view.settings.robot.time_scale),
         "time_scale": view.settings.robot.time_scale,
         "mission": _mission(mission),
         "battery": _battery(status),

@@ -66,7 +66,7 @@ function showTechnical(state) {
   const bus = state.bus ? [`waits for the bus at ${state.bus}`] : [];
   const lines = [`${state.state}: ${state.reason || "no reason"}`, ...bus, ...state.faults, ...away];
   showList("technical", lines.map((text) => item(text)));
-  find("foot").textContent = `fasaco-edge ${state.version}`;
+  find("foot").textContent = [`fasaco-edge ${state.version}`, state.simulated].filter(Boolean).join(", ");
 }
 
 // What is not swept: each line shows itself on the map; the list opens by itself at the end.
@@ -77,11 +77,15 @@ function showLeft(state) {
   find("left-what").textContent = isOver ? "Not swept" : "Left out so far";
   find("left-m2").textContent = squares(parts.reduce((sum, part) => sum + part.m2, 0));
   find("left").querySelector("ul").replaceChildren(...parts.map((part) => {
-    const line = document.createElement("li"), show = action("", () => showOnMap(part));
-    show.append(...item(["span", "m2", squares(part.m2)], part.reason).childNodes);
+    const line = item(["span", "m2", squares(part.m2)], part.reason);
+    // Where it is, is not recorded, but for areas with a place.
+    if (model.recording && !part.places.length) return line;
+    const show = action("", () => showOnMap(part));
+    show.append(...line.childNodes);
     line.append(show);
     return line;
   }));
+  find("left-hint").hidden = !find("left").querySelector("button");
   if (isOver && !wasOver) find("left").open = true;
   wasOver = isOver;
   const shown = model.left && parts.find((part) => part.reason === model.left.reason);
