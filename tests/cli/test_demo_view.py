@@ -42,7 +42,10 @@ def test_the_demo_is_a_live_map_and_then_a_summary(folder):
         assert page.count("\n") == 23
         page = shell.wait(
             lambda seen: (
-                re.search(r" COVERING .* path \d+, [\d.]+ s to go ", seen) is not None
+                re.search(
+                    r" COVERING .* path \d+, (at least )?[\d.]+ s to go  30 x real time ", seen
+                )
+                is not None
                 and all(sign in seen for sign in ("swept", "█", "▀"))
             )
         )

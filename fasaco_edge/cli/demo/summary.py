@@ -180,8 +180,9 @@ def _openers(summary: Summary) -> Iterator[tuple[str, str]]:
     yield "review it:", f"{terminal.command()} review {files}"
     if not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
         if not summary.fleet_recording:
-            serve = f"{terminal.command()} serve {files} --listen 0.0.0.0:8465 --tokens page-tokens"
-            yield "in browser:", f"{serve}  (from another computer)"
+            # From another computer's.
+            options = "--listen 0.0.0.0:8465 --tokens tokens"
+            yield "in browser:", f"{terminal.command()} serve {files} {options}"
         yield "in Rerun:", f"copy {files} to a computer with a desktop"
         return
     if not summary.fleet_recording:
