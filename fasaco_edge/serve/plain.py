@@ -73,7 +73,8 @@ LEFT = {
 TRIED, OTHERWISE = "left over after", "for another reason"
 NOT_REACHED = "it could not get there"
 ENDED = "the work was ended before it got there"
-# Much floor is passed without a trace if the robot's place is not known often enough.
+# Much floor is left, or passed without a trace, if the robot's place is not known often enough.
+FAR_APART = "poses are too far apart"
 PASSED, SELDOM = 8, "it may have missed that: its place was known too seldom"
 # Share of the floor in reach above which that is so.
 MUCH = 0.1
@@ -185,7 +186,9 @@ def left(status: Status, ordered: Status | None = None) -> list[LeftFloor]:
         else:
             marks, reason = MARKS.get(part.reason, 0), LEFT.get(part.reason, OTHERWISE)
             is_much = floor is not None and part.m2 > MUCH * (floor.reachable_m2 or math.inf)
-            kind = _of(found, SELDOM if marks == PASSED and is_much else reason, marks)
+            if is_much and (marks == PASSED or FAR_APART in of.reason):
+                reason = SELDOM
+            kind = _of(found, reason, marks)
         kind.m2 += part.m2
     for part in (floor.out_of_reach or ()) if floor else ():
         _of(found, LEFT.get(part.reason, OTHERWISE), MARKS.get(part.reason, 0)).m2 += part.m2
