@@ -33,6 +33,7 @@ from fasaco_edge.wire.documents.json_text import decode_json, decode_tolerant
 from fasaco_edge.wire.messages.maps import CoverageValue, decode_occupancy_grid
 from fasaco_edge.wire.messages.paths import decode_path
 from fasaco_edge.wire.messages.pheromone import decode_pheromone
+from fasaco_edge.wire.reasons import plain
 from fasaco_edge.wire.topics import RPC_NAMES
 
 if TYPE_CHECKING:
@@ -160,7 +161,7 @@ def show_mission(reply: Reply) -> None:
 
 def _rows(answer: replies.Reply) -> list[tuple[str, str]]:
     mission = answer.mission
-    rows = [("robot", answer.robot), ("state", answer.state), ("reason", answer.reason)]
+    rows = [("robot", answer.robot), ("state", answer.state), ("reason", plain(answer.reason))]
     if mission.ordered is not None:
         began = "begun by itself" if mission.ordered == "itself" else "as ordered"
         stage = phrases.stage(mission)
