@@ -66,7 +66,7 @@ class RoomWatch:
         pixels = min(grid.cells.size, MOST_PIXELS)
         self._due = now + max(PERIOD_S, pixels / PIXELS_PER_S)
         # A mapper of a robot that stands sends the same map again and again.
-        key = zlib.crc32(np.ascontiguousarray(grid.cells)), grid.geometry, grid.frame, cuts
+        key = zlib.crc32(np.ascontiguousarray(grid.cells).data), grid.geometry, grid.frame, cuts
         if key == self._key and is_settled:
             return
         if key != self._key or self._found is None:
