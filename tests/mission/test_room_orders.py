@@ -11,8 +11,11 @@ import pytest
 from fasaco_edge.errors import OrderError
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.grid.polygons import is_near
+from fasaco_edge.grid.rooms import find_rooms
 from fasaco_edge.grid.rotation import rotated_geometry, rotated_pose
 from fasaco_edge.mission.core.events import MapReceived, PoseReceived, State
+from fasaco_edge.mission.map import room_watch
+from fasaco_edge.mission.map.inputs import PATIENCE_S
 from fasaco_edge.mission.map.room_watch import PERIOD_S
 from fasaco_edge.mission.orders.order import (
     Command,
@@ -37,6 +40,8 @@ BOTH = (
 ONLY_WEST = tuple(row[:11] + "?" * 10 for row in BOTH)
 IN_WEST, IN_EAST = (2, 2), (2, 18)
 WAITS = OrderState.idle("waits")
+# As many as any change of rooms takes.
+LOOKS = 10
 
 
 def settled(*rows, order_state=WAITS, config=CONFIG):
@@ -52,7 +57,7 @@ def settled(*rows, order_state=WAITS, config=CONFIG):
 
 
 def settle(drive):
-    for _ in range(8):
+    for _ in range(LOOKS):
         drive.tell(pose_at(*drive.cell), after=1.01 * PERIOD_S)
         assert not drive.mission.rooms.sheet or len(drive.mission.rooms.rooms) < 5
     return drive
@@ -264,7 +269,7 @@ def rotated(rows, deg):
     pose = pose_at(*IN_WEST).pose
     here = PoseReceived(replace(pose, pose=rotated_pose(pose.pose, deg)))
     drive = Drive(IN_WEST, MapReceived(turned), here, order_state=WAITS, config=config)
-    for _ in range(8):
+    for _ in range(LOOKS):
         drive.tell(here, after=1.01 * PERIOD_S)
     return drive
 
@@ -338,3 +343,46 @@ def test_what_is_wrong_with_a_request_is_named(document, said):
     with pytest.raises(OrderError) as refused:
         read_command(document)
     assert said in str(refused.value)
+
+
+def test_rooms_of_another_frame_are_not_known_on_this_map():
+    """Not even between its first map and the first look at it."""
+    drive = settled(*BOTH)
+    name(drive, room_at(drive, *IN_EAST).id, "kitchen")
+    upstairs = MapReceived(building(*BOTH, frame="upstairs"))
+    for _ in range(round(4 * PATIENCE_S)):
+        drive.tell(upstairs, pose_at(*IN_WEST, frame="upstairs"), after=0.5)
+        if drive.mission.grid.frame == "upstairs":
+            break
+    assert drive.mission.grid.frame == "upstairs"
+    start(drive, "kitchen")
+    assert drive.refused.code == "bad_order"
+    settle_in(drive, "upstairs")
+    assert len(drive.mission.rooms.rooms) == 2
+    start(drive, "kitchen")
+    assert "nor a room: there are room 3, room 4" in str(drive.refused)
+
+
+def settle_in(drive, frame):
+    for _ in range(LOOKS):
+        drive.tell(pose_at(*drive.cell, frame=frame), after=1.01 * PERIOD_S)
+
+
+def test_a_map_is_looked_at_once_however_often_it_comes(monkeypatch):
+    looks = []
+
+    def find(grid, cuts):
+        looks.append(len(cuts))
+        return find_rooms(grid, cuts)
+
+    monkeypatch.setattr(room_watch, "find_rooms", find)
+    drive = settled(*BOTH)
+    for _ in range(4):
+        drive.tell(MapReceived(building(*BOTH)), pose_at(*IN_WEST), after=PERIOD_S)
+        drive.tell(after=PERIOD_S)
+    assert looks == [0]
+    drive.command("room_split", room=RoomRequest(1, cut=((1.5, -0.1), (1.5, 2.6))))
+    settle(drive)
+    drive.tell(MapReceived(building(*ONLY_WEST)), pose_at(*IN_WEST))
+    settle(drive)
+    assert looks == [0, 1, 1]

@@ -76,6 +76,7 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--against",
         nargs="+",
+        action="extend",
         type=Path,
         metavar="FILE",
         help="the parts of another run to compare with",
@@ -96,7 +97,7 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         action="append",
         metavar="X,Y",
         help="answer why this spot [m] was not swept: never seen, too narrow, a keep-out zone, "
-        "missed and by how much, not worth it; may be repeated; --png draws it",
+        "poses missing, missed and by how much, not worth it; may be repeated; --png draws it",
     )
     parser.add_argument("--json", action="store_true", help="print JSON, described below")
     parser.add_argument(
@@ -172,7 +173,10 @@ def run(args: argparse.Namespace) -> int:
         from fasaco_edge.review.output.export import export
 
         with naming(args.export):
-            export(review, args.export, args.export_as)
+            written = export(review, args.export, args.export_as)
+        width = max(len(str(file)) for file, _ in written)
+        for file, what in written:
+            terminal.err().print(f"{file!s:{width}}  {what}", soft_wrap=True, highlight=False)
     if args.view:
         from fasaco_edge.recording.read.repair import view
 

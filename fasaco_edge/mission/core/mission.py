@@ -219,7 +219,7 @@ class Mission:
     def _look_for_rooms(self, happened: Decision, now: float) -> None:
         """Look for rooms if that is due; let the order follow them."""
         if any(isinstance(fault, LedgerMismatchError) for fault in happened.faults):
-            self._rooms.book.leave_building()
+            self._rooms.leave_building()
         if self.grid is not None and not self.is_in_doubt:
             self._rooms.look(self.grid, now)
         self._changes.follow_rooms()
@@ -307,6 +307,14 @@ class Mission:
     def floor_to_sweep(self) -> FloorToSweep | None:
         """Return the areas of floor to sweep; None if cells are counted."""
         return self._line.to_sweep
+
+    def unswept(self) -> OccupancyGrid | None:
+        """Return why floor is not swept, in the map frame, see ``Unswept``; None if unknown."""
+        found, grid = self._line.unswept(), self._map.grid
+        if found is None or grid is None:
+            return None
+        geometry = self.rotation.geometry(found[0])
+        return OccupancyGrid(geometry, found[1].view(np.int8), grid.frame, grid.stamp_ns)
 
     def line_ahead(self) -> AheadFigures | None:
         """Return figures of the line ahead; None if cells are counted."""
