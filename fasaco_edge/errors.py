@@ -238,6 +238,13 @@ class LedgerFileError(FasacoError):
     code = "ledger_file"
 
 
+class RoomsFileError(FasacoError):
+    """The file of the rooms is broken, or cannot be read or written."""
+
+    code = "rooms_file"
+    hint = "name the rooms again, or put an earlier file in its place while no daemon runs"
+
+
 class LedgerFullError(FasacoError):
     """A ledger is full: what lay farthest from the robot was dropped and is to be covered again."""
 

@@ -30,6 +30,7 @@ COMMANDS = {
     "run": "run the daemon: maps come in over Zenoh, paths go out",
     "follow": "drive a robot's base along the path: velocities, 20 times a second",
     "mission": "command a running daemon: start, pause, resume, home, cancel, replan, status ...",
+    "rooms": "list, name, split, merge and set the rooms that a daemon has found",
     "ask": "query a running daemon: status, path, coverage, pheromone, config, replan ...",
     "watch": "watch a robot's mission live in this terminal",
     "serve": "serve a robot's mission as a live page, for a phone too",

@@ -22,6 +22,7 @@ from fasaco_edge.cli.console.arguments import (
     robot_on_bus,
     seconds,
 )
+from fasaco_edge.cli.console.rooms_table import show_rooms
 from fasaco_edge.cli.console.streams import print_json
 from fasaco_edge.cli.console.terminal import figures, known, out
 from fasaco_edge.client import phrases
@@ -30,6 +31,7 @@ from fasaco_edge.text import one_line
 from fasaco_edge.wire import schemas
 from fasaco_edge.wire.documents import replies
 from fasaco_edge.wire.documents.json_text import decode_json, decode_tolerant
+from fasaco_edge.wire.documents.rooms import Rooms
 from fasaco_edge.wire.messages.maps import CoverageValue, decode_occupancy_grid
 from fasaco_edge.wire.messages.paths import decode_path
 from fasaco_edge.wire.messages.pheromone import decode_pheromone
@@ -208,6 +210,8 @@ def show(name: str, reply: Reply) -> None:
         out().print(figures(known(_figures(reply))))
     elif name in ("status", "mission"):
         show_mission(reply)
+    elif name == "rooms":
+        show_rooms(decode_tolerant(reply.payload, Rooms))
     else:
         document = decode_json(reply.payload)
         print(yaml.safe_dump(document, sort_keys=False), end="")

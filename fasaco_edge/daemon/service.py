@@ -17,6 +17,7 @@ from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.daemon.claim import NameClaim
 from fasaco_edge.daemon.compiling import KernelCompiler
 from fasaco_edge.daemon.fleet_wing import receiver_of, sender_of
+from fasaco_edge.daemon.ledger.rooms_file import RoomsFile, RoomsKeeper
 from fasaco_edge.daemon.ledger.writer import LedgerKeeper, LedgerWriter, open_ledger
 from fasaco_edge.daemon.loop.answers import Commands, serve_about
 from fasaco_edge.daemon.loop.inbox import Inbox, make_mailbox
@@ -113,7 +114,8 @@ def run_daemon(
         if bus is None:
             return
         with bus:
-            _serve(config, bus, ledger, record_to, stop, started, manager, reload)
+            rooms = RoomsKeeper(RoomsFile(folder, config.robot.name))
+            _serve(config, bus, (ledger, rooms), record_to, stop, started, manager, reload)
     finally:
         if compiler is not None:
             compiler.close()
@@ -171,14 +173,14 @@ def _afforded(config: DaemonConfig) -> DaemonConfig:
 def _serve(
     config: DaemonConfig,
     bus: Bus,
-    ledger: LedgerWriter,
+    kept: tuple[LedgerWriter, RoomsKeeper],
     record_to: Path | None,
     stop: threading.Event,
     started: float,
     manager: ServiceManager,
     reload: Reload,
 ) -> None:
-    keys = config.keys()
+    keys, (ledger, rooms) = config.keys(), kept
     max_pixels = config.map.max_pixels
     mailbox = make_mailbox(max_pixels)
     ros = RosBridge(bus, config.ros2, mailbox, max_pixels) if config.ros2 else None
@@ -199,12 +201,12 @@ def _serve(
         commands=Commands(bus, keys, mailbox, ros.commands if ros else {}),
         outbox=Outbox(bus, keys, ros),
         fleet=sender_of(config, bus),
-        turns=TurnLog(bus.advertise(keys, topics.TURNS), config, ledger.restored),
+        turns=TurnLog(bus.advertise(keys, topics.TURNS), config, ledger.restored, rooms.restored),
         claim=NameClaim(bus, keys),
     )
     keeper = LedgerKeeper(ledger, config.cell_m, autostart=config.mission.autostart)
     metrics = serve_metrics(config.metrics.address())
-    loop = Loop(config, ports, keeper, Host(Watchdog(manager), reload, recorder, metrics))
+    loop = Loop(config, ports, keeper, rooms, Host(Watchdog(manager), reload, recorder, metrics))
     serve_about(bus, keys, lambda: loop.config)
     try:
         loop.announce()
@@ -223,4 +225,5 @@ def _serve(
         loop.close(WORKER_STOP_S)
         if recorder is not None:
             recorder.close(RECORDER_STOP_S, RECORDER_LONGEST_S)
+        rooms.close(LEDGER_LEAST_S)
         ledger.close(max(stopped + LEDGER_STOP_S - time.monotonic(), LEDGER_LEAST_S))

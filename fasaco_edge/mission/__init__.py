@@ -15,6 +15,9 @@ Read in this order:
     map/reachable_area   reachable cells, updated incrementally
     map/loop_closure     whether a map has moved, and which cells are uncertain then
 
+    map/room_book        owns the rooms: their numbers, names, settings, and where they are
+    map/room_matching    the regions of a new map to the rooms that are known
+
     coverage/mission_ledger  owns the ledger, until a map contradicts it
     coverage/fit         whether a map contradicts the ledger
     coverage/ledger      covered cells
@@ -26,5 +29,6 @@ Read in this order:
     orders/sequencer     owns the order: zones, passes, retries, return home
     orders/order_state   an order and its progress; kept on disk with the ledger
     orders/order         orders, and their JSON or YAML form
+    orders/placing       zones by name to standing zones and rooms
     orders/zones         an order's polygons on the lattice
 """

@@ -14,6 +14,7 @@ from dataclasses import dataclass, field, replace
 from fasaco_edge.bus.arrival import Arrival, Sample
 from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.daemon.ledger.codec import decode_ledger
+from fasaco_edge.daemon.ledger.rooms_codec import decode_rooms
 from fasaco_edge.daemon.loop.inbox import Batch, Received
 from fasaco_edge.daemon.loop.turn_log import (
     EMBEDDED,
@@ -193,9 +194,9 @@ class CycleReplay:
 
     def __init__(self, config: DaemonConfig, record: CycleRecord) -> None:
         self._record = record
-        ledger = record.beginning.ledger
+        ledger, rooms = record.beginning.ledger, record.beginning.rooms
         restored = decode_ledger(ledger, config.cell_m) if ledger else None
-        self._drive = MissionDrive(config, restored)
+        self._drive = MissionDrive(config, restored, decode_rooms(rooms) if rooms else None)
         self.mission = self._drive.mission
         self._untaken = UntakenSamples(record.taken)
         self._decoder = SampleDecoder()

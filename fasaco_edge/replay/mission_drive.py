@@ -18,6 +18,7 @@ from fasaco_edge.daemon.loop.mission_runner import MissionRunner
 from fasaco_edge.errors import FasacoError
 from fasaco_edge.mission.core.events import CommandReceived, Decision, PlanReady
 from fasaco_edge.mission.coverage.ledger import LedgerSnapshot
+from fasaco_edge.mission.map.room_book import RoomBook
 from fasaco_edge.planners.registry import planner_of
 
 LOAD_S = 1.0
@@ -59,6 +60,7 @@ class MissionDrive:
     Args:
         config: of the daemon.
         ledger: the ledger that the mission begins with; None for nothing covered.
+        rooms: the rooms that it begins with; None for none.
 
     Attributes:
         mission: the mission, to be looked at between cycles.
@@ -68,7 +70,12 @@ class MissionDrive:
         state: state of the mission after the last cycle; "" before it has begun.
     """
 
-    def __init__(self, config: DaemonConfig, ledger: LedgerSnapshot | None = None) -> None:
+    def __init__(
+        self,
+        config: DaemonConfig,
+        ledger: LedgerSnapshot | None = None,
+        rooms: RoomBook | None = None,
+    ) -> None:
         max_pixels, planner = config.map.max_pixels, config.planner
         self.mailbox = make_mailbox(max_pixels, map_spacing_s=0.0, most_poses=math.inf)
         self._inbox = Inbox(
@@ -86,7 +93,7 @@ class MissionDrive:
         worker.close(LOAD_S)
         self.planner = planner_of(planner.name, planner.colony(), planner.threads)
         keeper = LedgerKeeper(_NoDisk(ledger), config.cell_m, autostart=config.mission.autostart)
-        self._runner = MissionRunner(config, keeper, self.mailbox, lambda *_: loader)
+        self._runner = MissionRunner(config, keeper, self.mailbox, lambda *_: loader, rooms)
         self.began: float | None = None
         self.state = ""
 

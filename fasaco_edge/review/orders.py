@@ -81,7 +81,7 @@ def command_words(name: str, order: MissionOrder) -> str:
 def order_words(order: OrderDocument) -> str:
     """Return an order in words."""
     asked = [f"zone {zone.name}" + passes_words(zone.passes or 1) for zone in order.zones] or [
-        "everything" + passes_words(order.passes)
+        "everything" + passes_words(order.passes or 1)
     ]
     if order.keep_out:
         corners = "; ".join(

@@ -328,7 +328,7 @@ class _SampleReader:
         self.data.poses.append((pose.x, pose.y, pose.yaw))
 
     def _command(self, arrival: Arrival) -> None:
-        name, order, _, _ = read_command(decode_json(arrival.sample.payload))
+        name, order, *_ = read_command(decode_json(arrival.sample.payload))
         self.data.commands.append((self._now, name, order))
         if name == "start":
             self.data.ordered_keep_out = order.keep_out

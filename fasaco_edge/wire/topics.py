@@ -170,6 +170,16 @@ DIRECTIONS = Topic(
     queues=Queues(recorder=NEWEST),
     limits=("max_grid_cells",),
 )
+ROOMS = Topic(
+    name="rooms",
+    direction="out",
+    when="rooms have changed, once a second at most, or were swept, every five seconds at most",
+    speaker="robot",
+    listeners=("viewer",),
+    json="rooms.json",
+    qos=Qos("data_low", cache=1),
+    limits=("max_json_bytes",),
+)
 STATUS = Topic(
     name="status",
     direction="out",
@@ -326,6 +336,7 @@ QUERIES = (
     Query("status", ("viewer",), json="status.json"),
     Query("coverage", ("viewer",), schema=schemas.OCCUPANCY_GRID, errors=("not_yet",)),
     Query("pheromone", ("viewer",), schema=schemas.PHEROMONE_GRID, errors=("not_yet",)),
+    Query("rooms", ("viewer",), json="rooms.json", errors=("not_yet",)),
     Query("config", ("viewer",), json="config.json"),
     Query("version", ("viewer",), json="version.json"),
     # These queries are commands.

@@ -176,6 +176,7 @@ def try_together(campaign: Campaign) -> None:
             until(lambda: _bytes_in(campaign.trap.state) > 100_000)
             campaign.run("ask", "status", "--json", *connect)
             campaign.run("mission", "status", *connect)
+            campaign.run("rooms", "list", *connect)
             campaign.run("watch", "--once", *connect)
             campaign.run("doctor", "--config", config, ends=(0, 1))
             until(lambda: _bytes_in(recordings) > 200_000)

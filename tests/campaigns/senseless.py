@@ -34,8 +34,13 @@ FREE, WALL, UNKNOWN = 0, 100, -1
 HONEST_FRAME = "map"
 FRAMES = ("odom", "", "x" * MAX_STRING_BYTES, "地図", "\u202e\x1b[2J", "map\n")
 KEEP_OUTS = ("keep_out_add", "keep_out_remove")
-COMMANDS = ("pause", "resume", "home", "cancel", "reset", "replan", "status", *KEEP_OUTS)
-QUERIES = ("path", "status", "coverage", "pheromone", "config", "version", "mission", "replan", "*")
+ROOMS = ("room_name", "room_split", "room_merge", "room_set")
+PLAIN = ("pause", "resume", "home", "cancel", "reset", "replan", "status")
+COMMANDS = (*PLAIN, *KEEP_OUTS, *ROOMS)
+QUERIES = (
+    *("path", "status", "coverage", "pheromone", "rooms", "config", "version", "mission"),
+    *("replan", "*"),
+)
 # Times that a stamp can be near: the epoch, today, and both ends of an int32 of seconds.
 EPOCHS = (1, 1_750_000_000 * 10**9, -(2**31) * 10**9, (2**31 - 10**4) * 10**9)
 # Events that are no message: they pass the time, or look whether all is well.
@@ -309,6 +314,8 @@ class Senseless:
             if command in KEEP_OUTS:
                 polygon = {"polygon": self._polygon()} if command == "keep_out_add" else {}
                 document["keep_out"] = {"name": f"k{self._rng.randint(1, 4)}", **polygon}
+            if command in ROOMS:
+                document["room"] = {"id": self._room(), **self._change_of(command)}
             if command == "start" and self._rng.random() < 0.8:
                 document["order"] = self._order()
             yield {"do": "command", "document": document}
@@ -323,12 +330,31 @@ class Senseless:
                 {"name": f"zone {number}", "polygon": self._polygon()}
                 | ({"passes": self._rng.choice([1, 2, MOST_PASSES])} if number % 2 else {})
                 for number in range(zones + limit * self._rng.randint(0, 1))
-            ],
+            ]
+            + ([{"name": str(self._room())}] if self._rng.random() < 0.3 else []),
+            "unknown": self._rng.choice(["refuse", "wait"]),
             "keep_out": [self._polygon() for _ in range(keep_out)],
             "passes": self._rng.choice([1] * 6 + [2, MOST_PASSES, MOST_PASSES + 1]),
             "return_home": self._rng.random() < 0.5,
             "keep_covered": self._rng.random() < 0.5,
         }
+
+    def _room(self) -> int | str:
+        """Return a number or a name that a room may have."""
+        number = self._rng.randint(1, 6)
+        return self._rng.choice([number, number, f"room {number}", f"r{number}"])
+
+    def _change_of(self, command: str) -> Event:
+        """Return what a command about a room is to change."""
+        if command == "room_split":
+            u, v, to_u, to_v = (self._rng.uniform(-0.2, 1.2) for _ in range(4))
+            return {"cut": [list(_point_on(self._map, *at)) for at in ((u, v), (to_u, to_v))]}
+        if command == "room_merge":
+            return {"others": [self._room() for _ in range(self._rng.randint(1, 3))]}
+        if command == "room_set":
+            passes = self._rng.choice([1, 2, ["edge", "rest"], ["auto", "cross"]])
+            return {"passes": passes, "skip": self._rng.random() < 0.3}
+        return {"name": f"r{self._rng.randint(1, 6)}"}
 
     def _polygon(self) -> list[list[float]]:
         """Return a polygon on the map or beside it; now and then one as wide as may be."""
@@ -397,8 +423,7 @@ class Senseless:
                 yield self._pose(self._x + 1e-3 * number, self._y) | {"type": "PoseStamped"}
         else:
             for _ in range(40):
-                plain = [each for each in COMMANDS if each not in KEEP_OUTS]
-                yield {"do": "command", "document": {"command": self._rng.choice(plain)}}
+                yield {"do": "command", "document": {"command": self._rng.choice(PLAIN)}}
 
     def _restart(self) -> Iterator[Event]:
         """End the daemon and start another one; the maps that are latched stand meanwhile."""

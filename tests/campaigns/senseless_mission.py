@@ -22,6 +22,7 @@ import numpy as np
 from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.daemon.fleet_wing import company_of
 from fasaco_edge.daemon.ledger.codec import decode_ledger, encode_ledger
+from fasaco_edge.daemon.ledger.rooms_codec import BookSnapshot, decode_rooms, encode_rooms
 from fasaco_edge.daemon.loop.last_samples import ShownTrail
 from fasaco_edge.daemon.loop.loader import mission_config
 from fasaco_edge.daemon.loop.mission_reports import mission_report
@@ -149,6 +150,7 @@ class MissionTrial:
             if snapshot.cell_m == config.cell_m:
                 if snapshot.tiles:
                     mission.restore_ledger(snapshot)
+                mission.restore_rooms(before.rooms)
                 mission.restore_order(OrderState.from_json(snapshot.note))
             if keeps_site and before.grid is not None:
                 self._batch.append(MapReceived(before.grid))
@@ -324,6 +326,9 @@ class MissionTrial:
             _hold(bool((floor_again[place] == swept).all()), f"tile of floor {place}")
         _hold(snapshot.floor.pixels == self._mission.floor.pixels, "swept pixels")
         _hold(OrderState.from_json(again.note).to_json() == snapshot.note, "note")
+        rooms = encode_rooms(BookSnapshot.of(self._mission.rooms))
+        _hold(encode_rooms(BookSnapshot.of(decode_rooms(rooms))) == rooms, "rooms")
+        self.counts["rooms read again"] += len(self._mission.rooms.rooms)
         self.counts["ledgers read again"] += 1
         self.counts["largest ledger [tiles]"] = max(
             self.counts["largest ledger [tiles]"], len(snapshot.tiles)

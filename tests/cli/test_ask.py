@@ -17,6 +17,7 @@ SAID = {
     "status": "covering",
     "coverage": "to_cover",
     "pheromone": "best_steps",
+    "rooms": "room",
     "config": "tool_width_m: 0.3",
     "version": "protocol: v1",
     "mission": "begun by itself",

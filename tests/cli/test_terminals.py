@@ -49,6 +49,7 @@ TO_THE_END = [
     ("ask status", {0}, "covering"),
     ("ask path", {0}, "length_m"),
     ("mission status", {0}, "everything reachable"),
+    ("rooms list", {0}, "room"),
     ("watch --once", {0}, "COVERING"),
     ("review night.rrd", {0}, "complete: every reachable cell"),
     ("review night.rrd --at 0:02", {0}, "robot "),

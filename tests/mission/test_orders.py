@@ -101,8 +101,8 @@ def test_each_pass_may_have_its_cells_lanes_and_speed():
         ({"zones": [KITCHEN, KITCHEN]}, "zones[1].name: there is a zone 'kitchen' already"),
         ({"zones": [{**KITCHEN, "passes": 0}]}, "zones[0].passes: expected int >= 1, got 0"),
         ({"passes": 101}, "passes: expected int <= 100, got 101"),
-        ({"passes": True}, "passes: expected int | array, got True"),
-        ({"passes": 1.5}, "passes: expected int | array, got 1.5"),
+        ({"passes": True}, "passes: expected int | array | null, got True"),
+        ({"passes": 1.5}, "passes: expected int | array | null, got 1.5"),
         ({"passes": []}, "passes: expected array of length >= 1, got []"),
         ({"passes": ["auto"] * 101}, "passes: expected array of length <= 100"),
         ({"passes": ["x"]}, "passes[0]: expected auto, cross, edge, rest, got 'x'"),
@@ -165,7 +165,7 @@ def test_commands():
         (
             {"command": "go"},
             "expected start, pause, resume, home, cancel, reset, replan, status, keep_out_add, "
-            "keep_out_remove, got 'go'",
+            "keep_out_remove, room_name, room_split, room_merge, room_set, got 'go'",
         ),
         ({"command": "pause", "order": {}}, "order goes with start alone"),
         ({"command": "start", "order": {"zones": 3}}, "order.zones: expected array, got 3"),

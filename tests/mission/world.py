@@ -135,10 +135,10 @@ class Drive:
             self.walk = walk[1:] if walk and walk[0] == self.cell else walk
         return decision
 
-    def command(self, name, order=None, after=TICK_S, *, keep_out=None, discard=True):
+    def command(self, name, order=None, after=TICK_S, *, keep_out=None, discard=True, room=None):
         """Give a command; the order as a document. Return what the mission decides."""
         self.commands += 1
-        event = CommandReceived(self.commands, name, read_order(order), keep_out, discard)
+        event = CommandReceived(self.commands, name, read_order(order), keep_out, discard, room)
         decision = self.tell(event, after=after)
         (answer,) = decision.answers
         assert answer.number == self.commands

@@ -34,7 +34,7 @@ examples:
   fasaco-edge mission start --passes 2 --return-home
   fasaco-edge mission start --passes edge,auto,cross@0.15   a lap along walls, lanes, lanes across
   fasaco-edge mission start --zone "kitchen:0,0;4,0;4,3;0,3" --zone "hall:4,0;6,0;6,9;4,9"
-  fasaco-edge mission start --zone kitchen          a zone of the daemon's configuration
+  fasaco-edge mission start --zone kitchen          a zone of the configuration, or a room
   fasaco-edge mission start --keep-out "1,1;2,1;2,2;1,2"
   fasaco-edge mission start --order evening.yaml
   fasaco-edge mission start --fleet building_7      to each of its robots: they share the floor
@@ -46,13 +46,15 @@ evening.yaml, or the same as JSON; all lengths in metres in the frame of the map
     - name: kitchen
       polygon: [[0, 0], [4, 0], [4, 3], [0, 3]]
       passes: 2
-    - name: hall              # without a polygon: mission.zones of the configuration has it
+    - name: hall              # without a polygon: mission.zones of the configuration has it,
+                              # or it is a room (`fasaco-edge rooms list`)
   keep_out:                   # the robot must not touch these, nor mission.keep_out
     - [[1, 1], [2, 1], [2, 2], [1, 2]]
   passes: 1                   # of zones without passes, and of everything; or one item a pass:
                               # [edge, auto, cross, {angle_deg: 30, speed_m_s: 0.15}]
   return_home: true           # at the end: mission.home, mission.dock, or where the mission began
   keep_covered: false         # true: skip what is already covered in the first pass
+  unknown: refuse             # wait: for a room of a zone's name, if there is none yet
 
 Each pass starts from zero: what was covered before is covered again; a rest leaves out what an
 edge has covered. An order, its progress, and
@@ -128,8 +130,8 @@ def _add_order(parser: argparse.ArgumentParser) -> None:
         type=_zone,
         action="append",
         metavar="NAME[:X,Y;X,Y;...]",
-        help="area to cover, by its corners [m], or a zone of the daemon's configuration by its "
-        "name; may be repeated, they are covered in this order",
+        help="area to cover, by its corners [m], or a zone of the daemon's configuration or a "
+        "room by its name; may be repeated, they are covered in this order",
     )
     parser.add_argument(
         "--keep-out",

@@ -219,10 +219,7 @@ class LedgerFile:
             if path.exists() and _is_empty(path):
                 path.unlink()
             elif path.exists():
-                aside = _free_name(path, why)
-                path.rename(aside)
-                kept.append(aside.name)
-                _prune(path, why, aside)
+                kept.append(move_aside(path, why))
             self._unwanted.pop()
         if kept:
             # Otherwise they may have their old names after a power failure.
@@ -239,6 +236,18 @@ class LedgerFile:
         os.replace(self._new, self.path)
         self._moving = False
         sync_folder(self.path.parent)
+
+
+def move_aside(path: Path, why: str) -> str:
+    """Rename a file that must not be overwritten; return its new name, which contains ``why``.
+
+    Raises:
+        OSError: renaming failed.
+    """
+    aside = _free_name(path, why)
+    path.rename(aside)
+    _prune(path, why, aside)
+    return aside.name
 
 
 def _reasons(broken: dict[Path, str]) -> str:

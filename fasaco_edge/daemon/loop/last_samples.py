@@ -43,7 +43,7 @@ class LastSamples:
         self._lock = threading.Lock()
         self._last: dict[str, Said] = {}
         self._living: ShownTrail | None = None
-        for topic in (topics.PATH, topics.STATUS, topics.COVERAGE):
+        for topic in (topics.PATH, topics.STATUS, topics.COVERAGE, topics.ROOMS):
             answer = answering(partial(self._answer, topic.name))
             for key in (keys.rpc(topic.name), keys.of(topic)):
                 bus.serve(key, answer)
@@ -72,7 +72,8 @@ class LastSamples:
         with self._lock:
             reply = self._last.get(BEFORE_STOP if BEFORE_STOP in request.parameters else topic)
         if reply is None:
-            raise NotYet(f"there is no {topic} yet")
+            what = "are no rooms" if topic == topics.ROOMS.name else f"is no {topic}"
+            raise NotYet(f"there {what} yet")
         return reply
 
     def _trail(self, request: Request) -> Said:

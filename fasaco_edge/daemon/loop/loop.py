@@ -15,6 +15,7 @@ from fasaco_edge.bus.mailbox import Mailbox
 from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.daemon.claim import NameClaim
 from fasaco_edge.daemon.figures import MapLatency
+from fasaco_edge.daemon.ledger.rooms_file import RoomsKeeper
 from fasaco_edge.daemon.ledger.writer import LedgerKeeper
 from fasaco_edge.daemon.loop.answers import Commands
 from fasaco_edge.daemon.loop.inbox import MAPS, Batch, Inbox, take_batch
@@ -26,6 +27,7 @@ from fasaco_edge.daemon.loop.outbox import (
     TrailPublisher,
     UnsweptPublisher,
 )
+from fasaco_edge.daemon.loop.rooms_publisher import RoomsPublisher
 from fasaco_edge.daemon.loop.status import StatusBoard
 from fasaco_edge.daemon.loop.turn_log import TurnLog, TurnNote
 from fasaco_edge.daemon.notify import Watchdog
@@ -81,18 +83,24 @@ class Loop:
     """Connects bus and mission; everything but planning runs on its thread."""
 
     def __init__(
-        self, config: DaemonConfig, bus: BusPorts, keeper: LedgerKeeper, host: Host
+        self,
+        config: DaemonConfig,
+        bus: BusPorts,
+        keeper: LedgerKeeper,
+        rooms: RoomsKeeper,
+        host: Host,
     ) -> None:
         self._bus = bus
-        self._keeper = keeper
+        self._keeper, self._rooms = keeper, rooms
         self._host = host
-        self._runner = MissionRunner(config, keeper, bus.mailbox)
+        self._runner = MissionRunner(config, keeper, bus.mailbox, rooms=rooms.book)
         self._status = StatusBoard(config)
         self._latency = MapLatency()
         self._coverage = CoveragePublisher(bus.outbox)
         self._floor = FloorPublisher(bus.outbox)
         self._unswept = UnsweptPublisher(bus.outbox)
         self._trail = TrailPublisher(bus.outbox)
+        self._rooms_out = RoomsPublisher(bus.outbox, rooms.book)
         self._guard = bus.outbox.guard
         self._failed_at = float("-inf")
         self._has_begun = self._is_warm = False
@@ -132,7 +140,11 @@ class Loop:
         self._log_cycle(TurnNote(now, batch, commands, decision))
         self._bus.outbox.commands(commands, decision.answers)
         self._keeper.keep(self._runner.mission, now)
+        self._rooms.keep(now, at_once=any(asked.room is not None for asked in commands))
         self._guard.attempt("status", partial(self._publish_status, now))
+        if not self._status.yield_reason:
+            mission = self._runner.mission
+            self._guard.attempt("rooms", partial(self._rooms_out.publish, mission, now))
         self._answer(decision.answers, now)
         ended = time.monotonic()
         self._host.watchdog.beat(self._runner.worker, ended)
@@ -221,6 +233,7 @@ class Loop:
         self._send_path()
         self._latency = MapLatency()
         self._coverage.forget()
+        self._rooms_out.forget()
 
     def _count_faults(self, faults: Sequence[FasacoError]) -> None:
         """Count faults; query the map that updates lack."""
@@ -337,7 +350,8 @@ class Loop:
         commands.note(answers, now)
         if commands.are_asked:
             report = self._status.reply(runner)
-            is_kept = self._keeper.is_kept(time.monotonic())
+            now = time.monotonic()
+            is_kept = self._keeper.is_kept(now) and self._rooms.is_kept(now)
             self._guard.attempt("@rpc/mission", partial(commands.answer, report, is_kept=is_kept))
 
     def _publish_status(self, now: float) -> None:
@@ -347,6 +361,7 @@ class Loop:
         status.claim = self._bus.claim.report()
         status.ledger = self._keeper.report(now)
         status.faults.count(self._keeper.take_faults(), is_logged=True)
+        status.faults.count(self._rooms.take_faults(), is_logged=True)
         status.faults.count(self._guard.take_faults(), is_logged=True)
         due = status.due(runner, now)
         if due is not None:

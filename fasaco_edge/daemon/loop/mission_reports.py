@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from fasaco_edge.grid.geometry import Polygon
 from fasaco_edge.mission.orders.order_state import OrderState
+from fasaco_edge.mission.orders.placing import left_out
 from fasaco_edge.wire.documents.replies import (
     CoverageReport,
     FloorLeft,
@@ -186,6 +187,8 @@ def mission_report(
         tries=order_state.tries,
         unreached=_unreached(mission),
         keep_outs=keep_outs,
+        waits_for_room=order_state.waits_for or None,
+        left_out=() if order is None else left_out(order.zones),
     )
 
 

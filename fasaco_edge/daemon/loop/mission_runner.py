@@ -26,9 +26,11 @@ from fasaco_edge.mission.core.events import (
     MapReceived,
 )
 from fasaco_edge.mission.core.path_exit import PathExit
+from fasaco_edge.mission.map.room_book import RoomBook
 from fasaco_edge.mission.map.standing_places import StandingPlaces
-from fasaco_edge.mission.orders.order import is_named
 from fasaco_edge.mission.orders.order_state import OrderState
+from fasaco_edge.mission.orders.placing import is_named
+from fasaco_edge.mission.orders.room_commands import carry_out, check_before_map
 
 if TYPE_CHECKING:
     from fasaco_edge.daemon.loop.worker import PlanningWorker
@@ -41,6 +43,7 @@ class MissionRunner:
 
     Attributes:
         config: the configuration in force.
+        rooms: the rooms, which each mission goes on with.
         paths: the exit for the paths of its missions.
         mission: the mission; None during startup.
         worker: its planning thread; None during startup.
@@ -52,8 +55,10 @@ class MissionRunner:
         keeper: LedgerKeeper,
         mailbox: Mailbox[object],
         load: Callable[[DaemonConfig, Mailbox[object]], Loader] | None = None,
+        rooms: RoomBook | None = None,
     ) -> None:
         self.config = config
+        self.rooms = rooms or RoomBook()
         self.paths = PathExit()
         self.mission: Mission | None = None
         self.worker: PlanningWorker | None = None
@@ -101,6 +106,7 @@ class MissionRunner:
         held = self._held.events
         if loaded is not None:
             self.mission, self.worker = loaded
+            self.mission.restore_rooms(self.rooms)
             self._keeper.restore(self.mission)
             if self._before is not None:
                 self.mission.succeed(self._before)
@@ -123,15 +129,20 @@ class MissionRunner:
         try:
             if rival:
                 raise CommandError(rival, hint="command the one that plans")
+            if asked.room is not None:
+                check_before_map(asked.command)
+                carry_out(self.rooms, asked.command, asked.room)
+                return None
             before = self.order_state
             places = StandingPlaces(self.config.mission, self.config.mission)
             places.resume(before.places)
             if before.frame:
                 places.enter(before.frame)
-            command = asked.asked._replace(order=places.located(asked.order))
+            command = asked.asked._replace(order=places.located(asked.order, self.rooms))
             after = before.commanded(command, has_home=places.place("home") is not None)
             if is_named(asked.order) and not after.frame:
-                after = replace(after, frame=places.frame)
+                is_room = any(zone.room for zone in command.order.zones)
+                after = replace(after, frame=self.rooms.frame if is_room else places.frame)
             if not asked.discard and before.forgets(command, after):
                 self._keeper.check_loss(asked.command)
             if asked.command == "replan":

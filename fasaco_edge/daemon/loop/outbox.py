@@ -29,6 +29,7 @@ from fasaco_edge.mission.orders.order import command_document
 from fasaco_edge.wire import schemas, topics
 from fasaco_edge.wire.documents.json_text import encode_json
 from fasaco_edge.wire.documents.path_documents import PathAttachment, Rectangle
+from fasaco_edge.wire.documents.rooms import Rooms
 from fasaco_edge.wire.documents.status import Status
 from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.messages.maps import coverage_values, encode_occupancy_grid
@@ -65,6 +66,7 @@ class Outbox:
         self._unswept = bus.advertise(keys, topics.UNSWEPT)
         self._pheromone = bus.advertise(keys, topics.PHEROMONE)
         self._directions = bus.advertise(keys, topics.DIRECTIONS)
+        self._rooms = bus.advertise(keys, topics.ROOMS)
         self._status = bus.advertise(keys, topics.STATUS)
         self._command = bus.advertise(keys, topics.COMMAND)
 
@@ -86,7 +88,8 @@ class Outbox:
 
     def forget(self) -> None:
         """Drop samples cached for late joiners: another daemon publishes them."""
-        for publisher in (self._path, self._coverage, self._pheromone, self._directions):
+        published = self._path, self._coverage, self._rooms, self._pheromone, self._directions
+        for publisher in published:
             publisher.forget()
         if self._ros is not None:
             self._ros.path.forget()
@@ -120,6 +123,12 @@ class Outbox:
         self._coverage.put(coverage.payload)
         if self._ros is not None:
             self._ros.coverage.put(coverage.payload)
+
+    def rooms(self, rooms: Rooms) -> None:
+        """Publish the rooms; the caller catches failures."""
+        payload = encode_json(rooms)
+        self._last.keep("rooms", Reply(payload))
+        self._rooms.put(payload)
 
     @property
     def shows_floor(self) -> bool:

@@ -83,14 +83,19 @@ class TurnLog:
         publisher: of the log's key.
         config: in force.
         restored: the ledger the daemon began with, if any.
+        rooms: the file of rooms it began with; b"" for none.
     """
 
     def __init__(
-        self, publisher: Publisher, config: DaemonConfig, restored: LedgerSnapshot | None
+        self,
+        publisher: Publisher,
+        config: DaemonConfig,
+        restored: LedgerSnapshot | None,
+        rooms: bytes = b"",
     ) -> None:
         self._publisher = publisher
         self._config = config
-        self._restored = restored
+        self._restored, self._rooms = restored, rooms
         self._is_open = True
         self._embed_until = float("inf")
         self._published_at = float("-inf")
@@ -160,7 +165,7 @@ class TurnLog:
         start, kernels = None, ""
         if self._first == 1:
             ledger = encode_ledger(self._restored) if self._restored else b""
-            start = LogStart(__version__, config_document(self._config), ledger)
+            start = LogStart(__version__, config_document(self._config), ledger, self._rooms)
         if self._has_begun and not self._kernels_named:
             self._kernels_named, kernels = True, kernels_name()
         batch = TurnBatch(
@@ -185,7 +190,7 @@ class TurnLog:
             return
         LOG.info("the turn log ends: %s", why)
         self._is_open = False
-        self._times, self._turns, self._restored = [], [], None
+        self._times, self._turns, self._restored, self._rooms = [], [], None, b""
         self._samples = SampleEncoder(run=0)
 
     def _taken(self, received: Received) -> TakenSample:

@@ -37,6 +37,7 @@ from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
 from fasaco_edge.mission.line.layer import LineLayer
 from fasaco_edge.mission.map.inputs import InputMonitor
 from fasaco_edge.mission.map.map_state import MapState
+from fasaco_edge.mission.map.room_watch import RoomWatch
 from fasaco_edge.mission.orders.sequencer import Sequencer
 
 
@@ -57,6 +58,7 @@ class EventHandler:
     way_out: WayOut
     blocked: BlockedFollower
     changes: OrderChanges
+    rooms: RoomWatch
     _now: float = field(default=0.0, init=False)
     # Results of the events of one step.
     _path: PathUpdate | None = field(default=None, init=False)
@@ -286,6 +288,7 @@ class EventHandler:
                 self.orders.move_reached(motion)
                 if self.map.building.take_closure():
                     self.orders.move_home(motion)
+                    self.rooms.move(motion, self.changes.lattice_deg)
                 self.monitor.driven.break_track()
             for driven in self.monitor.driven.take(stamped):
                 self._record(driven)

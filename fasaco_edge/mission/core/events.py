@@ -21,6 +21,7 @@ from fasaco_edge.mission.orders.order import (
     CommandName,
     MissionOrder,
 )
+from fasaco_edge.mission.orders.room_requests import RoomRequest
 
 if TYPE_CHECKING:
     # For types only: the daemon receives events before the planners are loaded.
@@ -107,11 +108,12 @@ class CommandReceived:
     order: MissionOrder = EVERYTHING_ONCE
     keep_out: KeepOut | None = None
     discard: bool = False
+    room: RoomRequest | None = None
 
     @property
     def asked(self) -> Command:
         """The command itself."""
-        return Command(self.command, self.order, self.keep_out, self.discard)
+        return Command(self.command, self.order, self.keep_out, self.discard, self.room)
 
 
 @dataclass(frozen=True, slots=True)

@@ -187,6 +187,11 @@ class Executive:
         self._update = self.route.take_up("goes on", self._now) or self._update
         return None
 
+    def _wait_for_room(self) -> Doing | None:
+        """Wait for a room that the order names, after all its other zones."""
+        name = self.orders.order_state.waits_for
+        return self._work.wait_for_room(name, self._update, self._now) if name else None
+
     def _judge_path(self) -> None:
         """Want a plan if the path no longer serves the order."""
         cell, now = self._cell, self._now
@@ -246,6 +251,7 @@ RULES: tuple[Callable[[Executive], Doing | None], ...] = (
     Executive._rest,
     Executive._find_place,
     Executive._run_errand,
+    Executive._wait_for_room,
     Executive._judge_path,
     Executive._plan,
     Executive._end_order,

@@ -34,8 +34,8 @@ from fasaco_edge.mission.core.events import (
 )
 from fasaco_edge.mission.map.loop_closure import Motion, moved_mask
 from fasaco_edge.mission.orders.mask import mask_polygons
-from fasaco_edge.mission.orders.order import rotated_order
 from fasaco_edge.mission.orders.order_state import OrderState
+from fasaco_edge.mission.orders.placing import rotated_order
 from fasaco_edge.mission.orders.reached_cells import ReachedCells
 
 _AnyPlace = TypeVar("_AnyPlace", bound=Place)

@@ -12,6 +12,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from fasaco_edge.errors import LedgerMismatchError
 from fasaco_edge.grid.geometry import StampedPose
 from fasaco_edge.grid.lattice import Cell, CoverageLattice
 from fasaco_edge.grid.occupancy import OccupancyGrid
@@ -42,7 +43,12 @@ from fasaco_edge.mission.core.way_out import WayOut
 from fasaco_edge.mission.coverage.drive_meter import DriveMeter, DriveTimes
 from fasaco_edge.mission.coverage.ledger import CoverageLedger, LedgerSnapshot
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
-from fasaco_edge.mission.coverage.progress import Coverage, ZoneProgress, zone_progress
+from fasaco_edge.mission.coverage.progress import (
+    Coverage,
+    ZoneProgress,
+    room_progress,
+    zone_progress,
+)
 from fasaco_edge.mission.coverage.rotated_ledger import rotated_ledger
 from fasaco_edge.mission.coverage.swept_floor import SweptFloor
 from fasaco_edge.mission.coverage.tool_sight import ToolSight
@@ -53,6 +59,8 @@ from fasaco_edge.mission.map.idle_places import IdlePlaces
 from fasaco_edge.mission.map.inputs import InputMonitor
 from fasaco_edge.mission.map.map_state import MapState
 from fasaco_edge.mission.map.reachable_area import ReachableArea
+from fasaco_edge.mission.map.room_book import RoomBook
+from fasaco_edge.mission.map.room_watch import RoomWatch
 from fasaco_edge.mission.orders.mask import mask_frame
 from fasaco_edge.mission.orders.order_state import OrderState
 from fasaco_edge.mission.orders.sequencer import Sequencer
@@ -79,6 +87,7 @@ class Mission:
         self._drive, self._gauge = DriveMeter(), BatteryGauge()
         self._angle = LatticeAngle(config)
         self._idle = IdlePlaces(config)
+        self._rooms = RoomWatch()
         self._lay_cells()
         self.restore_order(order or OrderState.autostart())
 
@@ -111,12 +120,15 @@ class Mission:
         ordered = self._map, self._ledger, self._orders, self.route, self._line
         is_alone = self._kind is ALONE
         self._changes = OrderChanges(
-            *(*ordered, config.policy, self._rotation.deg, is_alone, config.speed_m_s)
+            *(*ordered, config.policy, self._rooms),
+            *(self._rotation.deg, is_alone, config.speed_m_s),
         )
         way_out = WayOut(self._map, self.route)
         blocked = BlockedFollower()
         measured = self._drive, self.company, self._gauge, way_out, blocked
-        self._handler = EventHandler(*owners, self._line, self._trail, *measured, self._changes)
+        self._handler = EventHandler(
+            *owners, self._line, self._trail, *measured, self._changes, self._rooms
+        )
         self.giving_way = self._kind.waiting(config, self._map, self.route, self.company)
         decided_by = self._line, self.company, self.charging, self.giving_way
         in_dock = InDock(self._map, self._gauge)
@@ -146,6 +158,11 @@ class Mission:
         self._map.places.resume(order.places)
         self._changes.begin(self._rotation.order(order, self._rotated_by_deg))
         self.state, self.reason = self._executive.status()
+
+    def restore_rooms(self, book: RoomBook) -> None:
+        """Go on with the rooms of a book, which the mission changes; to be called before
+        ``restore_order``."""
+        self._rooms.book = book
 
     def succeed(self, before: Mission) -> None:
         """Take over another mission's state of robot and inputs, and its doubt about the building.
@@ -185,6 +202,7 @@ class Mission:
         events = list(events)
         begun = self._make_room(events, now)
         happened = self._along_lanes(self._handle(events, now), now)
+        self._look_for_rooms(happened, now)
         decided = self._executive.decide(now)
         self.state, self.reason = self._executive.status()
         stop = self.route.stop(self.reason, now) if self.state.is_at_rest else None
@@ -197,6 +215,14 @@ class Mission:
             path = replace(path, speed_m_s=self.order_state.speed_m_s)
         plan = decided.plan and self._trail.posed(decided.plan)
         return replace(happened, plan=plan, path=path)
+
+    def _look_for_rooms(self, happened: Decision, now: float) -> None:
+        """Look for rooms if that is due; let the order follow them."""
+        if any(isinstance(fault, LedgerMismatchError) for fault in happened.faults):
+            self._rooms.leave_building()
+        if self.grid is not None and not self.is_in_doubt:
+            self._rooms.look(self.grid, now)
+        self._changes.follow_rooms()
 
     def _handle(self, events: Iterable[Event], now: float) -> Decision:
         return self._handler.handle(map(self._rotation.event, events), now)
@@ -306,6 +332,10 @@ class Mission:
         """Return the progress of each zone of the order."""
         return zone_progress(self.order_state, self._map.area, self._ledger)
 
+    def room_progress(self) -> dict[int, tuple[int, int]]:
+        """Return for each room, by its number, how many cells are reachable, and covered."""
+        return room_progress(self.rooms, self._rotation.deg, self._map.area, self._ledger)
+
     def snapshot(self) -> LedgerSnapshot:
         """Return the state kept over a restart: coverage, and the order's progress."""
         trail = self._trail.snapshot()
@@ -317,6 +347,11 @@ class Mission:
     def rotation(self) -> LatticeRotation:
         """The lattice rotation, which converts places on the lattice to the map frame."""
         return self._rotation
+
+    @property
+    def rooms(self) -> RoomBook:
+        """The rooms, in the map frame."""
+        return self._rooms.book
 
     @property
     def order_state(self) -> OrderState:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from fasaco_edge.errors import CommandError, FasacoError, OrderError
 from fasaco_edge.grid.geometry import Polygon
@@ -14,10 +14,14 @@ from fasaco_edge.mission.coverage.loss import loss_in
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
 from fasaco_edge.mission.line.layer import LineLayer
 from fasaco_edge.mission.map.map_state import MapState
+from fasaco_edge.mission.map.room_watch import RoomWatch
 from fasaco_edge.mission.orders.mask import mask_polygons
-from fasaco_edge.mission.orders.order import MissionOrder, rotated_order
+from fasaco_edge.mission.orders.order import MissionOrder
 from fasaco_edge.mission.orders.order_state import OrderState, Stage
+from fasaco_edge.mission.orders.placing import placed, rotated_order
+from fasaco_edge.mission.orders.room_commands import carry_out
 from fasaco_edge.mission.orders.sequencer import Sequencer
+from fasaco_edge.mission.orders.zones import in_zones
 
 
 @dataclass(slots=True, eq=False)
@@ -30,6 +34,7 @@ class OrderChanges:
     route: Route
     line: LineLayer
     policy: MissionPolicy
+    rooms: RoomWatch
     # Angle of the cells' rows to the x axis of the map frame [deg].
     lattice_deg: float = 0.0
     # Whether there is no fleet, whose robots share cells.
@@ -38,6 +43,8 @@ class OrderChanges:
     speed_m_s: float = 0.0
     # Keep-out polygons of every order.
     _standing: tuple[Polygon, ...] = field(default=(), init=False)
+    # Version of the rooms, and the order, that were compared last.
+    _followed: tuple[int, MissionOrder | None] = field(default=(-1, None), init=False)
 
     def __post_init__(self) -> None:
         self._standing = self.policy.keep_out + mask_polygons(self.policy.keep_out_mask)
@@ -73,9 +80,12 @@ class OrderChanges:
 
     def answer(self, event: CommandReceived) -> tuple[Answer, OrderState | None]:
         """Return the answer to a command, and the state that follows; None if it is refused."""
-        before = self.orders.order_state
+        before, book = self.orders.order_state, self.rooms.on(self.map.grid)
         try:
-            order = rotated_order(self.map.places.located(event.order), -self.lattice_deg)
+            if event.room is not None:
+                carry_out(book, event.command, event.room)
+                return Answer(event.number), before
+            order = rotated_order(self.map.places.located(event.order, book), -self.lattice_deg)
             if event.command == "start":
                 self.map.check_zones(order)
                 self._check_passes(order)
@@ -118,6 +128,26 @@ class OrderChanges:
             update = self._resume(after, now)
         self.orders.set_state(after)
         return update
+
+    def follow_rooms(self) -> None:
+        """Let the zones of the order follow their rooms; want a plan if cells to cover change."""
+        book, state = self.rooms.book, self.orders.order_state
+        if self._followed == (book.version, state.order) or state.order is None:
+            return
+        begun = state.zone - (1 if state.waits_for else 0)
+        before = state.order.as_given
+        given = placed(before, book, begun)
+        order = state.order
+        if given is not before:
+            order = rotated_order(given, -self.lattice_deg)
+            self.orders.set_state(replace(state, order=order))
+            lattice, zone = self.map.lattice, self.orders.order_state.current_zone
+            if lattice is not None and zone is not None and state.begun:
+                zones = (state.current_zone or zone,), (zone,)
+                then, now = (in_zones(each, lattice.window, lattice.cell_m) for each in zones)
+                if (then != now).any():
+                    self.route.want(f"the outline of {zone.name!r} has changed")
+        self._followed = book.version, order
 
     def _change_keep_outs(self, order: OrderState, now: float) -> PathUpdate | None:
         """Apply other keep-outs under the same order; stop a robot inside one of them."""

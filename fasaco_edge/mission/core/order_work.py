@@ -88,6 +88,8 @@ class OrderWork:
         """Advance the order; None if its next stage has something to plan."""
         route, orders = self.route, self.orders
         orders.advance(now)
+        if name := orders.order_state.waits_for:
+            return self.wait_for_room(name, update, now)
         if orders.is_waiting or orders.order_state.stage is Stage.OVER:
             route.drop()
             return self.settle(update, now)
@@ -103,6 +105,13 @@ class OrderWork:
         if area is not None and (why := self.shut_in.why(area)):
             return self.shut_in.lead_out(why, update, now)
         return Doing(State.BLOCKED, orders.waiting_reason(), update)
+
+    def wait_for_room(self, name: str, update: PathUpdate | None, now: float) -> Doing:
+        """Stand until there is a room of a name."""
+        reason = f"waits for a room {name!r}: no room on the map has this name yet"
+        update = self.route.stop(reason, now) or update
+        self.route.drop()
+        return Doing(State.BLOCKED, reason, update)
 
     def share(self, cell: Cell, now: float, *, at_once: bool = False) -> str:
         """Divide the rest among the robots if due; return why a plan is wanted, or ""."""

@@ -16,9 +16,11 @@ import msgspec
 
 from fasaco_edge.errors import OrderError, PlacesElsewhere
 from fasaco_edge.mission.config import Dock, MissionPolicy, Place
+from fasaco_edge.mission.map.room_book import RoomBook
 from fasaco_edge.mission.orders.mask import mask_frame
-from fasaco_edge.mission.orders.order import Errand, MissionOrder, located
+from fasaco_edge.mission.orders.order import Errand, MissionOrder
 from fasaco_edge.mission.orders.order_state import NO_PLACES, PlacesNote
+from fasaco_edge.mission.orders.placing import located
 
 
 class StandingPlaces:
@@ -124,13 +126,14 @@ class StandingPlaces:
         """The frame of the map they belong to; "" while that is not known."""
         return self.note.frame if self.note.of == self._of else self._given.map_frame
 
-    def located(self, order: MissionOrder) -> MissionOrder:
-        """Return an order with its named zones replaced by those of the configuration.
+    def located(self, order: MissionOrder, book: RoomBook) -> MissionOrder:
+        """Return an order with its named zones replaced by those of the configuration, or rooms.
 
         Raises:
-            OrderError: there is no zone of that name, or it is on another map.
+            OrderError: there is no zone or room of that name, or it is on another map.
         """
-        names = [zone.name for zone in order.zones if zone.polygon == ()]
-        if names and self.why:
+        named = [zone.name for zone in order.zones if zone.polygon == () and not zone.room]
+        names = [name for name in named if book.find(name) is None]
+        if names and self.why and order.unknown == "refuse":
             raise OrderError(f"zone {names[0]!r}: {self.why}", hint=PlacesElsewhere.hint)
-        return located(order, self._policy.zones)
+        return located(order, () if self.why else self._policy.zones, book)

@@ -196,7 +196,7 @@ def zones_beyond(
     """
     beyond = []
     for zone in order.zones:
-        if zone.polygon is None or is_in_reach(zone, area):
+        if not zone.polygon or is_in_reach(zone, area):
             continue
         inside = cells_inside(zone.polygon, free.window, free.cell_m)
         visited = inside & (visits > 0)

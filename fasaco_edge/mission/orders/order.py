@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Annotated, Any, Literal, NamedTuple, TypeVar, get_args
 
 import msgspec
@@ -14,7 +14,6 @@ from msgspec import Meta
 
 from fasaco_edge.errors import OrderError
 from fasaco_edge.grid.geometry import Polygon
-from fasaco_edge.grid.rotation import rotated_polygon
 from fasaco_edge.mission.orders.keep_outs import (
     MOST_KEEP_OUT,
     Corners,
@@ -27,9 +26,24 @@ from fasaco_edge.mission.orders.keep_outs import (
     keep_out_of,
 )
 from fasaco_edge.mission.orders.passes import Passes, PassWord, passes_document, passes_of
+from fasaco_edge.mission.orders.room_requests import (
+    RoomDocument,
+    RoomNumber,
+    RoomRequest,
+    room_document,
+    room_of,
+)
 from fasaco_edge.planners.passes import Covers, Direction, Laid, Pass, laid
 
 MOST_ZONES = 100
+
+
+class LeftOut(NamedTuple):
+    """A room that an order for everything leaves out: its title, its outline, holes in that."""
+
+    title: str
+    outline: Polygon
+    holes: tuple[Polygon, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,15 +53,24 @@ class Zone:
     Attributes:
         name: unique in its order.
         polygon: corners (x, y) [m] in the map frame, the last joined to the first; None for
-            everything reachable, or, before ``located``, for a standing zone of that name.
+            everything reachable; () for a standing zone or a room of that name that is not placed
+            yet, see ``orders.placing``.
         passes: number of passes.
         kinds: what is special about each pass; () if nothing is.
+        room: number of the room that it is, whose outline it follows; 0 for none.
+        holes: polygons within ``polygon`` that are not part of it.
+        without: of everything: the rooms that are left out.
+        is_as_usual: whether the order says nothing about passes, so that a room's settings apply.
     """
 
     name: str
     polygon: Polygon | None
     passes: int = 1
     kinds: tuple[Pass, ...] = ()
+    room: int = 0
+    holes: tuple[Polygon, ...] = ()
+    without: tuple[LeftOut, ...] = ()
+    is_as_usual: bool = field(default=False, compare=False)
 
     def kind(self, number: int) -> Pass:
         """Return what is special about a pass, from 1."""
@@ -59,6 +82,7 @@ class Zone:
 
 
 EVERYTHING = "everything"
+Unknown = Literal["refuse", "wait"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,6 +94,8 @@ class MissionOrder:
         keep_out: polygons (x, y) [m] in the map frame that the robot must not touch.
         return_home: whether to drive back to the start at the end.
         keep_covered: whether the first pass skips cells that were covered before.
+        unknown: what becomes of a zone whose name is not known yet: the order is refused, or waits
+            for a room of that name.
         given: the order as given, in the map frame, if the polygons are rotated, see
             ``rotated_order``.
     """
@@ -78,6 +104,7 @@ class MissionOrder:
     keep_out: tuple[Polygon, ...] = ()
     return_home: bool = False
     keep_covered: bool = False
+    unknown: Unknown = "refuse"
     given: MissionOrder | None = field(default=None, compare=False, repr=False)
 
     @property
@@ -99,6 +126,10 @@ CommandName = Literal[
     "status",
     "keep_out_add",
     "keep_out_remove",
+    "room_name",
+    "room_split",
+    "room_merge",
+    "room_set",
 ]
 FORGETFUL = ("start", "reset")
 """The commands that may forget covered cells."""
@@ -114,12 +145,14 @@ class Command(NamedTuple):
         order: what to cover, for ``start``.
         keep_out: what to add or remove, for ``keep_out_add`` and ``keep_out_remove``.
         discard: whether ``start`` and ``reset`` may forget covered cells.
+        room: which room to change, and how, for the commands ``ROOM_COMMANDS``.
     """
 
     name: CommandName
     order: MissionOrder = EVERYTHING_ONCE
     keep_out: KeepOut | None = None
     discard: bool = False
+    room: RoomRequest | None = None
 
 
 class _Document(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -134,21 +167,34 @@ class StandingZone(_Document, frozen=True):
 
 
 class ZoneDocument(_Document, frozen=True):
-    """An area to cover; without a polygon, the standing zone of that name."""
+    """An area to cover; without a polygon, the standing zone or else the room of that name.
+
+    Attributes:
+        room: number of the room that it is: it follows the room's outline.
+    """
 
     name: PlaceName
     polygon: Corners | None = None
     passes: Passes | None = None
+    room: RoomNumber | None = None
 
 
 class OrderDocument(_Document, frozen=True):
-    """What to cover. Without zones: everything the robot can reach."""
+    """What to cover. Without zones: everything the robot can reach.
+
+    Attributes:
+        passes: of zones without passes, and of everything; without it once, and rooms as their
+            settings say.
+        unknown: what becomes of a zone whose name is not known: the order is refused, or the zone
+            waits, after all others, for a room of that name.
+    """
 
     zones: Annotated[list[ZoneDocument], Meta(max_length=MOST_ZONES)] = []
     keep_out: Annotated[list[Corners], Meta(max_length=MOST_KEEP_OUT)] = []
-    passes: Passes = 1
+    passes: Passes | None = None
     return_home: bool = False
     keep_covered: bool = False
+    unknown: Unknown = "refuse"
 
 
 class CommandDocument(_Document, frozen=True):
@@ -159,17 +205,24 @@ class CommandDocument(_Document, frozen=True):
         keep_out: for `keep_out_add` and, by its name alone, `keep_out_remove`.
         discard: for `start` and `reset`: whether they may forget what is covered. Without it, a
             command that would forget covered cells is refused (`would_forget`).
+        room: for `room_name`, `room_split`, `room_merge` and `room_set` only.
     """
 
     command: CommandName
     order: OrderDocument | None = None
     keep_out: KeepOutDocument | None = None
     discard: bool = False
+    room: RoomDocument | None = None
 
 
 _Read = TypeVar("_Read", bound=_Document)
 # The words of members other than ``command``.
-_WORDS: dict[str, object] = {"passes": PassWord, "covers": Covers, "lanes": Direction}
+_WORDS: dict[str, object] = {
+    "passes": PassWord,
+    "covers": Covers,
+    "lanes": Direction,
+    "unknown": Unknown,
+}
 
 
 def read_order(document: object) -> MissionOrder:
@@ -200,7 +253,8 @@ def read_command(document: object) -> Command:
     if keep_out is not None and bool(keep_out.polygon) != (name == "keep_out_add"):
         got = "missing" if name == "keep_out_add" else "got it with keep_out_remove"
         raise OrderError(f"keep_out.polygon: goes with keep_out_add, {got}")
-    return Command(name, order_of(asked.order or OrderDocument()), keep_out, asked.discard)
+    room = room_of(name, asked.room)
+    return Command(name, order_of(asked.order or OrderDocument()), keep_out, asked.discard, room)
 
 
 def read_recorded(document: dict[str, object]) -> Command:
@@ -220,56 +274,19 @@ def order_document(order: MissionOrder) -> dict[str, object]:
         "keep_out": order.keep_out,
         "return_home": order.return_home,
         "keep_covered": order.keep_covered,
-    }
+    } | ({} if order.unknown == "refuse" else {"unknown": order.unknown})
     first = order.zones[0]
     if first.polygon is None:
         return {"passes": passes_document(first.passes, first.kinds), **rest}
-    zones = [
-        {"name": zone.name, "passes": passes_document(zone.passes, zone.kinds)}
-        | ({"polygon": zone.polygon} if zone.polygon else {})
-        for zone in order.zones
-    ]
-    return {"zones": zones, **rest}
+    return {"zones": list(map(_zone_document, order.zones)), **rest}
 
 
-def is_named(order: MissionOrder) -> bool:
-    """Return whether an order has zones that are given by name alone."""
-    return any(zone.polygon == () for zone in order.zones)
-
-
-def located(order: MissionOrder, standing: tuple[StandingZone, ...]) -> MissionOrder:
-    """Return an order with its named zones replaced by standing zones.
-
-    Raises:
-        OrderError: there is no zone of that name.
-    """
-    known = {zone.name: tuple(zone.polygon) for zone in standing}
-    for index, zone in enumerate(order.zones):
-        if zone.polygon == () and zone.name not in known:
-            there = f"there are {', '.join(known)}" if known else "it has none"
-            raise OrderError(
-                f"zones[{index}].name: no zone {zone.name!r} in mission.zones of the daemon's "
-                f"configuration; {there}",
-                hint="name one of those, or give the zone a polygon",
-            )
-    zones = (
-        replace(zone, polygon=known[zone.name]) if zone.polygon == () else zone
-        for zone in order.zones
-    )
-    return replace(order, zones=tuple(zones))
-
-
-def rotated_order(order: MissionOrder, by_deg: float) -> MissionOrder:
-    """Return an order with its polygons rotated by ``by_deg`` [deg]."""
-    given = order.as_given
-    if not by_deg:
-        return given
-    zones = tuple(
-        replace(zone, polygon=rotated_polygon(zone.polygon, by_deg)) if zone.polygon else zone
-        for zone in given.zones
-    )
-    keep_out = tuple(rotated_polygon(polygon, by_deg) for polygon in given.keep_out)
-    return replace(given, zones=zones, keep_out=keep_out, given=given)
+def _zone_document(zone: Zone) -> dict[str, object]:
+    # A zone by name alone may be a room, which has passes of its own.
+    says_none = zone.is_as_usual and zone.polygon == ()
+    passes = {} if says_none else {"passes": passes_document(zone.passes, zone.kinds)}
+    polygon = {"polygon": zone.polygon} if zone.polygon else {}
+    return {"name": zone.name, **passes, **polygon, **({"room": zone.room} if zone.room else {})}
 
 
 def command_document(command: Command) -> dict[str, object]:
@@ -281,6 +298,8 @@ def command_document(command: Command) -> dict[str, object]:
         document["discard"] = command.discard
     if command.keep_out is not None:
         document["keep_out"] = keep_out_document(command.keep_out)
+    if command.room is not None:
+        document["room"] = room_document(command.room)
     return document
 
 
@@ -290,12 +309,14 @@ def order_of(document: OrderDocument) -> MissionOrder:
     Raises:
         OrderError: naming the member, what is wrong with it, and what is allowed.
     """
-    usual = passes_of(document.passes, "passes")
+    usual, is_usual = passes_of(document.passes or 1, "passes"), document.passes is None
     zones = tuple(
         Zone(
             zone.name,
             tuple(zone.polygon or ()),
             *(passes_of(zone.passes, f"zones[{index}].passes") if zone.passes else usual),
+            room=zone.room or 0,
+            is_as_usual=is_usual and zone.passes is None,
         )
         for index, zone in enumerate(document.zones)
     )
@@ -304,6 +325,7 @@ def order_of(document: OrderDocument) -> MissionOrder:
         tuple(map(tuple, document.keep_out)),
         document.return_home,
         document.keep_covered,
+        document.unknown,
     )
     # Checks beyond types that need no map.
     names = [zone.name for zone in order.zones]

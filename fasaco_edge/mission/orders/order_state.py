@@ -32,6 +32,7 @@ from fasaco_edge.mission.orders.order import (
     order_document,
     order_of,
 )
+from fasaco_edge.mission.orders.placing import are_same
 from fasaco_edge.mission.orders.reached_cells import ReachedCells
 from fasaco_edge.planners.passes import Laid
 
@@ -128,6 +129,12 @@ class OrderState:
         if self.order is None or self.stage is not Stage.COVERING:
             return None
         return self.order.zones[self.zone]
+
+    @property
+    def waits_for(self) -> str:
+        """Name of the room that the present zone waits for; "" for none."""
+        zone = self.current_zone
+        return zone.name if zone is not None and zone.polygon == () else ""
 
     @property
     def current_pass(self) -> Laid:
@@ -276,9 +283,7 @@ class OrderState:
         return self._without_order("cancelled")
 
     def _started(self, order: MissionOrder) -> OrderState:
-        same = self.order is not None and order == replace(
-            self.order, keep_covered=order.keep_covered
-        )
+        same = self.order is not None and are_same(self.order, order)
         errand: Errand = "" if self.errand == "home" else self.errand
         if same and self.stage is not Stage.OVER:
             return replace(self, paused=False, errand=errand, why="")

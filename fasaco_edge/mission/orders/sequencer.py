@@ -21,6 +21,7 @@ from fasaco_edge.mission.orders.cells_left import CellsLeft, LeftBehind, zones_b
 from fasaco_edge.mission.orders.exploration import Exploration
 from fasaco_edge.mission.orders.order import Errand, Zone
 from fasaco_edge.mission.orders.order_state import NO_ORDER, OrderState, Stage
+from fasaco_edge.mission.orders.placing import left_out
 from fasaco_edge.mission.orders.reached_cells import ReachedCells
 from fasaco_edge.mission.orders.zones import in_zones
 from fasaco_edge.planners.cost import CoverageCost
@@ -217,7 +218,7 @@ class Sequencer:
         if run.retry_at is not None:
             return self._begin_retry(cell) if now >= run.retry_at else ""
         state = self.order_state
-        if state.begun or state.order is None or state.stage is Stage.OVER:
+        if state.begun or state.order is None or state.stage is Stage.OVER or state.waits_for:
             return ""
         zone = state.current_zone
         if zone is not None and not (state.order.keep_covered and state.pass_number == 1):
@@ -443,6 +444,8 @@ class Sequencer:
         area, free = self._map.area, self._map.free
         if order is not None and area is not None and free is not None:
             run.ending += zones_beyond(order, area, free, self._ledger.visits(free.window))
+        if order is not None and (rooms := left_out(order.zones)):
+            run.ending += f"; left out: {', '.join(map(repr, rooms))}"
         self.order_state = replace(state, why=run.ending)
 
     def _is_worth_trying(self) -> bool:

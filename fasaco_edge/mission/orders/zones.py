@@ -21,9 +21,30 @@ TOUCH_TOLERANCE_M = 1e-6
 
 def in_zones(zones: tuple[Zone, ...], window: Window, cell_m: float) -> NDArray[np.bool_]:
     """Return which cells of ``window`` lie in one of the zones, bool (rows, cols), read-only."""
+    if [zone for zone in zones if zone.holes or zone.without]:
+        return _with_holes(zones, window, cell_m)
     if any(zone.polygon is None for zone in zones):
         return _everything(window)
     return _inside_any(tuple(zone.polygon for zone in zones if zone.polygon), window, cell_m)
+
+
+def _with_holes(zones: tuple[Zone, ...], window: Window, cell_m: float) -> NDArray[np.bool_]:
+    """Return which cells lie in one of the zones, some of which have holes."""
+    cells = np.zeros((window.rows, window.cols), bool)
+
+    def inside(outline: Polygon, holes: tuple[Polygon, ...]) -> NDArray[np.bool_]:
+        found = _inside_any((outline,), window, cell_m)
+        return found & ~_inside_any(holes, window, cell_m) if holes else found
+
+    for zone in zones:
+        if zone.polygon:
+            cells |= inside(zone.polygon, zone.holes)
+        elif zone.polygon is None:
+            own = np.ones_like(cells)
+            for room in zone.without:
+                own &= ~inside(room.outline, room.holes)
+            cells |= own
+    return cells
 
 
 def counts_in(
@@ -94,8 +115,8 @@ def _inside_any(polygons: tuple[Polygon, ...], window: Window, cell_m: float) ->
     return cells
 
 
-# One bit per cell: a hundred zones take as much as a dozen masks.
-@lru_cache(maxsize=1)
+# One bit per cell: a hundred zones take as much as a dozen masks. For zones, and for rooms.
+@lru_cache(maxsize=2)
 def _planes(polygons: tuple[Polygon, ...], window: Window, cell_m: float) -> NDArray[np.uint8]:
     return np.stack([np.packbits(cells_inside(polygon, window, cell_m)) for polygon in polygons])
 

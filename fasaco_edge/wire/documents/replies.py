@@ -165,6 +165,8 @@ class MissionReport(Document, frozen=True):
         home: position the robot returns to; by default where the first order began since a reset.
         tries: retries of cells left over.
         unreached: part of the order that stays uncovered as things are.
+        waits_for_room: name of the room that the order waits for; null for none.
+        left_out: rooms that the order for everything leaves out, by their settings.
     """
 
     ordered: Annotated[str | None, allowed(enum=("command", "itself", None))] = None
@@ -183,6 +185,8 @@ class MissionReport(Document, frozen=True):
     tries: Count = 0
     unreached: UnreachedReport = UnreachedReport()
     keep_outs: Annotated[tuple[KeepOutReport, ...], allowed(maxItems=200)] = ()
+    waits_for_room: str | None = None
+    left_out: Annotated[tuple[str, ...], allowed(maxItems=250)] = ()
 
 
 class Reply(Document, frozen=True):

@@ -20,11 +20,13 @@ class LogStart(msgspec.Struct, frozen=True):
         version: its release.
         config: the configuration in force, without secrets.
         ledger: the bytes of the restored ledger's file; empty for none.
+        rooms: the bytes of the file of rooms; empty for none.
     """
 
     version: str
     config: Settings
     ledger: bytes = b""
+    rooms: bytes = b""
 
 
 class EarlySample(msgspec.Struct, frozen=True):

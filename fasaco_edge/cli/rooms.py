@@ -1,0 +1,142 @@
+"""``fasaco-edge rooms``: the rooms of a running daemon, listed, named, split, merged and set."""
+
+from __future__ import annotations
+
+import argparse
+
+from fasaco_edge.cli.ask import add_question, ask
+from fasaco_edge.cli.console.arguments import Command, Exit, add_common
+from fasaco_edge.cli.console.help import HelpText
+from fasaco_edge.cli.console.pass_option import WORDS, add_passes
+from fasaco_edge.cli.console.rooms_table import show_rooms
+from fasaco_edge.cli.console.streams import print_json
+from fasaco_edge.cli.console.terminal import out
+from fasaco_edge.mission.orders.order import read_command
+from fasaco_edge.mission.orders.passes import passes_document
+from fasaco_edge.wire.documents.json_text import decode_json, decode_tolerant, encode_json
+from fasaco_edge.wire.documents.rooms import Rooms
+
+EPILOG = """\
+examples:
+  fasaco-edge rooms list
+  fasaco-edge rooms name 3 kitchen
+  fasaco-edge rooms split kitchen 1.5,0 1.5,3.2      from wall to wall, in metres on the map
+  fasaco-edge rooms merge kitchen 5 --name "living room"
+  fasaco-edge rooms set kitchen --passes auto,cross  a cross pass, wherever an order says nothing
+  fasaco-edge rooms set bath --skip                  left out of orders for everything
+  fasaco-edge mission start --zone kitchen --zone "room 5"
+
+The daemon finds rooms on its map by itself, also without an order. Each has a number that no other
+room ever gets; a room is given by its number, its name, or as "room 3". What was named, split,
+merged or set stays so through new maps, restarts and resets, and no map parts or joins it any more.
+
+exit codes: 0 done; 1 refused, or no answer; 2 usage error; 78 invalid robot name
+"""
+
+ACTIONS = {
+    "list": "show the rooms: number, name, area, swept share, neighbours and settings",
+    "name": "give a room a name",
+    "split": "split a room along a line from wall to wall",
+    "merge": "merge rooms that have a passage to each other",
+    "set": "set what orders do in a room",
+}
+
+
+def _add_actions(parser: argparse.ArgumentParser) -> None:
+    actions = parser.add_subparsers(title="commands", required=True, metavar="COMMAND")
+    for name, text in ACTIONS.items():
+        described = f"{text[0].upper()}{text[1:]}."
+        action = actions.add_parser(
+            name, help=text, description=described, formatter_class=HelpText
+        )
+        action.set_defaults(rooms_action=name)
+        if name != "list":
+            action.add_argument("room", type=_room, metavar="ROOM", help="its number or name")
+        _ADD.get(name, lambda _: None)(action)
+        add_common(action)
+        add_question(action)
+
+
+def _add_name(action: argparse.ArgumentParser) -> None:
+    action.add_argument("name", metavar="NAME", help="the name, which no other room has")
+
+
+def _add_split(action: argparse.ArgumentParser) -> None:
+    for end in ("start", "end"):
+        action.add_argument(end, type=_point, metavar="X,Y", help=f"{end} of the line [m]")
+
+
+def _add_merge(action: argparse.ArgumentParser) -> None:
+    action.add_argument(
+        "others", nargs="+", type=_room, metavar="ROOM", help="the rooms to merge with it"
+    )
+    action.add_argument("--name", metavar="NAME", help="name of the merged room")
+
+
+def _add_set(action: argparse.ArgumentParser) -> None:
+    add_passes(action, f"passes of orders by its name that give none: how many, or {WORDS}")
+    action.add_argument(
+        "--skip",
+        action=argparse.BooleanOptionalAction,
+        help="leave it out of orders for everything, or not any more",
+    )
+
+
+_ADD = {"name": _add_name, "split": _add_split, "merge": _add_merge, "set": _add_set}
+
+
+def _room(text: str) -> int | str:
+    return int(text) if text.isascii() and text.isdigit() else text
+
+
+def _point(text: str) -> list[float]:
+    try:
+        x, y = map(float, text.split(","))
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"must be x,y in metres, got {text!r}") from None
+    return [x, y]
+
+
+def run(args: argparse.Namespace) -> int:
+    """Give the command, if there is one, and show the rooms."""
+    if args.rooms_action != "list":
+        asked = _asked(args)
+        read_command(asked)  # faults are reported without a daemon
+        reply = ask(args, "mission", payload=encode_json(asked))
+        if args.json:
+            print_json(decode_json(reply.payload))
+        else:
+            out().print("done")
+        return Exit.OK
+    reply = ask(args, "rooms")
+    if args.json:
+        print_json(decode_json(reply.payload))
+    else:
+        show_rooms(decode_tolerant(reply.payload, Rooms))
+    return Exit.OK
+
+
+def _asked(args: argparse.Namespace) -> dict[str, object]:
+    room: dict[str, object] = {"id": args.room}
+    match args.rooms_action:
+        case "name":
+            room |= {"name": args.name}
+        case "split":
+            room |= {"cut": [args.start, args.end]}
+        case "merge":
+            room |= {"others": args.others} | ({"name": args.name} if args.name else {})
+        case "set":
+            if args.passes is not None:
+                room["passes"] = passes_document(len(args.passes), args.passes)
+            if args.skip is not None:
+                room["skip"] = args.skip
+    return {"command": f"room_{args.rooms_action}", "room": room}
+
+
+COMMAND = Command(
+    description="Show the rooms of a running daemon, and change their names, borders and settings.",
+    run=run,
+    add_options=_add_actions,
+    epilog=EPILOG,
+    is_group=True,
+)

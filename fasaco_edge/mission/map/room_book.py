@@ -1,0 +1,315 @@
+"""Room book: the only owner of rooms: their numbers, names, settings, and where they are.
+
+The rooms of one building in one map frame are a sheet; the sheet in use is the one that the newest
+map shows. A number is never given to a second room, on any sheet. The map changes rooms by
+``room_matching``, people by ``room_edits`` and the methods here. Needs no kernels, so that commands
+are accepted before there is a map.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Self
+
+from fasaco_edge.errors import OrderError
+from fasaco_edge.grid.geometry import Polygon
+from fasaco_edge.mission.map.room_raster import Cut, RoomRaster
+from fasaco_edge.mission.orders.keep_outs import check_name
+from fasaco_edge.planners.passes import Pass
+
+if TYPE_CHECKING:
+    from fasaco_edge.mission.map.loop_closure import Motion
+
+# Limits of one sheet; a number needs 16 bits.
+MOST_ROOMS, MOST_CUTS, MOST_NUMBER = 250, 100, 65_000
+# Sheets that are kept: floors and buildings.
+MOST_SHEETS = 8
+
+BY_NUMBER = re.compile(r"room (\d{1,5})")
+
+
+@dataclass(frozen=True, slots=True)
+class RoomSettings:
+    """What an order by a room's name does where it says nothing itself.
+
+    Attributes:
+        passes: number of passes; None for as many as other zones have.
+        kinds: what is special about each; () if nothing is.
+        skip: whether orders for everything leave the room out.
+    """
+
+    passes: int | None = None
+    kinds: tuple[Pass, ...] = ()
+    skip: bool = False
+
+
+USUAL = RoomSettings()
+
+
+@dataclass(frozen=True, slots=True)
+class Room:
+    """A room.
+
+    Attributes:
+        id: its number, from 1.
+        name: given by people; "" for none.
+        is_by_hand: whether people have split or merged it: then no map splits or merges it.
+        settings: what orders do in it.
+        outline: corners (x, y) [m] in the map frame, without holes.
+        area_m2: area of its squares [m2].
+        neighbours: numbers of the rooms it is joined to, ascending.
+        encloses: numbers of the rooms that lie within its outline, as those in a ring of corridors.
+    """
+
+    id: int
+    name: str = ""
+    is_by_hand: bool = False
+    settings: RoomSettings = USUAL
+    outline: Polygon = ()
+    area_m2: float = 0.0
+    neighbours: tuple[int, ...] = ()
+    encloses: tuple[int, ...] = ()
+
+    @property
+    def is_kept(self) -> bool:
+        """Whether no map may take it away, or join it with another that is kept."""
+        return bool(self.name) or self.is_by_hand or self.settings != USUAL
+
+    @property
+    def title(self) -> str:
+        """Its name, or its number in words."""
+        return self.name or f"room {self.id}"
+
+
+@dataclass(slots=True, eq=False)
+class RoomSheet:
+    """The rooms of one building.
+
+    Attributes:
+        frame: frame of its map.
+        raster: which squares belong to which room.
+        rooms: by their numbers.
+        cuts: segments that people have split rooms along [m].
+        gone: squares of rooms that have joined others by themselves, to get their numbers back.
+        regions: scores of the regions that are no rooms yet, by their numbers in ``pending``.
+        pending: squares of these regions.
+        settled: the squares of rooms some updates ago: what one map adds decides nothing.
+        changes: scores of rooms that may join another, and of parts that may change their room, as
+            (what, room, other room). A score counts the updates that have shown a change; one that
+            does not show it counts twice against it.
+    """
+
+    frame: str
+    raster: RoomRaster
+    gone: RoomRaster
+    pending: RoomRaster
+    settled: RoomRaster
+    rooms: dict[int, Room] = field(default_factory=dict)
+    cuts: list[Cut] = field(default_factory=list)
+    regions: dict[int, int] = field(default_factory=dict)
+    changes: dict[tuple[str, int, int], int] = field(default_factory=dict)
+    # How many squares of each room have changed since its outline was drawn.
+    stale: dict[int, int] = field(default_factory=dict, init=False)
+    # The squares since ``settled``, and how many updates there were in all.
+    _between: RoomRaster | None = field(default=None, init=False)
+    _updates: int = field(default=0, init=False)
+
+    @classmethod
+    def empty(cls, frame: str, square_m: float) -> Self:
+        """Return a sheet without rooms."""
+        nothing = RoomRaster.empty(square_m)
+        return cls(frame, nothing, nothing, nothing, nothing)
+
+    def lay(
+        self, raster: RoomRaster, gone: RoomRaster | None = None, pending: RoomRaster | None = None
+    ) -> None:
+        """Replace the squares of the rooms, of those that are gone, and of pending regions."""
+        self.raster, self.gone = raster, gone or self.gone
+        self.pending = pending or self.pending
+
+    def note(self, regions: dict[int, int], pending: RoomRaster) -> None:
+        """Replace the regions that are no rooms yet."""
+        self.regions, self.pending = regions, pending
+
+    def settle(self, period: int) -> None:
+        """Note the squares before an update: they are settled after ``period`` to twice as many."""
+        if self._updates % period == 0:
+            self.settled, self._between = self._between or self.raster, self.raster
+        self._updates += 1
+
+    def fix(self) -> None:
+        """Take the squares for settled: people have seen them so."""
+        self.settled, self._between = self.raster, self.raster
+
+    def move(self, motion: Motion) -> None:
+        """Move all squares with the map."""
+        self.lay(self.raster.moved(motion), self.gone.moved(motion), self.pending.moved(motion))
+        self.fix()
+
+    def note_changes(self, changes: dict[tuple[str, int, int], int]) -> None:
+        """Replace the scores of changes."""
+        self.changes = changes
+
+    def cut(self, cuts: list[Cut]) -> None:
+        """Replace the cuts."""
+        self.cuts = cuts
+
+    @property
+    def is_settling(self) -> bool:
+        """Whether a change is under way: the same map shown again would bring it about."""
+        return bool(self.regions or self.changes)
+
+    @property
+    def is_named(self) -> bool:
+        """Whether it has a room that no map may take away."""
+        return any(room.is_kept for room in self.rooms.values())
+
+
+@dataclass(slots=True, eq=False)
+class RoomBook:
+    """All rooms.
+
+    Attributes:
+        sheets: the one in use first.
+        next_id: the next number.
+        version: counter of changes that a listener sees.
+        is_elsewhere: whether the map may show another building than the first sheet, so that none
+            is in use until a map has been looked at.
+    """
+
+    sheets: list[RoomSheet] = field(default_factory=list)
+    next_id: int = 1
+    version: int = 0
+    is_elsewhere: bool = False
+
+    @property
+    def sheet(self) -> RoomSheet | None:
+        """The sheet in use; None before the first map, and while it may be another."""
+        return self.sheets[0] if self.sheets and not self.is_elsewhere else None
+
+    @property
+    def rooms(self) -> tuple[Room, ...]:
+        """The rooms of the sheet in use, by their numbers."""
+        sheet = self.sheet
+        return () if sheet is None else tuple(sheet.rooms[each] for each in sorted(sheet.rooms))
+
+    @property
+    def frame(self) -> str:
+        """The frame of the sheet in use; "" without one."""
+        return "" if self.sheet is None else self.sheet.frame
+
+    def leave_building(self) -> None:
+        """Note that the map shows another building: the next update looks for its sheet."""
+        self.version += not self.is_elsewhere
+        self.is_elsewhere = True
+
+    def find(self, called: str | int) -> Room | None:
+        """Return the room of a name, as ``room 3``, or of a number; None for none."""
+        rooms = {} if self.sheet is None else self.sheet.rooms
+        if isinstance(called, int):
+            return rooms.get(called)
+        named = next((room for room in rooms.values() if room.name == called), None)
+        by_number = BY_NUMBER.fullmatch(called)
+        return rooms.get(int(by_number[1])) if named is None and by_number else named
+
+    def room(self, called: str | int) -> Room:
+        """Return the room of a name or number.
+
+        Raises:
+            OrderError: there is none; the text lists those there are.
+        """
+        room = self.find(called)
+        if room is None:
+            raise OrderError(
+                f"room.id: there is no room {called!r}; {self.listed()}",
+                hint="name one of those, or its number",
+            )
+        return room
+
+    def listed(self) -> str:
+        """Return which rooms there are, as text."""
+        titles = ", ".join(repr(room.name) if room.name else room.title for room in self.rooms)
+        return f"there are {titles:.400}" if titles else "no room is known yet"
+
+    def name(self, called: str | int, name: str) -> None:
+        """Give a room a name.
+
+        Raises:
+            OrderError: there is no such room, or another one has that name, or it is no name.
+        """
+        room = self.room(called)
+        self.check_name("room.name", name, room.id)
+        self.put_by_hand(replace(room, name=name))
+
+    def holes(self, room: Room) -> tuple[Polygon, ...]:
+        """Return the outlines of the rooms that lie within that of a room."""
+        rooms = {} if self.sheet is None else self.sheet.rooms
+        return tuple(rooms[each].outline for each in room.encloses if each in rooms)
+
+    def check_name(self, where: str, name: str, *of: int) -> None:
+        """Check a name for a room, which may be that of the rooms ``of`` now.
+
+        Raises:
+            OrderError: it is no name, or that of another room.
+        """
+        check_name(where, name)
+        if BY_NUMBER.fullmatch(name):
+            raise OrderError(
+                f"{where}: {name!r} is how a room without a name is called",
+                hint="choose a name without a number after `room`",
+            )
+        taken = self.find(name)
+        if taken is not None and taken.id not in of:
+            raise OrderError(
+                f"{where}: room {taken.id} is {name!r} already",
+                hint="choose another name, or give that room another one first",
+            )
+
+    def set(self, called: str | int, settings: RoomSettings) -> None:
+        """Give a room settings.
+
+        Raises:
+            OrderError: there is no such room.
+        """
+        self.put_by_hand(replace(self.room(called), settings=settings))
+
+    def put(self, room: Room) -> None:
+        """Replace a room of the sheet in use, or add it; nothing if it has not changed."""
+        assert self.sheet is not None
+        if self.sheet.rooms.get(room.id) != room:
+            self.sheet.rooms[room.id] = room
+            self.version += 1
+
+    def put_by_hand(self, room: Room) -> None:
+        """Replace a room as people want it."""
+        assert self.sheet is not None
+        self.put(room)
+        self.sheet.fix()
+
+    def drop(self, rooms: Iterable[int]) -> None:
+        """Remove rooms from the sheet in use."""
+        assert self.sheet is not None
+        for room in rooms:
+            del self.sheet.rooms[room]
+            self.version += 1
+
+    def new_id(self) -> int:
+        """Return a number that no room ever had; 0 if there are too many rooms."""
+        sheet = self.sheet
+        if sheet is None or len(sheet.rooms) >= MOST_ROOMS or self.next_id > MOST_NUMBER:
+            return 0
+        self.next_id += 1
+        return self.next_id - 1
+
+    def turn_to(self, sheet: RoomSheet) -> None:
+        """Use a sheet, new or not; of too many the one used longest ago is dropped, first of those
+        where no room has a name."""
+        if self.sheet is not sheet:
+            self.version += 1
+        self.sheets = [sheet, *(each for each in self.sheets if each is not sheet)]
+        self.is_elsewhere = False
+        if len(self.sheets) > MOST_SHEETS:
+            blank = [each for each in self.sheets[1:] if not each.is_named]
+            self.sheets.remove(blank[-1] if blank else self.sheets[-1])

@@ -1,0 +1,147 @@
+"""Room edits: rooms split and merged by people, and moved with the map."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fasaco_edge.errors import OrderError
+from fasaco_edge.grid.geometry import Point
+from fasaco_edge.kernels.lattice.areas import find_areas
+from fasaco_edge.mission.map.room_book import MOST_CUTS, USUAL, Room, RoomBook, RoomSheet
+from fasaco_edge.mission.map.room_matching import LEAST_M2
+from fasaco_edge.mission.map.room_raster import Cut, RoomRaster, cut_window, is_cut, spread
+from fasaco_edge.mission.map.room_update import refresh
+
+if TYPE_CHECKING:
+    from fasaco_edge.mission.map.loop_closure import Motion
+
+Mask = NDArray[np.bool_]
+
+
+def split(book: RoomBook, called: str | int, cut: Cut) -> None:
+    """Split a room along a segment; the largest part keeps number, name and settings.
+
+    Raises:
+        OrderError: there is no such room, or the segment does not divide it, or there are too many
+            rooms or cuts.
+    """
+    room, sheet = book.room(called), _sheet(book)
+    if len(sheet.cuts) >= MOST_CUTS:
+        raise OrderError(f"room.cut: there are {MOST_CUTS} already", hint="merge rooms first")
+    window, mask = sheet.raster.squares(room.id)
+    near = is_cut(window, sheet.raster.square_m, cut)
+    inside = _part_at(mask, mask & near)
+    areas = find_areas((inside & ~near).astype(np.uint8))
+    least = LEAST_M2 / sheet.raster.square_m**2
+    parts = [number for number, squares in enumerate(areas.cells.tolist(), 1) if squares >= least]
+    if len(parts) < 2:
+        raise OrderError(
+            f"room.cut: does not divide {room.title!r} into parts of {LEAST_M2:g} m2 or more",
+            hint="draw it from wall to wall, across the whole room",
+        )
+    parts.sort(key=lambda number: (-areas.cells[number - 1], number))
+    ids = np.zeros(mask.shape, np.uint16)
+    numbers = [room.id]
+    for _ in parts[1:]:
+        if not (number := book.new_id()):
+            raise OrderError("room.cut: there are too many rooms", hint="merge some first")
+        numbers.append(number)
+        book.put(Room(number, is_by_hand=True, settings=room.settings))
+    for part, number in zip(parts, numbers, strict=True):
+        ids[areas.labels == part] = number
+    spread(ids, inside)
+    place = window.slices_in(sheet.raster.window)
+    after = sheet.raster.ids.copy()
+    after[place][inside] = ids[inside]
+    sheet.lay(replace(sheet.raster, ids=after))
+    sheet.cut([*sheet.cuts, cut])
+    book.put_by_hand(replace(room, is_by_hand=True))
+    refresh(book, numbers)
+
+
+def merge(book: RoomBook, called: Sequence[str | int], name: str = "") -> None:
+    """Merge rooms that are joined; the smallest number stays, and the name given, or its name, or
+    the next one's.
+
+    Raises:
+        OrderError: there is no such room, or the rooms are not joined, or the name is taken.
+    """
+    sheet = _sheet(book) if book.sheet else None
+    rooms = sorted({room.id: room for room in map(book.room, called)}.values(), key=_number)
+    if len(rooms) < 2 or sheet is None:
+        raise OrderError("room.others: a merge takes two rooms or more", hint="name another room")
+    numbers = [room.id for room in rooms]
+    if name:
+        book.check_name("room.name", name, *numbers)
+    if apart := _apart(rooms):
+        raise OrderError(
+            f"room.others: {apart.title!r} is not joined to the others",
+            hint="merge rooms that have a passage to each other; add the room between them",
+        )
+    stays = rooms[0]
+    settings = next((each.settings for each in rooms if each.settings != USUAL), USUAL)
+    name = name or next((each.name for each in rooms if each.name), "")
+    after = sheet.raster.ids.copy()
+    after[np.isin(after, np.array(numbers, np.uint16))] = stays.id
+    sheet.lay(replace(sheet.raster, ids=after))
+    sheet.cut([cut for cut in sheet.cuts if not _is_inside(sheet.raster, cut, stays.id)])
+    book.drop(numbers[1:])
+    book.put_by_hand(replace(stays, name=name, settings=settings, is_by_hand=True))
+    refresh(book, [stays.id])
+
+
+def move(book: RoomBook, motion: Motion) -> None:
+    """Move the rooms of the sheet in use with the map, as a loop closure has moved it."""
+    sheet = book.sheet
+    if sheet is None or motion.is_still:
+        return
+    sheet.move(motion)
+    sheet.cut([(_moved(start, motion), _moved(end, motion)) for start, end in sheet.cuts])
+    refresh(book, sheet.rooms)
+
+
+def _moved(point: Point, motion: Motion) -> Point:
+    x, y = motion.forward(np.array([point[0]]), np.array([point[1]]))
+    return float(x[0]), float(y[0])
+
+
+def _number(room: Room) -> int:
+    return room.id
+
+
+def _sheet(book: RoomBook) -> RoomSheet:
+    assert book.sheet is not None  # a room was found
+    return book.sheet
+
+
+def _part_at(mask: Mask, marked: Mask) -> Mask:
+    """Return the connected part of a room with the most marked squares; all if none is marked."""
+    areas = find_areas(mask.astype(np.uint8))
+    counts = np.bincount(areas.labels[marked], minlength=1)
+    part: Mask = mask if not counts.sum() else areas.labels == int(counts.argmax())
+    return part
+
+
+def _apart(rooms: Sequence[Room]) -> Room | None:
+    """Return a room that no chain of the others joins to the first; None for none."""
+    left = {room.id: room for room in rooms[1:]}
+    reached = [rooms[0]]
+    while reached:
+        for number in reached.pop().neighbours:
+            if number in left:
+                reached.append(left.pop(number))
+    return next(iter(left.values()), None)
+
+
+def _is_inside(raster: RoomRaster, cut: Cut, room: int) -> bool:
+    """Return whether a cut goes through one room alone."""
+    around = cut_window(cut, raster.square_m).intersection(raster.window)
+    if around is None:
+        return False
+    under = raster.on(around)[is_cut(around, raster.square_m, cut)]
+    return set(np.unique(under).tolist()) - {0} == {room}

@@ -1,0 +1,194 @@
+"""Room raster: squares of the map frame, each with the number of its room.
+
+It has its own squares, aligned with the axes of the map frame: maps may have other pixels, another
+corner or another yaw each time, and cover another part of the building.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fasaco_edge.grid.geometry import GridGeometry, Point, Window
+
+if TYPE_CHECKING:
+    from fasaco_edge.grid.rooms import FoundRooms
+    from fasaco_edge.mission.map.loop_closure import Motion
+
+# Limit on the squares of a raster; a larger building gets wider squares.
+MOST_SQUARES = 1_000_000
+NOWHERE = Window(0, 0, 0, 0)
+# Squares worked on at once, which bounds memory.
+BLOCK = 1 << 18
+
+# Squares are cut if their centre is nearer to a cut than this [squares]: no step passes between.
+CUT = 0.75
+
+Ids = NDArray[np.uint16]
+Cut = tuple[Point, Point]
+"""A segment (x, y) to (x, y) [m] in the map frame that parts two rooms."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RoomRaster:
+    """Squares with the numbers of rooms.
+
+    Attributes:
+        square_m: edge of a square [m]; square (row, col) begins at (col, row) * ``square_m``.
+        window: the squares.
+        ids: uint16 (rows, cols), the room of each; 0 for none.
+    """
+
+    square_m: float
+    window: Window
+    ids: Ids
+
+    @classmethod
+    def empty(cls, square_m: float) -> Self:
+        """Return a raster without squares."""
+        return cls(square_m, NOWHERE, np.zeros((0, 0), np.uint16))
+
+    def on(self, window: Window) -> Ids:
+        """Return a copy of the numbers on another window."""
+        ids = np.zeros((window.rows, window.cols), np.uint16)
+        if (common := window.intersection(self.window)) is not None:
+            ids[common.slices_in(window)] = self.ids[common.slices_in(self.window)]
+        return ids
+
+    def cropped(self) -> RoomRaster:
+        """Return the same without empty rows and columns at its border."""
+        inner = Window.of(self.ids > 0)
+        if inner is None:
+            return RoomRaster.empty(self.square_m)
+        window = inner.moved(self.window.row0, self.window.col0)
+        return replace(self, window=window, ids=self.on(window))
+
+    def squares(self, room: int) -> tuple[Window, NDArray[np.bool_]]:
+        """Return the squares of a room, bool (rows, cols), and their window."""
+        mask = self.ids == room
+        inner = Window.of(mask)
+        if inner is None:
+            return NOWHERE, np.zeros((0, 0), np.bool_)
+        window = inner.moved(self.window.row0, self.window.col0)
+        return window, mask[window.slices_in(self.window)].copy()
+
+    def coarser(self, factor: int) -> RoomRaster:
+        """Return it with squares ``factor`` times as wide: each has the number at its middle."""
+        window = self.window.rounded_out(factor)
+        ids = self.on(window)[factor // 2 :: factor, factor // 2 :: factor]
+        edges = (window.row0, window.col0, window.row1, window.col1)
+        return RoomRaster(
+            self.square_m * factor, Window(*(edge // factor for edge in edges)), ids.copy()
+        )
+
+    def moved(self, motion: Motion) -> RoomRaster:
+        """Return it after a motion of the map; unchanged if it would be too large."""
+        if not self.ids.size:
+            return self
+        window, side = self.window, self.square_m
+        rows, cols = np.meshgrid((window.row0, window.row1), (window.col0, window.col1))
+        x, y = motion.forward(cols.ravel() * side, rows.ravel() * side)
+        row0, col0 = math.floor(y.min() / side), math.floor(x.min() / side)
+        whole = Window(row0, col0, math.ceil(y.max() / side) + 1, math.ceil(x.max() / side) + 1)
+        if whole.rows * whole.cols > MOST_SQUARES:
+            return self
+        ids = np.zeros((whole.rows, whole.cols), np.uint16)
+        step = max(BLOCK // whole.cols, 1)
+        for first in range(0, whole.rows, step):
+            part = Window(whole.row0 + first, whole.col0, 0, whole.col1)
+            part = replace(part, row1=min(part.row0 + step, whole.row1))
+            x, y = motion.back(1.0, *centres(part, side))
+            cells = np.stack((np.floor(y / side), np.floor(x / side)), axis=1).astype(np.int32)
+            found = _values_at(self, cells)
+            ids[first : first + part.rows] = found.reshape(part.rows, part.cols)
+        return replace(self, window=whole, ids=ids).cropped()
+
+
+def _values_at(raster: RoomRaster, cells: NDArray[np.int32]) -> Ids:
+    window = raster.window
+    rows, cols = cells[:, 0] - window.row0, cells[:, 1] - window.col0
+    inside = (rows >= 0) & (rows < window.rows) & (cols >= 0) & (cols < window.cols)
+    found = np.zeros(len(cells), np.uint16)
+    found[inside] = raster.ids[rows[inside], cols[inside]]
+    return found
+
+
+def centres(window: Window, square_m: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the centres x, y [m] of a window's squares, float64 (n,) each, row by row."""
+    rows, cols = np.mgrid[window.row0 : window.row1, window.col0 : window.col1]
+    return (cols.ravel() + 0.5) * square_m, (rows.ravel() + 0.5) * square_m
+
+
+def window_over(geometry: GridGeometry, square_m: float) -> Window:
+    """Return the window of squares over a grid."""
+    x0, y0, x1, y1 = (edge / square_m for edge in geometry.bounds())
+    return Window(math.floor(y0), math.floor(x0), math.ceil(y1), math.ceil(x1))
+
+
+def sampled(found: FoundRooms, window: Window, square_m: float) -> NDArray[np.int32]:
+    """Return the region at the centre of each square of a window, int32 (rows, cols)."""
+    geometry = found.geometry
+    labels = np.zeros((window.rows, window.cols), np.int32)
+    step = max(BLOCK // window.cols, 1)
+    for first in range(0, window.rows, step):
+        row0 = window.row0 + first
+        part = Window(row0, window.col0, min(row0 + step, window.row1), window.col1)
+        at_col, at_row = geometry.to_pixels(*centres(part, square_m))
+        rows, cols = np.floor(at_row).astype(np.int64), np.floor(at_col).astype(np.int64)
+        inside = (rows >= 0) & (cols >= 0) & (rows < geometry.rows) & (cols < geometry.cols)
+        values = np.zeros(len(rows), np.int32)
+        values[inside] = found.labels[rows[inside], cols[inside]]
+        labels[first : first + part.rows] = values.reshape(part.rows, part.cols)
+    return labels
+
+
+def spread(ids: Ids, allowed: NDArray[np.bool_]) -> None:
+    """Give squares without a number that of the nearest square with one, in place.
+
+    Near is counted in steps over the edges of squares.
+
+    Args:
+        ids: the numbers.
+        allowed: bool (rows, cols), the squares to fill, and to step over.
+    """
+    padded = np.pad(ids, 1)
+    is_open = np.pad(allowed, 1) & (padded == 0)
+    flat, is_open = padded.ravel(), is_open.ravel()
+    width = padded.shape[1]
+    front = np.flatnonzero(flat)
+    while len(front):
+        reached = []
+        for step in (1, -1, width, -width):
+            beside = front + step
+            inside = (beside >= 0) & (beside < flat.size)
+            beside, source = beside[inside], front[inside]
+            new = is_open[beside]
+            beside, source = beside[new], source[new]
+            flat[beside] = flat[source]
+            is_open[beside] = False
+            reached.append(beside)
+        front = np.concatenate(reached)
+    ids[:] = padded[1:-1, 1:-1]
+
+
+def cut_window(cut: Cut, square_m: float) -> Window:
+    """Return a window around the squares that a cut goes through."""
+    rows = sorted(math.floor(y / square_m) for _, y in cut)
+    cols = sorted(math.floor(x / square_m) for x, _ in cut)
+    return Window(rows[0] - 1, cols[0] - 1, rows[1] + 2, cols[1] + 2)
+
+
+def is_cut(window: Window, square_m: float, cut: Cut) -> NDArray[np.bool_]:
+    """Return which squares of a window a cut goes through, bool (rows, cols)."""
+    (x0, y0), (x1, y1) = cut
+    x, y = centres(window, square_m)
+    dx, dy = x1 - x0, y1 - y0
+    along = ((x - x0) * dx + (y - y0) * dy) / max(dx * dx + dy * dy, 1e-12)
+    along = np.clip(along, 0.0, 1.0)
+    away = np.hypot(x0 + along * dx - x, y0 + along * dy - y)
+    near: NDArray[np.bool_] = (away < CUT * square_m).reshape(window.rows, window.cols)
+    return near

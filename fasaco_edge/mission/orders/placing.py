@@ -1,0 +1,142 @@
+"""Placing of orders: zones by name become standing zones or rooms, whose outlines they follow.
+
+Polygons are in the map frame, but for ``rotated_order``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+
+from fasaco_edge.errors import OrderError
+from fasaco_edge.grid.geometry import Polygon
+from fasaco_edge.grid.rotation import rotated_polygon
+from fasaco_edge.mission.map.room_book import Room, RoomBook
+from fasaco_edge.mission.orders.order import LeftOut, MissionOrder, StandingZone, Zone
+
+
+def is_named(order: MissionOrder) -> bool:
+    """Return whether an order has zones that are given by name alone."""
+    return any(zone.polygon == () for zone in order.zones)
+
+
+def located(
+    order: MissionOrder, standing: tuple[StandingZone, ...], book: RoomBook
+) -> MissionOrder:
+    """Return an order with its named zones in place: standing zones first, then rooms.
+
+    Raises:
+        OrderError: there is no zone or room of that name, and the order does not wait for one.
+    """
+    known = {zone.name: tuple(zone.polygon) for zone in standing}
+    placed_order = placed(
+        replace(
+            order,
+            zones=tuple(
+                replace(zone, polygon=known[zone.name])
+                if zone.polygon == () and not zone.room and zone.name in known
+                else zone
+                for zone in order.zones
+            ),
+        ),
+        book,
+    )
+    for index, zone in enumerate(order.zones):
+        name, is_unknown = zone.name, zone.polygon == () and zone.name not in known
+        if not is_unknown or order.unknown == "wait" or _room_of(zone, book) is not None:
+            continue
+        there = f"there are {', '.join(known)}" if known else "it has none"
+        raise OrderError(
+            f"zones[{index}].name: no zone {name!r} in mission.zones of the daemon's "
+            f"configuration; {there}; nor a room: {book.listed()}",
+            hint="name one of those, or give the zone a polygon; with `unknown: wait` the order "
+            "waits for a room of that name",
+        )
+    return placed_order
+
+
+def placed(order: MissionOrder, book: RoomBook, begun: int = -1) -> MissionOrder:
+    """Return an order with its rooms as they are now; the same object if nothing has changed.
+
+    Zones that wait for a room come after all others.
+
+    Args:
+        order: the order.
+        book: the rooms.
+        begun: index of the zone that is being covered: up to it zones keep their places.
+    """
+    skipped = tuple(
+        LeftOut(room.title, room.outline, book.holes(room))
+        for room in book.rooms
+        if room.settings.skip and room.outline
+    )
+    zones = [_placed(zone, book, skipped) for zone in order.zones]
+    zones[begun + 1 :] = sorted(zones[begun + 1 :], key=lambda zone: zone.polygon == ())
+    is_same = all(here is there for here, there in zip(zones, order.zones, strict=True))
+    return order if is_same else replace(order, zones=tuple(zones))
+
+
+def _placed(zone: Zone, book: RoomBook, skipped: tuple[LeftOut, ...]) -> Zone:
+    if zone.polygon is None:
+        return zone if zone.without == skipped else replace(zone, without=skipped)
+    room = _room_of(zone, book) if zone.room or zone.polygon == () else None
+    if room is None:
+        return zone
+    holes = book.holes(room)
+    if (zone.room, zone.polygon, zone.holes) == (room.id, room.outline, holes):
+        return zone
+    zone = replace(zone, room=room.id, polygon=room.outline, holes=holes)
+    if zone.is_as_usual and room.settings.passes is not None:
+        return replace(
+            zone, passes=room.settings.passes, kinds=room.settings.kinds, is_as_usual=False
+        )
+    return replace(zone, is_as_usual=False)
+
+
+def _room_of(zone: Zone, book: RoomBook) -> Room | None:
+    """Return the room that a zone is; None if it is not known, or nowhere."""
+    room = book.find(zone.room or zone.name)
+    return room if room is not None and room.outline else None
+
+
+def are_same(one: MissionOrder, other: MissionOrder) -> bool:
+    """Return whether two orders ask for the same, wherever the outlines of rooms are by now."""
+    return _unplaced(one) == _unplaced(other)
+
+
+def _unplaced(order: MissionOrder) -> MissionOrder:
+    zones = (
+        replace(zone, polygon=(), holes=()) if zone.room else replace(zone, without=())
+        for zone in order.zones
+    )
+    return replace(order, zones=tuple(zones), keep_covered=False)
+
+
+def left_out(zones: Iterable[Zone]) -> tuple[str, ...]:
+    """Return the titles of the rooms that zones leave out."""
+    return tuple(room.title for zone in zones for room in zone.without)
+
+
+def rotated_order(order: MissionOrder, by_deg: float) -> MissionOrder:
+    """Return an order with its polygons rotated by ``by_deg`` [deg]."""
+    given = order.as_given
+    if not by_deg:
+        return given
+    zones = tuple(_rotated(zone, by_deg) for zone in given.zones)
+    keep_out = tuple(rotated_polygon(polygon, by_deg) for polygon in given.keep_out)
+    return replace(given, zones=zones, keep_out=keep_out, given=given)
+
+
+def _rotated(zone: Zone, by_deg: float) -> Zone:
+    if not zone.polygon and not zone.without:
+        return zone
+
+    def rotated(polygons: Iterable[Polygon]) -> tuple[Polygon, ...]:
+        return tuple(rotated_polygon(polygon, by_deg) for polygon in polygons)
+
+    without = tuple(
+        LeftOut(room.title, rotated_polygon(room.outline, by_deg), rotated(room.holes))
+        for room in zone.without
+    )
+    polygon = rotated_polygon(zone.polygon, by_deg) if zone.polygon else zone.polygon
+    return replace(zone, polygon=polygon, holes=rotated(zone.holes), without=without)

@@ -1,0 +1,51 @@
+"""Room commands: what people ask about rooms, carried out on the room book."""
+
+from __future__ import annotations
+
+from fasaco_edge.errors import CommandError
+from fasaco_edge.mission.map.room_book import RoomBook, RoomSettings
+from fasaco_edge.mission.orders.room_requests import RoomRequest
+
+# Commands that need the map, and kernels.
+ON_MAP = frozenset(("room_split", "room_merge"))
+
+
+def check_before_map(command: str) -> None:
+    """Check that a command can be carried out before there is a mission.
+
+    Raises:
+        CommandError: it changes where rooms are.
+    """
+    if command in ON_MAP:
+        raise CommandError(
+            f"{command}: there is no map yet", hint="publish a map first, and ask again"
+        )
+
+
+def carry_out(book: RoomBook, command: str, asked: RoomRequest) -> None:
+    """Carry out a command.
+
+    Raises:
+        OrderError: there is no such room, or it cannot be changed so; nothing has changed.
+    """
+    match command:
+        case "room_name":
+            book.name(asked.id, asked.name)
+        case "room_set":
+            before = book.room(asked.id).settings
+            passes, kinds = (
+                (before.passes, before.kinds)
+                if asked.passes is None
+                else (asked.passes, asked.kinds)
+            )
+            skip = before.skip if asked.skip is None else asked.skip
+            book.set(asked.id, RoomSettings(passes, kinds, skip))
+        case _:
+            # With kernels, which a daemon without a map has not loaded.
+            from fasaco_edge.mission.map.room_edits import merge, split  # noqa: PLC0415
+
+            if command == "room_split":
+                assert asked.cut is not None
+                split(book, asked.id, asked.cut)
+            else:
+                merge(book, [asked.id, *asked.others], asked.name)

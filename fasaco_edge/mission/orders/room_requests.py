@@ -1,0 +1,121 @@
+"""Requests of people about rooms: to name, split, merge and set them; their documents."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Annotated, Literal
+
+import msgspec
+from msgspec import Meta
+
+from fasaco_edge.errors import OrderError
+from fasaco_edge.grid.geometry import FARTHEST_M, Point
+from fasaco_edge.mission.orders.keep_outs import PlaceName
+from fasaco_edge.mission.orders.passes import Passes, passes_document, passes_of
+from fasaco_edge.planners.passes import Pass
+
+# A merge joins at most this many rooms with one.
+MOST_MERGED = 50
+
+RoomNumber = Annotated[int, Meta(ge=1, le=65_000)]
+RoomCommand = Literal["room_name", "room_split", "room_merge", "room_set"]
+Corner = Annotated[tuple[float, float], Meta(description="x, y [m] in the map frame")]
+
+
+class RoomDocument(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """A room, and what to change.
+
+    Attributes:
+        id: its number or its name.
+        name: for `room_name` the new name; for `room_merge`, if given, that of the merged room.
+        cut: for `room_split`: a segment from wall to wall.
+        others: for `room_merge`: numbers or names of the rooms to merge with it.
+        passes: for `room_set`: passes of an order by its name that gives none itself.
+        skip: for `room_set`: whether orders for everything leave the room out.
+    """
+
+    id: RoomNumber | PlaceName
+    name: PlaceName | None = None
+    cut: (
+        Annotated[list[Corner], Meta(min_length=2, max_length=2, description="its two ends")] | None
+    ) = None
+    others: (
+        Annotated[list[RoomNumber | PlaceName], Meta(min_length=1, max_length=MOST_MERGED)] | None
+    ) = None
+    passes: Passes | None = None
+    skip: bool | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class RoomRequest:
+    """A room, and what to change; members as in ``RoomDocument``.
+
+    Attributes:
+        passes, kinds: number of passes, None for unchanged; what is special about each.
+    """
+
+    id: int | str
+    name: str = ""
+    cut: tuple[Point, Point] | None = None
+    others: tuple[int | str, ...] = ()
+    passes: int | None = None
+    kinds: tuple[Pass, ...] = ()
+    skip: bool | None = None
+
+
+# Members that each command takes beside the room itself, and those of them that it must have.
+_TAKES: dict[str, tuple[set[str], set[str]]] = {
+    "room_name": ({"name"}, {"name"}),
+    "room_split": ({"cut"}, {"cut"}),
+    "room_merge": ({"others", "name"}, {"others"}),
+    "room_set": ({"passes", "skip"}, set()),
+}
+ROOM_COMMANDS = frozenset(_TAKES)
+
+
+def room_of(command: str, document: RoomDocument | None) -> RoomRequest | None:
+    """Return the request of a command; None for a command that takes none.
+
+    Raises:
+        OrderError: naming the member that is missing, of another command, or wrong.
+    """
+    if command not in _TAKES:
+        if document is not None:
+            raise OrderError(f"room goes with {', '.join(_TAKES)}, got it with {command}")
+        return None
+    if document is None:
+        raise OrderError(f"room goes with {', '.join(_TAKES)}, missing with {command}")
+    takes, needs = _TAKES[command]
+    given = {
+        name
+        for name in RoomDocument.__struct_fields__
+        if name != "id" and getattr(document, name) is not None
+    }
+    if other := sorted(given - takes):
+        raise OrderError(f"room.{other[0]}: does not go with {command}")
+    if missing := sorted(needs - given or (takes if not given else set())):
+        raise OrderError(f"room.{' or '.join(missing)}: missing with {command}")
+    if any(not math.hypot(x, y) <= FARTHEST_M for x, y in document.cut or ()):
+        raise OrderError(f"room.cut: must be finite and within {FARTHEST_M:g} m of 0")
+    passes, kinds = (
+        (None, ()) if document.passes is None else passes_of(document.passes, "room.passes")
+    )
+    cut = None if document.cut is None else (document.cut[0], document.cut[1])
+    others = tuple(document.others or ())
+    return RoomRequest(document.id, document.name or "", cut, others, passes, kinds, document.skip)
+
+
+def room_document(request: RoomRequest) -> dict[str, object]:
+    """Return the document of a request; ``room_of`` reads it."""
+    members: dict[str, object | None] = {
+        "name": request.name or None,
+        "cut": None if request.cut is None else [list(end) for end in request.cut],
+        "others": list(request.others) or None,
+        "passes": None
+        if request.passes is None
+        else passes_document(request.passes, request.kinds),
+        "skip": request.skip,
+    }
+    given = {name: value for name, value in members.items() if value is not None}
+    return {"id": request.id, **given}

@@ -1,0 +1,55 @@
+"""Rooms: those that the daemon has found on its map, with names and settings that people gave."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from msgspec import Meta
+
+from fasaco_edge.wire.documents.json_text import Amount, Count, Document, Ordinal, allowed
+
+Share = Annotated[float, Meta(ge=0, le=1)]
+
+
+class RoomReport(Document, frozen=True):
+    """A room.
+
+    Attributes:
+        id: its number; no other room ever gets it.
+        name: given by people; "" for none: then it is shown and ordered as `room 3`, by its number.
+        outline: corners x, y [m] in the frame of the map, without holes.
+        neighbours: numbers of the rooms that it has a passage to.
+        encloses: numbers of the rooms that lie within its outline, and are no part of it.
+        swept: swept share of its reachable floor, in the present pass; null if none is reachable.
+        passes: passes of an order by its name that gives none itself, as in `mission.json`; null
+            for as many as other zones.
+        skip: whether orders for everything leave it out.
+    """
+
+    id: Ordinal = 1
+    name: str = ""
+    outline: Annotated[tuple[tuple[float, float], ...], allowed(maxItems=1000)] = ()
+    area_m2: Amount = 0.0
+    neighbours: Annotated[tuple[Ordinal, ...], allowed(maxItems=250)] = ()
+    encloses: Annotated[tuple[Ordinal, ...], allowed(maxItems=250)] = ()
+    swept: Share | None = None
+    passes: int | tuple[str | dict[str, object], ...] | None = None
+    skip: bool = False
+
+    @property
+    def title(self) -> str:
+        """Its name, or its number in words."""
+        return self.name or f"room {self.id}"
+
+
+class Rooms(Document, frozen=True):
+    """The rooms of the building that the map shows.
+
+    Attributes:
+        frame: frame of the map; "" before the first map.
+        revision: counter of changes of the rooms; swept shares change without it.
+    """
+
+    frame: str = ""
+    revision: Count = 0
+    rooms: Annotated[tuple[RoomReport, ...], allowed(maxItems=250)] = ()

@@ -1,0 +1,116 @@
+"""Rooms of a real daemon: found while it is idle, named, ordered, and known after a restart."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import json
+import signal
+from typing import Any
+
+import pytest
+
+from fasaco_edge.cli import main
+from tests.daemon.test_commands import ask, command
+from tests.daemon.test_mission import about, planned
+from tests.support.outsider import Outsider
+from tests.support.processes import Daemon, daemon_process
+from tests.support.rooms import cells_of, map_bytes, pose_bytes, two_rooms
+from tests.wire.schemas import check
+
+FLAT = two_rooms(door=True)
+IN_WEST = (1.05, 1.05)
+IDLE: dict[str, Any] = {"mission": {"autostart": False}}
+
+
+def show(outsider: Outsider) -> None:
+    outsider.put("map", map_bytes(FLAT))
+    outsider.put("pose", pose_bytes(*IN_WEST))
+
+
+def room_command(outsider: Outsider, name: str, /, **room: Any) -> dict[str, Any]:
+    asked = {"command": f"room_{name}", "room": room}
+    check("mission.json", asked)
+    return ask(outsider, json.dumps(asked).encode())
+
+
+def rooms_of(outsider: Outsider) -> dict[str, Any]:
+    (reply,) = outsider.session.get(f"{outsider.prefix}/@rpc/rooms", timeout=10.0)
+    document: dict[str, Any] = json.loads(reply.ok.payload.to_bytes())
+    check("rooms.json", document)
+    return document
+
+
+def cli(daemon: Daemon, *words: str) -> str:
+    out, err = io.StringIO(), io.StringIO()
+    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
+        code = main([*words, "--connect", daemon.endpoint])
+    assert code == 0, err.getvalue()
+    return out.getvalue()
+
+
+def test_rooms_are_named_ordered_and_known_again(tmp_path):
+    with daemon_process(tmp_path, **IDLE) as running, Outsider(running.endpoint) as outsider:
+        heard = outsider.listen("rooms")
+        heard.wait(lambda sample: True)
+        assert rooms_of(outsider) == {"frame": "", "revision": 0, "rooms": []}
+        show(outsider)
+        found = heard.wait(lambda sample: len(sample.json()["rooms"]) == 2).json()
+        check("rooms.json", found)
+        assert found["frame"] == "map"
+        assert [room["id"] for room in found["rooms"]] == [1, 2]
+        assert [room["neighbours"] for room in found["rooms"]] == [[2], [1]]
+        assert outsider.ask_status()["state"] == "idle"
+        west, east = sorted(found["rooms"], key=lambda room: min(room["outline"]))
+        assert west["area_m2"] == pytest.approx(8.5, abs=1.0)
+
+        assert "done" in cli(running, "rooms", "name", str(east["id"]), "kitchen")
+        cli(running, "rooms", "set", "kitchen", "--passes", "2")
+        heard.wait(lambda sample: any(room["name"] == "kitchen" for room in sample.json()["rooms"]))
+        assert room_command(outsider, "name", id=west["id"], name="kitchen")["code"] == "bad_order"
+        table = cli(running, "rooms", "list")
+        assert "kitchen" in table
+        assert "passes: 2" in table
+
+        # What is not known yet is refused with what there is, or waited for.
+        attic = {"zones": [{"name": "attic"}]}
+        assert "'kitchen'" in command(outsider, "start", attic)["message"]
+        answer = command(outsider, "start", attic | {"unknown": "wait"})
+        assert answer["mission"]["waits_for_room"] == "attic"
+        outsider.wait_status(lambda status: "waits for a room 'attic'" in status["reason"])
+        running.process.send_signal(signal.SIGKILL)
+        running.process.wait()
+    with daemon_process(tmp_path, **IDLE) as running, Outsider(running.endpoint) as outsider:
+        heard, paths = outsider.listen("rooms"), outsider.listen("path")
+        # Before any map the rooms are known, and can be ordered.
+        again = heard.wait(lambda sample: sample.json()["rooms"]).json()
+        assert {room["id"]: room["name"] for room in again["rooms"]} == {
+            west["id"]: "",
+            east["id"]: "kitchen",
+        }
+        assert room_command(outsider, "split", id=1, cut=[[0, 0], [1, 1]])["code"] == "not_now"
+        answer = command(outsider, "start", {"zones": [{"name": "kitchen"}]})
+        assert answer["mission"]["zones"][0]["passes"] == 2
+        show(outsider)
+        first = paths.wait(lambda sample: len(planned(sample)[0]) > 0)
+        assert about(first)["reason"].startswith("zone 'kitchen', pass 1 of 2")
+        swept = cells_of(planned(first)[0])
+        assert sum(col >= 11 for _, col in swept) > 40
+        # A reset forgets what is swept, and no room.
+        command(outsider, "reset")
+        assert [room["name"] for room in rooms_of(outsider)["rooms"]].count("kitchen") == 1
+
+
+def test_a_broken_file_is_a_named_fault_and_no_more(tmp_path):
+    state = tmp_path / "state"
+    state.mkdir()
+    (state / "robot.rooms.json").write_text("{}")
+    with (
+        daemon_process(tmp_path, mission={"autostart": False, "state_dir": str(state)}) as running,
+        Outsider(running.endpoint) as outsider,
+    ):
+        outsider.listen("rooms").wait(lambda sample: True)
+        status = outsider.wait_status(lambda status: status["errors"]["total"] == 1)
+        assert status["errors"]["by_code"] == {"rooms_file": 1}
+        assert rooms_of(outsider)["rooms"] == []
+    assert [path.name for path in state.glob("robot.rooms.json*")] != ["robot.rooms.json"]

@@ -1,0 +1,388 @@
+"""Orders by room name: rooms found on the map, named, set, and swept by name."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import replace
+
+import pytest
+
+from fasaco_edge.errors import OrderError
+from fasaco_edge.grid.occupancy import OccupancyGrid
+from fasaco_edge.grid.polygons import is_near
+from fasaco_edge.grid.rooms import find_rooms
+from fasaco_edge.grid.rotation import rotated_geometry, rotated_pose
+from fasaco_edge.mission.core.events import MapReceived, PoseReceived, State
+from fasaco_edge.mission.map import room_watch
+from fasaco_edge.mission.map.inputs import PATIENCE_S
+from fasaco_edge.mission.map.room_watch import PERIOD_S
+from fasaco_edge.mission.orders.order import (
+    Command,
+    StandingZone,
+    command_document,
+    order_document,
+    read_command,
+    read_order,
+)
+from fasaco_edge.mission.orders.order_state import OrderState
+from fasaco_edge.mission.orders.placing import are_same
+from fasaco_edge.mission.orders.room_requests import RoomRequest
+from fasaco_edge.mission.orders.zones import in_zones
+from fasaco_edge.planners.passes import Pass
+from tests.mission.world import CONFIG, Drive, building, pose_at, rectangle, with_policy
+
+BOTH = (
+    *(["..........#.........."] * 4),
+    *(["....................."] * 2),
+    *(["..........#.........."] * 4),
+)
+ONLY_WEST = tuple(row[:11] + "?" * 10 for row in BOTH)
+IN_WEST, IN_EAST = (2, 2), (2, 18)
+WAITS = OrderState.idle("waits")
+# As many as any change of rooms takes.
+LOOKS = 10
+
+
+def settled(*rows, order_state=WAITS, config=CONFIG):
+    """A robot whose map has shown its rooms for long enough."""
+    drive = Drive(
+        IN_WEST,
+        MapReceived(building(*rows)),
+        pose_at(*IN_WEST),
+        order_state=order_state,
+        config=config,
+    )
+    return settle(drive)
+
+
+def settle(drive):
+    for _ in range(LOOKS):
+        drive.tell(pose_at(*drive.cell), after=1.01 * PERIOD_S)
+        assert not drive.mission.rooms.sheet or len(drive.mission.rooms.rooms) < 5
+    return drive
+
+
+def room_at(drive, row, col):
+    """The room around a cell."""
+    place = (col + 0.5) * 0.25, (row + 0.5) * 0.25
+    (found,) = (room for room in drive.mission.rooms.rooms if is_near(room.outline, place, 1e-9))
+    return found
+
+
+def name(drive, called, to):
+    drive.command("room_name", room=RoomRequest(called, name=to))
+    assert drive.refused is None
+
+
+def start(drive, *names, **members):
+    drive.command("start", {"zones": [{"name": each} for each in names], **members})
+
+
+def visited(drive, columns):
+    return {cell for cell in drive.visited if cell[1] in columns}
+
+
+WEST_COLUMNS, EAST_COLUMNS = range(9), range(12, 21)
+
+
+def test_an_idle_mission_knows_its_rooms():
+    drive = settled(*BOTH)
+    west, east = room_at(drive, *IN_WEST), room_at(drive, *IN_EAST)
+    assert west.neighbours == (east.id,)
+    assert 5.5 < west.area_m2 < 8.0
+    assert drive.mission.rooms.frame == "map"
+
+
+def test_a_room_is_ordered_by_its_name_and_by_its_number():
+    drive = settled(*BOTH)
+    name(drive, room_at(drive, *IN_EAST).id, "kitchen")
+    start(drive, "kitchen")
+    drive.finish()
+    east = {(row, col) for row in range(10) for col in EAST_COLUMNS}
+    assert east <= drive.visited
+    assert len(visited(drive, WEST_COLUMNS)) < 30
+    (zone,) = drive.mission.zone_progress()
+    assert (zone.name, zone.covered) == ("kitchen", zone.cells)
+    progress = drive.mission.room_progress()
+    assert progress[room_at(drive, *IN_EAST).id] == (zone.cells, zone.covered)
+    assert progress[room_at(drive, *IN_WEST).id][1] < 30
+    start(drive, f"room {room_at(drive, *IN_WEST).id}")
+    assert drive.refused is None
+    drive.finish()
+    assert len(visited(drive, WEST_COLUMNS)) == 90
+
+
+def test_what_is_unknown_is_refused_with_what_there_is():
+    zone = StandingZone(name="rug", polygon=[tuple(at) for at in rectangle(0, 0, 4, 4)])
+    drive = settled(*BOTH, config=with_policy(CONFIG, zones=(zone,)))
+    name(drive, room_at(drive, *IN_EAST).id, "kitchen")
+    start(drive, "rug", "attic")
+    assert drive.refused.code == "bad_order"
+    assert "zones[1].name: no zone 'attic'" in str(drive.refused)
+    assert "there are rug; nor a room: there are " in str(drive.refused)
+    assert "'kitchen'" in str(drive.refused)
+    assert drive.mission.state is State.IDLE
+    # A standing zone comes before a room of its name.
+    name(drive, room_at(drive, *IN_WEST).id, "rug")
+    start(drive, "rug")
+    assert drive.mission.order_state.order.zones[0].polygon == tuple(map(tuple, zone.polygon))
+
+
+def test_a_zone_follows_its_room_as_the_map_grows():
+    half = tuple(row[:6] + "?" * 15 for row in BOTH)
+    drive = settled(*half)
+    name(drive, 1, "hall")
+    start(drive, "hall")
+    before = drive.mission.order_state.order.zones[0]
+    drive.plan()
+    assert drive.mission.state is State.COVERING
+    drive.tell(MapReceived(building(*ONLY_WEST)))
+    settle(drive)
+    after = drive.mission.order_state.order.zones[0]
+    assert after.room == before.room == 1
+    assert after.polygon != before.polygon
+    assert drive.mission.order_state.begun
+    drive.finish()
+    assert len(visited(drive, WEST_COLUMNS)) == 90
+
+
+def test_the_same_order_by_name_goes_on_after_its_room_has_grown():
+    drive = settled(*tuple(row[:6] + "?" * 15 for row in BOTH))
+    name(drive, 1, "hall")
+    start(drive, "hall")
+    drive.plan()
+    for _ in range(5):
+        drive.go()
+    covered = len(drive.visited)
+    drive.tell(MapReceived(building(*ONLY_WEST)))
+    settle(drive)
+    drive.command("start", {"zones": [{"name": "hall"}]}, discard=False)
+    assert drive.refused is None
+    assert len(drive.visited) >= covered > 3
+
+
+def test_an_order_waits_for_a_room_after_its_other_zones():
+    drive = settled(*ONLY_WEST)
+    name(drive, 1, "hall")
+    start(drive, "kitchen", "hall", unknown="wait")
+    assert drive.refused is None
+    assert [zone.name for zone in drive.mission.order_state.order.zones] == ["hall", "kitchen"]
+    drive.run(State.BLOCKED)
+    assert "waits for a room 'kitchen'" in drive.mission.reason
+    assert len(visited(drive, WEST_COLUMNS)) == 90
+    # A restart waits on.
+    note = drive.mission.order_state.to_json()
+    assert OrderState.from_json(note).waits_for == "kitchen"
+    drive.tell(MapReceived(building(*BOTH)))
+    settle(drive)
+    assert drive.mission.state is State.BLOCKED
+    name(drive, room_at(drive, *IN_EAST).id, "kitchen")
+    drive.finish()
+    assert len(visited(drive, EAST_COLUMNS)) == 90
+
+
+def test_a_wait_before_anything_else_stands_and_can_be_cancelled():
+    drive = settled(*BOTH)
+    start(drive, "kitchen", unknown="wait")
+    assert drive.mission.state is State.BLOCKED
+    assert drive.request is None
+    drive.command("pause")
+    assert drive.mission.state is State.PAUSED
+    drive.command("resume")
+    assert drive.mission.state is State.BLOCKED
+    drive.command("cancel")
+    assert drive.mission.state is State.IDLE
+
+
+def test_settings_of_a_room_are_used_where_the_order_says_nothing():
+    drive = settled(*BOTH)
+    number = room_at(drive, *IN_EAST).id
+    twice = RoomRequest(number, passes=2, kinds=(Pass(), Pass(lanes="cross")))
+    drive.command("room_set", room=twice)
+    start(drive, f"room {number}")
+    assert drive.mission.order_state.order.zones[0].kinds == twice.kinds
+    start(drive, f"room {number}", passes=1)
+    assert drive.mission.order_state.order.zones[0].passes == 1
+    # What is not given stays as it was.
+    drive.command("room_set", room=RoomRequest(number, skip=True))
+    assert drive.mission.rooms.room(number).settings.passes == 2
+
+
+def test_an_order_for_everything_leaves_a_skipped_room_out_and_says_so():
+    drive = settled(*BOTH)
+    name(drive, room_at(drive, *IN_EAST).id, "bath")
+    drive.command("room_set", room=RoomRequest("bath", skip=True))
+    drive.command("start")
+    drive.finish()
+    assert not visited(drive, range(13, 21))
+    assert len(visited(drive, WEST_COLUMNS)) == 90
+    assert drive.mission.reason.endswith("; left out: 'bath'")
+    # By its name it is swept all the same.
+    start(drive, "bath")
+    drive.finish()
+    assert len(visited(drive, EAST_COLUMNS)) == 90
+    drive.command("room_set", room=RoomRequest("bath", skip=False))
+    drive.command("start")
+    assert drive.mission.order_state.order.zones[0].without == ()
+
+
+# A room of 12 x 12 cells, with a door in its eastern wall, within corridors 6 cells wide.
+RING = (
+    *(["." * 26] * 6),
+    "......" + "#" * 14 + "......",
+    *(["......#" + "." * 12 + "#......"] * 5),
+    *(["......#" + "." * 19] * 2),
+    *(["......#" + "." * 12 + "#......"] * 5),
+    "......" + "#" * 14 + "......",
+    *(["." * 26] * 6),
+)
+
+
+@pytest.mark.parametrize("deg", [0.0, 20.0])
+def test_a_ring_of_corridors_does_not_contain_the_room_within(deg):
+    """An order for it, or one that leaves it out, is about the corridors alone."""
+    drive = rotated(RING, deg)
+    book = drive.mission.rooms
+    (ring,) = (room for room in book.rooms if room.encloses)
+    assert len(book.rooms) == 2
+    start(drive, ring.title)
+    drive.plan()
+    (zone,) = drive.mission.zone_progress()
+    within = {(row, col) for row in range(7, 19) for col in range(7, 19)}
+    assert 400 < zone.cells <= 26 * 26 - 14 * 14 + 2
+    lattice = drive.mission.lattice
+    asked = in_zones(drive.mission.order_state.order.zones, lattice.window, lattice.cell_m)
+    assert not any(asked[lattice.local(cell)] for cell in within)
+    drive.command("room_set", room=RoomRequest(ring.id, skip=True))
+    drive.command("start")
+    drive.tell()
+    asked = in_zones(drive.mission.order_state.order.zones, lattice.window, lattice.cell_m)
+    assert all(asked[lattice.local(cell)] for cell in within)
+    assert not asked[lattice.local((1, 1))]
+
+
+def rotated(rows, deg):
+    """A robot on a map that is rotated, and its lattice with it, once the rooms are known."""
+    grid, config = building(*rows), replace(CONFIG, lattice_deg=deg)
+    turned = OccupancyGrid(rotated_geometry(grid.geometry, deg), grid.cells, "map")
+    pose = pose_at(*IN_WEST).pose
+    here = PoseReceived(replace(pose, pose=rotated_pose(pose.pose, deg)))
+    drive = Drive(IN_WEST, MapReceived(turned), here, order_state=WAITS, config=config)
+    for _ in range(LOOKS):
+        drive.tell(here, after=1.01 * PERIOD_S)
+    return drive
+
+
+def test_a_room_order_lies_on_a_rotated_lattice_as_on_any():
+    """The walls are at 20 degrees to the map frame, and so are the cells."""
+    drive = rotated(BOTH, 20.0)
+    assert len(drive.mission.rooms.rooms) == 2
+    east = max(drive.mission.rooms.rooms, key=lambda room: room.outline[0][0])
+    start(drive, east.title)
+    zone = drive.mission.order_state.order.zones[0]
+    assert drive.mission.order_state.order.as_given.zones[0].polygon == east.outline
+    xs = [x for x, _ in zone.polygon]
+    assert min(xs) == pytest.approx(11 * 0.25, abs=0.4)
+    assert max(xs) == pytest.approx(21 * 0.25, abs=0.4)
+
+
+def test_documents_are_read_as_they_were_written():
+    for asked in (
+        RoomRequest(3, name="kitchen"),
+        RoomRequest("kitchen", cut=((0.0, 1.0), (2.0, 1.0))),
+        RoomRequest(3, others=(4, "bath"), name="wet"),
+        RoomRequest(3, passes=2, kinds=(), skip=True),
+        RoomRequest(3, passes=2, kinds=(Pass("edge"), Pass(angle_deg=30.0))),
+    ):
+        kind = (
+            "room_split"
+            if asked.cut
+            else "room_merge"
+            if asked.others
+            else "room_name"
+            if asked.name
+            else "room_set"
+        )
+        command = Command(kind, room=asked)
+        assert read_command(json.loads(json.dumps(command_document(command)))) == command
+    order = {"zones": [{"name": "kitchen"}], "unknown": "wait"}
+    written = order_document(read_order(order))
+    assert (written["zones"], written["unknown"]) == (order["zones"], "wait")
+    assert are_same(read_order(written), read_order(order))
+    followed = {"name": "k", "room": 3, "polygon": rectangle(0, 0, 2, 2), "passes": 1}
+    assert order_document(read_order({"zones": [followed]}))["zones"][0]["room"] == 3
+
+
+@pytest.mark.parametrize(
+    ("document", "said"),
+    [
+        ({"command": "room_name"}, "room goes with room_name, room_split"),
+        ({"command": "pause", "room": {"id": 3}}, "room goes with room_name"),
+        ({"command": "room_name", "room": {}}, "room: missing member id"),
+        ({"command": "room_name", "room": {"id": 0, "name": "a"}}, "room.id: expected"),
+        ({"command": "room_name", "room": {"id": 3}}, "room.name: missing with room_name"),
+        ({"command": "room_name", "room": {"id": 3, "skip": True}}, "room.skip: does not go with"),
+        ({"command": "room_split", "room": {"id": 3}}, "room.cut: missing with room_split"),
+        (
+            {"command": "room_split", "room": {"id": 3, "cut": [[0, 0]]}},
+            "room.cut: expected array of length >= 2",
+        ),
+        (
+            {"command": "room_split", "room": {"id": 3, "cut": [[0, 0], [math.inf, 0]]}},
+            "room.cut: must be finite",
+        ),
+        ({"command": "room_merge", "room": {"id": 3, "name": "a"}}, "room.others: missing"),
+        ({"command": "room_set", "room": {"id": 3}}, "room.passes or skip: missing"),
+        ({"command": "room_set", "room": {"id": 3, "passes": 0}}, "room.passes: expected"),
+        ({"command": "room_set", "room": {"id": 3, "passes": ["rest"]}}, "rest goes after an edge"),
+        ({"command": "start", "order": {"unknown": "ask"}}, "order.unknown: expected refuse, wait"),
+    ],
+)
+def test_what_is_wrong_with_a_request_is_named(document, said):
+    with pytest.raises(OrderError) as refused:
+        read_command(document)
+    assert said in str(refused.value)
+
+
+def test_rooms_of_another_frame_are_not_known_on_this_map():
+    """Not even between its first map and the first look at it."""
+    drive = settled(*BOTH)
+    name(drive, room_at(drive, *IN_EAST).id, "kitchen")
+    upstairs = MapReceived(building(*BOTH, frame="upstairs"))
+    for _ in range(round(4 * PATIENCE_S)):
+        drive.tell(upstairs, pose_at(*IN_WEST, frame="upstairs"), after=0.5)
+        if drive.mission.grid.frame == "upstairs":
+            break
+    assert drive.mission.grid.frame == "upstairs"
+    start(drive, "kitchen")
+    assert drive.refused.code == "bad_order"
+    settle_in(drive, "upstairs")
+    assert len(drive.mission.rooms.rooms) == 2
+    start(drive, "kitchen")
+    assert "nor a room: there are room 3, room 4" in str(drive.refused)
+
+
+def settle_in(drive, frame):
+    for _ in range(LOOKS):
+        drive.tell(pose_at(*drive.cell, frame=frame), after=1.01 * PERIOD_S)
+
+
+def test_a_map_is_looked_at_once_however_often_it_comes(monkeypatch):
+    looks = []
+
+    def find(grid, cuts):
+        looks.append(len(cuts))
+        return find_rooms(grid, cuts)
+
+    monkeypatch.setattr(room_watch, "find_rooms", find)
+    drive = settled(*BOTH)
+    for _ in range(4):
+        drive.tell(MapReceived(building(*BOTH)), pose_at(*IN_WEST), after=PERIOD_S)
+        drive.tell(after=PERIOD_S)
+    assert looks == [0]
+    drive.command("room_split", room=RoomRequest(1, cut=((1.5, -0.1), (1.5, 2.6))))
+    settle(drive)
+    drive.tell(MapReceived(building(*ONLY_WEST)), pose_at(*IN_WEST))
+    settle(drive)
+    assert looks == [0, 1, 1]
