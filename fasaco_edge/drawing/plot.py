@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image, ImageChops, ImageDraw
+from PIL import Image, ImageChops, ImageDraw, ImageFont
 
 from fasaco_edge.drawing import palette
 from fasaco_edge.drawing.palette import Colour
@@ -116,6 +116,7 @@ RULED_CELL_PX = 14
 HATCH_PX = 7
 LINE_PX, OUTLINE_PX = 1.2, 2.5
 MARK_RADIUS_PX = 8.0
+NAME_PX, RIM_PX = 16, 2
 
 
 class Plot:
@@ -229,6 +230,16 @@ class Plot:
         """Mark where it ended, (x, y) [m], with a square."""
         for radius, colour in ((1.25, palette.PAPER), (0.9, palette.END), (0.3, palette.PAPER)):
             self._draw.rectangle(self._box(point, radius), colour)
+
+    def text(self, words: str, point: Point) -> None:
+        """Write a few words, their middle at a point (x, y) [m]."""
+        x, y = self.view.samples(np.array([point]))[0].tolist()
+        size = NAME_PX * self.view.oversampling
+        rim = RIM_PX * self.view.oversampling
+        font = ImageFont.load_default(size)
+        self._draw.text(
+            (x, y), words, palette.INK, font, "mm", stroke_width=rim, stroke_fill=palette.PAPER
+        )
 
     def _box(self, point: NDArray[np.float64], radius: float) -> tuple[float, float, float, float]:
         x, y = self.view.samples(point[None])[0].tolist()

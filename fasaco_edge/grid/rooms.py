@@ -1,32 +1,61 @@
-"""Rooms of an occupancy grid: regions of free floor that doors and other narrow places part."""
+"""Rooms of an occupancy grid: regions of free floor that doors separate.
+
+Furniture that stands free is ignored. Doors are narrow gaps between the ends of walls
+(``kernels.rooms.doors``); each is cut, and what then hangs together is a region. A region that is
+too small for a room is joined to a neighbour through the least certain door. Half-seen maps are
+served too: a room is one as soon as enough of its floor has been seen through the door.
+"""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.grid.geometry import GridGeometry, Point
-from fasaco_edge.grid.occupancy import FREE, OccupancyGrid, coarser
+from fasaco_edge.grid.geometry import GridGeometry, Point, Pose2D, Window
+from fasaco_edge.grid.occupancy import OccupancyGrid
+from fasaco_edge.grid.walls import THRESHOLDS
 from fasaco_edge.kernels.lattice.areas import find_areas
+from fasaco_edge.kernels.rooms.clearance import clearances
+from fasaco_edge.kernels.rooms.doors import DoorLimits, Pixels, find_doors
+from fasaco_edge.kernels.rooms.islands import Limits, furniture
+from fasaco_edge.kernels.rooms.regions import beside_cuts, draw_cuts, grow
 
-# A place is narrow where walls are nearer than this on both sides [m].
-NARROW_M = 0.5
-MOST_OCCUPIED = 50
-MOST_PIXELS = 500_000
+# Finer pixels are joined to about this [m].
+PIXEL_M = 0.05
+# Widest door, thickest wall with a door, how far beside a door the floor has to widen [m].
+DOOR_M, WALL_M, BESIDE_M = 1.3, 0.45, 0.5
+# Smallest room [m2].
+ROOM_M2 = 1.5
+# Furniture: longest edge; shorter than this in any case; else thicker than this [m].
+LONGEST_M, SMALL_M, THICK_M = 2.5, 0.6, 0.3
+# A larger unknown area is a part of the building that has not been seen yet [m2].
+UNSEEN_M2 = 6.0
+# With more unknown pixels beside free ones than this many times those of walls, a map marks no
+# walls, and all that is not free is wall.
+MOST_UNMARKED = 4
+# Clearance beyond which nothing can be a door [m].
+CLEAR_M = 2.0
+# Directions of chords, integers on half a square: their unit vectors are equal on all machines.
+_HALF = 6
+_RING = [(row, _HALF) for row in range(1 - _HALF, _HALF + 1)] + [
+    (_HALF, col) for col in range(_HALF - 1, -_HALF - 1, -1)
+]
+_DIRECTIONS = np.array(_RING) / np.sqrt((np.array(_RING) ** 2).sum(axis=1, keepdims=True))
+# How certain a cut by hand is: more than any door.
+_BY_HAND = 9.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FoundRooms:
-    """Regions of a map.
+    """Rooms of a map, numbered by their first pixels, row by row.
 
     Attributes:
-        geometry: placement of the labels' pixels.
-        labels: int32 (rows, cols); 0 none, 1..count.
-        count: number of regions.
+        geometry: of the labels' pixels, a part of the map.
+        labels: int32 (rows, cols), the room of each free pixel, from 1; 0 for none.
+        count: number of rooms.
     """
 
     geometry: GridGeometry
@@ -35,26 +64,154 @@ class FoundRooms:
 
 
 def find_rooms(grid: OccupancyGrid, cuts: Sequence[tuple[Point, Point]] = ()) -> FoundRooms:
-    """Return the rooms of a map; cuts are segments [m] in the map frame that count as walls."""
-    grid = coarser(grid, MOST_PIXELS)
-    free = (grid.cells >= FREE) & (grid.cells < MOST_OCCUPIED)
-    for (x0, y0), (x1, y1) in cuts:
-        steps = 4 * math.ceil(math.hypot(x1 - x0, y1 - y0) / grid.geometry.resolution) + 1
-        share = np.linspace(0.0, 1.0, steps)
-        col, row = grid.geometry.to_pixels(x0 + share * (x1 - x0), y0 + share * (y1 - y0))
-        inside = (row >= 0) & (col >= 0) & (row < free.shape[0]) & (col < free.shape[1])
-        free[row[inside].astype(int), col[inside].astype(int)] = False
-    reach = max(round(NARROW_M / grid.geometry.resolution), 1)
-    taken = np.pad(~free, reach, constant_values=True)
-    sums = np.pad(np.cumsum(np.cumsum(taken, 0), 1), ((1, 0), (1, 0)))
-    side = 2 * reach + 1
-    near = sums[side:, side:] - sums[:-side, side:] - sums[side:, :-side] + sums[:-side, :-side]
-    areas = find_areas((free & (near == 0)).astype(np.uint8))
-    labels = np.pad(areas.labels, 1)
-    free = np.pad(free, 1)
-    for _ in range(3 * reach):
-        for axis, step in ((0, 1), (0, -1), (1, 1), (1, -1)):
-            beside = np.roll(labels, step, axis)
-            labels = np.where(free & (labels == 0), beside, labels)
-    labels = np.ascontiguousarray(labels[1:-1, 1:-1].astype(np.int32))
-    return FoundRooms(grid.geometry, labels, len(areas.cells))
+    """Return the rooms of a map.
+
+    Args:
+        grid: the map, any part of it unknown.
+        cuts: segments between two points (x, y) [m] in the map frame that count as walls.
+    """
+    geometry, kinds = _kinds(grid)
+    if not kinds.size:
+        return FoundRooms(geometry, np.zeros(kinds.shape, np.int32), 0)
+    pixel_m = geometry.resolution
+    free = kinds == _FREE
+    things = furniture(
+        ~free, Limits(round(LONGEST_M / pixel_m), SMALL_M / pixel_m, THICK_M / pixel_m)
+    )
+    solid = ~free & ~things
+    pixels = Pixels(
+        clearances(solid, round(CLEAR_M / pixel_m)),
+        solid,
+        (kinds == _WALL) & ~things,
+        _unseen(kinds == _UNKNOWN, UNSEEN_M2 / pixel_m**2),
+    )
+    limits = DoorLimits(DOOR_M / pixel_m, WALL_M / pixel_m, round(BESIDE_M / pixel_m))
+    doors = np.concatenate([_by_hand(cuts, geometry), find_doors(pixels, _DIRECTIONS, limits)])
+    open_floor = (~solid).astype(np.uint8)
+    draw_cuts(open_floor, doors, 1.0)
+    regions = find_areas(open_floor).labels
+    sizes = np.bincount(regions.ravel(), free.ravel()).astype(np.float64) * pixel_m**2
+    labels = _joined(doors, beside_cuts(regions, doors), sizes)[regions]
+    grow(labels, ~solid)
+    labels[~free] = 0
+    return _numbered(geometry, labels)
+
+
+def _numbered(geometry: GridGeometry, labels: NDArray[np.int32]) -> FoundRooms:
+    """Return rooms of any labels, numbered by their first pixels."""
+    names, first, at = np.unique(labels, return_index=True, return_inverse=True)
+    is_room = names > 0
+    numbers = np.zeros(len(names), np.int32)
+    numbers[is_room] = 1 + np.argsort(np.argsort(first[is_room]))
+    count = int(np.count_nonzero(is_room))
+    return FoundRooms(geometry, numbers[at].reshape(labels.shape), count)
+
+
+_UNKNOWN, _FREE, _WALL = 0, 1, 2
+
+
+def _kinds(grid: OccupancyGrid) -> tuple[GridGeometry, NDArray[np.uint8]]:
+    """Return what the pixels of the known part are, joined to about ``PIXEL_M``."""
+    given, cells = grid.geometry, grid.cells
+    known = Window.of(cells >= 0)
+    if known is None:
+        return replace(given, rows=0, cols=0), np.zeros((0, 0), np.uint8)
+    joined = max(1, round(PIXEL_M / given.resolution))
+    known = known.rounded_out(joined)
+    kinds = np.zeros((known.rows, known.cols), np.uint8)
+    inside = Window(0, 0, *cells.shape).intersection(known) or known
+    seen, part = cells[inside.slices_in(Window(0, 0, *cells.shape))], inside.slices_in(known)
+    kinds[part][(seen >= 0) & (seen <= THRESHOLDS.free)] = _FREE
+    kinds[part][seen >= THRESHOLDS.occupied] = _WALL
+    if joined > 1:
+        shape = known.rows // joined, joined, known.cols // joined, joined
+        kinds = kinds.reshape(shape).max(axis=(1, 3))
+    if _beside_free(kinds, _UNKNOWN) > MOST_UNMARKED * _beside_free(kinds, _WALL):
+        kinds[kinds == _UNKNOWN] = _WALL
+    x, y = given.to_map(known.col0, known.row0)
+    origin = Pose2D(x, y, given.origin.yaw)
+    return GridGeometry(*kinds.shape, given.resolution * joined, origin), kinds
+
+
+def _beside_free(kinds: NDArray[np.uint8], kind: int) -> int:
+    """Return how many sides free pixels share with those of another kind."""
+    is_free, is_kind = kinds == _FREE, kinds == kind
+    return sum(
+        int(np.count_nonzero(one & other))
+        for a, b in ((is_free, is_kind), (is_kind, is_free))
+        for one, other in ((a[1:], b[:-1]), (a[:, 1:], b[:, :-1]))
+    )
+
+
+def _unseen(unknown: NDArray[np.bool_], least: float) -> NDArray[np.bool_]:
+    """Return the unknown areas of at least so many pixels, or at the rim, bool (rows, cols)."""
+    areas = find_areas(unknown.astype(np.uint8))
+    large = np.concatenate([[False], areas.cells >= least])
+    for rim in (areas.labels[0], areas.labels[-1], areas.labels[:, 0], areas.labels[:, -1]):
+        large[rim] = True
+    large[0] = False
+    marked: NDArray[np.bool_] = large[areas.labels]
+    return marked
+
+
+def _by_hand(cuts: Sequence[tuple[Point, Point]], geometry: GridGeometry) -> NDArray[np.float64]:
+    """Return cuts by hand as rows of ``find_doors``."""
+    rows = []
+    for start, end in cuts:
+        (col, row), (last_col, last_row) = geometry.to_pixels(*start), geometry.to_pixels(*end)
+        rows.append((row, col, last_row, last_col, _BY_HAND))
+    return np.array(rows, np.float64).reshape(-1, 5)
+
+
+def _joined(
+    doors: NDArray[np.float64], beside: NDArray[np.int32], sizes: NDArray[np.float64]
+) -> NDArray[np.int32]:
+    """Return the room of each region, int32 (n,), 0 for none: small ones are joined to others.
+
+    Args:
+        doors: float64 (m, 5), see ``find_doors``.
+        beside: int32 (m, 2), the regions on both sides of each.
+        sizes: float64 (n,), free floor of each region [m2]; that of region 0 has no meaning.
+    """
+    lengths = np.hypot(doors[:, 2] - doors[:, 0], doors[:, 3] - doors[:, 1])
+    links: dict[tuple[int, int], tuple[float, float]] = {}
+    certain = zip(beside.tolist(), doors[:, 4].tolist(), (-lengths).tolist(), strict=True)
+    for (one, other), kind, length in certain:
+        if one and other and one != other:
+            ends = min(one, other), max(one, other)
+            links[ends] = max(links.get(ends, (0.0, 0.0)), (kind, length))
+    rooms, floor = list(range(len(sizes))), sizes.tolist()
+    is_done = [False] * len(sizes)
+    while links:
+        small = [
+            (floor[room], room) for ends in links for room in ends
+            if floor[room] < ROOM_M2 and not is_done[room]
+        ]  # fmt: skip
+        if not small:
+            break
+        _, room = min(small)
+        ways = [(link, ends) for ends, link in links.items() if room in ends]
+        (kind, _), ends = min(ways)
+        if kind == _BY_HAND:
+            is_done[room] = True
+            continue
+        into = ends[1] if ends[0] == room else ends[0]
+        rooms = [into if there == room else there for there in rooms]
+        floor[into] += floor[room]
+        links = _relinked(links, room, into)
+    hand = {room for ends, (kind, _) in links.items() if kind == _BY_HAND for room in ends}
+    kept = [room if room in hand or floor[room] >= ROOM_M2 else 0 for room in rooms]
+    return np.array([0, *kept[1:]], np.int32)
+
+
+def _relinked(
+    links: dict[tuple[int, int], tuple[float, float]], room: int, into: int
+) -> dict[tuple[int, int], tuple[float, float]]:
+    """Return the links after a room has been joined to another."""
+    kept: dict[tuple[int, int], tuple[float, float]] = {}
+    for ends, link in links.items():
+        one, other = (into if end == room else end for end in ends)
+        if one != other:
+            there = min(one, other), max(one, other)
+            kept[there] = max(kept.get(there, (0.0, 0.0)), link)
+    return kept

@@ -5,15 +5,16 @@ from __future__ import annotations
 from fasaco_edge.planners.registry import PLANNER_NAMES
 
 LATTICE, CHANGES, REACH, AREAS = "lattice", "changes of the map", "reachability", "areas"
+ROOMS = "rooms"
 WALKS, BOUND = "shortest walks", "lower bound"
 LOCAL_SEARCH, REPAIR, LINE = "local search", "repair", "driven line"
 CURVES = "curves"
 WINDOWS, SHARES = "windows of the walk", "shares of a fleet"
 # Stages in the order in which they are compiled; the stages of a plan come first.
 _FOR_PLANS = (LATTICE, REACH, WALKS, BOUND, LOCAL_SEARCH, WINDOWS, REPAIR, LINE)
-STAGES = tuple(dict.fromkeys((*_FOR_PLANS, CHANGES, AREAS, SHARES, CURVES, *PLANNER_NAMES)))
+STAGES = tuple(dict.fromkeys((*_FOR_PLANS, CHANGES, AREAS, ROOMS, SHARES, CURVES, *PLANNER_NAMES)))
 # Stages that share few kernels with the others: a second process compiles them.
-APART = (LINE, CHANGES, AREAS, SHARES, CURVES)
+APART = (LINE, CHANGES, AREAS, ROOMS, SHARES, CURVES)
 
 
 def stages_of_plan(

@@ -16,6 +16,7 @@ from fasaco_edge.grid.floor_map import FloorMap
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D, Window
 from fasaco_edge.grid.lattice import CoverageLattice, Footprint, pixels_of, placement_on
 from fasaco_edge.grid.occupancy import OCCUPIED, OccupancyGrid
+from fasaco_edge.grid.rooms import find_rooms
 from fasaco_edge.kernels.fleet.nearest import walk_parts
 from fasaco_edge.kernels.floor.capsule import is_clear
 from fasaco_edge.kernels.floor.certain import TILE, FloorTiles, Whereabouts, certain_floor
@@ -54,6 +55,7 @@ from fasaco_edge.planners.stages import (
     LOCAL_SEARCH,
     REACH,
     REPAIR,
+    ROOMS,
     SHARES,
     WALKS,
     WINDOWS,
@@ -198,6 +200,7 @@ _STAGES: dict[str, Callable[[TinyRoom], object]] = {
     CHANGES: _take_changes_in,
     REACH: lambda room: room.problem,
     AREAS: _take_areas,
+    ROOMS: lambda room: find_rooms(room.grid),
     WALKS: lambda room: walk_figures(room.lattice, np.array([[0, 0], [0, 1]], np.int32)),
     BOUND: lambda room: lower_bound_of(room.costly).tighten_in_bands(16),
     LOCAL_SEARCH: _take_local_search,

@@ -1,0 +1,1 @@
+"""Rooms in an occupancy grid: clearances, furniture, doors, and the regions between them."""

@@ -1,0 +1,279 @@
+"""Doors: narrow gaps between the ends of walls.
+
+A door is a short chord across free pixels, from jamb to jamb, beyond which the free space widens on
+both sides. A jamb is the end of a wall that continues along the chord: thin across it, with free
+pixels on both sides. Where the far side has not been seen yet, the near side has to do. Beside one
+such jamb the other may be a corner or the side of a cabinet.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fasaco_edge.kernels.jit import kernel, lean_kernel
+
+# Kinds of jambs, the better the higher: no wall; thick, or a corner; thin as far as it has been
+# seen; thin.
+NONE, THICK, HALF_SEEN, THIN = 0, 1, 2, 3
+# Depth of a jamb that is looked at [pixels], and how much of it must be occupied.
+DEPTH, LEAST_MARKS = 4, 3
+# Walls are looked for along the chord, and a little aside of it and turned, as it may run from edge
+# to edge of two jambs [1, pixels].
+TURN, ASIDE = 0.2, 1.0
+# How much further the face of a wall along the chord may be a pixel deeper [pixels].
+ASLANT = 1.2
+# Least sum of the kinds of both jambs: a thin one beside a corner, or two half seen.
+LEAST_SURE = THIN + THICK
+# How far a chord's middle may be from the middle of the gap [pixels].
+OFF_CENTRE = 2.0
+# Ratio of the squared clearances beside a door to that in it: of the wider side, of the other side,
+# and of the other side if it is half seen.
+WIDER, OTHER, OTHER_HALF_SEEN = 1.32, 1.1, 0.94
+# Gaps looked at: one pixel of each gap is enough.
+MOST_GAPS = 20_000
+
+
+class Pixels(NamedTuple):
+    """What the pixels of a map are, each (rows, cols).
+
+    Attributes:
+        clearance: int32, squared distance to the nearest solid pixel [pixels^2].
+        solid: bool, not free, furniture excepted.
+        occupied: bool, walls that have been seen.
+        unseen: bool, large unknown areas, such as a room that has not been seen yet.
+    """
+
+    clearance: NDArray[np.int32]
+    solid: NDArray[np.bool_]
+    occupied: NDArray[np.bool_]
+    unseen: NDArray[np.bool_]
+
+
+class DoorLimits(NamedTuple):
+    """What a door measures at most.
+
+    Attributes:
+        width: of a door [pixels].
+        wall: thickness of a wall with a door [pixels].
+        reach: how far beside a door the free space is looked at [pixels].
+    """
+
+    width: float
+    wall: float
+    reach: int
+
+
+class _Place(NamedTuple):
+    """A point, row and column [pixels], and a direction, a unit vector."""
+
+    row: float
+    col: float
+    down: float
+    right: float
+
+
+@lean_kernel
+def _holds(row: int, col: int, shape: tuple[int, int]) -> bool:
+    return 0 <= row < shape[0] and 0 <= col < shape[1]
+
+
+@lean_kernel
+def _is_ridge(clearance: NDArray[np.int32], row: int, col: int) -> bool:
+    """Return whether a pixel is as far from walls as its neighbours on two opposite sides."""
+    here = clearance[row, col]
+    for down, right in ((0, 1), (1, 0), (1, 1), (1, -1)):
+        one, other = clearance[row + down, col + right], clearance[row - down, col - right]
+        if here >= one and here >= other and (here > one or here > other):
+            return True
+    return False
+
+
+@lean_kernel
+def _way(solid: NDArray[np.bool_], place: _Place, most: float) -> float:
+    """Return how far free pixels reach from a place in its direction, at most ``most`` [pixels]."""
+    way = 0.5
+    while way < most:
+        row = int(np.floor(place.row + way * place.down))
+        col = int(np.floor(place.col + way * place.right))
+        if not _holds(row, col, solid.shape) or solid[row, col]:
+            break
+        way += 0.5
+    return way
+
+
+@lean_kernel
+def _face(pixels: Pixels, place: _Place, most: float) -> float:
+    """Return how far a wall reaches from a place inside it, in the place's direction [pixels].
+
+    Negative if what begins there has not been seen, 0 if it is further than ``most``.
+    """
+    way = 0.5
+    while way <= most:
+        row = int(np.floor(place.row + way * place.down))
+        col = int(np.floor(place.col + way * place.right))
+        if not _holds(row, col, pixels.solid.shape) or pixels.unseen[row, col]:
+            return -way
+        if not pixels.solid[row, col]:
+            return way
+        way += 0.5
+    return 0.0
+
+
+@lean_kernel
+def _nearest_solid(pixels: Pixels, row: float, col: float) -> tuple[int, int, bool]:
+    """Return the solid pixel at a point, or the nearest beside it, and whether one is occupied.
+
+    The row is -1 without one.
+    """
+    at_row, at_col = int(np.floor(row)), int(np.floor(col))
+    found_row, found_col, is_wall, nearest = -1, -1, False, 9.0
+    for there_row in range(at_row - 1, at_row + 2):
+        for there_col in range(at_col - 1, at_col + 2):
+            if not _holds(there_row, there_col, pixels.solid.shape):
+                continue
+            is_wall = is_wall or pixels.occupied[there_row, there_col]
+            if not pixels.solid[there_row, there_col]:
+                continue
+            down, right = there_row + 0.5 - row, there_col + 0.5 - col
+            far = down * down + right * right
+            if there_row == at_row and there_col == at_col:
+                far = -1.0
+            if far < nearest:
+                found_row, found_col, nearest = there_row, there_col, far
+    return found_row, found_col, is_wall
+
+
+@lean_kernel
+def _jamb_along(pixels: Pixels, end: _Place, wall: float) -> int:
+    """Return the kind of the jamb that begins at the end of a chord, in that direction."""
+    marks, kind = 0, THIN
+    left_before, right_before = 0.0, 0.0
+    for depth in range(DEPTH):
+        row, col = end.row + (depth + 0.5) * end.down, end.col + (depth + 0.5) * end.right
+        at_row, at_col, is_wall = _nearest_solid(pixels, row, col)
+        marks += is_wall
+        if depth == 0:
+            continue
+        if at_row < 0:
+            return NONE
+        if depth > 2:
+            continue
+        if at_row != int(np.floor(row)) or at_col != int(np.floor(col)):
+            row, col = at_row + 0.5, at_col + 0.5
+        left = _face(pixels, _Place(row, col, -end.right, end.down), wall)
+        right = _face(pixels, _Place(row, col, end.right, -end.down), wall)
+        if left <= 0.0 and right <= 0.0:
+            if left < 0.0 or right < 0.0:
+                return NONE
+            kind = THICK
+        elif left == 0.0 or right == 0.0 or abs(left) + abs(right) > wall:
+            kind = THICK
+        elif (left < 0.0 or right < 0.0) and kind == THIN:
+            kind = HALF_SEEN
+        # A wall that the chord meets at an angle has faces that run away from the chord.
+        if depth > 1 and (
+            (min(left, left_before) > 0.0 and abs(left - left_before) > ASLANT)
+            or (min(right, right_before) > 0.0 and abs(right - right_before) > ASLANT)
+        ):  # fmt: skip
+            kind = THICK
+        left_before, right_before = left, right
+    return kind if marks >= LEAST_MARKS else NONE
+
+
+@lean_kernel
+def _jamb(pixels: Pixels, end: _Place, wall: float) -> int:
+    """Return the kind of the jamb at the end of a chord."""
+    best = _jamb_along(pixels, end, wall)
+    for turned in range(3):
+        for moved in range(3):
+            if best >= HALF_SEEN:
+                return best
+            turn, aside = (turned - 1) * TURN, (moved - 1) * ASIDE
+            place = _Place(
+                end.row - aside * end.right,
+                end.col + aside * end.down,
+                end.down + turn * end.right,
+                end.right - turn * end.down,
+            )
+            if _jamb_along(pixels, place, wall) == HALF_SEEN:
+                best = HALF_SEEN
+    return best
+
+
+@lean_kernel
+def _widest(clearance: NDArray[np.int32], place: _Place, reach: int) -> int:
+    """Return the largest squared clearance along a line from a place [pixels^2]."""
+    widest = 0
+    for way in range(1, reach + 1):
+        row = int(np.floor(place.row + way * place.down))
+        col = int(np.floor(place.col + way * place.right))
+        if not _holds(row, col, clearance.shape) or clearance[row, col] == 0:
+            break
+        widest = max(widest, clearance[row, col])
+    return widest
+
+
+@lean_kernel
+def _door_at(
+    pixels: Pixels, centre: tuple[int, int], directions: NDArray[np.float64], limits: DoorLimits,
+    door: NDArray[np.float64],
+) -> bool:  # fmt: skip
+    """Fill in the door through a pixel, as a row of ``find_doors``; return whether it is one."""
+    row, col = centre[0] + 0.5, centre[1] + 0.5
+    shortest, ahead, chord = limits.width, 0.0, -1
+    for number in range(len(directions)):
+        down, right = directions[number]
+        one = _way(pixels.solid, _Place(row, col, down, right), shortest)
+        if one >= shortest:
+            continue
+        other = _way(pixels.solid, _Place(row, col, -down, -right), shortest - one)
+        if one + other < shortest:
+            shortest, ahead, chord = one + other, one, number
+    behind = shortest - ahead
+    if chord < 0 or abs(ahead - behind) > OFF_CENTRE:
+        return False
+    down, right = directions[chord]
+    first = _Place(row + ahead * down, col + ahead * right, down, right)
+    kind = _jamb(pixels, first, limits.wall)
+    if kind == NONE:
+        return False
+    last = _Place(row - behind * down, col - behind * right, -down, -right)
+    other_kind = _jamb(pixels, last, limits.wall)
+    if other_kind == NONE or kind + other_kind < LEAST_SURE:
+        return False
+    here = pixels.clearance[centre]
+    one = _widest(pixels.clearance, _Place(row, col, -right, down), limits.reach)
+    other = _widest(pixels.clearance, _Place(row, col, right, -down), limits.reach)
+    least = OTHER_HALF_SEEN if HALF_SEEN in (kind, other_kind) else OTHER
+    if max(one, other) < WIDER * here or min(one, other) < least * here:
+        return False
+    door[0], door[1], door[2], door[3] = first.row, first.col, last.row, last.col
+    door[4] = kind + other_kind
+    return True
+
+
+@kernel
+def find_doors(
+    pixels: Pixels, directions: NDArray[np.float64], limits: DoorLimits
+) -> NDArray[np.float64]:
+    """Return the chords of all doors, several of each, float64 (n, 5).
+
+    Each is row and column of its first end and of its last [pixels], and how certain it is: the sum
+    of the kinds of its jambs.
+
+    Args:
+        pixels: what the pixels are.
+        directions: of the chords, unit vectors (row, col), float64 (m, 2), over half a turn.
+        limits: what a door measures.
+    """
+    rows, cols = pixels.solid.shape
+    most = int((limits.width / 2 + 1) ** 2)
+    doors, count = np.empty((MOST_GAPS, 5)), 0
+    for row in range(1, rows - 1):
+        for col in range(1, cols - 1):
+            if not 4 <= pixels.clearance[row, col] <= most:
+                continue
+            if count < MOST_GAPS and _is_ridge(pixels.clearance, row, col):
+                count += _door_at(pixels, (row, col), directions, limits, doors[count])
+    return doors[:count].copy()

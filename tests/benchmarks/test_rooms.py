@@ -1,0 +1,44 @@
+"""The benchmark of rooms in its short form, and its judge."""
+
+import json
+
+import numpy as np
+
+from tests.benchmarks.__main__ import main
+from tests.benchmarks.rooms.homes import home, seen
+from tests.benchmarks.rooms.judge import judge
+
+
+def test_the_judge_counts_pixels():
+    truth = np.array([[1, 1, 1, 1, 2, 2, 2, 2, 0]], np.int32)
+    same = judge(truth, truth, 1)
+    assert (same.recall, same.precision, same.matthews, same.true, same.found) == (1, 1, 1, 2, 2)
+    joined = judge(truth, np.ones_like(truth), 1)
+    assert (joined.recall, joined.precision, joined.found) == (1, 0.5, 1)
+    assert joined.matthews == 0
+    split = judge(truth, np.array([[1, 1, 3, 3, 2, 2, 2, 2, 2]], np.int32), 1)
+    assert (split.recall, split.precision, split.found) == (0.75, 1, 3)
+    nothing = judge(truth, np.zeros_like(truth), 1)
+    assert (nothing.recall, nothing.precision, nothing.found) == (0, 1, 0)
+
+
+def test_a_floor_seen_in_part_shows_nothing_else():
+    floor = home("home", 4)
+    free = np.count_nonzero(floor.grid.cells == 0)
+    for share in (0.2, 0.8):
+        cells = seen(floor, share, 4).cells
+        assert share <= np.count_nonzero(cells == 0) / free < share + 0.35
+        is_seen = cells >= 0
+        assert np.array_equal(cells[is_seen], floor.grid.cells[is_seen])
+
+
+def test_it_runs_as_a_command(capsys, tmp_path):
+    words = ["rooms", "--floors", "2", "--seed", "7", "--pictures", str(tmp_path), "--json"]
+    main(words)
+    document = json.loads(capsys.readouterr().out)
+    groups = {(group["kind"], group["share"]): group for group in document["rooms"]}
+    assert len(groups) == 8
+    for kind in ("home", "office"):
+        whole = groups[kind, 1.0]
+        assert min(whole["recall"], whole["precision"]) >= 0.9
+    assert len(list(tmp_path.glob("*.png"))) == 16

@@ -1,0 +1,166 @@
+"""Rooms of a map: what separates them, what does not, and maps of any kind."""
+
+import numpy as np
+import pytest
+
+from fasaco_edge.grid.geometry import GridGeometry, Pose2D
+from fasaco_edge.grid.occupancy import OccupancyGrid
+from fasaco_edge.grid.rooms import find_rooms
+from fasaco_edge.kernels.rooms.clearance import clearances
+
+FREE, WALL, UNKNOWN = 0, 100, -1
+
+
+def grid_of(cells, resolution=0.05, origin=None):
+    geometry = GridGeometry(*cells.shape, resolution, origin or Pose2D(0.0, 0.0))
+    return OccupancyGrid(geometry, cells)
+
+
+def two_rooms(door_m=0.9, resolution=0.05, wall_m=0.1):
+    """Two rooms of 4 x 3 m side by side; the door in the middle of the wall between them."""
+
+    def px(metres):
+        return round(metres / resolution)
+
+    cells = np.full((px(3.4), px(8.4 + wall_m)), WALL, np.int8)
+    cells[px(0.2) : px(3.2), px(0.2) : px(4.2)] = FREE
+    cells[px(0.2) : px(3.2), px(4.2 + wall_m) : px(8.2 + wall_m)] = FREE
+    cells[px(1.7 - door_m / 2) : px(1.7 + door_m / 2), px(4.2) : px(4.2 + wall_m)] = FREE
+    return cells
+
+
+def put(cells, x, y, width, depth, value=WALL):
+    changed = cells.copy()
+    rows, cols = (
+        slice(round(a / 0.05), round(b / 0.05)) for a, b in ((y, y + depth), (x, x + width))
+    )
+    changed[rows, cols] = value
+    return changed
+
+
+def numbers(found, *points):
+    """Return the room at each point (x, y) [m]."""
+    at = [found.geometry.to_pixels(x, y) for x, y in points]
+    return [int(found.labels[int(row), int(col)]) for col, row in at]
+
+
+LEFT, RIGHT = (1.0, 1.0), (7.0, 1.0)
+
+
+@pytest.mark.parametrize("most", [7, 40])
+def test_clearances_are_those_of_a_slow_twin(most):
+    rng = np.random.default_rng(3)
+    for share in (0.0, 0.02, 0.3, 1.0):
+        solid = rng.random((23, 31)) < share
+        found = clearances(solid, most)
+        rows, cols = solid.shape
+        walls = [*np.argwhere(solid).tolist()]
+        for row in range(rows):
+            for col in range(cols):
+                rim = min(row + 1, rows - row, col + 1, cols - col) ** 2
+                ways = [(row - r) ** 2 + (col - c) ** 2 for r, c in walls]
+                expected = 0 if solid[row, col] else min(*ways, rim, most**2, most**2)
+                assert found[row, col] == expected
+
+
+@pytest.mark.parametrize("door_m", [0.6, 0.9, 1.2])
+@pytest.mark.parametrize("wall_m", [0.05, 0.1, 0.3])
+def test_a_door_separates_two_rooms(door_m, wall_m):
+    found = find_rooms(grid_of(two_rooms(door_m, wall_m=wall_m)))
+    assert found.count == 2
+    assert numbers(found, LEFT, RIGHT) == [1, 2]
+    # Nobody owns walls, and each free pixel has a room.
+    assert (found.labels > 0).sum() == (two_rooms(door_m, wall_m=wall_m) == FREE).sum()
+
+
+def test_a_wide_opening_does_not():
+    assert find_rooms(grid_of(two_rooms(1.6))).count == 1
+
+
+@pytest.mark.parametrize("resolution", [0.025, 0.05, 0.1])
+def test_the_size_of_pixels_does_not_matter(resolution):
+    found = find_rooms(grid_of(two_rooms(resolution=resolution), resolution))
+    assert found.count == 2
+    assert numbers(found, LEFT, RIGHT) == [1, 2]
+
+
+def test_furniture_does_not_separate():
+    cells = two_rooms()
+    for x, y, width, depth in (
+        # Table, block, a bed and a wardrobe with a narrow passage between them.
+        (1.5, 1.0, 0.05, 0.05), (2.4, 1.0, 0.05, 0.05), (1.5, 1.6, 0.05, 0.05),
+        (5.5, 1.0, 1.0, 0.8), (0.2, 1.3, 2.0, 1.6), (2.9, 2.6, 1.2, 0.6),
+    ):  # fmt: skip
+        cells = put(cells, x, y, width, depth)
+    assert find_rooms(grid_of(cells)).count == 2
+
+
+def test_a_niche_is_part_of_its_room():
+    cells = two_rooms()
+    # A wall of 0.1 m that leaves a corner of 1 m2 behind a gap.
+    cells = put(cells, 0.2, 1.2, 0.4, 0.1)
+    cells = put(cells, 1.2, 0.2, 0.1, 1.1)
+    assert find_rooms(grid_of(cells)).count == 2
+
+
+def test_a_room_half_seen_is_one():
+    cells = two_rooms()
+    rows, cols = np.indices(cells.shape)
+    # Seen through the door from the middle of the left room.
+    x, y = (cols + 0.5) * 0.05 - 2.2, (rows + 0.5) * 0.05 - 1.7
+    is_seen = (cols < 86) | (np.abs(y) < 0.45 / 2.0 * x)
+    cells[~is_seen] = UNKNOWN
+    found = find_rooms(grid_of(cells))
+    assert found.count == 2
+    assert numbers(found, LEFT, (6.0, 1.7)) == [1, 2]
+
+
+def test_a_cut_by_hand_divides_a_room():
+    cells = two_rooms()
+    found = find_rooms(grid_of(cells), [((1.0, 0.2), (1.0, 3.2))])
+    assert found.count == 3
+    assert len({*numbers(found, (0.5, 1.0), (2.0, 1.0), RIGHT)}) == 3
+
+
+def test_a_cut_that_leaves_a_way_round_divides_nothing():
+    assert find_rooms(grid_of(two_rooms()), [((1.0, 0.2), (1.0, 2.0))]).count == 2
+
+
+def test_the_map_may_be_turned_and_placed_anywhere():
+    cells = two_rooms()
+    placed = Pose2D(-31.0, 17.0, 0.7)
+    found = find_rooms(grid_of(cells, origin=placed))
+    plain = find_rooms(grid_of(cells))
+    assert np.array_equal(found.labels, plain.labels)
+    x, y = GridGeometry(*cells.shape, 0.05, placed).to_map(7.0 / 0.05, 1.0 / 0.05)
+    assert numbers(found, (x, y)) == [2]
+
+
+def test_unknown_around_the_known_part_changes_nothing():
+    cells = two_rooms()
+    padded = np.full((cells.shape[0] + 60, cells.shape[1] + 90), UNKNOWN, np.int8)
+    padded[20 : 20 + cells.shape[0], 50 : 50 + cells.shape[1]] = cells
+    one, other = find_rooms(grid_of(cells)), find_rooms(grid_of(padded))
+    assert np.array_equal(one.labels, other.labels)
+    assert other.geometry.corner_of(one.geometry) == (-20, -50)
+
+
+@pytest.mark.parametrize(
+    "cells",
+    [
+        np.full((5, 7), UNKNOWN, np.int8),
+        np.full((5, 7), WALL, np.int8),
+        np.zeros((1, 1), np.int8),
+        np.zeros((1, 400), np.int8),
+        np.full((40, 40), 50, np.int8),
+    ],
+    ids=["unknown", "wall", "one pixel", "a row", "neither free nor wall"],
+)
+def test_a_map_without_rooms_has_none(cells):
+    found = find_rooms(grid_of(cells))
+    assert found.count == 0
+    assert not found.labels.any()
+
+
+def test_an_open_floor_is_one_room():
+    assert find_rooms(grid_of(np.zeros((50, 60), np.int8))).count == 1
