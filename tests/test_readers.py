@@ -65,7 +65,7 @@ SAYS = {
     "free[5:12, 8:14]": r"fasaco .*\naco .*\nspiral-stc .*\nzigzag .*\n",
     "budget_s in (": r"(\{.*'gap'.*\}\n){3}",
     "from mine import": r"mine\.py:depth_first 666 333 \d+\n",
-    "observe=fields.append": r"(\d \d+ \(\d+, \d+\) \d\.\d+\n){8}",
+    "observe=fields.append": r"(\d \d+ \d\.\d+ at \(-?\d+\.\d+, -?\d+\.\d+\) m\n){8}",
     "pheromone.parquet": r"\d+ fields; the last has \d+ cells,\nthe strongest at \(.*\) m\n",
     "floor.parquet": r"monday (\{.*\})\ntuesday \1\n",
 }

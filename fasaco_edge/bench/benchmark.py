@@ -159,6 +159,7 @@ def add_grid_options(parser: argparse.ArgumentParser, default_maps: tuple[str, .
     parser.add_argument(
         "--grids",
         nargs="+",
+        action="extend",
         default=[],
         metavar="FILE.npy",
         help="coverage grids (bool, True = free); FILE.json beside one may name "
@@ -167,6 +168,7 @@ def add_grid_options(parser: argparse.ArgumentParser, default_maps: tuple[str, .
     parser.add_argument(
         "--maps",
         nargs="+",
+        action="extend",
         default=[],
         metavar="MAP",
         help="map_server YAMLs or names from `maps`, in cells of 0.3 m for a robot of 0.18 m "
@@ -179,6 +181,7 @@ def add_own_planners(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--planner",
         nargs="+",
+        action="extend",
         type=_place,
         default=[],
         metavar="PLACE",

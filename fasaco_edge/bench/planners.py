@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import time
+from collections import Counter
 from collections.abc import Generator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -79,13 +80,14 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--end",
         choices=("home", "anywhere"),
-        default="home",
-        help="where each walk ends; home as in the paper's Table I (default: %(default)s)",
+        default="anywhere",
+        help="where each walk ends: anywhere, or home as in the paper's Table I; a planner of your "
+        "own that ends elsewhere then fails (default: %(default)s)",
     )
 
 
 def _count(args: argparse.Namespace) -> int:
-    rows = len(args.planner) + len(REGISTRY)
+    rows = len(dict.fromkeys(args.planner)) + len(REGISTRY)
     runs: int = args.seeds * rows
     return runs * len(grid_names(args, DEFAULT_MAPS))
 
@@ -98,7 +100,13 @@ def _measure(args: argparse.Namespace, say: Say) -> Generator[Run, None, None]:
     from fasaco_edge.planners.problem import CoverageProblem  # noqa: PLC0415
 
     # Read first, so that a wrong name fails at once and not after minutes.
-    own = [load(place) for place in args.planner]
+    own = [load(place) for place in dict.fromkeys(args.planner)]
+    names = Counter(code.name for code in own)
+    # Files of one name in two folders are two rows.
+    own = [
+        replace(code, name=place) if names[code.name] > 1 else code
+        for code, place in zip(own, dict.fromkeys(args.planner), strict=True)
+    ]
     colony = ColonyConfig(ants=args.ants, velocities=parse_velocities(args.velocities))
     grids = [read_grid(name) for name in grid_names(args, DEFAULT_MAPS)]
     say("loading kernels")

@@ -17,8 +17,8 @@ from typing import NoReturn
 
 from fasaco_edge import __version__
 from fasaco_edge.cli.console.arguments import Command, Exit, add_common, with_negative_pairs
-from fasaco_edge.cli.console.help import HelpText
 from fasaco_edge.cli.console.logs import begin_logging, say_why
+from fasaco_edge.cli.console.parser import Parser
 from fasaco_edge.cli.console.streams import clean_streams, open_missing_streams
 from fasaco_edge.errors import BadConfiguration, DiskFailed, FasacoError, PlannerFailed
 from fasaco_edge.host.processes import end_with_parent
@@ -85,7 +85,7 @@ def program() -> NoReturn:
     os._exit(code)
 
 
-def run_command(parser: argparse.ArgumentParser, words: Sequence[str]) -> int:
+def run_command(parser: Parser, words: Sequence[str]) -> int:
     """Run the command that ``parser`` finds in ``words``; report errors; return the exit code."""
     # For any mask of the caller, no other user may change the files written here.
     os.umask(os.umask(0o022) | 0o022)
@@ -93,9 +93,8 @@ def run_command(parser: argparse.ArgumentParser, words: Sequence[str]) -> int:
     clean_streams()
     args, unknown = parser.parse_known_args(with_negative_pairs(words))
     if unknown:
-        told = f"{parser.prog} {words[0]} --help lists what there is"
-        told = next((REMOVED[word] for word in unknown if word in REMOVED), told)
-        parser.error(f"unrecognized arguments: {' '.join(unknown)}; {told}")
+        told = next((REMOVED[word] for word in unknown if word in REMOVED), "")
+        args.parser.refuse(unknown, told)
     begin_logging(args.log_level)
     if args.with_parent is not None:
         end_with_parent(args.with_parent)
@@ -121,18 +120,17 @@ def run_command(parser: argparse.ArgumentParser, words: Sequence[str]) -> int:
     return code
 
 
-def _parser(words: Sequence[str]) -> argparse.ArgumentParser:
+def _parser(words: Sequence[str]) -> Parser:
     """Return a parser that knows all commands by name, and the options of the one in ``words``."""
-    parser = argparse.ArgumentParser(
+    parser = Parser(
         prog="fasaco-edge",
         description="Coverage path planning with fast-spanning ant colonies, on a robot.",
-        formatter_class=HelpText,
         epilog="Begin with `fasaco-edge demo`. Each command has --help.",
     )
     parser.add_argument("--version", action="version", version=f"fasaco-edge {__version__}")
     commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND")
     for name, about in COMMANDS.items():
-        described = commands.add_parser(name, help=about, formatter_class=HelpText)
+        described = commands.add_parser(name, help=about)
         if name in words[:1]:
             module = import_module(f"fasaco_edge.cli.{name.replace('-', '_')}")
             _describe(described, module.COMMAND)

@@ -35,6 +35,7 @@ from fasaco_edge.wire.documents.rooms import Rooms
 from fasaco_edge.wire.messages.maps import CoverageValue, decode_occupancy_grid
 from fasaco_edge.wire.messages.paths import decode_path
 from fasaco_edge.wire.messages.pheromone import decode_pheromone
+from fasaco_edge.wire.reasons import plain
 from fasaco_edge.wire.topics import RPC_NAMES
 
 if TYPE_CHECKING:
@@ -162,7 +163,7 @@ def show_mission(reply: Reply) -> None:
 
 def _rows(answer: replies.Reply) -> list[tuple[str, str]]:
     mission = answer.mission
-    rows = [("robot", answer.robot), ("state", answer.state), ("reason", answer.reason)]
+    rows = [("robot", answer.robot), ("state", answer.state), ("reason", plain(answer.reason))]
     if mission.ordered is not None:
         began = "begun by itself" if mission.ordered == "itself" else "as ordered"
         stage = phrases.stage(mission)

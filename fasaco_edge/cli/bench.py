@@ -19,7 +19,6 @@ from fasaco_edge.bench.planners import PLANNERS
 from fasaco_edge.bench.speed import SPEED
 from fasaco_edge.cli.console import terminal
 from fasaco_edge.cli.console.arguments import Command, Exit, add_common, add_json
-from fasaco_edge.cli.console.help import HelpText
 from fasaco_edge.cli.console.logs import say_why
 from fasaco_edge.cli.console.streams import print_json
 
@@ -51,7 +50,6 @@ def add_benchmarks(
             help=benchmark.summary,
             description=benchmark.description,
             epilog=benchmark.epilog,
-            formatter_class=HelpText,
         )
         add_common(words)
         benchmark.add_options(words)

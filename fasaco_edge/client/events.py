@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from fasaco_edge.text import one_line
 from fasaco_edge.wire.documents.status import TROUBLES, Status
+from fasaco_edge.wire.reasons import plain
 
 KEPT = 200
 # Tone of an entry.
@@ -33,7 +34,7 @@ class EventLog:
 
     def add(self, at_s: float, text: str, tone: str = PLAIN) -> None:
         """Note what happened at ``at_s``, since the epoch [s]."""
-        self.entries.append(Event(at_s, one_line(text), tone))
+        self.entries.append(Event(at_s, one_line(plain(text)), tone))
         self.count += 1
 
     def since(self, count: int) -> list[Event]:

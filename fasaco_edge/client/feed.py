@@ -18,7 +18,7 @@ from fasaco_edge.errors import BusUnavailable
 from fasaco_edge.wire.keys import VERSION, Keys
 from fasaco_edge.wire.limits import MAX_JSON_BYTES, MAX_MESSAGE_BYTES
 from fasaco_edge.wire.topic_types import NEWEST, Topic
-from fasaco_edge.wire.topics import FLEET, FLOOR, PHEROMONE, TOPICS
+from fasaco_edge.wire.topics import FLEET, FLOOR, PHEROMONE, TOPICS, UNSWEPT
 
 RETRY_S = 0.5
 # Timeout at the end for a host that does not answer.
@@ -77,7 +77,7 @@ class Joining(ABC):
 
 WATCHED = [topic for topic in TOPICS if topic.queues.watch is not None]
 # The daemon makes these only while a subscriber exists: they are requested.
-ON_REQUEST = (PHEROMONE, FLOOR)
+ON_REQUEST = (PHEROMONE, FLOOR, UNSWEPT)
 SUBSCRIBED = [topic for topic in WATCHED if topic not in ON_REQUEST]
 # Queue length of messages of a fleet's other robots.
 FLEET_WAITING = 64
@@ -127,7 +127,7 @@ class Feed(Joining):
         """Query the robot's daemon; return all replies.
 
         Args:
-            query: name of the query.
+            query: name of the query, parameters after ``?``.
             payload: its JSON payload.
             timeout_s: how long to wait for a reply [s].
 
@@ -138,7 +138,8 @@ class Feed(Joining):
             bus = self._bus
         if bus is None:
             raise BusUnavailable(self.trouble or "not joined yet")
-        return bus.get(self._keys.rpc(query), timeout_s, payload)
+        name, mark, parameters = query.partition("?")
+        return bus.get(self._keys.rpc(name) + mark + parameters, timeout_s, payload)
 
     def _request(self, bus: Bus) -> None:
         for topic in self._wanted - self._requested.keys():

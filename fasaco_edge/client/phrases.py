@@ -13,6 +13,7 @@ from fasaco_edge.wire.documents.replies import (
 )
 from fasaco_edge.wire.documents.settings import known_settings
 from fasaco_edge.wire.documents.status import TROUBLES, DriveReport, Status
+from fasaco_edge.wire.reasons import possible
 
 # Offset of the wall clock from the monotonic one, when this module was imported [s].
 _OFFSET_S = time.time() - time.monotonic()
@@ -33,8 +34,7 @@ def swept(floor: FloorReport) -> str:
     share = f"{percent(reached_m2 / reachable_m2)}: {reached_m2:.1f} of {reachable_m2:.1f} m2"
     if (possible_m2 := floor.possible_m2) is None:
         return share
-    at_least = f"{percent(reached_m2 / possible_m2)} of {possible_m2:.1f} m2"
-    return f"{share}; {at_least} if walls are a pixel thinner than on the map"
+    return share + possible(f"{possible_m2:.1f} m2")
 
 
 def percent(fraction: float) -> str:
@@ -69,6 +69,11 @@ def time_to_go(status: Status) -> str:
     # A simulated robot may be faster than the clock.
     scale = known_settings(status.config).robot.time_scale
     return age(path.line_s / scale) if scale > path.line_s / LONGEST_S else ""
+
+
+def scale_words(scale: float) -> str:
+    """Return the speed of a simulation in words; "" for a real robot."""
+    return "" if scale == 1.0 else f"simulated at {scale:g} times real time"
 
 
 def figures(status: Status) -> str:

@@ -30,6 +30,8 @@ if TYPE_CHECKING:
 
 # The daemon publishes a status once a second.
 SILENCE_S = 3.5
+# A map that has grown within this time may grow further [s].
+GROWS_S = 60.0
 # If no pose has come on its own key for this long [s], the poses in the status are shown.
 POSE_LASTS_S = 2.0
 
@@ -68,7 +70,7 @@ class RobotState:
         self.robots: set[str] = set()
         self.trouble = ""
         self.gone_since: float | None = None
-        self._reported_at = self._posed_at = float("-inf")
+        self._reported_at = self._posed_at = self._grew_at = float("-inf")
         self._malformed = 0
         self._readers: dict[str, Callable[[Sample, float], None]] = {
             "pose": self._read_pose,
@@ -80,6 +82,10 @@ class RobotState:
     def is_here(self) -> bool:
         """Whether the robot's daemon is on the bus."""
         return self.robot in self.robots
+
+    def grows(self, now: float) -> bool:
+        """Whether more floor came into reach of late: the rest of the work is not known then."""
+        return now - self._grew_at < GROWS_S / max(self.settings.robot.time_scale, 1.0)
 
     def silent_s(self, now: float) -> float:
         """Return how long a status of the daemon is overdue [s]; 0 if it is not."""
@@ -138,6 +144,9 @@ class RobotState:
             self.events.add(now, text, tone)
         if self.status is None or status.config != self.status.config:
             self.settings = known_settings(status.config)
+        before = self.status.coverage if self.status else None
+        if before and status.coverage and status.coverage.coverable > before.coverable:
+            self._grew_at = now
         self.status, self.document, self._reported_at = status, sample.payload, now
         if status.path is None:
             # A restarted daemon has none of the old paths.

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -302,7 +301,7 @@ def draw_mission(
     title: str,
     lines: Sequence[str],
     space: tuple[int, int] = (MAX_WIDTH, MAX_HEIGHT),
-    jump_m: float = math.inf,
+    driven: NDArray[np.bool_] | None = None,
     swept: MapLayer | None = None,
     unswept: MapLayer | None = None,
     zones: Sequence[Polygon] = (),
@@ -319,7 +318,7 @@ def draw_mission(
         title: heading.
         lines: caption below it.
         space: the most the map may take (width, height) [px].
-        jump_m: two places further apart than this [m] are a jump, and are not joined.
+        driven: bool (n - 1,), which places are joined to the next; None for all.
         swept: reachable floor that was swept, shown in place of the cells; None to show these.
         unswept: reachable floor that was not swept; None where that is not known.
         zones, keep_out: polygons of the order [m].
@@ -338,7 +337,7 @@ def draw_mission(
         key += draw_unswept(plot, unswept)
     key += draw_order(plot, zones, keep_out)
     lengths_m = np.hypot(*np.diff(driven_xy, axis=0).T)
-    driven = lengths_m <= jump_m
+    driven = np.ones(len(lengths_m), np.bool_) if driven is None else driven
     plot.track(driven_xy[:-1][driven], driven_xy[1:][driven], DRIVEN_WIDTH * lattice.cell_m)
     plot.end_mark(driven_xy[-1])
     plot.start_mark(driven_xy[0])

@@ -42,7 +42,7 @@ Difference = tuple[str, str, str]
 Row = tuple[str, str, str, str]
 """Name, the texts of one recording and of the other, and the difference; "" for none."""
 NUMBERS = (
-    ("floor swept by the ledger", "ledger_swept_m2", "m2"),
+    ("floor swept, by the daemon", "ledger_swept_m2", "m2"),
     ("covered again", "recovered_cells", "cells"),
     ("out of reach", "unreachable_cells", "cells"),
     ("steps", "steps", ""),
@@ -244,7 +244,7 @@ def figures(document: ReviewDocument) -> Iterator[Figure]:
     text = NOT_KNOWN
     if swept_m2 is not None and reachable_m2 is not None:
         text = swept_words(swept_m2, reachable_m2)
-    yield Figure("reachable floor swept", text, swept_m2)
+    yield Figure("floor swept", text, swept_m2)
     patches, largest_m2 = document.patches_over_4_dm2, document.largest_patch_m2
     yield Figure("patches left, over 4 dm2", count(patches, ""), patches)
     yield Figure("largest patch left", count(largest_m2, "m2"), largest_m2)

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -166,7 +166,6 @@ def _distance_from(pose: NDArray[np.float64], cell_m: float) -> Callable[[Cell],
 def swept_floor(
     data: RunData,
     lattice: CoverageLattice,
-    lost_pose_s: float,
     keep_out: tuple[Polygon, ...] | None = None,
 ) -> JudgedFloor | None:
     """Return the swept floor; None without a pose on the map.
@@ -176,7 +175,6 @@ def swept_floor(
     Args:
         data: of the samples, with a map and a configuration.
         lattice: over that map; a pose beyond it is invalid.
-        lost_pose_s: gap between poses [s] over which the path is unknown; 0 for none.
         keep_out: other keep-out zones than the last order's.
     """
     footprint = data.footprint
@@ -186,23 +184,13 @@ def swept_floor(
     window = lattice.window
     low, high = (window.row0, window.col0), (window.row1, window.col1)
     on_map = ((cells >= low) & (cells < high)).all(axis=1)
-    track, at_s = data.track[on_map, :2], data.times[on_map]
+    kept = replace(data, pose_s=data.times[on_map].tolist(), poses=data.track[on_map].tolist())
+    track = kept.track[:, :2]
     if not len(track):
         return None
-    driven = _driven(track, at_s, data.jump_m, lost_pose_s)
     tool_m = known_settings(data.config).robot.tool_width_m
     robot = SweepingRobot(tool_m, footprint.robot_radius_m, free_at_most=footprint.free_at_most)
     # Reachability is from the robot's last position, as for the cells.
     x, y = track[-1].tolist()
     grid = with_kept_out(data.grid, data.keep_out if keep_out is None else keep_out)
-    return judge_floor(grid, track, robot, driven=driven, stands_at=(x, y))
-
-
-def _driven(
-    track: NDArray[np.float64], at_s: NDArray[np.float64], jump_m: float, lost_pose_s: float
-) -> NDArray[np.bool_]:
-    """Return which segments between poses, (n, 2), were driven, bool (n - 1,), as in the ledger."""
-    driven: NDArray[np.bool_] = np.hypot(*np.diff(track, axis=0).T) <= jump_m
-    if lost_pose_s > 0:
-        driven &= np.diff(at_s) <= lost_pose_s
-    return driven
+    return judge_floor(grid, track, robot, driven=kept.driven, stands_at=(x, y))

@@ -23,6 +23,7 @@ from fasaco_edge.recording.read.run import RecordedSamples, RunRecord
 from fasaco_edge.review.orders import CommandThen, commands_of, order_words
 from fasaco_edge.review.run_data import maps_of
 from fasaco_edge.wire.documents.path_documents import Rectangle
+from fasaco_edge.wire.reasons import plain
 
 if TYPE_CHECKING:
     from fasaco_edge.review.review import Review
@@ -303,7 +304,8 @@ def _why(
         apart = abs(math.remainder(now - was, 360.0))
         if new.at_s >= begin_s - TURN_S and apart > APART_DEG:
             return (
-                f"path {new.about.revision} came ({new.about.reason}) and leads {direction(now)}, "
+                f"path {new.about.revision} came ({plain(new.about.reason)}) and leads "
+                f"{direction(now)}, "
                 f"where path {old.about.revision} led {direction(was)}"
             )
     led = [path.about for path in paths if path.at_s <= end_s and path.about.steps]
@@ -311,7 +313,7 @@ def _why(
         return "there was no path"
     planned = next((about for about in reversed(led) if about.planner), led[-1])
     by = f", by the plan of path {planned.revision}" if planned is not led[-1] else ""
-    return f"as planned: path {led[-1].revision} turns there{by} ({planned.reason})"
+    return f"as planned: path {led[-1].revision} turns there{by} ({plain(planned.reason)})"
 
 
 def direction(degrees: float) -> str:

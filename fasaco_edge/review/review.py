@@ -212,10 +212,8 @@ def review_of(record: RunRecord, data: RunData, missing: int) -> Review:
     """
     end_s = _end_s(record, data)
     lattice, no_lattice = _lattice(data)
-    # The daemon's timeout is in real seconds.
-    lost_pose_s = data.time_scale * known_settings(data.config).mission.lost_pose_s
-    drive = drive_over(lattice, data.times, data.track, lost_pose_s) if lattice else None
-    floor = swept_floor(data, lattice, lost_pose_s) if lattice else None
+    drive = drive_over(lattice, data.times, data.track, data.lost_pose_s) if lattice else None
+    floor = swept_floor(data, lattice) if lattice else None
     states = spans_of(_mission_states(data, record), end_s)
     replans = Replans.of(data.paths)
     fractions = record.plots.get(entities.COVERED_FRACTION, np.zeros((0, 2)))

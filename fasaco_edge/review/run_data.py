@@ -213,6 +213,22 @@ class RunData:
         return JUMP_CELLS * self.footprint.cell_m if self.footprint else math.inf
 
     @property
+    def lost_pose_s(self) -> float:
+        """Gap between poses over which the path is unknown [s]; 0 for none."""
+        # The daemon's timeout is in real seconds.
+        return self.time_scale * known_settings(self.config).mission.lost_pose_s
+
+    @property
+    def driven(self) -> NDArray[np.bool_]:
+        """Which ways between poses were driven, bool (n - 1,), as in the ledger.
+
+        Over the others, jumps and gaps without a pose, no floor counts as swept.
+        """
+        lengths_m = np.hypot(*np.diff(self.track[:, :2], axis=0).T)
+        driven: NDArray[np.bool_] = lengths_m <= self.jump_m
+        return driven & (np.diff(self.times) <= (self.lost_pose_s or math.inf))
+
+    @property
     def times(self) -> NDArray[np.float64]:
         """When each pose came [s], float64 (n,)."""
         return np.array(self.pose_s, np.float64)

@@ -7,7 +7,8 @@ Reasons are checked in this order:
 3. it is in a keep-out zone;
 4. the robot cannot reach it;
 5. it is not part of the order;
-6. it is sweepable, but was missed by the robot or by its path.
+6. poses are missing for a time in which the robot can have swept it;
+7. it is sweepable, but was missed by the robot or by its path.
 """
 
 from __future__ import annotations
@@ -35,6 +36,7 @@ from fasaco_edge.review.drive import swept_floor
 from fasaco_edge.review.run_data import maps_of
 from fasaco_edge.review.wording import clock
 from fasaco_edge.wire.documents.settings import known_settings
+from fasaco_edge.wire.reasons import plain
 
 if TYPE_CHECKING:
     from fasaco_edge.review.review import Review
@@ -53,7 +55,7 @@ class Spot(msgspec.Struct):
     Attributes:
         swept: whether the tool passed over it; None if unknown.
         why: the reason in a word: swept, never seen, not floor, keep-out, too narrow, closed off,
-            not ordered, still to come, seen late, missed, not worth it, not known.
+            not ordered, poses missing, still to come, seen late, missed, not worth it, not known.
         words: the reason in full.
         missed_m: least distance of the tool's edge [m].
         nearest_s: when the robot came nearest [s since the recording began].
@@ -196,7 +198,7 @@ class _Judge:
         assert lattice is not None
         assert footprint is not None
         if self._data.keep_out:
-            free = swept_floor(self._data, lattice, 0.0, keep_out=())
+            free = swept_floor(self._data, lattice, keep_out=())
             if free is not None and _is_in(free.reachable, free.geometry, self._x, self._y):
                 return self._spot("keep-out", "a keep-out zone is in the way, or too near")
         geometry = grid.geometry
@@ -223,7 +225,7 @@ class _Judge:
 
     def _within_reach(self, floor: JudgedFloor) -> Spot:
         times, track = self._data.times, self._data.track[:, :2]
-        away_m, at_s = _passed(track, times, self._data.jump_m, (self._x, self._y))
+        away_m, at_s = _passed(track, times, self._data.driven, (self._x, self._y))
         first = int(np.argmin(away_m))
         nearest_m, nearest_s = float(away_m[first]), float(at_s[first])
         if _is_in(floor.swept, floor.geometry, self._x, self._y):
@@ -242,12 +244,19 @@ class _Judge:
     def _missed(self, missed_m: float, nearest_s: float) -> Spot:
         """Return why the tool missed it."""
         by = f"the tool's edge passed {100 * missed_m:.0f} cm from it at {clock(nearest_s)}"
+        gap = self._gap()
         if self._data.zones and self._zone([zone.polygon for zone in self._data.zones]) is None:
             words = f"in no zone of the last order; {by}"
             for at_s, _, order in self._data.commands:
                 if (zone := self._zone(order.keep_out)) is not None:
                     words += f"; in keep-out zone {zone + 1} of the order at {clock(at_s)}"
             return self._spot("not ordered", words)
+        if gap is not None:
+            words = (
+                f"no pose came between {clock(gap[0])} and {clock(gap[1])}: the robot may have "
+                "swept it meanwhile, and such floor does not count"
+            )
+            return self._spot("poses missing", f"{words}; {by}", swept=None)
         over = self._last_path_over()
         seen_s = self._drawn.seen_s[self._number]
         if over is not None and over is self._drawn.paths[-1] and not self._review.complete:
@@ -271,12 +280,26 @@ class _Judge:
         spot.seen_s = None if seen_s is None else round(seen_s, 3)
         return spot
 
+    def _gap(self) -> tuple[float, float] | None:
+        """Return the first time without poses in which the robot can have come here [s]."""
+        data = self._data
+        starts, ends = (data.track[part, :2] for part in (slice(-1), slice(1, None)))
+        way_m = np.hypot(*(ends - starts).T)
+        via_m = sum(np.hypot(*(end - (self._x, self._y)).T) for end in (starts, ends))
+        # At its speed it can have made a detour; if it hardly moved, it rather stood.
+        speed_m_s = known_settings(data.config).robot.speed_m_s
+        detour_m = np.clip(speed_m_s * np.diff(data.times) - way_m, 0.0, way_m)
+        gaps = np.flatnonzero(~data.driven & (via_m <= way_m + detour_m + self._tool_m))
+        if not len(gaps):
+            return None
+        return data.pose_s[gaps[0]], data.pose_s[gaps[0] + 1]
+
     def _last_path_over(self) -> DrawnLine | None:
         """Return the last path that would have swept it; None without any."""
         reach_m = self._tool_m / 2 - NEAR_M
         for one in reversed(self._drawn.paths):
-            stamps = np.zeros(len(one.xy))
-            away_m, _ = _passed(one.xy, stamps, math.inf, (self._x, self._y))
+            stamps, whole = np.zeros(len(one.xy)), np.ones(max(len(one.xy) - 1, 0), np.bool_)
+            away_m, _ = _passed(one.xy, stamps, whole, (self._x, self._y))
             if float(away_m.min()) <= reach_m:
                 return one
         return None
@@ -287,7 +310,7 @@ class _Judge:
         later = [p.about for p in self._data.paths if p.about.revision > over.revision]
         if not later:
             return "missed", f"{led}, and the robot did not get there"
-        words = f"{led}, until path {later[0].revision} took its place ({later[0].reason})"
+        words = f"{led}, until path {later[0].revision} took its place ({plain(later[0].reason)})"
         # A shorter line leaves floor that is not worth the distance.
         return "not worth it" if later[0].reason in (POLISHED, BETTER) else "missed", words
 
@@ -333,15 +356,18 @@ def _nearest(
 def _passed(
     line: NDArray[np.float64],
     at_s: NDArray[np.float64],
-    jump_m: float,
+    driven: NDArray[np.bool_],
     place: tuple[float, float],
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the distance of each piece of a line to a point [m], and when it ended [s]."""
+    """Return the distance of each piece of a line to a point [m], and when it ended [s].
+
+    ``driven``: bool (n - 1,), which pieces were driven; others are infinitely far.
+    """
     if len(line) < 2:
         return np.hypot(*(line - place).T), at_s
     starts, ways = line[:-1], np.diff(line, axis=0)
     squares = np.maximum((ways**2).sum(axis=1), 1e-12)
     shares = np.clip(((np.array(place) - starts) * ways).sum(axis=1) / squares, 0.0, 1.0)
     away = np.hypot(*(starts + shares[:, None] * ways - place).T)
-    away[squares > jump_m**2] = math.inf
+    away[~driven] = math.inf
     return away, at_s[1:]

@@ -17,6 +17,7 @@ from fasaco_edge.wire.documents.replies import (
 )
 from fasaco_edge.wire.documents.settings import KnownSettings
 from fasaco_edge.wire.documents.status import FleetReport, Status
+from fasaco_edge.wire.reasons import plain as plain_words
 
 Digest = dict[str, object]
 
@@ -33,8 +34,15 @@ MOST_M = 1e6
 UNDERWAY = ("planning", "covering", "returning", "degraded", "paused", "charging")
 
 
-def state(view: RobotState, way: Way, now: float) -> Digest:
-    """Return the content of the newest status, and why there is none; ``way``: the path."""
+def state(view: RobotState, way: Way, now: float, ordered: Status | None = None) -> Digest:
+    """Return the content of the newest status, and why there is none.
+
+    Args:
+        view: of the robot.
+        way: its path.
+        now: since the epoch [s].
+        ordered: the newest status with an order.
+    """
     status = view.status
     others = sorted(view.robots - {view.robot})[:MOST_ROBOTS]
     absent = _absent(view, now)
@@ -48,13 +56,15 @@ def state(view: RobotState, way: Way, now: float) -> Digest:
         "does": plain.last_seen(status) if absent else plain.does(status),
         "needs": plain.needs(status),
         "left": [
-            {"m2": part.m2, "reason": part.reason, "places": part.places}
-            for part in plain.left(status)
+            {"m2": part.m2, "reason": part.reason, "marks": part.marks, "places": part.places}
+            for part in plain.left(status, ordered)
         ],
         "reason": _reason(status),
         "cells": status.coverage.fraction if status.coverage else None,
         "floor": _floor(floor) if floor else None,
         "to_go_s": _to_go_s(view, status, way),
+        "grows": view.grows(now),
+        "simulated": phrases.scale_words(view.settings.robot.time_scale),
         "time_scale": view.settings.robot.time_scale,
         "mission": _mission(mission),
         "battery": _battery(status),
@@ -84,8 +94,8 @@ def _absent(view: RobotState, now: float) -> str:
 def _reason(status: Status) -> str:
     path = status.path
     if path is not None and status.reason == f"path {path.revision}":
-        return path.reason if path.steps else ""
-    return status.reason
+        return plain_words(path.reason) if path.steps else ""
+    return plain_words(status.reason)
 
 
 def _floor(floor: FloorReport) -> Digest:

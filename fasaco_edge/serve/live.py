@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
+
+from fasaco_edge.bus.arrival import Sample
 from fasaco_edge.bus.queries import Reply
 from fasaco_edge.client.feed import Feed
 from fasaco_edge.client.phrases import steady_now
+from fasaco_edge.errors import FasacoError
 from fasaco_edge.serve.guard import Guard
 from fasaco_edge.serve.served_view import ServedView
 from fasaco_edge.serve.server import Server
-from fasaco_edge.wire.topics import FLOOR, PHEROMONE
+from fasaco_edge.wire.topics import FLOOR, PHEROMONE, UNSWEPT
 
 # Least period of messages to pages; without any, period of the check for viewers [s].
 FRAME_S, IDLE_S = 0.1, 0.2
+# Timeout of the query for a path [s].
+PATH_S = 1.0
 
 
 class LiveServer(Server):
@@ -48,13 +54,26 @@ class LiveServer(Server):
             now = steady_now()
             for topic, item in items:
                 self._view.take(topic, item, now)
+            if self._view.lacks_path:
+                self._ask_for_path(now)
             self._view.trouble = self._feed.trouble
             viewers = tuple(self._viewers)
             self._feed.want(FLOOR, bool(viewers))
+            self._feed.want(UNSWEPT, any(viewer.wants_unswept for viewer in viewers))
             self._feed.want(PHEROMONE, any(viewer.wants_field for viewer in viewers))
             if viewers and (news := self._view.news(now)) and self._loop is not None:
                 self._loop.call_soon_threadsafe(self._publish, news)
             self._ended.wait(max(FRAME_S - (steady_now() - now), 0.0))
+
+    def _ask_for_path(self, now: float) -> None:
+        """Take the path with which a paused robot goes on: it was sent before this server began."""
+        self._view.lacks_path = False
+        with suppress(FasacoError):
+            for reply in self._feed.ask("path?before_stop", b"", PATH_S):
+                if not reply.is_error:
+                    self._view.take_path_before(
+                        Sample("", reply.payload, reply.schema, reply.attachment), now
+                    )
 
     def _publish(self, news: dict[str, str | bytes]) -> None:
         for kind, message in news.items():

@@ -55,6 +55,8 @@ FLOOR_MARKS = level_marks(100)
 """For a floor in percent."""
 FIELD_MARKS = level_marks(255)
 """For a pheromone field."""
+UNSWEPT_MARKS = bytes(1 << value - 1 if 1 <= value <= 6 else 0 for value in range(256))
+"""For the reasons of unswept floor: a bit for each."""
 
 
 def grid_message(kind: str, grid: GridOctets, marks: bytes) -> bytes:

@@ -30,9 +30,10 @@ class Hello(msgspec.Struct, tag="hello", tag_field="kind", forbid_unknown_fields
 
 
 class Wants(msgspec.Struct, tag="wants", tag_field="kind", forbid_unknown_fields=True):
-    """Whether the page shows the pheromone field."""
+    """Whether the page shows the pheromone field, and where floor is not swept."""
 
     field: bool = False
+    unswept: bool = False
 
 
 class Seek(msgspec.Struct, tag="seek", tag_field="kind", forbid_unknown_fields=True):

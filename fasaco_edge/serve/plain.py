@@ -72,6 +72,26 @@ LEFT = {
 """Why floor was left, by the reason in the status."""
 TRIED, OTHERWISE = "left over after", "for another reason"
 NOT_REACHED = "it could not get there"
+ENDED = "the work was ended before it got there"
+# Much floor is passed without a trace if the robot's place is not known often enough.
+PASSED, SELDOM = 8, "it may have missed that: its place was known too seldom"
+# Share of the floor in reach above which that is so.
+MUCH = 0.1
+MARKS = {
+    "too narrow for the robot, or too near to a wall or to furniture": 1,
+    "closed off: no way leads there that the robot fits through": 2,
+    "in a keep-out zone, or too near to one": 4,
+    "passed, or in narrow strips, and not known to be swept": 8,
+    "beside the path, and not worth the way": 16,
+    "to come": 16,
+    "not planned yet": 16,
+    "on the path": 32,
+}
+"""The mark in ``serve.marks.UNSWEPT_MARKS`` of each reason for which floor is left."""
+REST = 64
+"""A mark for free floor that is not swept, and has no other mark: no order asks for it any more."""
+# Reasons of cells that are no free floor: the areas of floor do not include them.
+NO_FLOOR = ("no longer free on the map", "unknown to the map")
 # Less is not worth a line [m2].
 LEAST_M2 = 0.05
 # At home, the robot is this near to it [m].
@@ -130,35 +150,55 @@ class LeftFloor:
     Attributes:
         m2: its area [m2].
         reason: why, in the owner's words.
-        places: where larger parts of it are (x, y) [m].
+        marks: its marks on the map, see ``MARKS``.
+        places: where it is (x, y) [m], if it has no marks.
     """
 
     reason: str
     m2: float = 0.0
+    marks: int = 0
     places: list[tuple[float, float]] = field(default_factory=list)
 
 
-def left(status: Status) -> list[LeftFloor]:
-    """Return the floor of an order that is not swept, the largest part first."""
-    mission, floor = status.mission, status.floor
-    if mission.ordered is None:
+def left(status: Status, ordered: Status | None = None) -> list[LeftFloor]:
+    """Return the floor of an order that is not swept, the largest part first.
+
+    ``ordered``: the newest status with an order, which may have been ended since.
+    """
+    is_ended = status.mission.ordered is None
+    if is_ended and (ordered is None or not (status.floor and status.floor.swept_m2)):
         return []
+    of = ordered if is_ended and ordered is not None else status
+    mission, floor = of.mission, of.floor
     found: dict[str, LeftFloor] = {}
-    parts = (*(floor.left or ()), *(floor.out_of_reach or ())) if floor else ()
-    for part in parts:
-        if mission.stage == "over" or part.reason not in TO_COME:
-            _of(found, part.reason).m2 += part.m2
-    # Where the floor is known, its areas are those of the cells, more exactly.
-    are_counted = set(found)
-    for area in mission.unreached.areas:
-        kind = _of(found, area.reason)
+    knows = floor is not None and floor.left is not None
+    areas = [area for area in mission.unreached.areas if not knows or area.reason in NO_FLOOR]
+    tried = sum(area.m2 for area in mission.unreached.areas if area.reason.startswith(TRIED))
+    for part in (floor.left or ()) if floor else ():
+        if is_ended:
+            kind = _of(found, ENDED, REST)
+        elif mission.stage != "over" and part.reason in TO_COME:
+            continue
+        elif tried >= LEAST_M2 and MARKS.get(part.reason) == MARKS["to come"]:
+            # The same floor, counted in cells: no spot has two reasons.
+            kind = _of(found, NOT_REACHED, MARKS["to come"])
+        else:
+            marks, reason = MARKS.get(part.reason, 0), LEFT.get(part.reason, OTHERWISE)
+            is_much = floor is not None and part.m2 > MUCH * (floor.reachable_m2 or math.inf)
+            kind = _of(found, SELDOM if marks == PASSED and is_much else reason, marks)
+        kind.m2 += part.m2
+    for part in (floor.out_of_reach or ()) if floor else ():
+        _of(found, LEFT.get(part.reason, OTHERWISE), MARKS.get(part.reason, 0)).m2 += part.m2
+    for area in areas:
+        tries = area.reason.startswith(TRIED)
+        kind = _of(found, NOT_REACHED if tries else LEFT.get(area.reason, OTHERWISE))
         kind.places.append((area.x, area.y))
-        if kind.reason not in are_counted:
-            kind.m2 += area.m2
+        kind.m2 += area.m2
     larger = (kind for kind in found.values() if kind.m2 >= LEAST_M2)
     return sorted(larger, key=lambda kind: -kind.m2)
 
 
-def _of(found: dict[str, LeftFloor], reason: str) -> LeftFloor:
-    plain = NOT_REACHED if reason.startswith(TRIED) else LEFT.get(reason, OTHERWISE)
-    return found.setdefault(plain, LeftFloor(plain))
+def _of(found: dict[str, LeftFloor], reason: str, marks: int = 0) -> LeftFloor:
+    kind = found.setdefault(reason, LeftFloor(reason))
+    kind.marks |= marks
+    return kind

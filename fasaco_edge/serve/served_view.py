@@ -15,6 +15,7 @@ from fasaco_edge.serve.marks import (
     COVERAGE_MARKS,
     FIELD_MARKS,
     FLOOR_MARKS,
+    UNSWEPT_MARKS,
     grid_message,
     map_marks,
 )
@@ -24,6 +25,7 @@ from fasaco_edge.wire.documents.fleet import decode_member
 from fasaco_edge.wire.documents.json_text import decode_document
 from fasaco_edge.wire.documents.path_documents import PathAttachment
 from fasaco_edge.wire.documents.replies import MissionReport
+from fasaco_edge.wire.documents.status import Status
 from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.messages.grid_octets import GridOctets, read_field, read_grid, with_update
 from fasaco_edge.wire.messages.path_points import PathPoints
@@ -41,6 +43,7 @@ PERIODS_S = {
     "events": 0.5,
     "map": 0.5,
     "floor": 1.0,
+    "unswept": 1.0,
     "field": 1.0,
     "others": 1.0,
 }
@@ -51,6 +54,7 @@ class ServedView(RobotState):
 
     Attributes:
         periods_s: least period of each message [s].
+        lacks_path: whether the robot is paused, and the path before that has not come.
     """
 
     periods_s: Mapping[str, float] = PERIODS_S
@@ -66,11 +70,15 @@ class ServedView(RobotState):
         # The newest path that leads anywhere: a paused robot goes on with it.
         self._to_drive: Sample | None = None
         self._way = Way()
+        self.lacks_path = False
+        # The newest status with an order: what it left is shown after its end, too.
+        self._ordered: Status | None = None
         self._readers |= {
             "map": self._read_map,
             "map_update": self._read_map_update,
             "coverage": self._read_coverage,
             "floor": self._read_floor,
+            "unswept": self._read_unswept,
             "pheromone": self._read_field,
             "path": self._read_path,
             "fleet": self._read_fleet,
@@ -79,13 +87,16 @@ class ServedView(RobotState):
             # The path comes first: the place on it, and the time to go, are by the newest.
             "path": self._path_message,
             "pose": lambda _: self._pose_message(),
-            "state": lambda now: message_text("state", **state(self, self._way, now)),
+            "state": lambda now: message_text(
+                "state", **state(self, self._way, now, self._ordered)
+            ),
             "areas": lambda _: message_text(
                 "areas", **areas(self.settings, self._order, self._mission)
             ),
             "events": lambda _: message_text("events", entries=lately(self.events)),
             "map": lambda _: self._map_message(),
             "floor": lambda _: self._grid_message("floor", FLOOR_MARKS),
+            "unswept": lambda _: self._grid_message("unswept", UNSWEPT_MARKS),
             "field": lambda _: self._grid_message("field", FIELD_MARKS),
             "others": lambda now: message_text("others", robots=list(self._near(now))),
         }
@@ -124,6 +135,7 @@ class ServedView(RobotState):
             "areas": (self.settings, self._order, self._mission.zones, self._mission.keep_outs),
             "map": (self._grids.get("map", self._grids.get("coverage")), self.settings.map),
             "floor": self._grids.get("floor"),
+            "unswept": self._grids.get("unswept"),
             "field": self._grids.get("field"),
         }
         # Messages of other kinds depend on the path and the time, too.
@@ -133,6 +145,15 @@ class ServedView(RobotState):
     @property
     def _mission(self) -> MissionReport:
         return self.status.mission if self.status else MissionReport()
+
+    def _read_status(self, sample: Sample, now: float) -> None:
+        before = self.status
+        super()._read_status(sample, now)
+        if self.status is not None and self.status.mission.ordered is not None:
+            self._ordered = self.status
+        if self.status is not None and self.status.state == "paused":
+            is_new = before is None or before.state != "paused"
+            self.lacks_path = self._to_drive is None and (is_new or self.lacks_path)
 
     def _read_map(self, sample: Sample, _: float) -> None:
         self._grids["map"] = read_grid(sample.payload)
@@ -148,6 +169,9 @@ class ServedView(RobotState):
     def _read_floor(self, sample: Sample, _: float) -> None:
         self._grids["floor"] = read_grid(sample.payload)
 
+    def _read_unswept(self, sample: Sample, _: float) -> None:
+        self._grids["unswept"] = read_grid(sample.payload)
+
     def _read_field(self, sample: Sample, _: float) -> None:
         self._grids["field"] = read_field(sample.payload)
 
@@ -155,7 +179,7 @@ class ServedView(RobotState):
     def _shown_path(self) -> Sample | None:
         """The newest path; of a paused robot, which has an empty one, that before the pause."""
         is_paused = self.status is not None and self.status.state == "paused"
-        is_stopped = self._path is not None and self._path is not self._to_drive
+        is_stopped = self._path is not self._to_drive
         return self._to_drive or self._path if is_paused and is_stopped else self._path
 
     def _read_path(self, sample: Sample, _: float) -> None:
@@ -167,6 +191,14 @@ class ServedView(RobotState):
             self._to_drive = sample
         elif not about.revision:  # a daemon begins, and goes on with no path from before
             self._to_drive = None
+
+    def take_path_before(self, sample: Sample, now: float) -> None:
+        """Take in the path before a stop."""
+        try:
+            if PathPoints(sample.payload).left:
+                self._to_drive = sample
+        except FasacoError as error:
+            self.note_unreadable("path", error, now)
 
     def _read_fleet(self, sample: Sample, now: float) -> None:
         robot = self._keys.robot_of(sample.key)

@@ -17,6 +17,7 @@ from fasaco_edge.text import one_line
 from fasaco_edge.wire.documents.json_text import decode_tolerant, encode_json
 from fasaco_edge.wire.documents.replies import Error
 from fasaco_edge.wire.documents.replies import Reply as Answer
+from fasaco_edge.wire.reasons import plain
 
 if TYPE_CHECKING:
     from websockets.asyncio.server import ServerConnection
@@ -55,11 +56,12 @@ class Viewer:
 
     Attributes:
         wants_field: whether it shows the pheromone field.
+        wants_unswept: whether it shows where floor is not swept.
         news: set when there is a newer message.
     """
 
     def __init__(self, socket: ServerConnection, source: Source, guard: Guard) -> None:
-        self.wants_field = False
+        self.wants_field = self.wants_unswept = False
         self.news = asyncio.Event()
         self._socket = socket
         self._source = source
@@ -87,8 +89,8 @@ class Viewer:
         try:
             async for text in self._socket:
                 match from_page(text):
-                    case Wants(field):
-                        self.wants_field = field
+                    case Wants(field, unswept):
+                        self.wants_field, self.wants_unswept = field, unswept
                         self.news.set()
                     case Seek(at_s):
                         for message in await asyncio.to_thread(self._source.at, at_s):
@@ -104,10 +106,11 @@ class Viewer:
 
     async def _send_news(self) -> None:
         sent: dict[str, int] = {}
+        asked = {"field": lambda: self.wants_field, "unswept": lambda: self.wants_unswept}
         while True:
             self.news.clear()
             for kind, number, message in self._source.newest():
-                if sent.get(kind) != number and (kind != "field" or self.wants_field):
+                if sent.get(kind) != number and (kind not in asked or asked[kind]()):
                     sent[kind] = number
                     await self._send(message)
             await self.news.wait()
@@ -142,7 +145,7 @@ class Viewer:
             answer = decode_tolerant(found[0].payload, Answer)
         except FasacoError as error:
             return message_text("answer", id=order.id, ok=False, text=str(error), hint=error.hint)
-        text = f"{answer.state}: {answer.reason}"
+        text = f"{answer.state}: {plain(answer.reason)}"
         return message_text("answer", id=order.id, ok=True, text=text, hint="")
 
 

@@ -155,5 +155,10 @@ def headline(view: RobotView, now: float, width: int) -> Text:
             line.append(f"  {percent(status.coverage.fraction)} of cells")
         if status.path is not None:
             to_go = time_to_go(status)
-            line.append(f"  path {status.path.revision}{f', {to_go} to go' if to_go else ''}")
+            least = "at least " if view.grows(now) else ""
+            line.append(f"  path {status.path.revision}")
+            line.append(f", {least}{to_go} to go" if to_go else "")
+        # What the robot does looks faster, and the time to go is by the clock.
+        scale = view.settings.robot.time_scale
+        line.append(f"  {scale:g} x real time" if scale != 1.0 else "", "dim")
     return with_keys(line, width, "q quits", "f trail", clock(now))

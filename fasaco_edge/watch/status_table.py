@@ -11,6 +11,7 @@ from fasaco_edge.watch.glyphs import GlyphSet
 from fasaco_edge.wire.documents.path_documents import PathReport
 from fasaco_edge.wire.documents.replies import CoverageReport, FloorReport, MissionReport
 from fasaco_edge.wire.documents.status import BatteryReport, FleetReport, Status, SupervisedRecorder
+from fasaco_edge.wire.reasons import plain
 
 Row = tuple[str, Text]
 # Colour of a state.
@@ -45,7 +46,7 @@ def _rows(status: Status, width: int, glyphs: GlyphSet) -> list[Row]:
     state = Text(one_line(status.state), f"bold {state_colour(status.state)}")
     # The path's number is shown with the path.
     if status.path is None or status.reason != f"path {status.path.revision}":
-        state.append(f": {one_line(status.reason)}", "not bold")
+        state.append(f": {one_line(plain(status.reason))}", "not bold")
     rows: list[Row] = [("state", state)]
     rows += [
         ("trouble", _text(f"{what}: {to_do}", "red")) for what, to_do in phrases.troubles(status)
@@ -89,10 +90,10 @@ def _floor(floor: FloorReport) -> list[Row]:
 def _path(path: PathReport, time: str) -> list[Row]:
     number = f"path {path.revision}"
     if not path.steps:
-        return [(number, _text("stop")), ("", _text(path.reason))]
+        return [(number, _text("stop")), ("", _text(plain(path.reason)))]
     steps = f"{path.remaining_steps} steps"
     to_go = f"{time}, {steps}" if time else steps
-    return [("to go", _text(to_go)), (number, _text(path.reason))]
+    return [("to go", _text(to_go)), (number, _text(plain(path.reason)))]
 
 
 def _plan(path: PathReport, width: int) -> list[Row]:

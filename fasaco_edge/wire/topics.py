@@ -134,6 +134,18 @@ FLOOR = Topic(
     queues=Queues(recorder=NEWEST, watch=NEWEST),
     limits=("max_grid_cells",),
 )
+UNSWEPT = Topic(
+    name="unswept",
+    direction="out",
+    when="floor was swept, or another reason holds for it, every two seconds at most; again after "
+    "ten seconds; only while someone listens",
+    speaker="robot",
+    listeners=("viewer",),
+    schemas=(schemas.OCCUPANCY_GRID,),
+    qos=Qos("data_low", why="for display: late joiners get it within two seconds"),
+    queues=Queues(watch=NEWEST),
+    limits=("max_grid_cells",),
+)
 PHEROMONE = Topic(
     name="pheromone",
     direction="out",
@@ -314,7 +326,13 @@ IN_ORDER = frozenset({MAP.name, MAP_UPDATE.name})
 QOS = {topic.name: topic.qos for topic in TOPICS if topic.qos is not None}
 
 QUERIES = (
-    Query("path", ("viewer",), schema=schemas.PATH, errors=("not_yet",)),
+    Query(
+        "path",
+        ("viewer",),
+        schema=schemas.PATH,
+        parameters=("before_stop",),
+        errors=("not_yet",),
+    ),
     Query("status", ("viewer",), json="status.json"),
     Query("coverage", ("viewer",), schema=schemas.OCCUPANCY_GRID, errors=("not_yet",)),
     Query("pheromone", ("viewer",), schema=schemas.PHEROMONE_GRID, errors=("not_yet",)),

@@ -13,6 +13,7 @@ from typing import Any
 from fasaco_edge.bench.benchmark import Benchmark
 from fasaco_edge.cli import run_command
 from fasaco_edge.cli.bench import EPILOG, add_benchmarks
+from fasaco_edge.cli.console.parser import Parser
 from tests.benchmarks.codec import CODEC
 from tests.benchmarks.fleet import FLEET
 from tests.benchmarks.fleets.benchmark import FLEET_ONLINE
@@ -37,7 +38,7 @@ BENCHMARKS: tuple[Benchmark[Any], ...] = (
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one benchmark and return the process's exit code."""
-    parser = argparse.ArgumentParser(
+    parser = Parser(
         prog="python -m tests.benchmarks",
         description="Measure planner, codecs and whole missions in simulation.",
         epilog=EPILOG,

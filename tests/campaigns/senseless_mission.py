@@ -26,7 +26,7 @@ from fasaco_edge.daemon.ledger.rooms_codec import BookSnapshot, decode_rooms, en
 from fasaco_edge.daemon.loop.last_samples import ShownTrail
 from fasaco_edge.daemon.loop.loader import mission_config
 from fasaco_edge.daemon.loop.mission_reports import mission_report
-from fasaco_edge.daemon.loop.outbox import MOST_SQUARES, headings
+from fasaco_edge.daemon.loop.outbox import MOST_SQUARES, headings, merged
 from fasaco_edge.errors import FasacoError
 from fasaco_edge.grid.fine_raster import map_to_raster
 from fasaco_edge.grid.geometry import GridGeometry
@@ -270,6 +270,7 @@ class MissionTrial:
             covered = OccupancyGrid(geometry, values, grid.frame, grid.stamp_ns)
             self._say("coverage", lambda: encode_occupancy_grid(covered))
             self._say("floor", lambda: self._floor(grid))
+            self._say("unswept", self._unswept)
             self._say("trail", self._trail)
         report = encode_json({"report": mission_report(mission, mission.order_state)})
         json.loads(report)
@@ -278,6 +279,11 @@ class MissionTrial:
         """Return the swept floor as it is published, b"" where it is too wide to be shown."""
         shown = self._mission.floor.snapshot().shown(MOST_SQUARES, grid.frame, grid.stamp_ns)
         return b"" if shown is None else encode_occupancy_grid(shown)
+
+    def _unswept(self) -> bytes:
+        """Return why floor is not swept, as it is published, b"" where that is not known."""
+        shown = self._mission.unswept()
+        return b"" if shown is None else encode_occupancy_grid(merged(shown, MOST_SQUARES))
 
     def _trail(self) -> bytes:
         """Return the living trail, and where it points to, as they are published."""

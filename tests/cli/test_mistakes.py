@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -139,7 +140,10 @@ def test_a_mistake_is_told_with_a_hint(folder, capsys, words, code, said):
     ("words", "said"),
     [
         ("", "the following arguments are required: COMMAND"),
-        ("dance", "invalid choice: 'dance'"),
+        ("dance", "invalid choice: 'dance'; there are demo, plan, init"),
+        ("reviw a.rrd", "did you mean review?"),
+        ("bench planer", "did you mean planners?"),
+        ("mission strat", "did you mean start?"),
         ("plan", "the following arguments are required: MAP"),
         ("plan office --start here", "argument --start: must be row,column, got 'here'"),
         ("plan office --start 1,2,3", "argument --start: must be row,column, got '1,2,3'"),
@@ -151,7 +155,9 @@ def test_a_mistake_is_told_with_a_hint(folder, capsys, words, code, said):
         ("plan office --end there", "--end: must be anywhere, home or row,column, got 'there'"),
         ("plan office --end home --return-home", "not allowed with argument --end"),
         ("plan office --cell wide", "argument --cell: invalid float value: 'wide'"),
-        ("review a.rrd --format csv", "--format csv; fasaco-edge review --help lists what"),
+        ("review a.rrd --pint 1,2", "unrecognized arguments: --pint 1,2; did you mean --point?"),
+        ("mission start --pases 2", "did you mean --passes?"),
+        ("review a.rrd --format csv", "unrecognized arguments: --format csv"),
         ("plan office --no-local-search", "removed in this version: write --planner fasaco"),
         ("plan office --planner best", "argument --planner: must be colony-search, fasaco, aco"),
         ("record", "the following arguments are required: --out"),
@@ -165,6 +171,10 @@ def test_a_word_nobody_understands_is_named(folder, capsys, words, said):
     told = capsys.readouterr()
     assert told.out == ""
     assert said in told.err
+    # The cause first, and no usage of many lines before it.
+    cause, see = told.err.splitlines()
+    assert cause.startswith("fasaco-edge")
+    assert re.fullmatch("see: fasaco-edge.* --help", see)
 
 
 @pytest.mark.parametrize(

@@ -29,6 +29,7 @@ from fasaco_edge.mission.core.events import (
 )
 from fasaco_edge.mission.core.mission import Mission
 from fasaco_edge.mission.coverage.floor_tiles import PIXEL_M
+from fasaco_edge.mission.line.figures import Unswept
 from fasaco_edge.mission.line.missed_floor import Cause
 from fasaco_edge.mission.line.polisher import AHEAD_M
 from fasaco_edge.mission.line.polyline import POLISHED
@@ -237,6 +238,17 @@ def test_the_rest_of_an_order_is_pending_while_the_robot_is_home():
     assert "beside the path, and not worth the way" not in reasons
 
 
+def why_unswept(mission, x, y):
+    """Return why the floor at x, y [m] is not swept; all areas are those of the status."""
+    grid, told = mission.unswept(), floor_report(mission)
+    pixels = np.bincount(grid.cells.ravel(), minlength=len(Unswept) + 1) * 0.025**2
+    assert sum(left.m2 for left in told.left) == pytest.approx(pixels[4:].sum(), abs=0.002)
+    beyond = sum(left.m2 for left in told.out_of_reach)
+    assert beyond == pytest.approx(pixels[1:4].sum(), abs=0.002)
+    col, row = (int(at) for at in grid.geometry.to_pixels(x, y))
+    return Unswept(grid.cells[row, col])
+
+
 def test_the_status_says_what_floor_is_out_of_reach_and_why():
     # A closet without a door and a gap between two shelves, and a zone in the far corner.
     grid = room(4.8, 2.4)
@@ -254,6 +266,9 @@ def test_the_status_says_what_floor_is_out_of_reach_and_why():
     beyond = {left.reason.split(",")[0].split(":")[0]: left.m2 for left in told.out_of_reach}
     assert sum(beyond.values()) == pytest.approx(free_m2 - judged.figures.reachable_m2, rel=0.01)
     closet = judge_floor(grid, np.array([(6.4, 2.2)]), ROBOT).figures.reachable_m2
+    assert why_unswept(robot.mission, 6.4, 2.2) is Unswept.CLOSED
+    assert why_unswept(robot.mission, *grid.geometry.to_map(23.5, 16.0)) is Unswept.NARROW
+    assert why_unswept(robot.mission, 5.4, 1.4) is Unswept.AHEAD
     assert beyond["closed off"] == pytest.approx(closet, rel=0.01)
     assert beyond["too narrow for the robot"] > 28 * 4 * 0.05**2
     robot.tell(CommandReceived(1, "start", read_order({"keep_out": [zone]})))
@@ -264,6 +279,7 @@ def test_the_status_says_what_floor_is_out_of_reach_and_why():
     assert more["closed off"] == beyond["closed off"]
     # The zone lies in the corner; what is too near to it counts, too.
     assert 0.75 < more["in a keep-out zone"] < 1.05
+    assert why_unswept(robot.mission, 5.4, 1.4) is Unswept.KEPT_OUT
     # Each is told in whole thousandths.
     left_m2 = told.reachable_m2 - more["in a keep-out zone"]
     assert kept.reachable_m2 == pytest.approx(left_m2, abs=0.0015)

@@ -7,9 +7,11 @@ import math
 import numpy as np
 import pytest
 
+from fasaco_edge.daemon.loop.status import path_report
 from fasaco_edge.mission.line.published_line import HELD_M, PublishedLine
 from tests.campaigns.lab.path_changes import PathAhead, differs
 from tests.mission.line_robot import PIXEL_M, LineRobot
+from tests.support.rooms import UNKNOWN, WALL, fill, room
 
 ZIGZAG = np.array([(0.4 * number, 0.3 * (number % 2)) for number in range(60)])
 EDGE_M = 0.5
@@ -134,3 +136,21 @@ def with_specks(pixels, random, away_from):
         if math.dist((PIXEL_M * col, PIXEL_M * row), away_from) > 3.0:
             shown[row, col] = 100
     return shown
+
+
+def test_no_path_has_more_steps_to_go_than_it_has():
+    """A longer path waits until the robot comes near its change; the status is of the one sent."""
+    whole = fill(room(8.0, 5.0), 4.0, 1.5, 4.2, 5.0, WALL)
+    robot = LineRobot(fill(whole, 3.0, 0.0, 8.0, 5.0, UNKNOWN), (0.6, 0.6))
+    waited = 0
+    for tick in range(160):
+        known_m = min(3.0 + 0.5 * (tick // 40), 8.0)
+        if tick % 40:
+            robot.step()
+        else:
+            robot.show(fill(whole, known_m, 0.0, 8.0, 5.0, UNKNOWN))
+        told = path_report(robot.exit.newest, robot.mission)
+        if told is not None:
+            assert told.remaining_steps <= told.steps
+            waited += len(robot.mission.route.path.ahead) - 1 > told.steps
+    assert waited

@@ -113,14 +113,24 @@ def test_from_python_a_class_and_its_object_are_planners_too():
 
 def test_bench_has_it_as_a_row_beside_the_others(mine, capsys):
     np.save(mine.parent / "room.npy", np.ones((4, 5), bool))
+    # Another planner of that name, which does not end at home.
+    other = mine.parent / "other" / "mine.py"
+    other.parent.mkdir()
+    other.write_text(
+        OWN_PLANNER + "\n\ndef rows(problem):\n"
+        "    return [(r, c if r % 2 == 0 else 4 - c) for r in range(4) for c in range(5)]\n\n\n"
+        "depth_first = rows\n"
+    )
+    places = [f"{mine}:depth_first", f"{other}:depth_first"]
     words = ["--grids", str(mine.parent / "room.npy"), "--seeds", "2", "--budget", "0.1", "--json"]
-    assert main(["bench", "planners", "--planner", f"{mine}:depth_first", *words]) == 0
+    own = [word for place in places for word in ("--planner", place)]
+    assert main(["bench", "planners", *own, *words]) == 0
     (grid,) = json.loads(capsys.readouterr().out)["grids"]
     rows = {row["planner"]: row for row in grid["rows"]}
-    assert list(rows) == ["mine.py:depth_first", *PLANNER_NAMES]
-    # There and back along a tree over 20 cells; a closed walk over them.
-    assert rows["mine.py:depth_first"]["steps"]["median"] == 38
-    assert rows["colony-search"]["steps"]["median"] == grid["bound_steps"] == 20
+    assert list(rows) == [*places, *PLANNER_NAMES]
+    # There and back along a tree over 20 cells; row by row, and one walk over them.
+    assert [rows[place]["steps"]["median"] for place in places] == [38, 19]
+    assert rows["colony-search"]["steps"]["median"] == grid["bound_steps"] == 19
     assert all(row["runs"] == 2 for row in rows.values())
 
 

@@ -35,11 +35,14 @@ def told(poses, *, keep_out=(), yaw=0.0, lost_pose_s=0.0, at_s=None, **changes):
         ordered_keep_out=tuple(
             tuple(turned(geometry, *at) for at in polygon) for polygon in keep_out
         ),
-        config={"robot": {"tool_width_m": TOOL_M, "radius_m": RADIUS_M}},
+        config={
+            "robot": {"tool_width_m": TOOL_M, "radius_m": RADIUS_M},
+            "mission": {"lost_pose_s": lost_pose_s},
+        },
         **changes,
     )
     lattice = CoverageLattice.from_map(data.grid, data.footprint)
-    floor = swept_floor(data, lattice, lost_pose_s)
+    floor = swept_floor(data, lattice)
     return floor and floor.figures
 
 
@@ -107,7 +110,7 @@ def test_what_the_ledger_had_last_is_told_beside():
     samples = [StatusSample(float(at), status) for at, status in enumerate(told)]
     assert RunData(statuses=samples).ledger_floor.swept_m2 == 3.5
     assert RunData(statuses=samples[2:]).ledger_floor is None
-    assert Figure("floor swept by the ledger", "3.5 m2", 3.5) in list(
+    assert Figure("floor swept, by the daemon", "3.5 m2", 3.5) in list(
         figures(ReviewDocument(ledger_swept_m2=3.5))
     )
 

@@ -211,6 +211,9 @@ def test_the_command_writes_them(parts, tmp_path):
         assert image.height == SIZE[1]
         assert image.width <= SIZE[0]
     names = {file.name for file in folder.iterdir()}
+    told = dict(line.split(maxsplit=1) for line in ended.err.splitlines() if str(folder) in line)
+    assert set(told) == {str(folder / name) for name in names}
+    assert told[str(folder / "trail.csv")] == "a row is a pose of the robot"
     assert names == {*(f"{name}.csv" for name in (*TABLES, "columns")), "end.npz"}
 
 

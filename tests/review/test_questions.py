@@ -17,11 +17,14 @@ pytest.importorskip("rerun")
 from fasaco_edge.cli import main
 from fasaco_edge.drawing import palette
 from fasaco_edge.recording import entities
+from fasaco_edge.review.drive import swept_floor
 from fasaco_edge.review.figures import document_of
 from fasaco_edge.review.instant import direction, heading_from, scene_at
+from fasaco_edge.review.output.pictures import draw_spots
 from fasaco_edge.review.output.rows import instant_rows, screen_rows
 from fasaco_edge.review.review import read_review
 from fasaco_edge.review.spot import explain, is_inside, spots_left
+from fasaco_edge.review.wording import clock
 from fasaco_edge.wire import topics
 from fasaco_edge.wire.documents.json_text import encode_json
 from fasaco_edge.wire.documents.replies import FloorReport
@@ -189,6 +192,31 @@ def test_why_a_spot_is_not_swept(review, place, why, words):
     assert spot.swept is (why == "swept")
 
 
+def test_floor_of_a_time_without_poses_is_not_called_missed(review):
+    """The robot drove there twice, but poses came only from both ends."""
+    data = review.data
+    kept = [i for i, (x, *_) in enumerate(data.poses) if not 0.5 < x < 1.3]
+    some = replace(data, poses=[data.poses[i] for i in kept], pose_s=[data.pose_s[i] for i in kept])
+    lost = replace(review, data=some, floor=swept_floor(some, review.lattice))
+    (spot,) = explain(lost, [(0.9, Y)])
+    assert (spot.why, spot.swept) == ("poses missing", None)
+    first, end = (
+        some.pose_s[0],
+        next(at for at, pose in zip(some.pose_s, some.poses, strict=True) if pose[0] > 1.3),
+    )
+    assert f"no pose came between {clock(first)} and {clock(end)}" in spot.words
+    assert dict(screen_rows(lost, document_of(lost)))["poses"].startswith("2 gaps over 2 m: floor")
+    assert "poses" not in dict(screen_rows(review, document_of(review)))
+    # The picture does not show a drive there; and what lies far off is missed as before.
+    colours = [
+        {colour for _, colour in draw_spots(each, [spot]).getcolors(maxcolors=1 << 20)}
+        for each in (review, lost)
+    ]
+    assert [palette.ORANGE in found for found in colours] == [False, True]
+    (spot,) = explain(lost, [(0.9, 1.4)])
+    assert spot.why == "not worth it"
+
+
 def with_floor(review, *swept_m2):
     """Return the review with statuses that report so much swept floor."""
     first, last = review.data.statuses[0], review.data.statuses[-1]
@@ -207,7 +235,9 @@ def test_floor_swept_before_the_recording_is_not_called_left(review):
     assert (spot.why, spot.swept) == ("not known", None)
     assert "when that began, 1.9 m2 had been swept" in spot.words
     assert document_of(late).swept_before_m2 == pytest.approx(1.9, abs=0.05)
-    assert ", and 1.9 m2 before it began" in dict(screen_rows(late, document_of(late)))["swept"]
+    assert (
+        ", and 1.9 m2 before it began" in dict(screen_rows(late, document_of(late)))["floor swept"]
+    )
     # The floor of an order before this one is none of it.
     for told in (with_floor(review, 2.0, 0.0, 0.3), with_floor(review, 0.0, 0.3)):
         (spot,) = explain(told, [(0.9, 0.7)])

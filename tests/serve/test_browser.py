@@ -25,11 +25,11 @@ pytest.importorskip("websockets")
 
 from websockets.sync.client import ClientConnection, connect
 
-from tests.serve.serving import served
+from tests.serve.serving import looking, served
 from tests.serve.test_plain import TECHNICAL
 from tests.support.outsider import TIMEOUT_S, Outsider
 from tests.support.processes import daemon_process
-from tests.support.rooms import HALL, begin, drive, lanes, map_bytes, pose_bytes
+from tests.support.rooms import HALL, UNKNOWN, begin, drive, fill, lanes, map_bytes, pose_bytes
 from tests.support.waiting import until
 
 BROWSER = shutil.which("chromium")
@@ -141,8 +141,26 @@ def pages_at(listed: str) -> list[dict[str, Any]]:
 
 def has(picture: np.ndarray, colour: str) -> int:
     """Return how many pixels have a colour."""
-    wanted = [int(colour[at : at + 2], 16) for at in (1, 3, 5)]
-    return int((picture == wanted).all(axis=-1).sum())
+    return int((picture == channels(colour)).all(axis=-1).sum())
+
+
+def channels(colour: str) -> list[int]:
+    """Return red, green and blue of a colour of the style."""
+    return [int(colour[at : at + 2], 16) for at in (1, 3, 5)]
+
+
+def pause_and_reload(tab: Tab, outsider: Outsider, url: str) -> None:
+    """Pause the mission, and open its page anew."""
+    tab.click("pause")
+    outsider.wait_status(lambda status: status["state"] == "paused")
+    tab.call("Page.navigate", url=url)
+    until(lambda: tab.js("model.state && model.state.state") == "paused")
+
+
+def another_server_shows_the_path(folder: Path, endpoint: str) -> bool:
+    """Tell whether the first path that a server shows which begins now leads anywhere."""
+    with served(folder, endpoint) as again, looking(again) as looker:
+        return bool(looker.wait("path", lambda path: path["revision"])["body"])
 
 
 def canceled(tab: Tab, outsider: Outsider) -> bool:
@@ -198,13 +216,12 @@ def test_a_mission_is_ordered_by_finger(tmp_path):
         assert not TECHNICAL.search(tab.js("document.body.innerText"))
         assert tab.js("find('technical').textContent").startswith("covering: ")
         # A pause, and a page opened anew, lose neither the path nor what is drawn.
-        tab.click("pause")
-        outsider.wait_status(lambda status: status["state"] == "paused")
-        tab.call("Page.navigate", url=page.url)
-        until(lambda: tab.js("model.state && model.state.state") == "paused")
+        pause_and_reload(tab, outsider, page.url)
         until(lambda: has(tab.picture(), tab.js("colours.ahead")))
         until(lambda: tab.js("find('togo').offsetParent !== null"))
         assert tab.js("drafts.map((draft) => draft.name).join()") == "keep-out 1"
+        # Nor does a server that begins in the pause: the daemon has sent an empty path since.
+        assert another_server_shows_the_path(tmp_path, daemon.endpoint)
         assert not TECHNICAL.search(tab.js("document.body.innerText"))
         tab.js("drafts.length = 0; showDrafts()")
         tab.click("resume")
@@ -259,8 +276,6 @@ def test_a_keep_out_applies_mid_mission_and_a_restart_asks_first(tmp_path):
             assert outsider.ask_status()["coverage"]["covered"] == 12
             until(lambda: tab.js("drafts.length") == 0)
 
-            show_what_is_left(tab)
-
             # Tapped on the map it can be removed; one of the order cannot.
             tab.js("canvas.scrollIntoView()")
             tab.touch(tab.on_screen(3.2, 2.2))
@@ -279,16 +294,69 @@ def test_a_keep_out_applies_mid_mission_and_a_restart_asks_first(tmp_path):
             assert tab.complaints == []
 
 
-def show_what_is_left(tab: Tab) -> None:
-    """Tap on a reason for which floor is not swept: the map shows where."""
-    until(lambda: tab.js("find('left-what').textContent") == "Left out so far")
-    assert not has(tab.picture(), tab.js("colours.left"))
-    tab.js("find('left').querySelector('button').click()")
-    until(lambda: has(tab.picture(), tab.js("colours.left")) > 100)
-    assert "in a keep-out" in tab.js("find('leftname').textContent")
-    assert not TECHNICAL.search(tab.js("document.body.innerText"))
-    photograph(tab, "not_swept")
-    tab.click("unleft")
+@needs_browser
+def test_a_reason_shows_its_floor_on_the_map_and_nothing_else(tmp_path):
+    with (
+        daemon_process(tmp_path, planner={"line": "quick"}) as daemon,
+        Outsider(daemon.endpoint) as outsider,
+        served(tmp_path, daemon.endpoint, "--allow-commands") as page,
+        browsing(page.url, tmp_path / "browser") as tab,
+    ):
+        until(lambda: tab.js("Boolean(model.state)"))
+        begin(outsider, fill(HALL, 3.0, 0.0, 6.0, 4.5, UNKNOWN))
+        until(lambda: "done at" in tab.js("find('togo-of').textContent"))
+        # While the map grows, nobody knows how much there is to do.
+        outsider.put("map", map_bytes(HALL))
+        until(lambda: "not before" in tab.js("find('togo-of').textContent"))
+        drive(outsider, lanes(12))
+        keep_out = {"name": "shelf", "polygon": [[2.0, 2.0], [2.6, 2.0], [2.6, 2.6], [2.0, 2.6]]}
+        tab.js(f"command('keep_out_add', {{ keep_out: {json.dumps(keep_out)} }})")
+        until(lambda: tab.js("find('left-what').textContent") == "Left out so far")
+        assert not any(painted(tab))
+        show_left(tab, "in a keep-out")
+        inside, outside = painted(tab, (1.7, 1.7), (2.9, 2.9))
+        photograph(tab, "not_swept")
+        assert inside > 300
+        assert outside == 0
+        # The robot's tool is round: corners stay.
+        show_left(tab, "too narrow")
+        corners = painted(tab, (0.0, 0.0), (0.3, 0.3)), painted(tab, (1.9, 1.9), (2.7, 2.7))
+        assert (corners[0][0] > 0, corners[1][0]) == (True, 0)
+        until(lambda: canceled(tab, outsider))
+        until(lambda: tab.js("find('left-what').textContent") == "Not swept")
+        show_left(tab, "ended before it got there")
+        inside, outside = painted(tab, (2.05, 2.05), (2.55, 2.55))
+        assert outside > 10_000
+        assert inside == 0
+        photograph(tab, "not_swept_after_cancel")
+        assert not TECHNICAL.search(tab.js("document.body.innerText"))
+        tab.click("unleft")
+        assert tab.complaints == []
+
+
+def show_left(tab: Tab, reason: str) -> None:
+    """Tap on a reason for which floor is not swept, until it is painted."""
+    tab.js("find('left').open = true")
+    every = "[...find('left').querySelectorAll('button')]"
+    until(lambda: tab.js(f"{every}.some((b) => b.textContent.includes({reason!r}))"))
+    tab.js(f"{every}.find((b) => b.textContent.includes({reason!r})).click()")
+    assert reason in tab.js("find('leftname').textContent")
+    tab.js("canvas.scrollIntoView()")
+    until(lambda: any(painted(tab)))
+
+
+def painted(
+    tab: Tab, low: tuple[float, float] = (0.0, 0.0), high: tuple[float, float] = (0.0, 0.0)
+) -> tuple[int, int]:
+    """Return how many pixels of the map have the colour of floor left in a rectangle, and beside.
+
+    ``low``, ``high``: its corners (x, y) [m].
+    """
+    picture = tab.picture()[: int(tab.js("canvas.getBoundingClientRect().bottom"))]
+    rows, cols = np.nonzero((picture == channels(tab.js("colours.left"))).all(axis=-1))
+    (x0, y1), (x1, y0) = tab.on_screen(*low), tab.on_screen(*high)
+    inside = np.count_nonzero((cols > x0) & (cols < x1) & (rows > y0) & (rows < y1))
+    return int(inside), len(rows) - int(inside)
 
 
 def draw_keep_out(tab: Tab, low: tuple[float, float], high: tuple[float, float]) -> None:

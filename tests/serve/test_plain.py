@@ -57,27 +57,53 @@ def test_all_reasons_for_floor_left_have_an_owners_words():
     assert reasons == set(plain.LEFT)
     assert {mission_reports.ON_PATH, *mission_reports.LATER} == set(plain.TO_COME)
     assert unreached.LEFT_OVER.startswith(plain.TRIED)
-    assert not [text for text in plain.LEFT.values() if TECHNICAL.search(text)]
+    assert not [text for text in (*plain.LEFT.values(), plain.ENDED) if TECHNICAL.search(text)]
+    of_floor = {*missed_floor.REASONS.values(), mission_reports.PASSED, mission_reports.BESIDE}
+    assert set(plain.MARKS) == of_floor | set(plain.TO_COME)
 
 
-def test_floor_left_is_listed_once_with_its_places():
-    """The floor's areas count before those of cells, which know the places."""
+def test_floor_left_is_listed_once_with_its_marks():
+    """No spot has two reasons: floor counts before cells, but for cells that are no floor."""
     narrow, closed, *_ = plain.LEFT
+    beside = "beside the path, and not worth the way"
     floor = {
-        "left": [{"m2": 3.0, "reason": "on the path"}, {"m2": 0.01, "reason": narrow}],
-        "out_of_reach": [{"m2": 1.5, "reason": closed}],
+        "swept_m2": 9.0,
+        "left": [{"m2": 3.0, "reason": "on the path"}, {"m2": 0.9, "reason": beside}],
+        "out_of_reach": [{"m2": 1.5, "reason": closed}, {"m2": 0.01, "reason": narrow}],
     }
     areas = [
         {"m2": 0.9, "x": 1.0, "y": 2.0, "reason": "closed off by obstacles"},
         {"m2": 0.7, "x": 3.0, "y": 4.0, "reason": "left over after 2 tries, robot stands"},
-        {"m2": 0.2, "x": 5.0, "y": 6.0, "reason": "left over after 1 try"},
+        {"m2": 0.2, "x": 5.0, "y": 6.0, "reason": "no longer free on the map"},
     ]
     mission = {"ordered": "command", "stage": "covering", "unreached": {"areas": areas}}
-    found = plain.left(status(floor=floor, mission=mission))
-    assert [(part.m2, part.places) for part in found] == [
-        (1.5, [(1.0, 2.0)]),
-        (pytest.approx(0.9), [(3.0, 4.0), (5.0, 6.0)]),
+    underway = status(floor=floor, mission=mission)
+    assert told_left(underway) == [
+        (1.5, "no way in: a closed door, or something in the way", 2, []),
+        (0.9, "it could not get there", 16, []),
+        (0.2, "something stands there now", 0, [(5.0, 6.0)]),
     ]
-    assert plain.left(status(floor=floor, mission=mission | {"ordered": None})) == []
-    over = plain.left(status(floor=floor, mission=mission | {"stage": "over"}))
-    assert over[0].m2 == 3.0
+    over = status(floor=floor, mission=mission | {"stage": "over"})
+    assert told_left(over)[0] == (3.0, "for another reason", 32, [])
+    # Much that was passed, and is not known to be swept: poses were far apart.
+    for m2, said in ((0.4, plain.LEFT[mission_reports.PASSED]), (2.0, plain.SELDOM)):
+        parts = floor | {
+            "reachable_m2": 9.0,
+            "left": [{"m2": m2, "reason": mission_reports.PASSED}],
+        }
+        assert (m2, said, 8, []) in told_left(status(floor=parts, mission=mission))
+    # Where only cells are counted, they tell it.
+    counted = status(floor={"swept_m2": 9.0}, mission=mission)
+    assert [m2 for m2, *_ in told_left(counted)] == [0.9, 0.7, 0.2]
+    # A canceled order asks for no floor any more: what it left is remembered.
+    canceled = status(floor=floor | {"left": []}, mission=mission | {"ordered": None})
+    assert told_left(canceled, underway)[0] == (3.9, plain.ENDED, plain.REST, [])
+    assert told_left(canceled) == []
+    forgotten = status(floor={"swept_m2": 0.0}, mission=mission | {"ordered": None})
+    assert told_left(forgotten, underway) == []
+
+
+def told_left(of: Status, ordered: Status | None = None) -> list[tuple[object, ...]]:
+    """Return the parts of the floor that are left."""
+    parts = plain.left(of, ordered)
+    return [(round(part.m2, 3), part.reason, part.marks, part.places) for part in parts]

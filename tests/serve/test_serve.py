@@ -199,6 +199,7 @@ def test_a_keep_out_keeps_coverage_and_a_new_order_asks_first(tmp_path):
         begin(outsider)
         drive(outsider, lanes(12))
         with served(tmp_path, daemon.endpoint, *words) as page, looking(page) as looker:
+            looker.wait("state", lambda state: state.get("state"))  # it has joined the bus
             assert looker.command("keep_out_add", keep_out=VASE)["ok"]
             areas = looker.wait("areas", lambda areas: areas["keep_out"])
             assert areas["keep_out"] == [{**VASE, "is": "operator"}]

@@ -200,7 +200,7 @@ def test_no_number_that_a_status_may_have_ends_the_page():
         now += 10.0
         view.take("status", Sample("", payload), now)
         shown += "state" in view.news(now)
-    assert shown > 80
+    assert shown > 70
 
 
 @pytest.mark.parametrize("name", MALFORMED)

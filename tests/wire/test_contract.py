@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 
 from fasaco_edge.errors import BadConfiguration, MalformedMessage, NothingToCover
 from fasaco_edge.host.resources import folder
+from fasaco_edge.mission.line.figures import Unswept
 from fasaco_edge.wire import limits, schemas, topics
 from fasaco_edge.wire.documents.json_text import decode_json, encode_json
 from fasaco_edge.wire.documents.replies import encode_error
@@ -49,9 +50,13 @@ def test_payloads_are_those_of_the_table() -> None:
     assert len(columns) == 1
 
 
-def test_the_readme_has_the_values_of_coverage() -> None:
-    shown = re.findall(r"^\| (-?\d+) \|", CONTRACT, re.MULTILINE)
-    assert [int(value) for value in shown] == sorted(CoverageValue)
+@pytest.mark.parametrize(
+    ("key", "values"), [("coverage", sorted(CoverageValue)), ("unswept", [0, *sorted(Unswept)])]
+)
+def test_the_readme_has_the_values_of_a_grid(key: str, values: list[int]) -> None:
+    table = CONTRACT.split(f"| value in `{key}` |")[1].split("\n\n")[0]
+    shown = re.findall(r"^\| (-?\d+) \|", table, re.MULTILINE)
+    assert [int(value) for value in shown] == values
 
 
 @pytest.mark.parametrize(

@@ -15,6 +15,7 @@ from fasaco_edge.cli.console.arguments import (
 )
 from fasaco_edge.cli.console.terminal import err
 from fasaco_edge.cli.warmup import compile_kernels
+from fasaco_edge.client.phrases import scale_words
 from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.grid.map_files import find_map
 from fasaco_edge.host.files import make_own_folder
@@ -121,7 +122,8 @@ def run(args: argparse.Namespace) -> int:
             make_own_folder(out)
         out.mkdir(parents=True, exist_ok=True)
     seconds = compile_kernels()
-    err().print(f"kernels ready ({seconds:.1f} s); results go to {out}")
+    simulated = scale_words(args.speed) or "simulated in real time"
+    err().print(f"kernels ready ({seconds:.1f} s); results go to {out}; {simulated}")
     robots = demo_robots(args, out)
     for robot in robots:
         # A demo writes this file, and must not overwrite one that no demo wrote.

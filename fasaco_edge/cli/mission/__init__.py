@@ -11,7 +11,6 @@ import msgspec
 
 from fasaco_edge.cli.ask import RefusedError, add_question, ask, show_mission
 from fasaco_edge.cli.console.arguments import Command, Exit, add_common
-from fasaco_edge.cli.console.help import HelpText
 from fasaco_edge.cli.console.pass_option import WORDS, add_passes
 from fasaco_edge.cli.console.streams import print_json
 from fasaco_edge.cli.console.terminal import agrees, err, may_ask
@@ -95,7 +94,7 @@ def _add_commands(parser: argparse.ArgumentParser) -> None:
     names = parser.add_subparsers(title="commands", required=True, metavar="COMMAND")
     for name, text in COMMANDS.items():
         described = text[0].upper() + text[1:] + "."
-        command = names.add_parser(name, help=text, description=described, formatter_class=HelpText)
+        command = names.add_parser(name, help=text, description=described)
         command.set_defaults(mission_command=name)
         if name == "keep-out":
             add_actions(command, _polygon, _add_receiver)

@@ -7,7 +7,6 @@ from collections.abc import Callable, Sequence
 
 from rich.table import Table
 
-from fasaco_edge.cli.console.help import HelpText
 from fasaco_edge.cli.console.terminal import out
 from fasaco_edge.mission.orders.order import read_command
 from fasaco_edge.wire.documents import replies
@@ -42,7 +41,6 @@ def add_actions(
     add_options: Callable[[argparse.ArgumentParser], None],
 ) -> None:
     """Add the commands of ``keep-out``; ``polygon`` reads corners, ``add_options`` is for all."""
-    parser.formatter_class = HelpText
     parser.epilog = EPILOG
     actions = parser.add_subparsers(title="commands", required=True, metavar="COMMAND")
     for name, text in ACTIONS.items():

@@ -76,6 +76,7 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--against",
         nargs="+",
+        action="extend",
         type=Path,
         metavar="FILE",
         help="the parts of another run to compare with",
@@ -172,7 +173,10 @@ def run(args: argparse.Namespace) -> int:
         from fasaco_edge.review.output.export import export
 
         with naming(args.export):
-            export(review, args.export, args.export_as)
+            written = export(review, args.export, args.export_as)
+        width = max(len(str(file)) for file, _ in written)
+        for file, what in written:
+            terminal.err().print(f"{file!s:{width}}  {what}", soft_wrap=True, highlight=False)
     if args.view:
         from fasaco_edge.recording.read.repair import view
 

@@ -8,7 +8,7 @@ from functools import partial
 
 import numpy as np
 
-from fasaco_edge.bus.queries import Reply, Request
+from fasaco_edge.bus.queries import Reply, Request, Shared
 from fasaco_edge.bus.session import Bus
 from fasaco_edge.daemon.loop.answers import Said, answering, check
 from fasaco_edge.errors import NotYet
@@ -28,6 +28,9 @@ from fasaco_edge.wire.documents.path_documents import TrailAttachment
 from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.messages.maps import direction_values, encode_occupancy_grid
 from fasaco_edge.wire.messages.pheromone import encode_pheromone
+
+# Parameter of the query for a path, and what is kept for it.
+BEFORE_STOP = "before_stop"
 
 
 class LastSamples:
@@ -52,15 +55,22 @@ class LastSamples:
         with self._lock:
             self._last[topic] = reply
 
+    def keep_path(self, path: Shared, *, stops: bool) -> None:
+        """Keep a path; the one before it, too, if it only ``stops`` the robot."""
+        with self._lock:
+            self._last["path"] = path
+            if not stops:
+                self._last[BEFORE_STOP] = path
+
     def keep_living(self, shown: ShownTrail) -> None:
         """Keep the living trail."""
         with self._lock:
             self._living = shown
 
     def _answer(self, topic: str, request: Request) -> Said:
-        check(request)
+        check(request, *((BEFORE_STOP,) if topic == topics.PATH.name else ()))
         with self._lock:
-            reply = self._last.get(topic)
+            reply = self._last.get(BEFORE_STOP if BEFORE_STOP in request.parameters else topic)
         if reply is None:
             what = "are no rooms" if topic == topics.ROOMS.name else f"is no {topic}"
             raise NotYet(f"there {what} yet")

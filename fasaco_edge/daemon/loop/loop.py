@@ -25,6 +25,7 @@ from fasaco_edge.daemon.loop.outbox import (
     FloorPublisher,
     Outbox,
     TrailPublisher,
+    UnsweptPublisher,
 )
 from fasaco_edge.daemon.loop.rooms_publisher import RoomsPublisher
 from fasaco_edge.daemon.loop.status import StatusBoard
@@ -97,6 +98,7 @@ class Loop:
         self._latency = MapLatency()
         self._coverage = CoveragePublisher(bus.outbox)
         self._floor = FloorPublisher(bus.outbox)
+        self._unswept = UnsweptPublisher(bus.outbox)
         self._trail = TrailPublisher(bus.outbox)
         self._rooms_out = RoomsPublisher(bus.outbox, rooms.book)
         self._guard = bus.outbox.guard
@@ -286,6 +288,7 @@ class Loop:
         self._perform(decision)
         self._guard.attempt("coverage", partial(self._coverage.publish, mission, now))
         self._guard.attempt("floor", partial(self._floor.publish, mission, now))
+        self._guard.attempt("unswept", partial(self._unswept.publish, mission, now))
         self._guard.attempt("pheromone", partial(self._trail.publish, mission, now))
         if self._bus.fleet is not None:
             self._guard.attempt("fleet", partial(self._bus.fleet.publish, mission, now))

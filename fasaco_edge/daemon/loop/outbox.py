@@ -6,6 +6,7 @@ The last samples are kept for queries (``daemon.loop.last_samples``).
 from __future__ import annotations
 
 import logging
+import math
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -62,6 +63,7 @@ class Outbox:
         self._path = bus.advertise(keys, topics.PATH)
         self._coverage = bus.advertise(keys, topics.COVERAGE)
         self._floor = bus.advertise(keys, topics.FLOOR)
+        self._unswept = bus.advertise(keys, topics.UNSWEPT)
         self._pheromone = bus.advertise(keys, topics.PHEROMONE)
         self._directions = bus.advertise(keys, topics.DIRECTIONS)
         self._rooms = bus.advertise(keys, topics.ROOMS)
@@ -79,7 +81,7 @@ class Outbox:
         attachment = encode_json(structs.replace(path_attachment(path), daemon=self._id))
         payload = encode_path(path.xy, yaw, path.frame, path.map_stamp_ns)
         message = Shared.of(payload, schemas.PATH, attachment)
-        self._last.keep("path", message)
+        self._last.keep_path(message, stops=path.stops)
         self._path.put(message.payload, attachment)
         if self._ros is not None:
             self._ros.path.put(message.payload)
@@ -136,6 +138,15 @@ class Outbox:
     def floor(self, grid: OccupancyGrid) -> None:
         """Publish the swept floor; the caller catches failures."""
         self._floor.put(encode_occupancy_grid(grid))
+
+    @property
+    def shows_unswept(self) -> bool:
+        """Whether the unswept floor has subscribers."""
+        return self._unswept.has_listeners()
+
+    def unswept(self, grid: OccupancyGrid) -> None:
+        """Publish the unswept floor; the caller catches failures."""
+        self._unswept.put(encode_occupancy_grid(grid))
 
     @property
     def shows_pheromone(self) -> bool:
@@ -276,6 +287,46 @@ class FloorPublisher:
         shown = floor.snapshot().shown(MOST_SQUARES, grid.frame, grid.stamp_ns)
         if shown is not None:
             self._outbox.floor(replace(shown, geometry=mission.rotation.geometry(shown.geometry)))
+
+
+class UnsweptPublisher:
+    """Publishes why floor is not swept while that has subscribers: on change, as the floor."""
+
+    def __init__(self, outbox: Outbox) -> None:
+        self._outbox = outbox
+        self._published_at = float("-inf")
+        self._key: tuple[object, ...] = ()
+
+    def publish(self, mission: Mission, now: float) -> None:
+        """Publish the unswept floor if that is due."""
+        if not self._outbox.shows_unswept:
+            self._key = ()  # the next listener has not received it
+            return
+        if now - self._published_at < FLOOR_PERIOD_S:
+            return
+        key = (mission.map_revision, mission.floor_to_sweep())
+        if key == self._key and now - self._published_at < REPEAT_S:
+            return
+        self._published_at, self._key = now, key
+        if (shown := mission.unswept()) is not None:
+            self._outbox.unswept(merged(shown, MOST_SQUARES))
+
+
+def merged(grid: OccupancyGrid, most: int) -> OccupancyGrid:
+    """Return a grid of at most ``most`` squares, each with the highest value of its pixels."""
+    rows, cols = grid.cells.shape
+    step = max(math.ceil(math.sqrt(rows * cols / most)), 1)
+    if step == 1:
+        return grid
+    padded = np.pad(grid.cells, ((0, -rows % step), (0, -cols % step)))
+    squares = padded.reshape(padded.shape[0] // step, step, -1, step).max(axis=(1, 3))
+    size = replace(
+        grid.geometry,
+        rows=squares.shape[0],
+        cols=squares.shape[1],
+        resolution=grid.geometry.resolution * step,
+    )
+    return replace(grid, geometry=size, cells=squares)
 
 
 class TrailPublisher:

@@ -124,7 +124,7 @@ class StatusBoard:
             pose=pose_report(mission),
             coverage=coverage_report(mission),
             floor=floor_report(mission),
-            path=_path_report(path, mission),
+            path=path_report(path, mission),
             plan=plan_counts(mission),
             latency_ms=Latencies(_ms(self.ingest_s), _ms(self.plan_s), _ms(self.map_to_path_s)),
             loop_ms=self.turns.report(),
@@ -193,7 +193,7 @@ class StatusBoard:
         return (TroubleReport("not_begun", text, to_do, since_s),) if since_s >= 0.0 else ()
 
 
-def _path_report(path: PublishedPath | None, mission: Mission | None) -> PathReport | None:
+def path_report(path: PublishedPath | None, mission: Mission | None) -> PathReport | None:
     """Return this part of the status; None before the first path of a mission."""
     if path is None or not path.revision or mission is None:
         return None
@@ -203,7 +203,8 @@ def _path_report(path: PublishedPath | None, mission: Mission | None) -> PathRep
         PathReport.of(path.plan),
         revision=path.revision,
         steps=path.steps,
-        remaining_steps=max(len(mission.route.path.ahead) - 1, 0),
+        # The mission may hold back a longer path until the robot comes near its change.
+        remaining_steps=min(max(len(mission.route.path.ahead) - 1, 0), path.steps),
         line_s=None if line is None else round(line.seconds, 1),
         line_gap=None if gap is None else round(gap, 4),
         reason=path.reason,

@@ -22,6 +22,7 @@ from fasaco_edge.wire.documents import replies
 from fasaco_edge.wire.documents.json_text import decode_json, decode_tolerant, encode_json, tolerant
 from fasaco_edge.wire.documents.status import Status
 from fasaco_edge.wire.keys import VERSION, Keys, is_chunk
+from fasaco_edge.wire.reasons import plain
 
 if TYPE_CHECKING:
     from fasaco_edge.bus.queries import Reply
@@ -157,5 +158,5 @@ def _cells(member: _Member, shown: Shown | None) -> tuple[str, str, str]:
         return "-", "-", one_line(member.refused)
     answer = tolerant(member.document, replies.Reply)
     covered = phrases.covered(answer.coverage) if answer.coverage else "-"
-    said = shown(answer) if shown else answer.reason
+    said = shown(answer) if shown else plain(answer.reason)
     return one_line(answer.state), covered, one_line(said)

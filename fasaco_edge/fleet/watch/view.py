@@ -18,6 +18,7 @@ from fasaco_edge.wire.documents.fleet import decode_member, fleet_of
 from fasaco_edge.wire.documents.json_text import decode_tolerant
 from fasaco_edge.wire.documents.status import FleetReport, Status
 from fasaco_edge.wire.keys import is_chunk
+from fasaco_edge.wire.reasons import plain
 
 # Least time between two notes of a robot's state [s]; time over which its rate is averaged [s].
 NOTED_EVERY_S, RATE_S = 1.0, 5
@@ -191,7 +192,7 @@ class FleetView:
             return
         name += {"": " joined", "gone": " is back"}.get(before, "")
         is_troubled = not robot.waits_for and robot.state in TROUBLED
-        why = f": {short(status.reason)}" if is_troubled and status is not None else ""
+        why = f": {short(plain(status.reason))}" if is_troubled and status is not None else ""
         is_good = doing == "done" or before in ("", "gone")
         tone = BAD if is_troubled else GOOD if is_good else PLAIN
         self.events.add(now, f"{name}: {doing}{why}", tone)

@@ -308,6 +308,14 @@ class Mission:
         """Return the areas of floor to sweep; None if cells are counted."""
         return self._line.to_sweep
 
+    def unswept(self) -> OccupancyGrid | None:
+        """Return why floor is not swept, in the map frame, see ``Unswept``; None if unknown."""
+        found, grid = self._line.unswept(), self._map.grid
+        if found is None or grid is None:
+            return None
+        geometry = self.rotation.geometry(found[0])
+        return OccupancyGrid(geometry, found[1].view(np.int8), grid.frame, grid.stamp_ns)
+
     def line_ahead(self) -> AheadFigures | None:
         """Return figures of the line ahead; None if cells are counted."""
         return self._line.ahead()

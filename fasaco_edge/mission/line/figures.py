@@ -2,7 +2,21 @@
 
 from __future__ import annotations
 
+from enum import IntEnum
 from typing import NamedTuple
+
+from fasaco_edge.mission.line.missed_floor import Cause
+
+
+class Unswept(IntEnum):
+    """Why a pixel of the floor is not swept; 0 if it is, or if it is no floor."""
+
+    NARROW = Cause.NARROW
+    CLOSED = Cause.CLOSED
+    KEPT_OUT = Cause.KEPT_OUT
+    PASSED = 4
+    BESIDE = 5
+    AHEAD = 6
 
 
 class FloorToSweep(NamedTuple):

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from fasaco_edge.grid.changes import carried
 from fasaco_edge.grid.fine_raster import raster_to_map, strips
 from fasaco_edge.grid.floor_map import FloorMap
-from fasaco_edge.grid.geometry import Pose2D, Window
+from fasaco_edge.grid.geometry import GridGeometry, Pose2D, Window
 from fasaco_edge.grid.possible_floor import possible_m2
 from fasaco_edge.mission.config import Sweeping
 from fasaco_edge.mission.core.events import PathUpdate
@@ -232,6 +232,13 @@ class LineLayer:
         return FloorToSweep(
             tally.wanted_m2, ahead_m2, left_m2, tally.passed_m2, beyond_m2, possible_m2
         )
+
+    def unswept(self) -> tuple[GridGeometry, NDArray[np.uint8]] | None:
+        """Return the raster, and why its pixels are not swept, see ``Unswept``."""
+        floor = self._map.floor
+        if floor is None or self._ahead is None or self.to_sweep is None:
+            return None
+        return floor.geometry, self._ahead.tally.unswept()
 
     def ahead(self) -> AheadFigures | None:
         """Return figures of the line ahead; None where cells are counted, or without a line."""

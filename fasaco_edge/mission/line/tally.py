@@ -26,6 +26,7 @@ from fasaco_edge.kernels.floor.open_floor import (
     set_open,
 )
 from fasaco_edge.kernels.floor.sweeps import BLOCK, NEVER, Scratch, Sweeps, sweep_edges
+from fasaco_edge.mission.line.figures import Unswept
 from fasaco_edge.mission.line.missed_floor import Cause
 from fasaco_edge.planners.line import blocks_of, left_in_blocks, memory_for_moves
 
@@ -144,6 +145,16 @@ class SweepTally:
             block = self.sweeps.counts[row : row + (1 << BLOCK), col : col + (1 << BLOCK)]
             found.append(np.argwhere(block == 0) + corner)
         return np.concatenate(found)
+
+    def unswept(self) -> NDArray[np.uint8]:
+        """Return why each pixel is not swept, uint8 (rows, cols), see ``Unswept``."""
+        state = self._state
+        causes: NDArray[np.uint8] = (state & np.uint8(CAUSE)) >> np.uint8(CAUSE_SHIFT)
+        causes[state & np.uint8(WANTED | SWEPT | OPEN) == WANTED] = Unswept.PASSED
+        is_open = state & np.uint8(OPEN) != 0
+        causes[is_open] = Unswept.AHEAD
+        causes[is_open & (self.sweeps.counts == 0)] = Unswept.BESIDE
+        return causes
 
     def open_in_m2(self, part: Window) -> float:
         """Return the area in a window that should be swept, on the line or not [m2]."""

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.bus.arrival import Arrival
+from fasaco_edge.client.phrases import scale_words
 from fasaco_edge.errors import FasacoError
 from fasaco_edge.wire.documents.json_text import decode_tolerant
 from fasaco_edge.wire.documents.settings import KnownSettings, known_settings
@@ -104,11 +105,6 @@ class RobotClock:
             both = self.robot_s, self.recorder_s
             recorder_s = float(_converted(np.array([robot_s]), *both)[0])
         return self.began_ns + round(1e9 * recorder_s)
-
-
-def scale_words(scale: float) -> str:
-    """Return the speed of a simulation in words; "" for a real robot."""
-    return "" if scale == 1.0 else f"simulated at {scale:g} times real time"
 
 
 def _settings(arrival: Arrival) -> KnownSettings | None:

@@ -17,6 +17,7 @@ from fasaco_edge.recording.sdk import rr
 from fasaco_edge.recording.write.writer import RecordingWriter
 from fasaco_edge.wire.documents.path_documents import PathAttachment, Rectangle
 from fasaco_edge.wire.messages.paths import PathMessage
+from fasaco_edge.wire.reasons import plain
 
 # Bytes of a point in the file; each path is drawn twice, the second time as the previous path.
 POINT_BYTES = 2 * 12
@@ -124,7 +125,7 @@ class PathLog:
         group, self._group = self._group, None
         if group is not None and group.more:
             plans = f"{group.more} more plan{'s' * (group.more != 1)}"
-            why = "the map changed" if group.kind == "map" else group.kind
+            why = "the map changed" if group.kind == "map" else plain(group.kind)
             self._write(f"{plans} up to path {group.newest}: {why}", "INFO")
 
     def _write(self, line: str, level: str) -> None:
@@ -142,7 +143,7 @@ def _path_line(message: PathMessage, about: PathAttachment) -> str:
         facts.append(f"gap {100 * about.gap:.0f} %")
     if about.planner:
         facts.append(f"{about.planner} took {about.plan_ms:.0f} ms")
-    return f"{named}{': ' if about.reason else ''}{about.reason} ({', '.join(facts)})"
+    return f"{named}{': ' if about.reason else ''}{plain(about.reason)} ({', '.join(facts)})"
 
 
 SPACING_M = 0.02

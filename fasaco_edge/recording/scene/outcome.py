@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from fasaco_edge.client.phrases import scale_words
 from fasaco_edge.grid.geometry import StampedPose
-from fasaco_edge.recording.read.robot_clock import scale_words
 from fasaco_edge.text import duration
 from fasaco_edge.wire.documents.settings import known_settings
 from fasaco_edge.wire.documents.status import Status
+from fasaco_edge.wire.reasons import plain
 
 # States in which there is no outcome yet.
 UNDER_WAY = ("planning", "covering")
@@ -40,7 +41,7 @@ class Outcome:
             words += f" after {duration(1e-9 * (self._now_ns - self._began_ns))}"
         if simulated := scale_words(known_settings(status.config).robot.time_scale):
             words += f" ({simulated})"
-        said = [status.reason] if status.reason else []
+        said = [plain(status.reason)] if status.reason else []
         floor = status.floor
         if floor is not None and floor.reachable_m2 and "swept" not in status.reason:
             said.append(f"{floor.swept_m2:.1f} of {floor.reachable_m2:.1f} m2 swept")

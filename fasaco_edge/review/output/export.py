@@ -23,12 +23,14 @@ DESCRIPTION = "columns"
 """The table that describes the columns of the others."""
 
 
-def export(review: Review, folder: Path, form: str = CSV) -> None:
-    """Write all series of a review into ``folder``, which is made if missing.
+def export(review: Review, folder: Path, form: str = CSV) -> list[tuple[Path, str]]:
+    """Write all series of a review into ``folder``, which is made if missing; return the files.
 
     A file for each of ``tables``; columns.csv, which says what they hold, in what units;
     and end.npz: map int8 and its origin (x, y, yaw) and resolution_m; visits uint16 and reachable
     bool of the lattice with its first row, column and cell_m.
+
+    Each file comes with a phrase that says what is in it.
 
     Args:
         review: what to write.
@@ -40,13 +42,14 @@ def export(review: Review, folder: Path, form: str = CSV) -> None:
         UnreadableRecording: a file of the recording is gone.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    described = []
+    described, written = [], []
     for table in tables_of(review):
         file = folder / f"{table.name}.{form}"
         if form == CSV:
             _write_csv(table, file)
         else:
             _write_parquet(table, file)
+        written.append((file, f"a row is {table.about}"))
         described += [(file.name, table.about, *column) for column in table.columns]
     columns = (
         Column("file", "text", "", "its name"),
@@ -57,8 +60,14 @@ def export(review: Review, folder: Path, form: str = CSV) -> None:
         Column("description", "text", "", "what it is"),
     )
     # This table is CSV even with Parquet, for people to read.
-    _write_csv(Table(DESCRIPTION, "", columns, described), folder / f"{DESCRIPTION}.csv")
-    _write_arrays(review, folder / "end.npz")
+    columns_of, arrays = folder / f"{DESCRIPTION}.csv", folder / "end.npz"
+    _write_csv(Table(DESCRIPTION, "", columns, described), columns_of)
+    _write_arrays(review, arrays)
+    return [
+        (columns_of, "what the columns of the tables hold, in what units: begin here"),
+        *written,
+        (arrays, "the map at the end, and how often each cell was covered, for NumPy"),
+    ]
 
 
 def _write_csv(table: Table, file: Path) -> None:

@@ -19,6 +19,7 @@ from fasaco_edge.review.instant import Scene
 from fasaco_edge.review.output.panels import coverage_panel, replan_panel, state_panel
 from fasaco_edge.review.output.rows import instant_rows, spot_rows
 from fasaco_edge.review.review import Review
+from fasaco_edge.review.run_data import RunData
 from fasaco_edge.review.spot import Spot
 from fasaco_edge.review.wording import clock
 from fasaco_edge.wire.documents.settings import known_settings
@@ -70,7 +71,7 @@ def draw_map(review: Review, space: tuple[int, int]) -> Image.Image | None:
         space: largest size of the map (width, height) [px].
     """
     grid, lattice, drive, floor = review.data.grid, review.lattice, review.drive, review.floor
-    track = _thinned(review.data.track[:, :2])
+    track, driven = _thinned(review.data)
     if grid is None or lattice is None or drive is None or not len(track):
         return None
     # A line over the floor covers cells without passing their centres: visits would not show it.
@@ -83,7 +84,7 @@ def draw_map(review: Review, space: tuple[int, int]) -> Image.Image | None:
         title=f"{review.record.recording_id}: {DONE[review.complete]}",
         lines=_caption(review),
         space=space,
-        jump_m=review.data.jump_m,
+        driven=driven,
         swept=MapLayer(floor.geometry, floor.swept) if floor and is_line else None,
         unswept=MapLayer(floor.geometry, floor.unswept) if floor else None,
         left_out_words=left_out_words(review),
@@ -107,8 +108,8 @@ def draw_scene(review: Review, scene: Scene) -> Image.Image | None:
     grid, lattice, instant, data = scene.grid, review.lattice, scene.instant, review.data
     if grid is None or lattice is None:
         return None
-    near = np.abs(data.times - instant.at_s) <= AROUND_S
-    drive = _thinned(data.track[near, :2])
+    near = np.flatnonzero(np.abs(data.times - instant.at_s) <= AROUND_S)
+    drive, driven = _thinned(data, slice(near[0], near[-1] + 1) if len(near) else slice(0))
     plot = Plot(View.over(bounds_of(grid, lattice, drive), lattice.cell_m))
     plot.ground(grid)
     key = draw_order(plot, [zone.polygon for zone in data.zones if zone.polygon], data.keep_out)
@@ -120,8 +121,8 @@ def draw_scene(review: Review, scene: Scene) -> Image.Image | None:
         if line is not None and len(line.xy):
             plot.line(line.xy, colour, width)
             key.append(KeyEntry("tile", colour, f"{label} ({line.revision})"))
-    if len(drive) > 1:
-        plot.track(drive[:-1], drive[1:], DRIVE_M)
+    if driven.any():
+        plot.track(drive[:-1][driven], drive[1:][driven], DRIVE_M)
     if (changed := instant.map) is not None and (box := changed.around) is not None:
         corners = [(box.x_min, box.y_min), (box.x_max, box.y_min)]
         corners += [(box.x_max, box.y_max), (box.x_min, box.y_max)]
@@ -143,15 +144,20 @@ def draw_spots(review: Review, spots: Sequence[Spot]) -> Image.Image | None:
     lattice, data = review.lattice, review.data
     if data.grid is None or lattice is None or not spots:
         return None
-    drive = _thinned(data.track[:, :2])
+    drive, driven = _thinned(data)
     plot = Plot(View.over(bounds_of(data.grid, lattice, drive), lattice.cell_m))
     plot.ground(data.grid)
     key = []
     if review.floor is not None:
         key += draw_unswept(plot, MapLayer(review.floor.geometry, review.floor.unswept))
     key += draw_order(plot, [zone.polygon for zone in data.zones if zone.polygon], data.keep_out)
-    if len(drive) > 1:
-        plot.track(drive[:-1], drive[1:], DRIVE_M)
+    if driven.any():
+        plot.track(drive[:-1][driven], drive[1:][driven], DRIVE_M)
+    gaps = [drive[at : at + 2] for at in np.flatnonzero(~driven).tolist()]
+    for gap in gaps:
+        plot.line(gap, palette.ORANGE, 1.5)
+    if gaps:
+        key.append(KeyEntry("tile", palette.ORANGE, "no pose in between: does not count"))
     for spot in spots:
         plot.end_mark(np.array([spot.x, spot.y]))
     key.append(KeyEntry("square", palette.END, "asked for"))
@@ -178,7 +184,7 @@ def _caption(review: Review) -> list[str]:
     if review.floor is not None:
         figures = review.floor.figures
         swept = swept_words(figures.swept_m2, figures.reachable_m2)
-        lines.append(f"reachable floor swept: {swept}")
+        lines.append(f"floor swept: {swept}, by recorded poses")
     if walk is not None:
         lines.append(
             f"{walk.steps:,} steps, {walk.revisits:,} revisits, {walk.turns_90:,} quarter-turns"
@@ -204,11 +210,21 @@ def left_out_words(review: Review) -> str:
     return "not passed while it was recorded" if has_counted_more else "not covered"
 
 
-def _thinned(track: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return a track (n, 2) without points that almost coincide with others."""
-    if len(track) < 3:
-        return track
-    way = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(track, axis=0).T))))
-    kept = np.diff(np.floor(way / TRAIL_SPACING_M), prepend=-1.0) > 0
-    kept[-1] = True
-    return track[kept]
+def _thinned(
+    data: RunData, part: slice = slice(None)
+) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    """Return a track without points that almost coincide with others, float64 (n, 2).
+
+    And which of its points were driven to from the one before, bool (n - 1,).
+    """
+    track = data.track[part, :2]
+    gaps = np.concatenate(([0], np.cumsum(~data.driven)))[: len(data.poses)][part]
+    if len(track) > 2:
+        ways = np.hypot(*np.diff(track, axis=0).T)
+        way = np.concatenate(([0.0], np.cumsum(ways)))
+        kept = np.diff(np.floor(way / TRAIL_SPACING_M), prepend=-1.0) > 0
+        kept[-1] = True
+        # Both ends of a gap.
+        kept[:-1] |= np.diff(gaps) > 0
+        track, gaps = track[kept], gaps[kept]
+    return track, np.diff(gaps) == 0

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
+import numpy as np
 from msgspec.structs import astuple
 
-from fasaco_edge.recording.read.robot_clock import scale_words
+from fasaco_edge.client.phrases import scale_words
 from fasaco_edge.review.comparison import figures
 from fasaco_edge.review.document import ReviewDocument
 from fasaco_edge.review.drive import MILESTONES
@@ -15,6 +16,7 @@ from fasaco_edge.review.instant import Instant, MapThen, PathThen, PlanThen, dir
 from fasaco_edge.review.orders import order_words
 from fasaco_edge.review.wording import NOT_KNOWN, amount, clock, count
 from fasaco_edge.wire.documents.path_documents import Rectangle
+from fasaco_edge.wire.reasons import plain
 
 if TYPE_CHECKING:
     from fasaco_edge.review.moments import Span
@@ -36,6 +38,8 @@ LEFT = ("m2", "at", "why")
 MOST_PLACES = 3
 # Less saved by a cohort or by local search is not shown [s].
 LEAST_SAVED_S = 0.05
+# Nor is less of a way without poses [m].
+LEAST_LOST_M = 1.0
 CHARGES = ("at", "for", "battery")
 
 
@@ -110,7 +114,7 @@ def screen_rows(review: Review, document: ReviewDocument) -> list[tuple[str, str
     return [
         ("run", f"{_began(document.began)}, {sides}{planner}, {document.robot or 'robot'}"),
         *clock_rows(document),
-        ("swept", by_name["reachable floor swept"] + _before(document)),
+        ("floor swept", _swept(document, by_name["floor swept"])),
         ("covered", by_name["covered"]),
         ("cells after", ", ".join(reached)),
         ("left", _some(left)),
@@ -120,9 +124,22 @@ def screen_rows(review: Review, document: ReviewDocument) -> list[tuple[str, str
         *([("processor", _processor(document))] if document.processor_s else []),
         ("commands", _some(commands)),
         *([("charges", _some(charges))] if charges else []),
+        *([("poses", lost)] if (lost := _lost_way(review)) else []),
         ("troubles", _some(troubles)),
         ("refused", f"{document.faults} messages; lost {count(document.recorder_lost, '')}"),
     ]
+
+
+def _lost_way(review: Review) -> str:
+    """Return over how much of its way the robot's poses are missing; "" over little."""
+    data = review.data
+    if len(data.poses) < 2:
+        return ""
+    ways_m = np.hypot(*np.diff(data.track[:, :2], axis=0).T)[~data.driven]
+    if ways_m.sum() < LEAST_LOST_M:
+        return ""
+    gaps = f"{len(ways_m)} gap{'s' * (len(ways_m) != 1)}"
+    return f"{gaps} over {ways_m.sum():.0f} m: floor between them does not count"
 
 
 def _processor(document: ReviewDocument) -> str:
@@ -172,9 +189,10 @@ def _ending(document: ReviewDocument) -> str:
     return f"not complete: the recording {how} while the mission was {document.state}"
 
 
-def _before(document: ReviewDocument) -> str:
-    m2 = document.swept_before_m2
-    return f", and {m2:.1f} m2 before it began" if m2 else ""
+def _swept(document: ReviewDocument, text: str) -> str:
+    before_m2 = document.swept_before_m2
+    by = ", by recorded poses" if document.swept_m2 is not None else ""
+    return text + by + (f", and {before_m2:.1f} m2 before it began" if before_m2 else "")
 
 
 def card_rows(document: ReviewDocument) -> list[tuple[str, str]]:
@@ -218,7 +236,7 @@ def reason_rows(document: ReviewDocument) -> list[tuple[str, str, str, str]]:
     """Return each kind of reason for a replan: number, median and slowest."""
     took = document.replan_ms_by_reason
     return [
-        (kind, str(count), amount(took[kind].p50, "ms"), amount(took[kind].max, "ms"))
+        (plain(kind), str(count), amount(took[kind].p50, "ms"), amount(took[kind].max, "ms"))
         for kind, count in document.replans_by_reason.items()
     ]
 
@@ -237,18 +255,18 @@ def _replan_row(path: PathSample) -> tuple[str, ...]:
         "-" if about.gap is None else f"{100 * about.gap:.1f} %",
         "-" if about.planned_cost_s is None else clock(about.planned_cost_s),
         _place(about.changed),
-        about.reason,
+        plain(about.reason),
     )
 
 
 def moment_rows(review: Review) -> list[tuple[str, ...]]:
     """Return the worst moments: figure, value, time and note."""
-    return [(m.what, amount(m.value, m.unit), clock(m.at_s), m.note) for m in review.moments]
+    return [(m.what, amount(m.value, m.unit), clock(m.at_s), plain(m.note)) for m in review.moments]
 
 
 def trouble_rows(troubles: list[Span]) -> list[tuple[str, ...]]:
     """Return each trouble: the state, when, for how long, and why."""
-    return [(s.name, clock(s.begin_s), f"{s.seconds:.1f} s", s.reason) for s in troubles]
+    return [(s.name, clock(s.begin_s), f"{s.seconds:.1f} s", plain(s.reason)) for s in troubles]
 
 
 def charge_rows(document: ReviewDocument) -> list[tuple[str, str, str]]:
@@ -294,7 +312,7 @@ def _began(began: str) -> str:
 
 def instant_rows(instant: Instant) -> Iterator[tuple[str, str]]:
     """Yield name and text of all that is known of a moment."""
-    state, why = instant.state or "not known", instant.state_reason
+    state, why = instant.state or "not known", plain(instant.state_reason or "")
     # The first path since that state was entered; the present path follows below.
     yield "state", f"{state}: {why}" if why and not why.startswith("path ") else state
     if instant.order:
@@ -327,7 +345,7 @@ def instant_rows(instant: Instant) -> Iterator[tuple[str, str]]:
 def _path_words(path: PathThen, when: str) -> str:
     leads = "" if path.leads_deg is None else f"; leads {direction(path.leads_deg)} from there"
     where = "" if path.changed is None else f", map changed {_box_words(path.changed)}"
-    return f"{path.revision} at {when}: {path.reason}{where}; {path.steps} steps{leads}"
+    return f"{path.revision} at {when}: {plain(path.reason)}{where}; {path.steps} steps{leads}"
 
 
 def _plan_words(plan: PlanThen, when: str) -> str:
@@ -339,7 +357,9 @@ def _plan_words(plan: PlanThen, when: str) -> str:
     if plan.saved_by_local_search_s >= LEAST_SAVED_S:
         found.append(f"local search saved {plan.saved_by_local_search_s:.1f} s")
     why = ", ".join(found) or "nothing saved"
-    return f"{plan.revision} at {when}: {plan.reason}; {plan.planner}, {plan.ants} ants; {why}"
+    return (
+        f"{plan.revision} at {when}: {plain(plan.reason)}; {plan.planner}, {plan.ants} ants; {why}"
+    )
 
 
 def _map_words(change: MapThen, since: str) -> str:

@@ -172,7 +172,7 @@ def _mission(review: Review) -> Iterator[Table]:
         (round(at, 6), round(part, 6))
         for at, part in zip(*(each.tolist() for each in covered_share(review)), strict=True)
     )
-    yield Table("coverage", "how much was covered", (AT, share), covered)
+    yield Table("coverage", "the share covered at a time", (AT, share), covered)
     columns = (
         AT,
         Column("name", "text", "", "of the plot, with its unit where it has one"),

@@ -82,8 +82,8 @@ function showBars() {
     taken = taken || Boolean(wanted);
   }
   if (model.left) {
-    const { reason, places } = model.left, isOver = model.state.mission.stage === "over";
-    document.getElementById("leftname").textContent = `${isOver ? "not swept" : "not swept yet"}; ${places.length ? "ringed" : "among it"}: ${reason}`;
+    const isShown = model.left.places.length || model.left.marks === REST || (model.left.marks && !model.recording);
+    document.getElementById("leftname").textContent = `${model.left.reason}${isShown ? "" : " (where is not known)"}`;
   }
   redraw();
 }

@@ -15,7 +15,7 @@ function remembered() {
 }
 
 const send = (message) => socket && socket.readyState === WebSocket.OPEN && socket.send(JSON.stringify(message));
-const wants = () => send({ kind: "wants", field: showsField });
+const wants = () => send({ kind: "wants", field: showsField, unswept: Boolean(model.left) });
 
 // Callbacks for accepted and refused commands, by their number.
 const awaited = new Map();

@@ -1,10 +1,10 @@
 // The state of the robot: the newest message of each kind, grids and path unpacked.
 const model = {
   state: null, pose: null, areas: null, events: [], others: [],
-  map: null, floor: null, field: null, path: null, role: "viewer",
+  map: null, floor: null, unswept: null, field: null, path: null, role: "viewer",
   // Of a recording: what it is, the track driven in all of it, and the time shown.
   recording: null, track: null, at: 0,
-  // The part of the floor that is not swept, and shown on the map.
+  // Floor that is not swept for one reason, and shown on the map.
   left: null,
 };
 

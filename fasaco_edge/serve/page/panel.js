@@ -27,9 +27,10 @@ function duration(seconds) {
 
 // When a robot that drives will be done, by the clock.
 function ends(state) {
-  if (state.to_go_s === null || state.to_go_s < 60 || state.state === "paused" || model.recording || !(state.time_scale > 0)) return "to go";
+  if (state.to_go_s === null || state.to_go_s < 60 || state.state === "paused" || model.recording || !(state.time_scale > 0)) return state.grows ? "to go at least" : "to go";
   const end = new Date(Date.now() + (1000 * state.to_go_s) / state.time_scale);
-  return `done at ${end.toLocaleTimeString([], { hour: "2-digit", minute: "2-digit", hour12: false })}`;
+  // While it still finds rooms, there is more to do than it knows.
+  return `${state.grows ? "not before" : "done at"} ${end.toLocaleTimeString([], { hour: "2-digit", minute: "2-digit", hour12: false })}`;
 }
 
 function showState() {
@@ -65,26 +66,30 @@ function showTechnical(state) {
   const bus = state.bus ? [`waits for the bus at ${state.bus}`] : [];
   const lines = [`${state.state}: ${state.reason || "no reason"}`, ...bus, ...state.faults, ...away];
   showList("technical", lines.map((text) => item(text)));
-  find("foot").textContent = `fasaco-edge ${state.version}`;
+  find("foot").textContent = [`fasaco-edge ${state.version}`, state.simulated].filter(Boolean).join(", ");
 }
 
 // What is not swept: each line shows itself on the map; the list opens by itself at the end.
 let wasOver = null;
 function showLeft(state) {
-  const parts = state.left, isOver = state.mission.stage === "over";
+  const parts = state.left, isOver = ["over", null].includes(state.mission.stage);
   find("left").hidden = !parts.length;
   find("left-what").textContent = isOver ? "Not swept" : "Left out so far";
   find("left-m2").textContent = squares(parts.reduce((sum, part) => sum + part.m2, 0));
   find("left").querySelector("ul").replaceChildren(...parts.map((part) => {
-    const line = document.createElement("li"), show = action("", () => showOnMap(part));
-    show.append(...item(["span", "m2", squares(part.m2)], part.reason).childNodes);
+    const line = item(["span", "m2", squares(part.m2)], part.reason);
+    // Where it is, is not recorded, but for areas with a place.
+    if (model.recording && !part.places.length) return line;
+    const show = action("", () => showOnMap(part));
+    show.append(...line.childNodes);
     line.append(show);
     return line;
   }));
+  find("left-hint").hidden = !find("left").querySelector("button");
   if (isOver && !wasOver) find("left").open = true;
   wasOver = isOver;
   const shown = model.left && parts.find((part) => part.reason === model.left.reason);
-  if (model.left) { model.left = shown || null; showBars(); }
+  if (model.left) { model.left = shown || null; showBars(); if (!shown) wants(); }
 }
 
 function showOnMap(part) {
@@ -93,9 +98,10 @@ function showOnMap(part) {
   Object.assign(view, { fitted: true, follows: false });
   showTools();
   showBars();
+  wants();
   document.querySelector("main").scrollIntoView({ block: "nearest" });
 }
-find("unleft").addEventListener("click", () => { model.left = null; showBars(); });
+find("unleft").addEventListener("click", () => { model.left = null; showBars(); wants(); });
 
 function showProgress(state) {
   const floor = state.floor, knows = floor && floor.reachable_m2;

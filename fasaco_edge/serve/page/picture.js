@@ -57,34 +57,28 @@ function drawGrid(context, grid) {
   context.restore();
 }
 
-// Free floor that is not swept, of the order's rooms if it has some, in a colour of its own.
+// Floor that is not swept for one reason, and nothing else; thin strips are drawn wider.
 const beside = document.createElement("canvas");
+const THICK = [[0, 0], [1, 0], [-1, 0], [0, 1], [0, -1]];
+const REST = 64, OUT_OF_REACH = 7;
 function drawLeft(context, ratio) {
-  if (!model.left || !model.map) return;
+  if (!model.left) return;
+  const { marks, places } = model.left;
   [beside.width, beside.height] = [canvas.width, canvas.height];
   const over = beside.getContext("2d");
   over.setTransform(ratio, 0, 0, ratio, 0, 0);
-  const pixels = [["map", (mark) => (mark & 3) === 1], ["floor", (mark) => mark >= 8]];
-  for (const [kind, holds] of pixels) {
+  const layers = marks === REST
+    ? [["map", (mark) => (mark & 3) === 1], ["floor", (mark) => mark >= 8], ["unswept", (mark) => mark & OUT_OF_REACH]]
+    : [["unswept", (mark) => mark & marks]];
+  for (const [kind, holds] of layers) {
     if (!model[kind]) continue;
-    over.globalCompositeOperation = kind === "map" ? "source-over" : "destination-out";
-    drawGrid(over, { ...model[kind], image: maskOf(model[kind], holds) });
+    over.globalCompositeOperation = kind === layers[0][0] ? "source-over" : "destination-out";
+    drawGrid(over, { ...model[kind], image: maskOf(model[kind], marks, holds) });
   }
-  const names = new Set(((model.state && model.state.mission) || { zones: [] }).zones.map((zone) => zone.name));
-  const rooms = ((model.areas && model.areas.zones) || []).filter((zone) => names.has(zone.name));
-  if (rooms.length) {
-    over.globalCompositeOperation = "destination-in";
-    over.beginPath();
-    for (const room of rooms) {
-      room.polygon.forEach(([x, y], i) => over[i ? "lineTo" : "moveTo"](...toScreen(x, y)));
-      over.closePath();
-    }
-    over.fill();
-  }
-  context.drawImage(beside, 0, 0, canvas.clientWidth, canvas.clientHeight);
+  for (const [x, y] of marks === REST ? THICK.slice(0, 1) : THICK) context.drawImage(beside, x, y, canvas.clientWidth, canvas.clientHeight);
   context.lineWidth = 3;
   context.strokeStyle = colours.ink;
-  for (const [x, y] of model.left.places) {
+  for (const [x, y] of places) {
     context.beginPath();
     context.arc(...toScreen(x, y), 14, 0, 2 * Math.PI);
     context.stroke();
@@ -92,11 +86,12 @@ function drawLeft(context, ratio) {
 }
 
 // The pixels of a grid whose marks hold, as an image; kept with the grid.
-function maskOf(grid, holds) {
-  if (grid.mask && grid.maskColour === colours.left) return grid.mask;
+function maskOf(grid, marks, holds) {
+  const key = `${marks} ${colours.left}`;
+  if (grid.maskKey === key) return grid.mask;
   const table = new Uint8ClampedArray(4 * 256);
   for (let mark = 0; mark < 256; mark++) if (holds(mark)) table.set([...channels(colours.left), 255], 4 * mark);
-  [grid.mask, grid.maskColour] = [tinted(grid, table), colours.left];
+  [grid.mask, grid.maskKey] = [tinted(grid, table), key];
   return grid.mask;
 }
 

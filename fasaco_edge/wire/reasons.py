@@ -1,0 +1,27 @@
+"""Plain words for reasons that a daemon publishes in words of its own.
+
+The published texts stay as they are: a replay compares them with those of old recordings.
+"""
+
+from __future__ import annotations
+
+import re
+
+WORDS = {
+    "better further on": "a better path found for floor further ahead",
+    "line polished": "the line ahead improved",
+}
+# A mission's ending has it, too; where the swept floor is shown in full, ``possible`` says it.
+_POSSIBLE = re.compile(r", or of [\d.]+ m2 if walls are a pixel thinner than on the map")
+
+
+def plain(text: str) -> str:
+    """Return a text with the reasons in it in plain words."""
+    for reason, words in WORDS.items():
+        text = text.replace(reason, words)
+    return _POSSIBLE.sub("", text)
+
+
+def possible(area: str) -> str:
+    """Return what could be reachable at most: ``area``, of floor."""
+    return f" (of {area} if the map shows walls too thick)"
