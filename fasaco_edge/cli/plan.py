@@ -8,10 +8,12 @@ import signal
 from collections import deque
 from collections.abc import Sequence
 from contextlib import nullcontext
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
+from rich.table import Table
 
 from fasaco_edge.cli.console import terminal
 from fasaco_edge.cli.console.arguments import Command, Exit, check_outputs, writing
@@ -25,10 +27,11 @@ from fasaco_edge.grid.map_files import find_map, map_sources
 from fasaco_edge.host.processes import first_signal_calls
 from fasaco_edge.offline.settings import CELLS
 from fasaco_edge.planners.planner import ColonySnapshot, Interrupt, ignore
-from fasaco_edge.planners.stages import stages_of_plan
+from fasaco_edge.planners.stages import ROOMS, stages_of_plan
 
 if TYPE_CHECKING:
     from fasaco_edge.offline.result import Plan
+    from fasaco_edge.offline.rooms import RoomsUnderLine
 
 LOG = logging.getLogger(__name__)
 
@@ -44,9 +47,8 @@ def run(args: argparse.Namespace) -> int:
         (args.path_out, args.xy_out, args.png, args.pheromone_png),
         [*map_sources(find_map(args.map)), *request.sources],
     )
+    _check_together(args)
     if args.robots or args.robots_xy:
-        if args.passes is not None:
-            raise BadConfiguration("--passes is for one robot, not with --robots and --robots-xy")
         from fasaco_edge.fleet.cli.plan import plan_fleet
 
         return plan_fleet(args, request)
@@ -60,7 +62,8 @@ def run(args: argparse.Namespace) -> int:
             hint=f"choose --planner {', '.join(WITH_PHEROMONE[:-1])} or {WITH_PHEROMONE[-1]}",
         )
     has_curves = robot.turn_radius_m > 0.0
-    compile_kernels(stages_of_plan(search.planner, has_curves=has_curves))
+    stages = stages_of_plan(search.planner, has_curves=has_curves)
+    compile_kernels((*stages, ROOMS) if args.rooms else stages)
     # Imported only now, as these modules import the compiler.
     from fasaco_edge.offline.maps import load_map
     from fasaco_edge.offline.plan import plan
@@ -116,11 +119,24 @@ def run(args: argparse.Namespace) -> int:
             np.savetxt(file, line, "%.6f", ",", header=header, comments="")
     if args.png is not None:
         with writing(args.png) as file:
-            planned.plot(file)
+            planned.plot(file, rooms=args.rooms)
     if args.pheromone_png is not None:
         _draw_pheromone(args.pheromone_png, planned, trails)
     _print(args, planned)
     return Exit.INTERRUPTED if asked.asked.is_set() else Exit.OK
+
+
+def _check_together(args: argparse.Namespace) -> None:
+    """Refuse options that do not go together."""
+    has_robots = args.robots or args.robots_xy
+    if args.passes is not None and has_robots:
+        raise BadConfiguration("--passes is for one robot, not with --robots and --robots-xy")
+    if args.rooms and (args.passes is not None or has_robots):
+        raise BadConfiguration("--rooms is for one pass of one robot, not with several")
+    if args.rooms and Path(args.map).suffix == ".npy":
+        raise BadConfiguration(
+            "--rooms: a coverage grid shows no walls", hint="give a map_server .yaml or an image"
+        )
 
 
 def _draw_pheromone(file: Path, planned: Plan, trails: Sequence[ColonySnapshot]) -> None:
@@ -138,6 +154,9 @@ def _draw_pheromone(file: Path, planned: Plan, trails: Sequence[ColonySnapshot])
 def _print(args: argparse.Namespace, planned: Plan) -> None:
     """Print the figures as JSON, those that matter in some lines, or all as a table."""
     figures = planned.figures | {"map": str(args.map)}
+    under = planned.rooms if args.rooms else None
+    if under is not None:
+        figures["rooms"] = [asdict(room) for room in under.rooms]
     if args.json:
         print_json(figures)
         return
@@ -151,7 +170,23 @@ def _print(args: argparse.Namespace, planned: Plan) -> None:
         from fasaco_edge.offline.summary import rows_of
 
         terminal.out().print(terminal.summary(rows_of(planned)))
+    if under is not None:
+        terminal.out().print(_table(under))
     say_written(args)
+
+
+def _table(under: RoomsUnderLine) -> Table:
+    """Return a table of the rooms."""
+    from fasaco_edge.judge.floor import share_words
+
+    table = Table(box=None, padding=(0, 2, 0, 0))
+    for name in ("room", "floor", "swept", "entered"):
+        table.add_column(name, justify="right", style="cyan" if name == "room" else "")
+    for room in under.rooms:
+        swept = "-" if room.swept_share is None else share_words(room.swept_share)
+        often = {0: "never", 1: "once"}.get(room.entered, f"{room.entered} times")
+        table.add_row(str(room.room), f"{room.area_m2:,.1f} m2", swept, often)
+    return table
 
 
 COMMAND = Command(

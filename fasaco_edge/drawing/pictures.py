@@ -10,10 +10,12 @@ from PIL import Image
 
 from fasaco_edge.drawing import palette
 from fasaco_edge.drawing.plot import MAX_HEIGHT, MAX_WIDTH, MapLayer, Plot, View, bounds_of
+from fasaco_edge.drawing.rooms import number_rooms, paint_rooms
 from fasaco_edge.drawing.sheet import KeyEntry, Sheet
 from fasaco_edge.grid.geometry import Polygon
 from fasaco_edge.grid.lattice import COVERABLE, Cell, CoverageLattice
 from fasaco_edge.grid.occupancy import OccupancyGrid
+from fasaco_edge.grid.rooms import FoundRooms
 from fasaco_edge.kernels.lattice.reach import reachable_from
 
 
@@ -182,6 +184,7 @@ def draw_walk(
     is_backward: NDArray[np.bool_] | None = None,
     swept: MapLayer | None = None,
     unswept: MapLayer | None = None,
+    rooms: FoundRooms | None = None,
 ) -> Image.Image:
     """Return a picture, RGB, of a walk over the lattice, with the map below it.
 
@@ -197,13 +200,20 @@ def draw_walk(
         is_backward: bool (n - 1,), which of its segments are driven backward, if it is a curve.
         swept: floor that it sweeps, to be drawn in place of the cells; None for these.
         unswept: reachable floor that it leaves; None where that is not known.
+        rooms: to be drawn in place of the cells and the swept floor; None for none.
     """
     centres = lattice.centres(cells)
     driven = centres if line_xy is None else line_xy
     plot = Plot(View.over(bounds_of(grid, lattice, driven), lattice.cell_m))
     plot.ground(lattice if grid is None else grid)
+    if rooms is not None:
+        paint_rooms(plot, rooms)
     left = draw_unswept(plot, unswept) if unswept is not None else []
-    key = plot_walk(plot, lattice, cells, driven, swept, is_backward) + left
+    if rooms is not None:
+        key = draw_driven(plot, driven, is_backward, lattice.cell_m) + left
+        number_rooms(plot, rooms)
+    else:
+        key = plot_walk(plot, lattice, cells, driven, swept, is_backward) + left
     bar = ("0", f"{len(cells) - 1:,} steps")
     return Sheet(title, lines, key, bar, plot.view.scale).around(plot.finished())
 
@@ -222,10 +232,18 @@ def plot_walk(
         key = draw_visits(plot, lattice, _visits(lattice, cells), tuple(cells[0].tolist()))
     else:
         key = draw_swept(plot, swept)
+    return key + draw_driven(plot, line, is_backward, lattice.cell_m)
+
+
+def draw_driven(
+    plot: Plot, line: Points, is_backward: NDArray[np.bool_] | None, cell_m: float
+) -> list[KeyEntry]:
+    """Draw a line, or a curve, with its ends; return what its colours mean."""
+    key: list[KeyEntry] = []
     if is_backward is None:
-        draw_line(plot, in_pieces(line, lattice.cell_m), lattice.cell_m)
+        draw_line(plot, in_pieces(line, cell_m), cell_m)
     else:
-        key += draw_curve(plot, line, is_backward, lattice.cell_m)
+        key += draw_curve(plot, line, is_backward, cell_m)
     if (line[0] != line[-1]).any():
         plot.end_mark(line[-1])
     plot.start_mark(line[0])

@@ -28,18 +28,23 @@ def draw_rooms(grid: OccupancyGrid, rooms: FoundRooms, title: str = "Rooms") -> 
     )
     plot.ground(grid)
     paint_rooms(plot, rooms)
+    number_rooms(plot, rooms)
     area_m2 = np.count_nonzero(rooms.labels) * rooms.geometry.resolution**2
     lines = [f"{rooms.count} rooms, {area_m2:,.1f} m2 in all"]
     return Sheet(title, lines, (), None, plot.view.scale).around(plot.finished())
 
 
 def paint_rooms(plot: Plot, rooms: FoundRooms) -> None:
-    """Paint rooms onto a map, and write each one's number where it is widest."""
+    """Paint rooms onto a map."""
     reach = round(NEAR_M / rooms.geometry.resolution)
     colours = _colours(rooms.labels, rooms.count, reach)
     for number in range(1, rooms.count + 1):
         mask = rooms.labels == number
         plot.paint(MapLayer(rooms.geometry, mask), colours[number - 1])
+
+
+def number_rooms(plot: Plot, rooms: FoundRooms) -> None:
+    """Write each room's number where it is widest."""
     for number in range(1, rooms.count + 1):
         clear = clearances(rooms.labels != number, 100)
         row, col = np.unravel_index(int(clear.argmax()), clear.shape)

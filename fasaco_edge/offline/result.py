@@ -21,6 +21,7 @@ from fasaco_edge.judge.floor import JudgedFloor, share_words
 from fasaco_edge.offline.figures import CurveFigures, PlannedFloor, judged_floor
 from fasaco_edge.offline.ground import Ground, Line
 from fasaco_edge.offline.maps import Map
+from fasaco_edge.offline.rooms import RoomsUnderLine
 from fasaco_edge.offline.settings import CELLS, Search
 from fasaco_edge.planners.cost import count_turns
 from fasaco_edge.planners.curves import Curve
@@ -159,9 +160,19 @@ class Plan:
         """All figures, as values that JSON has too: those of ``fasaco-edge plan --json``."""
         return figures_of(self)
 
-    def plot(self, file: str | Path | None = None) -> Image.Image:
-        """Return a picture, RGB, of the walk or the line over the map; as PNG, too."""
-        picture = picture_of(self)
+    @cached_property
+    def rooms(self) -> RoomsUnderLine | None:
+        """The rooms of the map, and what the line does in each; None for a coverage grid."""
+        if self.map.grid is None or self.judged is None:
+            return None
+        return RoomsUnderLine.of(self.map.grid, self.xy, self.judged)
+
+    def plot(self, file: str | Path | None = None, *, rooms: bool = False) -> Image.Image:
+        """Return a picture, RGB, of the walk or the line over the map; as PNG, too.
+
+        ``rooms``: each room in its colour, in place of the floor that is swept.
+        """
+        picture = picture_of(self, rooms=rooms)
         if file is not None:
             with whole(Path(file)) as new:
                 picture.save(new, "PNG")
@@ -225,8 +236,8 @@ def png_of(picture: Image.Image) -> bytes:
     return png.getvalue()
 
 
-def picture_of(plan: Plan, of: str = "") -> Image.Image:
-    """Return a picture, RGB, of a plan; its title begins with ``of``."""
+def picture_of(plan: Plan, of: str = "", *, rooms: bool = False) -> Image.Image:
+    """Return a picture, RGB, of a plan, with its rooms or not; its title begins with ``of``."""
     path, ground, judged = plan.path, plan.ground, plan.judged
     has_search = plan.search.has_local_search
     search = f", {path.work.perturbations} perturbations" if has_search else ""
@@ -243,6 +254,9 @@ def picture_of(plan: Plan, of: str = "") -> Image.Image:
     if plan.curve_figures is not None:
         lines.append(str(plan.curve_figures))
     shows_floor = judged is not None and plan.line != CELLS
+    under = plan.rooms if rooms else None
+    if under is not None:
+        lines.append(f"{under.found.count} rooms")
     return draw_walk(
         ground.lattice,
         path.cells,
@@ -253,6 +267,7 @@ def picture_of(plan: Plan, of: str = "") -> Image.Image:
         is_backward=None if plan.curve is None else plan.curve.is_backward,
         swept=MapLayer(judged.geometry, judged.swept) if judged and shows_floor else None,
         unswept=MapLayer(judged.geometry, judged.unswept) if judged else None,
+        rooms=None if under is None else under.found,
     )
 
 

@@ -54,6 +54,34 @@ def plan(tmp_path, capsys):
     return run
 
 
+def test_rooms_are_those_of_the_map(plan, capsys, tmp_path):
+    """The hall of the flat, and five rooms around it."""
+    picture = tmp_path / "rooms.png"
+    figures, _ = plan("flat", "--rooms", "--png", picture)
+    assert [room["room"] for room in figures["rooms"]] == [1, 2, 3, 4, 5, 6]
+    areas = [room["area_m2"] for room in figures["rooms"]]
+    assert areas == pytest.approx([9.3, 5.1, 18.3, 7.0, 9.0, 6.0], abs=0.15)
+    floor = figures["floor"]
+    swept_m2 = sum(room["swept_share"] * room["reachable_m2"] for room in figures["rooms"])
+    assert swept_m2 == pytest.approx(floor["swept_share"] * floor["reachable_m2"], rel=0.01)
+    assert all(room["entered"] >= 1 for room in figures["rooms"])
+    with Image.open(picture) as image:
+        assert image.width > 500
+    assert main(["plan", "flat", "--budget", "0.05", "--rooms"]) == 0
+    assert "9.3 m2" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("words", [["--passes", "2"], ["--robots", "0,0", "3,3"]])
+def test_rooms_are_for_one_line(words, capsys):
+    assert main(["plan", "flat", "--rooms", *words]) == Exit.CONFIG
+    assert "--rooms is for one pass of one robot" in capsys.readouterr().err
+
+
+def test_a_coverage_grid_has_no_rooms(grid_file, capsys):
+    assert main(["plan", str(grid_file), "--rooms"]) == Exit.CONFIG
+    assert "shows no walls" in capsys.readouterr().err
+
+
 @pytest.fixture
 def grid_file(tmp_path):
     """A coverage grid with two areas that do not touch."""

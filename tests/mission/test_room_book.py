@@ -120,6 +120,18 @@ def test_a_flickering_map_makes_no_numbers(flicker, name):
     assert [room.area_m2 for room in book.rooms] == [room.area_m2 for room in before]
 
 
+@pytest.mark.parametrize("times", [1, 2, HOLD_CHANGE // 2])
+def test_new_floor_that_one_map_adds_to_a_room_is_not_the_room(times):
+    """For a moment the map shows no door to the hall that comes into view."""
+    book = known(regions("aa", "aa"))
+    book.name(1, "bath")
+    shown(book, regions("aaaaaaaa", "aaaaaaaa"), times)
+    shown(book, regions("aabbbbbb", "aabbbbbb"), HOLD_CHANGE)
+    assert book.room("bath").id == at(book, 0.5, 0.5) == 1
+    assert at(book, 6.5, 0.5) == 2
+    assert book.room("bath").area_m2 == pytest.approx(4.0)
+
+
 MOTIONS = [
     pytest.param(0.15, 0.0, 0.0, id="a decimetre"),
     pytest.param(-0.4, 0.3, math.radians(2.0), id="half a metre"),
@@ -244,6 +256,19 @@ def test_merged_rooms_are_one_whatever_the_map_shows():
     assert book.next_id == 5
 
 
+def test_no_map_gives_a_part_of_merged_rooms_to_another():
+    book = known(FLAT)
+    merge(book, [at(book, *KITCHEN), at(book, *BATH)])
+    number = at(book, *BATH)
+    # No door is seen between the bath, a part of it now, and a new room beside.
+    assert number == 1
+    shown(book, regions("########cccc", "########cccc", "########cccc", at=(0.0, 3.0)), HOLD_NEW)
+    assert at(book, 10.5, 4.5) == 4
+    beside = regions("aaa#cccccccc", "aaa#cccccccc", "aaaacccccccc", at=(0.0, 3.0))
+    shown(book, beside, 3 * HOLD_CHANGE)
+    assert at(book, *BATH) == at(book, *KITCHEN) == number
+
+
 @pytest.mark.parametrize(
     ("change", "why"),
     [
@@ -299,3 +324,12 @@ def test_a_large_building_gets_wider_squares_and_keeps_its_rooms():
     shown(book, coarse)
     assert book.sheet.raster.square_m == pytest.approx(1.0)
     assert at(book, *KITCHEN) == book.room("kitchen").id
+
+
+def test_a_room_within_another_one_is_no_part_of_it():
+    book = known(regions("aaaaa", "abbba", "abbba", "aaaaa"))
+    ring, inner = at(book, 0.5, 0.5), at(book, 2.5, 2.0)
+    assert book.room(ring).encloses == (inner,)
+    assert book.room(inner).encloses == ()
+    assert book.room(ring).area_m2 == pytest.approx(14.0)
+    assert book.holes(book.room(ring)) == (book.room(inner).outline,)

@@ -25,6 +25,7 @@ from fasaco_edge.mission.orders.order import (
 from fasaco_edge.mission.orders.order_state import OrderState
 from fasaco_edge.mission.orders.placing import are_same
 from fasaco_edge.mission.orders.room_requests import RoomRequest
+from fasaco_edge.mission.orders.zones import in_zones
 from fasaco_edge.planners.passes import Pass
 from tests.mission.world import CONFIG, Drive, building, pose_at, rectangle, with_policy
 
@@ -218,16 +219,56 @@ def test_an_order_for_everything_leaves_a_skipped_room_out_and_says_so():
     assert drive.mission.order_state.order.zones[0].without == ()
 
 
-def test_a_room_order_lies_on_a_rotated_lattice_as_on_any():
-    """The walls are at 20 degrees to the map frame, and so are the cells."""
-    deg = 20.0
-    grid, config = building(*BOTH), replace(CONFIG, lattice_deg=deg)
+# A room of 12 x 12 cells, with a door in its eastern wall, within corridors 6 cells wide.
+RING = (
+    *(["." * 26] * 6),
+    "......" + "#" * 14 + "......",
+    *(["......#" + "." * 12 + "#......"] * 5),
+    *(["......#" + "." * 19] * 2),
+    *(["......#" + "." * 12 + "#......"] * 5),
+    "......" + "#" * 14 + "......",
+    *(["." * 26] * 6),
+)
+
+
+@pytest.mark.parametrize("deg", [0.0, 20.0])
+def test_a_ring_of_corridors_does_not_contain_the_room_within(deg):
+    """An order for it, or one that leaves it out, is about the corridors alone."""
+    drive = rotated(RING, deg)
+    book = drive.mission.rooms
+    (ring,) = (room for room in book.rooms if room.encloses)
+    assert len(book.rooms) == 2
+    start(drive, ring.title)
+    drive.plan()
+    (zone,) = drive.mission.zone_progress()
+    within = {(row, col) for row in range(7, 19) for col in range(7, 19)}
+    assert 400 < zone.cells <= 26 * 26 - 14 * 14 + 2
+    lattice = drive.mission.lattice
+    asked = in_zones(drive.mission.order_state.order.zones, lattice.window, lattice.cell_m)
+    assert not any(asked[lattice.local(cell)] for cell in within)
+    drive.command("room_set", room=RoomRequest(ring.id, skip=True))
+    drive.command("start")
+    drive.tell()
+    asked = in_zones(drive.mission.order_state.order.zones, lattice.window, lattice.cell_m)
+    assert all(asked[lattice.local(cell)] for cell in within)
+    assert not asked[lattice.local((1, 1))]
+
+
+def rotated(rows, deg):
+    """A robot on a map that is rotated, and its lattice with it, once the rooms are known."""
+    grid, config = building(*rows), replace(CONFIG, lattice_deg=deg)
     turned = OccupancyGrid(rotated_geometry(grid.geometry, deg), grid.cells, "map")
     pose = pose_at(*IN_WEST).pose
     here = PoseReceived(replace(pose, pose=rotated_pose(pose.pose, deg)))
     drive = Drive(IN_WEST, MapReceived(turned), here, order_state=WAITS, config=config)
     for _ in range(8):
         drive.tell(here, after=1.01 * PERIOD_S)
+    return drive
+
+
+def test_a_room_order_lies_on_a_rotated_lattice_as_on_any():
+    """The walls are at 20 degrees to the map frame, and so are the cells."""
+    drive = rotated(BOTH, 20.0)
     assert len(drive.mission.rooms.rooms) == 2
     east = max(drive.mission.rooms.rooms, key=lambda room: room.outline[0][0])
     start(drive, east.title)

@@ -7,12 +7,20 @@ import math
 import zlib
 from zlib import crc32
 
+import numpy as np
 import pytest
 
 pytest.importorskip("rerun")
 
 from fasaco_edge.cli import main
+from fasaco_edge.daemon.ledger.rooms_codec import BookSnapshot, encode_rooms
+from fasaco_edge.daemon.ledger.rooms_file import RoomsFile
 from fasaco_edge.errors import MalformedMessage
+from fasaco_edge.grid.geometry import GridGeometry, Pose2D
+from fasaco_edge.grid.rooms import FoundRooms
+from fasaco_edge.mission.map.room_book import RoomBook
+from fasaco_edge.mission.map.room_matching import HOLD_NEW
+from fasaco_edge.mission.map.room_update import update
 from fasaco_edge.recording.read.run import RecordedSamples
 from fasaco_edge.replay.cycle_replay import CycleReplay, inflated_sample, read_turns
 from fasaco_edge.replay.replay import read_run
@@ -106,14 +114,22 @@ def test_cells_along_askew_walls_are_found_once_more(tmp_path):
 KEEP_OUT = {"name": "crate", "polygon": [[2.4, 0.6], [2.9, 0.6], [2.9, 1.1], [2.4, 1.1]]}
 
 
-def test_keep_outs_and_what_was_not_to_be_forgotten_are_repeated(tmp_path):
+def test_keep_outs_rooms_and_what_was_not_to_be_forgotten_are_repeated(tmp_path):
+    # A room of an earlier run: the whole floor.
+    labels, book = np.ones((54, 72), np.int32), RoomBook()
+    for _ in range(HOLD_NEW):
+        update(book, FoundRooms(GridGeometry(54, 72, 0.05, Pose2D(0.0, 0.0)), labels, 1), "map")
+    RoomsFile(tmp_path / "state", "robot").write(encode_rooms(BookSnapshot.of(book)))
+    hall = {"zones": [{"name": "hall"}], "return_home": True}
     commands = (
+        (7.0, {"command": "room_name", "room": {"id": 1, "name": "hall"}}, ""),
+        (7.5, {"command": "room_name", "room": {"id": 7, "name": "bath"}}, "bad_order"),
         (8.0, {"command": "keep_out_add", "keep_out": KEEP_OUT}, ""),
         (12.0, {"command": "start", "order": {"passes": 2}}, "would_forget"),
         (14.0, {"command": "reset"}, "would_forget"),
         (16.0, {"command": "keep_out_remove", "keep_out": {"name": "lamp"}}, "bad_order"),
         (18.0, {"command": "keep_out_remove", "keep_out": {"name": "crate"}}, ""),
-        (22.0, {"command": "start", "order": {"return_home": True}, "discard": True}, ""),
+        (22.0, {"command": "start", "order": hall, "discard": True}, ""),
     )
     recording = record_mission(tmp_path, commands=commands)
     samples = list(RecordedSamples(recording.paths))
@@ -124,7 +140,10 @@ def test_keep_outs_and_what_was_not_to_be_forgotten_are_repeated(tmp_path):
     assert all(step.as_recorded for step in steps if step.decision.path is not None)
     answers = [answer for step in steps for answer in step.decision.answers]
     codes = [answer.error.code if answer.error else "" for answer in answers]
-    assert [code for code in codes if code] == ["would_forget", "would_forget", "bad_order"]
+    assert [code for code in codes if code] == [
+        *("bad_order", "would_forget", "would_forget", "bad_order")
+    ]
+    assert replay.mission.order_state.order.zones[0].room == 1
     assert replay.mission.coverage().covered == recording.status["coverage"]["covered"]
 
 

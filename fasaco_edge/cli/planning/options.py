@@ -34,6 +34,7 @@ your building and robot:
   fasaco-edge plan scan.png --resolution 0.05 --unknown-free --png line.png
   fasaco-edge plan site.yaml --line quick --align axes --xy-out line.csv
   fasaco-edge plan site.yaml --swept 0.995 --budget 10 --png line.png
+  fasaco-edge plan site.yaml --rooms --png rooms.png
   fasaco-edge plan site.yaml --passes edge,auto,cross --png passes.png
   fasaco-edge plan lawn.yaml --cell 0.4 --turn-radius 0.5 --png curve.png
   fasaco-edge plan office --turn-s 2 --budget 0.1 --end 12,3
@@ -61,6 +62,9 @@ figures:
   curve            (--turn-radius) length_m, seconds and backward_m of the curve;
                    reversals, from forward to backward or back; spot_turns, which do not
                    fit and stay on the spot, of all bends judged on the curve's points
+
+rooms (--rooms)  area_m2 of free floor, reachable_m2 of it, the share of that which the line
+                   sweeps, and how often it enters the room
 
 figures of several passes: sums, and for each pass its own
   along_share      share of its line's length along its lanes, within 15 degrees; null if
@@ -339,6 +343,12 @@ def _add_output(group: argparse._ArgumentGroup) -> None:
         ".npy grid has no frame",
     )
     group.add_argument("--png", type=Path, metavar="FILE", help="write a picture of the walk")
+    group.add_argument(
+        "--rooms",
+        action="store_true",
+        help="find the rooms of a YAML map: print them with what the line does in each, and draw "
+        "them in the picture",
+    )
     group.add_argument(
         "--pheromone-png",
         type=Path,

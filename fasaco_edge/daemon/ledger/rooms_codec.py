@@ -75,6 +75,7 @@ class RoomNote(_Note, frozen=True, omit_defaults=True):
     outline: Annotated[list[_Corner], Meta(max_length=MOST_OUTLINE)] = []
     area_m2: Annotated[float, Meta(ge=0)] = 0.0
     neighbours: Annotated[list[_Number], Meta(max_length=MOST_ROOMS)] = []
+    encloses: Annotated[list[_Number], Meta(max_length=MOST_ROOMS)] = []
 
 
 class SheetNote(_Note, frozen=True):
@@ -163,6 +164,7 @@ def _room_note(room: Room) -> RoomNote:
         outline=list(room.outline),
         area_m2=room.area_m2,
         neighbours=list(room.neighbours),
+        encloses=list(room.encloses),
     )
 
 
@@ -194,7 +196,7 @@ def _sheet(note: SheetNote, next_id: int) -> RoomSheet:
     if max(_numbers(gone), default=0) >= next_id:
         raise ValueError("squares have numbers that are still to come")
     nothing = RoomRaster.empty(note.square_m)
-    return RoomSheet(note.frame, raster, gone, nothing, rooms, list(note.cuts))
+    return RoomSheet(note.frame, raster, gone, nothing, raster, rooms, list(note.cuts))
 
 
 def _numbers(raster: RoomRaster) -> set[int]:
@@ -213,7 +215,7 @@ def _room(note: RoomNote) -> Room:
     outline: Sequence[Point] = note.outline
     return Room(
         *(note.id, note.name or "", note.by_hand, RoomSettings(passes, kinds, note.skip)),
-        *(tuple(outline), note.area_m2, tuple(note.neighbours)),
+        *(tuple(outline), note.area_m2, tuple(note.neighbours), tuple(note.encloses)),
     )
 
 

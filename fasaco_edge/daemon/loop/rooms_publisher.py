@@ -52,6 +52,7 @@ def _report(room: Room, cells: int, covered: int) -> RoomReport:
         outline=room.outline,
         area_m2=room.area_m2,
         neighbours=room.neighbours,
+        encloses=room.encloses,
         swept=round(covered / cells, 4) if cells else None,
         passes=tuple(passes) if isinstance(passes, list) else passes,  # type: ignore[arg-type]
         skip=settings.skip,

@@ -334,7 +334,7 @@ class Mission:
 
     def room_progress(self) -> dict[int, tuple[int, int]]:
         """Return for each room, by its number, how many cells are reachable, and covered."""
-        return room_progress(self.rooms.rooms, self._rotation.deg, self._map.area, self._ledger)
+        return room_progress(self.rooms, self._rotation.deg, self._map.area, self._ledger)
 
     def snapshot(self) -> LedgerSnapshot:
         """Return the state kept over a restart: coverage, and the order's progress."""

@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fasaco_edge.grid.geometry import Polygon
 from fasaco_edge.grid.lattice import Cell, CoverageLattice, pixels_of, placement_on
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.grid.rotation import rotated_polygon
 from fasaco_edge.kernels.lattice.pixels import count_free_beside
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
 from fasaco_edge.mission.map.reachable_area import ReachableArea
-from fasaco_edge.mission.map.room_book import Room
+from fasaco_edge.mission.map.room_book import RoomBook
 from fasaco_edge.mission.orders.order_state import OrderState, Stage
 from fasaco_edge.mission.orders.zones import counts_in
 
@@ -203,8 +204,9 @@ def zone_progress(
     if ground is not None and polygons:
         lattice, reachable = ground.lattice, ground.reachable
         visited = reachable & (ledger.visits(lattice.window) > 0)
-        cells = counts_in(polygons, lattice.window, lattice.cell_m, reachable)
-        covered = counts_in(polygons, lattice.window, lattice.cell_m, visited)
+        holes = [zone.holes for zone in order.zones if zone.polygon]
+        cells = _counts(polygons, holes, lattice, reachable)
+        covered = _counts(polygons, holes, lattice, visited)
     found = []
     # Either all zones have polygons, or there is only one, without polygon: everything.
     for index, counted in enumerate(zip(cells, covered, strict=True)):
@@ -220,28 +222,46 @@ def zone_progress(
     return found
 
 
+def _counts(
+    polygons: tuple[Polygon, ...],
+    holes: Sequence[tuple[Polygon, ...]],
+    lattice: CoverageLattice,
+    cells: NDArray[np.bool_],
+) -> list[int]:
+    """Return how many cells lie in each polygon, and in none of its holes."""
+    flat = tuple(hole for each in holes for hole in each)
+    counts = counts_in((*polygons, *flat), lattice.window, lattice.cell_m, cells)
+    in_holes = iter(counts[len(polygons) :])
+    return [
+        count - sum(next(in_holes) for _ in each)
+        for count, each in zip(counts, holes, strict=False)
+    ]
+
+
 def room_progress(
-    rooms: Sequence[Room], lattice_deg: float, ground: ReachableArea | None, ledger: MissionLedger
+    book: RoomBook, lattice_deg: float, ground: ReachableArea | None, ledger: MissionLedger
 ) -> dict[int, tuple[int, int]]:
     """Return for each room, by its number, how many cells are reachable, and covered.
 
     Args:
-        rooms: in the map frame.
+        book: the rooms, in the map frame.
         lattice_deg: angle of the cells' rows to its x axis [deg].
         ground: the reachable area.
         ledger: the covered cells.
     """
-    placed = [room for room in rooms if room.outline]
+    placed = [room for room in book.rooms if room.outline]
     if ground is None or not placed:
         return {}
-    outlines = tuple(
-        rotated_polygon(room.outline, -lattice_deg) if lattice_deg else room.outline
-        for room in placed
-    )
+
+    def on_lattice(polygons: Iterable[Polygon]) -> tuple[Polygon, ...]:
+        return tuple(
+            rotated_polygon(each, -lattice_deg) if lattice_deg else each for each in polygons
+        )
+
+    outlines = on_lattice(room.outline for room in placed)
+    holes = [on_lattice(book.holes(room)) for room in placed]
     lattice, reachable = ground.lattice, ground.reachable
     visited = reachable & (ledger.visits(lattice.window) > 0)
-    cells, covered = (
-        counts_in(outlines, lattice.window, lattice.cell_m, each) for each in (reachable, visited)
-    )
+    cells, covered = (_counts(outlines, holes, lattice, each) for each in (reachable, visited))
     counts = zip(cells, covered, strict=True)
     return {room.id: counted for room, counted in zip(placed, counts, strict=True)}

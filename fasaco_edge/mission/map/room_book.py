@@ -11,13 +11,16 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
-from typing import Self
+from typing import TYPE_CHECKING, Self
 
 from fasaco_edge.errors import OrderError
 from fasaco_edge.grid.geometry import Polygon
 from fasaco_edge.mission.map.room_raster import Cut, RoomRaster
 from fasaco_edge.mission.orders.keep_outs import check_name
 from fasaco_edge.planners.passes import Pass
+
+if TYPE_CHECKING:
+    from fasaco_edge.mission.map.loop_closure import Motion
 
 # Limits of one sheet; a number needs 16 bits.
 MOST_ROOMS, MOST_CUTS, MOST_NUMBER = 250, 100, 65_000
@@ -57,6 +60,7 @@ class Room:
         outline: corners (x, y) [m] in the map frame, without holes.
         area_m2: area of its squares [m2].
         neighbours: numbers of the rooms it is joined to, ascending.
+        encloses: numbers of the rooms that lie within its outline, as those in a ring of corridors.
     """
 
     id: int
@@ -66,6 +70,7 @@ class Room:
     outline: Polygon = ()
     area_m2: float = 0.0
     neighbours: tuple[int, ...] = ()
+    encloses: tuple[int, ...] = ()
 
     @property
     def is_kept(self) -> bool:
@@ -90,6 +95,7 @@ class RoomSheet:
         gone: squares of rooms that have joined others by themselves, to get their numbers back.
         regions: scores of the regions that are no rooms yet, by their numbers in ``pending``.
         pending: squares of these regions.
+        settled: the squares of rooms some updates ago: what one map adds decides nothing.
         changes: scores of rooms that may join another, and of parts that may change their room, as
             (what, room, other room). A score counts the updates that have shown a change; one that
             does not show it counts twice against it.
@@ -99,16 +105,22 @@ class RoomSheet:
     raster: RoomRaster
     gone: RoomRaster
     pending: RoomRaster
+    settled: RoomRaster
     rooms: dict[int, Room] = field(default_factory=dict)
     cuts: list[Cut] = field(default_factory=list)
     regions: dict[int, int] = field(default_factory=dict)
     changes: dict[tuple[str, int, int], int] = field(default_factory=dict)
+    # How many squares of each room have changed since its outline was drawn.
+    stale: dict[int, int] = field(default_factory=dict, init=False)
+    # The squares since ``settled``, and how many updates there were in all.
+    _between: RoomRaster | None = field(default=None, init=False)
+    _updates: int = field(default=0, init=False)
 
     @classmethod
     def empty(cls, frame: str, square_m: float) -> Self:
         """Return a sheet without rooms."""
         nothing = RoomRaster.empty(square_m)
-        return cls(frame, nothing, nothing, nothing)
+        return cls(frame, nothing, nothing, nothing, nothing)
 
     def lay(
         self, raster: RoomRaster, gone: RoomRaster | None = None, pending: RoomRaster | None = None
@@ -120,6 +132,21 @@ class RoomSheet:
     def note(self, regions: dict[int, int], pending: RoomRaster) -> None:
         """Replace the regions that are no rooms yet."""
         self.regions, self.pending = regions, pending
+
+    def settle(self, period: int) -> None:
+        """Note the squares before an update: they are settled after ``period`` to twice as many."""
+        if self._updates % period == 0:
+            self.settled, self._between = self._between or self.raster, self.raster
+        self._updates += 1
+
+    def fix(self) -> None:
+        """Take the squares for settled: people have seen them so."""
+        self.settled, self._between = self.raster, self.raster
+
+    def move(self, motion: Motion) -> None:
+        """Move all squares with the map."""
+        self.lay(self.raster.moved(motion), self.gone.moved(motion), self.pending.moved(motion))
+        self.fix()
 
     def note_changes(self, changes: dict[tuple[str, int, int], int]) -> None:
         """Replace the scores of changes."""
@@ -213,7 +240,12 @@ class RoomBook:
         """
         room = self.room(called)
         self.check_name("room.name", name, room.id)
-        self.put(replace(room, name=name))
+        self.put_by_hand(replace(room, name=name))
+
+    def holes(self, room: Room) -> tuple[Polygon, ...]:
+        """Return the outlines of the rooms that lie within that of a room."""
+        rooms = {} if self.sheet is None else self.sheet.rooms
+        return tuple(rooms[each].outline for each in room.encloses if each in rooms)
 
     def check_name(self, where: str, name: str, *of: int) -> None:
         """Check a name for a room, which may be that of the rooms ``of`` now.
@@ -240,15 +272,20 @@ class RoomBook:
         Raises:
             OrderError: there is no such room.
         """
-        self.put(replace(self.room(called), settings=settings))
+        self.put_by_hand(replace(self.room(called), settings=settings))
 
-    def put(self, *rooms: Room) -> None:
-        """Replace rooms of the sheet in use, or add them; nothing if they have not changed."""
+    def put(self, room: Room) -> None:
+        """Replace a room of the sheet in use, or add it; nothing if it has not changed."""
         assert self.sheet is not None
-        for room in rooms:
-            if self.sheet.rooms.get(room.id) != room:
-                self.sheet.rooms[room.id] = room
-                self.version += 1
+        if self.sheet.rooms.get(room.id) != room:
+            self.sheet.rooms[room.id] = room
+            self.version += 1
+
+    def put_by_hand(self, room: Room) -> None:
+        """Replace a room as people want it."""
+        assert self.sheet is not None
+        self.put(room)
+        self.sheet.fix()
 
     def drop(self, rooms: Iterable[int]) -> None:
         """Remove rooms from the sheet in use."""

@@ -60,7 +60,7 @@ def split(book: RoomBook, called: str | int, cut: Cut) -> None:
     after[place][inside] = ids[inside]
     sheet.lay(replace(sheet.raster, ids=after))
     sheet.cut([*sheet.cuts, cut])
-    book.put(replace(room, is_by_hand=True))
+    book.put_by_hand(replace(room, is_by_hand=True))
     refresh(book, numbers)
 
 
@@ -91,7 +91,7 @@ def merge(book: RoomBook, called: Sequence[str | int], name: str = "") -> None:
     sheet.lay(replace(sheet.raster, ids=after))
     sheet.cut([cut for cut in sheet.cuts if not _is_inside(sheet.raster, cut, stays.id)])
     book.drop(numbers[1:])
-    book.put(replace(stays, name=name, settings=settings, is_by_hand=True))
+    book.put_by_hand(replace(stays, name=name, settings=settings, is_by_hand=True))
     refresh(book, [stays.id])
 
 
@@ -100,8 +100,7 @@ def move(book: RoomBook, motion: Motion) -> None:
     sheet = book.sheet
     if sheet is None or motion.is_still:
         return
-    rasters = sheet.raster, sheet.gone, sheet.pending
-    sheet.lay(*(raster.moved(motion) for raster in rasters))
+    sheet.move(motion)
     sheet.cut([(_moved(start, motion), _moved(end, motion)) for start, end in sheet.cuts])
     refresh(book, sheet.rooms)
 

@@ -11,7 +11,8 @@ and grows over new floor of its region. Changes of what is known must last:
 An update without the change counts twice against it, so that one that flickers never lasts. A room
 that vanished so, and comes back, gets its number back. Rooms that people have named, set, split or
 merged are kept: they are neither parted nor joined by a map; two of them in one region are divided
-by memory. Rooms that the map does not show stay as they are.
+by memory, and those split or merged keep their parts. What a few maps have added to a room says
+nothing on where it is. Rooms that the map does not show stay as they are.
 """
 
 from __future__ import annotations
@@ -43,6 +44,8 @@ Labels = NDArray[np.int32]
 
 # Updates that a change must last.
 HOLD_NEW, HOLD_CHANGE = 3, 6
+# Squares are settled in a room after so many updates, to twice as many.
+SETTLED = 2 * HOLD_CHANGE
 # An update without a change takes this from its score.
 PENALTY = 2
 # Least area of a room, and of a part that is more than the border moving to and fro [m2].
@@ -106,6 +109,7 @@ class Matching:
         self._slots = slots_of(self._part, sheet.rooms)
         self._squares = np.bincount(self._ids.ravel(), minlength=MOST_NUMBER + 1)[self._rooms]
         self._counts = common_counts(labels, self._slots, len(sheet.rooms))
+        self._firm = common_counts(labels, self._slots * self._is_settled(), len(sheet.rooms))
         self._areas = self._counts.sum(axis=1)
         self._shown_by = self._find_shown()
         # The new number of squares, by region and slot.
@@ -152,17 +156,27 @@ class Matching:
     def _room(self, slot: int) -> Room:
         return self._sheet.rooms[self._rooms[slot]]
 
+    def _is_settled(self) -> NDArray[np.bool_]:
+        """Return which squares have belonged to the same room for some updates."""
+        settled = self._sheet.settled
+        if settled.square_m != self._sheet.raster.square_m:
+            return np.zeros(self._part.shape, np.bool_)
+        is_settled: NDArray[np.bool_] = settled.on(self._window) == self._part
+        return is_settled
+
     def _find_shown(self) -> dict[int, int]:
         """Return for each room's slot that the map shows the region that shows it."""
         found = dict[int, int]()
         if len(self._areas) < 2:
             return found
-        best = self._counts[1:].argmax(axis=0) + 1
         for slot in range(1, len(self._rooms)):
-            label, squares = int(best[slot]), int(self._squares[slot])
+            squares = int(self._squares[slot])
+            least = min(LEAST_SHOWN_M2 / self._square_m2, 0.5 * squares)
+            # What was added lately says little on where a room is, unless it is all there is.
+            counts = self._counts if self._firm[1:, slot].sum() < least else self._firm
+            label = int(counts[1:, slot].argmax()) + 1
             common = int(self._counts[label, slot])
             smaller = min(int(self._areas[label]), squares)
-            least = min(LEAST_SHOWN_M2 / self._square_m2, 0.5 * squares)
             if common and common >= least and common >= LEAST_SHARE * smaller:
                 found[slot] = label
         return found
@@ -184,7 +198,7 @@ class Matching:
         for other in self._others(label, slot):
             if self._is_border(label, other):
                 self._becomes[label, other] = room
-            else:
+            elif not self._room(other).is_by_hand:
                 self._changes.add(("move", self._rooms[other], room))
         if self._areas[label] >= WHOLE * self._squares[slot]:
             self._becomes[0, slot] = 0
@@ -203,15 +217,15 @@ class Matching:
 
     def _take_none(self, label: int) -> None:
         """A region shows no room: it is a part of one, or new."""
-        counts, parent = self._counts[label], 0
-        if counts[1:].max(initial=0) >= 0.5 * self._areas[label]:
-            parent = int(counts[1:].argmax()) + 1
+        parent, half = 0, 0.5 * self._areas[label]
+        if self._counts[label, 1:].max(initial=0) >= half:
+            parent = int(self._counts[label, 1:].argmax()) + 1
             self._becomes[label, 0] = self._rooms[parent]
-        is_part = parent > 0
-        if is_part and self._room(parent).is_kept:
+        # What has come to a kept room lately may turn out to be another one.
+        if parent and self._room(parent).is_kept and self._firm[label, parent] >= half:
             return
         if self._m2(self._areas[label]) >= LEAST_M2 and len(self._regions) < MOST_ROOMS:
-            self._regions.append(_Region(label, HOLD_CHANGE if is_part else HOLD_NEW))
+            self._regions.append(_Region(label, HOLD_CHANGE if parent else HOLD_NEW))
 
     def _count_changes(self) -> list[tuple[str, int, int]]:
         """Score the changes that this map shows, and others; return those that have lasted."""

@@ -8,10 +8,18 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fasaco_edge.grid.geometry import Window
-from fasaco_edge.mission.map.room_book import MOST_NUMBER, RoomBook, RoomSheet
-from fasaco_edge.mission.map.room_matching import Matching, common_counts, slots_of
-from fasaco_edge.mission.map.room_outline import joined, outline
+from fasaco_edge.grid.geometry import Point, Window
+from fasaco_edge.grid.polygons import area_m2, is_near
+from fasaco_edge.kernels.lattice.areas import find_areas
+from fasaco_edge.mission.map.room_book import MOST_NUMBER, Room, RoomBook, RoomSheet
+from fasaco_edge.mission.map.room_matching import (
+    LEAST_M2,
+    SETTLED,
+    Matching,
+    common_counts,
+    slots_of,
+)
+from fasaco_edge.mission.map.room_outline import joined, largest_part, outline
 from fasaco_edge.mission.map.room_raster import (
     MOST_SQUARES,
     Ids,
@@ -26,6 +34,8 @@ if TYPE_CHECKING:
 # Share of the floor in rooms that match from which a map shows the building of a sheet; region and
 # room match if they have this share of all their floor in common.
 ALIKE = MATCH = 0.5
+# Outlines follow once so much has changed [m2]: pixels along walls flicker.
+STALE_M2 = 0.1
 # Squares are as wide as the map's pixels, and not narrower than this [m].
 LEAST_SQUARE_M = 0.05
 
@@ -46,11 +56,12 @@ def update(book: RoomBook, found: FoundRooms, frame: str) -> None:
             break
         _widen(sheet, 2)
     book.turn_to(sheet)
+    sheet.settle(SETTLED)
     before = sheet.raster.on(whole)
     sheet.lay(replace(sheet.raster, window=whole, ids=before.copy()))
     labels = sampled(found, window, sheet.raster.square_m)
     Matching(book, sheet, window, labels).apply(before)
-    refresh(book, _changed(before, sheet.raster.ids))
+    refresh(book, _stale(sheet, before))
 
 
 def _widen(sheet: RoomSheet, factor: int) -> None:
@@ -86,10 +97,19 @@ def _alike(sheet: RoomSheet, found: FoundRooms) -> float:
     return float(common[matches].sum()) / floor if floor else 0.0
 
 
-def _changed(before: Ids, after: Ids) -> set[int]:
-    """Return the numbers of the rooms whose squares have changed."""
+def _stale(sheet: RoomSheet, before: Ids) -> list[int]:
+    """Return the rooms of which so many squares have changed that their outlines are outdated."""
+    after = sheet.raster.ids
     other = before != after
-    return set(np.unique(np.concatenate((before[other], after[other]))).tolist()) - {0}
+    changed = np.bincount(np.concatenate((before[other], after[other])), minlength=1)
+    for room in np.flatnonzero(changed).tolist():
+        sheet.stale[room] = sheet.stale.get(room, 0) + int(changed[room])
+    least = STALE_M2 / sheet.raster.square_m**2
+    return [
+        number
+        for number, room in sheet.rooms.items()
+        if sheet.stale.get(number, 0) >= least or not room.outline
+    ]
 
 
 def refresh(book: RoomBook, changed: Iterable[int]) -> None:
@@ -98,15 +118,37 @@ def refresh(book: RoomBook, changed: Iterable[int]) -> None:
     rooms = set(changed)
     if sheet is None or not rooms:
         return
+    for room in rooms:
+        sheet.stale.pop(room, None)
     square_m = sheet.raster.square_m
-    beside = joined(sheet.raster.ids, square_m)
-    for room in book.rooms:
-        shape = replace(room, neighbours=beside.get(room.id, ()))
-        if room.id in rooms:
-            window, mask = sheet.raster.squares(room.id)
+    beside, shapes = joined(sheet.raster.ids, square_m), list[Room]()
+    for known in book.rooms:
+        shape = replace(known, neighbours=beside.get(known.id, ()), encloses=())
+        if known.id in rooms:
+            window, mask = sheet.raster.squares(known.id)
             shape = replace(
                 shape,
                 outline=outline(window, mask, square_m) if mask.any() else (),
                 area_m2=round(int(np.count_nonzero(mask)) * square_m**2, 2),
             )
-        book.put(shape)
+        shapes.append(shape)
+    # Outlines with a hole that a room fits in.
+    rings = {
+        each.id
+        for each in shapes
+        if each.outline and area_m2(each.outline) > each.area_m2 + LEAST_M2
+    }
+    inner = {each.id: _inner_point(sheet, each.id) for each in shapes if rings and each.outline}
+    for each in shapes:
+        encloses: list[int] = []
+        if each.id in rings:
+            encloses = [at for at, point in inner.items() if is_near(each.outline, point, 0.0)]
+        book.put(replace(each, encloses=tuple(at for at in encloses if at != each.id)))
+
+
+def _inner_point(sheet: RoomSheet, room: int) -> Point:
+    """Return the centre of a square of a room, away from its border."""
+    window, mask = sheet.raster.squares(room)
+    row, col = find_areas(largest_part(mask).astype(np.uint8)).inner[0].tolist()
+    square_m = sheet.raster.square_m
+    return (window.col0 + col + 0.5) * square_m, (window.row0 + row + 0.5) * square_m

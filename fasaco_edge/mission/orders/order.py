@@ -38,6 +38,14 @@ from fasaco_edge.planners.passes import Covers, Direction, Laid, Pass, laid
 MOST_ZONES = 100
 
 
+class LeftOut(NamedTuple):
+    """A room that an order for everything leaves out: its title, its outline, holes in that."""
+
+    title: str
+    outline: Polygon
+    holes: tuple[Polygon, ...] = ()
+
+
 @dataclass(frozen=True, slots=True)
 class Zone:
     """An area to cover.
@@ -50,7 +58,8 @@ class Zone:
         passes: number of passes.
         kinds: what is special about each pass; () if nothing is.
         room: number of the room that it is, whose outline it follows; 0 for none.
-        without: of everything: titles and outlines of the rooms that are left out.
+        holes: polygons within ``polygon`` that are not part of it.
+        without: of everything: the rooms that are left out.
         is_as_usual: whether the order says nothing about passes, so that a room's settings apply.
     """
 
@@ -59,7 +68,8 @@ class Zone:
     passes: int = 1
     kinds: tuple[Pass, ...] = ()
     room: int = 0
-    without: tuple[tuple[str, Polygon], ...] = ()
+    holes: tuple[Polygon, ...] = ()
+    without: tuple[LeftOut, ...] = ()
     is_as_usual: bool = field(default=False, compare=False)
 
     def kind(self, number: int) -> Pass:

@@ -12,7 +12,7 @@ from fasaco_edge.errors import OrderError
 from fasaco_edge.grid.geometry import Polygon
 from fasaco_edge.grid.rotation import rotated_polygon
 from fasaco_edge.mission.map.room_book import Room, RoomBook
-from fasaco_edge.mission.orders.order import MissionOrder, StandingZone, Zone
+from fasaco_edge.mission.orders.order import LeftOut, MissionOrder, StandingZone, Zone
 
 
 def is_named(order: MissionOrder) -> bool:
@@ -66,7 +66,9 @@ def placed(order: MissionOrder, book: RoomBook, begun: int = -1) -> MissionOrder
         begun: index of the zone that is being covered: up to it zones keep their places.
     """
     skipped = tuple(
-        (room.title, room.outline) for room in book.rooms if room.settings.skip and room.outline
+        LeftOut(room.title, room.outline, book.holes(room))
+        for room in book.rooms
+        if room.settings.skip and room.outline
     )
     zones = [_placed(zone, book, skipped) for zone in order.zones]
     zones[begun + 1 :] = sorted(zones[begun + 1 :], key=lambda zone: zone.polygon == ())
@@ -74,13 +76,16 @@ def placed(order: MissionOrder, book: RoomBook, begun: int = -1) -> MissionOrder
     return order if is_same else replace(order, zones=tuple(zones))
 
 
-def _placed(zone: Zone, book: RoomBook, skipped: tuple[tuple[str, Polygon], ...]) -> Zone:
+def _placed(zone: Zone, book: RoomBook, skipped: tuple[LeftOut, ...]) -> Zone:
     if zone.polygon is None:
         return zone if zone.without == skipped else replace(zone, without=skipped)
     room = _room_of(zone, book) if zone.room or zone.polygon == () else None
-    if room is None or (zone.room == room.id and zone.polygon == room.outline):
+    if room is None:
         return zone
-    zone = replace(zone, room=room.id, polygon=room.outline)
+    holes = book.holes(room)
+    if (zone.room, zone.polygon, zone.holes) == (room.id, room.outline, holes):
+        return zone
+    zone = replace(zone, room=room.id, polygon=room.outline, holes=holes)
     if zone.is_as_usual and room.settings.passes is not None:
         return replace(
             zone, passes=room.settings.passes, kinds=room.settings.kinds, is_as_usual=False
@@ -101,7 +106,7 @@ def are_same(one: MissionOrder, other: MissionOrder) -> bool:
 
 def _unplaced(order: MissionOrder) -> MissionOrder:
     zones = (
-        replace(zone, polygon=(), without=()) if zone.room else replace(zone, without=())
+        replace(zone, polygon=(), holes=()) if zone.room else replace(zone, without=())
         for zone in order.zones
     )
     return replace(order, zones=tuple(zones), keep_covered=False)
@@ -109,7 +114,7 @@ def _unplaced(order: MissionOrder) -> MissionOrder:
 
 def left_out(zones: Iterable[Zone]) -> tuple[str, ...]:
     """Return the titles of the rooms that zones leave out."""
-    return tuple(title for zone in zones for title, _ in zone.without)
+    return tuple(room.title for zone in zones for room in zone.without)
 
 
 def rotated_order(order: MissionOrder, by_deg: float) -> MissionOrder:
@@ -125,6 +130,13 @@ def rotated_order(order: MissionOrder, by_deg: float) -> MissionOrder:
 def _rotated(zone: Zone, by_deg: float) -> Zone:
     if not zone.polygon and not zone.without:
         return zone
-    without = tuple((title, rotated_polygon(each, by_deg)) for title, each in zone.without)
+
+    def rotated(polygons: Iterable[Polygon]) -> tuple[Polygon, ...]:
+        return tuple(rotated_polygon(polygon, by_deg) for polygon in polygons)
+
+    without = tuple(
+        LeftOut(room.title, rotated_polygon(room.outline, by_deg), rotated(room.holes))
+        for room in zone.without
+    )
     polygon = rotated_polygon(zone.polygon, by_deg) if zone.polygon else zone.polygon
-    return replace(zone, polygon=polygon, without=without)
+    return replace(zone, polygon=polygon, holes=rotated(zone.holes), without=without)

@@ -21,12 +21,30 @@ TOUCH_TOLERANCE_M = 1e-6
 
 def in_zones(zones: tuple[Zone, ...], window: Window, cell_m: float) -> NDArray[np.bool_]:
     """Return which cells of ``window`` lie in one of the zones, bool (rows, cols), read-only."""
+    if any(zone.holes or zone.without for zone in zones):
+        return _with_holes(zones, window, cell_m)
     if any(zone.polygon is None for zone in zones):
-        left_out = tuple(polygon for zone in zones for _, polygon in zone.without)
-        if left_out:
-            return ~_inside_any(left_out, window, cell_m)
         return _everything(window)
     return _inside_any(tuple(zone.polygon for zone in zones if zone.polygon), window, cell_m)
+
+
+def _with_holes(zones: tuple[Zone, ...], window: Window, cell_m: float) -> NDArray[np.bool_]:
+    """Return which cells lie in one of the zones, some of which have holes."""
+    cells = np.zeros((window.rows, window.cols), bool)
+
+    def inside(outline: Polygon, holes: tuple[Polygon, ...]) -> NDArray[np.bool_]:
+        found = _inside_any((outline,), window, cell_m)
+        return found & ~_inside_any(holes, window, cell_m) if holes else found
+
+    for zone in zones:
+        if zone.polygon:
+            cells |= inside(zone.polygon, zone.holes)
+        elif zone.polygon is None:
+            own = np.ones_like(cells)
+            for room in zone.without:
+                own &= ~inside(room.outline, room.holes)
+            cells |= own
+    return cells
 
 
 def counts_in(

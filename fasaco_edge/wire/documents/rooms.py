@@ -19,6 +19,7 @@ class RoomReport(Document, frozen=True):
         name: given by people; "" for none: then it is shown and ordered as `room 3`, by its number.
         outline: corners x, y [m] in the frame of the map, without holes.
         neighbours: numbers of the rooms that it has a passage to.
+        encloses: numbers of the rooms that lie within its outline, and are no part of it.
         swept: swept share of its reachable floor, in the present pass; null if none is reachable.
         passes: passes of an order by its name that gives none itself, as in `mission.json`; null
             for as many as other zones.
@@ -30,6 +31,7 @@ class RoomReport(Document, frozen=True):
     outline: Annotated[tuple[tuple[float, float], ...], allowed(maxItems=1000)] = ()
     area_m2: Amount = 0.0
     neighbours: Annotated[tuple[Ordinal, ...], allowed(maxItems=250)] = ()
+    encloses: Annotated[tuple[Ordinal, ...], allowed(maxItems=250)] = ()
     swept: Share | None = None
     passes: int | tuple[str | dict[str, object], ...] | None = None
     skip: bool = False

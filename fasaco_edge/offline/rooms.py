@@ -1,0 +1,96 @@
+"""Rooms under a planned line: how much of each it sweeps, and how often it enters it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fasaco_edge.drawing.pictures import in_pieces
+from fasaco_edge.grid.geometry import GridGeometry
+from fasaco_edge.grid.occupancy import OccupancyGrid
+from fasaco_edge.grid.rooms import FoundRooms, find_rooms
+from fasaco_edge.judge.floor import JudgedFloor
+from fasaco_edge.offline.ground import Line
+
+_Value = TypeVar("_Value", np.int32, np.bool_)
+
+# Longest piece of the line between two places whose room is looked up [m].
+PIECE_M = 0.05
+
+
+@dataclass(frozen=True, slots=True)
+class PlannedRoom:
+    """A room and what a line does in it, as in ``plan --rooms --json``.
+
+    Attributes:
+        room: its number on this map, by its first pixel.
+        area_m2: its free floor [m2].
+        reachable_m2: the part of it that the tool can reach.
+        swept_share: share of that which the line sweeps; None if nothing is reachable.
+        entered: how often the line enters it, its start included.
+    """
+
+    room: int
+    area_m2: float
+    reachable_m2: float
+    swept_share: float | None
+    entered: int
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RoomsUnderLine:
+    """The rooms of a map, and what a line does in each."""
+
+    found: FoundRooms
+    rooms: tuple[PlannedRoom, ...]
+
+    @classmethod
+    def of(cls, grid: OccupancyGrid, line_xy: Line, judged: JudgedFloor) -> RoomsUnderLine:
+        """Return the rooms under a line, points (x, y) [m], that was judged on the same map."""
+        found = find_rooms(grid)
+        labels, pixel_m2 = found.labels, found.geometry.resolution**2
+        rows, cols = np.nonzero(labels)
+        x, y = found.geometry.to_map(cols.astype(np.float64) + 0.5, rows.astype(np.float64) + 0.5)
+        xy = np.stack((x, y), axis=1)
+        at = labels[rows, cols]
+        swept = _values_at(judged.geometry, judged.swept, xy)
+        reachable = swept | _values_at(judged.geometry, judged.unswept, xy)
+        sizes, reached, done = (
+            np.bincount(at, weights, found.count + 1) * pixel_m2
+            for weights in (None, reachable, swept)
+        )
+        entered = np.bincount(_entries(found, line_xy), minlength=found.count + 1)
+        rooms = tuple(
+            PlannedRoom(
+                room,
+                round(float(sizes[room]), 2),
+                round(float(reached[room]), 2),
+                round(float(done[room] / reached[room]), 4) if reached[room] else None,
+                int(entered[room]),
+            )
+            for room in range(1, found.count + 1)
+        )
+        return cls(found, rooms)
+
+
+def _entries(found: FoundRooms, line_xy: Line) -> NDArray[np.int32]:
+    """Return the rooms that a line enters, one after the other, int32 (n,)."""
+    passed = _values_at(found.geometry, found.labels, in_pieces(line_xy, PIECE_M))
+    # Between rooms, in doors and beside furniture, it is in none.
+    passed = passed[passed > 0]
+    entered: NDArray[np.int32] = passed[np.diff(passed, prepend=0) != 0]
+    return entered
+
+
+def _values_at(
+    geometry: GridGeometry, values: NDArray[_Value], xy: NDArray[np.float64]
+) -> NDArray[_Value]:
+    """Return the values of pixels at points (x, y) [m], (n,); 0 beyond the grid."""
+    cols, rows = (np.floor(at).astype(np.int64) for at in geometry.to_pixels(xy[:, 0], xy[:, 1]))
+    inside = (rows >= 0) & (cols >= 0) & (rows < geometry.rows) & (cols < geometry.cols)
+    found = np.zeros(len(xy), values.dtype)
+    found[inside] = values[rows[inside], cols[inside]]
+    return found
