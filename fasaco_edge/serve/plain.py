@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 
+from fasaco_edge.wire.documents.replies import FloorLeft, FloorReport
 from fasaco_edge.wire.documents.status import Status
 
 WORDS = {
@@ -76,18 +77,20 @@ LEFT = {
 TRIED, OTHERWISE = "left over after", "for another reason"
 NOT_REACHED = "it could not get there"
 ENDED = "the work was ended before it got there"
-# Much floor is passed without a trace if the robot's place is not known often enough.
-PASSED, SELDOM = 8, "it may have missed that: its place was known too seldom"
+# Much floor is left, or passed without a trace, if the robot's place is not known often enough.
+FAR_APART = "poses are too far apart"
+SELDOM = "it may have missed that: its place was known too seldom"
 # Share of the floor in reach above which that is so.
 MUCH = 0.1
+PASSED, BESIDE = 8, 16
 MARKS = {
     "too narrow for the robot, or too near to a wall or to furniture": 1,
     "closed off: no way leads there that the robot fits through": 2,
     "in a keep-out zone, or too near to one": 4,
-    "passed, or in narrow strips, and not known to be swept": 8,
-    "beside the path, and not worth the way": 16,
-    "to come": 16,
-    "not planned yet": 16,
+    "passed, or in narrow strips, and not known to be swept": PASSED,
+    "beside the path, and not worth the way": BESIDE,
+    "to come": BESIDE,
+    "not planned yet": BESIDE,
     "on the path": 32,
 }
 """The mark in ``serve.marks.UNSWEPT_MARKS`` of each reason for which floor is left."""
@@ -174,33 +177,38 @@ def left(status: Status, ordered: Status | None = None) -> list[LeftFloor]:
     if is_ended and (ordered is None or not (status.floor and status.floor.swept_m2)):
         return []
     of = ordered if is_ended and ordered is not None else status
-    mission, floor = of.mission, of.floor
-    found: dict[str, LeftFloor] = {}
-    knows = floor is not None and floor.left is not None
-    areas = [area for area in mission.unreached.areas if not knows or area.reason in NO_FLOOR]
-    tried = sum(area.m2 for area in mission.unreached.areas if area.reason.startswith(TRIED))
-    for part in (floor.left or ()) if floor else ():
-        if is_ended:
-            kind = _of(found, ENDED, REST)
-        elif mission.stage != "over" and part.reason in TO_COME:
+    mission, floor, found = of.mission, of.floor or FloorReport(), dict[str, LeftFloor]()
+    for part in floor.left or ():
+        reason, marks = _why_left(part, of)
+        if is_ended and mission.stage != "over":
+            reason, marks = ENDED, REST
+        elif part.reason in TO_COME and mission.stage != "over":
             continue
-        elif tried >= LEAST_M2 and MARKS.get(part.reason) == MARKS["to come"]:
-            # The same floor, counted in cells: no spot has two reasons.
-            kind = _of(found, NOT_REACHED, MARKS["to come"])
-        else:
-            marks, reason = MARKS.get(part.reason, 0), LEFT.get(part.reason, OTHERWISE)
-            is_much = floor is not None and part.m2 > MUCH * (floor.reachable_m2 or math.inf)
-            kind = _of(found, SELDOM if marks == PASSED and is_much else reason, marks)
-        kind.m2 += part.m2
-    for part in (floor.out_of_reach or ()) if floor else ():
+        _of(found, reason, marks).m2 += part.m2
+    for part in floor.out_of_reach or ():
         _of(found, LEFT.get(part.reason, OTHERWISE), MARKS.get(part.reason, 0)).m2 += part.m2
-    for area in areas:
-        tries = area.reason.startswith(TRIED)
-        kind = _of(found, NOT_REACHED if tries else LEFT.get(area.reason, OTHERWISE))
-        kind.places.append((area.x, area.y))
-        kind.m2 += area.m2
+    for area in mission.unreached.areas:
+        # No spot has two reasons: where the floor is known, cells of it are not counted again.
+        if floor.left is None or area.reason in NO_FLOOR:
+            is_tried = area.reason.startswith(TRIED)
+            kind = _of(found, NOT_REACHED if is_tried else LEFT.get(area.reason, OTHERWISE))
+            kind.places.append((area.x, area.y))
+            kind.m2 += area.m2
     larger = (kind for kind in found.values() if kind.m2 >= LEAST_M2)
     return sorted(larger, key=lambda kind: -kind.m2)
+
+
+def _why_left(part: FloorLeft, of: Status) -> tuple[str, int]:
+    """Return why a part of the floor in reach is left, in the owner's words, and its marks."""
+    marks, areas = MARKS.get(part.reason, 0), of.mission.unreached.areas
+    reachable_m2 = (of.floor and of.floor.reachable_m2) or math.inf
+    is_far = FAR_APART in of.reason or any(FAR_APART in area.reason for area in areas)
+    if part.m2 > MUCH * reachable_m2 and (marks == PASSED or (marks == BESIDE and is_far)):
+        return SELDOM, marks
+    tried_m2 = sum(area.m2 for area in areas if area.reason.startswith(TRIED))
+    if marks == BESIDE and tried_m2 >= LEAST_M2:
+        return NOT_REACHED, marks
+    return LEFT.get(part.reason, OTHERWISE), marks
 
 
 def _of(found: dict[str, LeftFloor], reason: str, marks: int = 0) -> LeftFloor:

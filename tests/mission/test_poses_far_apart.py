@@ -5,7 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from fasaco_edge.daemon.loop.mission_reports import floor_report, mission_report
 from fasaco_edge.mission.core.events import PoseReceived
+from fasaco_edge.serve import plain
+from fasaco_edge.wire.documents.status import Status
 from tests.mission.line_robot import CONFIG, SPEED_M_S, LineRobot
 from tests.mission.world import with_policy
 
@@ -33,6 +36,15 @@ def robot(rows, cols, every_s=5.0):
     return found
 
 
+def status_of(mission):
+    """The mission's part of a status."""
+    return Status(
+        reason=mission.reason,
+        floor=floor_report(mission),
+        mission=mission_report(mission, mission.order_state),
+    )
+
+
 def test_what_lies_between_poses_is_said_not_to_count():
     found = robot(40, 60)
     assert found.wait(100.0, lambda robot: "poses are too far apart" in robot.mission.reason)
@@ -44,8 +56,16 @@ def test_a_robot_that_drives_on_unseen_is_not_led_back(size, every_s):
     found = robot(*size, every_s=every_s)
     assert found.wait(1500.0, lambda robot: robot.mission.state == "done")
     assert found.mission.reason.startswith("every reachable cell is covered; ")
+    assert found.mission.reason.endswith(
+        "; poses are too far apart, and what lies between them does not count"
+    )
     reasons = [why for _, _, why in found.paths]
     assert not [why for why in reasons if why.startswith("the pose came back")]
     seen = robot(*size, every_s=1.0)
     assert seen.wait(400.0, lambda robot: robot.mission.state == "done")
+    assert "too far apart" not in seen.mission.reason
+    # Floor that no pose shows as swept is not called small, or not worth the way.
+    owners = [part.reason for part in plain.left(status_of(found.mission))]
+    assert plain.SELDOM in owners
+    assert plain.SELDOM not in [part.reason for part in plain.left(status_of(seen.mission))]
     assert found.now < 4.0 * seen.now

@@ -97,7 +97,7 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         action="append",
         metavar="X,Y",
         help="answer why this spot [m] was not swept: never seen, too narrow, a keep-out zone, "
-        "missed and by how much, not worth it; may be repeated; --png draws it",
+        "poses missing, missed and by how much, not worth it; may be repeated; --png draws it",
     )
     parser.add_argument("--json", action="store_true", help="print JSON, described below")
     parser.add_argument(

@@ -34,6 +34,7 @@ class PathChecks:
     ) -> None:
         self._ledger, self._monitor, self._orders = ledger, monitor, orders
         self._route, self._line, self._standing = route, line, standing
+        orders.ask_for_floor(self._sum_up)
         self._worth_at = float("-inf")
         # Number of covered cells and its time [s], while poses are too far apart.
         self._progress: tuple[int, float] | None = None
@@ -85,6 +86,13 @@ class PathChecks:
         before, covered = self._progress, self._orders.done
         self._progress = covered, now
         return before is not None and covered <= before[0]
+
+    def _sum_up(self) -> str:
+        """Return what else to say at the end of an order, as text that follows another."""
+        floor = self._line.sum_up()
+        if not self._monitor.are_poses_far_apart:
+            return floor
+        return f"{floor}; {FAR_APART}, and what lies between them does not count"
 
     def check_worth(self, now: float) -> None:
         """Want a new plan for a fleet's robot if others have swept all cells ahead."""

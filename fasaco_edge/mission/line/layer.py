@@ -64,7 +64,6 @@ class LineLayer:
         route: Route,
     ) -> None:
         self._map, self._ledger, self._orders, self._route = map_state, ledger, orders, route
-        orders.ask_for_floor(self.sum_up)
         self.offset = Offset(sweeping.tool_m if sweeping else 0.0)
         self._config = sweeping.line if sweeping else None
         self._polisher = Polisher(sweeping.line) if sweeping else None

@@ -30,6 +30,18 @@ from fasaco_edge.mission.line.figures import Unswept
 from fasaco_edge.mission.line.missed_floor import Cause
 from fasaco_edge.planners.line import blocks_of, left_in_blocks, memory_for_moves
 
+
+def _causes() -> NDArray[np.uint8]:
+    """Return the ``Unswept`` of each state of a pixel, uint8 (256,); AHEAD of all open ones."""
+    state = np.arange(256, dtype=np.uint8)
+    causes: NDArray[np.uint8] = (state & np.uint8(CAUSE)) >> np.uint8(CAUSE_SHIFT)
+    causes[state & np.uint8(WANTED | SWEPT | OPEN) == WANTED] = Unswept.PASSED
+    causes[state & np.uint8(OPEN) != 0] = Unswept.AHEAD
+    return causes
+
+
+_CAUSE_OF = _causes()
+assert Unswept.BESIDE == Unswept.AHEAD - 1
 NO_MASK = np.zeros((0, 0), np.bool_)
 
 
@@ -148,12 +160,9 @@ class SweepTally:
 
     def unswept(self) -> NDArray[np.uint8]:
         """Return why each pixel is not swept, uint8 (rows, cols), see ``Unswept``."""
-        state = self._state
-        causes: NDArray[np.uint8] = (state & np.uint8(CAUSE)) >> np.uint8(CAUSE_SHIFT)
-        causes[state & np.uint8(WANTED | SWEPT | OPEN) == WANTED] = Unswept.PASSED
-        is_open = state & np.uint8(OPEN) != 0
-        causes[is_open] = Unswept.AHEAD
-        causes[is_open & (self.sweeps.counts == 0)] = Unswept.BESIDE
+        causes: NDArray[np.uint8] = _CAUSE_OF[self._state]
+        # Only an open pixel that the line ahead does not sweep has a count of 0.
+        causes -= (self.sweeps.counts == 0).view(np.uint8)
         return causes
 
     def open_in_m2(self, part: Window) -> float:
