@@ -47,6 +47,7 @@ def _room(room: RoomReport, tint: int) -> Digest:
         "title": room.title,
         "outline": [[round(x, 2), round(y, 2)] for x, y in room.outline],
         "neighbours": room.neighbours,
+        "encloses": room.encloses,
         "m2": round(room.area_m2, 1),
         "passes": room.passes,
         "skip": room.skip,

@@ -95,8 +95,8 @@ function maskOf(grid, marks, holds) {
   return grid.mask;
 }
 
-function trace(context, points, closed) {
-  context.beginPath();
+function trace(context, points, closed, begins = true) {
+  if (begins) context.beginPath();
   points.forEach(([x, y], i) => context[i ? "lineTo" : "moveTo"](...toScreen(x, y)));
   if (closed) context.closePath();
 }

@@ -18,8 +18,10 @@ function drawRooms(context) {
   context.globalCompositeOperation = dark.matches ? "lighten" : "multiply";
   for (const room of foundRooms()) {
     trace(context, room.outline, true);
+    // Rooms within a ring of corridors are no part of it.
+    for (const inner of room.encloses.map(roomOf).filter(Boolean)) trace(context, inner.outline, true, false);
     context.fillStyle = colours[`room${room.tint}`];
-    context.fill();
+    context.fill("evenodd");
   }
   context.restore();
 }
@@ -57,7 +59,8 @@ function fitting(context, text, wide) {
 
 function roomAt(at) {
   const there = foundRooms().filter((room) => isInside(at, room.outline));
-  return there.length ? there.reduce((one, other) => (other.m2 < one.m2 ? other : one)).id : 0;
+  const inner = there.find((room) => !there.some((other) => room.encloses.includes(other.id)));
+  return inner ? inner.id : 0;
 }
 
 // The card of the tapped room.
