@@ -64,6 +64,10 @@ def told(daemon: Daemon, *words: str) -> Any:
         (b'{"command":"start","order":{"keep_out":[[[0,0],[1,1],[1,0],[0,1]]]}}', "bad_order",
          "keep_out[0] crosses or touches itself"),
         (b'{"command":"start","order":{"passes":1e9}}', "bad_order", "order.passes"),
+        (b'{"command":"start","order":{"zones":[{"name":"a"}]}}', "bad_order", "nor a room"),
+        (b'{"command":"room_name","room":{"id":1}}', "bad_order", "room.name: missing"),
+        (b'{"command":"room_set","room":{"id":1,"skip":true}}', "bad_order", "no room 1"),
+        (b'{"command":"room_split","room":{"id":1,"cut":[[0,0],[1,1]]}}', "not_now", "no map yet"),
     ],
 )  # fmt: skip
 def test_what_is_no_command_is_answered_with_an_error(outsider, payload, code, said):

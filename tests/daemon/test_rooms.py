@@ -19,7 +19,7 @@ from tests.support.rooms import cells_of, map_bytes, pose_bytes, two_rooms
 from tests.wire.schemas import check
 
 FLAT = two_rooms(door=True)
-IN_WEST, IN_EAST = (1.05, 1.05), (4.65, 1.65)
+IN_WEST = (1.05, 1.05)
 IDLE: dict[str, Any] = {"mission": {"autostart": False}}
 
 
@@ -78,11 +78,9 @@ def test_rooms_are_named_ordered_and_known_again(tmp_path):
         answer = command(outsider, "start", attic | {"unknown": "wait"})
         assert answer["mission"]["waits_for_room"] == "attic"
         outsider.wait_status(lambda status: "waits for a room 'attic'" in status["reason"])
-        ended = len(heard.heard)
         running.process.send_signal(signal.SIGKILL)
         running.process.wait()
     with daemon_process(tmp_path, **IDLE) as running, Outsider(running.endpoint) as outsider:
-        assert ended
         heard, paths = outsider.listen("rooms"), outsider.listen("path")
         # Before any map the rooms are known, and can be ordered.
         again = heard.wait(lambda sample: sample.json()["rooms"]).json()
@@ -98,11 +96,6 @@ def test_rooms_are_named_ordered_and_known_again(tmp_path):
         assert about(first)["reason"].startswith("zone 'kitchen', pass 1 of 2")
         swept = cells_of(planned(first)[0])
         assert sum(col >= 11 for _, col in swept) > 40
-        outsider.put("pose", pose_bytes(*IN_EAST))
-        shares = heard.wait(
-            lambda sample: any(room["swept"] for room in sample.json()["rooms"])
-        ).json()
-        assert 0.0 < max(room["swept"] or 0.0 for room in shares["rooms"]) < 0.3
         # A reset forgets what is swept, and no room.
         command(outsider, "reset")
         assert [room["name"] for room in rooms_of(outsider)["rooms"]].count("kitchen") == 1

@@ -272,7 +272,7 @@ def test_no_map_gives_a_part_of_merged_rooms_to_another():
 @pytest.mark.parametrize(
     ("change", "why"),
     [
-        (lambda book: book.name(7, "x"), "no room room 7; there are 'kitchen', room"),
+        (lambda book: book.name(7, "x"), "no room 7; there are 'kitchen', room"),
         (lambda book: book.name("attic", "x"), "no room 'attic'; there are"),
         (lambda book: book.name(2, "kitchen"), "is 'kitchen' already"),
         (lambda book: book.name(2, "room 9"), "how a room without a name is called"),

@@ -13,6 +13,7 @@ from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.grid.polygons import is_near
 from fasaco_edge.grid.rotation import rotated_geometry, rotated_pose
 from fasaco_edge.mission.core.events import MapReceived, PoseReceived, State
+from fasaco_edge.mission.map.inputs import PATIENCE_S
 from fasaco_edge.mission.map.room_watch import PERIOD_S
 from fasaco_edge.mission.orders.order import (
     Command,
@@ -99,6 +100,9 @@ def test_a_room_is_ordered_by_its_name_and_by_its_number():
     assert len(visited(drive, WEST_COLUMNS)) < 30
     (zone,) = drive.mission.zone_progress()
     assert (zone.name, zone.covered) == ("kitchen", zone.cells)
+    progress = drive.mission.room_progress()
+    assert progress[room_at(drive, *IN_EAST).id] == (zone.cells, zone.covered)
+    assert progress[room_at(drive, *IN_WEST).id][1] < 30
     start(drive, f"room {room_at(drive, *IN_WEST).id}")
     assert drive.refused is None
     drive.finish()
@@ -112,7 +116,7 @@ def test_what_is_unknown_is_refused_with_what_there_is():
     start(drive, "rug", "attic")
     assert drive.refused.code == "bad_order"
     assert "zones[1].name: no zone 'attic'" in str(drive.refused)
-    assert "there are rug; and no room: there are " in str(drive.refused)
+    assert "there are rug; nor a room: there are " in str(drive.refused)
     assert "'kitchen'" in str(drive.refused)
     assert drive.mission.state is State.IDLE
     # A standing zone comes before a room of its name.
@@ -335,3 +339,26 @@ def test_what_is_wrong_with_a_request_is_named(document, said):
     with pytest.raises(OrderError) as refused:
         read_command(document)
     assert said in str(refused.value)
+
+
+def test_rooms_of_another_frame_are_not_known_on_this_map():
+    """Not even between its first map and the first look at it."""
+    drive = settled(*BOTH)
+    name(drive, room_at(drive, *IN_EAST).id, "kitchen")
+    upstairs = MapReceived(building(*BOTH, frame="upstairs"))
+    for _ in range(round(4 * PATIENCE_S)):
+        drive.tell(upstairs, pose_at(*IN_WEST, frame="upstairs"), after=0.5)
+        if drive.mission.grid.frame == "upstairs":
+            break
+    assert drive.mission.grid.frame == "upstairs"
+    start(drive, "kitchen")
+    assert drive.refused.code == "bad_order"
+    settle_in(drive, "upstairs")
+    assert len(drive.mission.rooms.rooms) == 2
+    start(drive, "kitchen")
+    assert "nor a room: there are room 3, room 4" in str(drive.refused)
+
+
+def settle_in(drive, frame):
+    for _ in range(8):
+        drive.tell(pose_at(*drive.cell, frame=frame), after=1.01 * PERIOD_S)

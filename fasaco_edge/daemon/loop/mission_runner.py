@@ -141,7 +141,8 @@ class MissionRunner:
             command = asked.asked._replace(order=places.located(asked.order, self.rooms))
             after = before.commanded(command, has_home=places.place("home") is not None)
             if is_named(asked.order) and not after.frame:
-                after = replace(after, frame=places.frame)
+                is_room = any(zone.room for zone in command.order.zones)
+                after = replace(after, frame=self.rooms.frame if is_room else places.frame)
             if not asked.discard and before.forgets(command, after):
                 self._keeper.check_loss(asked.command)
             if asked.command == "replan":

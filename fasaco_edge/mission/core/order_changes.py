@@ -80,7 +80,7 @@ class OrderChanges:
 
     def answer(self, event: CommandReceived) -> tuple[Answer, OrderState | None]:
         """Return the answer to a command, and the state that follows; None if it is refused."""
-        before, book = self.orders.order_state, self.rooms.book
+        before, book = self.orders.order_state, self.rooms.on(self.map.grid)
         try:
             if event.room is not None:
                 carry_out(book, event.command, event.room)

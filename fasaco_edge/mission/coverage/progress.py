@@ -231,6 +231,8 @@ def _counts(
     """Return how many cells lie in each polygon, and in none of its holes."""
     flat = tuple(hole for each in holes for hole in each)
     counts = counts_in((*polygons, *flat), lattice.window, lattice.cell_m, cells)
+    if not flat:
+        return counts
     in_holes = iter(counts[len(polygons) :])
     return [
         count - sum(next(in_holes) for _ in each)

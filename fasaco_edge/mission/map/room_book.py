@@ -175,7 +175,8 @@ class RoomBook:
         sheets: the one in use first.
         next_id: the next number.
         version: counter of changes that a listener sees.
-        is_elsewhere: whether the next map may show another building than the sheet in use.
+        is_elsewhere: whether the map may show another building than the first sheet, so that none
+            is in use until a map has been looked at.
     """
 
     sheets: list[RoomSheet] = field(default_factory=list)
@@ -185,8 +186,8 @@ class RoomBook:
 
     @property
     def sheet(self) -> RoomSheet | None:
-        """The sheet in use; None before the first map."""
-        return self.sheets[0] if self.sheets else None
+        """The sheet in use; None before the first map, and while it may be another."""
+        return self.sheets[0] if self.sheets and not self.is_elsewhere else None
 
     @property
     def rooms(self) -> tuple[Room, ...]:
@@ -196,11 +197,12 @@ class RoomBook:
 
     @property
     def frame(self) -> str:
-        """The frame of the sheet in use; "" before the first map."""
+        """The frame of the sheet in use; "" without one."""
         return "" if self.sheet is None else self.sheet.frame
 
     def leave_building(self) -> None:
         """Note that the map shows another building: the next update looks for its sheet."""
+        self.version += not self.is_elsewhere
         self.is_elsewhere = True
 
     def find(self, called: str | int) -> Room | None:
@@ -220,9 +222,8 @@ class RoomBook:
         """
         room = self.find(called)
         if room is None:
-            shown = f"room {called}" if isinstance(called, int) else repr(called)
             raise OrderError(
-                f"room.id: no room {shown}; {self.listed()}",
+                f"room.id: there is no room {called!r}; {self.listed()}",
                 hint="name one of those, or its number",
             )
         return room

@@ -74,7 +74,7 @@ def _widen(sheet: RoomSheet, factor: int) -> None:
 def _sheet_for(book: RoomBook, found: FoundRooms, frame: str) -> RoomSheet:
     """Return the sheet of the building that a map shows, perhaps a new one."""
     in_use = book.sheet
-    if in_use is not None and in_use.frame == frame and not book.is_elsewhere:
+    if in_use is not None and in_use.frame == frame:
         return in_use
     alike = [(_alike(sheet, found), sheet) for sheet in book.sheets if sheet.frame == frame]
     share, best = max(alike, key=lambda each: each[0], default=(0.0, None))

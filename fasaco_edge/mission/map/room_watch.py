@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from fasaco_edge.grid.geometry import Pose2D
-from fasaco_edge.grid.occupancy import OccupancyGrid
+from fasaco_edge.grid.occupancy import OccupancyGrid, coarser
 from fasaco_edge.grid.rooms import FoundRooms, find_rooms
 from fasaco_edge.grid.rotation import rotated_pose
 from fasaco_edge.mission.map.loop_closure import Motion
@@ -17,6 +17,8 @@ from fasaco_edge.mission.map.room_update import update
 # Least time from one look to the next [s]; large maps, at some 0.2 s per million pixels, are looked
 # at less often.
 PERIOD_S, PIXELS_PER_S = 2.0, 50_000
+# Maps of more pixels are looked at with wider ones: a look takes some 50 bytes a pixel.
+MOST_PIXELS = 1_000_000
 # A look waits at most this long for a step without a new map [s]: a plan comes first.
 LATE_S = 1.0
 
@@ -43,8 +45,10 @@ class RoomWatch:
         A map that stays is shown to the book again until nothing more follows from it.
         """
         came, self._newest = grid is not self._newest, grid
+        if self.book.sheet is not None and self.book.frame != grid.frame:
+            self.book.leave_building()
         sheet = self.book.sheet
-        cuts = tuple(sheet.cuts) if sheet is not None and sheet.frame == grid.frame else ()
+        cuts = tuple(sheet.cuts) if sheet is not None else ()
         is_new = grid is not self._seen or cuts != self._cuts
         if now < self._due or not (is_new or (sheet is not None and sheet.is_settling)):
             return
@@ -52,12 +56,18 @@ class RoomWatch:
             self._due = max(self._due, now)
             return
         if is_new or self._found is None:
-            self._found = find_rooms(grid, cuts)
+            self._found = find_rooms(coarser(grid, MOST_PIXELS), cuts)
             self._seen, self._cuts = grid, cuts
-        self._due = now + max(PERIOD_S, grid.cells.size / PIXELS_PER_S)
+        pixels = min(grid.cells.size, MOST_PIXELS)
+        self._due = now + max(PERIOD_S, pixels / PIXELS_PER_S)
         update(self.book, self._found, grid.frame)
         if self.book.sheet is None or not self.book.sheet.is_settling:
             self._found = None
+
+    def on(self, grid: OccupancyGrid | None) -> RoomBook:
+        """Return the rooms as far as they are those of a map; all without one."""
+        is_here = grid is None or self.book.frame in ("", grid.frame)
+        return self.book if is_here else RoomBook()
 
     def move(self, motion: Motion, lattice_deg: float) -> None:
         """Move the rooms with the map; the motion is given in a frame at an angle [deg]."""

@@ -48,7 +48,7 @@ def located(
         there = f"there are {', '.join(known)}" if known else "it has none"
         raise OrderError(
             f"zones[{index}].name: no zone {name!r} in mission.zones of the daemon's "
-            f"configuration; {there}; and no room: {book.listed()}",
+            f"configuration; {there}; nor a room: {book.listed()}",
             hint="name one of those, or give the zone a polygon; with `unknown: wait` the order "
             "waits for a room of that name",
         )

@@ -21,7 +21,7 @@ TOUCH_TOLERANCE_M = 1e-6
 
 def in_zones(zones: tuple[Zone, ...], window: Window, cell_m: float) -> NDArray[np.bool_]:
     """Return which cells of ``window`` lie in one of the zones, bool (rows, cols), read-only."""
-    if any(zone.holes or zone.without for zone in zones):
+    if [zone for zone in zones if zone.holes or zone.without]:
         return _with_holes(zones, window, cell_m)
     if any(zone.polygon is None for zone in zones):
         return _everything(window)
