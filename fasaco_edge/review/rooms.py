@@ -20,8 +20,6 @@ from fasaco_edge.wire.documents.rooms import RoomReport
 
 # States in which the robot is not at work, whatever room it stands in.
 RESTS = ("idle", "done", "paused", "charging", "loading", "waiting for map", "waiting for pose")
-# A polygon of fewer corners has no inside.
-LEAST_CORNERS = 3
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,8 +58,7 @@ class RoomChapter:
 
 def outlined(data: RunData) -> list[RoomReport]:
     """Return the rooms that have an outline, the largest first: others may lie within."""
-    found = [room for room in data.rooms.rooms if len(room.outline) >= LEAST_CORNERS]
-    return sorted(found, key=lambda room: -area_m2(room.outline))
+    return sorted(data.rooms.outlined, key=lambda room: -area_m2(room.outline))
 
 
 def room_at(data: RunData, point: Point) -> RoomReport | None:

@@ -7,7 +7,7 @@ from functools import lru_cache
 
 from fasaco_edge.grid.geometry import Bounds, Polygon
 from fasaco_edge.grid.label_place import label_place
-from fasaco_edge.serve.digest import MOST_CORNERS, MOST_M
+from fasaco_edge.serve.digest import MOST_CORNERS
 from fasaco_edge.wire.documents.rooms import RoomReport, Rooms
 
 Digest = dict[str, object]
@@ -20,7 +20,7 @@ TINTS, NEAR_M = 6, 0.4
 
 def rooms(found: Rooms) -> Digest:
     """Return rooms with their settings, and places of labels, without what a drive changes."""
-    shown = [each for each in found.rooms[:MOST_ROOMS] if _is_valid(each.outline)]
+    shown = [each for each in found.outlined[:MOST_ROOMS] if len(each.outline) <= MOST_CORNERS]
     tints = _tints(shown)
     return {"rooms": [_room(each, tints[each.id]) for each in shown]}
 
@@ -32,11 +32,6 @@ def shares(found: Rooms) -> Digest:
         for each in found.rooms[:MOST_ROOMS]
     }
     return {"swept": share}
-
-
-def _is_valid(outline: Polygon) -> bool:
-    corners = (value for corner in outline for value in corner)
-    return 3 <= len(outline) <= MOST_CORNERS and all(abs(value) < MOST_M for value in corners)
 
 
 def _room(room: RoomReport, tint: int) -> Digest:

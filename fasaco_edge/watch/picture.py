@@ -178,7 +178,7 @@ def draw_robot(kinds: Kinds, frame: Frame, pose: Pose2D, radius_m: float) -> Non
 
 def draw_names(kinds: Kinds, frame: Frame, rooms: Rooms) -> None:
     """Write the rooms' names with swept shares, or names, or numbers, as they are wide."""
-    for room in rooms.rooms:
+    for room in rooms.outlined:
         place = label_place(room.outline)
         if place is None:
             continue

@@ -79,7 +79,8 @@ def test_without_a_floor_the_daemon_has_counted():
 def test_recordings_without_rooms_have_no_chapters():
     data = driven()
     nothing = RoomReport(1, outline=((0, 0), (1, 1)))
-    for rooms in (Rooms(), Rooms("map", 1, (nothing,))):
+    far = RoomReport(2, outline=((0, 0), (1e14, 0), (0, 1e14)))
+    for rooms in (Rooms(), Rooms("map", 1, (nothing, far))):
         assert room_chapters(replace(data, rooms=rooms), (), None) == ()
     # Rooms without a map, or without a pose, as of a torn recording.
     assert room_chapters(replace(data, grid=None), (), None) == ()

@@ -142,14 +142,15 @@ def test_it_shows_rooms_with_their_swept_shares():
     hall = RoomReport(1, "hall", ((0, 0), (3, 0), (3, 4), (0, 4)), swept=0.459)
     nook = RoomReport(2, "\x1b[2J", ((3, 0), (6, 0), (6, 4), (3, 4)), skip=True)
     many = tuple(RoomReport(number, swept=1.0) for number in range(3, 20))
-    tell(view, "rooms", encode_json(Rooms("map", 1, (hall, nook, *many))))
+    far = RoomReport(40, "far", ((0, 0), (1e14, 0), (0, 1e14)), swept=1.0)
+    tell(view, "rooms", encode_json(Rooms("map", 1, (hall, nook, *many, far))))
     tell(view, "status", status(mission={"left_out": ["nook"]}))
     page = page_of(view, 140, 60)
     assert " hall 45% " in page
     assert " 2 " in page  # a name that would control the terminal is none
     assert "leaves out nook" in page
     assert "hall 45.9 %" in page
-    assert ", 7 more" in page
+    assert ", 8 more" in page
     # In a narrow picture names give way.
     assert " hall " not in page_of(view, 10, 8)
 

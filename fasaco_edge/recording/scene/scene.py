@@ -139,7 +139,7 @@ class Scene:
 
     def add_rooms(self, found: Rooms) -> None:
         """Draw the outlines of the rooms, with their names; a drive alone changes neither."""
-        named = [(room.title, room.outline) for room in found.rooms if room.outline]
+        named = [(room.title, room.outline) for room in found.outlined]
         if named == self._rooms:
             return
         self._rooms = named

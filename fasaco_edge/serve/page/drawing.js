@@ -49,7 +49,7 @@ function finish(corners) {
   drafts.push({ kind, polygon: rounded(corners), name: `${what} ${number}` });
   Object.assign(drawing, { kind: "", corners: [] });
   showDrafts();
-  document.getElementById("plan").scrollIntoView({ block: "nearest" });
+  document.getElementById("drafts").scrollIntoView({ block: "nearest" });
 }
 
 // Keep-outs in force: those with a name are the operator's, and may be removed by a tap on the map.
