@@ -113,7 +113,8 @@ def test_rooms_are_named_set_ordered_merged_and_split_by_finger(tmp_path):
         # A name that another room has is refused, and the owner reads why.
         tab.js("find('roomname').value = 'kitchen'")
         tab.click("rename")
-        until(lambda: "is 'kitchen' already: choose another" in tab.js("find('answer').innerText"))
+        until(lambda: tab.js("find('answer').innerText").startswith("Choose another name"))
+        assert "is 'kitchen' already" in tab.js("find('answer').innerText")
         assert tab.js("find('roomtitle').innerText") == "bath"
         tab.click("roomcross")
         until(lambda: tab.js("JSON.stringify(roomOf(pickedRoom).passes)") == '["auto","cross"]')

@@ -334,7 +334,7 @@ function showAnswer(answer) {
   awaited.delete(answer.id);
   if (answer.ok) say(TAKEN[then.name] || "", "good");
   // What is wrong with a room is for its owner to mend.
-  else if (answer.code === "bad_order" && then.name.startsWith("room_")) say(`${answer.text.replace(/^room\.\w+: /, "")}: ${answer.hint}.`, "bad");
+  else if (answer.code === "bad_order" && then.name.startsWith("room_")) say(roomFault(answer), "bad");
   else say(REFUSED[answer.code] || "That did not work.", "bad", answer.hint ? `${answer.text} (${answer.hint})` : answer.text);
   const next = answer.ok ? then.taken : then.refused;
   if (next) next(answer);

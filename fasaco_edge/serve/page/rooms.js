@@ -38,7 +38,9 @@ function drawRoomNames(context) {
     const isPicked = room.id === pickedRoom, turn = turnOf(room.id);
     if (!room.label) continue;
     const [x, y, wide] = room.label, [px, py] = toScreen(x, y);
-    const text = fitting(context, `${turn ? `${turn}. ` : ""}${room.title}`, isPicked ? Infinity : 1.3 * wide * view.scale);
+    const mark = turn ? `${turn}. ` : "", most = isPicked ? Infinity : 1.3 * wide * view.scale;
+    // Of a room without a name the number will do.
+    const text = (!room.name && whole(context, mark + room.title, most)) || fitting(context, mark + (room.name || room.id), most);
     if (!text) continue;
     const below = room.skip ? "left out" : hasShare(room) ? percent(shareOf(room)) : "";
     drawLabel(context, text, px, below ? py - 8 : py, isPicked || turn ? colours.accent : colours.ink);
@@ -46,13 +48,17 @@ function drawRoomNames(context) {
   }
 }
 
+function whole(context, text, wide) {
+  context.font = LABEL_FONT;
+  return context.measureText(text).width <= wide ? text : "";
+}
+
 // As much of a name as a room is wide; "" if that is not worth it.
 function fitting(context, text, wide) {
-  context.font = LABEL_FONT;
-  if (context.measureText(text).width <= wide) return text;
+  if (whole(context, text, wide)) return text;
   for (let most = text.length - 1; most >= 3; most--) {
     const cut = `${text.slice(0, most)}…`;
-    if (context.measureText(cut).width <= wide) return cut;
+    if (whole(context, cut, wide)) return cut;
   }
   return "";
 }
@@ -152,6 +158,12 @@ function passesIn(count, cross) {
 
 function twiceAtLeast(count, cross) {
   if (find(cross).checked && !(Number(find(count).value) > 1)) find(count).value = 2;
+}
+
+// What to do comes first, and in brackets what is wrong.
+function roomFault(answer) {
+  const what = answer.text.replace(/^room\.\w+: /, "").replace(/ m2\b/g, " m²");
+  return answer.hint ? `${answer.hint[0].toUpperCase()}${answer.hint.slice(1)} (${what}).` : what;
 }
 
 const change = (name, members, then) => command(name, { room: { id: pickedRoom, ...members } }, then);
