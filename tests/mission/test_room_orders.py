@@ -11,8 +11,10 @@ import pytest
 from fasaco_edge.errors import OrderError
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.grid.polygons import is_near
+from fasaco_edge.grid.rooms import find_rooms
 from fasaco_edge.grid.rotation import rotated_geometry, rotated_pose
 from fasaco_edge.mission.core.events import MapReceived, PoseReceived, State
+from fasaco_edge.mission.map import room_watch
 from fasaco_edge.mission.map.inputs import PATIENCE_S
 from fasaco_edge.mission.map.room_watch import PERIOD_S
 from fasaco_edge.mission.orders.order import (
@@ -362,3 +364,23 @@ def test_rooms_of_another_frame_are_not_known_on_this_map():
 def settle_in(drive, frame):
     for _ in range(8):
         drive.tell(pose_at(*drive.cell, frame=frame), after=1.01 * PERIOD_S)
+
+
+def test_a_map_is_looked_at_once_however_often_it_comes(monkeypatch):
+    looks = []
+
+    def find(grid, cuts):
+        looks.append(len(cuts))
+        return find_rooms(grid, cuts)
+
+    monkeypatch.setattr(room_watch, "find_rooms", find)
+    drive = settled(*BOTH)
+    for _ in range(4):
+        drive.tell(MapReceived(building(*BOTH)), pose_at(*IN_WEST), after=PERIOD_S)
+        drive.tell(after=PERIOD_S)
+    assert looks == [0]
+    drive.command("room_split", room=RoomRequest(1, cut=((1.5, -0.1), (1.5, 2.6))))
+    settle(drive)
+    drive.tell(MapReceived(building(*ONLY_WEST)), pose_at(*IN_WEST))
+    settle(drive)
+    assert looks == [0, 1, 1]

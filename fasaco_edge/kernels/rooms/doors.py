@@ -29,7 +29,7 @@ LEAST_SURE = THIN + THICK
 OFF_CENTRE = 2.0
 # Ratio of the squared clearances beside a door to that in it: of the wider side, of the other side,
 # and of the other side if it is half seen.
-WIDER, OTHER, OTHER_HALF_SEEN = 1.32, 1.1, 0.94
+WIDER, OTHER, OTHER_HALF_SEEN = 1.32, 1.1, 0.8
 # Gaps looked at: one pixel of each gap is enough.
 MOST_GAPS = 20_000
 

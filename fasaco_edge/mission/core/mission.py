@@ -219,7 +219,7 @@ class Mission:
     def _look_for_rooms(self, happened: Decision, now: float) -> None:
         """Look for rooms if that is due; let the order follow them."""
         if any(isinstance(fault, LedgerMismatchError) for fault in happened.faults):
-            self._rooms.book.leave_building()
+            self._rooms.leave_building()
         if self.grid is not None and not self.is_in_doubt:
             self._rooms.look(self.grid, now)
         self._changes.follow_rooms()

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import math
+import zlib
+
+import numpy as np
 
 from fasaco_edge.grid.geometry import Pose2D
 from fasaco_edge.grid.occupancy import OccupancyGrid, coarser
@@ -32,9 +35,11 @@ class RoomWatch:
 
     def __init__(self) -> None:
         self.book = RoomBook()
-        # The map of the last step; the map that was looked at last, the cuts on it, what was found.
+        # The map of the last step, and whether it was looked at.
         self._newest: OccupancyGrid | None = None
-        self._seen: OccupancyGrid | None = None
+        self._is_seen = False
+        # What was looked at last, the cuts on it, and what was found, as long as it is needed.
+        self._key: tuple[object, ...] = ()
         self._cuts: tuple[Cut, ...] = ()
         self._found: FoundRooms | None = None
         self._due = -math.inf
@@ -45,24 +50,36 @@ class RoomWatch:
         A map that stays is shown to the book again until nothing more follows from it.
         """
         came, self._newest = grid is not self._newest, grid
+        self._is_seen &= not came
         if self.book.sheet is not None and self.book.frame != grid.frame:
-            self.book.leave_building()
+            self.leave_building()
         sheet = self.book.sheet
-        cuts = tuple(sheet.cuts) if sheet is not None else ()
-        is_new = grid is not self._seen or cuts != self._cuts
-        if now < self._due or not (is_new or (sheet is not None and sheet.is_settling)):
+        cuts = () if sheet is None else tuple(sheet.cuts)
+        is_settled = sheet is None or not sheet.is_settling
+        is_seen = self._is_seen and cuts == self._cuts
+        if now < self._due or (is_seen and is_settled):
             return
-        if (came and now < self._due + LATE_S) or (came and self._due == -math.inf):
+        if came and (self._due == -math.inf or now < self._due + LATE_S):
             self._due = max(self._due, now)
             return
-        if is_new or self._found is None:
-            self._found = find_rooms(coarser(grid, MOST_PIXELS), cuts)
-            self._seen, self._cuts = grid, cuts
+        self._is_seen, self._cuts = True, cuts
         pixels = min(grid.cells.size, MOST_PIXELS)
         self._due = now + max(PERIOD_S, pixels / PIXELS_PER_S)
+        # A mapper of a robot that stands sends the same map again and again.
+        key = zlib.crc32(np.ascontiguousarray(grid.cells).data), grid.geometry, grid.frame, cuts
+        if key == self._key and is_settled:
+            return
+        if key != self._key or self._found is None:
+            self._found = find_rooms(coarser(grid, MOST_PIXELS), cuts)
+        self._key = key
         update(self.book, self._found, grid.frame)
         if self.book.sheet is None or not self.book.sheet.is_settling:
             self._found = None
+
+    def leave_building(self) -> None:
+        """Note that the map shows another building."""
+        self.book.leave_building()
+        self._key, self._is_seen = (), False
 
     def on(self, grid: OccupancyGrid | None) -> RoomBook:
         """Return the rooms as far as they are those of a map; all without one."""
