@@ -40,6 +40,8 @@ BOTH = (
 ONLY_WEST = tuple(row[:11] + "?" * 10 for row in BOTH)
 IN_WEST, IN_EAST = (2, 2), (2, 18)
 WAITS = OrderState.idle("waits")
+# As many as any change of rooms takes.
+LOOKS = 10
 
 
 def settled(*rows, order_state=WAITS, config=CONFIG):
@@ -55,7 +57,7 @@ def settled(*rows, order_state=WAITS, config=CONFIG):
 
 
 def settle(drive):
-    for _ in range(8):
+    for _ in range(LOOKS):
         drive.tell(pose_at(*drive.cell), after=1.01 * PERIOD_S)
         assert not drive.mission.rooms.sheet or len(drive.mission.rooms.rooms) < 5
     return drive
@@ -267,7 +269,7 @@ def rotated(rows, deg):
     pose = pose_at(*IN_WEST).pose
     here = PoseReceived(replace(pose, pose=rotated_pose(pose.pose, deg)))
     drive = Drive(IN_WEST, MapReceived(turned), here, order_state=WAITS, config=config)
-    for _ in range(8):
+    for _ in range(LOOKS):
         drive.tell(here, after=1.01 * PERIOD_S)
     return drive
 
@@ -362,7 +364,7 @@ def test_rooms_of_another_frame_are_not_known_on_this_map():
 
 
 def settle_in(drive, frame):
-    for _ in range(8):
+    for _ in range(LOOKS):
         drive.tell(pose_at(*drive.cell, frame=frame), after=1.01 * PERIOD_S)
 
 

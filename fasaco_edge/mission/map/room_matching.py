@@ -43,7 +43,7 @@ from fasaco_edge.mission.map.room_raster import (
 Labels = NDArray[np.int32]
 
 # Updates that a change must last.
-HOLD_NEW, HOLD_CHANGE = 3, 6
+HOLD_NEW, HOLD_CHANGE = 4, 8
 # Squares are settled in a room after so many updates, to twice as many.
 SETTLED = 2 * HOLD_CHANGE
 # An update without a change takes this from its score.
