@@ -16,6 +16,7 @@ from fasaco_edge.errors import FasacoError, MalformedMessage
 from fasaco_edge.grid.geometry import Pose2D
 from fasaco_edge.text import is_reported
 from fasaco_edge.wire.documents.json_text import OF_JSON, decode_document, decode_json
+from fasaco_edge.wire.documents.rooms import Rooms
 from fasaco_edge.wire.documents.settings import KnownSettings, known_settings
 from fasaco_edge.wire.documents.status import Status
 from fasaco_edge.wire.limits import MAX_COORDINATE_M
@@ -52,6 +53,7 @@ class RobotState:
         status: the newest one; None before the first.
         document: its bytes, b"" before the first.
         settings: of the daemon, from the status.
+        rooms: the newest ones; none before the first, and of a daemon that finds none.
         walk: the path, and the robot's progress on it.
         robots: names of all robots on the bus with a daemon.
         trouble: why the bus cannot be reached; "" if it can.
@@ -66,6 +68,7 @@ class RobotState:
         self.status: Status | None = None
         self.document = b""
         self.settings = KnownSettings()
+        self.rooms = Rooms()
         self.walk = PathProgress()
         self.robots: set[str] = set()
         self.trouble = ""
@@ -76,6 +79,7 @@ class RobotState:
             "pose": self._read_pose,
             "status": self._read_status,
             "command": self._read_command,
+            "rooms": self._read_rooms,
         }
 
     @property
@@ -161,6 +165,9 @@ class RobotState:
         if pose is not None and now - self._posed_at > POSE_LASTS_S:
             self._move(Pose2D(pose.x, pose.y, pose.yaw))
 
+    def _read_rooms(self, sample: Sample, _: float) -> None:
+        self.rooms = decode_document(sample.payload, Rooms)
+
     def _read_command(self, sample: Sample, now: float) -> None:
         self._follow(decode_json(sample.payload), now)
 
@@ -171,6 +178,8 @@ class RobotState:
         about = f" with {', '.join(names)}" if names else ""
         if isinstance(keep_out := document.get("keep_out"), dict):
             about = f" {keep_out.get('name')}"
+        if isinstance(room := document.get("room"), dict):
+            about = f" {room.get('id')}"
         self.events.add(now, f"command {document.get('command')}{about}", ORDER)
 
     def _move(self, pose: Pose2D) -> None:

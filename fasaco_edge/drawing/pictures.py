@@ -13,6 +13,7 @@ from fasaco_edge.drawing.plot import MAX_HEIGHT, MAX_WIDTH, MapLayer, Plot, View
 from fasaco_edge.drawing.rooms import number_rooms, paint_rooms
 from fasaco_edge.drawing.sheet import KeyEntry, Sheet
 from fasaco_edge.grid.geometry import Polygon
+from fasaco_edge.grid.label_place import label_place
 from fasaco_edge.grid.lattice import COVERABLE, Cell, CoverageLattice
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.grid.rooms import FoundRooms
@@ -308,6 +309,8 @@ def _draw_arrows(plot: Plot, points: Points, offset: float, cell_m: float) -> No
 
 # In cells.
 DRIVEN_WIDTH = 0.12
+# The border of a room, on the finished picture.
+ROOM_PX = 1.2
 
 
 def draw_mission(
@@ -324,6 +327,7 @@ def draw_mission(
     unswept: MapLayer | None = None,
     zones: Sequence[Polygon] = (),
     keep_out: Sequence[Polygon] = (),
+    rooms: Sequence[tuple[str, Polygon]] = (),
     left_out_words: str = "not covered",
 ) -> Image.Image:
     """Return a picture, RGB, of a mission's result.
@@ -340,6 +344,7 @@ def draw_mission(
         swept: reachable floor that was swept, shown in place of the cells; None to show these.
         unswept: reachable floor that was not swept; None where that is not known.
         zones, keep_out: polygons of the order [m].
+        rooms: names and outlines [m].
         left_out_words: what reachable cells without a visit are called.
     """
     plot = Plot(View.over(bounds_of(grid, lattice, driven_xy), lattice.cell_m, *space))
@@ -353,11 +358,16 @@ def draw_mission(
         key = [*_ENDS, KeyEntry("tile", palette.COVERED, label)]
     if unswept is not None:
         key += draw_unswept(plot, unswept)
+    for _, outline in rooms:
+        plot.line(np.array((*outline, outline[0])), palette.FAINT_INK, ROOM_PX)
     key += draw_order(plot, zones, keep_out)
     lengths_m = np.hypot(*np.diff(driven_xy, axis=0).T)
     driven = np.ones(len(lengths_m), np.bool_) if driven is None else driven
     plot.track(driven_xy[:-1][driven], driven_xy[1:][driven], DRIVEN_WIDTH * lattice.cell_m)
     plot.end_mark(driven_xy[-1])
     plot.start_mark(driven_xy[0])
+    for name, outline in rooms:
+        if (place := label_place(outline)) is not None:
+            plot.text(name, place[:2])
     bar = ("0", f"{lengths_m[driven].sum():,.0f} m driven")
     return Sheet(title, lines, key, bar, plot.view.scale).around(plot.finished())

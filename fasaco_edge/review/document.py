@@ -12,6 +12,7 @@ import msgspec
 if TYPE_CHECKING:
     from fasaco_edge.review.moments import Moment
     from fasaco_edge.review.orders import CommandThen, OrderChapter
+    from fasaco_edge.review.rooms import RoomChapter
     from fasaco_edge.review.spot import LeftPatch
     from fasaco_edge.wire.documents.path_documents import Rectangle
 
@@ -108,6 +109,12 @@ class ReviewDocument(msgspec.Struct):
             null where that is not recorded), replans, paused_s, driven_m, and unreached: areas
             that stayed uncovered at its end, with cells, m2, place (x, y) [m] and reason.
         commands: each received command: at_s, command (in words).
+        rooms: each room, with the outline that it had at the end: room (its number), name, area_m2,
+            seconds (in it at work, standing too, but not in pauses and charging), entered (how
+            often the robot came into it), swept_share and left_m2 (of its reachable floor, by
+            recorded poses; null if that is not known), counted_share (swept, as the daemon counted
+            last, in that pass), passes (the newest pass of the last order that named it; null if
+            none did), skip (whether orders for everything leave it out).
         complete: of the last order: whether the mission reached `done` with every reachable cell
             (of its zones) covered.
         covered_cells, coverable_cells: at the end: covered cells, and all reachable cells.
@@ -188,6 +195,7 @@ class ReviewDocument(msgspec.Struct):
     complete: bool | None = None
     orders: list[OrderChapter] = []
     commands: list[CommandThen] = []
+    rooms: list[RoomChapter] = []
     covered_cells: int | None = None
     coverable_cells: int | None = None
     recovered_cells: int | None = None

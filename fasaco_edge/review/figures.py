@@ -55,6 +55,7 @@ def document_of(review: Review) -> ReviewDocument:
             for order in review.orders
         ],
         commands=commands_of(data),
+        rooms=list(review.rooms),
         paths=len(data.paths),
         replans=len(replans.later),
         replans_by_reason=replans.by_reason,

@@ -45,6 +45,7 @@ from fasaco_edge.review.moments import (
     worst_moments,
 )
 from fasaco_edge.review.orders import OrderChapter, chapters, is_complete, is_still_true
+from fasaco_edge.review.rooms import RoomChapter, room_chapters
 from fasaco_edge.review.run_data import RunData, first_counted, gather
 from fasaco_edge.wire.documents.settings import known_settings
 
@@ -200,6 +201,11 @@ class Review:
     def orders(self) -> tuple[OrderChapter, ...]:
         """The orders, and the outcome of each."""
         return chapters(self.data, self.states, self.known_fractions, self.duration_s)
+
+    @property
+    def rooms(self) -> tuple[RoomChapter, ...]:
+        """The rooms, and what was done in each; none if no rooms were recorded."""
+        return room_chapters(self.data, self.states, self.floor)
 
 
 def review_of(record: RunRecord, data: RunData, missing: int) -> Review:

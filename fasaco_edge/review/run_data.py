@@ -26,6 +26,7 @@ from fasaco_edge.recording.read.robot_clock import RobotClock
 from fasaco_edge.wire.documents.json_text import decode_json, decode_tolerant
 from fasaco_edge.wire.documents.path_documents import PATH_DIGEST, PathAttachment
 from fasaco_edge.wire.documents.replies import FloorReport
+from fasaco_edge.wire.documents.rooms import Rooms
 from fasaco_edge.wire.documents.settings import Settings, known_settings
 from fasaco_edge.wire.documents.status import Status
 from fasaco_edge.wire.documents.turns import Cycle, TurnBatch, decode_turns
@@ -127,6 +128,7 @@ class RunData:
         grid: the map at the end, with all updates.
         ordered_keep_out: polygons of the last order.
         zones: of the last order; empty without an order, or if it is for everything.
+        rooms: as they were at the end; none if none were recorded.
         config, version, robot: of the daemon, by its last status.
         undecodable: samples that could not be read, by topic.
         last_s: when the last sample came.
@@ -143,6 +145,7 @@ class RunData:
     grid: OccupancyGrid | None = None
     ordered_keep_out: tuple[Polygon, ...] = ()
     zones: tuple[Zone, ...] = ()
+    rooms: Rooms = field(default_factory=Rooms)
     config: Settings = field(default_factory=dict)
     version: str = ""
     robot: str = ""
@@ -292,6 +295,7 @@ class _SampleReader:
             "command": self._command,
             "status": self._status,
             "turns": self._turns,
+            "rooms": self._rooms,
             PATH_DIGEST: self._path,
         }
 
@@ -348,6 +352,9 @@ class _SampleReader:
     def _turns(self, arrival: Arrival) -> None:
         turns = decode_turns(arrival.sample.payload)
         self.data.plan_log.take(turns, self._now, self.data.time_scale)
+
+    def _rooms(self, arrival: Arrival) -> None:
+        self.data.rooms = decode_tolerant(arrival.sample.payload, Rooms)
 
     def _path(self, arrival: Arrival) -> None:
         about = decode_tolerant(arrival.sample.attachment, PathAttachment)

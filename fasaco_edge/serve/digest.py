@@ -136,6 +136,7 @@ def _mission(mission: MissionReport) -> Digest:
             }
             for zone in mission.zones[:MOST_AREAS]
         ],
+        "left_out": list(mission.left_out),
         "home": [mission.home.x, mission.home.y] if mission.home else None,
     }
 

@@ -19,7 +19,18 @@ _LENGTH = struct.Struct("<I")
 Role = Literal["viewer", "operator"]
 # Commands of the page: all but a reset of the coverage.
 Command = Literal[
-    "start", "pause", "resume", "home", "cancel", "replan", "keep_out_add", "keep_out_remove"
+    "start",
+    "pause",
+    "resume",
+    "home",
+    "cancel",
+    "replan",
+    "keep_out_add",
+    "keep_out_remove",
+    "room_name",
+    "room_split",
+    "room_merge",
+    "room_set",
 ]
 
 
@@ -51,6 +62,7 @@ class Order(msgspec.Struct, tag="command", tag_field="kind", forbid_unknown_fiel
         order: what to cover, as in ``protocol/schema/mission.json``; only with ``start``.
         discard: whether it may forget what is covered; only with ``start``.
         keep_out: as in that schema; only with ``keep_out_add`` and ``keep_out_remove``.
+        room: as in that schema; only with the commands of rooms.
     """
 
     id: int
@@ -58,6 +70,7 @@ class Order(msgspec.Struct, tag="command", tag_field="kind", forbid_unknown_fiel
     order: dict[str, Any] | None = None
     discard: bool = False
     keep_out: dict[str, Any] | None = None
+    room: dict[str, Any] | None = None
 
 
 FromPage = Hello | Wants | Seek | Order

@@ -8,7 +8,16 @@ from dataclasses import dataclass
 from importlib.resources import files
 
 # Concatenated in this order they are one script.
-SCRIPTS = ("model.js", "view.js", "picture.js", "drawing.js", "panel.js", "timeline.js", "link.js")
+SCRIPTS = (
+    "model.js",
+    "view.js",
+    "picture.js",
+    "drawing.js",
+    "panel.js",
+    "rooms.js",
+    "timeline.js",
+    "link.js",
+)
 
 
 @dataclass(frozen=True, slots=True)

@@ -32,6 +32,9 @@ DOES = {
     "blocked": "Cannot go on just now",
 }
 STUCK = "Something closes its way: open doors and clear the floor. It tries again by itself."
+UNKNOWN_ROOM = (
+    "It knows no room of that name yet. Tap the room on the map and name it, or end the work."
+)
 NEEDS = {
     "not_begun": "It cannot begin without its map. Switch it off and on; if that does not help, "
     "call service.",
@@ -104,6 +107,8 @@ NEAR_M = 0.5
 def does(status: Status) -> str:
     """Return what the robot does now."""
     mission, path = status.mission, status.path
+    if status.state == "blocked" and mission.waits_for_room:
+        return f"Waits for {mission.waits_for_room}"
     if status.state in DOES:
         return DOES[status.state]
     if status.state == "paused":
@@ -142,7 +147,7 @@ def needs(status: Status) -> list[str]:
     """Return what the robot needs from its owner."""
     found = [NEEDS.get(each.code, "Call service.") for each in status.troubles]
     if status.state == "blocked" and not found:
-        found.append(STUCK)
+        found.append(UNKNOWN_ROOM if status.mission.waits_for_room else STUCK)
     return found + ([UNSAVED] if status.ledger.fault else [])
 
 

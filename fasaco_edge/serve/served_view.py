@@ -21,6 +21,7 @@ from fasaco_edge.serve.marks import (
 )
 from fasaco_edge.serve.messages import framed, message_text
 from fasaco_edge.serve.pace import Way
+from fasaco_edge.serve.rooms import rooms, shares
 from fasaco_edge.wire.documents.fleet import decode_member
 from fasaco_edge.wire.documents.json_text import decode_document
 from fasaco_edge.wire.documents.path_documents import PathAttachment
@@ -40,6 +41,8 @@ PERIODS_S = {
     "state": 0.2,
     "path": 0.2,
     "areas": 0.5,
+    "rooms": 0.5,
+    "shares": 0.5,
     "events": 0.5,
     "map": 0.5,
     "floor": 1.0,
@@ -93,6 +96,8 @@ class ServedView(RobotState):
             "areas": lambda _: message_text(
                 "areas", **areas(self.settings, self._order, self._mission)
             ),
+            "rooms": lambda _: message_text("rooms", **rooms(self.rooms)),
+            "shares": lambda _: message_text("shares", **shares(self.rooms)),
             "events": lambda _: message_text("events", entries=lately(self.events)),
             "map": lambda _: self._map_message(),
             "floor": lambda _: self._grid_message("floor", FLOOR_MARKS),
@@ -133,6 +138,8 @@ class ServedView(RobotState):
             "path": self._shown_path,
             "events": self.events.count,
             "areas": (self.settings, self._order, self._mission.zones, self._mission.keep_outs),
+            "rooms": (self.rooms,),
+            "shares": (self.rooms,),
             "map": (self._grids.get("map", self._grids.get("coverage")), self.settings.map),
             "floor": self._grids.get("floor"),
             "unswept": self._grids.get("unswept"),

@@ -132,6 +132,8 @@ class Viewer:
             asked |= {"order": order.order or {}, "discard": order.discard}
         elif order.keep_out is not None:
             asked["keep_out"] = order.keep_out
+        elif order.room is not None:
+            asked["room"] = order.room
         try:
             payload = encode_json(asked)
             found = await asyncio.to_thread(self._source.ask, "mission", payload, ANSWER_S)

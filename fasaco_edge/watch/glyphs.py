@@ -137,6 +137,9 @@ def _run(glyphs: GlyphSet, upper: int, lower: int, length: int) -> str:
 def _glyph(glyphs: GlyphSet, upper: int, lower: int) -> tuple[str, int, int]:
     """Return a character, and the kinds that its foreground and background show."""
     shown = max(upper, lower)
+    if shown >= picture.LETTER:
+        letter = picture.LETTERS[shown - picture.LETTER]
+        return letter if glyphs.unicode or letter.isascii() else "?", picture.WALL, picture.UNKNOWN
     if shown >= picture.HEADING:
         arrows = ARROWS if glyphs.unicode else PLAIN_ARROWS
         return arrows[shown - picture.HEADING], picture.WALL, picture.ROBOT

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from rich.console import Console
+from rich.console import Console, RenderableType
 from rich.text import Text
 
 from fasaco_edge.client.events import TROUBLED
@@ -15,7 +15,6 @@ from fasaco_edge.watch.blocks import FAINT, Blocks, with_keys
 from fasaco_edge.watch.picture import MissionPicture
 from fasaco_edge.watch.robot_view import RobotView
 from fasaco_edge.watch.status_table import figures, state_colour
-from fasaco_edge.wire.documents.status import Status
 
 LEGEND = (
     (picture.COVERED, "covered"),
@@ -107,12 +106,14 @@ class Page:
         if not layout.figures:
             return left
         # The status is a value: a new one is another object.
-        key = (view.status, layout)
-        right = self._blocks.keep("figures", key, lambda: self._figures(view.status, layout))
+        key = (view.status, view.rooms, layout)
+        right = self._blocks.keep("figures", key, lambda: self._figures(view, layout))
         return [f"{a} {b}" for a, b in zip(left, right, strict=True)]
 
-    def _figures(self, status: Status | None, layout: Layout) -> list[str]:
-        shown = Text("") if status is None else figures(status, layout.figures, self._blocks.glyphs)
+    def _figures(self, view: RobotView, layout: Layout) -> list[str]:
+        shown: RenderableType = Text("")
+        if view.status is not None:
+            shown = figures(view.status, view.rooms, layout.figures, self._blocks.glyphs)
         return self._blocks.block(shown, layout.figures, layout.lines)
 
     def _legend(self, path_is_whole: bool) -> Text:

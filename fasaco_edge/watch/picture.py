@@ -9,8 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.grid.geometry import Bounds, Pose2D, union_bounds
+from fasaco_edge.grid.label_place import label_place
 from fasaco_edge.grid.occupancy import OccupancyGrid, known_bounds
 from fasaco_edge.watch.robot_view import FIELD_LEVELS, RobotView
+from fasaco_edge.wire.documents.rooms import Rooms
 from fasaco_edge.wire.documents.settings import known_settings
 from fasaco_edge.wire.messages.maps import CoverageValue
 
@@ -98,6 +100,9 @@ FIELD = range(ROBOT + 1, ROBOT + 1 + FIELD_LEVELS)
 HEADING = FIELD.stop
 """The character of the robot's centre: this plus its heading in eighths of a turn."""
 EIGHTHS = 8
+LETTER = HEADING + EIGHTHS
+"""A letter of a room's name: this plus its place in ``LETTERS``."""
+LETTERS = bytes((*range(0x20, 0x7F), *range(0xA1, 0xAD), *range(0xAE, 0x100))).decode("latin1")
 
 # Thresholds from the defaults of the daemon's configuration; only the picture depends on them.
 FREE_AT_MOST, OCCUPIED_AT_LEAST = 25, 65
@@ -171,6 +176,25 @@ def draw_robot(kinds: Kinds, frame: Frame, pose: Pose2D, radius_m: float) -> Non
     _put(kinds, np.array([[upper, col], [upper + 1, col]]), HEADING + eighth)
 
 
+def draw_names(kinds: Kinds, frame: Frame, rooms: Rooms) -> None:
+    """Write the rooms' names with swept shares, or names, or numbers, as they are wide."""
+    for room in rooms.outlined:
+        place = label_place(room.outline)
+        if place is None:
+            continue
+        share = "" if room.swept is None else f"{math.floor(100 * room.swept)}%"
+        texts = (
+            f" {text} " for text in (f"{room.title} {share}".rstrip(), room.title, str(room.id))
+        )
+        fits = (text for text in texts if len(text) * frame.pixel_m <= place.width_m)
+        text = next((text for text in fits if set(text) <= set(LETTERS)), "")
+        row, col = frame.pixels(np.array([[place.x, place.y]]))[0]
+        upper, first = int(row) // 2 * 2, int(col) - len(text) // 2
+        for index, letter in enumerate(text):
+            both = np.array([[upper, first + index], [upper + 1, first + index]])
+            _put(kinds, both, LETTER + LETTERS.index(letter))
+
+
 def _coverage(frame: Frame, coverage: OccupancyGrid, *, blocked: bool) -> Kinds:
     table = _COVERAGE_AND_BLOCKED_KINDS if blocked else _COVERAGE_KINDS
     kinds: Kinds = table[frame.sampled(coverage, 1, CoverageValue.UNKNOWN).view(np.uint8)]
@@ -213,6 +237,8 @@ class MissionPicture:
         self._bounds: Bounds | None = None
         self._frame: Frame | None = None
         self._ground: Kinds | None = None
+        self._named: tuple[Rooms, Frame] | None = None
+        self._names = np.zeros((0, 0), np.uint8)
 
     def kinds(self, view: RobotView, columns: int, lines: int) -> Kinds | None:
         """Return a picture, uint8 (2 * lines, columns); None while there is nothing to show."""
@@ -237,6 +263,11 @@ class MissionPicture:
         self.pixel_m = frame.pixel_m
         if not self.shows_field:
             self.path_is_whole = draw_path(kinds, frame, view.path_ahead)
+            if (view.rooms, frame) != self._named:
+                self._named = view.rooms, frame
+                self._names = np.zeros_like(kinds)
+                draw_names(self._names, frame, view.rooms)
+            kinds = np.where(self._names, self._names, kinds)
         if pose is not None:
             settings = known_settings(view.status.config if view.status else {})
             draw_robot(kinds, frame, pose, settings.robot.radius_m)

@@ -10,6 +10,7 @@ from fasaco_edge.text import one_line
 from fasaco_edge.watch.glyphs import GlyphSet
 from fasaco_edge.wire.documents.path_documents import PathReport
 from fasaco_edge.wire.documents.replies import CoverageReport, FloorReport, MissionReport
+from fasaco_edge.wire.documents.rooms import Rooms
 from fasaco_edge.wire.documents.status import BatteryReport, FleetReport, Status, SupervisedRecorder
 from fasaco_edge.wire.reasons import plain
 
@@ -27,22 +28,24 @@ STATE_COLOURS = {
 }
 LONGEST_BAR = 40
 LABEL_WIDTH = 9
+# Limit on the rooms shown.
+MOST_ROOMS = 12
 # Width from which optional parts are shown [characters].
 WIDE = 30
 
 
-def figures(status: Status, width: int, glyphs: GlyphSet) -> Table:
-    """Return all figures of a status as a table ``width`` characters wide."""
+def figures(status: Status, rooms: Rooms, width: int, glyphs: GlyphSet) -> Table:
+    """Return all figures of a status, and of rooms, as a table ``width`` characters wide."""
     table = Table.grid(padding=(0, 1), pad_edge=False)
     table.add_column(width=LABEL_WIDTH, style="cyan", no_wrap=True)
     table.add_column(overflow="fold")
     table.width = width
-    for name, value in _rows(status, width - LABEL_WIDTH - 1, glyphs):
+    for name, value in _rows(status, rooms, width - LABEL_WIDTH - 1, glyphs):
         table.add_row(name, value)
     return table
 
 
-def _rows(status: Status, width: int, glyphs: GlyphSet) -> list[Row]:
+def _rows(status: Status, rooms: Rooms, width: int, glyphs: GlyphSet) -> list[Row]:
     state = Text(one_line(status.state), f"bold {state_colour(status.state)}")
     # The path's number is shown with the path.
     if status.path is None or status.reason != f"path {status.path.revision}":
@@ -64,6 +67,7 @@ def _rows(status: Status, width: int, glyphs: GlyphSet) -> list[Row]:
     if status.path is not None:
         rows += _plan(status.path, width)
     rows += _mission(status.mission)
+    rows += _rooms(rooms)
     rows += _fleet(status.fleet)
     rows += _running(status)
     return rows
@@ -118,12 +122,27 @@ def _mission(mission: MissionReport) -> list[Row]:
         more.append(f"keep-out zones: {mission.keep_out}")
     if mission.return_home:
         more.append("returns home")
+    if mission.left_out:
+        more.append(f"leaves out {', '.join(mission.left_out)}")
     if more:
         rows.append(("", _text(", ".join(more))))
     if mission.unreached.cells:
         left = f"{_cells(mission.unreached.cells)}, {mission.unreached.m2:.1f} m2"
         rows.append(("unreached", _text(left)))
     return rows
+
+
+def _rooms(found: Rooms) -> list[Row]:
+    """Return the swept share of each room; of many, those that are not done, and some others."""
+    known = sorted(found.rooms, key=lambda room: (room.swept == 1.0, room.swept is None))
+    shown = sorted(known[:MOST_ROOMS], key=lambda room: room.id)
+    parts = [
+        room.title if room.swept is None else f"{room.title} {phrases.percent(room.swept)}"
+        for room in shown
+    ]
+    more = len(known) - len(shown)
+    text = ", ".join(parts) + (f", {more} more" if more else "")
+    return [("rooms", _text(text))] if parts else []
 
 
 def _fleet(fleet: FleetReport | None) -> list[Row]:

@@ -178,6 +178,7 @@ ROOMS = Topic(
     listeners=("viewer",),
     json="rooms.json",
     qos=Qos("data_low", cache=1),
+    queues=Queues(recorder=NEWEST, watch=NEWEST),
     limits=("max_json_bytes",),
 )
 STATUS = Topic(

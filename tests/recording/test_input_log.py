@@ -28,8 +28,9 @@ from fasaco_edge.recording.write.process import Output
 from fasaco_edge.recording.write.quota import DiskBudget
 from fasaco_edge.recording.write.writer import RecordingWriter, WriterState
 from fasaco_edge.wire import topics
-from fasaco_edge.wire.documents.json_text import encode_json
+from fasaco_edge.wire.documents.json_text import decode_document, encode_json
 from fasaco_edge.wire.documents.path_documents import DIGEST_BYTES, PATH_DIGEST, digest
+from fasaco_edge.wire.documents.rooms import RoomReport, Rooms
 from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.messages.maps import decode_occupancy_grid, encode_occupancy_grid
 from fasaco_edge.wire.messages.paths import encode_path
@@ -164,6 +165,31 @@ def test_of_a_path_there_is_a_digest_and_of_a_status_what_is_new(tmp_path):
     assert path.sample.payload == digest(xy.tobytes())
     assert len(path.sample.payload) == DIGEST_BYTES
     assert [one.sample for one in statuses] == [desk.told[1].sample, desk.told[3].sample]
+
+
+def test_of_rooms_there_are_changes_and_now_and_then_their_shares(tmp_path):
+    desk = Desk(tmp_path)
+
+    def hear(revision: int, swept: float, after_s: float = 1.0) -> None:
+        rooms = Rooms("map", revision, (RoomReport(1, swept=swept),))
+        desk.hear("rooms", encode_json(rooms), after_s=after_s)
+
+    hear(1, 0.1)
+    hear(1, 0.2)
+    hear(1, 0.3)
+    desk.hear("pose", b"a pose", after_s=entities.STATUS_PERIOD_S)
+    hear(2, 0.4)
+    hear(2, 0.5)
+    desk.hear("rooms", b"no JSON")
+    samples = list(RecordedSamples(desk.close()))
+    kept = [decode_document(one.sample.payload, Rooms) for one in samples if one.topic == "rooms"]
+    assert [(each.revision, each.rooms[0].swept) for each in kept] == [
+        (1, 0.1),
+        (1, 0.3),
+        (2, 0.4),
+        (2, 0.5),
+    ]
+    assert [one.at_ns for one in samples] == sorted(one.at_ns for one in samples)
 
 
 def test_inputs_queued_at_the_end_are_kept_and_drawn_if_in_time(tmp_path, monkeypatch):

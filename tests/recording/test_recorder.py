@@ -41,7 +41,16 @@ from tests.support.recordings import (
     read_summary,
     recorder_process,
 )
-from tests.support.scripted_mission import CELL_M, COLS, ORIGIN, RADIUS_M, ROWS, Mission, building
+from tests.support.scripted_mission import (
+    CELL_M,
+    COLS,
+    HALL,
+    ORIGIN,
+    RADIUS_M,
+    ROWS,
+    Mission,
+    building,
+)
 from tests.support.senders import Sender
 
 ERRORS = {"total": 2, "last": "", "by_code": {"malformed_message": 2, "no code": 3}}
@@ -111,6 +120,14 @@ def test_what_the_mission_hears_is_there_byte_for_byte(recorded):
     assert np.array_equal(decode_occupancy_grid(maps[-1].sample.payload).cells, building(1.0))
     assert [sample.at_ns for sample in samples] == sorted(sample.at_ns for sample in samples)
     assert len({sample.wall_ns - sample.at_ns for sample in samples}) == 1
+
+
+def test_rooms_are_outlined_where_they_are_with_their_names(recorded):
+    outlines = read_column(recorded.path, entities.ROOMS, "LineStrips3D:strips").values
+    names = read_column(recorded.path, entities.ROOMS, "LineStrips3D:labels").values
+    # A drive alone draws none anew.
+    assert names == [["room 1", "room 2"], ["hall", "room 2"]]
+    assert [tuple(corner[:2]) for corner in outlines[-1][0]] == [*HALL, HALL[0]]
 
 
 def test_the_end_is_orderly(recorded):

@@ -36,7 +36,7 @@ from tests.support.reviews import document
 
 TABLES = (
     *("trail", "paths", "path_points", "plans", "commands", "states", "coverage", "plots"),
-    *("floor", "pheromone"),
+    *("floor", "pheromone", "rooms"),
 )
 ROOT = Path(__file__).parents[2]
 

@@ -194,7 +194,7 @@ def test_a_mission_is_ordered_by_finger(tmp_path):
         tab.click("drawdone")
         tab.click("order")
         mission = outsider.wait_status(lambda status: status["state"] == "covering")["mission"]
-        assert [zone["name"] for zone in mission["zones"]] == ["room 1"]
+        assert [zone["name"] for zone in mission["zones"]] == ["area 1"]
         assert mission["keep_out"] == 1
         until(lambda: tab.js("model.areas.zones.length") == 1)
         corners = json.loads(tab.js("JSON.stringify(model.areas.zones[0].polygon)"))
@@ -212,7 +212,7 @@ def test_a_mission_is_ordered_by_finger(tmp_path):
             assert tab.js("document.documentElement.scrollWidth <= innerWidth")
             assert tab.js(COVERED) == 0
         tab.size(PHONE, "light")
-        assert tab.js("find('does').textContent") == "Sweeps room 1"
+        assert tab.js("find('does').textContent") == "Sweeps area 1"
         assert not TECHNICAL.search(tab.js("document.body.innerText"))
         assert tab.js("find('technical').textContent").startswith("covering: ")
         # A pause, and a page opened anew, lose neither the path nor what is drawn.

@@ -47,6 +47,12 @@ def test_each_state_is_said_in_an_owners_words(state):
     assert not [text for text in needs if TECHNICAL.search(text)]
 
 
+def test_a_room_that_is_waited_for_is_named():
+    of = status(state="blocked", troubles=[], mission={"waits_for_room": "attic"})
+    assert plain.does(of) == "Waits for attic"
+    assert plain.needs(of)[:1] == [plain.UNKNOWN_ROOM]
+
+
 def test_all_reasons_for_floor_left_have_an_owners_words():
     reasons = {
         *missed_floor.REASONS.values(),

@@ -26,6 +26,7 @@ from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.planners.planner import ColonySnapshot
 from fasaco_edge.wire import topics
 from fasaco_edge.wire.documents.json_text import encode_json
+from fasaco_edge.wire.documents.rooms import RoomReport, Rooms
 from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.messages.maps import CoverageValue, direction_values, encode_occupancy_grid
 from fasaco_edge.wire.messages.paths import encode_path
@@ -43,6 +44,9 @@ ORIGIN = (-1.0, -2.0)
 ROWS, COLS = 120, 160
 # What the robot leaves of each square that it passes is little.
 SWEPT_PERCENT = 90
+# Outlines of two rooms [m].
+HALL = (-1.0, -2.0), (3.0, -2.0), (3.0, 4.0), (-1.0, 4.0)
+NOOK = (3.0, -2.0), (7.0, -2.0), (7.0, 4.0), (3.0, 4.0)
 # The box that turns up half-way, where the map said free: rows and columns of pixels.
 SURPRISE = (slice(80, 92), slice(40, 52))
 
@@ -64,6 +68,7 @@ class Mission:
         self._pheromone = Sender(bus, topics.PHEROMONE)
         self._directions = Sender(bus, topics.DIRECTIONS)
         self._status = Sender(bus, topics.STATUS)
+        self._rooms = Sender(bus, topics.ROOMS)
         self.walk = _walk()
         self.rest = self.walk
         self.seen_cells = 0
@@ -87,7 +92,17 @@ class Mission:
             self.drive(done)
             if frame % 4 == 0:
                 self.publish_coverage(done)
+                self.publish_rooms(done)
             yield done
+
+    def publish_rooms(self, done: float) -> None:
+        """Publish rooms: one has a name half-way, the swept share of the other grows."""
+        hall = RoomReport(1, "hall" if done > 0.5 else "", HALL, 12.0, (2,), swept=1.0)
+        self._rooms.put(
+            encode_json(
+                Rooms("map", 1 + (done > 0.5), (hall, RoomReport(2, outline=NOOK, swept=done)))
+            )
+        )
 
     def publish_map(self, done: float) -> None:
         """Publish what is known of the building by then: it grows to the right."""

@@ -16,6 +16,8 @@ from fasaco_edge.watch.glyphs import GlyphSet
 from fasaco_edge.watch.page import Page
 from fasaco_edge.watch.picture import COVERED, HEADING, TO_COVER, WALL
 from fasaco_edge.watch.robot_view import RobotView
+from fasaco_edge.wire.documents.json_text import encode_json
+from fasaco_edge.wire.documents.rooms import RoomReport, Rooms
 from fasaco_edge.wire.messages.pheromone import encode_pheromone
 from tests.support.statuses import extreme_statuses
 from tests.watch.grids import NOW, console, mid_mission, plain, status, tell
@@ -133,6 +135,24 @@ def test_the_time_to_go_is_by_the_clock(line_s, scale, said):
     page = page_of(view)
     assert (f"path 7, {said} to go" in page) == bool(said)
     assert f"to go     {said}{', ' if said else ''}30 steps" in page
+
+
+def test_it_shows_rooms_with_their_swept_shares():
+    view = mid_mission()
+    hall = RoomReport(1, "hall", ((0, 0), (3, 0), (3, 4), (0, 4)), swept=0.459)
+    nook = RoomReport(2, "\x1b[2J", ((3, 0), (6, 0), (6, 4), (3, 4)), skip=True)
+    many = tuple(RoomReport(number, swept=1.0) for number in range(3, 20))
+    far = RoomReport(40, "far", ((0, 0), (1e14, 0), (0, 1e14)), swept=1.0)
+    tell(view, "rooms", encode_json(Rooms("map", 1, (hall, nook, *many, far))))
+    tell(view, "status", status(mission={"left_out": ["nook"]}))
+    page = page_of(view, 140, 60)
+    assert " hall 45% " in page
+    assert " 2 " in page  # a name that would control the terminal is none
+    assert "leaves out nook" in page
+    assert "hall 45.9 %" in page
+    assert ", 8 more" in page
+    # In a narrow picture names give way.
+    assert " hall " not in page_of(view, 10, 8)
 
 
 def test_it_says_how_far_an_order_is():

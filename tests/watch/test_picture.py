@@ -124,7 +124,7 @@ def test_everything_known_fits_and_pixels_are_square(columns, lines):
 
 
 def test_every_kind_has_a_look():
-    kinds = np.arange(HEADING + picture.EIGHTHS, dtype=np.uint8)
+    kinds = np.arange(picture.LETTER + len(picture.LETTERS), dtype=np.uint8)
     for colours in (ColorSystem.TRUECOLOR, ColorSystem.EIGHT_BIT, ColorSystem.STANDARD, None):
         for unicode in (True, False):
             for below in (kinds, kinds[::-1]):

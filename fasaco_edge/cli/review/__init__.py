@@ -113,8 +113,8 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         type=Path,
         metavar="DIR",
         help="write tables: trail, paths and their points, plans, commands, states, coverage, "
-        "floor swept, pheromone, plots; columns.csv says what they hold, in what units; the map "
-        "as .npz",
+        "floor swept, rooms, pheromone, plots; columns.csv says what they hold, in what units; "
+        "the map as .npz",
     )
     parser.add_argument(
         "--export-as",

@@ -48,6 +48,7 @@ def print_review(review: Review, document: ReviewDocument, *, full: bool) -> Non
     _print_curve(console, review, PLOT_HEIGHT)
     console.print(terminal.figures(rows.figure_rows(document)))
     _print_table(console, "Orders", rows.ORDERS, rows.order_rows(document))
+    _print_table(console, "Rooms", rows.ROOMS, rows.room_rows(document, review))
     if commands := rows.command_rows(document):
         console.print("Commands", style="bold")
         console.print(terminal.figures(commands))

@@ -12,7 +12,7 @@ from fasaco_edge.wire.documents.rooms import RoomReport, Rooms
 if TYPE_CHECKING:
     from fasaco_edge.mission.core.mission import Mission
 
-# Least period of changed rooms, and of swept shares alone [s].
+# Least period of changed rooms, and of swept shares alone while the robot drives [s].
 PERIOD_S, SWEPT_PERIOD_S = 1.0, 5.0
 
 
@@ -35,7 +35,9 @@ class RoomsPublisher:
         is_new = book.version != self._version
         if not is_new and (covered == self._covered or not book.rooms):
             return
-        if now - self._published_at < (PERIOD_S if is_new else SWEPT_PERIOD_S):
+        # Shares at the end of an order are not to be missed by who ends with it.
+        is_over = mission is not None and mission.state.is_at_rest
+        if now - self._published_at < (PERIOD_S if is_new or is_over else SWEPT_PERIOD_S):
             return
         self._published_at, self._version, self._covered = now, book.version, covered
         swept = {} if mission is None else mission.room_progress()

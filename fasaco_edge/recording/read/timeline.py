@@ -37,7 +37,7 @@ from fasaco_edge.recording.read.run import RecordedSamples, read_run_record
 from fasaco_edge.wire.documents.path_documents import PATH_DIGEST
 
 GRIDS = (entities.MAP, entities.FLOOR, entities.PHEROMONE)
-KEPT = ("status", "command", PATH_DIGEST)
+KEPT = ("status", "command", "rooms", PATH_DIGEST)
 # Rows of poses and drawings in a file: at least this many bytes each, beyond these few.
 ROW_BYTES, FEW_ROWS = 8, 100_000
 
@@ -59,7 +59,7 @@ class Timeline:
     Attributes:
         began_ns, ended_ns: of the recording, since the epoch [ns].
         clock: the robot's time at any of these times.
-        samples: statuses, commands and digests of paths.
+        samples: statuses, commands, rooms and digests of paths.
         pose_ns, poses: times int64 (n,) [ns], and float64 (n, 3): x [m], y [m], yaw [rad].
     """
 

@@ -126,6 +126,7 @@ RATES = {
     entities.PHEROMONE: 3_500,
     entities.DIRECTIONS: 2_500,
     entities.PATH: 2_000,
+    entities.ROOMS: 500,
 }
 # A grid's size in the file is estimated from every n-th row.
 EVERY_ROW = 8

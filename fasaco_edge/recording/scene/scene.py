@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -23,7 +23,7 @@ from fasaco_edge.recording.scene.curves import (
     Curves,
     StatusFigures,
 )
-from fasaco_edge.recording.scene.drawings import DrivenPathDrawing, PathDrawing
+from fasaco_edge.recording.scene.drawings import POINT_BYTES, DrivenPathDrawing, PathDrawing
 from fasaco_edge.recording.scene.flows import flows_of
 from fasaco_edge.recording.scene.layers import (
     Anchor,
@@ -38,6 +38,7 @@ from fasaco_edge.recording.sdk import rr
 from fasaco_edge.recording.write.writer import RecordingWriter
 from fasaco_edge.text import one_line
 from fasaco_edge.wire.documents.path_documents import PathAttachment, TrailAttachment
+from fasaco_edge.wire.documents.rooms import Rooms
 from fasaco_edge.wire.documents.settings import known_settings
 from fasaco_edge.wire.documents.status import TROUBLES, ErrorCounts, Recorder, Status
 from fasaco_edge.wire.messages.maps import directions_of
@@ -67,6 +68,7 @@ class Scene:
         # The order, by the last command, and the operator's keep-outs, by the last status.
         self._order = EVERYTHING_ONCE
         self._kept_out: list[tuple[str, Polygon]] = []
+        self._rooms: list[tuple[str, Polygon]] = []
         self._troubles: set[str] = set()
         # What was drawn last of the grids that a daemon publishes again unchanged.
         self._drawn: dict[str, object] = {}
@@ -128,11 +130,25 @@ class Scene:
     def add_command(self, command: Command) -> None:
         """Log a command accepted by the mission; draw the zones of the new order."""
         which = f" {command.keep_out.name!r}" if command.keep_out else ""
+        which += f" {command.room.id!r}" if command.room else ""
         self.add_line(entities.MISSION_LOG, f"command: {command.name}{which}")
         if command.name in ("start", "cancel", "reset"):
             # Only a start has an order; other commands remove its zones.
             self._order = command.order
             self._draw_areas()
+
+    def add_rooms(self, found: Rooms) -> None:
+        """Draw the outlines of the rooms, with their names; a drive alone changes neither."""
+        named = [(room.title, room.outline) for room in found.outlined]
+        if named == self._rooms:
+            return
+        self._rooms = named
+
+        def draw_rooms() -> None:
+            self._draw_polygons(entities.ROOMS, draw.ROOM, named)
+
+        points = sum(len(outline) for _, outline in named)
+        self._draw(entities.ROOMS, POINT_BYTES * points, draw_rooms)
 
     def _draw_areas(self) -> None:
         """Draw the zones of the order, its keep-outs and the operator's."""
@@ -143,12 +159,17 @@ class Scene:
             (entities.ZONES, draw.ZONE, zones),
             (entities.KEEP_OUT, draw.KEEP_OUT, keep_out),
         ):
-            placed = [
-                (one_line(name), np.array(corners) - self._anchored(Pose2D(*corners[0])).xy)
-                for name, corners in polygons
-                if corners
-            ]
-            self._writer.log(entity, draw.polygons_archetype(placed, style), latched=True)
+            self._draw_polygons(entity, style, polygons)
+
+    def _draw_polygons(
+        self, entity: str, style: draw.LineStyle, polygons: Sequence[tuple[str, Polygon | None]]
+    ) -> None:
+        placed = [
+            (one_line(name), np.array(corners) - self._anchored(Pose2D(*corners[0])).xy)
+            for name, corners in polygons
+            if corners
+        ]
+        self._writer.log(entity, draw.polygons_archetype(placed, style), latched=True)
 
     def add_path(self, message: PathMessage, about: PathAttachment) -> None:
         """Draw the path to drive, over the previous one, and log its reason."""

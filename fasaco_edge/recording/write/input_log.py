@@ -19,6 +19,7 @@ from fasaco_edge.recording.write.writer import RecordingWriter
 from fasaco_edge.samples import Numbered, SampleEncoder
 from fasaco_edge.wire.documents.json_text import decode_tolerant
 from fasaco_edge.wire.documents.path_documents import PATH_DIGEST, digest
+from fasaco_edge.wire.documents.rooms import Rooms
 from fasaco_edge.wire.documents.status import Status
 from fasaco_edge.wire.messages.paths import decode_path
 from fasaco_edge.wire.topics import RECORDED_INPUTS
@@ -38,7 +39,7 @@ class InputLog:
     """Writes samples into a writer; for the writer's thread only.
 
     Of paths only a digest is kept; of statuses the changed ones, and one in ``STATUS_PERIOD_NS``,
-    so that the progress of the mission is known at that rate.
+    so that the progress of the mission is known at that rate. So are rooms, and the last ones.
     """
 
     def __init__(self, writer: RecordingWriter, run: int) -> None:
@@ -50,12 +51,22 @@ class InputLog:
         self._next_ns = 0
         self._logged: tuple[object, ...] = ()
         self._logged_ns = 0
+        # The rooms that were kept, when, and later ones of which only swept shares differ.
+        self._rooms: tuple[object, ...] = ()
+        self._rooms_ns = 0
+        self._late_rooms: Arrival | None = None
+        self._now_ns = (0, 0)
 
     def add(self, arrival: Arrival) -> None:
-        """Take a sample, if it is an input of the mission."""
+        """Take a sample, if it is an input of the mission, or tells how it went."""
+        self._now_ns = arrival.at_ns, arrival.wall_ns
+        if arrival.at_ns - self._rooms_ns >= STATUS_PERIOD_NS:
+            self._add_late_rooms()
         if arrival.topic == "path":
             arrival = _path_digest(arrival)
-        elif arrival.topic not in RECORDED_INPUTS and not self._is_news(arrival):
+        elif (arrival.topic == "rooms" and not self._are_new_rooms(arrival)) or (
+            arrival.topic not in (*RECORDED_INPUTS, "rooms") and not self._is_news(arrival)
+        ):
             return
         self._in_force.note(self._encoder.add(arrival))
         if self._encoder.waiting_bytes > WAITING_BYTES:
@@ -75,6 +86,7 @@ class InputLog:
 
     def finish(self) -> None:
         """Write the remaining samples; a part begun just before the end gets a batch, too."""
+        self._add_late_rooms()
         part = self._writer.part_number
         self._write(in_any_case=part > 1 and part != self._part)
 
@@ -90,6 +102,25 @@ class InputLog:
         if batch and not self._writer.write_blob(batch):
             # No digest may refer to a sample that was not written.
             self._part = 0
+
+    def _are_new_rooms(self, arrival: Arrival) -> bool:
+        try:
+            found = decode_tolerant(arrival.sample.payload, Rooms)
+        except MalformedMessage:
+            return False
+        news = found.frame, found.revision
+        if news == self._rooms and arrival.at_ns - self._rooms_ns < STATUS_PERIOD_NS:
+            self._late_rooms = arrival
+            return False
+        self._rooms, self._rooms_ns, self._late_rooms = news, arrival.at_ns, None
+        return True
+
+    def _add_late_rooms(self) -> None:
+        if (late := self._late_rooms) is not None:
+            # Samples are in order of time.
+            at_ns, wall_ns = self._now_ns
+            self._late_rooms, self._rooms_ns = None, at_ns
+            self._in_force.note(self._encoder.add(replace(late, at_ns=at_ns, wall_ns=wall_ns)))
 
     def _is_news(self, arrival: Arrival) -> bool:
         if arrival.topic != "status":

@@ -31,6 +31,7 @@ from fasaco_edge.text import is_reported
 from fasaco_edge.wire import topics
 from fasaco_edge.wire.documents.json_text import decode_json, decode_tolerant, encode_json
 from fasaco_edge.wire.documents.path_documents import PathAttachment, TrailAttachment
+from fasaco_edge.wire.documents.rooms import Rooms
 from fasaco_edge.wire.documents.status import Recorder as RecorderReport
 from fasaco_edge.wire.documents.status import Status
 from fasaco_edge.wire.messages.maps import decode_map_update, decode_occupancy_grid
@@ -90,6 +91,7 @@ class Recorder:
             "directions": lambda sample: self._scene.add_directions(
                 decode_occupancy_grid(sample.payload)
             ),
+            "rooms": lambda sample: self._scene.add_rooms(decode_tolerant(sample.payload, Rooms)),
             "status": self._draw_status,
         }
         frames = (ros.frames.map, ros.frames.robot) if (ros := config.ros2) else DEFAULT_FRAMES

@@ -19,9 +19,11 @@ from fasaco_edge.review.instant import Scene
 from fasaco_edge.review.output.panels import coverage_panel, replan_panel, state_panel
 from fasaco_edge.review.output.rows import instant_rows, spot_rows
 from fasaco_edge.review.review import Review
+from fasaco_edge.review.rooms import outlined
 from fasaco_edge.review.run_data import RunData
 from fasaco_edge.review.spot import Spot
 from fasaco_edge.review.wording import clock
+from fasaco_edge.text import one_line
 from fasaco_edge.wire.documents.settings import known_settings
 
 # The most that one review takes, and the height of all [px].
@@ -90,6 +92,7 @@ def draw_map(review: Review, space: tuple[int, int]) -> Image.Image | None:
         left_out_words=left_out_words(review),
         zones=[zone.polygon for zone in review.data.zones if zone.polygon],
         keep_out=review.data.keep_out,
+        rooms=[(one_line(room.title), room.outline) for room in outlined(review.data)],
     )
 
 

@@ -14,6 +14,7 @@ from fasaco_edge.review.document import ReviewDocument
 from fasaco_edge.review.drive import MILESTONES
 from fasaco_edge.review.instant import Instant, MapThen, PathThen, PlanThen, direction
 from fasaco_edge.review.orders import order_words
+from fasaco_edge.review.rooms import room_at
 from fasaco_edge.review.wording import NOT_KNOWN, amount, clock, count
 from fasaco_edge.wire.documents.path_documents import Rectangle
 from fasaco_edge.wire.reasons import plain
@@ -35,6 +36,8 @@ ORDERS = ("order", "from", "to", "result", "driven", "replans", "paused", "asked
 UNREACHED = ("order", "m2", "at", "why")
 LEFT = ("m2", "at", "why")
 """Columns of ``order_rows``, ``unreached_rows``, ``left_rows`` and ``command_rows``."""
+ROOMS = ("room", "m2", "time", "entered", "swept", "passes", "left")
+"""Columns of ``room_rows``."""
 MOST_PLACES = 3
 # Less saved by a cohort or by local search is not shown [s].
 LEAST_SAVED_S = 0.05
@@ -75,6 +78,32 @@ def left_rows(document: ReviewDocument, spots: Sequence[Spot]) -> list[tuple[str
         (f"{patch.m2:.2f}", f"({patch.x:.2f}, {patch.y:.2f})", f"{spot.why}: {spot.words}")
         for patch, spot in zip(document.left, spots, strict=True)
     ]
+
+
+def room_rows(document: ReviewDocument, review: Review) -> list[tuple[str, ...]]:
+    """Return a row of each room: the time in it, what was swept, and the largest patches left."""
+    at = {patch: room_at(review.data, (patch.x, patch.y)) for patch in document.left}
+    found: list[tuple[str, ...]] = []
+    for room in document.rooms:
+        share = room.counted_share if room.swept_share is None else room.swept_share
+        patches = [
+            f"{patch.m2:.2f} at ({patch.x:.2f}, {patch.y:.2f})"
+            for patch, there in at.items()
+            if there is not None and there.id == room.room
+        ]
+        left = NOT_KNOWN if room.left_m2 is None else f"{room.left_m2:.2f} m2"
+        found.append(
+            (
+                room.title + (", left out" if room.skip else ""),
+                f"{room.area_m2:.1f}",
+                clock(room.seconds),
+                str(room.entered),
+                NOT_KNOWN if share is None else f"{100 * share:.1f} %",
+                "-" if room.passes is None else str(room.passes),
+                left + (f": {_some(patches)}" if patches else ""),
+            )
+        )
+    return found
 
 
 def command_rows(document: ReviewDocument) -> list[tuple[str, str]]:
@@ -123,11 +152,22 @@ def screen_rows(review: Review, document: ReviewDocument) -> list[tuple[str, str
         ("replans", replans),
         *([("processor", _processor(document))] if document.processor_s else []),
         ("commands", _some(commands)),
+        *([("rooms", _shares(document))] if document.rooms else []),
         *([("charges", _some(charges))] if charges else []),
         *([("poses", lost)] if (lost := _lost_way(review)) else []),
         ("troubles", _some(troubles)),
         ("refused", f"{document.faults} messages; lost {count(document.recorder_lost, '')}"),
     ]
+
+
+def _shares(document: ReviewDocument) -> str:
+    """Return the swept share of each room, those with the least first."""
+    shares = [
+        (room.counted_share if room.swept_share is None else room.swept_share, room.title)
+        for room in document.rooms
+    ]
+    known = sorted((share, title) for share, title in shares if share is not None)
+    return ", ".join(f"{title} {share:.0%}" for share, title in known) or NOT_KNOWN
 
 
 def _lost_way(review: Review) -> str:

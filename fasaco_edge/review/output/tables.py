@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from dataclasses import astuple as astuple_of
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -167,6 +168,7 @@ def _mission(review: Review) -> Iterator[Table]:
     )
     states = ((round(s.begin_s, 6), round(s.end_s, 6), s.name, s.reason) for s in review.states)
     yield Table("states", "a state of the mission", columns, states)
+    yield _rooms(review)
     share = Column("share", "float", "", "of the cells coverable at the end")
     covered = (
         (round(at, 6), round(part, 6))
@@ -184,6 +186,22 @@ def _mission(review: Review) -> Iterator[Table]:
         for at, value in points.tolist()
     )
     yield Table("plots", "a value that was plotted", columns, plots)
+
+
+def _rooms(review: Review) -> Table:
+    columns = (
+        Column("room", "int", "", "its number"),
+        Column("name", "text", "", "given by people"),
+        Column("area_m2", "float", "m2", "of its free floor, as the daemon says it"),
+        Column("seconds", "float", "s", "in it at work"),
+        Column("entered", "int", "", "how often the robot came into it"),
+        Column("swept_share", "float", "", "of its reachable floor, by recorded poses"),
+        Column("left_m2", "float", "m2", "reachable floor in it that was not swept"),
+        Column("counted_share", "float", "", "swept, as the daemon counted last"),
+        Column("passes", "int", "", "the newest pass of the last order that named it"),
+        Column("skip", "bool", "", "whether orders for everything leave it out"),
+    )
+    return Table("rooms", "a room", columns, (astuple_of(room) for room in review.rooms))
 
 
 def _floor(review: Review) -> Table:

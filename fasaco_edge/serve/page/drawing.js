@@ -1,11 +1,12 @@
-// Rooms and keep-outs drawn by hand: drag for a rectangle, or tap corner after corner.
+// Areas and keep-outs drawn by hand: drag for a rectangle, or tap corner after corner; or the line
+// that splits a room.
 const drawing = { kind: "", corners: [], from: null, to: null };
 const drafts = [];
 const TAP_PIXELS = 12, CLOSE_PIXELS = 24;
 
 function beginDrawing(kind) {
   Object.assign(drawing, { kind, corners: [], from: null, to: null });
-  if (kind) document.querySelector("main").scrollIntoView({ block: "nearest" });
+  if (kind) scrollToMap();
   showDrawing();
 }
 
@@ -22,29 +23,33 @@ function endStroke(at) {
   drawing.from = drawing.to = null;
   if (!from) return;
   if (Math.hypot(at[0] - from[0], at[1] - from[1]) > TAP_PIXELS) {
-    if (!drawing.corners.length) finish(rectangle(from, at));
+    if (drawing.kind === "cut") split([toMap(...from), toMap(...at)]);
+    else if (!drawing.corners.length) finish(rectangle(from, at));
   } else {
     const first = drawing.corners[0] && toScreen(...drawing.corners[0]);
     const closes = drawing.corners.length >= 3 && Math.hypot(at[0] - first[0], at[1] - first[1]) < CLOSE_PIXELS;
     if (closes) finish(drawing.corners);
     else drawing.corners.push(toMap(...at));
+    if (drawing.kind === "cut" && drawing.corners.length === 2) split(drawing.corners);
   }
   showDrawing();
 }
 
 const rectangle = ([ax, ay], [bx, by]) => [[ax, ay], [bx, ay], [bx, by], [ax, by]].map((at) => toMap(...at));
+const WHAT = { zone: "area", keepout: "keep-out", cut: "line" };
+const scrollToMap = () => document.querySelector("main").scrollIntoView({ block: "nearest" });
 const rounded = (corners) => corners.map((corner) => corner.map((value) => Math.round(value * 100) / 100));
 
 function finish(corners) {
   const kind = drawing.kind;
   const taken = new Set([...drafts, ...keptOut()].map((area) => area.name));
-  const what = kind === "zone" ? "room" : "keep-out";
+  const what = WHAT[kind];
   let number = 1;
   while (taken.has(`${what} ${number}`)) number++;
   drafts.push({ kind, polygon: rounded(corners), name: `${what} ${number}` });
   Object.assign(drawing, { kind: "", corners: [] });
   showDrafts();
-  document.getElementById("plan").scrollIntoView({ block: "nearest" });
+  document.getElementById("drafts").scrollIntoView({ block: "nearest" });
 }
 
 // Keep-outs in force: those with a name are the operator's, and may be removed by a tap on the map.
@@ -63,8 +68,9 @@ function isInside([x, y], polygon) {
 function pick(at) {
   const area = keptOut().find((each) => each.name && isInside(toMap(...at), each.polygon));
   picked = area && model.role === "operator" ? area.name : "";
-  if (picked) document.querySelector("main").scrollIntoView({ block: "nearest" });
+  if (picked) scrollToMap();
   showPicked();
+  pickRoom(picked ? 0 : roomAt(toMap(...at)));
 }
 
 function showPicked() {
@@ -75,7 +81,7 @@ function showPicked() {
 
 // Below the map is what is going on there: drawing, a keep-out, floor not swept, else the tools.
 function showBars() {
-  const bars = { drawbar: drawing.kind, pickbar: picked, leftbar: model.left, tools: true };
+  const bars = { drawbar: drawing.kind, pickbar: picked, roombar: pickedRoom, leftbar: model.left, tools: true };
   let taken = false;
   for (const [name, wanted] of Object.entries(bars)) {
     document.getElementById(name).hidden = taken || !wanted;
@@ -89,11 +95,11 @@ function showBars() {
 }
 
 function showDrawing() {
-  const count = drawing.corners.length;
-  const what = drawing.kind === "zone" ? "room" : "keep-out";
-  document.getElementById("drawhint").textContent = count
-    ? `${count} corner${count > 1 ? "s" : ""} of the ${what}; tap the next`
-    : `Drag over the ${what}, or tap its corners`;
+  const count = drawing.corners.length, what = WHAT[drawing.kind];
+  const isLine = drawing.kind === "cut";
+  const hint = isLine ? "Drag a line across the room, from wall to wall" : `Drag over the ${what}, or tap its corners`;
+  const goOn = isLine ? "Tap the other end of the line" : `${count} corner${count > 1 ? "s" : ""} of the ${what}; tap the next`;
+  document.getElementById("drawhint").textContent = count ? goOn : hint;
   document.getElementById("drawdone").hidden = count < 3;
   canvas.classList.toggle("draws", Boolean(drawing.kind));
   showBars();
@@ -102,8 +108,13 @@ function showDrawing() {
 function drawDrafts(context) {
   for (const draft of drafts) drawArea(context, draft.polygon, draft.kind === "zone" ? colours.zone : colours.keepout, draft.name, false);
   if (!drawing.kind) return;
-  const colour = drawing.kind === "zone" ? colours.zone : colours.keepout;
-  if (drawing.from && Math.hypot(drawing.to[0] - drawing.from[0], drawing.to[1] - drawing.from[1]) > TAP_PIXELS && !drawing.corners.length) {
+  const colour = drawing.kind === "keepout" ? colours.keepout : colours.zone;
+  if (drawing.kind === "cut" && drawing.from) {
+    trace(context, [toMap(...drawing.from), toMap(...drawing.to)], false);
+    context.lineWidth = 3;
+    context.strokeStyle = colour;
+    context.stroke();
+  } else if (drawing.from && Math.hypot(drawing.to[0] - drawing.from[0], drawing.to[1] - drawing.from[1]) > TAP_PIXELS && !drawing.corners.length) {
     drawArea(context, rectangle(drawing.from, drawing.to), colour, "", false);
   }
   if (drawing.corners.length) {

@@ -71,6 +71,7 @@ function show(message) {
       showLink(true, message.role === "operator" ? "connected; may command" : "connected; to look only");
       wants();
       showCommands();
+      showRooms();
       break;
     case "denied":
       try { sessionStorage.removeItem("token"); } catch (error) { /* nothing was kept */ }
@@ -82,6 +83,8 @@ function show(message) {
     case "recording": showRecording(); break;
     case "time": showTime(message); break;
     case "areas": showDrafts(); showPicked(); break;
+    case "rooms": showRooms(); break;
+    case "shares": showShares(); break;
     default: redraw();
   }
 }

@@ -1,6 +1,6 @@
 // The state of the robot: the newest message of each kind, grids and path unpacked.
 const model = {
-  state: null, pose: null, areas: null, events: [], others: [],
+  state: null, pose: null, areas: null, events: [], others: [], rooms: null, shares: null,
   map: null, floor: null, unswept: null, field: null, path: null, role: "viewer",
   // Of a recording: what it is, the track driven in all of it, and the time shown.
   recording: null, track: null, at: 0,
@@ -19,7 +19,7 @@ async function take(data) {
     const message = JSON.parse(data);
     if (message.kind === "events") model.events = message.entries;
     else if (message.kind === "others") model.others = message.robots;
-    else if (["state", "pose", "areas", "recording"].includes(message.kind)) model[message.kind] = message;
+    else if (["state", "pose", "areas", "recording", "rooms", "shares"].includes(message.kind)) model[message.kind] = message;
     return message;
   }
   const length = new DataView(data).getUint32(0, true);

@@ -99,7 +99,7 @@ function showOnMap(part) {
   showTools();
   showBars();
   wants();
-  document.querySelector("main").scrollIntoView({ block: "nearest" });
+  scrollToMap();
 }
 find("unleft").addEventListener("click", () => { model.left = null; showBars(); wants(); });
 
@@ -119,6 +119,7 @@ function showProgress(state) {
     return item(["span", "", zone.name], ["span", "quiet", zone.pass ? `${percent(zone.share)}${pass}` : "to come"]);
   });
   if (!lines.length && state.mission.passes > 1) lines.push(item(["span", "", "everything"], ["span", "quiet", `pass ${state.mission.pass} of ${state.mission.passes}`]));
+  for (const name of state.mission.left_out) lines.push(item(["span", "", name], ["span", "quiet", "left out"]));
   find("zones").replaceChildren(...lines);
 }
 
@@ -159,7 +160,7 @@ function showDrafts() {
     const line = item(["i", "", ""]), label = document.createElement("label"), box = document.createElement("input");
     box.type = "checkbox";
     box.checked = chosen.has(zone.name);
-    box.addEventListener("change", () => { (box.checked ? chosen.add(zone.name) : chosen.delete(zone.name)); keepDrafts(); showCommands(); });
+    box.addEventListener("change", () => { choose(zone.name); });
     label.className = "row name";
     label.append(box, zone.name);
     line.append(label);
@@ -173,7 +174,7 @@ function showDrafts() {
     name.className = "name";
     name.value = draft.name;
     name.maxLength = 64;
-    name.setAttribute("aria-label", isZone ? "name of the room" : "name of the keep-out");
+    name.setAttribute("aria-label", isZone ? "name of the area" : "name of the keep-out");
     name.addEventListener("input", () => { draft.name = name.value; keepDrafts(); redraw(); });
     const remove = action("Remove", () => { drafts.splice(index, 1); showDrafts(); redraw(); });
     const now = isZone ? [] : [action("Apply now", () => apply(draft), "primary")];
@@ -186,7 +187,7 @@ function showDrafts() {
 
 // What is drawn and chosen, and not ordered yet, outlives a reload of the page.
 function keepDrafts() {
-  const kept = { drafts, chosen: [...chosen], passes: find("passes").value, home: find("return").checked };
+  const kept = { drafts, chosen: [...chosen], passes: find("passes").value, cross: find("cross").checked, home: find("return").checked };
   try { sessionStorage.setItem("drafts", JSON.stringify(kept)); } catch (error) { /* a browser that keeps nothing */ }
 }
 
@@ -197,6 +198,7 @@ function takeUpDrafts() {
     drafts.push(...kept.drafts);
     kept.chosen.forEach((name) => chosen.add(name));
     find("passes").value = kept.passes;
+    find("cross").checked = kept.cross;
     find("return").checked = kept.home;
     find("plan").open = drafts.length > 0 || chosen.size > 0;
   } catch (error) { /* nothing was kept */ }
@@ -228,13 +230,13 @@ const chosen = new Set();
 
 function order() {
   const zones = [
-    ...[...chosen].map((name) => ({ name })),
+    ...[...chosen].map((key) => ({ name: titleOf(key) })),
     ...drafts.filter((draft) => draft.kind === "zone").map(({ name, polygon }) => ({ name: name.trim(), polygon })),
   ];
   return {
     zones,
     keep_out: drafts.filter((draft) => draft.kind === "keepout").map((draft) => draft.polygon),
-    passes: Math.round(Number(find("passes").value)) || 1,
+    passes: passesIn("passes", "cross"),
     return_home: find("return").checked,
   };
 }
@@ -273,7 +275,7 @@ function calm() {
 let refused = null;
 function start(what, discard = false) {
   command("start", { order: what, discard }, {
-    taken: () => { drafts.length = 0; chosen.clear(); showDrafts(); redraw(); },
+    taken: () => { drafts.length = 0; chosen.clear(); showDrafts(); pickRoom(0); },
     refused: (answer) => {
       if (answer.code !== "would_forget") return;
       refused = what;
@@ -322,6 +324,8 @@ function say(text, tone, why = "") {
 
 const TAKEN = {
   start: "It begins.", pause: "It stops.", resume: "It goes on.", home: "It comes home.", cancel: "It has ended.",
+  room_name: "It knows the room by that name.", room_set: "It will do so.",
+  room_split: "These are two rooms now.", room_merge: "These are one room now.",
   keep_out_add: "It stays out of there.", keep_out_remove: "It may go there again.",
 };
 const REFUSED = { not_now: "That is not possible now.", bad_order: "It cannot do it like that." };
@@ -329,6 +333,8 @@ function showAnswer(answer) {
   const then = awaited.get(answer.id) || {};
   awaited.delete(answer.id);
   if (answer.ok) say(TAKEN[then.name] || "", "good");
+  // What is wrong with a room is for its owner to mend.
+  else if (answer.code === "bad_order" && then.name.startsWith("room_")) say(roomFault(answer), "bad");
   else say(REFUSED[answer.code] || "That did not work.", "bad", answer.hint ? `${answer.text} (${answer.hint})` : answer.text);
   const next = answer.ok ? then.taken : then.refused;
   if (next) next(answer);

@@ -4,7 +4,7 @@ const dark = window.matchMedia("(prefers-color-scheme: dark)");
 
 function readColours() {
   const style = getComputedStyle(document.documentElement);
-  for (const name of ["map", "free", "wall", "swept", "ahead", "driven", "robot", "keepout", "zone", "other", "left", "ink", "card"]) {
+  for (const name of ["map", "free", "wall", "swept", "ahead", "driven", "robot", "keepout", "zone", "other", "left", "ink", "faint", "accent", "card", ...[0, 1, 2, 3, 4, 5].map((tint) => `room${tint}`)]) {
     colours[name] = style.getPropertyValue(`--${name}`).trim();
   }
   for (const kind of ["map", "floor", "field"]) if (model[kind]) model[kind].image = null;
@@ -95,8 +95,8 @@ function maskOf(grid, marks, holds) {
   return grid.mask;
 }
 
-function trace(context, points, closed) {
-  context.beginPath();
+function trace(context, points, closed, begins = true) {
+  if (begins) context.beginPath();
   points.forEach(([x, y], i) => context[i ? "lineTo" : "moveTo"](...toScreen(x, y)));
   if (closed) context.closePath();
 }
@@ -119,9 +119,10 @@ function drawArea(context, polygon, colour, name, dashed, opacity = 0.14) {
   drawLabel(context, name, ...toScreen(x, y), colour);
 }
 
+const LABEL_FONT = "600 13px system-ui, sans-serif";
 function drawLabel(context, text, px, py, colour) {
   const shown = text.length > 24 ? `${text.slice(0, 23)}…` : text;
-  context.font = "600 13px system-ui, sans-serif";
+  context.font = LABEL_FONT;
   context.textAlign = "center";
   context.textBaseline = "middle";
   context.lineWidth = 4;
@@ -246,6 +247,9 @@ function drawScale(context) {
   drawLabel(context, metres < 1 ? `${Math.round(100 * metres)} cm` : `${metres} m`, x - width / 2, y - 12, colours.ink);
 }
 
+// A room has its name already.
+const isRoom = (zone) => foundRooms().some((room) => room.title === zone.name);
+
 function draw() {
   waiting = false;
   const ratio = window.devicePixelRatio || 1;
@@ -261,12 +265,16 @@ function draw() {
   if (!view.scale) return;
   drawGrid(context, model.map);
   if (showsField) drawGrid(context, model.field);
-  else drawGrid(context, model.floor);
+  else {
+    drawRooms(context);
+    drawGrid(context, model.floor);
+  }
   drawLeft(context, ratio);
-  for (const zone of (model.areas && model.areas.zones) || []) drawArea(context, zone.polygon, colours.zone, zone.name, zone.is === "standing", zone.is === "standing" ? 0.03 : 0.14);
+  for (const zone of (model.areas && model.areas.zones) || []) drawArea(context, zone.polygon, colours.zone, isRoom(zone) ? "" : zone.name, zone.is === "standing", zone.is === "standing" || isRoom(zone) ? 0.03 : 0.14);
   for (const area of (model.areas && model.areas.keep_out) || []) drawArea(context, area.polygon, colours.keepout, area.name || "", area.is === "standing", area.name && area.name === picked ? 0.4 : 0.14);
   if (!showsField) drawTrack(context);
   if (!showsField) drawPath(context);
+  drawRoomNames(context);
   drawHome(context);
   drawDrafts(context);
   drawOthers(context);

@@ -7,6 +7,10 @@ from typing import Annotated
 from msgspec import Meta
 
 from fasaco_edge.wire.documents.json_text import Amount, Count, Document, Ordinal, allowed
+from fasaco_edge.wire.limits import MAX_COORDINATE_M
+
+# A polygon of fewer corners has no inside.
+LEAST_CORNERS = 3
 
 Share = Annotated[float, Meta(ge=0, le=1)]
 
@@ -53,3 +57,13 @@ class Rooms(Document, frozen=True):
     frame: str = ""
     revision: Count = 0
     rooms: Annotated[tuple[RoomReport, ...], allowed(maxItems=250)] = ()
+
+    @property
+    def outlined(self) -> tuple[RoomReport, ...]:
+        """The rooms that can be drawn: an outline has three corners, and lies on the map."""
+        return tuple(
+            room
+            for room in self.rooms
+            if len(room.outline) >= LEAST_CORNERS
+            and all(abs(value) <= MAX_COORDINATE_M for corner in room.outline for value in corner)
+        )

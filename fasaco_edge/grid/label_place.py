@@ -1,0 +1,52 @@
+"""The place of a label in a polygon: the middle of where it is widest.
+
+Does not import numpy, so that small programs stay small.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+from fasaco_edge.grid.geometry import Point, Polygon
+
+# Lines of text looked at, and how much wider than tall a label is.
+LINES, ASPECT = 16, 3.0
+
+
+class LabelPlace(NamedTuple):
+    """A place for a label: its middle x, y [m], and how wide the polygon is there [m]."""
+
+    x: float
+    y: float
+    width_m: float
+
+
+def label_place(polygon: Polygon) -> LabelPlace | None:
+    """Return the place for a label in a polygon, corners (x, y) [m]; None if it has no area."""
+    corners = list(polygon)
+    turned = [(y, x) for x, y in corners]
+    found, best = None, 0.0
+    low, high = min((y for _, y in corners), default=0.0), max((y for _, y in corners), default=0.0)
+    for index in range(LINES):
+        y = low + (index + 0.5) / LINES * (high - low)
+        for x0, x1 in _chords(corners, y):
+            x = (x0 + x1) / 2
+            # Above and below the middle of the line there has to be place, too.
+            y0, y1 = next(((a, b) for a, b in _chords(turned, x) if a <= y <= b), (y, y))
+            tall = 2 * min(y - y0, y1 - y)
+            fits = min(x1 - x0, ASPECT * tall) + tall / 2
+            # Of lines as good as each other the first stays, whatever the last bit of a float says.
+            if fits > best + 1e-6:
+                best, found = fits, LabelPlace(x, y, x1 - x0)
+    return found
+
+
+def _chords(corners: list[Point], y: float) -> Iterator[Point]:
+    """Yield where a horizontal line is in a polygon, from x to x [m]."""
+    ends = sorted(
+        ax + (y - ay) / (by - ay) * (bx - ax)
+        for (ax, ay), (bx, by) in zip(corners, corners[1:] + corners[:1], strict=True)
+        if (ay > y) != (by > y)
+    )
+    return zip(ends[::2], ends[1::2], strict=False)

@@ -1,0 +1,161 @@
+"""The rooms of a recording, one section each: the time in it, what was swept and what was left."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fasaco_edge.grid.geometry import GridGeometry, Point, Polygon, Window, polygon_bounds
+from fasaco_edge.grid.polygons import area_m2, is_near
+from fasaco_edge.judge.floor import JudgedFloor
+from fasaco_edge.mission.orders.zones import cells_inside
+from fasaco_edge.review.moments import Span
+from fasaco_edge.review.run_data import RunData
+from fasaco_edge.text import one_line
+from fasaco_edge.wire.documents.rooms import RoomReport
+
+# States in which the robot is not at work, whatever room it stands in.
+RESTS = ("idle", "done", "paused", "charging", "loading", "waiting for map", "waiting for pose")
+
+
+@dataclass(frozen=True, slots=True)
+class RoomChapter:
+    """A room, with the outline that it had at the end.
+
+    Attributes:
+        room: its number.
+        name: its name; "" for none.
+        area_m2: its area, by the daemon [m2].
+        seconds: time in it at work, standing too, but not in pauses and charging [s].
+        entered: how often the robot came into it, its first pose included.
+        swept_share: swept share of its reachable floor, by recorded poses; None if not known.
+        left_m2: its reachable floor that was not swept [m2]; None if not known.
+        counted_share: swept share as the daemon counted last, in that pass; None if not known.
+        passes: the newest pass of the last order that named it; None if none did.
+        skip: whether orders for everything leave it out.
+    """
+
+    room: int
+    name: str
+    area_m2: float
+    seconds: float
+    entered: int
+    swept_share: float | None
+    left_m2: float | None
+    counted_share: float | None
+    passes: int | None
+    skip: bool
+
+    @property
+    def title(self) -> str:
+        """Its name, or its number in words."""
+        return one_line(self.name) or f"room {self.room}"
+
+
+def outlined(data: RunData) -> list[RoomReport]:
+    """Return the rooms that have an outline, the largest first: others may lie within."""
+    return sorted(data.rooms.outlined, key=lambda room: -area_m2(room.outline))
+
+
+def room_at(data: RunData, point: Point) -> RoomReport | None:
+    """Return the room that a point x, y [m] lies in; None for none."""
+    there = [room for room in outlined(data) if is_near(room.outline, point, 0.0)]
+    return there[-1] if there else None
+
+
+def room_chapters(
+    data: RunData, states: Sequence[Span], floor: JudgedFloor | None
+) -> tuple[RoomChapter, ...]:
+    """Return the chapters of the rooms, by number; none if no rooms were recorded.
+
+    Args:
+        data: of the samples.
+        states: of the mission, in order.
+        floor: swept and left; None if not known.
+    """
+    rooms = outlined(data)
+    geometry = floor.geometry if floor else data.grid.geometry if data.grid else None
+    if not rooms or geometry is None:
+        return ()
+    labels = _labels(geometry, [room.outline for room in rooms])
+    at = _values_at(geometry, labels, data.track[:, :2])
+    seconds = np.bincount(at[:-1], _work_s(data, states), len(rooms) + 1) if len(at) else None
+    # Between rooms, in doors and beside furniture, it is in none.
+    passed = at[at > 0]
+    entered = np.bincount(passed[np.diff(passed, prepend=0) != 0], minlength=len(rooms) + 1)
+    pixel_m2, done, left = geometry.resolution**2, None, None
+    if floor is not None:
+        done, left = (
+            np.bincount(labels[mask], minlength=len(rooms) + 1) * pixel_m2
+            for mask in (floor.swept, floor.unswept)
+        )
+    found = []
+    for index, room in enumerate(rooms, 1):
+        share = left_m2 = None
+        if done is not None and left is not None and done[index] + left[index]:
+            share = round(float(done[index] / (done[index] + left[index])), 4)
+            left_m2 = round(float(left[index]), 3)
+        found.append(
+            RoomChapter(
+                room.id,
+                room.name,
+                round(room.area_m2, 2),
+                round(float(seconds[index]), 1) if seconds is not None else 0.0,
+                int(entered[index]),
+                share,
+                left_m2,
+                room.swept,
+                _passes(data, room),
+                room.skip,
+            )
+        )
+    return tuple(sorted(found, key=lambda chapter: chapter.room))
+
+
+def _labels(geometry: GridGeometry, outlines: Sequence[Polygon]) -> NDArray[np.int16]:
+    """Return which room each pixel is in, from 1, int16 (rows, cols); later ones lie above."""
+    whole = Window(0, 0, geometry.rows, geometry.cols)
+    labels = np.zeros((geometry.rows, geometry.cols), np.int16)
+    for number, outline in enumerate(outlines, 1):
+        corners = tuple(geometry.to_pixels(x, y) for x, y in outline)
+        x0, y0, x1, y1 = polygon_bounds(corners)
+        around = Window(math.floor(y0), math.floor(x0), math.ceil(y1), math.ceil(x1))
+        if box := around.intersection(whole):
+            labels[box.slices_in(whole)][cells_inside(corners, box, 1.0)] = number
+    return labels
+
+
+def _values_at(
+    geometry: GridGeometry, labels: NDArray[np.int16], xy: NDArray[np.float64]
+) -> NDArray[np.int64]:
+    """Return the labels at points (x, y) [m], int64 (n,); 0 beyond the raster."""
+    cols, rows = (np.floor(at).astype(np.int64) for at in geometry.to_pixels(xy[:, 0], xy[:, 1]))
+    inside = (rows >= 0) & (cols >= 0) & (rows < geometry.rows) & (cols < geometry.cols)
+    found = np.zeros(len(xy), np.int64)
+    found[inside] = labels[rows[inside], cols[inside]]
+    return found
+
+
+def _work_s(data: RunData, states: Sequence[Span]) -> NDArray[np.float64]:
+    """Return how long the robot was at work from each pose to the next [s], float64 (n - 1,)."""
+    times = data.times
+    lasted = np.diff(times)
+    lasted[lasted > (data.lost_pose_s or math.inf)] = 0.0
+    for span in states:
+        if span.name in RESTS:
+            lasted[(times[:-1] >= span.begin_s) & (times[:-1] < span.end_s)] = 0.0
+    return lasted
+
+
+def _passes(data: RunData, room: RoomReport) -> int | None:
+    """Return the newest pass of the last order that named a room; None if none did."""
+    titles = (room.title, f"room {room.id}")
+    for each in reversed(data.statuses):
+        for zone in each.status.mission.zones:
+            if zone.name in titles:
+                return zone.pass_number
+    return None

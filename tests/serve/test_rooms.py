@@ -1,0 +1,165 @@
+"""Rooms on the page: what the server says of them, and what is done to them by finger."""
+
+from __future__ import annotations
+
+import itertools
+import json
+import shutil
+
+import pytest
+
+pytest.importorskip("websockets")
+
+from fasaco_edge.grid.label_place import label_place
+from fasaco_edge.serve.served_view import ServedView
+from fasaco_edge.wire.documents.rooms import RoomReport, Rooms
+from fasaco_edge.wire.keys import Keys
+from tests.serve.serving import served
+from tests.serve.test_browser import Tab, browsing, photograph, press
+from tests.serve.test_plain import TECHNICAL
+from tests.serve.test_served_view import heard, tell
+from tests.support.outsider import Outsider
+from tests.support.processes import daemon_process
+from tests.support.rooms import map_bytes, pose_bytes, two_rooms
+from tests.support.waiting import until
+
+
+def square(x: float, y: float, size: float = 3.0) -> tuple[tuple[float, float], ...]:
+    return (x, y), (x + size, y), (x + size, y + size), (x, y + size)
+
+
+GRID = [square(3.1 * col, 3.1 * row) for row in range(4) for col in range(5)]
+
+
+def test_rooms_are_said_once_and_shares_as_they_are_swept():
+    view = ServedView(Keys())
+    assert heard(view, "rooms", 1.0) == {"kind": "rooms", "rooms": []}
+    rooms = [RoomReport(index + 1, outline=each) for index, each in enumerate(GRID)]
+    rooms[1] = RoomReport(
+        2, "kit\x1bchen", GRID[1], 9.04, (1, 3), (), 0.25, ("auto", "cross"), True
+    )
+    far = RoomReport(90, outline=square(1e9, 0.0))
+    tell(view, "rooms", Rooms("map", 1, (*rooms, far, RoomReport(91))), 2.0)
+    news = view.news(2.0)
+    assert len(news["rooms"]) < 6_000
+    said = json.loads(news["rooms"])["rooms"]
+    assert [room["id"] for room in said] == list(range(1, 21))
+    assert "\x1b" not in said[1]["title"]
+    assert (said[1]["m2"], said[1]["passes"], said[1]["skip"]) == (9.0, ["auto", "cross"], True)
+    assert said[0]["title"] == "room 1"
+    shares = json.loads(news["shares"])["swept"]
+    assert (shares["1"], shares["2"]) == (None, 0.25)
+    # A drive changes the shares alone.
+    rooms[1] = RoomReport(2, "kit\x1bchen", GRID[1], 9.04, (1, 3), (), 0.5, ("auto", "cross"), True)
+    tell(view, "rooms", Rooms("map", 1, tuple(rooms)), 3.0)
+    news = view.news(3.0)
+    assert "rooms" not in news
+    assert json.loads(news["shares"])["swept"]["2"] == 0.5
+
+
+def test_rooms_beside_each_other_have_other_tints_and_keep_them():
+    view = ServedView(Keys())
+    # Numbers in an order of no meaning.
+    numbers = [1 + (7 * index) % len(GRID) for index in range(len(GRID))]
+    every = [RoomReport(number, outline=each) for number, each in zip(numbers, GRID, strict=True)]
+    before: dict[int, int] = {}
+    for count in range(1, len(every) + 1):
+        there = sorted(every, key=lambda room: room.id)[:count]
+        tell(view, "rooms", Rooms("map", count, tuple(there)), float(count))
+        tints = {room["id"]: room["tint"] for room in heard(view, "rooms", float(count))["rooms"]}
+        assert before.items() <= tints.items()
+        before = tints
+    tint_at = [before[number] for number in numbers]
+    for (i, a), (j, b) in itertools.combinations(enumerate(GRID), 2):
+        if max(abs(a[0][0] - b[0][0]), abs(a[0][1] - b[0][1])) < 3.2:
+            assert tint_at[i] != tint_at[j]
+
+
+@pytest.mark.parametrize(
+    ("outline", "place"),
+    [
+        (square(0.0, 0.0, 4.0), (2.0, 2.0, 4.0)),
+        # An L: not at the mean of its corners, which is outside.
+        (((0, 0), (6, 0), (6, 2), (1, 2), (1, 8), (0, 8)), (3.0, 1.0, 6.0)),
+        # A corridor from south to north.
+        (((0, 0), (1, 0), (1, 9), (0, 9)), (0.5, 4.5, 1.0)),
+    ],
+)
+def test_a_label_lies_where_there_is_place(outline, place):
+    assert label_place(outline) == pytest.approx(place, abs=0.3)
+
+
+def test_no_area_has_no_label():
+    assert label_place(((0, 0), (1, 1), (2, 2))) is None
+    assert label_place(()) is None
+
+
+@pytest.mark.skipif(shutil.which("chromium") is None, reason="needs chromium")
+def test_rooms_are_named_set_ordered_merged_and_split_by_finger(tmp_path):
+    with (
+        daemon_process(tmp_path, mission={"autostart": False}) as daemon,
+        Outsider(daemon.endpoint) as outsider,
+        served(tmp_path, daemon.endpoint, "--allow-commands") as page,
+        browsing(page.url, tmp_path / "browser") as tab,
+    ):
+        outsider.put("map", map_bytes(two_rooms(door=True)))
+        outsider.put("pose", pose_bytes(1.05, 1.05))
+        until(lambda: tab.js("foundRooms().length") == 2 and tab.js("Boolean(model.map)"))
+        for xy, name in (((1.05, 2.5), "kitchen"), ((4.65, 2.5), "bath")):
+            tap(tab, *xy)
+            tab.js(f"find('roomname').value = {name!r}")
+            tab.click("rename")
+            until(lambda name=name: tab.js(f"foundRooms().some((r) => r.name === {name!r})"))
+        # A name that another room has is refused, and the owner reads why.
+        tab.js("find('roomname').value = 'kitchen'")
+        tab.click("rename")
+        until(lambda: tab.js("find('answer').innerText").startswith("Choose another name"))
+        assert "is 'kitchen' already" in tab.js("find('answer').innerText")
+        assert tab.js("find('roomtitle').innerText") == "bath"
+        tab.click("roomcross")
+        until(lambda: tab.js("JSON.stringify(roomOf(pickedRoom).passes)") == '["auto","cross"]')
+        assert tab.js("find('roompasses').value") == "2"
+        assert not TECHNICAL.search(tab.js("document.body.innerText"))
+        photograph(tab, "room")
+
+        # In the order of the taps, each as it is set.
+        tab.click("chooseroom")
+        tap(tab, 1.05, 2.5)
+        tab.click("chooseroom")
+        assert tab.js("find('roomsnow').textContent") == "Sweep bath, then kitchen"
+        tab.click("roomsnow")
+        mission = outsider.wait_status(lambda s: s["mission"]["zones"])["mission"]
+        assert [(z["name"], z["passes"]) for z in mission["zones"]] == [("bath", 2), ("kitchen", 1)]
+        until(lambda: tab.js("chosen.size") == 0 and tab.js("find('room').hidden"))
+
+        # What is left out of an order for everything, the page says.
+        tap(tab, 4.65, 2.5)
+        tab.click("roomskip")
+        until(lambda: tab.js("roomOf(pickedRoom).skip"))
+        tab.js("start({}, true)")
+        until(lambda: "left out" in tab.js("find('zones').innerText"))
+
+        tab.js("document.querySelector('#room details').open = true")
+        tap(tab, 1.05, 2.5)
+        press(tab, "Merge")
+        press(tab, "Tap again")
+        until(lambda: tab.js("foundRooms().length") == 1)
+        until(lambda: tab.js("find('roomtitle').innerText") == "kitchen")
+        # The line begins and ends before the walls; the page leads it on to them.
+        tab.click("split")
+        tab.js("canvas.scrollIntoView()")
+        (x0, y0), (x1, y1) = tab.on_screen(1.6, 1.0), tab.on_screen(1.6, 2.0)
+        tab.touch((x0, y0), ((x0 + x1) / 2, (y0 + y1) / 2), (x1, y1))
+        until(
+            lambda: tab.js("foundRooms().length") == 2,
+            why=lambda: tab.js("find('answer').innerText"),
+        )
+        photograph(tab, "split")
+        assert tab.complaints == []
+
+
+def tap(tab: Tab, x: float, y: float) -> None:
+    """Tap on a room, until its card is shown."""
+    tab.js("canvas.scrollIntoView()")
+    tab.touch(tab.on_screen(x, y))
+    until(lambda: tab.js("find('room').offsetParent !== null"))
