@@ -66,9 +66,10 @@ def home(kind: str, seed: int) -> Home:
 
 
 def seen(floor: Home, share: float, seed: int) -> OccupancyGrid:
-    """Return what a robot has mapped once it saw ``share`` of the free floor, the same geometry."""
-    if share >= 1.0:
-        return floor.grid
+    """Return what a robot has mapped once it saw ``share`` of the free floor, the same geometry.
+
+    With a share of 1 it has seen all that it can: not what is behind furniture.
+    """
     wanted = share * np.count_nonzero(floor.grid.cells == FREE)
     grid = floor.grid
     for grid in growing(floor, seed):
