@@ -31,8 +31,8 @@ DOOR_M, WALL_M, BESIDE_M = 1.3, 0.45, 0.5
 ROOM_M2 = 1.5
 # Furniture: longest edge; shorter than this in any case; else thicker than this [m].
 LONGEST_M, SMALL_M, THICK_M = 2.5, 0.6, 0.3
-# A larger unknown area is a part of the building that has not been seen yet [m2].
-UNSEEN_M2 = 6.0
+# Unknown pixels nearer than this to floor that is open to them are yet to be seen [m].
+OPEN_M = 0.5
 # With more unknown pixels beside free ones than this many times those of walls, a map marks no
 # walls, and all that is not free is wall.
 MOST_UNMARKED = 4
@@ -83,7 +83,7 @@ def find_rooms(grid: OccupancyGrid, cuts: Sequence[tuple[Point, Point]] = ()) ->
         clearances(solid, round(CLEAR_M / pixel_m)),
         solid,
         (kinds == _WALL) & ~things,
-        _unseen(kinds == _UNKNOWN, UNSEEN_M2 / pixel_m**2),
+        _unseen(kinds, pixel_m),
     )
     limits = DoorLimits(DOOR_M / pixel_m, WALL_M / pixel_m, round(BESIDE_M / pixel_m))
     doors = np.concatenate([_by_hand(cuts, geometry), find_doors(pixels, _DIRECTIONS, limits)])
@@ -143,15 +143,21 @@ def _beside_free(kinds: NDArray[np.uint8], kind: int) -> int:
     )
 
 
-def _unseen(unknown: NDArray[np.bool_], least: float) -> NDArray[np.bool_]:
-    """Return the unknown areas of at least so many pixels, or at the rim, bool (rows, cols)."""
-    areas = find_areas(unknown.astype(np.uint8))
-    large = np.concatenate([[False], areas.cells >= least])
-    for rim in (areas.labels[0], areas.labels[-1], areas.labels[:, 0], areas.labels[:, -1]):
-        large[rim] = True
-    large[0] = False
-    marked: NDArray[np.bool_] = large[areas.labels]
-    return marked
+def _unseen(kinds: NDArray[np.uint8], pixel_m: float) -> NDArray[np.bool_]:
+    """Return unknown pixels that belong to parts of the building yet to be seen, bool (rows, cols).
+
+    Free floor is open to those parts nearby; walls alone border on what is behind furniture.
+    """
+    unknown, free = kinds == _UNKNOWN, kinds == _FREE
+    is_open = np.zeros_like(free)
+    is_open[1:] |= free[1:] & unknown[:-1]
+    is_open[:-1] |= free[:-1] & unknown[1:]
+    is_open[:, 1:] |= free[:, 1:] & unknown[:, :-1]
+    is_open[:, :-1] |= free[:, :-1] & unknown[:, 1:]
+    reach = round(OPEN_M / pixel_m)
+    near: NDArray[np.bool_] = clearances(is_open, reach) < reach * reach
+    near &= unknown
+    return near
 
 
 def _by_hand(cuts: Sequence[tuple[Point, Point]], geometry: GridGeometry) -> NDArray[np.float64]:

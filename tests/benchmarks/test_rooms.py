@@ -1,10 +1,12 @@
 """The benchmark of rooms in its short form, and its judge."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 
 from tests.benchmarks.__main__ import main
+from tests.benchmarks.rooms import identity
 from tests.benchmarks.rooms.homes import home, seen
 from tests.benchmarks.rooms.judge import judge
 
@@ -42,3 +44,19 @@ def test_it_runs_as_a_command(capsys, tmp_path):
         whole = groups[kind, 1.0]
         assert min(whole["recall"], whole["precision"]) >= 0.9
     assert len(list(tmp_path.glob("*.png"))) == 16
+
+
+def test_rooms_keep_their_names_while_the_map_grows(monkeypatch):
+    """The short form of ``room-ids``: one map from each place, and a loop closure."""
+    monkeypatch.setattr(identity, "MAPS_EACH", 1)
+    floor = home("home", 4)
+    book, maps, moved = identity.follow(floor, 4, is_named=True)
+    assert maps > 30
+    assert not moved
+    assert len({room.name for room in book.rooms} - {""}) >= 4
+    # The judge sees a room that is somewhere else.
+    one, other = [room for room in book.rooms if room.name][:2]
+    names = one.name, other.name
+    book.put(replace(one, name="aside"))
+    book.put(replace(other, name=names[0]))
+    assert names[0] in identity.name_rooms(book, floor, floor.grid.geometry.origin)

@@ -95,6 +95,19 @@ def test_furniture_does_not_separate():
     assert find_rooms(grid_of(cells)).count == 2
 
 
+def test_what_is_behind_furniture_is_no_room():
+    """As a scanner maps it: no wall is seen behind bed and wardrobe, nor anything outside."""
+    cells = two_rooms()
+    for x, y, width, depth in ((0.0, 0.6, 2.2, 1.4), (1.0, 2.8, 1.2, 0.6)):
+        cells = put(cells, x, y, width, depth)
+    is_free = cells == FREE
+    seen = is_free.copy()
+    for axis, by in ((0, 1), (0, -1), (1, 1), (1, -1)):
+        seen |= np.roll(is_free, by, axis)
+    cells[~seen] = UNKNOWN
+    assert find_rooms(grid_of(cells)).count == 2
+
+
 def test_a_niche_is_part_of_its_room():
     cells = two_rooms()
     # A wall of 0.1 m that leaves a corner of 1 m2 behind a gap.

@@ -9,6 +9,7 @@ inside. The same seed gives the same floor (with the same release of numpy).
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -65,32 +66,40 @@ def home(kind: str, seed: int) -> Home:
 
 
 def seen(floor: Home, share: float, seed: int) -> OccupancyGrid:
-    """Return what a robot has mapped once it saw ``share`` of the free floor, the same geometry."""
-    truth = floor.grid.cells
-    if share >= 1.0:
-        return floor.grid
-    rng = Generator(PCG64((seed, 1)))
+    """Return what a robot has mapped once it saw ``share`` of the free floor, the same geometry.
+
+    With a share of 1 it has seen all that it can: not what is behind furniture.
+    """
+    wanted = share * np.count_nonzero(floor.grid.cells == FREE)
+    grid = floor.grid
+    for grid in growing(floor, seed):
+        if np.count_nonzero(grid.cells == FREE) >= wanted:
+            break
+    return grid
+
+
+def growing(floor: Home, seed: int) -> Iterator[OccupancyGrid]:
+    """Yield what a robot has mapped at each place from which it looks, the same geometry."""
+    truth, rng = floor.grid.cells, Generator(PCG64((seed, 1)))
     known = np.full_like(truth, UNKNOWN)
     angles = np.arange(0.0, 2.0 * math.pi, RESOLUTION_M / REACH_M)
     rays = np.column_stack((np.cos(angles), np.sin(angles)))
     is_free = truth == FREE
-    place, wanted = np.array(floor.start), share * np.count_nonzero(is_free)
-    unvisited = _roomy(is_free)
-    while np.count_nonzero(known == FREE) < wanted:
+    place, unvisited = np.array(floor.start), _roomy(is_free)
+    while True:
         x, y = place[1] + 0.5, place[0] + 0.5
         cast_rays(truth, known, Scanner(x, y, REACH_M / RESOLUTION_M, 0), rays)
         reveal_disc(truth, known, x, y, HULL_M / RESOLUTION_M)
+        yield OccupancyGrid(floor.grid.geometry, known.copy(), floor.grid.frame)
         # On to the nearest place from which something new may be seen, or nearly the nearest.
         unvisited[tuple(slice(max(at - 5, 0), at + 6) for at in place)] = False
         frontier = unvisited & (known == FREE) & _beside(is_free & (known == UNKNOWN), 8)
         places = np.argwhere(frontier)
         if not len(places):
-            break
+            return
         far = np.hypot(*(places - place).T)
         near = np.flatnonzero(far <= far.min() + 0.5 / RESOLUTION_M)
         place = places[rng.choice(near)]
-    geometry = floor.grid.geometry
-    return OccupancyGrid(geometry, known, floor.grid.frame)
 
 
 def _beside(mask: NDArray[np.bool_], reach: int) -> NDArray[np.bool_]:

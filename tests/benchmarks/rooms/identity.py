@@ -1,0 +1,208 @@
+"""``benchmarks room-ids``: whether rooms keep their numbers and names on maps of growing missions.
+
+Each floor is mapped from place to place. Pixels beside walls flicker, each map lies a little aside,
+and now and then a loop closure moves it by decimetres, as the mission knows.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+from collections.abc import Generator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.random import PCG64
+from numpy.typing import NDArray
+
+from fasaco_edge.bench.benchmark import Benchmark, Goal, Report, Say, positive, seed
+from fasaco_edge.grid.geometry import Pose2D
+from fasaco_edge.grid.occupancy import FREE, OCCUPIED, OccupancyGrid
+from fasaco_edge.grid.rooms import ROOM_M2, find_rooms
+from fasaco_edge.grid.rotation import composed
+from fasaco_edge.mission.map.loop_closure import Motion
+from fasaco_edge.mission.map.room_book import RoomBook
+from fasaco_edge.mission.map.room_edits import move
+from fasaco_edge.mission.map.room_update import update
+from tests.benchmarks.rooms.homes import RESOLUTION_M, Home, growing, home
+
+KINDS = ("home", "office")
+# Maps from each place; the share of pixels beside walls that are the opposite on a map; how far a
+# map lies aside [m]; of the maps, those before which a loop closes, and its motion [m, degrees].
+MAPS_EACH, FLICKER, ASIDE_M, CLOSES, CLOSURE_M, CLOSURE_DEG = 3, 0.1, 0.03, 0.05, 0.3, 2.0
+GOAL_IDS = 1.2
+HEADER = ("floor", "floors", "maps", "rooms", "numbers", "a room", "names moved", "names lost")
+
+
+@dataclass(frozen=True, slots=True)
+class Kept:
+    """What became of the rooms of one floor.
+
+    Attributes:
+        kind: of the floor.
+        maps: number of maps.
+        rooms: true rooms that are large enough.
+        ids: numbers that were given.
+        moved: of the rooms that were named when they appeared, those whose name was of another true
+            room on some later map.
+        lost: those whose name was gone at the end.
+    """
+
+    kind: str
+    maps: int
+    rooms: int
+    ids: int
+    moved: int
+    lost: int
+
+
+def follow(floor: Home, number: int, *, is_named: bool) -> tuple[RoomBook, int, set[str]]:
+    """Return the rooms after a mission, the number of its maps, and the names that moved."""
+    rng, book, maps = np.random.Generator(PCG64((number, 2))), RoomBook(), 0
+    frame, moved = Pose2D(0.0, 0.0), set[str]()
+    for grid in growing(floor, number):
+        for _ in range(MAPS_EACH):
+            if maps and rng.random() < CLOSES:
+                x, y = rng.uniform(-CLOSURE_M, CLOSURE_M, 2).tolist()
+                closure = Pose2D(x, y, math.radians(rng.uniform(-CLOSURE_DEG, CLOSURE_DEG)))
+                move(book, Motion(frame, after := composed(closure, frame)))
+                frame = after
+            maps += 1
+            aside = Pose2D(*rng.uniform(-ASIDE_M, ASIDE_M, 2).tolist())
+            placed = composed(aside, composed(frame, grid.geometry.origin))
+            shown = OccupancyGrid(
+                replace(grid.geometry, origin=placed), _flickered(grid.cells, rng)
+            )
+            update(book, find_rooms(shown), "map")
+            if is_named:
+                moved |= name_rooms(book, floor, placed)
+    return book, maps, moved
+
+
+def _flickered(cells: NDArray[np.int8], rng: np.random.Generator) -> NDArray[np.int8]:
+    """Return a map on which some free pixels beside walls are walls, and some walls are free."""
+    flickered, wall = cells.copy(), cells == OCCUPIED
+    beside = np.zeros_like(wall)
+    for axis, by in ((0, 1), (0, -1), (1, 1), (1, -1)):
+        beside |= np.roll(wall, by, axis)
+    drawn = rng.random(cells.shape) < FLICKER
+    flickered[drawn & beside & (cells == FREE)] = OCCUPIED
+    return flickered
+
+
+def name_rooms(book: RoomBook, floor: Home, placed: Pose2D) -> set[str]:
+    """Name rooms after the true ones that they lie in; return the names of those that do not."""
+    wrong = set[str]()
+    sheet = book.sheet
+    if sheet is None:
+        return wrong
+    geometry = replace(floor.grid.geometry, origin=placed)
+    for room in book.rooms:
+        window, mask = sheet.raster.squares(room.id)
+        rows, cols = np.nonzero(mask)
+        x, y = (
+            (at.astype(np.float64) + 0.5) * sheet.raster.square_m
+            for at in (cols + window.col0, rows + window.row0)
+        )
+        at_col, at_row = (np.floor(at).astype(np.int64) for at in geometry.to_pixels(x, y))
+        inside = (at_row >= 0) & (at_col >= 0) & (at_row < geometry.rows) & (at_col < geometry.cols)
+        true = floor.rooms[at_row[inside], at_col[inside]]
+        counts = np.bincount(true[true > 0])
+        if not len(counts):
+            continue
+        name = f"true {int(counts.argmax())}"
+        if room.name and room.name != name:
+            wrong.add(room.name)
+        elif not room.name and book.find(name) is None:
+            book.name(room.id, name)
+    return wrong
+
+
+def _measure(args: argparse.Namespace, say: Say) -> Generator[Kept, None, None]:
+    least = ROOM_M2 / RESOLUTION_M**2
+    for kind in KINDS:
+        for number in range(args.seed, args.seed + args.floors):
+            floor = home(kind, number)
+            say(floor.name)
+            true = int((np.bincount(floor.rooms[floor.rooms > 0]) >= least).sum())
+            book, maps, _ = follow(floor, number, is_named=False)
+            named, _, moved = follow(floor, number, is_named=True)
+            names = {room.name for room in named.rooms} - {""}
+            given = named.next_id - 1
+            assert given >= len(names)
+            lost = _lost(named, floor)
+            yield Kept(kind, maps, true, book.next_id - 1, len(moved), lost)
+
+
+def _lost(book: RoomBook, floor: Home) -> int:
+    """Return how many large true rooms no room is named after at the end."""
+    sizes = np.bincount(floor.rooms[floor.rooms > 0])
+    large = np.flatnonzero(sizes * RESOLUTION_M**2 >= ROOM_M2).tolist()
+    return sum(book.find(f"true {room}") is None for room in large)
+
+
+def _add_options(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--floors", type=positive, default=10, help="of each kind (default: %(default)s)"
+    )
+    parser.add_argument("--seed", type=seed, default=0, help="the first (default: %(default)s)")
+
+
+def _report(args: argparse.Namespace, samples: Sequence[Kept]) -> Report:
+    groups = {kind: [one for one in samples if one.kind == kind] for kind in KINDS}
+    figures = [
+        {
+            "kind": kind,
+            "floors": len(kept),
+            **{
+                name: sum(getattr(one, name) for one in kept)
+                for name in ("maps", "rooms", "ids", "moved", "lost")
+            },
+        }
+        for kind, kept in groups.items()
+    ]
+    shares = [
+        sum(one.ids for one in kept) / max(sum(one.rooms for one in kept), 1)
+        for kept in groups.values()
+    ]
+    return Report(
+        title="numbers and names that rooms kept",
+        header=HEADER,
+        rows=tuple(
+            (
+                str(each["kind"]),
+                *(str(each[name]) for name in ("floors", "maps", "rooms", "ids")),
+                f"{share:.2f}",
+                str(each["moved"]),
+                str(each["lost"]),
+            )
+            for each, share in zip(figures, shares, strict=True)
+        ),
+        figures={"rooms": figures},
+        goals=(
+            Goal("numbers given for each true room", round(max(shares), 3), GOAL_IDS),
+            Goal("names that moved to another room", sum(one.moved for one in samples), 0),
+        ),
+        remarks=(
+            "rooms: of at least 1.5 m2; names lost: true rooms that no room is named after at the "
+            "end, as it was never found or is part of another",
+        ),
+    )
+
+
+ROOM_IDS = Benchmark(
+    name="room-ids",
+    summary="whether rooms keep numbers and names while the map grows",
+    description="Map generated homes and offices from place to place: pixels beside walls flicker, "
+    "each map lies up to 3 cm aside, and one in twenty after a loop closure of up to 0.3 m and 2 "
+    "degrees. Count the numbers that rooms get, and names that move to another room.",
+    add_options=_add_options,
+    count=lambda args: len(KINDS) * int(args.floors),
+    measure=_measure,
+    report=_report,
+    epilog="""\
+examples:
+  python -m tests.benchmarks room-ids
+  python -m tests.benchmarks room-ids --seed 500 --floors 20 --json
+""",
+)
