@@ -20,8 +20,9 @@ from fasaco_edge.recording import entities
 from fasaco_edge.review.drive import swept_floor
 from fasaco_edge.review.figures import document_of
 from fasaco_edge.review.instant import direction, heading_from, scene_at
+from fasaco_edge.review.output.answer_rows import instant_rows
 from fasaco_edge.review.output.pictures import draw_spots
-from fasaco_edge.review.output.rows import instant_rows, screen_rows
+from fasaco_edge.review.output.rows import screen_rows
 from fasaco_edge.review.review import read_review
 from fasaco_edge.review.spot import explain, is_inside, spots_left
 from fasaco_edge.review.wording import clock

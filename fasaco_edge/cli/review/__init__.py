@@ -189,7 +189,7 @@ def _answer(args: argparse.Namespace, review: Review) -> int:
     import msgspec
 
     from fasaco_edge.review.instant import scene_at
-    from fasaco_edge.review.output import rows
+    from fasaco_edge.review.output import answer_rows
     from fasaco_edge.review.output.pictures import draw_scene, draw_spots
     from fasaco_edge.review.spot import explain
     from fasaco_edge.review.wording import clock
@@ -211,9 +211,9 @@ def _answer(args: argparse.Namespace, review: Review) -> int:
             console.print(f"{clock_of_robot.words}: times are the robot's")
         if scene is not None:
             console.print(f"at {clock(args.at)}", style="bold")
-            console.print(terminal.figures(rows.instant_rows(scene.instant)))
+            console.print(terminal.figures(answer_rows.instant_rows(scene.instant)))
         for spot in spots:
-            console.print(terminal.figures(rows.spot_rows(spot)))
+            console.print(terminal.figures(answer_rows.spot_rows(spot)))
     if args.png:
         picture = draw_scene(review, scene) if scene else draw_spots(review, spots)
         if picture is None:

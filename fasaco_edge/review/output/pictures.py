@@ -16,8 +16,8 @@ from fasaco_edge.drawing.plot import MapLayer, Plot, View, bounds_of
 from fasaco_edge.drawing.sheet import KeyEntry, Sheet
 from fasaco_edge.judge.floor import swept_words
 from fasaco_edge.review.instant import Scene
+from fasaco_edge.review.output.answer_rows import instant_rows, spot_rows
 from fasaco_edge.review.output.panels import coverage_panel, replan_panel, state_panel
-from fasaco_edge.review.output.rows import instant_rows, spot_rows
 from fasaco_edge.review.review import Review
 from fasaco_edge.review.rooms import outlined
 from fasaco_edge.review.run_data import RunData

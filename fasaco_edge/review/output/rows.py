@@ -12,7 +12,6 @@ from fasaco_edge.client.phrases import scale_words
 from fasaco_edge.review.comparison import figures
 from fasaco_edge.review.document import ReviewDocument
 from fasaco_edge.review.drive import MILESTONES
-from fasaco_edge.review.instant import Instant, MapThen, PathThen, PlanThen, direction
 from fasaco_edge.review.orders import order_words
 from fasaco_edge.review.rooms import room_at
 from fasaco_edge.review.wording import NOT_KNOWN, amount, clock, count
@@ -39,9 +38,7 @@ LEFT = ("m2", "at", "why")
 ROOMS = ("room", "m2", "time", "entered", "swept", "passes", "left")
 """Columns of ``room_rows``."""
 MOST_PLACES = 3
-# Less saved by a cohort or by local search is not shown [s].
-LEAST_SAVED_S = 0.05
-# Nor is less of a way without poses [m].
+# Less of a way without poses is not shown [m].
 LEAST_LOST_M = 1.0
 CHARGES = ("at", "for", "battery")
 
@@ -348,83 +345,3 @@ def _began(began: str) -> str:
     """Return when it began; a time before this program existed means that the clock was not set."""
     when = began.replace("T", " ").replace("Z", " UTC")
     return when if began >= "2024" else f"{when}, by a clock that was not set"
-
-
-def instant_rows(instant: Instant) -> Iterator[tuple[str, str]]:
-    """Yield name and text of all that is known of a moment."""
-    state, why = instant.state or "not known", plain(instant.state_reason or "")
-    # The first path since that state was entered; the present path follows below.
-    yield "state", f"{state}: {why}" if why and not why.startswith("path ") else state
-    if instant.order:
-        yield "order", instant.order
-    if instant.x is not None and instant.yaw_deg is not None:
-        moving = "" if instant.speed_m_s is None else f", {instant.speed_m_s:.2f} m/s"
-        facing = direction(instant.yaw_deg)
-        yield "robot", f"at ({instant.x:.2f}, {instant.y:.2f}) m, facing {facing}{moving}"
-    if (turn := instant.turn) is not None:
-        side = "left" if turn.degrees > 0 else "right"
-        span = f"{clock(turn.begin_s)} to {clock(turn.end_s)}"
-        yield "turned", f"{abs(turn.degrees):.0f} deg to the {side}, {span}: {turn.why}"
-    for name, path in (
-        ("path before", instant.path_before),
-        ("path", instant.path),
-        ("path after", instant.path_after),
-    ):
-        if path is not None:
-            yield name, _path_words(path, clock(path.at_s))
-    if (plan := instant.plan) is not None:
-        yield "planned", _plan_words(plan, clock(plan.at_s))
-    if (change := instant.map) is not None:
-        yield "map", _map_words(change, clock(change.since_s))
-    for name, command in (("command", instant.command), ("next command", instant.next_command)):
-        if command is not None:
-            yield name, f"{clock(command.at_s)} {command.command}"
-    yield "trail", instant.trail or "not recorded"
-
-
-def _path_words(path: PathThen, when: str) -> str:
-    leads = "" if path.leads_deg is None else f"; leads {direction(path.leads_deg)} from there"
-    where = "" if path.changed is None else f", map changed {_box_words(path.changed)}"
-    return f"{path.revision} at {when}: {plain(path.reason)}{where}; {path.steps} steps{leads}"
-
-
-def _plan_words(plan: PlanThen, when: str) -> str:
-    found = [
-        f"ants of velocity {velocity} saved {saved_s:.1f} s"
-        for velocity, saved_s in plan.saved_by_velocity_s.items()
-        if saved_s >= LEAST_SAVED_S
-    ]
-    if plan.saved_by_local_search_s >= LEAST_SAVED_S:
-        found.append(f"local search saved {plan.saved_by_local_search_s:.1f} s")
-    why = ", ".join(found) or "nothing saved"
-    return (
-        f"{plan.revision} at {when}: {plain(plan.reason)}; {plan.planner}, {plan.ants} ants; {why}"
-    )
-
-
-def _map_words(change: MapThen, since: str) -> str:
-    parts = [
-        f"{m2:.2f} m2 {what}"
-        for m2, what in (
-            (change.seen_m2, "seen for the first time"),
-            (change.blocked_m2, "now blocked"),
-            (change.freed_m2, "now free"),
-        )
-        if m2
-    ]
-    if not parts or change.around is None:
-        return f"no change since {since}"
-    return f"since {since} {', '.join(parts)}, {_box_words(change.around)}"
-
-
-def _box_words(box: Rectangle) -> str:
-    return f"within ({box.x_min:.1f}, {box.y_min:.1f}) to ({box.x_max:.1f}, {box.y_max:.1f}) m"
-
-
-def spot_rows(spot: Spot) -> Iterator[tuple[str, str]]:
-    """Yield name and text of each known fact about a spot."""
-    known = {True: "swept", False: "not swept", None: "not known"}[spot.swept]
-    yield "at", f"({spot.x:.2f}, {spot.y:.2f}) m: {known}"
-    yield "why", spot.words if spot.words.startswith(spot.why) else f"{spot.why}: {spot.words}"
-    if spot.patch_m2 is not None:
-        yield "in one piece", f"{spot.patch_m2:.2f} m2 of floor not swept"
