@@ -8,6 +8,7 @@ served too: a room is one as soon as enough of its floor has been seen through t
 
 from __future__ import annotations
 
+import heapq
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -46,6 +47,7 @@ _RING = [(row, _HALF) for row in range(1 - _HALF, _HALF + 1)] + [
 _DIRECTIONS = np.array(_RING) / np.sqrt((np.array(_RING) ** 2).sum(axis=1, keepdims=True))
 # How certain a cut by hand is: more than any door.
 _BY_HAND = 9.0
+_NO_LINK = (0.0, 0.0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -179,45 +181,44 @@ def _joined(
         beside: int32 (m, 2), the regions on both sides of each.
         sizes: float64 (n,), free floor of each region [m2]; that of region 0 has no meaning.
     """
-    lengths = np.hypot(doors[:, 2] - doors[:, 0], doors[:, 3] - doors[:, 1])
-    links: dict[tuple[int, int], tuple[float, float]] = {}
-    certain = zip(beside.tolist(), doors[:, 4].tolist(), (-lengths).tolist(), strict=True)
-    for (one, other), kind, length in certain:
+    downs, rights = doors[:, 2] - doors[:, 0], doors[:, 3] - doors[:, 1]
+    squares = downs * downs + rights * rights
+    # By region, the most certain door to each other one.
+    links: list[dict[int, tuple[float, float]]] = [{} for _ in sizes]
+    certain = zip(beside.tolist(), doors[:, 4].tolist(), (-squares).tolist(), strict=True)
+    for (one, other), kind, narrow in certain:
         if one and other and one != other:
-            ends = min(one, other), max(one, other)
-            links[ends] = max(links.get(ends, (0.0, 0.0)), (kind, length))
-    rooms, floor = list(range(len(sizes))), sizes.tolist()
-    is_done = [False] * len(sizes)
-    while links:
-        small = [
-            (floor[room], room) for ends in links for room in ends
-            if floor[room] < ROOM_M2 and not is_done[room]
-        ]  # fmt: skip
-        if not small:
-            break
-        _, room = min(small)
-        ways = [(link, ends) for ends, link in links.items() if room in ends]
-        (kind, _), ends = min(ways)
-        if kind == _BY_HAND:
-            is_done[room] = True
+            best = max(links[one].get(other, _NO_LINK), (kind, narrow))
+            links[one][other] = links[other][one] = best
+    floor, into = sizes.tolist(), list(range(len(sizes)))
+    small = [(floor[room], room) for room, to in enumerate(links) if to and floor[room] < ROOM_M2]
+    heapq.heapify(small)
+    while small:
+        size, room = heapq.heappop(small)
+        # Joined or grown since, or with nothing beside it any more.
+        if into[room] != room or size != floor[room] or not links[room]:
             continue
-        into = ends[1] if ends[0] == room else ends[0]
-        rooms = [into if there == room else there for there in rooms]
-        floor[into] += floor[room]
-        links = _relinked(links, room, into)
-    hand = {room for ends, (kind, _) in links.items() if kind == _BY_HAND for room in ends}
-    kept = [room if room in hand or floor[room] >= ROOM_M2 else 0 for room in rooms]
-    return np.array([0, *kept[1:]], np.int32)
-
-
-def _relinked(
-    links: dict[tuple[int, int], tuple[float, float]], room: int, into: int
-) -> dict[tuple[int, int], tuple[float, float]]:
-    """Return the links after a room has been joined to another."""
-    kept: dict[tuple[int, int], tuple[float, float]] = {}
-    for ends, link in links.items():
-        one, other = (into if end == room else end for end in ends)
-        if one != other:
-            there = min(one, other), max(one, other)
-            kept[there] = max(kept.get(there, (0.0, 0.0)), link)
-    return kept
+        (kind, _), _, other = min(
+            (link, floor[there], there) for there, link in links[room].items()
+        )
+        if kind == _BY_HAND:
+            continue
+        into[room] = other
+        floor[other] += size
+        for third, link in links[room].items():
+            del links[third][room]
+            if third != other:
+                best = max(links[third].get(other, _NO_LINK), link)
+                links[third][other] = links[other][third] = best
+        if floor[other] < ROOM_M2 and links[other]:
+            heapq.heappush(small, (floor[other], other))
+    rooms = np.zeros(len(sizes), np.int32)
+    for region in range(1, len(sizes)):
+        room = region
+        while into[room] != room:
+            room = into[room]
+        into[region] = room
+        is_cut = any(kind == _BY_HAND for kind, _ in links[room].values())
+        if is_cut or floor[room] >= ROOM_M2:
+            rooms[region] = room
+    return rooms

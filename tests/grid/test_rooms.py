@@ -177,3 +177,24 @@ def test_a_map_without_rooms_has_none(cells):
 
 def test_an_open_floor_is_one_room():
     assert find_rooms(grid_of(np.zeros((50, 60), np.int8))).count == 1
+
+
+def test_many_chambers_are_joined_until_they_are_large_enough():
+    """Chambers of 1 m2 in rows, each with a door to the next: none is a room of its own."""
+    side, count = 22, 14
+    cells = np.full((3 * side + 2, count * side + 2), WALL, np.int8)
+    for row in range(3):
+        for col in range(count):
+            cells[row * side + 2 : (row + 1) * side, col * side + 2 : (col + 1) * side] = FREE
+            if col:
+                middle = row * side + side // 2
+                cells[middle - 7 : middle + 7, col * side : col * side + 2] = FREE
+    found = find_rooms(grid_of(cells))
+    floor_m2 = np.bincount(found.labels[found.labels > 0])[1:] * 0.05**2
+    assert (floor_m2 >= 1.5).all()
+    assert 3 * 2 <= found.count <= 3 * count // 2
+    # The rows are not joined to each other.
+    rows = [
+        set(numbers(found, *((1.1 * col + 0.6, y) for col in range(count)))) for y in (0.6, 1.7)
+    ]
+    assert not rows[0] & rows[1]

@@ -189,6 +189,7 @@ def is_cut(window: Window, square_m: float, cut: Cut) -> NDArray[np.bool_]:
     dx, dy = x1 - x0, y1 - y0
     along = ((x - x0) * dx + (y - y0) * dy) / max(dx * dx + dy * dy, 1e-12)
     along = np.clip(along, 0.0, 1.0)
-    away = np.hypot(x0 + along * dx - x, y0 + along * dy - y)
-    near: NDArray[np.bool_] = (away < CUT * square_m).reshape(window.rows, window.cols)
+    right, up = x0 + along * dx - x, y0 + along * dy - y
+    far = right * right + up * up
+    near: NDArray[np.bool_] = (far < (CUT * square_m) ** 2).reshape(window.rows, window.cols)
     return near
