@@ -242,7 +242,10 @@ class RoomsFileError(FasacoError):
     """The file of the rooms is broken, or cannot be read or written."""
 
     code = "rooms_file"
-    hint = "name the rooms again, or put an earlier file in its place while no daemon runs"
+    hint = (
+        "name the rooms again, or put an earlier file in its place while no daemon runs; if it "
+        "cannot be written, free the disk"
+    )
 
 
 class LedgerFullError(FasacoError):

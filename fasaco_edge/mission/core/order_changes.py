@@ -146,7 +146,8 @@ class OrderChanges:
                 zones = (state.current_zone or zone,), (zone,)
                 then, now = (in_zones(each, lattice.window, lattice.cell_m) for each in zones)
                 if (then != now).any():
-                    self.route.want(f"the outline of {zone.name!r} has changed")
+                    what = f"the outline of {zone.name!r} has changed"
+                    self.route.want(what if zone.polygon else "other rooms are left out")
         self._followed = book.version, order
 
     def _change_keep_outs(self, order: OrderState, now: float) -> PathUpdate | None:

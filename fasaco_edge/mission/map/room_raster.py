@@ -152,7 +152,7 @@ def spread(ids: Ids, allowed: NDArray[np.bool_]) -> None:
     Near is counted in steps over the edges of squares.
 
     Args:
-        ids: the numbers.
+        ids: uint16 (rows, cols), the numbers.
         allowed: bool (rows, cols), the squares to fill, and to step over.
     """
     padded = np.pad(ids, 1)

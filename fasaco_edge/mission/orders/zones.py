@@ -29,7 +29,7 @@ def in_zones(zones: tuple[Zone, ...], window: Window, cell_m: float) -> NDArray[
 
 
 def _with_holes(zones: tuple[Zone, ...], window: Window, cell_m: float) -> NDArray[np.bool_]:
-    """Return which cells lie in one of the zones, some of which have holes."""
+    """Return the same as ``in_zones`` for zones some of which have holes or leave out rooms."""
     cells = np.zeros((window.rows, window.cols), bool)
 
     def inside(outline: Polygon, holes: tuple[Polygon, ...]) -> NDArray[np.bool_]:
@@ -44,6 +44,7 @@ def _with_holes(zones: tuple[Zone, ...], window: Window, cell_m: float) -> NDArr
             for room in zone.without:
                 own &= ~inside(room.outline, room.holes)
             cells |= own
+    cells.flags.writeable = False
     return cells
 
 

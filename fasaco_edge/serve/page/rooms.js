@@ -115,7 +115,7 @@ function showPasses(passes) {
   if (document.activeElement !== find("roompasses")) find("roompasses").value = list.length || passes || 1;
   find("roomcross").checked = isCross;
   const words = list.map((pass) => (typeof pass === "string" ? pass : JSON.stringify(pass)));
-  find("roomspecial").textContent = list.length && !isCross ? `Set by your helper: ${words.join(", ")}` : "";
+  find("roomspecial").textContent = list.length && !isCross ? `Set by service: ${words.join(", ")}` : "";
 }
 
 function showShares() {
