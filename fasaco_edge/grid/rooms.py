@@ -9,7 +9,7 @@ served too: a room is one as soon as enough of its floor has been seen through t
 from __future__ import annotations
 
 import heapq
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -47,12 +47,14 @@ _RING = [(row, _HALF) for row in range(1 - _HALF, _HALF + 1)] + [
 _DIRECTIONS = np.array(_RING) / np.sqrt((np.array(_RING) ** 2).sum(axis=1, keepdims=True))
 # How certain a cut by hand is: more than any door.
 _BY_HAND = 9.0
+# Pixels worked on at once, where arrays of other types are made of them.
+BLOCK = 1 << 16
 _NO_LINK = (0.0, 0.0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FoundRooms:
-    """Rooms of a map, numbered by their first pixels, row by row.
+    """Rooms of a map, numbered by their first pixels, row by row, those in doors aside.
 
     Attributes:
         geometry: of the labels' pixels, a part of the map.
@@ -75,7 +77,26 @@ def find_rooms(grid: OccupancyGrid, cuts: Sequence[tuple[Point, Point]] = ()) ->
     geometry, kinds = _kinds(grid)
     if not kinds.size:
         return FoundRooms(geometry, np.zeros(kinds.shape, np.int32), 0)
-    pixel_m = geometry.resolution
+    free = kinds == _FREE
+    solid, found = _solid_and_doors(kinds, geometry.resolution)
+    doors = np.concatenate([_by_hand(cuts, geometry), found])
+    open_floor = (~solid).astype(np.uint8)
+    draw_cuts(open_floor, doors, 1.0)
+    labels = find_areas(open_floor).labels
+    del open_floor
+    sizes = _counted(labels, free) * geometry.resolution**2
+    rooms, count = _numbered(_joined(doors, beside_cuts(labels, doors), sizes))
+    for rows in _blocks(labels):
+        labels[rows] = rooms[labels[rows]]
+    grow(labels, ~solid)
+    labels[~free] = 0
+    return FoundRooms(geometry, labels, count)
+
+
+def _solid_and_doors(
+    kinds: NDArray[np.uint8], pixel_m: float
+) -> tuple[NDArray[np.bool_], NDArray[np.float64]]:
+    """Return the pixels that are not free, furniture excepted, and the doors between them."""
     free = kinds == _FREE
     things = furniture(
         ~free, Limits(round(LONGEST_M / pixel_m), SMALL_M / pixel_m, THICK_M / pixel_m)
@@ -88,25 +109,29 @@ def find_rooms(grid: OccupancyGrid, cuts: Sequence[tuple[Point, Point]] = ()) ->
         _unseen(kinds, pixel_m),
     )
     limits = DoorLimits(DOOR_M / pixel_m, WALL_M / pixel_m, round(BESIDE_M / pixel_m))
-    doors = np.concatenate([_by_hand(cuts, geometry), find_doors(pixels, _DIRECTIONS, limits)])
-    open_floor = (~solid).astype(np.uint8)
-    draw_cuts(open_floor, doors, 1.0)
-    regions = find_areas(open_floor).labels
-    sizes = np.bincount(regions.ravel(), free.ravel()).astype(np.float64) * pixel_m**2
-    labels = _joined(doors, beside_cuts(regions, doors), sizes)[regions]
-    grow(labels, ~solid)
-    labels[~free] = 0
-    return _numbered(geometry, labels)
+    return solid, find_doors(pixels, _DIRECTIONS, limits)
 
 
-def _numbered(geometry: GridGeometry, labels: NDArray[np.int32]) -> FoundRooms:
-    """Return rooms of any labels, numbered by their first pixels."""
-    names, first, at = np.unique(labels, return_index=True, return_inverse=True)
-    is_room = names > 0
-    numbers = np.zeros(len(names), np.int32)
-    numbers[is_room] = 1 + np.argsort(np.argsort(first[is_room]))
-    count = int(np.count_nonzero(is_room))
-    return FoundRooms(geometry, numbers[at].reshape(labels.shape), count)
+def _blocks(pixels: NDArray[np.int32]) -> Iterator[slice]:
+    """Yield slices of rows that are worked on at once, which bounds memory."""
+    step = max(BLOCK // pixels.shape[1], 1)
+    yield from (slice(first, first + step) for first in range(0, pixels.shape[0], step))
+
+
+def _counted(labels: NDArray[np.int32], free: NDArray[np.bool_]) -> NDArray[np.float64]:
+    """Return how many free pixels each region has, float64 (n,)."""
+    counts = np.zeros(int(labels.max()) + 1)
+    for rows in _blocks(labels):
+        counts += np.bincount(labels[rows][free[rows]], minlength=len(counts))
+    return counts
+
+
+def _numbered(rooms: NDArray[np.int32]) -> tuple[NDArray[np.int32], int]:
+    """Return the rooms of regions, numbered by their first regions, and how many there are."""
+    names = dict.fromkeys(room for room in rooms.tolist() if room)
+    numbers = np.zeros(len(rooms), np.int32)
+    numbers[list(names)] = np.arange(1, len(names) + 1)
+    return numbers[rooms], len(names)
 
 
 _UNKNOWN, _FREE, _WALL = 0, 1, 2
@@ -219,6 +244,6 @@ def _joined(
             room = into[room]
         into[region] = room
         is_cut = any(kind == _BY_HAND for kind, _ in links[room].values())
-        if is_cut or floor[room] >= ROOM_M2:
+        if floor[room] >= (0.0 if is_cut else ROOM_M2) and floor[room] > 0.0:
             rooms[region] = room
     return rooms
