@@ -227,6 +227,37 @@ def test_an_order_for_everything_leaves_a_skipped_room_out_and_says_so():
     assert drive.mission.order_state.order.zones[0].without == ()
 
 
+@pytest.mark.parametrize(
+    ("zone", "where"),
+    [
+        ({"name": "bay", "room": 99}, "zones[0].room: there is no room 99"),
+        ({"name": "x", "room": 99, "polygon": rectangle(0, 0, 4, 4)}, "zones[0].room: there is no"),
+        ({"name": "room 99"}, "zones[0].name: no zone 'room 99'"),
+    ],
+)
+@pytest.mark.parametrize("unknown", ["refuse", "wait"])
+def test_a_number_that_no_room_has_is_refused_even_by_an_order_that_waits(zone, where, unknown):
+    """Whatever room gets the number next would be swept."""
+    bay = StandingZone(name="bay", polygon=[tuple(at) for at in rectangle(0, 0, 4, 4)])
+    drive = settled(*BOTH, config=with_policy(CONFIG, zones=(bay,)))
+    drive.command("start", {"zones": [zone], "unknown": unknown})
+    assert where in str(drive.refused)
+    assert drive.mission.state is State.IDLE
+
+
+def test_an_order_does_not_follow_a_room_that_gets_a_lost_number():
+    """After a power cut the rooms' file may be older than the order, or broken."""
+    drive = settled(*BOTH)
+    start(drive, f"room {room_at(drive, *IN_EAST).id}")
+    kept = OrderState.from_json(drive.mission.order_state.to_json())
+    (before,) = kept.order.zones
+    again = Drive(IN_WEST, MapReceived(building(*BOTH)), pose_at(*IN_WEST), order_state=kept)
+    settle(again)
+    (zone,) = again.mission.order_state.order.as_given.zones
+    assert (zone.room, zone.polygon) == (0, before.polygon)
+    assert min(room.id for room in again.mission.rooms.rooms) > before.room
+
+
 # A room of 12 x 12 cells, with a door in its eastern wall, within corridors 6 cells wide.
 RING = (
     *(["." * 26] * 6),

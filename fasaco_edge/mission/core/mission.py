@@ -63,6 +63,7 @@ from fasaco_edge.mission.map.room_book import RoomBook
 from fasaco_edge.mission.map.room_watch import RoomWatch
 from fasaco_edge.mission.orders.mask import mask_frame
 from fasaco_edge.mission.orders.order_state import OrderState
+from fasaco_edge.mission.orders.placing import restored
 from fasaco_edge.mission.orders.sequencer import Sequencer
 from fasaco_edge.planners.living_trail import LivingTrail
 
@@ -154,8 +155,11 @@ class Mission:
         self._map.frames.activate(before.frame)
 
     def restore_order(self, order: OrderState) -> None:
-        """Continue an order from before a restart; to be called before the first step."""
+        """Continue an order from before a restart; to be called before the first step, and after
+        ``restore_rooms``."""
         self._map.places.resume(order.places)
+        if order.order is not None:
+            order = replace(order, order=restored(order.order, self._rooms.book))
         self._changes.begin(self._rotation.order(order, self._rotated_by_deg))
         self.state, self.reason = self._executive.status()
 

@@ -303,6 +303,11 @@ class RoomBook:
         self.next_id += 1
         return self.next_id - 1
 
+    def pass_over(self, number: int) -> None:
+        """Give no room a number up to this one: a room that is not known any more had it."""
+        self.next_id = max(self.next_id, number + 1)
+        self.version += 1
+
     def turn_to(self, sheet: RoomSheet) -> None:
         """Use a sheet, new or not; of too many the one used longest ago is dropped, first of those
         where no room has a name."""
