@@ -117,6 +117,10 @@ WRONG = [
     (document(rooms=[ROOM | {"id": 70_000}]), "id"),
     (document(rooms=[ROOM | {"passes": ["rest"]}]), "rest goes after"),
     (document(rooms=[ROOM | {"outline": [[0, 0], [1, 0]]}]), "three corners"),
+    (
+        document(squares=raster([0, 0]), rooms=[ROOM | {"outline": [[0, 0], [1, 0], [1, 1]]}]),
+        "no squares",
+    ),
     (document(rooms=[ROOM | {"outline": [[0, 0], [1, 0], [1e300, 0]]}]), "outline"),
     (document(cuts=[[[0, 0]]]), "cuts"),
     (document(squares=raster([1])), "need 4 bytes"),

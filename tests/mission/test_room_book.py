@@ -326,6 +326,17 @@ def test_a_large_building_gets_wider_squares_and_keeps_its_rooms():
     assert at(book, *KITCHEN) == book.room("kitchen").id
 
 
+def test_a_room_whose_squares_are_lost_has_no_outline():
+    """As in wider squares; a ring has to know what lies within it, which no square of it does."""
+    book = known(regions("aaaaa", "abbba", "abbba", "aaaaa"))
+    closet = at(book, 2.5, 2.0)
+    book.name(closet, "closet")
+    ids = book.sheet.raster.ids
+    book.sheet.lay(replace(book.sheet.raster, ids=np.where(ids == closet, 0, ids)))
+    shown(book, regions("aaaaaaa", "a...aaa", "a...aaa", "aaaaaaa"), HOLD_CHANGE)
+    assert (book.room("closet").outline, book.room("closet").area_m2) == ((), 0.0)
+
+
 def test_a_room_within_another_one_is_no_part_of_it():
     book = known(regions("aaaaa", "abbba", "abbba", "aaaaa"))
     ring, inner = at(book, 0.5, 0.5), at(book, 2.5, 2.0)

@@ -399,6 +399,22 @@ def settle_in(drive, frame):
         drive.tell(pose_at(*drive.cell, frame=frame), after=1.01 * PERIOD_S)
 
 
+def test_a_look_that_fails_is_a_fault_and_the_robot_sweeps_on(monkeypatch):
+    def fail(*_):
+        raise IndexError("index 0 is out of bounds")
+
+    monkeypatch.setattr(room_watch, "find_rooms", fail)
+    drive = Drive(IN_WEST, MapReceived(building(*BOTH)), pose_at(*IN_WEST))
+    faults = []
+    for _ in range(3):
+        decision = drive.tell(MapReceived(building(*BOTH)), pose_at(*IN_WEST), after=PERIOD_S)
+        faults += decision.faults
+    assert {str(fault) for fault in faults} == {
+        "rooms of this map were not published: IndexError: index 0 is out of bounds"
+    }
+    drive.finish()
+
+
 def test_a_map_is_looked_at_once_however_often_it_comes(monkeypatch):
     looks = []
 

@@ -191,8 +191,11 @@ def _sheet(note: SheetNote, next_id: int) -> RoomSheet:
     if max(rooms, default=0) >= next_id:
         raise ValueError("the next number is taken")
     raster, gone = (_raster(each, note.square_m) for each in (note.squares, note.gone))
-    if not _numbers(raster) <= rooms.keys():
+    there = _numbers(raster)
+    if not there <= rooms.keys():
         raise ValueError("squares have numbers of no room")
+    if any(room.outline and room.id not in there for room in rooms.values()):
+        raise ValueError("a room has an outline, and no squares")
     if max(_numbers(gone), default=0) >= next_id:
         raise ValueError("squares have numbers that are still to come")
     nothing = RoomRaster.empty(note.square_m)

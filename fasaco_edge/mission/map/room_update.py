@@ -100,6 +100,7 @@ def _alike(sheet: RoomSheet, found: FoundRooms) -> float:
 def _stale(sheet: RoomSheet, before: Ids) -> list[int]:
     """Return the rooms of which so many squares have changed that their outlines are outdated."""
     after = sheet.raster.ids
+    squares = np.bincount(after.ravel(), minlength=MOST_NUMBER + 1)
     other = before != after
     changed = np.bincount(np.concatenate((before[other], after[other])), minlength=1)
     for room in np.flatnonzero(changed).tolist():
@@ -108,7 +109,7 @@ def _stale(sheet: RoomSheet, before: Ids) -> list[int]:
     return [
         number
         for number, room in sheet.rooms.items()
-        if sheet.stale.get(number, 0) >= least or not room.outline
+        if sheet.stale.get(number, 0) >= least or bool(room.outline) != bool(squares[number])
     ]
 
 

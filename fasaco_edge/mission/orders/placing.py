@@ -30,20 +30,22 @@ def located(
             no room of that number: none is awaited, as the next one to get it may be any.
     """
     known = {zone.name: tuple(zone.polygon) for zone in standing}
-    zones = []
-    for index, zone in enumerate(order.zones):
-        if zone.polygon == () and not zone.room and zone.name in known:
-            zone = replace(zone, polygon=known[zone.name])
-        if zone.polygon == () or zone.room:
-            zone = _looked_up(zone, book, index, tuple(known), may_wait=order.unknown == "wait")
-        zones.append(zone)
+    may_wait = order.unknown == "wait"
+    zones = (
+        _looked_up(zone, index, known, book, may_wait=may_wait)
+        for index, zone in enumerate(order.zones)
+    )
     return placed(replace(order, zones=tuple(zones)), book)
 
 
 def _looked_up(
-    zone: Zone, book: RoomBook, index: int, standing: tuple[str, ...], *, may_wait: bool
+    zone: Zone, index: int, standing: dict[str, Polygon], book: RoomBook, *, may_wait: bool
 ) -> Zone:
-    """Return a zone with the number of its room; without one if it waits for a name."""
+    """Return a zone with its polygon or the number of its room; without both if it waits."""
+    if not zone.room and zone.polygon != ():
+        return zone
+    if not zone.room and zone.name in standing:
+        return replace(zone, polygon=standing[zone.name])
     room = book.find(zone.room or zone.name)
     if room is not None and (room.outline or zone.polygon or may_wait):
         return replace(zone, room=room.id)
