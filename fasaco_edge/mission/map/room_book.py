@@ -295,10 +295,15 @@ class RoomBook:
             del self.sheet.rooms[room]
             self.version += 1
 
+    @property
+    def numbers_left(self) -> int:
+        """How many rooms may come to the sheet in use."""
+        there = MOST_ROOMS if self.sheet is None else len(self.sheet.rooms)
+        return min(MOST_ROOMS - there, MOST_NUMBER + 1 - self.next_id)
+
     def new_id(self) -> int:
         """Return a number that no room ever had; 0 if there are too many rooms."""
-        sheet = self.sheet
-        if sheet is None or len(sheet.rooms) >= MOST_ROOMS or self.next_id > MOST_NUMBER:
+        if self.numbers_left < 1:
             return 0
         self.next_id += 1
         return self.next_id - 1
@@ -306,6 +311,11 @@ class RoomBook:
     def pass_over(self, number: int) -> None:
         """Give no room a number up to this one: a room that is not known any more had it."""
         self.next_id = max(self.next_id, number + 1)
+        self.version += 1
+
+    def forget(self, sheet: RoomSheet) -> None:
+        """Drop a sheet: another one turns out to be that of its building."""
+        self.sheets.remove(sheet)
         self.version += 1
 
     def turn_to(self, sheet: RoomSheet) -> None:

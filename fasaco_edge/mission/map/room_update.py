@@ -73,13 +73,20 @@ def _widen(sheet: RoomSheet, factor: int) -> None:
 
 def _sheet_for(book: RoomBook, found: FoundRooms, frame: str) -> RoomSheet:
     """Return the sheet of the building that a map shows, perhaps a new one."""
-    in_use = book.sheet
-    if in_use is not None and in_use.frame == frame:
+    in_use = book.sheet if book.frame == frame else None
+    if in_use is not None and in_use.is_named:
         return in_use
-    alike = [(_alike(sheet, found), sheet) for sheet in book.sheets if sheet.frame == frame]
+    # A first look may have seen a corner: as long as nobody misses the rooms in use, others may
+    # turn out to be those of the building.
+    others = [each for each in book.sheets if each.frame == frame and each is not in_use]
+    alike = [(_alike(each, found), each) for each in others if each.is_named or in_use is None]
     share, best = max(alike, key=lambda each: each[0], default=(0.0, None))
     if best is not None and share >= ALIKE:
+        if in_use is not None:
+            book.forget(in_use)
         return best
+    if in_use is not None:
+        return in_use
     return RoomSheet.empty(frame, max(found.geometry.resolution, LEAST_SQUARE_M))
 
 
