@@ -277,6 +277,8 @@ def test_no_map_gives_a_part_of_merged_rooms_to_another():
         (lambda book: book.name("attic", "x"), "no room 'attic'; there are"),
         (lambda book: book.name(2, "kitchen"), "is 'kitchen' already"),
         (lambda book: book.name(2, "room 9"), "how a room without a name is called"),
+        (lambda book: book.name(2, "1"), "how a room without a name is called"),
+        (lambda book: book.name(2, "room 123456"), "how a room without a name is called"),
         (lambda book: book.name(2, " x"), "printable characters"),
         (lambda book: split(book, 1, ((9.0, 9.0), (9.5, 9.0))), "does not divide"),
         (lambda book: split(book, 1, ((0.0, 4.5), (1.0, 4.5))), "does not divide"),

@@ -28,6 +28,8 @@ MOST_ROOMS, MOST_CUTS, MOST_NUMBER = 250, 100, 65_000
 MOST_SHEETS = 8
 
 BY_NUMBER = re.compile(r"room (\d{1,5})")
+# Names that read as a number, which would be taken for that of a room.
+LIKE_NUMBER = re.compile(r"(room )?\d+")
 
 
 @dataclass(frozen=True, slots=True)
@@ -255,10 +257,10 @@ class RoomBook:
             OrderError: it is no name, or that of another room.
         """
         check_name(where, name)
-        if BY_NUMBER.fullmatch(name):
+        if LIKE_NUMBER.fullmatch(name):
             raise OrderError(
                 f"{where}: {name!r} is how a room without a name is called",
-                hint="choose a name without a number after `room`",
+                hint="choose a name that is more than a number",
             )
         taken = self.find(name)
         if taken is not None and taken.id not in of:
