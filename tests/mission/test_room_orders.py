@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from dataclasses import replace
 
 import pytest
@@ -17,6 +18,7 @@ from fasaco_edge.mission.core.events import MapReceived, PoseReceived, State
 from fasaco_edge.mission.map import room_watch
 from fasaco_edge.mission.map.inputs import PATIENCE_S
 from fasaco_edge.mission.map.room_watch import PERIOD_S
+from fasaco_edge.mission.orders import sequencer
 from fasaco_edge.mission.orders.order import (
     Command,
     StandingZone,
@@ -209,7 +211,7 @@ def test_settings_of_a_room_are_used_where_the_order_says_nothing():
     assert drive.mission.rooms.room(number).settings.passes == 2
 
 
-def test_an_order_for_everything_leaves_a_skipped_room_out_and_says_so():
+def test_an_order_for_everything_leaves_a_skipped_room_out_and_says_so(monkeypatch):
     drive = settled(*BOTH)
     name(drive, room_at(drive, *IN_EAST).id, "bath")
     drive.command("room_set", room=RoomRequest("bath", skip=True))
@@ -218,6 +220,11 @@ def test_an_order_for_everything_leaves_a_skipped_room_out_and_says_so():
     assert not visited(drive, range(13, 21))
     assert len(visited(drive, WEST_COLUMNS)) == 90
     assert drive.mission.reason.endswith("; left out: 'bath'")
+    # Of many rooms it names as many as can be read.
+    monkeypatch.setattr(sequencer, "MOST_LISTED", 3)
+    drive.command("start")
+    drive.finish()
+    assert drive.mission.reason.endswith("; left out: 'ba")
     # By its name it is swept all the same.
     start(drive, "bath")
     drive.finish()
@@ -291,6 +298,17 @@ def test_a_ring_of_corridors_does_not_contain_the_room_within(deg):
     asked = in_zones(drive.mission.order_state.order.zones, lattice.window, lattice.cell_m)
     assert all(asked[lattice.local(cell)] for cell in within)
     assert not asked[lattice.local((1, 1))]
+
+
+def test_an_area_that_was_not_reached_is_without_the_room_within():
+    closed = (*RING[:12], RING[7], RING[7], *RING[14:])
+    drive = Drive((9, 9), MapReceived(building(*closed)), pose_at(9, 9), order_state=WAITS)
+    settle(drive)
+    (ring,) = (room for room in drive.mission.rooms.rooms if room.encloses)
+    start(drive, ring.title)
+    drive.finish()
+    said = re.search(r"not reached: 'room \d' \(([\d.]+) m2\)", drive.mission.reason)
+    assert float(said[1]) == pytest.approx(ring.area_m2, abs=1.0)
 
 
 def rotated(rows, deg):

@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 
 # Limits of one sheet; a number needs 16 bits.
 MOST_ROOMS, MOST_CUTS, MOST_NUMBER = 250, 100, 65_000
+# Titles of rooms in a text are cut after so many characters.
+MOST_LISTED = 400
 # Sheets that are kept: floors and buildings.
 MOST_SHEETS = 8
 
@@ -233,7 +235,7 @@ class RoomBook:
     def listed(self) -> str:
         """Return which rooms there are, as text."""
         titles = ", ".join(repr(room.name) if room.name else room.title for room in self.rooms)
-        return f"there are {titles:.400}" if titles else "no room is known yet"
+        return f"there are {titles:.{MOST_LISTED}}" if titles else "no room is known yet"
 
     def name(self, called: str | int, name: str) -> None:
         """Give a room a name.
