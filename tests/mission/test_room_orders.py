@@ -240,6 +240,8 @@ def test_an_order_for_everything_leaves_a_skipped_room_out_and_says_so(monkeypat
         ({"name": "bay", "room": 99}, "zones[0].room: there is no room 99"),
         ({"name": "x", "room": 99, "polygon": rectangle(0, 0, 4, 4)}, "zones[0].room: there is no"),
         ({"name": "room 99"}, "zones[0].name: no zone 'room 99'"),
+        ({"name": "room 123456"}, "zones[0].name: no zone 'room 123456'"),
+        ({"name": "99"}, "zones[0].name: no zone '99'"),
     ],
 )
 @pytest.mark.parametrize("unknown", ["refuse", "wait"])

@@ -11,7 +11,7 @@ from dataclasses import replace
 from fasaco_edge.errors import OrderError
 from fasaco_edge.grid.geometry import Polygon
 from fasaco_edge.grid.rotation import rotated_polygon
-from fasaco_edge.mission.map.room_book import BY_NUMBER, Room, RoomBook
+from fasaco_edge.mission.map.room_book import LIKE_NUMBER, Room, RoomBook
 from fasaco_edge.mission.orders.order import LeftOut, MissionOrder, StandingZone, Zone
 
 
@@ -49,7 +49,7 @@ def _looked_up(
     room = book.find(zone.room or zone.name)
     if room is not None and (room.outline or zone.polygon or may_wait):
         return replace(zone, room=room.id)
-    is_by_number = zone.room or BY_NUMBER.fullmatch(zone.name)
+    is_by_number = zone.room or LIKE_NUMBER.fullmatch(zone.name)
     if room is None and may_wait and not is_by_number:
         return zone
     if zone.room:
