@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import errno
 import json
 import os
 import zlib
@@ -11,6 +12,7 @@ import numpy as np
 import pytest
 
 from fasaco_edge.config.config import DaemonConfig
+from fasaco_edge.daemon.ledger import rooms_file
 from fasaco_edge.daemon.ledger.rooms_codec import BookSnapshot, decode_rooms, encode_rooms
 from fasaco_edge.daemon.ledger.rooms_file import PERIOD_S, RoomsFile, RoomsKeeper
 from fasaco_edge.daemon.ledger.writer import LedgerKeeper, LedgerWriter
@@ -111,12 +113,18 @@ WRONG = [
     (document(more=1), "unknown field"),
     (document(square_m=0.0), "square_m"),
     (document(rooms=[ROOM, ROOM | {"id": 1}]), "one number"),
+    ({"version": 1, "next_id": 2, "sheets": [SHEET, SHEET | {"frame": "up"}]}, "one number"),
     (document(rooms=[]), "numbers of no room"),
     (document(rooms=[ROOM | {"name": " a"}]), "printable"),
     (document(rooms=[ROOM | {"name": "room 3"}]), "is no name"),
+    (document(rooms=[ROOM | {"name": "2"}]), "is no name"),
     (document(rooms=[ROOM | {"id": 70_000}]), "id"),
     (document(rooms=[ROOM | {"passes": ["rest"]}]), "rest goes after"),
     (document(rooms=[ROOM | {"outline": [[0, 0], [1, 0]]}]), "three corners"),
+    (
+        document(squares=raster([0, 0]), rooms=[ROOM | {"outline": [[0, 0], [1, 0], [1, 1]]}]),
+        "no squares",
+    ),
     (document(rooms=[ROOM | {"outline": [[0, 0], [1, 0], [1e300, 0]]}]), "outline"),
     (document(cuts=[[[0, 0]]]), "cuts"),
     (document(squares=raster([1])), "need 4 bytes"),
@@ -195,6 +203,36 @@ def test_a_broken_file_is_set_aside_and_everything_goes_on(tmp_path):
     assert keeper.book.rooms == ()
     (name,) = kept(tmp_path)
     assert (tmp_path / name).read_bytes() == b"{"
+
+
+def test_a_file_that_could_not_be_set_aside_is_not_overwritten(tmp_path, monkeypatch):
+    (tmp_path / "robot.rooms.json").write_bytes(b"{")
+    with monkeypatch.context() as patched:
+        patched.setattr(rooms_file, "move_aside", read_only)
+        keeper = RoomsKeeper(RoomsFile(tmp_path, "robot"))
+    (fault,) = keeper.take_faults()
+    assert str(fault).endswith("; Read-only file system")
+    for _ in range(HOLD_CHANGE):
+        update(keeper.book, found(), "map")
+    keeper.close(5.0)
+    aside, name = sorted(kept(tmp_path), key=len, reverse=True)
+    assert (tmp_path / aside).read_bytes() == b"{"
+    assert decode_rooms((tmp_path / name).read_bytes()).rooms == keeper.book.rooms
+
+
+def read_only(*_):
+    raise OSError(errno.EROFS, os.strerror(errno.EROFS))
+
+
+def test_a_file_that_appears_after_the_start_is_not_overwritten(tmp_path):
+    """On a disk that is mounted late."""
+    keeper = RoomsKeeper(RoomsFile(tmp_path, "robot"))
+    (tmp_path / "robot.rooms.json").write_bytes(written(full()))
+    for _ in range(HOLD_CHANGE):
+        update(keeper.book, found(), "map")
+    keeper.close(5.0)
+    (aside,) = (name for name in kept(tmp_path) if ".unread-" in name)
+    assert decode_rooms((tmp_path / aside).read_bytes()).room("küche")
 
 
 def test_a_disk_that_fails_is_reported_once_and_tried_again(tmp_path):

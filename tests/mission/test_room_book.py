@@ -12,6 +12,7 @@ from fasaco_edge.errors import OrderError
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D
 from fasaco_edge.grid.polygons import area_m2, polygon_flaw
 from fasaco_edge.grid.rooms import FoundRooms
+from fasaco_edge.mission.map import room_book
 from fasaco_edge.mission.map.loop_closure import Motion
 from fasaco_edge.mission.map.room_book import RoomBook, RoomSettings
 from fasaco_edge.mission.map.room_edits import merge, move, split
@@ -276,6 +277,8 @@ def test_no_map_gives_a_part_of_merged_rooms_to_another():
         (lambda book: book.name("attic", "x"), "no room 'attic'; there are"),
         (lambda book: book.name(2, "kitchen"), "is 'kitchen' already"),
         (lambda book: book.name(2, "room 9"), "how a room without a name is called"),
+        (lambda book: book.name(2, "1"), "how a room without a name is called"),
+        (lambda book: book.name(2, "room 123456"), "how a room without a name is called"),
         (lambda book: book.name(2, " x"), "printable characters"),
         (lambda book: split(book, 1, ((9.0, 9.0), (9.5, 9.0))), "does not divide"),
         (lambda book: split(book, 1, ((0.0, 4.5), (1.0, 4.5))), "does not divide"),
@@ -310,6 +313,37 @@ def test_another_building_gets_a_sheet_of_its_own_and_the_first_one_comes_back()
     assert min(room.id for room in book.rooms) == 7
 
 
+def test_a_building_seen_again_from_a_corner_gets_its_names_back():
+    book = known(FLAT)
+    book.name(at(book, *KITCHEN), "kitchen")
+    number = book.room("kitchen").id
+    book.leave_building()
+    shown(book, regions("aabb", "aabb", "ccbb", "ccbb", at=(0.5, 0.5)), HOLD_CHANGE)
+    book.name(min(room.id for room in book.rooms), "garage")
+    book.leave_building()
+    shown(book, regions("bb", "bb"), HOLD_CHANGE)
+    assert book.find("kitchen") is None
+    assert len(book.sheets) == 3
+    version = book.version
+    shown(book, FLAT)
+    assert book.version > version
+    assert book.room("kitchen").id == number == at(book, *KITCHEN)
+    assert [each.is_named for each in book.sheets] == [True, True]
+    # A building whose rooms have names is not left again.
+    shown(book, regions("aabb", "aabb", "ccbb", "ccbb", at=(0.5, 0.5)), HOLD_CHANGE)
+    assert book.find("garage") is None
+
+
+def test_a_split_for_which_there_are_too_many_rooms_changes_nothing(monkeypatch):
+    book = known(regions("aaaaaaaaa", "aa..a..aa"))
+    monkeypatch.setattr(room_book, "MOST_ROOMS", 2)
+    before, next_id = book.rooms, book.next_id
+    # Three parts: below the cut lie two more.
+    with pytest.raises(OrderError, match="too many rooms"):
+        split(book, 1, ((-0.5, 1.0), (9.5, 1.0)))
+    assert (book.rooms, book.next_id) == (before, next_id)
+
+
 def test_a_large_building_gets_wider_squares_and_keeps_its_rooms():
     book = known(FLAT)
     book.name(at(book, *KITCHEN), "kitchen")
@@ -324,6 +358,17 @@ def test_a_large_building_gets_wider_squares_and_keeps_its_rooms():
     shown(book, coarse)
     assert book.sheet.raster.square_m == pytest.approx(1.0)
     assert at(book, *KITCHEN) == book.room("kitchen").id
+
+
+def test_a_room_whose_squares_are_lost_has_no_outline():
+    """As in wider squares; a ring has to know what lies within it, which no square of it does."""
+    book = known(regions("aaaaa", "abbba", "abbba", "aaaaa"))
+    closet = at(book, 2.5, 2.0)
+    book.name(closet, "closet")
+    ids = book.sheet.raster.ids
+    book.sheet.lay(replace(book.sheet.raster, ids=np.where(ids == closet, 0, ids)))
+    shown(book, regions("aaaaaaa", "a...aaa", "a...aaa", "aaaaaaa"), HOLD_CHANGE)
+    assert (book.room("closet").outline, book.room("closet").area_m2) == ((), 0.0)
 
 
 def test_a_room_within_another_one_is_no_part_of_it():

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from dataclasses import replace
 
 import pytest
@@ -17,6 +18,7 @@ from fasaco_edge.mission.core.events import MapReceived, PoseReceived, State
 from fasaco_edge.mission.map import room_watch
 from fasaco_edge.mission.map.inputs import PATIENCE_S
 from fasaco_edge.mission.map.room_watch import PERIOD_S
+from fasaco_edge.mission.orders import sequencer
 from fasaco_edge.mission.orders.order import (
     Command,
     StandingZone,
@@ -209,7 +211,7 @@ def test_settings_of_a_room_are_used_where_the_order_says_nothing():
     assert drive.mission.rooms.room(number).settings.passes == 2
 
 
-def test_an_order_for_everything_leaves_a_skipped_room_out_and_says_so():
+def test_an_order_for_everything_leaves_a_skipped_room_out_and_says_so(monkeypatch):
     drive = settled(*BOTH)
     name(drive, room_at(drive, *IN_EAST).id, "bath")
     drive.command("room_set", room=RoomRequest("bath", skip=True))
@@ -218,6 +220,11 @@ def test_an_order_for_everything_leaves_a_skipped_room_out_and_says_so():
     assert not visited(drive, range(13, 21))
     assert len(visited(drive, WEST_COLUMNS)) == 90
     assert drive.mission.reason.endswith("; left out: 'bath'")
+    # Of many rooms it names as many as can be read.
+    monkeypatch.setattr(sequencer, "MOST_LISTED", 3)
+    drive.command("start")
+    drive.finish()
+    assert drive.mission.reason.endswith("; left out: 'ba")
     # By its name it is swept all the same.
     start(drive, "bath")
     drive.finish()
@@ -225,6 +232,39 @@ def test_an_order_for_everything_leaves_a_skipped_room_out_and_says_so():
     drive.command("room_set", room=RoomRequest("bath", skip=False))
     drive.command("start")
     assert drive.mission.order_state.order.zones[0].without == ()
+
+
+@pytest.mark.parametrize(
+    ("zone", "where"),
+    [
+        ({"name": "bay", "room": 99}, "zones[0].room: there is no room 99"),
+        ({"name": "x", "room": 99, "polygon": rectangle(0, 0, 4, 4)}, "zones[0].room: there is no"),
+        ({"name": "room 99"}, "zones[0].name: no zone 'room 99'"),
+        ({"name": "room 123456"}, "zones[0].name: no zone 'room 123456'"),
+        ({"name": "99"}, "zones[0].name: no zone '99'"),
+    ],
+)
+@pytest.mark.parametrize("unknown", ["refuse", "wait"])
+def test_a_number_that_no_room_has_is_refused_even_by_an_order_that_waits(zone, where, unknown):
+    """Whatever room gets the number next would be swept."""
+    bay = StandingZone(name="bay", polygon=[tuple(at) for at in rectangle(0, 0, 4, 4)])
+    drive = settled(*BOTH, config=with_policy(CONFIG, zones=(bay,)))
+    drive.command("start", {"zones": [zone], "unknown": unknown})
+    assert where in str(drive.refused)
+    assert drive.mission.state is State.IDLE
+
+
+def test_an_order_does_not_follow_a_room_that_gets_a_lost_number():
+    """After a power cut the rooms' file may be older than the order, or broken."""
+    drive = settled(*BOTH)
+    start(drive, f"room {room_at(drive, *IN_EAST).id}")
+    kept = OrderState.from_json(drive.mission.order_state.to_json())
+    (before,) = kept.order.zones
+    again = Drive(IN_WEST, MapReceived(building(*BOTH)), pose_at(*IN_WEST), order_state=kept)
+    settle(again)
+    (zone,) = again.mission.order_state.order.as_given.zones
+    assert (zone.room, zone.polygon) == (0, before.polygon)
+    assert min(room.id for room in again.mission.rooms.rooms) > before.room
 
 
 # A room of 12 x 12 cells, with a door in its eastern wall, within corridors 6 cells wide.
@@ -260,6 +300,17 @@ def test_a_ring_of_corridors_does_not_contain_the_room_within(deg):
     asked = in_zones(drive.mission.order_state.order.zones, lattice.window, lattice.cell_m)
     assert all(asked[lattice.local(cell)] for cell in within)
     assert not asked[lattice.local((1, 1))]
+
+
+def test_an_area_that_was_not_reached_is_without_the_room_within():
+    closed = (*RING[:12], RING[7], RING[7], *RING[14:])
+    drive = Drive((9, 9), MapReceived(building(*closed)), pose_at(9, 9), order_state=WAITS)
+    settle(drive)
+    (ring,) = (room for room in drive.mission.rooms.rooms if room.encloses)
+    start(drive, ring.title)
+    drive.finish()
+    said = re.search(r"not reached: 'room \d' \(([\d.]+) m2\)", drive.mission.reason)
+    assert float(said[1]) == pytest.approx(ring.area_m2, abs=1.0)
 
 
 def rotated(rows, deg):
@@ -366,6 +417,22 @@ def test_rooms_of_another_frame_are_not_known_on_this_map():
 def settle_in(drive, frame):
     for _ in range(LOOKS):
         drive.tell(pose_at(*drive.cell, frame=frame), after=1.01 * PERIOD_S)
+
+
+def test_a_look_that_fails_is_a_fault_and_the_robot_sweeps_on(monkeypatch):
+    def fail(*_):
+        raise IndexError("index 0 is out of bounds")
+
+    monkeypatch.setattr(room_watch, "find_rooms", fail)
+    drive = Drive(IN_WEST, MapReceived(building(*BOTH)), pose_at(*IN_WEST))
+    faults = []
+    for _ in range(3):
+        decision = drive.tell(MapReceived(building(*BOTH)), pose_at(*IN_WEST), after=PERIOD_S)
+        faults += decision.faults
+    assert {str(fault) for fault in faults} == {
+        "rooms of this map were not published: IndexError: index 0 is out of bounds"
+    }
+    drive.finish()
 
 
 def test_a_map_is_looked_at_once_however_often_it_comes(monkeypatch):

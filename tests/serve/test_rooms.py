@@ -127,6 +127,9 @@ def test_rooms_are_named_set_ordered_merged_and_split_by_finger(tmp_path):
         tap(tab, 1.05, 2.5)
         tab.click("chooseroom")
         assert tab.js("find('roomsnow').textContent") == "Sweep bath, then kitchen"
+        # By number: a standing zone of that name would come first.
+        by_number = "order().zones.every((zone) => roomOf(zone.room).name === zone.name)"
+        assert tab.js(f"chosen.size === 2 && {by_number}")
         tab.click("roomsnow")
         mission = outsider.wait_status(lambda s: s["mission"]["zones"])["mission"]
         assert [(z["name"], z["passes"]) for z in mission["zones"]] == [("bath", 2), ("kitchen", 1)]

@@ -25,7 +25,7 @@ from fasaco_edge.grid.geometry import (
     Window,
 )
 from fasaco_edge.mission.map.room_book import (
-    BY_NUMBER,
+    LIKE_NUMBER,
     MOST_CUTS,
     MOST_NUMBER,
     MOST_ROOMS,
@@ -176,6 +176,9 @@ def decode_rooms(payload: bytes) -> RoomBook:
     """
     try:
         note = msgspec.json.decode(payload, type=BookNote)
+        numbers = [room.id for each in note.sheets for room in each.rooms]
+        if len(set(numbers)) < len(numbers):
+            raise ValueError("two rooms have one number")
         return RoomBook([_sheet(each, note.next_id) for each in note.sheets], note.next_id)
     except (msgspec.DecodeError, UnicodeError, OrderError, ValueError, zlib.error) as error:
         raise RoomsFileError(f"no file of rooms: {error}") from error
@@ -186,13 +189,16 @@ def decode_rooms(payload: bytes) -> RoomBook:
 def _sheet(note: SheetNote, next_id: int) -> RoomSheet:
     rooms = {room.id: _room(room) for room in note.rooms}
     names = [room.name for room in rooms.values() if room.name]
-    if len(rooms) < len(note.rooms) or len(set(names)) < len(names):
-        raise ValueError("two rooms have one number, or one name")
+    if len(set(names)) < len(names):
+        raise ValueError("two rooms have one name")
     if max(rooms, default=0) >= next_id:
         raise ValueError("the next number is taken")
     raster, gone = (_raster(each, note.square_m) for each in (note.squares, note.gone))
-    if not _numbers(raster) <= rooms.keys():
+    there = _numbers(raster)
+    if not there <= rooms.keys():
         raise ValueError("squares have numbers of no room")
+    if any(room.outline and room.id not in there for room in rooms.values()):
+        raise ValueError("a room has an outline, and no squares")
     if max(_numbers(gone), default=0) >= next_id:
         raise ValueError("squares have numbers that are still to come")
     nothing = RoomRaster.empty(note.square_m)
@@ -206,7 +212,7 @@ def _numbers(raster: RoomRaster) -> set[int]:
 def _room(note: RoomNote) -> Room:
     if note.name is not None:
         check_name("name", note.name)
-        if BY_NUMBER.fullmatch(note.name):
+        if LIKE_NUMBER.fullmatch(note.name):
             raise ValueError(f"{note.name!r} is no name")
     if len(note.outline) in (1, 2):
         raise ValueError("an outline has three corners or more")

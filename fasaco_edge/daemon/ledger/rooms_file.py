@@ -43,6 +43,8 @@ class RoomsFile:
     def __init__(self, folder: Path, robot: str) -> None:
         self.path = folder / f"{robot}.rooms.json"
         self._new = folder / f"{robot}.rooms.json.new"
+        # Why a file that was not read is set aside before the first write; "" for no such file.
+        self._unwanted = ""
 
     def load(self) -> tuple[bytes, RoomBook, RoomsFileError | None]:
         """Return the file's bytes, the rooms in it, and the fault, if any; b"" without a file."""
@@ -50,11 +52,13 @@ class RoomsFile:
             payload = read_own(self.path, MOST_BYTES)
             return payload, decode_rooms(payload), None
         except (FileNotFoundError, NotADirectoryError):
+            # One that appears later, on a disk mounted late, is not overwritten.
+            self._unwanted = "unread"
             return b"", RoomBook(), None
         except (OSError, RoomsFileError) as error:
-            why = reason_of(error)
+            self._unwanted, why = "broken", reason_of(error)
         try:
-            kept = f"kept as {move_aside(self.path, 'broken')}"
+            kept = f"kept as {self._set_aside()}"
         except OSError as error:
             kept = reason_of(error)
         return b"", RoomBook(), RoomsFileError(f"cannot read {self.path}: {why}; {kept}")
@@ -66,6 +70,10 @@ class RoomsFile:
             OSError: the write failed; the file before is intact.
         """
         make_folder(self.path.parent)
+        if self._unwanted and os.path.lexists(self.path):
+            kept = self._set_aside()
+            LOG.warning("the file of rooms before is kept as %s", kept)
+        self._unwanted = ""
         try:
             write_through(self._new, payload)
         except OSError:
@@ -74,6 +82,14 @@ class RoomsFile:
             raise
         os.replace(self._new, self.path)
         sync_folder(self.path.parent)
+
+    def _set_aside(self) -> str:
+        """Rename the file that must not be overwritten; return its new name."""
+        name = move_aside(self.path, self._unwanted)
+        self._unwanted = ""
+        # Otherwise it may have its old name after a power failure.
+        sync_folder(self.path.parent)
+        return name
 
 
 class RoomsKeeper:

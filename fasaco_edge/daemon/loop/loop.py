@@ -140,7 +140,9 @@ class Loop:
         self._log_cycle(TurnNote(now, batch, commands, decision))
         self._bus.outbox.commands(commands, decision.answers)
         self._keeper.keep(self._runner.mission, now)
-        self._rooms.keep(now, at_once=any(asked.room is not None for asked in commands))
+        # An order may hold numbers of rooms, which must not be lost while the ledger has them.
+        at_once = any(asked.room is not None or asked.command == "start" for asked in commands)
+        self._rooms.keep(now, at_once=at_once)
         self._guard.attempt("status", partial(self._publish_status, now))
         if not self._status.yield_reason:
             mission = self._runner.mission

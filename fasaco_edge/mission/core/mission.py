@@ -6,13 +6,14 @@ file, so a mission can be tested and repeated with plain values.
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.errors import LedgerMismatchError
+from fasaco_edge.errors import LedgerMismatchError, NotPublished
 from fasaco_edge.grid.geometry import StampedPose
 from fasaco_edge.grid.lattice import Cell, CoverageLattice
 from fasaco_edge.grid.occupancy import OccupancyGrid
@@ -63,10 +64,15 @@ from fasaco_edge.mission.map.room_book import RoomBook
 from fasaco_edge.mission.map.room_watch import RoomWatch
 from fasaco_edge.mission.orders.mask import mask_frame
 from fasaco_edge.mission.orders.order_state import OrderState
+from fasaco_edge.mission.orders.placing import restored
 from fasaco_edge.mission.orders.sequencer import Sequencer
 from fasaco_edge.planners.living_trail import LivingTrail
 
 __all__ = ["Mission", "MissionConfig"]
+
+LOG = logging.getLogger(__name__)
+
+ROOMS_STAY = "the robot goes on with the rooms it knows; report it with the log"
 
 
 class Mission:
@@ -154,8 +160,11 @@ class Mission:
         self._map.frames.activate(before.frame)
 
     def restore_order(self, order: OrderState) -> None:
-        """Continue an order from before a restart; to be called before the first step."""
+        """Continue an order from before a restart; to be called before the first step, and after
+        ``restore_rooms``."""
         self._map.places.resume(order.places)
+        if order.order is not None:
+            order = replace(order, order=restored(order.order, self._rooms.book))
         self._changes.begin(self._rotation.order(order, self._rotated_by_deg))
         self.state, self.reason = self._executive.status()
 
@@ -202,7 +211,7 @@ class Mission:
         events = list(events)
         begun = self._make_room(events, now)
         happened = self._along_lanes(self._handle(events, now), now)
-        self._look_for_rooms(happened, now)
+        happened = self._look_for_rooms(happened, now)
         decided = self._executive.decide(now)
         self.state, self.reason = self._executive.status()
         stop = self.route.stop(self.reason, now) if self.state.is_at_rest else None
@@ -216,13 +225,21 @@ class Mission:
         plan = decided.plan and self._trail.posed(decided.plan)
         return replace(happened, plan=plan, path=path)
 
-    def _look_for_rooms(self, happened: Decision, now: float) -> None:
-        """Look for rooms if that is due; let the order follow them."""
+    def _look_for_rooms(self, happened: Decision, now: float) -> Decision:
+        """Look for rooms if that is due, and let the order follow them; return the decision, with
+        the fault if that fails: the robot sweeps on without."""
         if any(isinstance(fault, LedgerMismatchError) for fault in happened.faults):
             self._rooms.leave_building()
-        if self.grid is not None and not self.is_in_doubt:
-            self._rooms.look(self.grid, now)
+        try:
+            if self.grid is not None and not self.is_in_doubt:
+                self._rooms.look(self.grid, now)
+        except Exception as error:
+            LOG.exception("rooms", extra={"event": "rooms_broke"})
+            why = f"{type(error).__name__}: {error}"
+            fault = NotPublished(f"rooms of this map were not published: {why}", hint=ROOMS_STAY)
+            happened = replace(happened, faults=(*happened.faults, fault))
         self._changes.follow_rooms()
+        return happened
 
     def _handle(self, events: Iterable[Event], now: float) -> Decision:
         return self._handler.handle(map(self._rotation.event, events), now)

@@ -24,10 +24,14 @@ if TYPE_CHECKING:
 
 # Limits of one sheet; a number needs 16 bits.
 MOST_ROOMS, MOST_CUTS, MOST_NUMBER = 250, 100, 65_000
+# Titles of rooms in a text are cut after so many characters.
+MOST_LISTED = 400
 # Sheets that are kept: floors and buildings.
 MOST_SHEETS = 8
 
 BY_NUMBER = re.compile(r"room (\d{1,5})")
+# Names that read as a number, which would be taken for that of a room.
+LIKE_NUMBER = re.compile(r"(room )?\d+")
 
 
 @dataclass(frozen=True, slots=True)
@@ -231,7 +235,7 @@ class RoomBook:
     def listed(self) -> str:
         """Return which rooms there are, as text."""
         titles = ", ".join(repr(room.name) if room.name else room.title for room in self.rooms)
-        return f"there are {titles:.400}" if titles else "no room is known yet"
+        return f"there are {titles:.{MOST_LISTED}}" if titles else "no room is known yet"
 
     def name(self, called: str | int, name: str) -> None:
         """Give a room a name.
@@ -255,10 +259,10 @@ class RoomBook:
             OrderError: it is no name, or that of another room.
         """
         check_name(where, name)
-        if BY_NUMBER.fullmatch(name):
+        if LIKE_NUMBER.fullmatch(name):
             raise OrderError(
                 f"{where}: {name!r} is how a room without a name is called",
-                hint="choose a name without a number after `room`",
+                hint="choose a name that is more than a number",
             )
         taken = self.find(name)
         if taken is not None and taken.id not in of:
@@ -295,13 +299,28 @@ class RoomBook:
             del self.sheet.rooms[room]
             self.version += 1
 
+    @property
+    def numbers_left(self) -> int:
+        """How many rooms may come to the sheet in use."""
+        there = MOST_ROOMS if self.sheet is None else len(self.sheet.rooms)
+        return min(MOST_ROOMS - there, MOST_NUMBER + 1 - self.next_id)
+
     def new_id(self) -> int:
         """Return a number that no room ever had; 0 if there are too many rooms."""
-        sheet = self.sheet
-        if sheet is None or len(sheet.rooms) >= MOST_ROOMS or self.next_id > MOST_NUMBER:
+        if self.numbers_left < 1:
             return 0
         self.next_id += 1
         return self.next_id - 1
+
+    def pass_over(self, number: int) -> None:
+        """Give no room a number up to this one: a room that is not known any more had it."""
+        self.next_id = max(self.next_id, number + 1)
+        self.version += 1
+
+    def forget(self, sheet: RoomSheet) -> None:
+        """Drop a sheet: another one turns out to be that of its building."""
+        self.sheets.remove(sheet)
+        self.version += 1
 
     def turn_to(self, sheet: RoomSheet) -> None:
         """Use a sheet, new or not; of too many the one used longest ago is dropped, first of those

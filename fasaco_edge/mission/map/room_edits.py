@@ -44,13 +44,12 @@ def split(book: RoomBook, called: str | int, cut: Cut) -> None:
             f"room.cut: does not divide {room.title!r} into parts of {LEAST_M2:g} m2 or more",
             hint="draw it from wall to wall, across the whole room",
         )
+    if book.numbers_left < len(parts) - 1:
+        raise OrderError("room.cut: there are too many rooms", hint="merge some first")
     parts.sort(key=lambda number: (-areas.cells[number - 1], number))
     ids = np.zeros(mask.shape, np.uint16)
-    numbers = [room.id]
-    for _ in parts[1:]:
-        if not (number := book.new_id()):
-            raise OrderError("room.cut: there are too many rooms", hint="merge some first")
-        numbers.append(number)
+    numbers = [room.id, *(book.new_id() for _ in parts[1:])]
+    for number in numbers[1:]:
         book.put(Room(number, is_by_hand=True, settings=room.settings))
     for part, number in zip(parts, numbers, strict=True):
         ids[areas.labels == part] = number

@@ -73,13 +73,20 @@ def _widen(sheet: RoomSheet, factor: int) -> None:
 
 def _sheet_for(book: RoomBook, found: FoundRooms, frame: str) -> RoomSheet:
     """Return the sheet of the building that a map shows, perhaps a new one."""
-    in_use = book.sheet
-    if in_use is not None and in_use.frame == frame:
+    in_use = book.sheet if book.frame == frame else None
+    if in_use is not None and in_use.is_named:
         return in_use
-    alike = [(_alike(sheet, found), sheet) for sheet in book.sheets if sheet.frame == frame]
+    # A first look may have seen a corner: as long as nobody misses the rooms in use, others may
+    # turn out to be those of the building.
+    others = [each for each in book.sheets if each.frame == frame and each is not in_use]
+    alike = [(_alike(each, found), each) for each in others if each.is_named or in_use is None]
     share, best = max(alike, key=lambda each: each[0], default=(0.0, None))
     if best is not None and share >= ALIKE:
+        if in_use is not None:
+            book.forget(in_use)
         return best
+    if in_use is not None:
+        return in_use
     return RoomSheet.empty(frame, max(found.geometry.resolution, LEAST_SQUARE_M))
 
 
@@ -100,6 +107,7 @@ def _alike(sheet: RoomSheet, found: FoundRooms) -> float:
 def _stale(sheet: RoomSheet, before: Ids) -> list[int]:
     """Return the rooms of which so many squares have changed that their outlines are outdated."""
     after = sheet.raster.ids
+    squares = np.bincount(after.ravel(), minlength=MOST_NUMBER + 1)
     other = before != after
     changed = np.bincount(np.concatenate((before[other], after[other])), minlength=1)
     for room in np.flatnonzero(changed).tolist():
@@ -108,7 +116,7 @@ def _stale(sheet: RoomSheet, before: Ids) -> list[int]:
     return [
         number
         for number, room in sheet.rooms.items()
-        if sheet.stale.get(number, 0) >= least or not room.outline
+        if sheet.stale.get(number, 0) >= least or bool(room.outline) != bool(squares[number])
     ]
 
 

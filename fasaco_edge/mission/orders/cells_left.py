@@ -19,7 +19,7 @@ from fasaco_edge.mission.map.map_state import MapState
 from fasaco_edge.mission.map.reachable_area import ReachableArea
 from fasaco_edge.mission.orders.exploration import Exploration, frontier, is_in_reach
 from fasaco_edge.mission.orders.order import MissionOrder, Zone
-from fasaco_edge.mission.orders.zones import cells_inside, in_zones
+from fasaco_edge.mission.orders.zones import in_zones
 from fasaco_edge.planners.passes import Covers, edge_cells
 
 
@@ -198,12 +198,13 @@ def zones_beyond(
     for zone in order.zones:
         if not zone.polygon or is_in_reach(zone, area):
             continue
-        inside = cells_inside(zone.polygon, free.window, free.cell_m)
+        inside = in_zones((zone,), free.window, free.cell_m)
         visited = inside & (visits > 0)
         left = inside & ~visited & (free.states != BLOCKED)
         left_m2 = np.count_nonzero(left) * free.cell_m**2
         if _sticks_out(zone.polygon, free):
-            left_m2 += max(area_m2(zone.polygon) - np.count_nonzero(inside) * free.cell_m**2, 0.0)
+            all_m2 = area_m2(zone.polygon) - sum(map(area_m2, zone.holes))
+            left_m2 += max(all_m2 - np.count_nonzero(inside) * free.cell_m**2, 0.0)
         if left_m2 or not visited.any():
             beyond.append(f"{zone.name!r} ({left_m2:.1f} m2)")
     return f"; not reached: {', '.join(beyond)}" if beyond else ""

@@ -145,7 +145,7 @@ class Command(NamedTuple):
         order: what to cover, for ``start``.
         keep_out: what to add or remove, for ``keep_out_add`` and ``keep_out_remove``.
         discard: whether ``start`` and ``reset`` may forget covered cells.
-        room: which room to change, and how, for the commands ``ROOM_COMMANDS``.
+        room: which room to change, and how, for the commands of rooms.
     """
 
     name: CommandName

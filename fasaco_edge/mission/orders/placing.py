@@ -11,7 +11,7 @@ from dataclasses import replace
 from fasaco_edge.errors import OrderError
 from fasaco_edge.grid.geometry import Polygon
 from fasaco_edge.grid.rotation import rotated_polygon
-from fasaco_edge.mission.map.room_book import Room, RoomBook
+from fasaco_edge.mission.map.room_book import LIKE_NUMBER, Room, RoomBook
 from fasaco_edge.mission.orders.order import LeftOut, MissionOrder, StandingZone, Zone
 
 
@@ -26,33 +26,55 @@ def located(
     """Return an order with its named zones in place: standing zones first, then rooms.
 
     Raises:
-        OrderError: there is no zone or room of that name, and the order does not wait for one.
+        OrderError: there is no zone or room of that name, and the order does not wait for one; or
+            no room of that number: none is awaited, as the next one to get it may be any.
     """
     known = {zone.name: tuple(zone.polygon) for zone in standing}
-    placed_order = placed(
-        replace(
-            order,
-            zones=tuple(
-                replace(zone, polygon=known[zone.name])
-                if zone.polygon == () and not zone.room and zone.name in known
-                else zone
-                for zone in order.zones
-            ),
-        ),
-        book,
+    may_wait = order.unknown == "wait"
+    zones = (
+        _looked_up(zone, index, known, book, may_wait=may_wait)
+        for index, zone in enumerate(order.zones)
     )
-    for index, zone in enumerate(order.zones):
-        name, is_unknown = zone.name, zone.polygon == () and zone.name not in known
-        if not is_unknown or order.unknown == "wait" or _room_of(zone, book) is not None:
-            continue
-        there = f"there are {', '.join(known)}" if known else "it has none"
+    return placed(replace(order, zones=tuple(zones)), book)
+
+
+def _looked_up(
+    zone: Zone, index: int, standing: dict[str, Polygon], book: RoomBook, *, may_wait: bool
+) -> Zone:
+    """Return a zone with its polygon or the number of its room; without both if it waits."""
+    if not zone.room and zone.polygon != ():
+        return zone
+    if not zone.room and zone.name in standing:
+        return replace(zone, polygon=standing[zone.name])
+    room = book.find(zone.room or zone.name)
+    if room is not None and (room.outline or zone.polygon or may_wait):
+        return replace(zone, room=room.id)
+    is_by_number = zone.room or LIKE_NUMBER.fullmatch(zone.name)
+    if room is None and may_wait and not is_by_number:
+        return zone
+    if zone.room:
         raise OrderError(
-            f"zones[{index}].name: no zone {name!r} in mission.zones of the daemon's "
-            f"configuration; {there}; nor a room: {book.listed()}",
-            hint="name one of those, or give the zone a polygon; with `unknown: wait` the order "
-            "waits for a room of that name",
+            f"zones[{index}].room: there is no room {zone.room} on the map; {book.listed()}",
+            hint="give the number of one of those, or none",
         )
-    return placed_order
+    there = f"there are {', '.join(standing)}" if standing else "it has none"
+    raise OrderError(
+        f"zones[{index}].name: no zone {zone.name!r} in mission.zones of the daemon's "
+        f"configuration; {there}; nor a room: {book.listed()}",
+        hint="name one of those, or give the zone a polygon; with `unknown: wait` the order "
+        "waits for a room of that name, but of no number",
+    )
+
+
+def restored(order: MissionOrder, book: RoomBook) -> MissionOrder:
+    """Return an order from before a restart without rooms that the book has lost: their zones keep
+    their polygons, and no other room gets their numbers."""
+    lost = {zone.room for zone in order.as_given.zones if zone.room >= book.next_id}
+    if not lost:
+        return order
+    book.pass_over(max(lost))
+    zones = (replace(zone, room=0) if zone.room in lost else zone for zone in order.as_given.zones)
+    return replace(order.as_given, zones=tuple(zones))
 
 
 def placed(order: MissionOrder, book: RoomBook, begun: int = -1) -> MissionOrder:

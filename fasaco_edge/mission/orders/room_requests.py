@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Annotated, Literal
+from typing import Annotated
 
 import msgspec
 from msgspec import Meta
@@ -19,7 +19,6 @@ from fasaco_edge.planners.passes import Pass
 MOST_MERGED = 50
 
 RoomNumber = Annotated[int, Meta(ge=1, le=65_000)]
-RoomCommand = Literal["room_name", "room_split", "room_merge", "room_set"]
 Corner = Annotated[tuple[float, float], Meta(description="x, y [m] in the map frame")]
 
 
@@ -71,7 +70,6 @@ _TAKES: dict[str, tuple[set[str], set[str]]] = {
     "room_merge": ({"others", "name"}, {"others"}),
     "room_set": ({"passes", "skip"}, set()),
 }
-ROOM_COMMANDS = frozenset(_TAKES)
 
 
 def room_of(command: str, document: RoomDocument | None) -> RoomRequest | None:

@@ -17,6 +17,7 @@ from fasaco_edge.mission.coverage.unreached import Unreached, UnreachedFinder
 from fasaco_edge.mission.map.loop_closure import Motion, moved_cells
 from fasaco_edge.mission.map.map_state import MapState
 from fasaco_edge.mission.map.reachable_area import ReachableArea, anchor_cell
+from fasaco_edge.mission.map.room_book import MOST_LISTED
 from fasaco_edge.mission.orders.cells_left import CellsLeft, LeftBehind, zones_beyond
 from fasaco_edge.mission.orders.exploration import Exploration
 from fasaco_edge.mission.orders.order import Errand, Zone
@@ -445,7 +446,7 @@ class Sequencer:
         if order is not None and area is not None and free is not None:
             run.ending += zones_beyond(order, area, free, self._ledger.visits(free.window))
         if order is not None and (rooms := left_out(order.zones)):
-            run.ending += f"; left out: {', '.join(map(repr, rooms))}"
+            run.ending += f"; left out: {', '.join(map(repr, rooms)):.{MOST_LISTED}}"
         self.order_state = replace(state, why=run.ending)
 
     def _is_worth_trying(self) -> bool:

@@ -230,7 +230,7 @@ const chosen = new Set();
 
 function order() {
   const zones = [
-    ...[...chosen].map((key) => ({ name: titleOf(key) })),
+    ...[...chosen].map(zoneOf),
     ...drafts.filter((draft) => draft.kind === "zone").map(({ name, polygon }) => ({ name: name.trim(), polygon })),
   ];
   return {

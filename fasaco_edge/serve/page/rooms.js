@@ -4,6 +4,8 @@ const foundRooms = () => (model.rooms && model.rooms.rooms) || [];
 const roomOf = (id) => foundRooms().find((room) => room.id === id);
 const titleOf = (key) => (typeof key === "number" ? (roomOf(key) || { title: `room ${key}` }).title : key);
 const shareOf = (room) => (model.shares ? model.shares.swept[room.id] : null);
+// A room is ordered by its number: a standing zone may have its name.
+const zoneOf = (key) => (typeof key === "number" ? { name: titleOf(key), room: key } : { name: key });
 
 const hasShare = (room) => Number.isFinite(shareOf(room));
 const figuresOf = (room) =>
@@ -176,7 +178,7 @@ const rename = () => {
 
 find("unroom").addEventListener("click", () => pickRoom(0));
 find("chooseroom").addEventListener("click", () => choose(pickedRoom));
-find("roomnow").addEventListener("click", () => start({ zones: [{ name: titleOf(pickedRoom) }], return_home: find("return").checked }));
+find("roomnow").addEventListener("click", () => start({ zones: [zoneOf(pickedRoom)], return_home: find("return").checked }));
 find("roomsnow").addEventListener("click", () => find("start").click());
 find("rename").addEventListener("click", rename);
 find("roomname").addEventListener("keydown", (event) => event.key === "Enter" && rename());
