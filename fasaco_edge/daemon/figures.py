@@ -8,7 +8,7 @@ import time
 from collections import Counter
 from collections.abc import Sequence
 
-from fasaco_edge.errors import FasacoError
+from fasaco_edge.errors import FasacoError, NotPublished
 from fasaco_edge.wire.documents.status import ErrorCounts, LoopTimes
 
 LOG = logging.getLogger(__name__)
@@ -21,9 +21,11 @@ LEAST_S, PER_DOUBLING, BUCKETS = 1e-6, 8, 8 * 30
 
 
 def log_fault(log: logging.Logger, fault: FasacoError) -> str:
-    """Log a fault; return its text."""
-    text = fault_text(fault)
-    log.warning("%s", text, extra={"event": "fault", "code": fault.code})
+    """Log a fault, with the traceback of what a mission caught; return its text."""
+    text, cause = fault_text(fault), None
+    if isinstance(fault, NotPublished):
+        cause = fault.__cause__
+    log.warning("%s", text, exc_info=cause, extra={"event": "fault", "code": fault.code})
     return text
 
 

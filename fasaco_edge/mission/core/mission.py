@@ -6,7 +6,6 @@ file, so a mission can be tested and repeated with plain values.
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Iterable
 from dataclasses import replace
 
@@ -69,8 +68,6 @@ from fasaco_edge.mission.orders.sequencer import Sequencer
 from fasaco_edge.planners.living_trail import LivingTrail
 
 __all__ = ["Mission", "MissionConfig"]
-
-LOG = logging.getLogger(__name__)
 
 ROOMS_STAY = "the robot goes on with the rooms it knows; report it with the log"
 
@@ -234,9 +231,9 @@ class Mission:
             if self.grid is not None and not self.is_in_doubt:
                 self._rooms.look(self.grid, now)
         except Exception as error:
-            LOG.exception("rooms", extra={"event": "rooms_broke"})
             why = f"{type(error).__name__}: {error}"
             fault = NotPublished(f"rooms of this map were not published: {why}", hint=ROOMS_STAY)
+            fault.__cause__ = error
             happened = replace(happened, faults=(*happened.faults, fault))
         self._changes.follow_rooms()
         return happened
