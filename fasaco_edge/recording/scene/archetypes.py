@@ -65,8 +65,8 @@ class LineStyle:
 
 CHANGE = LineStyle((8, 145, 178), z=0.02, width=1.6)
 WINDOW = LineStyle((219, 39, 119), z=0.055, width=2.0)
-# Quiet: they lie below all that moves.
-ROOM = LineStyle((120, 130, 145), z=0.015, width=1.0)
+# They lie below all that moves; the colour is also that of their names, on dark labels.
+ROOM = LineStyle((251, 146, 60), z=0.015, width=1.0)
 OLD_PATH = LineStyle((196, 181, 253), z=0.03, width=0.8)
 PATH = LineStyle((124, 58, 237), z=0.04, width=1.2)
 DRIVEN = LineStyle((5, 150, 105), z=0.05, width=1.6)
