@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 
     _Value = TypeVar("_Value", np.uint8, np.bool_)
     _Coordinate = TypeVar("_Coordinate", float, NDArray[np.float64])
+    _Pixel = TypeVar("_Pixel", bound=np.generic)
 
 # A raster's corner is rounded to this fraction of a pixel: a map that grows by whole pixels stays
 # on its raster, even if its origin is rounded to float32.
@@ -214,6 +215,20 @@ class GridGeometry:
         cos, sin = math.cos(self.origin.yaw), math.sin(self.origin.yaw)
         u, v = col * self.resolution, row * self.resolution
         return self.origin.x + cos * u - sin * v, self.origin.y + sin * u + cos * v
+
+    def values_at(self, values: NDArray[_Pixel], xy: NDArray[np.float64]) -> NDArray[_Pixel]:
+        """Return the values of the pixels at points (x, y) [m], float64 (n, 2); 0 beyond the grid.
+
+        ``values``: (rows, cols), of any dtype, which the result, (n,), has too.
+        """
+        col, row = self.to_pixels(xy[:, 0], xy[:, 1])
+        # Without numpy, which processes that never get here do not load.
+        cols, rows = (col // 1).astype(int), (row // 1).astype(int)
+        inside = (rows >= 0) & (cols >= 0) & (rows < self.rows) & (cols < self.cols)
+        found = cols.astype(values.dtype)
+        found.fill(0)
+        found[inside] = values[rows[inside], cols[inside]]
+        return found
 
     def on_raster(self) -> tuple[Raster, Window]:
         """Return the raster of this grid, and the grid's window on it.

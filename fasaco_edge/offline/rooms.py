@@ -3,19 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.drawing.pictures import in_pieces
-from fasaco_edge.grid.geometry import GridGeometry
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.grid.rooms import FoundRooms, find_rooms
 from fasaco_edge.judge.floor import JudgedFloor
 from fasaco_edge.offline.ground import Line
-
-_Value = TypeVar("_Value", np.int32, np.bool_)
 
 # Longest piece of the line between two places whose room is looked up [m].
 PIECE_M = 0.05
@@ -56,8 +52,8 @@ class RoomsUnderLine:
         x, y = found.geometry.to_map(cols.astype(np.float64) + 0.5, rows.astype(np.float64) + 0.5)
         xy = np.stack((x, y), axis=1)
         at = labels[rows, cols]
-        swept = _values_at(judged.geometry, judged.swept, xy)
-        reachable = swept | _values_at(judged.geometry, judged.unswept, xy)
+        swept = judged.geometry.values_at(judged.swept, xy)
+        reachable = swept | judged.geometry.values_at(judged.unswept, xy)
         sizes, reached, done = (
             np.bincount(at, weights, found.count + 1) * pixel_m2
             for weights in (None, reachable, swept)
@@ -78,19 +74,8 @@ class RoomsUnderLine:
 
 def _entries(found: FoundRooms, line_xy: Line) -> NDArray[np.int32]:
     """Return the rooms that a line enters, one after the other, int32 (n,)."""
-    passed = _values_at(found.geometry, found.labels, in_pieces(line_xy, PIECE_M))
+    passed = found.geometry.values_at(found.labels, in_pieces(line_xy, PIECE_M))
     # Between rooms, in doors and beside furniture, it is in none.
     passed = passed[passed > 0]
     entered: NDArray[np.int32] = passed[np.diff(passed, prepend=0) != 0]
     return entered
-
-
-def _values_at(
-    geometry: GridGeometry, values: NDArray[_Value], xy: NDArray[np.float64]
-) -> NDArray[_Value]:
-    """Return the values of pixels at points (x, y) [m], (n,); 0 beyond the grid."""
-    cols, rows = (np.floor(at).astype(np.int64) for at in geometry.to_pixels(xy[:, 0], xy[:, 1]))
-    inside = (rows >= 0) & (cols >= 0) & (rows < geometry.rows) & (cols < geometry.cols)
-    found = np.zeros(len(xy), values.dtype)
-    found[inside] = values[rows[inside], cols[inside]]
-    return found

@@ -82,7 +82,7 @@ def room_chapters(
     if not rooms or geometry is None:
         return ()
     labels = _labels(geometry, [room.outline for room in rooms])
-    at = _values_at(geometry, labels, data.track[:, :2])
+    at = geometry.values_at(labels, data.track[:, :2])
     seconds = np.bincount(at[:-1], _work_s(data, states), len(rooms) + 1) if len(at) else None
     # Between rooms, in doors and beside furniture, it is in none.
     passed = at[at > 0]
@@ -127,17 +127,6 @@ def _labels(geometry: GridGeometry, outlines: Sequence[Polygon]) -> NDArray[np.i
         if box := around.intersection(whole):
             labels[box.slices_in(whole)][cells_inside(corners, box, 1.0)] = number
     return labels
-
-
-def _values_at(
-    geometry: GridGeometry, labels: NDArray[np.int16], xy: NDArray[np.float64]
-) -> NDArray[np.int64]:
-    """Return the labels at points (x, y) [m], int64 (n,); 0 beyond the raster."""
-    cols, rows = (np.floor(at).astype(np.int64) for at in geometry.to_pixels(xy[:, 0], xy[:, 1]))
-    inside = (rows >= 0) & (cols >= 0) & (rows < geometry.rows) & (cols < geometry.cols)
-    found = np.zeros(len(xy), np.int64)
-    found[inside] = labels[rows[inside], cols[inside]]
-    return found
 
 
 def _work_s(data: RunData, states: Sequence[Span]) -> NDArray[np.float64]:
