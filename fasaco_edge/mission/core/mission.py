@@ -69,8 +69,6 @@ from fasaco_edge.planners.living_trail import LivingTrail
 
 __all__ = ["Mission", "MissionConfig"]
 
-ROOMS_STAY = "the robot goes on with the rooms it knows; report it with the log"
-
 
 class Mission:
     """Covers everything reachable on a growing map.
@@ -230,10 +228,7 @@ class Mission:
         try:
             if self.grid is not None and not self.is_in_doubt:
                 self._rooms.look(self.grid, now)
-        except Exception as error:
-            why = f"{type(error).__name__}: {error}"
-            fault = NotPublished(f"rooms of this map were not published: {why}", hint=ROOMS_STAY)
-            fault.__cause__ = error
+        except NotPublished as fault:
             happened = replace(happened, faults=(*happened.faults, fault))
         self._changes.follow_rooms()
         return happened

@@ -7,6 +7,7 @@ import zlib
 
 import numpy as np
 
+from fasaco_edge.errors import NotPublished
 from fasaco_edge.grid.geometry import Pose2D
 from fasaco_edge.grid.occupancy import OccupancyGrid, coarser
 from fasaco_edge.grid.rooms import FoundRooms, find_rooms
@@ -24,6 +25,8 @@ PERIOD_S, PIXELS_PER_S = 2.0, 50_000
 MOST_PIXELS = 1_000_000
 # A look waits at most this long for a step without a new map [s]: a plan comes first.
 LATE_S = 1.0
+
+ROOMS_STAY = "the robot goes on with the rooms it knows; report it with the log"
 
 
 class RoomWatch:
@@ -45,6 +48,18 @@ class RoomWatch:
         self._due = -math.inf
 
     def look(self, grid: OccupancyGrid, now: float) -> None:
+        """Look for rooms on a map at ``now`` [s] if that is due.
+
+        Raises:
+            NotPublished: that failed; the rooms known before are as good as they were.
+        """
+        try:
+            self._look(grid, now)
+        except Exception as error:
+            why = f"rooms of this map were not published: {type(error).__name__}: {error}"
+            raise NotPublished(why, hint=ROOMS_STAY) from error
+
+    def _look(self, grid: OccupancyGrid, now: float) -> None:
         """Look for rooms on a map at ``now`` [s] if that is due.
 
         A map that stays is shown to the book again until nothing more follows from it.
