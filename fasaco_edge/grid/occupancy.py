@@ -114,7 +114,10 @@ def coarser(grid: OccupancyGrid, most_pixels: int) -> OccupancyGrid:
     rows, cols = -(-grid.cells.shape[0] // factor), -(-grid.cells.shape[1] // factor)
     padded = np.full((rows * factor, cols * factor), UNKNOWN, np.int8)
     padded[: grid.cells.shape[0], : grid.cells.shape[1]] = grid.cells
-    cells = padded.reshape(rows, factor, cols, factor).max(axis=(1, 3))
+    # Slice by slice: many times faster than the maximum over two axes.
+    cells = padded[::factor, ::factor].copy()
+    for row, col in np.ndindex(factor, factor):
+        np.maximum(cells, padded[row::factor, col::factor], out=cells)
     resolution = grid.geometry.resolution * factor
     geometry = replace(grid.geometry, rows=rows, cols=cols, resolution=resolution)
     return replace(grid, geometry=geometry, cells=cells)

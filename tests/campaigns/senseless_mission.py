@@ -26,11 +26,11 @@ from fasaco_edge.daemon.ledger.rooms_codec import BookSnapshot, decode_rooms, en
 from fasaco_edge.daemon.loop.last_samples import ShownTrail
 from fasaco_edge.daemon.loop.loader import mission_config
 from fasaco_edge.daemon.loop.mission_reports import mission_report
-from fasaco_edge.daemon.loop.outbox import MOST_SQUARES, headings, merged
+from fasaco_edge.daemon.loop.outbox import MOST_SQUARES, headings
 from fasaco_edge.errors import FasacoError
 from fasaco_edge.grid.fine_raster import map_to_raster
 from fasaco_edge.grid.geometry import GridGeometry
-from fasaco_edge.grid.occupancy import OccupancyGrid
+from fasaco_edge.grid.occupancy import OccupancyGrid, coarser
 from fasaco_edge.grid.rotation import rotated_points
 from fasaco_edge.mission.core.events import (
     CommandReceived,
@@ -283,7 +283,7 @@ class MissionTrial:
     def _unswept(self) -> bytes:
         """Return why floor is not swept, as it is published, b"" where that is not known."""
         shown = self._mission.unswept()
-        return b"" if shown is None else encode_occupancy_grid(merged(shown, MOST_SQUARES))
+        return b"" if shown is None else encode_occupancy_grid(coarser(shown, MOST_SQUARES))
 
     def _trail(self) -> bytes:
         """Return the living trail, and where it points to, as they are published."""

@@ -69,7 +69,7 @@ def test_a_door_separates_two_rooms(door_m, wall_m):
     found = find_rooms(grid_of(two_rooms(door_m, wall_m=wall_m)))
     assert found.count == 2
     assert numbers(found, LEFT, RIGHT) == [1, 2]
-    # Nobody owns walls, and each free pixel has a room.
+    # Walls have no room, and each free pixel has a room.
     assert (found.labels > 0).sum() == (two_rooms(door_m, wall_m=wall_m) == FREE).sum()
 
 

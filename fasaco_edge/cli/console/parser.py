@@ -34,20 +34,20 @@ class Parser(argparse.ArgumentParser):
         print(f"{self.prog}: {message}\nsee: {self.prog} --help", file=sys.stderr)
         sys.exit(USAGE)
 
-    def refuse(self, unknown: Sequence[str], told: str = "") -> NoReturn:
-        """Say which arguments are unknown, ``told`` or what was perhaps meant, and exit."""
+    def refuse(self, unknown: Sequence[str], why: str = "") -> NoReturn:
+        """Say which arguments are unknown, ``why`` or what was perhaps meant, and exit."""
         options = [name for name in self._option_string_actions if name.startswith("--")]
         names = [word.partition("=")[0] for word in unknown if word.startswith("-")]
-        meant = told or "".join(f"did you mean {name}?" for name in _close(names[:1], options))
+        meant = why or "".join(f"did you mean {name}?" for name in _close(names[:1], options))
         self.error(f"unrecognized arguments: {' '.join(unknown)}{meant and f'; {meant}'}")
 
     def _check_value(self, action: argparse.Action, value: Any) -> None:  # noqa: ANN401
         if action.choices is None or value in action.choices:
             return
         names = [str(choice) for choice in action.choices]
-        told = "".join(f"did you mean {name}?" for name in _close([str(value)], names))
-        told = told or f"there are {', '.join(names)}"
-        raise argparse.ArgumentError(action, f"invalid choice: {value!r}; {told}")
+        meant = "".join(f"did you mean {name}?" for name in _close([str(value)], names))
+        meant = meant or f"there are {', '.join(names)}"
+        raise argparse.ArgumentError(action, f"invalid choice: {value!r}; {meant}")
 
 
 def _close(words: Iterable[str], names: Sequence[str]) -> list[str]:

@@ -27,7 +27,7 @@ from fasaco_edge.mission.map.room_book import RoomBook
 
 LOG = logging.getLogger(__name__)
 
-# Least time between two writes that nobody waits for [s]: memory cards wear out.
+# Least time between two writes without a command that waits [s]: memory cards wear out.
 PERIOD_S = 5.0
 # Time before a retry after a failure, and longest wait of a command for the disk [s].
 RETRY_S, MOST_WAIT_S = 2.0, 1.0
@@ -115,7 +115,7 @@ class RoomsKeeper:
             self._note(fault)
 
     def keep(self, now: float, *, at_once: bool = False) -> None:
-        """Write the rooms if they have changed; ``at_once``: somebody waits for it."""
+        """Write the rooms if they have changed; ``at_once``: a command waits for it."""
         if self.book.version == self._kept or (now - self._kept_at < PERIOD_S and not at_once):
             return
         self._kept, self._kept_at = self.book.version, now

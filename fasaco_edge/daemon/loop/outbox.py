@@ -6,7 +6,6 @@ The last samples are kept for queries (``daemon.loop.last_samples``).
 from __future__ import annotations
 
 import logging
-import math
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -23,7 +22,7 @@ from fasaco_edge.daemon.figures import log_fault
 from fasaco_edge.daemon.loop.last_samples import LastSamples, ShownTrail
 from fasaco_edge.daemon.ros_bridge import RosBridge
 from fasaco_edge.errors import FasacoError, NotPublished
-from fasaco_edge.grid.occupancy import OccupancyGrid
+from fasaco_edge.grid.occupancy import OccupancyGrid, coarser
 from fasaco_edge.mission.core.events import Answer, CommandReceived
 from fasaco_edge.mission.orders.order import command_document
 from fasaco_edge.wire import schemas, topics
@@ -312,26 +311,7 @@ class UnsweptPublisher:
         self._published_at, self._key = now, key
         if (shown := mission.unswept()) is not None:
             self._due = now + max(FLOOR_PERIOD_S, shown.cells.size / PIXELS_PER_S)
-            self._outbox.unswept(merged(shown, MOST_SQUARES))
-
-
-def merged(grid: OccupancyGrid, most: int) -> OccupancyGrid:
-    """Return a grid of at most ``most`` squares, each with the highest value of its pixels."""
-    rows, cols = grid.cells.shape
-    step = max(math.ceil(math.sqrt(rows * cols / most)), 1)
-    if step == 1:
-        return grid
-    padded = np.pad(grid.cells, ((0, -rows % step), (0, -cols % step)))
-    squares = padded[::step, ::step].copy()
-    for row, col in np.ndindex(step, step):
-        np.maximum(squares, padded[row::step, col::step], out=squares)
-    size = replace(
-        grid.geometry,
-        rows=squares.shape[0],
-        cols=squares.shape[1],
-        resolution=grid.geometry.resolution * step,
-    )
-    return replace(grid, geometry=size, cells=squares)
+            self._outbox.unswept(coarser(shown, MOST_SQUARES))
 
 
 class TrailPublisher:

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.grid.geometry import GridGeometry, Point, Window
+from fasaco_edge.kernels.rooms.regions import grow
 
 if TYPE_CHECKING:
     from fasaco_edge.grid.rooms import FoundRooms
@@ -137,11 +138,7 @@ def sampled(found: FoundRooms, window: Window, square_m: float) -> NDArray[np.in
     for first in range(0, window.rows, step):
         row0 = window.row0 + first
         part = Window(row0, window.col0, min(row0 + step, window.row1), window.col1)
-        at_col, at_row = geometry.to_pixels(*centres(part, square_m))
-        rows, cols = np.floor(at_row).astype(np.int64), np.floor(at_col).astype(np.int64)
-        inside = (rows >= 0) & (cols >= 0) & (rows < geometry.rows) & (cols < geometry.cols)
-        values = np.zeros(len(rows), np.int32)
-        values[inside] = found.labels[rows[inside], cols[inside]]
+        values = geometry.values_at(found.labels, np.stack(centres(part, square_m), axis=1))
         labels[first : first + part.rows] = values.reshape(part.rows, part.cols)
     return labels
 
@@ -155,24 +152,9 @@ def spread(ids: Ids, allowed: NDArray[np.bool_]) -> None:
         ids: uint16 (rows, cols), the numbers.
         allowed: bool (rows, cols), the squares to fill, and to step over.
     """
-    padded = np.pad(ids, 1)
-    is_open = np.pad(allowed, 1) & (padded == 0)
-    flat, is_open = padded.ravel(), is_open.ravel()
-    width = padded.shape[1]
-    front = np.flatnonzero(flat)
-    while len(front):
-        reached = []
-        for step in (1, -1, width, -width):
-            beside = front + step
-            inside = (beside >= 0) & (beside < flat.size)
-            beside, source = beside[inside], front[inside]
-            new = is_open[beside]
-            beside, source = beside[new], source[new]
-            flat[beside] = flat[source]
-            is_open[beside] = False
-            reached.append(beside)
-        front = np.concatenate(reached)
-    ids[:] = padded[1:-1, 1:-1]
+    grown = ids.astype(np.int32)
+    grow(grown, np.ascontiguousarray(allowed))
+    ids[:] = grown
 
 
 def cut_window(cut: Cut, square_m: float) -> Window:

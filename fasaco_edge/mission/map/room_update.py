@@ -76,8 +76,8 @@ def _sheet_for(book: RoomBook, found: FoundRooms, frame: str) -> RoomSheet:
     in_use = book.sheet if book.frame == frame else None
     if in_use is not None and in_use.is_named:
         return in_use
-    # A first look may have seen a corner: as long as nobody misses the rooms in use, others may
-    # turn out to be those of the building.
+    # A first look may have seen a corner: as long as no room in use has a name or settings,
+    # other rooms may turn out to be those of the building.
     others = [each for each in book.sheets if each.frame == frame and each is not in_use]
     alike = [(_alike(each, found), each) for each in others if each.is_named or in_use is None]
     share, best = max(alike, key=lambda each: each[0], default=(0.0, None))
@@ -105,7 +105,7 @@ def _alike(sheet: RoomSheet, found: FoundRooms) -> float:
 
 
 def _stale(sheet: RoomSheet, before: Ids) -> list[int]:
-    """Return the rooms of which so many squares have changed that their outlines are outdated."""
+    """Return the rooms whose outlines are outdated, as enough of their squares have changed."""
     after = sheet.raster.ids
     squares = np.bincount(after.ravel(), minlength=MOST_NUMBER + 1)
     other = before != after

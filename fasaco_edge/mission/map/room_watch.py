@@ -21,7 +21,7 @@ from fasaco_edge.mission.map.room_update import update
 # Least time from one look to the next [s]; large maps, at some 0.2 s per million pixels, are looked
 # at less often.
 PERIOD_S, PIXELS_PER_S = 2.0, 50_000
-# Maps of more pixels are looked at with wider ones: a look takes some 50 bytes a pixel.
+# Maps of more pixels are looked at with wider ones: a look takes some 20 bytes a pixel.
 MOST_PIXELS = 1_000_000
 # A look waits at most this long for a step without a new map [s]: a plan comes first.
 LATE_S = 1.0

@@ -28,6 +28,7 @@ def in_zones(zones: tuple[Zone, ...], window: Window, cell_m: float) -> NDArray[
     return _inside_any(tuple(zone.polygon for zone in zones if zone.polygon), window, cell_m)
 
 
+@lru_cache(maxsize=4)
 def _with_holes(zones: tuple[Zone, ...], window: Window, cell_m: float) -> NDArray[np.bool_]:
     """Return the same as ``in_zones`` for zones some of which have holes or leave out rooms."""
     cells = np.zeros((window.rows, window.cols), bool)

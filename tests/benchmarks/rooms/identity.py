@@ -104,9 +104,7 @@ def name_rooms(book: RoomBook, floor: Home, placed: Pose2D) -> set[str]:
             (at.astype(np.float64) + 0.5) * sheet.raster.square_m
             for at in (cols + window.col0, rows + window.row0)
         )
-        at_col, at_row = (np.floor(at).astype(np.int64) for at in geometry.to_pixels(x, y))
-        inside = (at_row >= 0) & (at_col >= 0) & (at_row < geometry.rows) & (at_col < geometry.cols)
-        true = floor.rooms[at_row[inside], at_col[inside]]
+        true = geometry.values_at(floor.rooms, np.stack((x, y), axis=1))
         counts = np.bincount(true[true > 0])
         if not len(counts):
             continue
@@ -127,9 +125,6 @@ def _measure(args: argparse.Namespace, say: Say) -> Generator[Kept, None, None]:
             true = int((np.bincount(floor.rooms[floor.rooms > 0]) >= least).sum())
             book, maps, _ = follow(floor, number, is_named=False)
             named, _, moved = follow(floor, number, is_named=True)
-            names = {room.name for room in named.rooms} - {""}
-            given = named.next_id - 1
-            assert given >= len(names)
             lost = _lost(named, floor)
             yield Kept(kind, maps, true, book.next_id - 1, len(moved), lost)
 
