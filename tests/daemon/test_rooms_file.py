@@ -6,6 +6,8 @@ import base64
 import errno
 import json
 import os
+import subprocess
+import sys
 import zlib
 
 import numpy as np
@@ -267,3 +269,8 @@ def test_an_order_by_room_before_any_map_belongs_to_the_frame_of_the_room():
     state = runner.order_state
     assert state.frame == "map"
     assert state.in_other_frame("it moved").order is None
+
+
+def test_it_is_read_without_a_compiler():
+    check = "import sys, fasaco_edge.daemon.ledger.rooms_file; sys.exit('numba' in sys.modules)"
+    subprocess.run([sys.executable, "-c", check], check=True)

@@ -13,8 +13,8 @@ from fasaco_edge.errors import OrderError
 from fasaco_edge.grid.geometry import Point
 from fasaco_edge.kernels.lattice.areas import find_areas
 from fasaco_edge.mission.map.room_book import MOST_CUTS, USUAL, Room, RoomBook, RoomSheet
-from fasaco_edge.mission.map.room_matching import LEAST_M2
-from fasaco_edge.mission.map.room_raster import Cut, RoomRaster, cut_window, is_cut, spread
+from fasaco_edge.mission.map.room_matching import LEAST_M2, spread
+from fasaco_edge.mission.map.room_raster import Cut, RoomRaster, cut_window, is_cut
 from fasaco_edge.mission.map.room_update import refresh
 
 if TYPE_CHECKING:

@@ -24,6 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.grid.geometry import Window
+from fasaco_edge.kernels.rooms.regions import grow
 from fasaco_edge.mission.map.room_book import (
     MOST_NUMBER,
     MOST_ROOMS,
@@ -31,14 +32,7 @@ from fasaco_edge.mission.map.room_book import (
     RoomBook,
     RoomSheet,
 )
-from fasaco_edge.mission.map.room_raster import (
-    BLOCK,
-    Ids,
-    RoomRaster,
-    cut_window,
-    is_cut,
-    spread,
-)
+from fasaco_edge.mission.map.room_raster import BLOCK, Ids, RoomRaster, cut_window, is_cut
 
 Labels = NDArray[np.int32]
 
@@ -336,3 +330,17 @@ class Matching:
         if empty:
             self._ids[np.isin(self._ids, np.array(empty, np.uint16))] = 0
             self._book.drop(empty)
+
+
+def spread(ids: Ids, allowed: NDArray[np.bool_]) -> None:
+    """Give squares without a number that of the nearest square with one, in place.
+
+    Near is counted in steps over the edges of squares.
+
+    Args:
+        ids: uint16 (rows, cols), the numbers.
+        allowed: bool (rows, cols), the squares to fill, and to step over.
+    """
+    grown = ids.astype(np.int32)
+    grow(grown, np.ascontiguousarray(allowed))
+    ids[:] = grown

@@ -1,7 +1,8 @@
 """Room raster: squares of the map frame, each with the number of its room.
 
 It has its own squares, aligned with the axes of the map frame: maps may have other pixels, another
-corner or another yaw each time, and cover another part of the building.
+corner or another yaw each time, and cover another part of the building. Needs no kernels: an idle
+daemon reads rooms from its file.
 """
 
 from __future__ import annotations
@@ -14,7 +15,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.grid.geometry import GridGeometry, Point, Window
-from fasaco_edge.kernels.rooms.regions import grow
 
 if TYPE_CHECKING:
     from fasaco_edge.grid.rooms import FoundRooms
@@ -141,20 +141,6 @@ def sampled(found: FoundRooms, window: Window, square_m: float) -> NDArray[np.in
         values = geometry.values_at(found.labels, np.stack(centres(part, square_m), axis=1))
         labels[first : first + part.rows] = values.reshape(part.rows, part.cols)
     return labels
-
-
-def spread(ids: Ids, allowed: NDArray[np.bool_]) -> None:
-    """Give squares without a number that of the nearest square with one, in place.
-
-    Near is counted in steps over the edges of squares.
-
-    Args:
-        ids: uint16 (rows, cols), the numbers.
-        allowed: bool (rows, cols), the squares to fill, and to step over.
-    """
-    grown = ids.astype(np.int32)
-    grow(grown, np.ascontiguousarray(allowed))
-    ids[:] = grown
 
 
 def cut_window(cut: Cut, square_m: float) -> Window:
