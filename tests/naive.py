@@ -11,6 +11,7 @@ import functools
 import itertools
 import math
 from collections import Counter, deque
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from fractions import Fraction
 
@@ -244,13 +245,17 @@ def fasaco(
     return best
 
 
-def walk_us(walk: list[Cell], cost: CoverageCost) -> int:
+def walk_us(
+    walk: list[Cell], cost: CoverageCost, room_of: Callable[[Cell], object] = lambda _: None
+) -> int:
     """Return what a walk costs [us], turn by turn."""
     headings = [
         DIRECTIONS.index(_difference(here, there)) for here, there in itertools.pairwise(walk)
     ]
     total = len(headings) * cost.step_us
     total += sum(cost.col_us if heading % 2 else cost.row_us for heading in headings)
+    rooms = itertools.pairwise(room_of(cell) for cell in walk)
+    total += sum(one != other for one, other in rooms) * cost.room_us
     for before, after in itertools.pairwise(headings):
         to_left = (after - before) % 4
         total += min(to_left, 4 - to_left) * cost.quarter_turn_us

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    _Value = TypeVar("_Value", np.uint8, np.bool_)
+    _Value = TypeVar("_Value", np.uint8, np.uint16, np.bool_)
     _Coordinate = TypeVar("_Coordinate", float, NDArray[np.float64])
     _Pixel = TypeVar("_Pixel", bound=np.generic)
 

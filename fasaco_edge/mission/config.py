@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import msgspec
 from msgspec import Meta
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
 LONGEST_FRAME = 255
 
+ByRoom = Literal["never", "auto", "always"]
 Period = Annotated[float, Meta(ge=0, le=86_400)]
 Coordinate = Annotated[float, Meta(ge=-FARTHEST_M, le=FARTHEST_M)]
 
@@ -69,6 +70,8 @@ class MissionPolicy(msgspec.Struct, frozen=True, kw_only=True):
         dock: where it charges; None if it does not.
         map_frame: frame of the map to which zones, keep_out, a mask of a file, home and dock
             belong; "" for the first map used with them.
+        by_room: whether a room is finished before the next is begun: "auto" where that costs
+            little, "always" also where it costs much.
     """
 
     autostart: bool = True
@@ -83,6 +86,7 @@ class MissionPolicy(msgspec.Struct, frozen=True, kw_only=True):
     home: Place | None = None
     dock: Dock | None = None
     map_frame: Annotated[str, Meta(max_length=LONGEST_FRAME)] = ""
+    by_room: ByRoom = "auto"
 
     @property
     def waits_for_mask(self) -> bool:

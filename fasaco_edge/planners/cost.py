@@ -1,7 +1,8 @@
 """Cost of a walk, in seconds for steps and quarter-turns; and counts of a search's work.
 
-A search that prefers lanes in one direction adds a price to each step across them: its walks then
-cost more than their seconds, and ``seconds`` is the cost without that price.
+A search that prefers lanes in one direction adds a price to each step across them, and one that
+prefers to finish a room to each step into another: walks then cost more than their seconds, and
+``seconds`` is the cost without these prices.
 """
 
 from __future__ import annotations
@@ -48,6 +49,7 @@ class CoverageCost:
     Attributes:
         step_s: a step to a neighbouring cell [s].
         quarter_turn_s: a turn by 90 degrees on the spot [s].
+        room_s: added to a step into another room [s].
         row_s, col_s: added to a step along a row, along a column, so that lanes in the other
             direction are preferred [s].
     """
@@ -56,12 +58,14 @@ class CoverageCost:
     quarter_turn_s: float = 0.0
     row_s: float = 0.0
     col_s: float = 0.0
+    room_s: float = 0.0
 
     def __post_init__(self) -> None:
         _require("step_s", self.step_s, SHORTEST_STEP_S, LONGEST_S, "s")
         _require("quarter_turn_s", self.quarter_turn_s, 0.0, LONGEST_S, "s")
         _require("row_s", self.row_s, 0.0, 2 * LONGEST_S, "s")
         _require("col_s", self.col_s, 0.0, 2 * LONGEST_S, "s")
+        _require("room_s", self.room_s, 0.0, 100 * LONGEST_S, "s")
 
     @classmethod
     def for_robot(cls, cell_m: float, speed_m_s: float, quarter_turn_s: float) -> Self:
@@ -85,13 +89,23 @@ class CoverageCost:
 
     @property
     def seconds(self) -> Self:
-        """This cost without a preference for lanes."""
-        return self.along(ANY_LANES)
+        """This cost without a preference for lanes, or for rooms."""
+        return replace(self.along(ANY_LANES), room_s=0.0)
 
     @property
     def has_lanes(self) -> bool:
         """Whether lanes in one direction are preferred."""
         return self.row_s != self.col_s
+
+    @property
+    def is_priced(self) -> bool:
+        """Whether steps cost more than their seconds."""
+        return self.has_lanes or self.room_s > 0.0
+
+    @property
+    def room_us(self) -> int:
+        """What is added to a step into another room, in whole microseconds."""
+        return round(self.room_s * MICROSECONDS)
 
     @property
     def step_us(self) -> int:

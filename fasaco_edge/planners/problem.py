@@ -21,9 +21,10 @@ from fasaco_edge.errors import (
     StartOutsideMap,
 )
 from fasaco_edge.grid.lattice import COVERABLE, UNKNOWN, Cell, CoverageLattice
+from fasaco_edge.kernels import EAST, NORTH, SOUTH, WEST
 from fasaco_edge.kernels.ants.graph import Graph, Scratch
 from fasaco_edge.kernels.lattice.reach import reachable_from, shortest_walk, walk_cost
-from fasaco_edge.kernels.local_search.walk_array import FRAME, Ground, Prices
+from fasaco_edge.kernels.local_search.walk_array import FRAME, ROOM_BIT, Ground, Prices
 from fasaco_edge.planners.cost import STEPS_ALONE, CoverageCost
 from fasaco_edge.planners.living_trail import TrailSnapshot
 
@@ -51,6 +52,8 @@ class CoverageProblem:
         whole: the problem that this one is the end of, see ``after``: a path that solves this
             one begins with the lead, and its figures are those of the whole. None for a problem
             that is whole itself.
+        rooms: uint16 (rows, cols), the room of each cell, 0 for none; None without a price for
+            steps from one room into another.
     """
 
     lattice: CoverageLattice
@@ -64,6 +67,7 @@ class CoverageProblem:
     whole: CoverageProblem | None = None
     trail: TrailSnapshot | None = None
     is_full: bool = False
+    rooms: NDArray[np.uint16] | None = None
 
     @classmethod
     def of(
@@ -172,10 +176,39 @@ class CoverageProblem:
         rows, cols = np.divmod(walk, window.cols)
         return np.column_stack((rows + window.row0, cols + window.col0)).astype(np.int32)
 
-    def cost_us(self, walk: NDArray[np.int32]) -> int:
-        """Return the price of a walk of flat or framed indices, int32 (n,) [us]."""
+    def cost_us(self, walk: NDArray[np.int32], framed: FramedGround | None = None) -> int:
+        """Return the price of a walk [us], int32 (n,) of flat indices, or of ``framed`` ones."""
         cost = self.cost
-        return int(walk_cost(walk, cost.step_us, cost.quarter_turn_us)) + self._added_us(walk)
+        price_us = int(walk_cost(walk, cost.step_us, cost.quarter_turn_us)) + self._added_us(walk)
+        if self.rooms is not None:
+            flat = walk if framed is None else framed.unframed(walk)
+            price_us += self._rooms_us(self.cells_of(flat))
+        return price_us
+
+    def price_us(self, cells: NDArray[np.int32]) -> int:
+        """Return the price of a walk [us], int32 (n, 2), cells (row, col)."""
+        return self.cost.of_walk_us(cells) + self._rooms_us(cells)
+
+    def _rooms_us(self, cells: NDArray[np.int32]) -> int:
+        """Return what is added to the price of a walk's steps into other rooms [us]."""
+        if self.rooms is None:
+            return 0
+        rooms = self.lattice.window.values_at(self.rooms, cells, 0)
+        return int(np.count_nonzero(_differ(rooms[:-1], rooms[1:]))) * self.cost.room_us
+
+    @property
+    def steps(self) -> NDArray[np.uint8]:
+        """The steps of the lattice, with those that lead into another room, see ``ROOM_BITS``."""
+        steps, rooms = self.lattice.steps, self.rooms
+        if rooms is None:
+            return steps
+        into = np.zeros_like(steps)
+        east, north = _differ(rooms[:, :-1], rooms[:, 1:]), _differ(rooms[:-1], rooms[1:])
+        into[:, :-1] |= east << np.uint8(EAST)
+        into[:, 1:] |= east << np.uint8(WEST)
+        into[:-1] |= north << np.uint8(NORTH)
+        into[1:] |= north << np.uint8(SOUTH)
+        return steps | (into & steps) << np.uint8(ROOM_BIT)
 
     def _added_us(self, walk: NDArray[np.int32]) -> int:
         """Return what is added to the price of a walk's steps by their direction [us]."""
@@ -196,6 +229,12 @@ class CoverageProblem:
         here, end = divmod(int(walk[-1]), cols), self.lattice.local(self.end)
         rest = shortest_walk(self.lattice.steps, here, end)
         return np.concatenate((walk, rest[1:, 0] * np.int32(cols) + rest[1:, 1]))
+
+
+def _differ(one: NDArray[np.uint16], other: NDArray[np.uint16]) -> NDArray[np.uint8]:
+    """Return 1 where two cells belong to two rooms, else 0."""
+    differ: NDArray[np.bool_] = (one != other) & (one > 0) & (other > 0)
+    return differ.view(np.uint8)
 
 
 def _check_cell(
@@ -266,7 +305,7 @@ class FramedGround:
     def of(cls, problem: CoverageProblem) -> FramedGround:
         """Add a border to a problem's lattice."""
         rows, cols = problem.to_cover.shape
-        steps = np.pad(problem.lattice.steps, FRAME)
+        steps = np.pad(problem.steps, FRAME)
         needed = np.pad(problem.to_cover.astype(np.int32), FRAME)
         width = cols + 2 * FRAME
         offsets = np.array([1, width, -1, -width], np.int64)
@@ -278,6 +317,7 @@ class FramedGround:
             problem.end is None,
             row_us=cost.row_us,
             col_us=cost.col_us,
+            room_us=cost.room_us,
         )
         return cls(rows, cols, ground, prices)
 

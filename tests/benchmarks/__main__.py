@@ -26,6 +26,7 @@ from tests.benchmarks.quality.benchmark import QUALITY
 from tests.benchmarks.replan import REPLAN
 from tests.benchmarks.rooms.benchmark import ROOMS
 from tests.benchmarks.rooms.identity import ROOM_IDS
+from tests.benchmarks.rooms.one_by_one import BY_ROOM
 from tests.benchmarks.scale.benchmark import SCALE
 from tests.benchmarks.table1.benchmark import TABLE1
 from tests.benchmarks.turns.benchmark import TURNS
@@ -33,7 +34,7 @@ from tests.benchmarks.twins import TWINS
 
 BENCHMARKS: tuple[Benchmark[Any], ...] = (
     TABLE1, QUALITY, TURNS, FLOOR, PEERS, REPLAN, FULL, FLEET, FLEET_ONLINE, ONLINE, SCALE, CODEC,
-    INGEST, ROOMS, ROOM_IDS, TWINS,
+    INGEST, ROOMS, ROOM_IDS, BY_ROOM, TWINS,
 )  # fmt: skip
 
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from tests.benchmarks.__main__ import main
-from tests.benchmarks.rooms import identity
+from tests.benchmarks.rooms import identity, one_by_one
 from tests.benchmarks.rooms.homes import home, seen
 from tests.benchmarks.rooms.judge import judge
 
@@ -60,3 +60,22 @@ def test_rooms_keep_their_names_while_the_map_grows(monkeypatch):
     book.put(replace(one, name="aside"))
     book.put(replace(other, name=names[0]))
     assert names[0] in identity.name_rooms(book, floor, floor.grid.geometry.origin)
+
+
+def test_stays_in_rooms_are_counted():
+    """A hall, 2, leads to two rooms; the robot comes back to one of them, and to the hall."""
+    stays = [(2, 5), (1, 30), (2, 9), (3, 20), (2, 1), (1, 12), (2, 8), (3, 3)]
+    assert one_by_one.returns_to(stays) == {2: 2, 1: 1, 3: 0}
+    assert one_by_one.passages(stays) == {2}
+
+
+def test_a_mission_finishes_rooms():
+    """The short form of ``by-room``: one home; each mission sweeps it, whatever the policy."""
+    floor, drives = home("home", 4), {}
+    for policy in ("never", "always"):
+        drives[policy] = one_by_one.drive(floor, 0, policy, "home", 4)
+        assert drives[policy].is_done
+    never, always = drives["never"], drives["always"]
+    assert always.returns <= never.returns
+    assert always.crossings < never.crossings
+    assert always.seconds < 1.1 * never.seconds

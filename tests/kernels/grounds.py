@@ -20,6 +20,7 @@ from fasaco_edge.kernels.local_search.walk_array import (
     COST,
     FRAME,
     LENGTH,
+    ROOM_BIT,
     SPARE_CELLS,
     Ground,
     Prices,
@@ -40,7 +41,14 @@ PRICES = (
     Prices(1_000, 3_600_000_000, True),
     Prices(700_000, 1_100_000, True, row_us=900_000),
     Prices(1_000_000, 0, False, col_us=300_000),
+    Prices(700_000, 1_100_000, True, room_us=2_000_000),
+    Prices(1_000_000, 0, False, row_us=300_000, room_us=5_000_000),
 )
+
+
+def room_of(cell):
+    """Each cell's room, where there is a price for rooms."""
+    return cell[0] // 3, cell[1] // 2
 
 
 def guarded(shape, dtype, value=0):
@@ -78,7 +86,14 @@ class Task(NamedTuple):
 
     def ground(self):
         needed = np.pad(self.wanted.astype(np.int32), FRAME).ravel()
-        steps = np.pad(self.steps, FRAME).ravel()
+        bits = np.zeros_like(self.steps)
+        for row, col in np.ndindex(bits.shape):
+            room, ways = room_of((row, col)), ((0, 1), (1, 0), (0, -1), (-1, 0))
+            for direction, (up, right) in enumerate(ways):
+                is_other = room_of((row + up, col + right)) != room
+                bits[row, col] |= is_other << direction
+        bits = (bits & self.steps) << ROOM_BIT
+        steps = np.pad(self.steps | bits, FRAME).ravel()
         offsets = np.array([1, self.width, -1, -self.width], np.int64)
         return Ground(steps, needed, offsets, steps.size)
 
@@ -234,4 +249,4 @@ def assert_sound(task, ground, walk, prices):
     assert {tuple(cell) for cell in np.argwhere(task.wanted).tolist()} <= set(way)
     assert way[0] == task.walk[0]
     assert prices.free_end or way[-1] == task.walk[-1]
-    assert walk.counts[COST] == naive.walk_us(way, prices)
+    assert walk.counts[COST] == naive.walk_us(way, prices, room_of)

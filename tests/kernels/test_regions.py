@@ -44,6 +44,7 @@ from tests.kernels.grounds import (
     drawn_task,
     guarded,
     memory_on,
+    room_of,
     steps_taken,
     stream,
     tally_on,
@@ -221,7 +222,7 @@ def test_whatever_is_done_in_a_region_the_whole_is_a_walk(seed, prices, hot, per
 
 
 def price_of(task, cells, prices):
-    return naive.walk_us([task.unframed(cell) for cell in cells.tolist()], prices)
+    return naive.walk_us([task.unframed(cell) for cell in cells.tolist()], prices, room_of)
 
 
 def corridor(*cols, cols_inside, prices=PRICES[0], **room):

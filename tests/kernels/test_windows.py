@@ -1,5 +1,6 @@
 """Windows of a walk against least costs, and the walk's soundness after each of them."""
 
+from dataclasses import replace
 from typing import get_args
 
 import numpy as np
@@ -146,3 +147,22 @@ def test_a_walk_that_takes_a_step_three_times_is_thinned():
     moves = [tuple(sorted(pair)) for pair in zip(found.tolist(), found[1:].tolist(), strict=False)]
     assert max(moves.count(move) for move in moves) <= 2
     assert all(abs(one - other) in (1, 10) for one, other in moves)
+
+
+@pytest.mark.parametrize("end", [None, (0, 0)])
+def test_windows_count_steps_into_other_rooms(end):
+    random = np.random.default_rng(6)
+    floor = random.random((13, 16)) < 0.93
+    floor[0, 0] = True
+    ground = CoverageLattice.from_free(floor)
+    cost = CoverageCost(1.0, 1.25, room_s=4.0)
+    problem = CoverageProblem.of(ground, (0, 0), end=end, cost=cost)
+    rows, cols = np.indices(floor.shape)
+    problem = replace(problem, rooms=(1 + rows // 5 + 3 * (cols // 6)).astype(np.uint16))
+    search, framed, walk = search_of(problem)
+    assert search.load(walk)
+    begun_us, stream = search.best_us, stream_of(3)
+    for _ in range(40):
+        search.solve(500, stream)
+        assert_sound(problem, framed, search)
+    assert search.best_us < begun_us

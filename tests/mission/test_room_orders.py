@@ -107,8 +107,9 @@ def test_a_room_is_ordered_by_its_name_and_by_its_number():
     (zone,) = drive.mission.zone_progress()
     assert (zone.name, zone.covered) == ("kitchen", zone.cells)
     progress = drive.mission.room_progress()
-    assert progress[room_at(drive, *IN_EAST).id] == (zone.cells, zone.covered)
-    assert progress[room_at(drive, *IN_WEST).id][1] < 30
+    east_room = progress[room_at(drive, *IN_EAST).id]
+    assert (east_room.cells, east_room.covered, east_room.share) == (zone.cells, zone.covered, 1.0)
+    assert progress[room_at(drive, *IN_WEST).id].covered < 30
     start(drive, f"room {room_at(drive, *IN_WEST).id}")
     assert drive.refused is None
     drive.finish()

@@ -1,6 +1,7 @@
 """A search may be stopped anywhere: its walk is sound, and its work repeats it bit for bit."""
 
 import math
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
@@ -238,3 +239,27 @@ def test_without_a_price_on_turns_lanes_run_in_that_direction_too():
     path = NearOptimal().plan(problem, WorkLimit(SearchWork(proposals=200_000)))
     assert path.steps == path.cost_s == 99
     assert steps_in_rows(path.cells) == 9
+
+
+def test_a_room_is_finished_before_the_next():
+    """Three rooms that are open to each other all along: without the price lanes run through."""
+    ground = CoverageLattice.from_free(np.ones((9, 18), bool))
+    rooms = np.tile(1 + np.arange(18, dtype=np.uint16) // 6, (9, 1))
+    cost, paths = CoverageCost(1.0, 1.25), {}
+    for room_s in (0.0, 40.0):
+        problem = CoverageProblem.of(ground, (0, 0), cost=replace(cost, room_s=room_s))
+        problem = replace(problem, rooms=rooms)
+        path = plan(problem, WorkLimit(SearchWork(proposals=400_000)))
+        assert path.cost_s == cost.of_walk(path.cells)
+        paths[room_s] = path
+        assert problem.price_us(path.cells) - cost.of_walk_us(path.cells) == round(
+            1e6 * room_s
+        ) * crossings(rooms, path)
+    assert crossings(rooms, paths[40.0]) == 2
+    assert crossings(rooms, paths[0.0]) > 2
+    free = plan(CoverageProblem.of(ground, (0, 0), cost=cost), WorkLimit(paths[0.0].work))
+    assert free.cells.tobytes() == paths[0.0].cells.tobytes()
+
+
+def crossings(rooms, path):
+    return int(np.count_nonzero(np.diff(rooms[tuple(path.cells.T)].astype(int))))

@@ -11,6 +11,7 @@ from fasaco_edge.wire.documents.rooms import RoomReport, Rooms
 
 if TYPE_CHECKING:
     from fasaco_edge.mission.core.mission import Mission
+    from fasaco_edge.mission.coverage.progress import RoomProgress
 
 # Least period of changed rooms, and of swept shares alone while the robot drives [s].
 PERIOD_S, SWEPT_PERIOD_S = 1.0, 5.0
@@ -40,12 +41,12 @@ class RoomsPublisher:
         if now - self._published_at < (PERIOD_S if is_new or is_over else SWEPT_PERIOD_S):
             return
         self._published_at, self._version, self._covered = now, book.version, covered
-        swept = {} if mission is None else mission.room_progress()
-        rooms = tuple(_report(room, *swept.get(room.id, (0, 0))) for room in book.rooms)
+        progress = {} if mission is None else mission.room_progress()
+        rooms = tuple(_report(room, progress.get(room.id)) for room in book.rooms)
         self._outbox.rooms(Rooms(book.frame, book.version, rooms))
 
 
-def _report(room: Room, cells: int, covered: int) -> RoomReport:
+def _report(room: Room, progress: RoomProgress | None) -> RoomReport:
     settings = room.settings
     passes = None if settings.passes is None else passes_document(settings.passes, settings.kinds)
     return RoomReport(
@@ -55,7 +56,8 @@ def _report(room: Room, cells: int, covered: int) -> RoomReport:
         area_m2=room.area_m2,
         neighbours=room.neighbours,
         encloses=room.encloses,
-        swept=round(covered / cells, 4) if cells else None,
+        swept=None if progress is None else progress.share,
+        to_go_s=None if progress is None else progress.to_go_s,
         passes=tuple(passes) if isinstance(passes, list) else passes,  # type: ignore[arg-type]
         skip=settings.skip,
     )

@@ -113,7 +113,7 @@ def _drop_end(state: _State) -> None:
     last = state.walk.counts[LENGTH] - 1
     prices, cells = state.prices, state.walk.cells
     delta = -prices.step_us - _turn_at(state.walk, last - 1, prices.quarter_turn_us)
-    delta -= added(prices, cells[last - 1], cells[last])
+    delta -= added(state.ground, prices, cells[last - 1], cells[last])
     _propose_drop(state, last, 1, delta)
 
 
@@ -122,7 +122,7 @@ def _drop_spike(state: _State, index: int) -> None:
     """Leave out visit ``index`` between two visits of one cell, and the second of these."""
     walk, turn = state.walk, state.prices.quarter_turn_us
     delta = -2 * state.prices.step_us
-    delta -= 2 * added(state.prices, walk.cells[index - 1], walk.cells[index])
+    delta -= 2 * added(state.ground, state.prices, walk.cells[index - 1], walk.cells[index])
     if turn:
         delta -= 2 * turn + _turn_at(walk, index - 1, turn) + _turn_at(walk, index + 1, turn)
         delta += _turn_in(walk, index - 2, walk.cells[index - 1], index + 2, turn)
@@ -134,7 +134,7 @@ def _added_by(state: _State, first: int, last: int) -> int:
     """Return what is added to the prices of the steps from visit ``first`` to ``last`` [us]."""
     total, cells = 0, state.walk.cells
     for index in range(first, last):
-        total += added(state.prices, cells[index], cells[index + 1])
+        total += added(state.ground, state.prices, cells[index], cells[index + 1])
     return total
 
 
@@ -143,7 +143,7 @@ def _drop_detour(state: _State, index: int) -> None:
     """Leave out visits ``index`` and ``index + 1``, whose neighbours are beside each other."""
     walk, turn = state.walk, state.prices.quarter_turn_us
     delta = -2 * state.prices.step_us - _added_by(state, index - 1, index + 2)
-    delta += added(state.prices, walk.cells[index - 1], walk.cells[index + 2])
+    delta += added(state.ground, state.prices, walk.cells[index - 1], walk.cells[index + 2])
     if turn:
         for place in range(index - 1, index + 3):
             delta -= _turn_at(walk, place, turn)
@@ -178,7 +178,9 @@ def _flip_corner(state: _State, index: int) -> None:
     corner = before + after - here
     if corner == here or not (leads(ground, before, corner) and leads(ground, after, corner)):
         return
-    delta = 0
+    prices = state.prices
+    delta = added(ground, prices, before, corner) + added(ground, prices, corner, after)
+    delta -= added(ground, prices, before, here) + added(ground, prices, here, after)
     if turn:
         delta -= _turn_at(walk, index - 1, turn) + _turn_at(walk, index + 1, turn)
         if index > 1:
@@ -234,14 +236,14 @@ def _turns_of_flip(walk: Walk, first: int, last: int, turn: int) -> int:
 
 
 @inlined
-def _added_by_flip(prices: Prices, walk: Walk, first: int, last: int) -> int:
+def _added_by_flip(ground: Ground, prices: Prices, walk: Walk, first: int, last: int) -> int:
     """Return the change in what is added to steps if visits ``first + 1`` to ``last`` reverse."""
     cells = walk.cells
     near, after, far = cells[first], cells[first + 1], cells[last]
-    delta = added(prices, near, far) - added(prices, near, after)
+    delta = added(ground, prices, near, far) - added(ground, prices, near, after)
     if last + 1 < walk.counts[LENGTH]:
         beyond = cells[last + 1]
-        delta += added(prices, after, beyond) - added(prices, far, beyond)
+        delta += added(ground, prices, after, beyond) - added(ground, prices, far, beyond)
     return int(delta)
 
 
@@ -279,7 +281,7 @@ def _flip_square(state: _State, index: int, direction: int, choice: int) -> None
         return
     turn = prices.quarter_turn_us
     delta = _turns_of_flip(walk, first, last, turn) if turn else 0
-    delta += _added_by_flip(prices, walk, first, last)
+    delta += _added_by_flip(ground, prices, walk, first, last)
     if _takes_flip(state, first + 1, delta):
         reverse(walk, first + 1, last)
 
@@ -310,8 +312,8 @@ def _add_detour(state: _State, index: int, direction: int, choice: int) -> None:
         delta -= _turn_at(walk, index + 1, turn)
         if index + 2 < length:
             delta += turning(back, after, cells[index + 2], turn)
-    delta += added(prices, here, aside) + added(prices, aside, back)
-    delta += added(prices, back, after) - added(prices, here, after)
+    delta += added(ground, prices, here, aside) + added(ground, prices, aside, back)
+    delta += added(ground, prices, back, after) - added(ground, prices, here, after)
     if accepts(delta, state.temperature_us, state.random):
         insert_two(ground, walk, index + 1, aside, back)
         walk.counts[COST] += delta

@@ -15,7 +15,14 @@ from numpy.typing import NDArray
 
 from fasaco_edge.kernels import NORTH
 from fasaco_edge.kernels.jit import inlined, lean_kernel
-from fasaco_edge.kernels.local_search.walk_array import FIXED, FRAME, Ground, axis_of, copy
+from fasaco_edge.kernels.local_search.walk_array import (
+    FIXED,
+    FRAME,
+    ROOM_BITS,
+    Ground,
+    axis_of,
+    copy,
+)
 
 
 @lean_kernel
@@ -174,7 +181,7 @@ def cut_ground(ground: Ground, box: Box, region: Ground) -> int:
             cell = row * width + col
             if box.labels[cell] != box.label or ground.steps[cell] == 0:
                 continue
-            mask = 0
+            mask = ground.steps[cell] & ROOM_BITS
             for direction in range(4):
                 beside = cell + ground.offsets[direction]
                 if ground.steps[cell] >> direction & 1 and box.labels[beside] == box.label:

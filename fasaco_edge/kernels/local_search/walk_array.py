@@ -25,12 +25,18 @@ FIXED = 1 << 30
 # Width of the frame [cells].
 FRAME = 2
 
+# First bit of a cell's step mask that says, for each direction, that the step there leads into
+# another room.
+ROOM_BIT = 4
+ROOM_BITS = 0b1111 << ROOM_BIT
+
 
 class Ground(NamedTuple):
     """The ground of the walk.
 
     Attributes:
-        steps: step masks, uint8 (n,); 0 for a jump.
+        steps: step masks, uint8 (n,); 0 for a jump. Bits ``ROOM_BITS`` tell which
+            steps lead into another room.
         needed: int32 (n,), how many visits the cell must keep: 1 where it is to be
             covered, 0 where it is not, FIXED where its visits must not change.
         offsets: int64 (4,), difference of flat index for a step in each direction.
@@ -71,6 +77,7 @@ class Prices(NamedTuple):
         free_end: whether the walk may end anywhere.
         held: this many first visits change only for a gain.
         row_us, col_us: added to the price of a step along a row, along a column [us].
+        room_us: added to the price of a step from one room into another [us].
     """
 
     step_us: int
@@ -79,6 +86,7 @@ class Prices(NamedTuple):
     held: int = 0
     row_us: int = 0
     col_us: int = 0
+    room_us: int = 0
 
 
 @inlined
@@ -110,9 +118,16 @@ def axis_of(one: int, other: int) -> int:
 
 
 @inlined
-def added(prices: Prices, one: int, other: int) -> int:
+def added(ground: Ground, prices: Prices, one: int, other: int) -> int:
     """Return what is added to the price of a step between two cells [us]."""
-    return prices.col_us if axis_of(one, other) else prices.row_us
+    axis = axis_of(one, other)
+    price = prices.col_us if axis else prices.row_us
+    if prices.room_us:
+        way = ROOM_BIT + axis + 2 * (other < one)
+        # One of the two may lie at the rim of a region, and has no mask there.
+        if (ground.steps[one] >> way | ground.steps[other] >> (way ^ 2)) & 1:
+            price += prices.room_us
+    return price
 
 
 @inlined
@@ -160,12 +175,10 @@ def recount(ground: Ground, walk: Walk, length: int, prices: Prices) -> None:
         walk.place[cell] = index
     cost = walk_cost(walk.cells[:length], prices.step_us, prices.quarter_turn_us)
     for index in range(1, length):
-        gap = abs(walk.cells[index] - walk.cells[index - 1])
+        one, other = walk.cells[index - 1], walk.cells[index]
         # Jumps have no direction.
-        if gap == 1:
-            cost += prices.row_us
-        elif gap == ground.offsets[1]:
-            cost += prices.col_us
+        if abs(other - one) == 1 or abs(other - one) == ground.offsets[1]:
+            cost += added(ground, prices, one, other)
     walk.counts[COST] = cost
 
 

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.kernels.jit import inlined, lean_kernel
-from fasaco_edge.kernels.local_search.walk_array import Ground
+from fasaco_edge.kernels.local_search.walk_array import ROOM_BIT, Ground
 from fasaco_edge.kernels.random import draw, index_of
 from fasaco_edge.kernels.windows.memory import (
     AHEAD,
@@ -171,15 +171,20 @@ def _sort(keys: NDArray[np.int64], size: int) -> None:
 
 
 @inlined
-def _added(terms: Terms, side: int) -> int:
+def _added(ground: Ground, terms: Terms, cell: int, side: int) -> int:
     """Return what is added to half a step through a side; nothing at the walk's ends."""
     if side >= WALK_BEGINS:
         return 0
-    return terms.col if side & 1 else terms.row
+    price = terms.col if side & 1 else terms.row
+    if ground.steps[cell] >> (ROOM_BIT + side) & 1:
+        price += terms.room
+    return price
 
 
 @lean_kernel
-def real_cost(passages: Passages, terms: Terms, program: Program, count: int) -> int:
+def real_cost(
+    ground: Ground, passages: Passages, terms: Terms, program: Program, count: int
+) -> int:
     """Return the cost of the window's passages, without prices."""
     total = 0
     for index in range(count):
@@ -189,5 +194,5 @@ def real_cost(passages: Passages, terms: Terms, program: Program, count: int) ->
             if other != NONE and other > slot:
                 one, two = side_of(slot), side_of(other)
                 total += passage_cost(one, two, terms.step, terms.turn)
-                total += _added(terms, one) + _added(terms, two)
+                total += _added(ground, terms, cell, one) + _added(ground, terms, cell, two)
     return total

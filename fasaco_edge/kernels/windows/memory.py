@@ -138,11 +138,12 @@ class Terms(NamedTuple):
 
     Attributes:
         step, turn: a step and a quarter-turn [half us].
-        prices: int64 (n, 4), additional price at a side of a cell, by direction, with ``row``
-            and ``col``.
+        prices: int64 (n, 4), additional price at a side of a cell, by direction, with ``row``,
+            ``col`` and ``room``.
         begin_price, end_price: additional price of its first and its last visit.
         free_end: whether it may end in any cell to cover.
         row, col: added to half a step along a row, along a column [half us].
+        room: added to half a step into another room [half us].
     """
 
     step: int
@@ -153,6 +154,7 @@ class Terms(NamedTuple):
     free_end: bool
     row: int = 0
     col: int = 0
+    room: int = 0
 
 
 class Window(NamedTuple):

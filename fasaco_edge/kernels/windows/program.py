@@ -200,9 +200,9 @@ def end_window(
         program.inside[program.cells[index]] = 0
     if best < 0:
         return 0
-    before = real_cost(passages, terms, program, count)
+    before = real_cost(ground, passages, terms, program, count)
     _put_back(passages, program, window, best, count)
-    return real_cost(passages, terms, program, count) - before
+    return real_cost(ground, passages, terms, program, count) - before
 
 
 @lean_kernel

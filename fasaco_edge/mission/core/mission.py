@@ -45,8 +45,10 @@ from fasaco_edge.mission.coverage.ledger import CoverageLedger, LedgerSnapshot
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
 from fasaco_edge.mission.coverage.progress import (
     Coverage,
+    RoomProgress,
     ZoneProgress,
     room_progress,
+    seconds_in,
     zone_progress,
 )
 from fasaco_edge.mission.coverage.rotated_ledger import rotated_ledger
@@ -60,7 +62,9 @@ from fasaco_edge.mission.map.inputs import InputMonitor
 from fasaco_edge.mission.map.map_state import MapState
 from fasaco_edge.mission.map.reachable_area import ReachableArea
 from fasaco_edge.mission.map.room_book import RoomBook
+from fasaco_edge.mission.map.room_cells import RoomCells
 from fasaco_edge.mission.map.room_watch import RoomWatch
+from fasaco_edge.mission.orders.by_room import RoomPrice
 from fasaco_edge.mission.orders.mask import mask_frame
 from fasaco_edge.mission.orders.order_state import OrderState
 from fasaco_edge.mission.orders.placing import restored
@@ -112,7 +116,9 @@ class Mission:
         self._ledger = MissionLedger(cell_m, tool_m, ahead_m, self._kind.cells(), sight)
         monitor = InputMonitor(config)
         self.company = self._kind.company(config, self._map, self._ledger)
-        self._orders = Sequencer(config, self._map, self._ledger, self.company)
+        self._room_cells = RoomCells(self._rooms, self._rotation.deg)
+        room_price = RoomPrice(config.policy.by_room, self._room_cells)
+        self._orders = Sequencer(config, self._map, self._ledger, self.company, room_price)
         self.route = Route(config.spare_share, self._map, self._orders)
         owners = self._map, self._ledger, monitor, self._orders, self.route
         self._line = LineLayer(sweeping, self._map, self._ledger, self._orders, self.route)
@@ -341,9 +347,15 @@ class Mission:
         """Return the progress of each zone of the order."""
         return zone_progress(self.order_state, self._map.area, self._ledger)
 
-    def room_progress(self) -> dict[int, tuple[int, int]]:
-        """Return for each room, by its number, how many cells are reachable, and covered."""
-        return room_progress(self.rooms, self._rotation.deg, self._map.area, self._ledger)
+    def room_progress(self) -> dict[int, RoomProgress]:
+        """Return the progress in each room, by its number."""
+        area, ahead, line = self._map.area, self.route.path.ahead, self.line_ahead()
+        rooms = None if area is None else self._room_cells.on(area.lattice)
+        to_go_s: dict[int, float] = {}
+        if area is not None and rooms is not None:
+            ahead_s = self._config.cost.of_walk(ahead) if line is None else line.seconds
+            to_go_s = seconds_in(rooms, area.lattice.window, ahead, ahead_s)
+        return room_progress(self.rooms, self._rotation.deg, area, self._ledger, to_go_s)
 
     def snapshot(self) -> LedgerSnapshot:
         """Return the state kept over a restart: coverage, and the order's progress."""

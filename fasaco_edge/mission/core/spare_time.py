@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from fasaco_edge.errors import FasacoError
 from fasaco_edge.mission.coverage.progress import PathProgress
 from fasaco_edge.mission.orders.sequencer import Sequencer
-from fasaco_edge.planners.cost import CoverageCost
 from fasaco_edge.planners.problem import CoverageProblem
 from fasaco_edge.planners.walk_before import HELD_CELLS
 
@@ -129,12 +128,12 @@ class Attempt:
         share = LEAST_SHARE
         if self.problem.is_full:
             share = SETTLED_SHARE if settled_s >= SETTLED_S else CHANGING_SHARE
-        return ahead if _is_worth_it(self.problem.cost, path.ahead, ahead, share) else None
+        return ahead if _is_worth_it(self.problem, path.ahead, ahead, share) else None
 
 
 def _is_worth_it(
-    cost: CoverageCost, before: NDArray[np.int32], after: NDArray[np.int32], share: float
+    problem: CoverageProblem, before: NDArray[np.int32], after: NDArray[np.int32], share: float
 ) -> bool:
-    cost_s = cost.of_walk(before)
-    least_s = max(LEAST_STEPS * cost.step_s, share * cost_s)
-    return cost_s - cost.of_walk(after) >= least_s
+    cost_us = problem.price_us(before)
+    least_us = max(LEAST_STEPS * problem.cost.step_us, share * cost_us)
+    return cost_us - problem.price_us(after) >= least_us

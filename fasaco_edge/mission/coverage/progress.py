@@ -9,7 +9,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.grid.geometry import Polygon
+from fasaco_edge.grid.geometry import Polygon, Window
 from fasaco_edge.grid.lattice import Cell, CoverageLattice, pixels_of, placement_on
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.grid.rotation import rotated_polygon
@@ -240,16 +240,42 @@ def _counts(
     ]
 
 
+@dataclass(frozen=True, slots=True)
+class RoomProgress:
+    """Progress in a room.
+
+    Attributes:
+        cells: how many of its cells are reachable.
+        covered: how many of these are covered.
+        to_go_s: time of the path ahead within it [s]; None without a path.
+    """
+
+    cells: int
+    covered: int
+    to_go_s: float | None
+
+    @property
+    def share(self) -> float | None:
+        """The covered share; None if no cell is reachable."""
+        return round(self.covered / self.cells, 4) if self.cells else None
+
+
 def room_progress(
-    book: RoomBook, lattice_deg: float, ground: ReachableArea | None, ledger: MissionLedger
-) -> dict[int, tuple[int, int]]:
-    """Return for each room, by its number, how many cells are reachable, and covered.
+    book: RoomBook,
+    lattice_deg: float,
+    ground: ReachableArea | None,
+    ledger: MissionLedger,
+    to_go_s: dict[int, float],
+) -> dict[int, RoomProgress]:
+    """Return the progress in each room, by its number.
 
     Args:
         book: the rooms, in the map frame.
         lattice_deg: angle of the cells' rows to its x axis [deg].
         ground: the reachable area.
         ledger: the covered cells.
+        to_go_s: time of the path ahead within each room that it leads through [s]; without a path
+            empty.
     """
     placed = [room for room in book.rooms if room.outline]
     if ground is None or not placed:
@@ -265,5 +291,25 @@ def room_progress(
     lattice, reachable = ground.lattice, ground.reachable
     visited = reachable & (ledger.visits(lattice.window) > 0)
     cells, covered = (_counts(outlines, holes, lattice, each) for each in (reachable, visited))
-    counts = zip(cells, covered, strict=True)
-    return {room.id: counted for room, counted in zip(placed, counts, strict=True)}
+    return {
+        room.id: RoomProgress(own, done, to_go_s.get(room.id, 0.0) if to_go_s else None)
+        for room, own, done in zip(placed, cells, covered, strict=True)
+    }
+
+
+def seconds_in(
+    rooms: NDArray[np.uint16], window: Window, ahead: NDArray[np.int32], ahead_s: float
+) -> dict[int, float]:
+    """Return how long a way stays in each room that it leads through [s].
+
+    Args:
+        rooms: uint16 (rows, cols), the room of each cell of ``window``, 0 for none.
+        window: these cells.
+        ahead: int32 (n, 2), the cells of the way.
+        ahead_s: how long it takes [s]; its cells share that evenly.
+    """
+    if len(ahead) < 2:
+        return {}
+    steps = np.bincount(window.values_at(rooms, ahead[1:], 0))
+    seconds = np.round(steps * (ahead_s / (len(ahead) - 1)), 1).tolist()
+    return {room: seconds[room] for room in np.flatnonzero(steps).tolist()}

@@ -60,6 +60,11 @@ class RoomRaster:
             ids[common.slices_in(window)] = self.ids[common.slices_in(self.window)]
         return ids
 
+    def at(self, points: NDArray[np.float64]) -> Ids:
+        """Return the rooms at points (x, y) [m] of the map frame, float64 (n, 2); 0 for none."""
+        squares = np.floor(points[:, ::-1] / self.square_m).astype(np.int32)
+        return self.window.values_at(self.ids, squares, 0)
+
     def cropped(self) -> RoomRaster:
         """Return the same without empty rows and columns at its border."""
         inner = Window.of(self.ids > 0)

@@ -18,6 +18,7 @@ from fasaco_edge.mission.map.loop_closure import Motion, moved_cells
 from fasaco_edge.mission.map.map_state import MapState
 from fasaco_edge.mission.map.reachable_area import ReachableArea, anchor_cell
 from fasaco_edge.mission.map.room_book import MOST_LISTED
+from fasaco_edge.mission.orders.by_room import RoomPrice
 from fasaco_edge.mission.orders.cells_left import CellsLeft, LeftBehind, zones_beyond
 from fasaco_edge.mission.orders.exploration import Exploration
 from fasaco_edge.mission.orders.order import Errand, Zone
@@ -70,13 +71,19 @@ class Sequencer:
     """
 
     def __init__(
-        self, config: MissionConfig, map_state: MapState, ledger: MissionLedger, company: Company
+        self,
+        config: MissionConfig,
+        map_state: MapState,
+        ledger: MissionLedger,
+        company: Company,
+        room_price: RoomPrice,
     ) -> None:
         self.order_state = OrderState.idle(NO_ORDER)
         self._config = config
         self._map = map_state
         self._ledger = ledger
         self._company = company
+        self._room_price = room_price
         self._run = _Run()
         # Returns at the end of an order how much floor was swept, as text; "" for no text.
         self._sum_up: Callable[[], str] = str
@@ -278,7 +285,7 @@ class Sequencer:
         )
         # The walk of another pass has other lanes: a repair would keep them.
         is_full, self._run.is_laid_anew = self._run.is_laid_anew, False
-        return replace(problem, is_full=is_full)
+        return self._room_price.added_to(replace(problem, is_full=is_full))
 
     def _cost(self, state: OrderState) -> CoverageCost:
         """Return the cost of paths in the present pass, by its lanes and its speed."""

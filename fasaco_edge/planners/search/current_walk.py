@@ -126,7 +126,7 @@ class CurrentWalk:
     def _unload(self) -> None:
         if self.region.is_loaded:
             walk = self.region.put_back()
-            self._accept(walk, self._problem.cost_us(walk))
+            self._accept(walk, self._problem.cost_us(walk, self._framed))
 
     def open_windows(self, bound: LowerBound) -> WindowSearch:
         """Return the search in windows, guided by the prices of ``bound``; opened now."""

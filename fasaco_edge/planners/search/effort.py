@@ -42,7 +42,7 @@ def effort_for(cost: CoverageCost, *, has_ants: bool = True) -> Effort:
     surroundings of a perturbation are annealed.
     """
     by_ants = BY_ANTS if has_ants else 0
-    if not (cost.quarter_turn_us or cost.has_lanes):
+    if not (cost.quarter_turn_us or cost.is_priced):
         rules = PerturbationRules(
             limit=EVERY_CELL,
             proposals=25,
@@ -105,7 +105,7 @@ def repair_for(cost: CoverageCost) -> RepairEffort:
         steady=True,
         strict=True,
     )
-    if not (cost.quarter_turn_us or cost.has_lanes):
+    if not (cost.quarter_turn_us or cost.is_priced):
         return RepairEffort(rules, 30_000, 24_000, 0)
     unit = (cost.step_us + cost.quarter_turn_us) * 2 // 5
     rules = rules._replace(proposals=40, radius=5, temperature_us=unit * 3 // 2, loops_of_256=64)

@@ -70,7 +70,7 @@ class NearOptimal:
         simple walk.
         """
         path = _with_lead(problem, self._plan(problem, stop, observe))
-        if not problem.cost.has_lanes:
+        if not problem.cost.is_priced:
             return path
         return replace(path, cost_s=problem.cost.seconds.of_walk(path.cells))
 

@@ -104,7 +104,8 @@ def _steady(
     _run(repair, stop)
     other = repair.path(path.planner, path.seed)
     cells = np.concatenate((problem.before[:held], other.cells))
-    cost_us, path_us = problem.cost.of_walk_us(cells), problem.cost.of_walk_us(path.cells)
+    cost_us = problem.price_us(cells)
+    path_us = problem.price_us(path.cells)
     if cost_us > min(path_us + effort.steady_us, max(path_us, completed_us)):
         return replace(path, work=other.work)
     cost_s = cost_us / MICROSECONDS
@@ -137,7 +138,7 @@ class _Repair:
         self.completed = problem.cells_of(self._framed.unframed(self._walk[: HELD_CELLS + 1]))
         self._first_walk_s = time.perf_counter() - began
         self._changed = _changed(self._framed, before, self._walk)
-        self.completed_us = self._cost_us = problem.cost_us(self._walk)
+        self.completed_us = self._cost_us = problem.cost_us(self._walk, self._framed)
         has_bound = problem.only_better or problem.cells <= BOUNDED_CELLS
         self._bound = lower_bound_of(problem, GLANCE) if has_bound else None
         self._random = stream_of(config.seed, len(self._walk))
@@ -201,7 +202,7 @@ class _Repair:
         if self._region is None:
             return
         self._walk, self._work = self._region.put_back(), self._work + self._region.work
-        self._cost_us = self._problem.cost_us(self._walk)
+        self._cost_us = self._problem.cost_us(self._walk, self._framed)
         self._saved_by_ants_us += self._region.saved_by_ants_us
         self._region = None
 

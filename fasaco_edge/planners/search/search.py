@@ -160,7 +160,7 @@ class Search:
         if self._walk.least_us <= self._bound.cost_us:
             return True
         cost = self._problem.cost
-        only_steps = not (cost.quarter_turn_us or cost.has_lanes)
+        only_steps = not (cost.quarter_turn_us or cost.is_priced)
         return only_steps and self.progress().steps == self._bound.steps
 
     def _tighten(self, work: int) -> LowerBound:
@@ -189,7 +189,7 @@ class Search:
         if before is None or not has_walk(problem):
             return
         walk = completed(problem, self._framed, before, HELD_CELLS)
-        cost_us = problem.cost_us(walk)
+        cost_us = problem.cost_us(walk, self._framed)
         if cost_us <= self._walk.cost_us:
             self._walk.begin(walk, cost_us)
             # The first visits of a region are those of the walk only if there is one region.

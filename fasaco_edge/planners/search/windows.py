@@ -12,7 +12,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.kernels.local_search.walk_array import FRAME
+from fasaco_edge.kernels.local_search.walk_array import FRAME, ROOM_BIT
 from fasaco_edge.kernels.windows.memory import (
     KINDS,
     MOST_CHOICES,
@@ -119,7 +119,7 @@ class WindowSearch:
         if walk.size < 2 or not passages_of(self._ground, walk, lanes, self._passages):
             return False
         _copy(self._passages, self._best)
-        self._tally[COST] = self._tally[BEST] = 2 * self._problem.cost_us(walk)
+        self._tally[COST] = self._tally[BEST] = 2 * self._problem.cost_us(walk, self._framed)
         self._counted_us = -1
         self._walk = given
         return True
@@ -224,19 +224,20 @@ def _terms(
     flat, priced, is_wanted = bound.side_prices()
     cells = framed.framed(flat)
     # Half a step is priced at each of the two cells.
-    row, col = problem.cost.row_us, problem.cost.col_us
+    row, col, room = problem.cost.row_us, problem.cost.col_us, problem.cost.room_us
     priced = priced + np.array([row, col, row, col], np.int64)
+    masks = framed.ground.steps[cells]
+    priced += room * (masks[:, np.newaxis] >> (ROOM_BIT + np.arange(4)) & 1)
     prices = np.zeros((framed.ground.bound, 4), np.int64)
     prices[cells] = priced
     step, turn = 2 * problem.cost.step_us, 2 * problem.cost.quarter_turn_us
-    masks = framed.ground.steps[cells]
     sides = np.where(masks[:, np.newaxis] >> np.arange(4) & 1, priced, NO_SIDE).min(axis=1)
     # With these prices no first or last visit has a negative cost.
     ends = is_wanted if problem.end is None else flat == problem.flat_end
     begin_price = -(step // 2 + int(sides[flat == problem.flat_start].min()))
     end_price = -(step // 2 + int(sides[ends].min()))
     is_free = problem.end is None
-    return Terms(step, turn, prices, begin_price, end_price, is_free, row, col), cells
+    return Terms(step, turn, prices, begin_price, end_price, is_free, row, col, room), cells
 
 
 def _program(size: int, beam: int, cells: int) -> Program:

@@ -25,6 +25,7 @@ class RoomReport(Document, frozen=True):
         neighbours: numbers of the rooms that it has a passage to.
         encloses: numbers of the rooms that lie within its outline, and are no part of it.
         swept: swept share of its reachable floor, in the present pass; null if none is reachable.
+        to_go_s: driving time of the path ahead within the room [s]; null without a path.
         passes: passes of an order by its name that gives none itself, as in `mission.json`; null
             for as many as other zones.
         skip: whether orders for everything leave it out.
@@ -37,6 +38,7 @@ class RoomReport(Document, frozen=True):
     neighbours: Annotated[tuple[Ordinal, ...], allowed(maxItems=250)] = ()
     encloses: Annotated[tuple[Ordinal, ...], allowed(maxItems=250)] = ()
     swept: Share | None = None
+    to_go_s: Amount | None = None
     passes: int | tuple[str | dict[str, object], ...] | None = None
     skip: bool = False
 

@@ -202,7 +202,7 @@ class Conditions:
         cost: what its walks are to have little of.
         seat: who plans.
         planning_takes_time: whether the robot drives on, or stands, while a plan is made.
-        plans_on_trail, policy, battery: see ``MissionConfig``.
+        plans_on_trail, policy, battery, spare_share: see ``MissionConfig``.
     """
 
     senses: Senses
@@ -213,6 +213,7 @@ class Conditions:
     plans_on_trail: bool = False
     policy: MissionPolicy = NO_PATIENCE
     battery: BatteryPolicy | None = None
+    spare_share: float = 0.0
 
 
 class OnlineMission:
@@ -242,6 +243,7 @@ class OnlineMission:
             policy=conditions.policy,
             plans_on_trail=conditions.plans_on_trail,
             battery=conditions.battery,
+            spare_share=conditions.spare_share,
         )
         self._mission = Mission(config)
         # A plan that takes its time, and when it will be there.

@@ -1,0 +1,51 @@
+"""Rooms on the lattice: the room of each cell."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fasaco_edge.grid.lattice import CoverageLattice
+from fasaco_edge.grid.rotation import rotated_points
+from fasaco_edge.mission.map.room_raster import BLOCK, NOWHERE, RoomRaster
+from fasaco_edge.mission.map.room_watch import RoomWatch
+
+
+class RoomCells:
+    """Finds the rooms of cells by their centres.
+
+    Args:
+        watch: the rooms, in the map frame.
+        lattice_deg: angle of the cells' rows to its x axis [deg].
+    """
+
+    def __init__(self, watch: RoomWatch, lattice_deg: float) -> None:
+        self._watch, self._lattice_deg = watch, lattice_deg
+        # The rooms of a window's cells, and the raster that they were read from.
+        self._raster, self._window = RoomRaster.empty(1.0), NOWHERE
+        self._rooms = np.zeros((0, 0), np.uint16)
+
+    def on(self, lattice: CoverageLattice) -> NDArray[np.uint16] | None:
+        """Return the room of each cell of a lattice, uint16 (rows, cols), 0 for none.
+
+        None as long as no room is known.
+        """
+        sheet = self._watch.book.sheet
+        if sheet is None or not sheet.rooms:
+            return None
+        if sheet.raster is not self._raster or lattice.window != self._window:
+            self._raster, self._window = sheet.raster, lattice.window
+            self._rooms = self._read(lattice)
+        return self._rooms
+
+    def _read(self, lattice: CoverageLattice) -> NDArray[np.uint16]:
+        window, rooms = lattice.window, np.zeros(lattice.states.shape, np.uint16)
+        step = max(1, BLOCK // max(window.cols, 1))
+        for first in range(0, window.rows, step):
+            part = rooms[first : first + step]
+            rows, cols = np.indices(part.shape, np.int32)
+            cells = np.stack((rows + (window.row0 + first), cols + window.col0), axis=-1)
+            centres = lattice.centres(cells.reshape(-1, 2))
+            places = rotated_points(centres, self._lattice_deg) if self._lattice_deg else centres
+            part[:] = self._raster.at(places).reshape(part.shape)
+        return rooms

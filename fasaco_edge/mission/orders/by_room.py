@@ -1,0 +1,38 @@
+"""Rooms one by one: a price of steps from one room into another.
+
+Of many walks that take nearly the same time most leave rooms half done. With the price the search
+chooses one that finishes a room before the next.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from fasaco_edge.mission.config import ByRoom
+from fasaco_edge.mission.map.room_cells import RoomCells
+from fasaco_edge.planners.problem import CoverageProblem
+
+# Price of a step into another room, in steps with a quarter-turn each. With 6 in place of 2 robots
+# came back to as many rooms.
+PRICES: dict[ByRoom, float] = {"never": 0.0, "auto": 2.0, "always": 20.0}
+
+
+class RoomPrice:
+    """Adds rooms, and the price of steps between them, to the problems of a mission.
+
+    Args:
+        by_room: how much rooms matter.
+        cells: the rooms of cells.
+    """
+
+    def __init__(self, by_room: ByRoom, cells: RoomCells) -> None:
+        self._price, self._cells = PRICES[by_room], cells
+
+    def added_to(self, problem: CoverageProblem) -> CoverageProblem:
+        """Return a problem with the rooms of its cells, and the price of steps between them."""
+        rooms = self._cells.on(problem.lattice) if self._price else None
+        if rooms is None:
+            return problem
+        cost = problem.cost
+        room_s = self._price * (cost.step_s + cost.quarter_turn_s)
+        return replace(problem, cost=replace(cost, room_s=room_s), rooms=rooms)
