@@ -33,12 +33,10 @@ RESOLUTION_M = 0.05
 HALL_PX, WALL_PX, DOOR_PX, CRATE_PX = 200, 4, 30, 16
 # Places of the crate: each time it moves by less than its width, forth and back.
 CRATE_PLACES, CRATE_STEP_PX = 12, 12
-# Where the crate stands when the robot begins to drive.
-FIRST_CRATE = 1
 POSES_HZ = 10
 SPEED_M_S = 0.5
-# Period of maps [s], each with the crate at another place: the rest of the path is replanned.
-MAP_EVERY_S = 1.0
+# In a mission maps come twice a second, and one in this many shows a change.
+MAP_EVERY_S, MAPS_A_CRATE = 0.5, 20
 # Timeout of the first path, which needs the kernels: a slow computer loads them for long.
 PATH_TIMEOUT_S = 300.0
 
@@ -154,28 +152,21 @@ class CoveringRobot:
 
     Args:
         source: publishes its poses and maps.
-        map_every_s: period of maps [s].
-        maps_a_crate: number of successive maps that show the crate at one place.
-
-    Attributes:
-        paths: number of received paths.
+        crate: number of the crate that stands in its way.
     """
 
-    def __init__(self, source: MapSource, map_every_s: float, maps_a_crate: int) -> None:
-        self.paths = 0
+    def __init__(self, source: MapSource, crate: int) -> None:
         self._source = source
-        self._map_every_s, self._maps_a_crate = map_every_s, maps_a_crate
         self._building = building()
         self._at = np.array([2.5, 2.5])
         self._ahead: NDArray[np.float64] = np.empty((0, 2))
-        self._maps, self._map_due = FIRST_CRATE * maps_a_crate, 0.0
+        self._maps, self._map_due = crate * MAPS_A_CRATE, 0.0
         self._lock = threading.Lock()
 
     def take_path(self, sample: Sample) -> None:
         """Drive this from now on."""
         ahead = decode_path(sample.payload).xy
         with self._lock:
-            self.paths += 1
             self._ahead = ahead
 
     def tick(self, now: float) -> None:
@@ -187,9 +178,9 @@ class CoveringRobot:
         self._source.put_pose(StampedPose(Pose2D(x, y), stamp_ns=time.time_ns()))
         if now >= self._map_due:
             self._maps += 1
-            self._map_due = now + self._map_every_s
-            number = self._maps // self._maps_a_crate
-            self._source.put_map(with_crate(self._building, number, time.time_ns()))
+            self._map_due = now + MAP_EVERY_S
+            crate = self._maps // MAPS_A_CRATE
+            self._source.put_map(with_crate(self._building, crate, time.time_ns()))
 
     def _drive(self, metres: float) -> None:
         while len(self._ahead) and metres > 0.0:
@@ -202,28 +193,18 @@ class CoveringRobot:
 
 
 @contextmanager
-def robot_beside(
-    daemon: DaemonProcess,
-    bus: Bus,
-    *,
-    map_every_s: float = MAP_EVERY_S,
-    maps_a_crate: int = 1,
-    source: MapSource | None = None,
-) -> Iterator[CoveringRobot]:
+def robot_beside(daemon: DaemonProcess, bus: Bus, source: MapSource, crate: int) -> Iterator[None]:
     """Let a robot drive for the block, from the moment it has its first path.
 
     Args:
         daemon, bus: whose robot it is, and a session with it.
-        map_every_s, maps_a_crate: see ``CoveringRobot``.
-        source: publisher of maps and poses; None for a new one.
+        source: publisher of its maps and poses.
+        crate: number of the first crate; on a map that it knows the daemon would plan nothing.
     """
-    source = source or MapSource(daemon, bus)
-    robot = CoveringRobot(source, map_every_s, maps_a_crate)
+    robot = CoveringRobot(source, crate)
     bus.subscribe(daemon.keys.of(topics.PATH), robot.take_path)
     stamp_ns = time.time_ns()
-    source.put_pose(robot_pose(stamp_ns))
-    # A new map: the daemon would plan nothing on one that it knows already.
-    source.put_map(with_crate(building(), FIRST_CRATE, stamp_ns))
+    source.put_map(with_crate(building(), crate, stamp_ns))
     source.wait_path(stamp_ns)
     over = threading.Event()
 
@@ -234,7 +215,7 @@ def robot_beside(
     thread = threading.Thread(target=drive, name="robot")
     thread.start()
     try:
-        yield robot
+        yield
     finally:
         over.set()
         thread.join()

@@ -38,7 +38,7 @@ COMMANDS = {
     "review": "report what happened in a recorded mission",
     "replay": "replay a recorded mission and compare its decisions",
     "simulate": "simulate a robot with a laser scanner on the bus",
-    "bench": "measure speed, footprint, latency and jitter on this machine",
+    "bench": "compare planners; measure a daemon's memory, load and delays on this machine",
     "maps": "list the maps that come with the package",
     "warmup": "compile the kernels into the cache, so that the first plan starts at once",
     "check-config": "check a configuration: every fault, with line, value and what is allowed",

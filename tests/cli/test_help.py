@@ -30,7 +30,7 @@ def test_help_explains(capsys, name):
 
 
 # Commands that have commands of their own.
-GROUPS = ("mission start", "mission keep-out", "rooms set", "bench footprint")
+GROUPS = ("mission start", "mission keep-out", "rooms set", "bench daemon")
 
 
 @pytest.mark.parametrize("columns", [80, 200])

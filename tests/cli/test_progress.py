@@ -56,13 +56,12 @@ def recording(tmp_path):
         ((*PLAN, "--robots", "1,1", "2,2"), "steps ━", "map +.*"),
         (("warmup",), "looking at the kernels ", "kernels ready after [0-9.]+ s in .*"),
         (
-            ("bench", "latency", "--samples", "2"),
-            "warming the kernels' cache ━* 0/2 ",
-            "from map.*",
+            ("bench", "planners", "--maps", "office", "--seeds", "1", "--ants", "8"),
+            "planners ━* +0/6 ",
+            ".*",
         ),
-        (("bench", "speed", "--maps", "flat"), "speed ━* +0/10 ", ".*"),
     ],
-    ids=["plan", "ants", "fleet", "warmup", "latency", "speed"],
+    ids=["plan", "ants", "fleet", "warmup", "planners"],
 )
 def test_progress_is_drawn_and_leaves_nothing_behind(words, shown, first_line):
     with Terminal(*words, columns=120) as shell:
