@@ -317,7 +317,7 @@ def draw_mission(
     grid: OccupancyGrid,
     lattice: CoverageLattice,
     driven_xy: NDArray[np.float64],
-    visits: NDArray[np.uint16],
+    visits: NDArray[np.uint16] | None = None,
     *,
     title: str,
     lines: Sequence[str],
@@ -336,7 +336,7 @@ def draw_mission(
         grid: the map at its end.
         lattice: the planning grid at its end.
         driven_xy: float64 (n, 2), n >= 1: where the robot was, (x, y) [m], in order.
-        visits: uint16, shape of the lattice: how often each cell was covered.
+        visits: uint16, shape of the lattice: how often each cell was covered; None with ``swept``.
         title: heading.
         lines: caption below it.
         space: the most the map may take (width, height) [px].
@@ -351,6 +351,7 @@ def draw_mission(
     plot.ground(grid)
     start = lattice.cell_at(*driven_xy[0].tolist())
     if swept is None:
+        assert visits is not None
         key = draw_visits(plot, lattice, visits, start, left_out_words)
     else:
         plot.paint(swept, palette.COVERED)

@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from fasaco_edge.cli.console.arguments import Exit
 from fasaco_edge.cli.demo import COMMAND
 from fasaco_edge.cli.demo.mission import DemoMission
 from fasaco_edge.cli.demo.robots import demo_robots
@@ -144,12 +143,6 @@ def test_robots_of_a_fleet_cover_a_building_together(tmp_path, building):
     with Image.open(summary["picture"]) as picture:
         assert min(picture.size) > 200
     assert not [pid for pid in processes_of(out) if is_running(pid)]
-
-
-def test_mishaps_need_a_fleet(tmp_path, building):
-    ended = fasaco_edge("demo", "--map", building, "--kill-after", 5, "--out", tmp_path)
-    assert ended.code == Exit.CONFIG
-    assert "--robots of 2 or more" in ended.err
 
 
 def test_more_robots_than_places_to_start_from(tmp_path):
