@@ -208,7 +208,6 @@ def figures_of(plan: Plan) -> dict[str, object]:
         "unreachable_cells": int(np.count_nonzero(problem.unreachable)),
         **driving(plan.robot),
         "budget_s": search.most_s,
-        "target_gap": search.target_gap,
         "threads": search.threads,
         "ended_by": plan.ended_by,
         "first_walk_ms": round(1e3 * path.first_walk_s, 3),

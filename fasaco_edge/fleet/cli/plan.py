@@ -87,11 +87,6 @@ def _check(args: argparse.Namespace, request: PlanRequest) -> None:
             f"--line {request.line}: a line over the floor is for one robot",
             hint="leave --line out",
         )
-    if search.target_gap is not None:
-        raise BadConfiguration(
-            "--target-gap: how far several robots' walks are from the best is not known well",
-            hint="choose --budget",
-        )
     if args.pheromone_png is not None:
         raise BadConfiguration(
             "--pheromone-png: is of one robot's colony; several robots' walks are cut from one",

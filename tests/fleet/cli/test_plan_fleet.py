@@ -153,7 +153,6 @@ def test_without_json_it_prints_a_line_for_each_robot(plan, grid):
         (["--robots", "0,0", "99,5"], "robot 2: start cell (99, 5) lies outside"),
         (["--robots", "0,0", "--end", "1,1"], "cannot end in one cell"),
         (["--robots", "0,0", "--planner", "aco"], "planned for by colony-search"),
-        (["--robots", "0,0", "--target-gap", "0.1"], "--target-gap"),
         (["--robots", "0,0", "--align", "walls"], "--align"),
         (["--robots", "0,0", "--overlap", "0.1"], "--overlap"),
         (["--robots", "0,0", "--clearance", "0.02"], "--clearance"),
