@@ -23,8 +23,7 @@ EPILOG = """\
 Nothing is started or changed: it joins the bus for a second, listens, and queries. Run it as the
 daemon's user or as root, so that it can read what the daemon reads. The checks:
   configuration   whether the file is in order
-  platform        processor, system, Python
-  C library       whether it is new enough for the installed packages
+  platform        processor, system, Python; whether there is more than one core
   memory          how much there is, and whether limits on it hold
   clock           whether it is synchronised
   kernels         whether they are compiled for this code and processor, and who owns them
@@ -37,7 +36,6 @@ daemon's user or as root, so that it can read what the daemon reads. The checks:
                   or user and password
   secret files    whether others on this computer can read keys and passwords
   roles           who may publish maps, command, view and record
-  limits          how much each sender may send
 
 Each line is ok; warn: works, but needs attention; or fail, with what to do.
 exit codes: 0 nothing failed, 1 something failed
