@@ -32,7 +32,7 @@ def test_the_key_stands_where_no_line_runs(points, is_low, is_left, monkeypatch)
             text(pen, x, y, words, *rest),
         ),
     )
-    picture = draw_panels("", (), [panel(points)], 1)
+    picture = draw_panels([panel(points)])
     ((x, y),) = {(x, y) for words, x, y in placed if words == "left"}
     assert (y > picture.height / 2) == is_low
     assert (x < picture.width / 2) == is_left
@@ -50,6 +50,13 @@ def test_the_unit_stands_below_the_caption(monkeypatch):
             text(pen, x, y, words, size, colour, anchor),
         ),
     )
-    draw_panels("", (), [panel(((0.0, 0.0),), caption="what is shown")], 1)
+    draw_panels([panel(((0.0, 0.0),), caption="what is shown")])
     upper, size = placed["what is shown"]
     assert placed["%"][0] > upper + size
+
+
+def test_an_axis_has_round_numbers():
+    axis = Axis.linear("%", [0.3, 1.9])
+    assert (axis.low, axis.high) == (0.0, 2.0)
+    assert [text for _, text in axis.ticks] == ["0", "0.5", "1", "1.5", "2"]
+    assert Axis.linear("%", [0.0]).high > 0.0
