@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import argparse
-import os
 import sys
 import textwrap
-import threading
 from dataclasses import asdict
 from pathlib import Path
 
@@ -16,7 +14,7 @@ from fasaco_edge.cli.console.arguments import Command, Exit, add_json
 from fasaco_edge.cli.console.streams import print_json
 from fasaco_edge.cli.console.terminal import out
 from fasaco_edge.doctor.finding import Finding, Level
-from fasaco_edge.doctor.report import CHECKS, findings
+from fasaco_edge.doctor.report import findings
 from fasaco_edge.text import one_line
 
 EPILOG = """\
@@ -68,14 +66,7 @@ def run(args: argparse.Namespace) -> int:
     else:
         _print(found)
     failed = any(finding.level is Level.FAIL for _, finding in found)
-    code = Exit.ERROR if failed else Exit.OK
-    checks = {check.name for check in CHECKS}
-    if any(thread.name in checks for thread in threading.enumerate()):
-        # The interpreter would wait at its exit for a check that hangs. Other threads belong to the
-        # caller.
-        sys.stdout.flush()
-        os._exit(code)
-    return code
+    return Exit.ERROR if failed else Exit.OK
 
 
 def _document(found: list[tuple[str, Finding]]) -> dict[str, object]:

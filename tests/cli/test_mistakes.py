@@ -154,7 +154,6 @@ def test_a_mistake_is_told_with_a_hint(folder, capsys, words, code, said):
         ("review a.rrd --pint 1,2", "unrecognized arguments: --pint 1,2; did you mean --point?"),
         ("mission start --pases 2", "did you mean --passes?"),
         ("review a.rrd --format csv", "unrecognized arguments: --format csv"),
-        ("plan office --no-local-search", "removed in this version: write --planner fasaco"),
         ("plan office --planner best", "argument --planner: must be colony-search, fasaco, aco"),
         ("record", "the following arguments are required: --out"),
         ("record --out . --pose-schema tf", "argument --pose-schema: invalid choice: 'tf'"),

@@ -103,7 +103,6 @@ def test_points_of_a_map_are_cells_of_it(plan, tmp_path, places):
     "starts",
     [
         ["--robots", "-1,0", "0,0", "-2,-3"],
-        ["--robots=-1,0", "0,0", "-2,-3"],
         ["--robots=-1,0", "--robots", "0,0", "-2,-3"],
     ],
     ids=" ".join,
