@@ -100,7 +100,7 @@ def run(args: argparse.Namespace) -> int:
             asked_share,
             swept,
         )
-    if planned.curve_figures is not None and (left := planned.curve_figures.spot_turns):
+    if planned.floor is not None and (left := planned.floor.spot_turns):
         LOG.warning(
             "%d turn%s not fit on arcs of %g m: the robot would turn on the spot there%s",
             left,
@@ -161,9 +161,11 @@ def _print(args: argparse.Namespace, planned: Plan) -> None:
         print_json(figures)
         return
     if args.long:
-        figures["floor"] = planned.floor or "not known of a coverage grid"
-        if planned.curve_figures is not None:
-            figures["curve"] = planned.curve_figures
+        from fasaco_edge.offline.figures import floor_words
+
+        floor = planned.floor
+        figures["floor"] = "not known of a coverage grid" if floor is None else floor_words(floor)
+        figures["curve"] = planned.curve_words or None
         rows = [(name.replace("_", " "), text) for name, text in terminal.known(figures)]
         terminal.out().print(terminal.figures(rows))
     else:

@@ -45,14 +45,12 @@ class Ending:
     Attributes:
         statuses: the last status of each daemon.
         wall_s: how long it took [s].
-        replan_ms: time of every plan reported [ms].
         timed_out: whether time ran out first.
         makespan_s: from when the first robot worked until the last was done, in simulated time.
     """
 
     statuses: tuple[Status, ...]
     wall_s: float
-    replan_ms: tuple[float, ...]
     timed_out: bool
     makespan_s: float = 0.0
 
@@ -71,7 +69,6 @@ class DemoMission:
         self._silent: set[str] = set()
         self._newest = [LatestSlot[Sample]() for _ in robots]
         self._statuses = [Status() for _ in robots]
-        self._plans: dict[tuple[int, int], float] = {}
         self._worked_at: list[float] = []
         self._started = 0.0
         self._done_since: float | None = None
@@ -106,7 +103,6 @@ class DemoMission:
         return Ending(
             tuple(self._statuses),
             time.monotonic() - self._started,
-            tuple(self._plans.values()),
             timed_out=self._done_since is None,
             makespan_s=worked_s * self._args.speed,
         )
@@ -121,8 +117,6 @@ class DemoMission:
             sample = newest.take(timeout_s / len(self._robots))
             if sample is not None:
                 status = decode_tolerant(sample.payload, Status)
-                if status.latency_ms.plan is not None:
-                    self._plans[number, status.plan.plans] = status.latency_ms.plan
                 self._statuses[number] = status
                 if not self._waiting:
                     self._view.show(number, status, now - self._started)

@@ -71,8 +71,6 @@ class Summary:
     complete: bool
     reachable_cells: int
     covered_cells: int
-    recovered_cells: int
-    unreachable_cells: int
     reachable_m2: float
     swept_m2: float
     swept_twice_m2: float
@@ -80,8 +78,6 @@ class Summary:
     robots: tuple[RobotFigures, ...]
     plans: int
     paths: int
-    plan_ms_p50: float | None
-    plan_ms_p99: float | None
     errors: int
     wall_s: float
     makespan_s: float
@@ -111,8 +107,6 @@ def summarise(
         complete=cells.covered == cells.coverable and not ending.timed_out,
         reachable_cells=cells.coverable,
         covered_cells=cells.covered,
-        recovered_cells=cells.recovered,
-        unreachable_cells=cells.unreachable,
         reachable_m2=round(truth.floor.figures.reachable_m2, 2),
         swept_m2=round(truth.floor.figures.swept_m2, 2),
         swept_twice_m2=round(truth.swept_twice_m2, 2),
@@ -120,8 +114,6 @@ def summarise(
         robots=figures,
         plans=sum(status.plan.plans for status in ending.statuses),
         paths=sum(status.path.revision for status in ending.statuses if status.path),
-        plan_ms_p50=_percentile(ending.replan_ms, 50),
-        plan_ms_p99=_percentile(ending.replan_ms, 99),
         errors=sum(status.errors.total for status in ending.statuses),
         wall_s=round(ending.wall_s, 1),
         makespan_s=round(ending.makespan_s, 1),
@@ -184,12 +176,9 @@ def _rows(summary: Summary) -> list[tuple[str, str]]:
     return [
         ("covered", f"{covered} of {cells} cells"),
         ("floor swept", _swept(summary)),
-        ("covered again", f"{summary.recovered_cells} cells"),
-        ("out of reach", f"{summary.unreachable_cells} cells"),
         ("driven", f"{summary.driven_m} m"),
         *(fleet if len(summary.robots) > 1 else ()),
         ("plans, paths", f"{summary.plans}, {summary.paths}"),
-        ("time of a plan", f"{summary.plan_ms_p50} ms, p99 {summary.plan_ms_p99} ms"),
         ("messages refused", str(summary.errors)),
         ("time in all", _time(summary)),
     ]
@@ -253,7 +242,3 @@ def _draw(args: argparse.Namespace, truth: _Truth, summary: Summary) -> None:
             unswept=unswept,
         )
     picture.save(summary.picture)
-
-
-def _percentile(values: tuple[float, ...], percent: float) -> float | None:
-    return round(float(np.percentile(values, percent)), 1) if values else None

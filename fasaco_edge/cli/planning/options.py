@@ -58,13 +58,10 @@ figures:
   curve            (--turn-radius) length_m, seconds and backward_m of the curve;
                    reversals, from forward to backward or back; spot_turns, which do not
                    fit and stay on the spot, of all bends judged on the curve's points
-
-rooms (--rooms)  area_m2 of free floor, reachable_m2 of it, the share of that which the line
-                   sweeps, and how often it enters the room
+  rooms            (--rooms) area_m2 of free floor, reachable_m2 of it, the share of that
+                   which the line sweeps, and how often it enters the room
 
 figures of several passes: sums, and for each pass its own
-  along_share      share of its line's length along its lanes, within 15 degrees; null if
-                   no direction is preferred
 
 figures of several robots:
   makespan_steps   steps of the longest walk; makespan_s seconds of the costliest

@@ -96,7 +96,10 @@ def _print(args: argparse.Namespace, planned: PassPlans, figures: dict[str, Any]
     """Print the sums, and a line for each pass."""
     passes = figures.pop("passes")
     if args.long:
-        figures["floor"] = planned.floor or "not known of a coverage grid"
+        from fasaco_edge.offline.figures import floor_words
+
+        floor = planned.floor
+        figures["floor"] = "not known of a coverage grid" if floor is None else floor_words(floor)
         rows = [(name.replace("_", " "), text) for name, text in terminal.known(figures)]
         terminal.out().print(terminal.figures(rows))
     else:
@@ -104,9 +107,8 @@ def _print(args: argparse.Namespace, planned: PassPlans, figures: dict[str, Any]
 
         terminal.out().print(terminal.summary(rows_of_passes(planned)))
     for number, each in enumerate(passes, 1):
-        share, gap = each["along_share"], each["gap"]
-        words = "" if share is None else f", {share:.0%} of the line along its lanes"
-        words += "" if gap is None else f", at most {gap:.1%} above the bound"
+        gap = each["gap"]
+        words = "" if gap is None else f", at most {gap:.1%} above the bound"
         terminal.out().print(
             f"pass {number}, {each['pass']}: {each['cells']} cells, {each['steps']} steps, "
             f"{each['cost_s']:.1f} s{words}"
