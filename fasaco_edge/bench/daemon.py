@@ -17,7 +17,7 @@ from fasaco_edge.bench.benchmark import (
     seconds_above_zero,
 )
 from fasaco_edge.bench.processes import DaemonProcess, warm_kernels
-from fasaco_edge.bench.robot import MapSource, building, robot_beside, robot_pose, with_crate
+from fasaco_edge.bench.robot import MapSource, building, robot_pose, with_crate
 from fasaco_edge.drawing.spread import Spread, document, median, percentile, text
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.host.processes import cpu_seconds, own_mb, resident_mb
@@ -32,7 +32,6 @@ MEASURES = (
     ("idle_percent", "share of a core before the first map [%]", 2),
     ("warm_mb", "memory after map and plan [MB]", 1),
     ("warm_own_mb", "of this without pages of files [MB]", 1),
-    ("mission_percent", "share of a core in a mission [%]", 2),
     ("peak_mb", "peak memory [MB]", 1),
 )
 # For each goal its measure, its text, the limit of its median, the unit.
@@ -41,7 +40,6 @@ GOALS = (
     ("idle_own_mb", "memory before the first map, without pages of files", 32.0, "MB"),
     ("idle_percent", "share of a core, idle", 0.5, "%"),
     ("warm_own_mb", "memory after map and plan, without pages of files", 135.0, "MB"),
-    ("mission_percent", "share of a core in a mission", 2.0, "%"),
 )
 # Delays from the put of a map to the arrival of its path; the daemon says how long it planned.
 DELAYS = (
@@ -67,8 +65,6 @@ class DaemonRun:
         idle_mb, warm_mb: resident before the first map, and after a map and a plan [MB].
         idle_own_mb, warm_own_mb: of that without pages of files, as those of libraries [MB].
         idle_percent: share of a core that it takes before the first map [%].
-        mission_percent: share of a core that it takes while a robot drives its path and sends ten
-            poses and two maps a second [%].
         peak_mb: its peak resident memory [MB].
         delays_ms: from a map to its path, and of that planning [ms]; a pair for each map.
     """
@@ -80,7 +76,6 @@ class DaemonRun:
     idle_percent: float
     warm_mb: float
     warm_own_mb: float
-    mission_percent: float
     peak_mb: float
     delays_ms: tuple[tuple[float, float], ...]
 
@@ -95,10 +90,9 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--load",
         type=seconds_above_zero,
-        default=10.0,
+        default=5.0,
         metavar="S",
-        help="how long its load is measured, without a map and in a mission [s] "
-        "(default: %(default)g)",
+        help="how long its load without a map is measured [s] (default: %(default)g)",
     )
 
 
@@ -127,8 +121,6 @@ def _run(args: argparse.Namespace) -> DaemonRun:
         for crate in range(1, WARM_UP_MAPS + args.maps):
             delays_ms.append(_delay_ms(source, grid, crate))
             time.sleep(PAUSE_S)
-        with robot_beside(daemon, bus, source, crate=WARM_UP_MAPS + args.maps):
-            mission = _share_of_core(pid, args.load)
         return DaemonRun(
             ready_s=ready_s,
             status_s=status_s,
@@ -137,7 +129,6 @@ def _run(args: argparse.Namespace) -> DaemonRun:
             idle_percent=100.0 * idle,
             warm_mb=warm_mb,
             warm_own_mb=warm_own_mb,
-            mission_percent=100.0 * mission,
             peak_mb=peak_mb_of(pid),
             delays_ms=tuple(delays_ms[WARM_UP_MAPS - 1 :]),
         )
@@ -213,8 +204,7 @@ DAEMON = Benchmark(
     "to its liveliness token and to the first status it answers with; read its memory and its "
     "share of a core before the first map, and its memory after one map of 1000 x 1000 pixels "
     "(50 m x 50 m) and its plan. Then a crate moves in the farthest hall, and each map needs a new "
-    "path: time each from its put to the arrival of its path. At last a robot drives, which sends "
-    "ten poses and two maps a second, one in twenty with something changed.",
+    "path: time each from its put to the arrival of its path.",
     add_options=_add_options,
     count=lambda args: int(args.starts),
     measure=_measure,

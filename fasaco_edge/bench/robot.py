@@ -6,14 +6,10 @@ The building is fully known, 50 m x 50 m, as it comes from SLAM. A crate in it m
 from __future__ import annotations
 
 import queue
-import threading
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fasaco_edge.bench.processes import LOOK_EVERY_S, START_TIMEOUT_S, DaemonProcess
 from fasaco_edge.bus.arrival import Sample
@@ -26,17 +22,12 @@ from fasaco_edge.wire import topics
 from fasaco_edge.wire.documents.json_text import decode_tolerant
 from fasaco_edge.wire.documents.path_documents import PathAttachment
 from fasaco_edge.wire.messages.maps import encode_occupancy_grid
-from fasaco_edge.wire.messages.paths import decode_path
 from fasaco_edge.wire.messages.poses import encode_pose_stamped
 
 RESOLUTION_M = 0.05
 HALL_PX, WALL_PX, DOOR_PX, CRATE_PX = 200, 4, 30, 16
 # Places of the crate: each time it moves by less than its width, forth and back.
 CRATE_PLACES, CRATE_STEP_PX = 12, 12
-POSES_HZ = 10
-SPEED_M_S = 0.5
-# In a mission maps come twice a second, and one in this many shows a change.
-MAP_EVERY_S, MAPS_A_CRATE = 0.5, 20
 # Timeout of the first path, which needs the kernels: a slow computer loads them for long.
 PATH_TIMEOUT_S = 300.0
 
@@ -134,88 +125,9 @@ class MapSource:
             f"no path for a map after {PATH_TIMEOUT_S:.0f} s", hint="is the machine overloaded?"
         )
 
-    def forget_paths(self) -> None:
-        """Drop paths that arrived earlier."""
-        while not self._arrivals.empty():
-            self._arrivals.get()
-
     def _await_listener(self, publisher: Publisher) -> None:
         deadline = time.monotonic() + START_TIMEOUT_S
         while not publisher.has_listeners():
             if time.monotonic() > deadline:
                 raise BusUnavailable("the daemon does not subscribe to maps and poses")
             time.sleep(LOOK_EVERY_S)
-
-
-class CoveringRobot:
-    """Drives; takes paths on Zenoh's threads, and is ticked by one.
-
-    Args:
-        source: publishes its poses and maps.
-        crate: number of the crate that stands in its way.
-    """
-
-    def __init__(self, source: MapSource, crate: int) -> None:
-        self._source = source
-        self._building = building()
-        self._at = np.array([2.5, 2.5])
-        self._ahead: NDArray[np.float64] = np.empty((0, 2))
-        self._maps, self._map_due = crate * MAPS_A_CRATE, 0.0
-        self._lock = threading.Lock()
-
-    def take_path(self, sample: Sample) -> None:
-        """Drive this from now on."""
-        ahead = decode_path(sample.payload).xy
-        with self._lock:
-            self._ahead = ahead
-
-    def tick(self, now: float) -> None:
-        """Drive on for a period, and publish the pose; now and then a map."""
-        with self._lock:
-            self._drive(SPEED_M_S / POSES_HZ)
-        x, y = self._at
-        self._source.forget_paths()
-        self._source.put_pose(StampedPose(Pose2D(x, y), stamp_ns=time.time_ns()))
-        if now >= self._map_due:
-            self._maps += 1
-            self._map_due = now + MAP_EVERY_S
-            crate = self._maps // MAPS_A_CRATE
-            self._source.put_map(with_crate(self._building, crate, time.time_ns()))
-
-    def _drive(self, metres: float) -> None:
-        while len(self._ahead) and metres > 0.0:
-            way = self._ahead[0] - self._at
-            left = float(np.hypot(*way))
-            if left > metres:
-                self._at = self._at + way * (metres / left)
-                return
-            self._at, self._ahead, metres = self._ahead[0], self._ahead[1:], metres - left
-
-
-@contextmanager
-def robot_beside(daemon: DaemonProcess, bus: Bus, source: MapSource, crate: int) -> Iterator[None]:
-    """Let a robot drive for the block, from the moment it has its first path.
-
-    Args:
-        daemon, bus: whose robot it is, and a session with it.
-        source: publisher of its maps and poses.
-        crate: number of the first crate; on a map that it knows the daemon would plan nothing.
-    """
-    robot = CoveringRobot(source, crate)
-    bus.subscribe(daemon.keys.of(topics.PATH), robot.take_path)
-    stamp_ns = time.time_ns()
-    source.put_map(with_crate(building(), crate, stamp_ns))
-    source.wait_path(stamp_ns)
-    over = threading.Event()
-
-    def drive() -> None:
-        while not over.wait(1.0 / POSES_HZ):
-            robot.tick(time.monotonic())
-
-    thread = threading.Thread(target=drive, name="robot")
-    thread.start()
-    try:
-        yield
-    finally:
-        over.set()
-        thread.join()

@@ -9,7 +9,7 @@ import pytest
 from fasaco_edge.cli import main
 from fasaco_edge.wire.topics import RPC_NAMES
 from tests.support.outsider import Outsider
-from tests.support.processes import daemon_process, fasaco_edge
+from tests.support.processes import daemon_process
 from tests.support.rooms import map_bytes, pose_bytes, room
 
 SAID = {
@@ -43,12 +43,6 @@ def test_every_question_has_an_answer_people_can_read(endpoint, capsys, name):
     assert SAID[name] in told.out
     assert "None" not in told.out
     assert told.err == ""
-
-
-def test_a_process_answers_as_well(endpoint):
-    ended = fasaco_edge("ask", "version", "--connect", endpoint)
-    assert (ended.code, ended.err) == (0, "")
-    assert SAID["version"] in ended.out
 
 
 def test_a_program_gets_json(endpoint, capsys):

@@ -156,7 +156,6 @@ def test_a_mistake_is_told_with_a_hint(folder, capsys, words, code, said):
         ("review a.rrd --format csv", "unrecognized arguments: --format csv"),
         ("plan office --planner best", "argument --planner: must be colony-search, fasaco, aco"),
         ("record", "the following arguments are required: --out"),
-        ("record --out . --pose-schema tf", "argument --pose-schema: invalid choice: 'tf'"),
         ("maps --log-level loud", "argument --log-level: invalid choice: 'loud'"),
     ],
 )
@@ -195,14 +194,6 @@ def test_a_pipe_or_a_device_holds_nobody_up(folder, words, make):
     assert code != 0
     assert "it." in err
     assert "Traceback" not in err
-
-
-def test_a_mistake_ends_a_process_in_order(folder):
-    ended = fasaco_edge("plan", "nowhere.yaml")
-    assert ended.code == 1
-    assert ended.out == ""
-    assert ended.err.startswith("fasaco-edge: no map 'nowhere.yaml'")
-    assert "  hint: " in ended.err
 
 
 def test_no_file_reuses_the_descriptor_of_a_closed_stream(folder):

@@ -68,17 +68,6 @@ def test_rooms_are_those_of_the_map(plan, capsys, tmp_path):
     assert "9.3 m2" in capsys.readouterr().out
 
 
-@pytest.mark.parametrize("words", [["--passes", "2"], ["--robots", "0,0", "3,3"]])
-def test_rooms_are_for_one_line(words, capsys):
-    assert main(["plan", "flat", "--rooms", *words]) == Exit.CONFIG
-    assert "--rooms is for one pass of one robot" in capsys.readouterr().err
-
-
-def test_a_coverage_grid_has_no_rooms(grid_file, capsys):
-    assert main(["plan", str(grid_file), "--rooms"]) == Exit.CONFIG
-    assert "shows no walls" in capsys.readouterr().err
-
-
 @pytest.fixture
 def grid_file(tmp_path):
     """A coverage grid with two areas that do not touch."""
@@ -177,14 +166,6 @@ def test_the_figures_of_a_map_are_right(plan, tmp_path):
     assert floor["patches_over_4_dm2"] >= 1
     assert 0.04 < floor["largest_patch_m2"] < floor["reachable_m2"] - swept_m2
     assert floor["illegal_share"] == 0.0
-
-
-def test_a_table_says_how_much_floor_is_swept(capsys):
-    assert main(["plan", "office", "--budget", "0.05"]) == 0
-    assert " % of 40.9 m2; " in capsys.readouterr().out
-    assert main(["plan", "office", "--budget", "0.05", "--long"]) == 0
-    said = " ".join(capsys.readouterr().out.replace("│", " ").split())
-    assert " of 40.9 m2 (" in said
 
 
 @pytest.mark.parametrize("origin", [Pose2D(0.0, 0.0), Pose2D(-40.0, 7.5, 0.4)])
@@ -435,12 +416,6 @@ def test_a_walk_ends_in_the_cell_asked_for(plan, grid_file, planner):
     assert walk[-1] == (2, 6)
 
 
-def test_anywhere_is_where_a_walk_ends_unless_asked(plan, grid_file):
-    _, asked = plan(grid_file, "--end", "anywhere", "--ants", 24)
-    _, default = plan(grid_file, "--ants", 24)
-    assert asked == default
-
-
 def test_turns_cost_what_they_take(plan, grid_file):
     cells = cells_in(grid_file)
     # Of ants alone: what a local search comes to in its time depends on the machine.
@@ -493,6 +468,7 @@ def test_a_line_is_quicker_for_who_says_how_the_robot_turns(tmp_path, capsys):
         ("--swept 1.5", "swept must be a share in (0, 1], got 1.5"),
         *((f"--line cells --align {to}", "line over the floor") for to in ("walls", "30")),
         ("--line cells --swept 0.9", "has no share to choose"),
+        *((f"--rooms {to}", "for one pass of one") for to in ("--passes 2", "--robots 0,0 3,3")),
         ("--planner zigzag --line cells --pheromone-png t.png", "leaves no pheromone"),
         ("--robots 0,0 5,5 --pheromone-png t.png", "of one robot's colony"),
     ],
@@ -506,6 +482,8 @@ def test_what_cannot_be_is_refused(capsys, words, said):
 def test_a_coverage_grid_has_no_floor(grid_file, capsys):
     assert main(["plan", str(grid_file), "--line", "thorough"]) == Exit.CONFIG
     assert "line thorough: grid.npy is a coverage grid" in capsys.readouterr().err
+    assert main(["plan", str(grid_file), "--rooms"]) == Exit.CONFIG
+    assert "shows no walls" in capsys.readouterr().err
 
 
 def test_a_budget_ends_the_search_with_a_whole_walk(plan, grid_file):
@@ -599,8 +577,3 @@ def test_without_a_picture_it_is_said_how_to_have_one(grid_file):
     ended = fasaco_edge("plan", grid_file, "--ants", 8)
     assert ended.out.endswith("more: --long; a picture: --png FILE\n")
     assert re.search(r"^time +1 min 20 s *$", ended.out, re.MULTILINE)
-
-
-def test_json_is_all_there_is_on_standard_output(grid_file):
-    ended = fasaco_edge("plan", grid_file, "--ants", 8, "--json")
-    assert set(json.loads(ended.out)) == KEYS

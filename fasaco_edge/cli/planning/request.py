@@ -138,16 +138,6 @@ def read_request(args: argparse.Namespace) -> PlanRequest:
     return PlanRequest(msgspec.structs.replace(robot, **changes), search, line, own, sources)
 
 
-def say_written(args: argparse.Namespace) -> None:
-    """Print where the files are that were asked for, or how to have a picture."""
-    console = terminal.out()
-    for name in ("path_out", "xy_out", "png", "pheromone_png"):
-        if (file := getattr(args, name)) is not None:
-            console.print(f"wrote {file}", soft_wrap=True)
-    if not args.long:
-        console.print("more: --long" + ("" if args.png else "; a picture: --png FILE"))
-
-
 def require_frame(map: Map, xy_out: Path | None) -> None:
     """Check that a map has a frame if points in it are to be written.
 
