@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 
 from PIL import Image, ImageDraw, ImageFont
 
@@ -13,30 +12,16 @@ from fasaco_edge.drawing import palette
 from fasaco_edge.drawing.palette import Colour
 from fasaco_edge.text import one_line
 
-COLOURS: tuple[Colour, ...] = (
-    palette.BLUE,
-    palette.VERMILION,
-    palette.GREEN,
-    palette.PURPLE,
-    palette.SKY,
-    palette.ORANGE,
-)
-
 PANEL_PX = (430, 290)
 # Left, top, right, bottom: space for numbers and names around a panel's axes.
 BORDER_PX = (62, 64, 16, 46)
 MARGIN_PX = 20
 LABEL_PX, NUMBER_PX = 14, 12
-DOT_PX, LINE_PX = 3.0, 2
+DOT_PX = 3.0
 OVERSAMPLING = 3
 MOST_TICKS = 6
 # Longest text [characters].
 MOST_CHARACTERS = 200
-
-Box = tuple[float, float, float, float]
-"""Left, upper, right and lower edge [px]."""
-Placer = Callable[[float, float], tuple[float, float]]
-"""Where a value (x, y) lies [px]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,23 +49,11 @@ class Axis:
 
 @dataclass(frozen=True, slots=True)
 class Line:
-    """Points (x, y), joined or not.
+    """Points (x, y), joined by a line of that width [px]; or a dot at each, for width 0."""
 
-    Attributes:
-        label: its text in the key; "" for no entry.
-        colour: of all its parts.
-        points: in the order they are joined in.
-        joined: whether a line goes through the points.
-        dotted: whether each point is marked.
-        width: of the line [px].
-    """
-
-    label: str
     colour: Colour
     points: tuple[tuple[float, float], ...]
-    joined: bool = True
-    dotted: bool = True
-    width: float = LINE_PX
+    width: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,14 +65,6 @@ class Panel:
     x: Axis
     y: Axis
     lines: tuple[Line, ...]
-
-    def placer(self, box: Box) -> Placer:
-        """Return where values lie in a box, y downward as on a screen."""
-        x0, y0, x1, y1 = box
-        return lambda x, y: (
-            x0 + self.x.share(x) * (x1 - x0),
-            y1 - self.y.share(y) * (y1 - y0),
-        )
 
 
 def draw_panels(panels: Sequence[Panel]) -> Image.Image:
@@ -139,7 +104,9 @@ def _draw_panel(pen: _Pen, panel: Panel, left: float, top: float) -> None:
     x1, y1 = left + PANEL_PX[0] - BORDER_PX[2], top + PANEL_PX[1] - BORDER_PX[3]
     pen.text(x0, top + 8, panel.title, LABEL_PX, palette.INK, "lt")
     pen.text(x0, top + 28, panel.caption, NUMBER_PX, palette.FAINT_INK, "lt")
-    place = panel.placer((x0, y0, x1, y1))
+
+    def place(x: float, y: float) -> tuple[float, float]:
+        return x0 + panel.x.share(x) * (x1 - x0), y1 - panel.y.share(y) * (y1 - y0)
 
     for value, text in panel.x.ticks:
         x, _ = place(value, panel.y.low)
@@ -155,48 +122,10 @@ def _draw_panel(pen: _Pen, panel: Panel, left: float, top: float) -> None:
     # The first line matters most, so it lies on top.
     for line in reversed(panel.lines):
         places = [place(x, y) for x, y in line.points]
-        if line.joined and len(places) > 1:
+        if line.width and len(places) > 1:
             pen.line(places, line.colour, line.width)
-        for x, y in places if line.dotted else ():
+        for x, y in () if line.width else places:
             pen.dot(x, y, DOT_PX, line.colour)
-    _draw_key(pen, panel, (x0, y0, x1, y1))
-
-
-def _draw_key(pen: _Pen, panel: Panel, box: Box) -> None:
-    """Draw the names of the lines into the corner that the fewest points lie in."""
-    lines = [line for line in panel.lines if line.label]
-    if not lines:
-        return
-    font = ImageFont.load_default(NUMBER_PX)
-    wide = max(font.getlength(line.label) for line in lines) + 24
-    high = len(lines) * (NUMBER_PX + 5) + 5
-    x0, y0, x1, y1 = box
-    place = panel.placer(box)
-    drawn = [at for line in panel.lines for at in _along(line, place)]
-
-    def points_in(corner: tuple[float, float]) -> int:
-        left, top = corner
-        return sum(left <= x <= left + wide and top <= y <= top + high for x, y in drawn)
-
-    corners = [(left, top) for top in (y0, y1 - high) for left in (x1 - wide, x0)]
-    left, top = min(corners, key=points_in)
-    for row, line in enumerate(lines):
-        y = top + 10 + row * (NUMBER_PX + 5)
-        pen.dot(left + wide - 14, y, 4, line.colour)
-        pen.text(left + wide - 24, y, line.label, NUMBER_PX, palette.INK, "rm")
-
-
-def _along(line: Line, place: Placer) -> list[tuple[float, float]]:
-    """Return places along a line [px], of unjoined points those alone."""
-    places = [place(x, y) for x, y in line.points]
-    if not line.joined:
-        return places
-    between = [
-        (a + part / 8 * (c - a), b + part / 8 * (d - b))
-        for (a, b), (c, d) in pairwise(places)
-        for part in range(8)
-    ]
-    return between + places[-1:]
 
 
 def _round_step(least: float) -> float:

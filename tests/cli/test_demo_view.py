@@ -149,8 +149,7 @@ def step(timeout_s):
         print("said")
         logging.getLogger("bus").warning("no router, \x1b[31mred")
     return Path(sys.argv[1]).exists()
-with LiveView(["robot"], "tcp/127.0.0.1:1") as view:
-    view.run(step)
+LiveView(["robot"], "tcp/127.0.0.1:1").run(step)
 print("the end")
 """
 

@@ -96,8 +96,7 @@ class DemoMission:
             ProcessEnded: one of the processes has ended.
         """
         self._started = time.monotonic()
-        with self._view:
-            self._view.run(self._step)
+        self._view.run(self._step)
         worked_at = self._worked_at
         worked_s = worked_at[-1] - worked_at[0] if worked_at else 0.0
         return Ending(

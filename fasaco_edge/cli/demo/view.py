@@ -8,7 +8,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
-from typing import TYPE_CHECKING, Protocol, Self
+from typing import TYPE_CHECKING
 
 from fasaco_edge.bus.settings import BusSettings
 from fasaco_edge.cli.console.streams import printed_by
@@ -28,27 +28,7 @@ WAIT_S = 0.25
 LEAST_COLUMNS, LEAST_LINES = 60, 20
 
 
-class DemoView(Protocol):
-    """Shows a demo; a context manager."""
-
-    def __enter__(self) -> Self:
-        """Begin to show it."""
-
-    def __exit__(self, *_: object) -> None:
-        """Leave the terminal as it was."""
-
-    def run(self, step: Callable[[float], bool]) -> None:
-        """Call ``step`` until it returns True, each time with how long it may wait [s].
-
-        Raises:
-            KeyboardInterrupt: the user quits.
-        """
-
-    def show(self, robot: int, status: Status, elapsed_s: float) -> None:
-        """Show one status of the robot with this number."""
-
-
-def demo_view(robots: Sequence[str], endpoint: str) -> DemoView:
+def demo_view(robots: Sequence[str], endpoint: str) -> LinesView | LiveView:
     """Return the view that fits the terminal.
 
     Args:
@@ -88,14 +68,8 @@ class LinesView:
         self._names = robots
         self._printed_at = [0.0] * len(robots)
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        pass
-
     def run(self, step: Callable[[float], bool]) -> None:
-        """Call ``step`` until it returns True."""
+        """Call ``step`` until it returns True, each time with how long it may wait [s]."""
         while not step(WAIT_S):
             pass
 
@@ -123,15 +97,12 @@ class LiveView:
         # A log may print on any thread.
         self._unseen: deque[str] = deque()
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        for text in self._printed:
-            err().print(text)
-
     def run(self, step: Callable[[float], bool]) -> None:
-        """Show pages until ``step`` returns True."""
+        """Show pages until ``step`` returns True.
+
+        Raises:
+            KeyboardInterrupt: the user quits.
+        """
         from fasaco_edge.watch.live import watch_on_screen
 
         is_over = False
@@ -145,6 +116,7 @@ class LiveView:
                     watched.events.add(phrases.steady_now(), self._unseen.popleft(), ORDER)
                 return not is_over
 
+            stack.callback(self._print_again)
             stack.enter_context(printed_by(self._keep))
             watch_on_screen(watched, sys.stderr, go_on)
         if not is_over:
@@ -152,6 +124,10 @@ class LiveView:
 
     def show(self, robot: int, status: Status, elapsed_s: float) -> None:
         """Do nothing: what is watched comes by the bus."""
+
+    def _print_again(self) -> None:
+        for text in self._printed:
+            err().print(text)
 
     def _keep(self, text: str) -> None:
         self._printed += text.splitlines()

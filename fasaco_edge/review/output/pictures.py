@@ -42,10 +42,9 @@ def draw_review(review: Review, other: Review | None = None) -> Image.Image:
     It is as wide as it has to be: one is of ``SIZE`` at most, two are wider by a map.
     """
     reviews = [review] if other is None else [review, other]
-    labels = ["left", "right"]
     panels = [
-        coverage_panel(reviews, labels),
-        replan_panel(reviews, labels),
+        coverage_panel(reviews),
+        replan_panel(reviews),
         *([state_panel(review)] if other is None else []),
     ]
     charts = draw_panels(panels)
