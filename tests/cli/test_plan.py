@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import math
 import re
-from collections import deque
 from itertools import pairwise
 
 import numpy as np
@@ -15,11 +14,14 @@ from PIL import Image
 from fasaco_edge.cli import main
 from fasaco_edge.cli.console.arguments import Exit
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D
+from fasaco_edge.grid.lattice import CoverageLattice
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.judge.driven_line import DriveLimits, drive_seconds
 from fasaco_edge.planners.registry import PLANNER_NAMES
 from fasaco_edge.simulation.robot import SimulationConfig
 from maps.map_writer import write_map
+from tests import naive
+from tests.benchmarks.judge import check_walk
 from tests.support.processes import fasaco_edge
 from tests.support.rooms import coverable_cells, pillared_room
 
@@ -79,59 +81,26 @@ def grid_file(tmp_path):
     return file
 
 
-def area_of(free, start):
-    """Return the cells that can be reached from ``start``."""
-    found, edge = {start}, deque([start])
-    while edge:
-        row, col = edge.popleft()
-        for cell in ((row + 1, col), (row - 1, col), (row, col + 1), (row, col - 1)):
-            if cell in free and cell not in found:
-                found.add(cell)
-                edge.append(cell)
-    return found
-
-
-def way_length(free, start, goal):
-    """Return the number of steps of a shortest way."""
-    distance, edge = {start: 0}, deque([start])
-    while goal not in distance:
-        row, col = edge.popleft()
-        for cell in ((row + 1, col), (row - 1, col), (row, col + 1), (row, col - 1)):
-            if cell in free and cell not in distance:
-                distance[cell] = distance[row, col] + 1
-                edge.append(cell)
-    return distance[goal]
-
-
 def check(figures, walk, free, start, speed_m_s=0.25, turn_s=0.0):
-    """Count the figures of a walk again."""
-    area = area_of(free, start)
-    visits = {cell: walk.count(cell) for cell in set(walk)}
-    moves = [(b[0] - a[0], b[1] - a[1]) for a, b in pairwise(walk)]
-    turns = [a[0] * b[0] + a[1] * b[1] for a, b in pairwise(moves)]
-    assert walk[0] == start == tuple(figures["start"])
-    assert walk[-1] == tuple(figures["end"])
-    assert set(walk) == area
-    assert all(abs(row) + abs(col) == 1 for row, col in moves)
-    assert figures["cells"] == len(area)
-    assert figures["steps"] == len(moves)
-    assert figures["revisits"] == len(walk) - len(area)
-    assert figures["recovered_cells"] == sum(count > 1 for count in visits.values())
-    assert figures["n_r_paper"] == len(walk) - len(area) + way_length(free, walk[-1], walk[0])
-    assert figures["turns_90"] == turns.count(0)
-    assert figures["turns_180"] == turns.count(-1)
-    assert figures["unreachable_cells"] == len(free) - len(area)
-    assert figures["length_m"] == pytest.approx(len(moves) * figures["cell_m"], abs=1e-3)
-    quarters = turns.count(0) + 2 * turns.count(-1)
-    cost_s = len(moves) * figures["cell_m"] / speed_m_s + quarters * turn_s
+    """Count the figures of a walk again; all are cells (row, col) from (0, 0) on, also ``free``."""
+    grid = np.zeros(np.max(list(free), axis=0) + 1, bool)
+    grid[tuple(np.transpose(list(free)))] = True
+    steps, cells = CoverageLattice.from_free(grid, 1.0).steps, np.array(walk)
+    verdict = check_walk(steps, grid, cells, start, tuple(figures["end"]))
+    assert not verdict.problems
+    counted = naive.figures(steps, walk)
+    assert {name: figures[name] for name in counted} == counted
+    area = len(set(walk))
+    assert (figures["start"], figures["cells"]) == (list(start), area)
+    assert figures["unreachable_cells"] == len(free) - area
+    length_m = verdict.steps * figures["cell_m"]
+    assert figures["length_m"] == pytest.approx(length_m, abs=1e-3)
+    cost_s = length_m / speed_m_s + (verdict.turns_90 + 2 * verdict.turns_180) * turn_s
     assert figures["cost_s"] == pytest.approx(cost_s)
     assert 0 < figures["first_walk_ms"] <= 1e3 * figures["wall_s"]
-    assert 0 <= figures["lower_bound_steps"] <= len(moves)
-    assert figures["lower_bound_steps"] >= len(area) - 1
-    if len(area) > 1:
-        gap = cost_s / figures["lower_bound_cost_s"] - 1
-        assert figures["gap"] == pytest.approx(gap, abs=1e-6)
-    assert figures["wall_s"] > 0
+    assert area - 1 <= figures["lower_bound_steps"] <= verdict.steps
+    gap = cost_s / figures["lower_bound_cost_s"] - 1
+    assert figures["gap"] == pytest.approx(gap, abs=1e-6)
     assert figures["cpu_s"] > 0
 
 
@@ -387,11 +356,6 @@ def test_a_start_may_be_negative(plan, tmp_path):
         assert tuple(figures["start"]) == walk[0] == (-9, -8)
 
 
-def test_without_a_start_the_larger_area_is_covered(plan, grid_file):
-    figures, walk = plan(grid_file, "--ants", 20)
-    check(figures, walk, cells_in(grid_file), (0, 0))
-
-
 def test_the_same_seed_gives_the_same_walk(plan):
     # Without a budget: where the clock ends a search, a busy computer gives another walk.
     (_, first), (_, again), (_, other) = (
@@ -399,13 +363,6 @@ def test_the_same_seed_gives_the_same_walk(plan):
     )
     assert first == again
     assert first != other
-
-
-def test_an_end_at_home_is_the_start(plan, grid_file):
-    figures, walk = plan(grid_file, "--start", "8,0", "--end", "home", "--ants", 40)
-    check(figures, walk, cells_in(grid_file), (8, 0))
-    assert walk[-1] == walk[0]
-    assert figures["n_r_paper"] == figures["revisits"]
 
 
 @pytest.mark.parametrize("planner", PLANNER_NAMES)
@@ -489,10 +446,10 @@ def test_a_coverage_grid_has_no_floor(grid_file, capsys):
 def test_a_budget_ends_the_search_with_a_whole_walk(plan, grid_file):
     options = ("--ants", 1_000_000, "--budget", 0.05)
     figures, walk = plan(grid_file, *options, "--planner", "fasaco")
+    # Without a start the larger area is covered.
     check(figures, walk, cells_in(grid_file), (0, 0))
     assert figures["ants"] < 1_000_000
     assert figures["ended_by"] == "budget"
-    assert figures["wall_s"] < 300
     # Pillars, and turns at a price: no walk is proven to be the best, so only the clock ends it.
     pillars = np.ones((11, 13), bool)
     pillars[2::3, 1::4] = False
@@ -502,14 +459,6 @@ def test_a_budget_ends_the_search_with_a_whole_walk(plan, grid_file):
     check(figures, walk, cells_in(grid_file), (0, 0), turn_s=1.0)
     assert figures["kicks"] > 0
     assert figures["ended_by"] == "budget"
-    assert figures["wall_s"] < 300
-
-
-@pytest.mark.parametrize("velocities", ["8:1", "1:8", "4", "8,4,1", "1"])
-def test_velocities_may_be_written_in_several_ways(plan, grid_file, velocities):
-    figures, walk = plan(grid_file, "--velocities", velocities, "--ants", 24)
-    check(figures, walk, cells_in(grid_file), (0, 0))
-    assert figures["velocities"] == velocities
 
 
 def test_one_cell_is_a_walk_without_a_step(plan, tmp_path):
