@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import time
 from collections.abc import Generator, Sequence
-from dataclasses import dataclass
 
 from fasaco_edge.bench.benchmark import (
     Benchmark,
@@ -55,29 +54,8 @@ WARM_UP_MAPS = 5
 PAUSE_S = 0.05
 
 
-@dataclass(frozen=True, slots=True)
-class DaemonRun:
-    """One daemon's life.
-
-    Attributes:
-        ready_s: from exec to its liveliness token [s].
-        status_s: from exec to the first status answered [s].
-        idle_mb, warm_mb: resident before the first map, and after a map and a plan [MB].
-        idle_own_mb, warm_own_mb: of that without pages of files, as those of libraries [MB].
-        idle_percent: share of a core that it takes before the first map [%].
-        peak_mb: its peak resident memory [MB].
-        delays_ms: from a map to its path, and of that planning [ms]; a pair for each map.
-    """
-
-    ready_s: float
-    status_s: float
-    idle_mb: float
-    idle_own_mb: float
-    idle_percent: float
-    warm_mb: float
-    warm_own_mb: float
-    peak_mb: float
-    delays_ms: tuple[tuple[float, float], ...]
+# ``MEASURES`` of one daemon; and of each map the time to its path, and of that planning [ms].
+DaemonRun = tuple[dict[str, float], list[tuple[float, float]]]
 
 
 def _add_options(parser: argparse.ArgumentParser) -> None:
@@ -108,38 +86,28 @@ def _run(args: argparse.Namespace) -> DaemonRun:
     grid = building()
     with DaemonProcess() as daemon:
         pid, bus = daemon.pid, daemon.join()
-        ready_s, status_s = daemon.wait_alive(bus), daemon.wait_status(bus)
+        found = {"ready_s": daemon.wait_alive(bus), "status_s": daemon.wait_status(bus)}
         source = MapSource(daemon, bus)
         time.sleep(SETTLE_S)
-        idle_mb, idle_own_mb = resident_mb(pid), own_mb(pid)
-        idle = _share_of_core(pid, args.load)
+        found |= {"idle_mb": resident_mb(pid), "idle_own_mb": own_mb(pid)}
+        found["idle_percent"] = 100.0 * _share_of_core(pid, args.load)
         source.put_pose(robot_pose(time.time_ns()))
         _delay_ms(source, grid, 0)
         time.sleep(SETTLE_S)
-        warm_mb, warm_own_mb = resident_mb(pid), own_mb(pid)
+        found |= {"warm_mb": resident_mb(pid), "warm_own_mb": own_mb(pid)}
         delays_ms = []
         for crate in range(1, WARM_UP_MAPS + args.maps):
             delays_ms.append(_delay_ms(source, grid, crate))
             time.sleep(PAUSE_S)
-        return DaemonRun(
-            ready_s=ready_s,
-            status_s=status_s,
-            idle_mb=idle_mb,
-            idle_own_mb=idle_own_mb,
-            idle_percent=100.0 * idle,
-            warm_mb=warm_mb,
-            warm_own_mb=warm_own_mb,
-            peak_mb=peak_mb_of(pid),
-            delays_ms=tuple(delays_ms[WARM_UP_MAPS - 1 :]),
-        )
+        return found | {"peak_mb": peak_mb_of(pid)}, delays_ms[WARM_UP_MAPS - 1 :]
 
 
 def _delay_ms(source: MapSource, grid: OccupancyGrid, crate: int) -> tuple[float, float]:
     """Return the time from a map with a crate to its path, and of that planning [ms]."""
     stamp_ns = time.time_ns()
     put_at = source.put_map(with_crate(grid, crate, stamp_ns))
-    arrival = source.wait_path(stamp_ns)
-    return 1e3 * (arrival.at - put_at), arrival.about.plan_ms
+    at, plan_ms = source.wait_path(stamp_ns)
+    return 1e3 * (at - put_at), plan_ms
 
 
 def _share_of_core(pid: int, for_s: float) -> float:
@@ -150,8 +118,8 @@ def _share_of_core(pid: int, for_s: float) -> float:
 
 
 def _report(args: argparse.Namespace, runs: Sequence[DaemonRun]) -> Report:
-    spreads = {name: Spread.of([getattr(run, name) for run in runs]) for name, _, _ in MEASURES}
-    pairs = [pair for run in runs for pair in run.delays_ms]
+    spreads = {name: Spread.of([found[name] for found, _ in runs]) for name, _, _ in MEASURES}
+    pairs = [pair for _, delays_ms in runs for pair in delays_ms]
     values = {
         "total_ms": [total for total, _ in pairs],
         "plan_ms": [plan for _, plan in pairs],

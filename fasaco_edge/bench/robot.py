@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import queue
 import time
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -68,14 +68,6 @@ def robot_pose(stamp_ns: int) -> StampedPose:
     return StampedPose(Pose2D(2.5, 2.5), stamp_ns=stamp_ns)
 
 
-@dataclass(frozen=True, slots=True)
-class PathArrival:
-    """A received path: its time of arrival [s, monotonic], and its attachment."""
-
-    at: float
-    about: PathAttachment
-
-
 class MapSource:
     """Publishes maps and the pose to a daemon, and receives its paths."""
 
@@ -102,8 +94,9 @@ class MapSource:
         self._maps.put(payload)
         return at
 
-    def wait_path(self, map_stamp_ns: int) -> PathArrival:
-        """Return the first path planned on the map of that stamp.
+    def wait_path(self, map_stamp_ns: int) -> tuple[float, float]:
+        """Return the arrival [s, monotonic] of the first path planned on the map of that stamp, and
+        how long it was planned [ms].
 
         Paths without a plan, a walk cut off before a new obstacle, are skipped.
 
@@ -120,7 +113,7 @@ class MapSource:
                 continue
             about = decode_tolerant(sample.attachment, PathAttachment)
             if about.map_stamp_ns == map_stamp_ns and about.planner is not None:
-                return PathArrival(at, about)
+                return at, about.plan_ms
         raise NotYet(
             f"no path for a map after {PATH_TIMEOUT_S:.0f} s", hint="is the machine overloaded?"
         )

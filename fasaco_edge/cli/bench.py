@@ -134,7 +134,7 @@ def _goals(report: Report) -> Table:
         table.add_column(column, justify="left" if column == "" else "right")
     for goal in report.goals:
         sign = "at least" if goal.at_least else "at most"
-        measured = "-" if goal.measured is None else f"{goal.measured:g} {goal.unit}".strip()
+        measured = "-" if goal.measured is None else f"{goal.measured:.4g} {goal.unit}".strip()
         table.add_row(
             goal.what, measured, f"{sign} {goal.limit:g} {goal.unit}".strip(), verdicts[goal.met]
         )

@@ -213,8 +213,7 @@ def check_outputs(outputs: Iterable[Path | None], inputs: Iterable[Path] = ()) -
 
     Raises:
         BadConfiguration: one is a folder, its folder is missing or not writable, it is also an
-            input,
-            or two outputs are the same.
+            input, or two outputs are the same.
     """
     # Unlike Path's methods these do not raise on names no file system takes.
     taken = {os.path.realpath(file): "it is read from" for file in inputs}
