@@ -146,6 +146,7 @@ def test_a_mistake_is_told_with_a_hint(folder, capsys, words, code, said):
         ("plan office --start 1,2,3", "argument --start: must be row,column, got '1,2,3'"),
         ("plan office --start 1.5,2", "argument --start: must be row,column, got '1.5,2'"),
         ("plan office --start-xy 1", "argument --start-xy: must be x,y in metres, got '1'"),
+        ("rooms split 1 0,0 1;2", "argument X,Y: must be x,y in metres, got '1;2'"),
         ("plan office --start-xy nan,1", "must be within 2e+07 m of 0, got nan,1"),
         ("plan office --start-xy 1,1e300", "must be within 2e+07 m of 0, got 1,1e300"),
         ("plan office --start 1,1 --start-xy 1,1", "not allowed with argument --start"),

@@ -135,6 +135,14 @@ def test_the_time_to_go_is_by_the_clock(line_s, scale, said):
     assert f"to go     {said}{', ' if said else ''}30 steps" in page
 
 
+def test_a_time_to_go_is_the_least_wherever_it_stands_while_the_map_grows():
+    view = mid_mission()
+    tell(view, "status", status(coverage={"coverable": 60, "covered": 10}))
+    page = page_of(view)
+    assert "path 7, at least 63 s to go" in page
+    assert "to go     at least 63 s, 30 steps" in page
+
+
 def test_it_shows_rooms_with_their_swept_shares():
     view = mid_mission()
     hall = RoomReport(1, "hall", ((0, 0), (3, 0), (3, 4), (0, 4)), swept=0.459)
