@@ -94,6 +94,11 @@ def folder(tmp_path, monkeypatch):
         ("review a.rrd --png a.rrd", 78, "cannot write a.rrd: it is read from"),
         ("review a.rrd --html a.html", 78, "hint: fasaco-edge serve FILE.rrd shows"),
         ("review a.rrd --against b.rrd --png b.rrd", 78, "cannot write b.rrd: it is read from"),
+        (
+            "mission start --order o --zone a --passes 2",
+            1,
+            "got --zone, --passes with it",
+        ),
         ("plan good.npy --png around", 78, "cannot write around: Too many levels of symbolic"),
         (f"plan good.npy --png {'w' * 300}", 78, "File name too long"),
         ("plan good.npy --path-out no/w.csv", 78, "cannot write no/w.csv: there is no folder no"),

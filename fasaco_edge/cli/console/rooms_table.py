@@ -5,6 +5,7 @@ from __future__ import annotations
 from rich.table import Table
 
 from fasaco_edge.cli.console.terminal import out
+from fasaco_edge.client.phrases import percent
 from fasaco_edge.wire.documents.rooms import RoomReport, Rooms
 
 
@@ -18,7 +19,7 @@ def show_rooms(rooms: Rooms) -> None:
     )
     for room in rooms.rooms:
         beside = ", ".join(map(str, room.neighbours)) or "-"
-        swept = "-" if room.swept is None else f"{100 * room.swept:.0f} %"
+        swept = "-" if room.swept is None else percent(room.swept)
         table.add_row(
             str(room.id), room.name or "-", f"{room.area_m2:.1f}", swept, beside, _settings(room)
         )

@@ -80,8 +80,8 @@ class LinesView:
             return
         self._printed_at[robot] = now
         name = f"{self._names[robot]}  " if len(self._names) > 1 else ""
-        percent = 100 * status.coverage.fraction if status.coverage else 0.0
-        words = f"{percent:5.1f} % of cells  {phrases.figures(status)}"
+        percent = phrases.percent(status.coverage.fraction if status.coverage else 0.0)
+        words = f"{percent:>7} of cells  {phrases.figures(status)}"
         err().print(f"{elapsed_s:6.1f} s  {name}{words}", soft_wrap=True)
 
 

@@ -216,7 +216,8 @@ def _order(args: argparse.Namespace) -> dict[str, object]:
     if args.order is None:
         return order_document(read_order(given))
     if given:
-        names = ", ".join(f"--{name.rstrip('s').replace('_', '-')}" for name in given)
+        told = ("zone" if name == "zones" else name.replace("_", "-") for name in given)
+        names = ", ".join(f"--{name}" for name in told)
         raise OrderError(f"--order says it all, got {names} with it", hint="put them into the file")
     try:
         return order_document(read_order(_read(args.order)))
