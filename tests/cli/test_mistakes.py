@@ -161,6 +161,7 @@ def test_a_mistake_is_told_with_a_hint(folder, capsys, words, code, said):
         ("mission start --pases 2", "did you mean --passes?"),
         ("review a.rrd --format csv", "unrecognized arguments: --format csv"),
         ("plan office --planner best", "argument --planner: must be colony-search, fasaco, aco"),
+        ("plan office --planner a-lab:Deep", "FILE.py:NAME or MODULE:NAME, got 'a-lab:Deep'"),
         ("record", "the following arguments are required: --out"),
         ("maps --log-level loud", "argument --log-level: invalid choice: 'loud'"),
     ],
