@@ -46,10 +46,8 @@ format: $(STAMP)  ## put the sources into their format
 contract: $(STAMP)  ## files of protocol/ that are made from the package: keys, QoS, schemas, tables
 	$(BIN)/python -m tests.wire.contract_files
 
-bench: $(STAMP)  ## speed, footprint, latency
-	$(BIN)/fasaco-edge bench speed
-	$(BIN)/fasaco-edge bench footprint
-	$(BIN)/fasaco-edge bench latency
+bench: $(STAMP)  ## a daemon's start, memory, load and delays on this computer
+	$(BIN)/fasaco-edge bench daemon
 
 lab: $(LAB_STAMP)  ## missions in a simulator of others, judged by the true poses: some 5 min each
 	$(BIN)/python -m tests.campaigns.lab table $(ARGS)

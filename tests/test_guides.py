@@ -14,7 +14,6 @@ from fasaco_edge.bench.benchmark import Benchmark
 from fasaco_edge.cli import COMMANDS, _parser
 from fasaco_edge.cli.bench import BENCHMARKS as ON_THE_ROBOT
 from fasaco_edge.cli.bench import add_benchmarks
-from fasaco_edge.cli.console.arguments import with_negative_pairs
 from tests.benchmarks.__main__ import BENCHMARKS as FOR_DEVELOPERS
 
 ROOT = Path(__file__).parents[1]
@@ -58,7 +57,7 @@ def words_of(line: str) -> list[str]:
 def assert_understood(words: list[str]) -> None:
     """Parse a command line, and do no more."""
     try:
-        _parser(words).parse_args(with_negative_pairs(words))
+        _parser(words).parse_args(words)
     except SystemExit:
         pytest.fail(f"not understood: fasaco-edge {shlex.join(words)}")
 
@@ -98,7 +97,7 @@ def test_each_benchmark_that_a_guide_or_help_runs_is_understood():
         parser = argparse.ArgumentParser()
         add_benchmarks(parser, FOR_DEVELOPERS)
         words = words_of(re.split(r"\s{3,}(?=[a-z])", line.strip())[0])
-        parser.parse_args(with_negative_pairs(words))
+        parser.parse_args(words)
 
 
 @pytest.mark.parametrize("guide", ["CONTRIBUTING.md", "fasaco_edge/README.md"])

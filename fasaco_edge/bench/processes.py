@@ -1,4 +1,4 @@
-"""A real daemon in a process of its own, its cores, a session with it, a recorder beside it."""
+"""A real daemon in a process of its own, and a session with it."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ import socket
 import subprocess
 import tempfile
 import time
-from collections.abc import Iterator, Sequence, Set
-from contextlib import ExitStack, contextmanager, suppress
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any, Self
 
@@ -27,9 +27,6 @@ START_TIMEOUT_S = 180.0
 STOP_TIMEOUT_S = 8.0
 LOOK_EVERY_S = 0.002
 PROGRAM = python_program("fasaco_edge")
-CGROUPS = Path("/sys/fs/cgroup")
-# cgroups(7): a weight of 100 of version 2 is 1024 shares of version 1.
-SHARES_OF_WEIGHT = 1024 / 100
 
 
 def warm_kernels() -> None:
@@ -126,25 +123,6 @@ def _listens(host: str, port: int) -> bool:
 
 
 @contextmanager
-def recorder_beside(daemon: DaemonProcess, bus: Bus) -> Iterator[None]:
-    """Record what ``daemon`` does, from the moment the recorder listens to the end of the block.
-
-    Raises:
-        ProcessEnded: it ended by itself, or does not listen in time.
-    """
-    with tempfile.TemporaryDirectory(prefix="fasaco-bench-") as folder:
-        log = Path(folder, "recorder.log")
-        words = ("record", "--out", folder, "--connect", daemon.endpoint)
-        with _running(words, log) as process:
-            deadline = time.monotonic() + START_TIMEOUT_S
-            while not bus.alive(daemon.keys.of(topics.RECORDER_ALIVE)):
-                if process.poll() is not None or time.monotonic() > deadline:
-                    raise ProcessEnded(f"the recorder does not listen:{_last_lines(log)}")
-                time.sleep(LOOK_EVERY_S)
-            yield
-
-
-@contextmanager
 def _running(words: Sequence[str], log: Path) -> Iterator[subprocess.Popen[bytes]]:
     """Run a command of this package for the block, its output in ``log``; then end it."""
     with log.open("wb") as output:
@@ -164,61 +142,3 @@ def _running(words: Sequence[str], log: Path) -> Iterator[subprocess.Popen[bytes
 def _last_lines(log: Path) -> str:
     lines = log.read_text(errors="replace").splitlines()[-5:]
     return "".join(f"\n  {line}" for line in lines)
-
-
-def place(pid: int, cores: Set[int], niceness: int) -> None:
-    """Set cores and niceness of all threads of a process.
-
-    Threads that it starts later inherit both.
-    """
-    for task in Path(f"/proc/{pid}/task").iterdir():
-        with suppress(ProcessLookupError):
-            os.sched_setaffinity(int(task.name), cores)
-            os.setpriority(os.PRIO_PROCESS, int(task.name), niceness)
-
-
-@contextmanager
-def weighed(pid: int, weight: int) -> Iterator[str]:
-    """Put a process into a control group of its own for the block; yield its name, "" for none.
-
-    Like ``CPUWeight`` of a unit; only root may, and only where there are control groups.
-    """
-    name = f"fasaco-bench-{os.getpid()}"
-    shares = round(weight * SHARES_OF_WEIGHT)
-    choices = ((CGROUPS, "cpu.weight", weight), (CGROUPS / "cpu", "cpu.shares", shares))
-    for parent, file, value in choices:
-        group = parent / name
-        if not _is_made(group, file, str(value), pid):
-            continue
-        try:
-            yield f"{file} {value}"
-        finally:
-            _dissolve(group)
-        return
-    yield ""
-
-
-def _is_made(group: Path, file: str, value: str, pid: int) -> bool:
-    # With version 1 the folder of all groups is an ordinary one.
-    if not (group.parent / "cgroup.procs").exists():
-        return False
-    try:
-        group.mkdir()
-    except OSError:
-        return False
-    try:
-        # Opened, not made: without the controller there is no such file.
-        for name, text in ((file, value), ("cgroup.procs", str(pid))):
-            with (group / name).open("r+", encoding="ascii") as control:
-                control.write(text)
-    except OSError:
-        _dissolve(group)
-        return False
-    return True
-
-
-def _dissolve(group: Path) -> None:
-    with suppress(OSError):
-        for pid in (group / "cgroup.procs").read_text(encoding="ascii").split():
-            (group.parent / "cgroup.procs").write_text(pid, encoding="ascii")
-        group.rmdir()

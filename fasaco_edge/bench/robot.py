@@ -6,14 +6,10 @@ The building is fully known, 50 m x 50 m, as it comes from SLAM. A crate in it m
 from __future__ import annotations
 
 import queue
-import threading
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fasaco_edge.bench.processes import LOOK_EVERY_S, START_TIMEOUT_S, DaemonProcess
 from fasaco_edge.bus.arrival import Sample
@@ -26,19 +22,12 @@ from fasaco_edge.wire import topics
 from fasaco_edge.wire.documents.json_text import decode_tolerant
 from fasaco_edge.wire.documents.path_documents import PathAttachment
 from fasaco_edge.wire.messages.maps import encode_occupancy_grid
-from fasaco_edge.wire.messages.paths import decode_path
 from fasaco_edge.wire.messages.poses import encode_pose_stamped
 
 RESOLUTION_M = 0.05
 HALL_PX, WALL_PX, DOOR_PX, CRATE_PX = 200, 4, 30, 16
 # Places of the crate: each time it moves by less than its width, forth and back.
 CRATE_PLACES, CRATE_STEP_PX = 12, 12
-# Where the crate stands when the robot begins to drive.
-FIRST_CRATE = 1
-POSES_HZ = 10
-SPEED_M_S = 0.5
-# Period of maps [s], each with the crate at another place: the rest of the path is replanned.
-MAP_EVERY_S = 1.0
 # Timeout of the first path, which needs the kernels: a slow computer loads them for long.
 PATH_TIMEOUT_S = 300.0
 
@@ -79,14 +68,6 @@ def robot_pose(stamp_ns: int) -> StampedPose:
     return StampedPose(Pose2D(2.5, 2.5), stamp_ns=stamp_ns)
 
 
-@dataclass(frozen=True, slots=True)
-class PathArrival:
-    """A received path: its time of arrival [s, monotonic], and its attachment."""
-
-    at: float
-    about: PathAttachment
-
-
 class MapSource:
     """Publishes maps and the pose to a daemon, and receives its paths."""
 
@@ -113,8 +94,9 @@ class MapSource:
         self._maps.put(payload)
         return at
 
-    def wait_path(self, map_stamp_ns: int) -> PathArrival:
-        """Return the first path planned on the map of that stamp.
+    def wait_path(self, map_stamp_ns: int) -> tuple[float, float]:
+        """Return the arrival [s, monotonic] of the first path planned on the map of that stamp, and
+        how long it was planned [ms].
 
         Paths without a plan, a walk cut off before a new obstacle, are skipped.
 
@@ -131,15 +113,10 @@ class MapSource:
                 continue
             about = decode_tolerant(sample.attachment, PathAttachment)
             if about.map_stamp_ns == map_stamp_ns and about.planner is not None:
-                return PathArrival(at, about)
+                return at, about.plan_ms
         raise NotYet(
             f"no path for a map after {PATH_TIMEOUT_S:.0f} s", hint="is the machine overloaded?"
         )
-
-    def forget_paths(self) -> None:
-        """Drop paths that arrived earlier."""
-        while not self._arrivals.empty():
-            self._arrivals.get()
 
     def _await_listener(self, publisher: Publisher) -> None:
         deadline = time.monotonic() + START_TIMEOUT_S
@@ -147,94 +124,3 @@ class MapSource:
             if time.monotonic() > deadline:
                 raise BusUnavailable("the daemon does not subscribe to maps and poses")
             time.sleep(LOOK_EVERY_S)
-
-
-class CoveringRobot:
-    """Drives; takes paths on Zenoh's threads, and is ticked by one.
-
-    Args:
-        source: publishes its poses and maps.
-        map_every_s: period of maps [s].
-        maps_a_crate: number of successive maps that show the crate at one place.
-
-    Attributes:
-        paths: number of received paths.
-    """
-
-    def __init__(self, source: MapSource, map_every_s: float, maps_a_crate: int) -> None:
-        self.paths = 0
-        self._source = source
-        self._map_every_s, self._maps_a_crate = map_every_s, maps_a_crate
-        self._building = building()
-        self._at = np.array([2.5, 2.5])
-        self._ahead: NDArray[np.float64] = np.empty((0, 2))
-        self._maps, self._map_due = FIRST_CRATE * maps_a_crate, 0.0
-        self._lock = threading.Lock()
-
-    def take_path(self, sample: Sample) -> None:
-        """Drive this from now on."""
-        ahead = decode_path(sample.payload).xy
-        with self._lock:
-            self.paths += 1
-            self._ahead = ahead
-
-    def tick(self, now: float) -> None:
-        """Drive on for a period, and publish the pose; now and then a map."""
-        with self._lock:
-            self._drive(SPEED_M_S / POSES_HZ)
-        x, y = self._at
-        self._source.forget_paths()
-        self._source.put_pose(StampedPose(Pose2D(x, y), stamp_ns=time.time_ns()))
-        if now >= self._map_due:
-            self._maps += 1
-            self._map_due = now + self._map_every_s
-            number = self._maps // self._maps_a_crate
-            self._source.put_map(with_crate(self._building, number, time.time_ns()))
-
-    def _drive(self, metres: float) -> None:
-        while len(self._ahead) and metres > 0.0:
-            way = self._ahead[0] - self._at
-            left = float(np.hypot(*way))
-            if left > metres:
-                self._at = self._at + way * (metres / left)
-                return
-            self._at, self._ahead, metres = self._ahead[0], self._ahead[1:], metres - left
-
-
-@contextmanager
-def robot_beside(
-    daemon: DaemonProcess,
-    bus: Bus,
-    *,
-    map_every_s: float = MAP_EVERY_S,
-    maps_a_crate: int = 1,
-    source: MapSource | None = None,
-) -> Iterator[CoveringRobot]:
-    """Let a robot drive for the block, from the moment it has its first path.
-
-    Args:
-        daemon, bus: whose robot it is, and a session with it.
-        map_every_s, maps_a_crate: see ``CoveringRobot``.
-        source: publisher of maps and poses; None for a new one.
-    """
-    source = source or MapSource(daemon, bus)
-    robot = CoveringRobot(source, map_every_s, maps_a_crate)
-    bus.subscribe(daemon.keys.of(topics.PATH), robot.take_path)
-    stamp_ns = time.time_ns()
-    source.put_pose(robot_pose(stamp_ns))
-    # A new map: the daemon would plan nothing on one that it knows already.
-    source.put_map(with_crate(building(), FIRST_CRATE, stamp_ns))
-    source.wait_path(stamp_ns)
-    over = threading.Event()
-
-    def drive() -> None:
-        while not over.wait(1.0 / POSES_HZ):
-            robot.tick(time.monotonic())
-
-    thread = threading.Thread(target=drive, name="robot")
-    thread.start()
-    try:
-        yield robot
-    finally:
-        over.set()
-        thread.join()

@@ -16,7 +16,7 @@ from importlib import import_module
 from typing import NoReturn
 
 from fasaco_edge import __version__
-from fasaco_edge.cli.console.arguments import Command, Exit, add_common, with_negative_pairs
+from fasaco_edge.cli.console.arguments import Command, Exit, add_common
 from fasaco_edge.cli.console.logs import begin_logging, say_why
 from fasaco_edge.cli.console.parser import Parser
 from fasaco_edge.cli.console.streams import clean_streams, open_missing_streams
@@ -38,16 +38,13 @@ COMMANDS = {
     "review": "report what happened in a recorded mission",
     "replay": "replay a recorded mission and compare its decisions",
     "simulate": "simulate a robot with a laser scanner on the bus",
-    "bench": "measure speed, footprint, latency and jitter on this machine",
+    "bench": "compare planners; measure a daemon's memory, load and delays on this machine",
     "maps": "list the maps that come with the package",
     "warmup": "compile the kernels into the cache, so that the first plan starts at once",
     "check-config": "check a configuration: every fault, with line, value and what is allowed",
     "doctor": "check host, bus and configuration, and say what to do",
 }
 """Each command, and its line in the list of them."""
-
-# Options of earlier releases, and their replacement.
-REMOVED = {"--no-local-search": "it was removed in this version: write --planner fasaco"}
 
 # A faulty or full disk, a computer without free files or memory. Its exit code differs from that of
 # an invalid configuration, so that a service is restarted.
@@ -72,7 +69,8 @@ def program() -> NoReturn:
     A session of Zenoh leaves threads behind that still release callbacks after it was closed (Zenoh
     1.10). Where the interpreter ends meanwhile, the C library aborts the process with "FATAL:
     exception not rethrown", or the interpreter waits for ever. So the process then exits without
-    the interpreter's own end, except with Rerun, which writes its last data there.
+    the interpreter's own end, except with Rerun, which writes its last data there. Nor does a check
+    of ``doctor`` that hangs hold it up.
     """
     code = main()
     if "zenoh" not in sys.modules or "rerun" in sys.modules:
@@ -91,10 +89,9 @@ def run_command(parser: Parser, words: Sequence[str]) -> int:
     os.umask(os.umask(0o022) | 0o022)
     open_missing_streams()
     clean_streams()
-    args, unknown = parser.parse_known_args(with_negative_pairs(words))
+    args, unknown = parser.parse_known_args(words)
     if unknown:
-        told = next((REMOVED[word] for word in unknown if word in REMOVED), "")
-        args.parser.refuse(unknown, told)
+        args.parser.refuse(unknown)
     begin_logging(args.log_level)
     if args.with_parent is not None:
         end_with_parent(args.with_parent)

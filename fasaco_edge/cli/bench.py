@@ -12,22 +12,18 @@ from rich.table import Table
 from rich.text import Text
 
 from fasaco_edge.bench.benchmark import Benchmark, Report, Sample, machine, peak_mb
-from fasaco_edge.bench.footprint import FOOTPRINT
-from fasaco_edge.bench.jitter import JITTER
-from fasaco_edge.bench.latency import LATENCY
+from fasaco_edge.bench.daemon import DAEMON
 from fasaco_edge.bench.planners import PLANNERS
-from fasaco_edge.bench.speed import SPEED
 from fasaco_edge.cli.console import terminal
 from fasaco_edge.cli.console.arguments import Command, Exit, add_common, add_json
 from fasaco_edge.cli.console.logs import say_why
 from fasaco_edge.cli.console.streams import print_json
 
-BENCHMARKS: tuple[Benchmark[Any], ...] = (PLANNERS, SPEED, FOOTPRINT, LATENCY, JITTER)
+BENCHMARKS: tuple[Benchmark[Any], ...] = (PLANNERS, DAEMON)
 
 EPILOG = """\
 examples:
-  fasaco-edge bench speed                              is this computer fast enough?
-  fasaco-edge bench footprint                          memory and processor of a daemon here
+  fasaco-edge bench daemon                             is this computer fast enough?
   fasaco-edge bench planners --planner mine.py:walk    your planner beside the others
 
 Each benchmark has --help, prints a table or --json, and can be
@@ -138,7 +134,7 @@ def _goals(report: Report) -> Table:
         table.add_column(column, justify="left" if column == "" else "right")
     for goal in report.goals:
         sign = "at least" if goal.at_least else "at most"
-        measured = "-" if goal.measured is None else f"{goal.measured:g} {goal.unit}".strip()
+        measured = "-" if goal.measured is None else f"{goal.measured:.4g} {goal.unit}".strip()
         table.add_row(
             goal.what, measured, f"{sign} {goal.limit:g} {goal.unit}".strip(), verdicts[goal.met]
         )
@@ -157,8 +153,8 @@ def _table(title: str) -> Table:
 
 
 COMMAND = Command(
-    description="Measure planning, the daemon's memory and delays on this machine, or compare "
-    "planners. Each benchmark states a goal and whether it is met.",
+    description="Measure the daemon's memory, load and delays on this machine, with goals and "
+    "whether they are met; or compare planners.",
     run=run,
     add_options=add_benchmarks,
     epilog=EPILOG,

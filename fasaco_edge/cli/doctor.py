@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import argparse
-import os
 import sys
 import textwrap
-import threading
 from dataclasses import asdict
 from pathlib import Path
 
@@ -16,15 +14,14 @@ from fasaco_edge.cli.console.arguments import Command, Exit, add_json
 from fasaco_edge.cli.console.streams import print_json
 from fasaco_edge.cli.console.terminal import out
 from fasaco_edge.doctor.finding import Finding, Level
-from fasaco_edge.doctor.report import CHECKS, findings
+from fasaco_edge.doctor.report import findings
 from fasaco_edge.text import one_line
 
 EPILOG = """\
 Nothing is started or changed: it joins the bus for a second, listens, and queries. Run it as the
 daemon's user or as root, so that it can read what the daemon reads. The checks:
   configuration   whether the file is in order
-  platform        processor, system, Python
-  C library       whether it is new enough for the installed packages
+  platform        processor, system, Python; whether there is more than one core
   memory          how much there is, and whether limits on it hold
   clock           whether it is synchronised
   kernels         whether they are compiled for this code and processor, and who owns them
@@ -37,7 +34,6 @@ daemon's user or as root, so that it can read what the daemon reads. The checks:
                   or user and password
   secret files    whether others on this computer can read keys and passwords
   roles           who may publish maps, command, view and record
-  limits          how much each sender may send
 
 Each line is ok; warn: works, but needs attention; or fail, with what to do.
 exit codes: 0 nothing failed, 1 something failed
@@ -70,14 +66,7 @@ def run(args: argparse.Namespace) -> int:
     else:
         _print(found)
     failed = any(finding.level is Level.FAIL for _, finding in found)
-    code = Exit.ERROR if failed else Exit.OK
-    checks = {check.name for check in CHECKS}
-    if any(thread.name in checks for thread in threading.enumerate()):
-        # The interpreter would wait at its exit for a check that hangs. Other threads belong to the
-        # caller.
-        sys.stdout.flush()
-        os._exit(code)
-    return code
+    return Exit.ERROR if failed else Exit.OK
 
 
 def _document(found: list[tuple[str, Finding]]) -> dict[str, object]:

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING
 
 import yaml
 
@@ -32,12 +31,31 @@ if TYPE_CHECKING:
     from fasaco_edge.config.config import DaemonConfig
     from fasaco_edge.doctor.finding import Finding
 
-Value = TypeVar("Value")
-
 WAYS = {
     "zenoh": "plain Zenoh",
     "rmw_zenoh": "ROS 2 whose middleware is rmw_zenoh",
     "bridge": "ROS 2 behind zenoh-bridge-ros2dds",
+}
+# Keys of the robot's section, and the options that set them.
+ROBOT = {
+    "name": "name",
+    "radius_m": "robot_radius",
+    "footprint": "robot_size",
+    "clearance_m": "clearance",
+    "tool_width_m": "tool_width",
+}
+# Options that are asked for: the question, and the answer by default.
+QUESTIONS = {
+    "robot_radius": ("Radius of the disc around the robot [m]", f"{DEFAULT_RADIUS_M:g}"),
+    "tool_width": ("Width of its tool [m]", f"{DEFAULT_CELL_M:g}"),
+    "map_by": (
+        f"How does the map come? {'; '.join(f'{way}: {what}' for way, what in WAYS.items())}",
+        "zenoh",
+    ),
+    "connect": (
+        f"Router to connect to, {DEFAULT_ENDPOINT} say; none: the daemon listens there",
+        "",
+    ),
 }
 # Where a robot passes something, its map and pose are wrong by one to two centimetres [m]; the
 # default of the key is for a simulation in which they are not.
@@ -149,31 +167,20 @@ def run(args: argparse.Namespace) -> int:
 
 def document_of(args: argparse.Namespace) -> dict[str, object]:
     """Return the settings that differ from the defaults."""
-    robot = {
-        "name": args.name,
-        "radius_m": args.robot_radius,
-        "footprint": args.robot_size,
-        "clearance_m": args.clearance,
-        "tool_width_m": args.tool_width,
-    }
-    usual = {
-        "name": "robot",
-        "radius_m": DEFAULT_RADIUS_M,
-        "footprint": None,
-        "clearance_m": 0.0,
-        "tool_width_m": DEFAULT_CELL_M,
-    }
+    from fasaco_edge.config.robot import RobotConfig
+
+    given, usual = {key: getattr(args, option) for key, option in ROBOT.items()}, RobotConfig()
     ros = {"domain": args.domain, "namespace": args.namespace}
     parts: dict[str, dict[str, object]] = {
-        "robot": {k: v for k, v in robot.items() if v not in (None, usual[k])},
+        "robot": {k: v for k, v in given.items() if v not in (None, getattr(usual, k))},
         "bus": {},
         "ros2": {},
     }
     if args.connect:
         parts["bus"] = {"mode": "client", "listen": [], "connect": [args.connect]}
     if args.map_by != "zenoh":
-        given = {k: v for k, v in ros.items() if v not in (None, 0, "/")}
-        parts["ros2"] = {"kind": args.map_by} | given
+        told = {k: v for k, v in ros.items() if v not in (None, 0, "/")}
+        parts["ros2"] = {"kind": args.map_by} | told
     elif args.domain is not None or args.namespace is not None:
         raise BadConfiguration("--domain and --namespace are for maps from ROS 2, see --map-by")
     return {name: part for name, part in parts.items() if part}
@@ -185,73 +192,52 @@ def _ask(args: argparse.Namespace) -> None:
     Raises:
         BadConfiguration: no person can answer, or there is no answer.
     """
-    needed = ("robot_radius", "tool_width", "map_by")
-    missing = [name for name in needed if getattr(args, name) is None]
+    missing = [name for name in QUESTIONS if getattr(args, name) is None]
     if args.robot_size is not None and "robot_radius" in missing:
         missing.remove("robot_radius")
-    if not missing:
+    if missing in ([], ["connect"]):
         return
     if not (sys.stdin.isatty() and err().is_terminal):
-        options = ", ".join(f"--{name.replace('_', '-')}" for name in missing)
-        raise BadConfiguration(f"{options} must be given: there is no terminal to ask at")
-    if args.robot_radius is None and args.robot_size is None:
-        question = "Radius of the disc around the robot [m]"
-        args.robot_radius = _asked(question, f"{DEFAULT_RADIUS_M:g}", _metres("radius_m"))
-    if args.tool_width is None:
-        tool_width = _metres("tool_width_m")
-        args.tool_width = _asked("Width of its tool [m]", f"{DEFAULT_CELL_M:g}", tool_width)
-    if args.map_by is None:
-        ways = "; ".join(f"{way}: {what}" for way, what in WAYS.items())
-        args.map_by = _asked(f"How does the map come? {ways}", "zenoh", _way)
-    if args.connect is None:
-        question = f"Router to connect to, {DEFAULT_ENDPOINT} say; none: the daemon listens there"
-        args.connect = _asked(question, "", _router)
+        names = [f"--{name.replace('_', '-')}" for name in missing if name != "connect"]
+        raise BadConfiguration(f"{', '.join(names)} must be given: there is no terminal to ask at")
+    for name in missing:
+        setattr(args, name, _asked(name))
 
 
-def _asked(question: str, default: str, read: Callable[[str], Value]) -> Value:
-    """Ask until ``read`` accepts the answer, and return what it makes of it."""
+def _asked(name: str) -> object:
+    """Ask for the value of an option until the answer is valid."""
+    question, default = QUESTIONS[name]
     while True:
-        text = _answer(question, default)
+        # Questions do not go to standard output, which may be JSON for another program.
+        err().print(f"{question} [{default or 'none'}]: ", end="", markup=False, soft_wrap=True)
+        line = sys.stdin.readline()
+        if not line:  # Ctrl-D: without an answer nothing is written
+            raise BadConfiguration(f"no answer to: {question}", hint="give the options, see --help")
         try:
-            return read(text)
+            return _read(name, line.strip() or default)
         except BadConfiguration as error:
             more = "" if error.hint == BadConfiguration.hint else f" ({error.hint})"
             err().print(f"  {error}{more}", markup=False, highlight=False, soft_wrap=True)
 
 
-def _metres(key: str) -> Callable[[str], float]:
-    """Return what reads a length [m] of the robot's section, and checks it."""
-
-    def read(text: str) -> float:
-        try:
-            value = float(text)
-        except ValueError:
-            raise BadConfiguration(f"must be a number, got {shown(text)}") from None
-        _checked(yaml.safe_dump({"robot": {key: value}}))
-        return value
-
-    return read
-
-
-def _way(text: str) -> str:
-    if text not in WAYS:
-        raise BadConfiguration(f"must be {', '.join(WAYS)}, got {shown(text)}")
-    return text
-
-
-def _router(text: str) -> str:
-    if text:
-        _checked(yaml.safe_dump({"bus": {"mode": "client", "listen": [], "connect": [text]}}))
-    return text
-
-
-def _answer(question: str, default: str) -> str:
-    # Questions do not go to standard output, which may be JSON for another program.
-    err().print(f"{question} [{default or 'none'}]: ", end="", markup=False, soft_wrap=True)
-    line = sys.stdin.readline()
-    if not line:  # Ctrl-D: without an answer nothing is written
-        raise BadConfiguration(f"no answer to: {question}", hint="give the options, see --help")
-    return line.strip() or default
+def _read(name: str, text: str) -> object:
+    """Return the value of an option in an answer, checked as in a configuration."""
+    if name == "map_by":
+        if text not in WAYS:
+            raise BadConfiguration(f"must be {', '.join(WAYS)}, got {shown(text)}")
+        return text
+    if name == "connect":
+        bus = {"mode": "client", "listen": [], "connect": [text]}
+        if text:
+            _checked(yaml.safe_dump({"bus": bus}))
+        return text
+    try:
+        value = float(text)
+    except ValueError:
+        raise BadConfiguration(f"must be a number, got {shown(text)}") from None
+    key = next(key for key, option in ROBOT.items() if option == name)
+    _checked(yaml.safe_dump({"robot": {key: value}}))
+    return value
 
 
 def _checked(text: str) -> DaemonConfig:

@@ -12,7 +12,6 @@ import msgspec
 from fasaco_edge.cli.console.arguments import Command, add_robot_on_bus, robot_on_bus
 from fasaco_edge.cli.console.terminal import err
 from fasaco_edge.errors import BadConfiguration
-from fasaco_edge.wire.schemas import POSE_SCHEMAS, POSE_STAMPED
 
 if TYPE_CHECKING:
     from fasaco_edge.bus.settings import BusSettings
@@ -39,21 +38,20 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         "keys, not of ROS 2",
     )
     parser.add_argument(
-        "--pose-schema",
-        choices=POSE_SCHEMAS,
-        default=POSE_STAMPED,
-        metavar="TYPE",
-        help=f"type of poses whose samples name none: {', '.join(POSE_SCHEMAS)} "
-        "(default: %(default)s)",
-    )
-    parser.add_argument(
         "--ros2",
         type=ros_config,
         metavar="JSON",
         help="the block ros2 of the daemon's configuration: also record these topics; not with "
         "--fleet",
     )
-    _add_room(parser)
+    parser.add_argument(
+        "--quota-mb",
+        type=int,
+        default=0,
+        metavar="MB",
+        help="size of the robot's recordings in DIR above which the oldest files are deleted, "
+        "never the one being written [MB]; 0 for no limit (default: %(default)s)",
+    )
     parser.add_argument(
         "--serve",
         type=address,
@@ -85,39 +83,6 @@ def address(text: str) -> tuple[str, int]:
     if not (port.isascii() and port.isdigit() and 0 < int(port) < 65536):
         raise argparse.ArgumentTypeError(f"must be [HOST:]PORT, got {text!r}")
     return host.strip("[]") or DEFAULT_HOST, int(port)
-
-
-def _add_room(parser: argparse.ArgumentParser) -> None:
-    room = parser.add_argument_group("disk space")
-    room.add_argument(
-        "--part-mb",
-        type=int,
-        default=64,
-        metavar="MB",
-        help="size after which the next file begins [MB] (default: %(default)s)",
-    )
-    room.add_argument(
-        "--part-min",
-        type=float,
-        default=10.0,
-        metavar="MIN",
-        help="time after which the next file begins [min]; 0 for never (default: %(default)g)",
-    )
-    room.add_argument(
-        "--quota-mb",
-        type=int,
-        default=0,
-        metavar="MB",
-        help="size of the robot's recordings in DIR above which the oldest files are deleted, "
-        "never the one being written [MB]; 0 for no limit (default: %(default)s)",
-    )
-    room.add_argument(
-        "--least-free-mb",
-        type=int,
-        default=50,
-        metavar="MB",
-        help="pause recording while the disk has less free space [MB] (default: %(default)s)",
-    )
 
 
 def run(args: argparse.Namespace) -> int:
@@ -161,20 +126,14 @@ def _record(args: argparse.Namespace) -> int:
 
 def config_of_options(args: argparse.Namespace) -> tuple[DaemonConfig, BusSettings]:
     """Return the configuration that the options state, and how to join the bus."""
-    from fasaco_edge.config.config import BusConfig, DaemonConfig, PoseConfig, RecordingConfig
+    from fasaco_edge.config.config import BusConfig, DaemonConfig, RecordingConfig
     from fasaco_edge.config.robot import RobotConfig
 
     keys, bus, _ = robot_on_bus(args)
     config = DaemonConfig(
         robot=RobotConfig(name=keys.robot),
         bus=BusConfig(base=keys.base),
-        pose=PoseConfig(schema=args.pose_schema),
-        recording=RecordingConfig(
-            part_mb=args.part_mb,
-            part_min=args.part_min,
-            quota_mb=args.quota_mb,
-            least_free_mb=args.least_free_mb,
-        ),
+        recording=RecordingConfig(quota_mb=args.quota_mb),
         ros2=args.ros2 or msgspec.UNSET,
     )
     return config, bus

@@ -8,7 +8,7 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import msgspec
 from rich.table import Table
@@ -24,6 +24,7 @@ from fasaco_edge.text import shown
 from fasaco_edge.wire.documents.path_documents import PlanFigures, digest
 
 if TYPE_CHECKING:
+    from fasaco_edge.errors import FasacoError
     from fasaco_edge.mission.core.events import PathUpdate
     from fasaco_edge.recording.read.run import RecordedSamples
     from fasaco_edge.replay.cycle_replay import CycleRecord
@@ -93,17 +94,16 @@ def run(args: argparse.Namespace) -> int:
     summary = _summary(replay, recorded, samples, steps, last_s)
     compared = None
     if record is not None and isinstance(replay, CycleReplay):
-        compared = _comparison(replay, record)
+        compared = _compared(replay, record)
     if args.json:
-        verdict = msgspec.to_builtins(compared) if compared else {"equal": None}
-        document = msgspec.to_builtins(summary) | verdict
+        document = summary | (msgspec.to_builtins(compared) if compared else {"equal": None})
         print_json({"decisions": [_document(step) for step in steps], "summary": document})
     else:
         console = terminal.out()
         console.print(_table(steps))
         console.print(terminal.figures([*_rows(summary), *_compared_rows(compared)]))
         terminal.err().print(f"{last_s:.1f} s in {time.monotonic() - began:.1f} s")
-    return Exit.OK if compared is None or compared.equal else Exit.ERROR
+    return Exit.OK if compared is None or compared["equal"] else Exit.ERROR
 
 
 def _count(text: str) -> int:
@@ -119,7 +119,7 @@ def _document(step: ReplayStep) -> dict[str, object]:
         document["asked"] = step.decision.plan.reason
     if step.decision.path is not None:
         document["path"] = _path(step.decision.path) | {"as_recorded": step.as_recorded}
-    if faults := (*step.refused, *step.decision.faults):
+    if faults := _faults(step):
         document["faults"] = [{"code": fault.code, "message": str(fault)} for fault in faults]
     return document
 
@@ -134,55 +134,38 @@ def _path(update: PathUpdate) -> dict[str, object]:
     }
 
 
-class Summary(msgspec.Struct):
-    """The result of a replay."""
-
-    duration_s: float
-    state: str
-    reason: str
-    covered_cells: int
-    coverable_cells: int
-    plans: int
-    paths: int
-    paths_recorded: int
-    paths_as_recorded: int
-    faults: dict[str, int]
-    samples_missing: int
-    restored_cells_missing: int
-    restarts_ignored: int
-    own_planner_missing: str
-
-
 def _summary(
     replay: Replay | CycleReplay,
     recorded: RecordedRun,
     samples: RecordedSamples,
     steps: Sequence[ReplayStep],
     last_s: float,
-) -> Summary:
+) -> dict[str, Any]:
+    """Return the result of a replay, as JSON values."""
     mission, coverage = replay.mission, replay.mission.coverage()
     is_approximate = isinstance(replay, Replay)
-    faults = Counter(
-        fault.code for step in steps for fault in (*step.refused, *step.decision.faults)
-    )
-    return Summary(
-        duration_s=round(last_s, 3),
-        state=str(mission.state),
-        reason=mission.reason,
-        covered_cells=coverage.covered if coverage else 0,
-        coverable_cells=coverage.coverable if coverage else 0,
-        plans=mission.route.plans,
-        paths=mission.route.revision,
-        paths_recorded=len(recorded.paths),
-        paths_as_recorded=sum(
-            step.as_recorded is True for step in steps if step.decision.path is not None
-        ),
-        faults=dict(sorted(faults.items())),
-        samples_missing=samples.missing,
-        restored_cells_missing=recorded.restored_cells if is_approximate else 0,
-        restarts_ignored=recorded.starts if is_approximate else 0,
-        own_planner_missing=recorded.own_planner,
-    )
+    codes = Counter(fault.code for step in steps for fault in _faults(step))
+    as_recorded = [step for step in steps if step.decision.path is not None and step.as_recorded]
+    return {
+        "duration_s": round(last_s, 3),
+        "state": str(mission.state),
+        "reason": mission.reason,
+        "covered_cells": coverage.covered if coverage else 0,
+        "coverable_cells": coverage.coverable if coverage else 0,
+        "plans": mission.route.plans,
+        "paths": mission.route.revision,
+        "paths_recorded": len(recorded.paths),
+        "paths_as_recorded": len(as_recorded),
+        "faults": dict(sorted(codes.items())),
+        "samples_missing": samples.missing,
+        "restored_cells_missing": recorded.restored_cells if is_approximate else 0,
+        "restarts_ignored": recorded.starts if is_approximate else 0,
+        "own_planner_missing": recorded.own_planner,
+    }
+
+
+def _faults(step: ReplayStep) -> tuple[FasacoError, ...]:
+    return (*step.refused, *step.decision.faults)
 
 
 def _table(steps: Sequence[ReplayStep]) -> Table:
@@ -192,7 +175,7 @@ def _table(steps: Sequence[ReplayStep]) -> Table:
     table.add_column("why", overflow="fold")
     for step in steps:
         update = step.decision.path
-        faults = [str(fault) for fault in (*step.refused, *step.decision.faults)]
+        faults = [str(fault) for fault in _faults(step)]
         why = update.reason if update else step.reason if step.changed else ""
         row = ["", "", "", ""]
         if update is not None:
@@ -210,23 +193,24 @@ def _table(steps: Sequence[ReplayStep]) -> Table:
     return table
 
 
-def _rows(summary: Summary) -> list[tuple[str, str]]:
-    faults = ", ".join(f"{count} {code}" for code, count in summary.faults.items())
+def _rows(summary: dict[str, Any]) -> list[tuple[str, str]]:
+    faults = ", ".join(f"{count} {code}" for code, count in summary["faults"].items())
     rows = [
-        ("ended", f"{summary.state}: {summary.reason}"),
-        ("covered", f"{summary.covered_cells} of {summary.coverable_cells} cells"),
-        ("plans, paths", f"{summary.plans}, {summary.paths}"),
-        ("as recorded", f"{summary.paths_as_recorded} of {summary.paths_recorded} paths"),
+        ("ended", f"{summary['state']}: {summary['reason']}"),
+        ("covered", f"{summary['covered_cells']} of {summary['coverable_cells']} cells"),
+        ("plans, paths", f"{summary['plans']}, {summary['paths']}"),
+        ("as recorded", f"{summary['paths_as_recorded']} of {summary['paths_recorded']} paths"),
         ("refused", faults or "nothing"),
     ]
-    if own := summary.own_planner_missing:
+    if own := summary["own_planner_missing"]:
         rows.append(("own planner", f"{shown(own)}: its plans cannot be repeated"))
-    if summary.samples_missing:
-        rows.append(("not recorded", f"{summary.samples_missing} samples"))
-    if summary.restored_cells_missing:
-        rows.append(("covered before", f"{summary.restored_cells_missing} cells, not recorded"))
-    if summary.restarts_ignored:
-        rows.append(("daemon restarts", f"{summary.restarts_ignored}, played as one mission"))
+    for name, key, words in (
+        ("not recorded", "samples_missing", "samples"),
+        ("covered before", "restored_cells_missing", "cells, not recorded"),
+        ("daemon restarts", "restarts_ignored", "played as one mission"),
+    ):
+        if count := summary[key]:
+            rows.append((name, f"{count} {words}"))
     return rows
 
 
@@ -234,69 +218,46 @@ def _rows(summary: Summary) -> list[tuple[str, str]]:
 NAMED = 5
 
 
-class Versions(msgspec.Struct):
-    """The software that decided then, and the software that decides now."""
-
-    recorded: str
-    replayed: str
-
-
-class Comparison(msgspec.Struct):
-    """The result of a replay by cycles."""
-
-    equal: bool
-    turns: int
-    turns_equal: int
-    plans_repeated: int
-    difference: Difference | None
-    samples_lacking: list[Difference]
-    log_ends: str
-    version: Versions
-    kernels: Versions
-
-
-def _comparison(replay: CycleReplay, record: CycleRecord) -> Comparison:
+def _compared(replay: CycleReplay, record: CycleRecord) -> dict[str, Any]:
+    """Return the result of a replay by cycles, as JSON values."""
     difference, *lacking = (
         found and replace(found, at_s=round(found.at_s, 6))
         for found in (replay.difference, *replay.lacking)
     )
-    return Comparison(
-        equal=difference is None and not lacking and not record.gap,
-        turns=record.turns,
-        turns_equal=replay.turns,
-        plans_repeated=replay.plans,
-        difference=difference,
-        samples_lacking=[found for found in lacking if found is not None],
-        log_ends=record.gap,
-        version=Versions(record.beginning.version, __version__),
-        kernels=Versions(record.kernels, replay.kernels),
-    )
+    return {
+        "equal": difference is None and not lacking and not record.gap,
+        "turns": record.turns,
+        "turns_equal": replay.turns,
+        "plans_repeated": replay.plans,
+        "difference": difference,
+        "samples_lacking": lacking,
+        "log_ends": record.gap,
+        "version": {"recorded": record.beginning.version, "replayed": __version__},
+        "kernels": {"recorded": record.kernels, "replayed": replay.kernels},
+    }
 
 
-def _compared_rows(compared: Comparison | None) -> list[tuple[str, str]]:
+def _compared_rows(compared: dict[str, Any] | None) -> list[tuple[str, str]]:
     """Return the result of a replay by cycles, for people."""
     if compared is None:
         return [("replay", "approximate: there is no turn log from the beginning, or it is unused")]
-    turns = f"{compared.turns_equal} of {compared.turns} turns"
-    said = "equal bit for bit" if compared.equal else "equal as far as can be compared"
-    if compared.difference is not None:
-        said = "not equal"
-    rows = [("replay", f"{said}: {turns}")]
-    if compared.difference is not None:
-        rows.append(("first difference", _words(compared.difference)))
-    lacking = compared.samples_lacking
+    difference, lacking = compared["difference"], compared["samples_lacking"]
+    said = "equal bit for bit" if compared["equal"] else "equal as far as can be compared"
+    said = said if difference is None else "not equal"
+    rows = [("replay", f"{said}: {compared['turns_equal']} of {compared['turns']} turns")]
+    if difference is not None:
+        rows.append(("first difference", _words(difference)))
     rows.extend(("sample", _words(found)) for found in lacking[:NAMED])
     if len(lacking) > NAMED:
         rows.append(("samples", f"{len(lacking) - NAMED} more are not as they were taken"))
-    if compared.log_ends:
-        rows.append(("compared up to", f"turn {compared.turns}: {compared.log_ends}"))
-    for name, versions in (("version", compared.version), ("kernels", compared.kernels)):
-        was, now = versions.recorded, versions.replayed
+    if ends := compared["log_ends"]:
+        rows.append(("compared up to", f"turn {compared['turns']}: {ends}"))
+    for name in ("version", "kernels"):
+        was, now = compared[name].values()
         if was and was != now:
             rows.append((name, f"recorded with {was}, replayed with {now}"))
-    kernels = compared.kernels
-    if compared.difference is not None and kernels.recorded not in ("", kernels.replayed):
-        rows.append(("why", "other kernels may plan other paths: that is no fault"))
+            if name == "kernels" and difference is not None:
+                rows.append(("why", "other kernels may plan other paths: that is no fault"))
     return rows
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 
 from fasaco_edge.cli.ask import add_question, ask
-from fasaco_edge.cli.console.arguments import Command, Exit, add_common
+from fasaco_edge.cli.console.arguments import Command, Exit, add_common, pair_of_floats
 from fasaco_edge.cli.console.help import HelpText
 from fasaco_edge.cli.console.pass_option import WORDS, add_passes
 from fasaco_edge.cli.console.rooms_table import show_rooms
@@ -63,7 +63,7 @@ def _add_name(action: argparse.ArgumentParser) -> None:
 
 def _add_split(action: argparse.ArgumentParser) -> None:
     for end in ("start", "end"):
-        action.add_argument(end, type=_point, metavar="X,Y", help=f"{end} of the line [m]")
+        action.add_argument(end, type=pair_of_floats, metavar="X,Y", help=f"{end} of the line [m]")
 
 
 def _add_merge(action: argparse.ArgumentParser) -> None:
@@ -87,14 +87,6 @@ _ADD = {"name": _add_name, "split": _add_split, "merge": _add_merge, "set": _add
 
 def _room(text: str) -> int | str:
     return int(text) if text.isascii() and text.isdigit() else text
-
-
-def _point(text: str) -> list[float]:
-    try:
-        x, y = map(float, text.split(","))
-    except ValueError:
-        raise argparse.ArgumentTypeError(f"must be x,y in metres, got {text!r}") from None
-    return [x, y]
 
 
 def run(args: argparse.Namespace) -> int:

@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import logging
-import os
-import sys
 from functools import partial
 from pathlib import Path
 
@@ -57,11 +54,7 @@ def run(args: argparse.Namespace) -> int:
 
     read = partial(read_config, args.config)
     run_daemon(read(), args.record, args.state, fresh=args.fresh, read=read)
-    # All is closed. The interpreter's own end is left out: after use of Zenoh's threads it was seen
-    # to wait for ever now and then, which a service must not.
-    logging.shutdown()
-    sys.stdout.flush()
-    os._exit(Exit.OK)
+    return Exit.OK
 
 
 COMMAND = Command(

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import argparse
-import os
 import sys
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, NoReturn
+from typing import TYPE_CHECKING
 
 from fasaco_edge.cli.console.arguments import Command, Exit, add_robot_on_bus, robot_on_bus
 from fasaco_edge.errors import BadConfiguration, MissingExtra
@@ -110,7 +109,7 @@ def run(args: argparse.Namespace) -> int:
     if args.recordings:
         guard = guard.to_look_only()
         with _recording(args) as source_of:
-            _serve(Server(guard, source_of), args, address, guard)
+            return _serve(Server(guard, source_of), args, address, guard)
     from fasaco_edge.client.feed import Feed
     from fasaco_edge.serve.live import LiveServer
     from fasaco_edge.serve.served_view import ServedView
@@ -118,7 +117,7 @@ def run(args: argparse.Namespace) -> int:
     here = robot_on_bus(args)
     with Feed(here.bus, here.keys, hears_fleet=True) as feed:
         server = LiveServer(feed, ServedView(here.keys), guard)
-        _serve(server, args, address, guard)
+        return _serve(server, args, address, guard)
 
 
 @contextmanager
@@ -143,7 +142,7 @@ def _recording(args: argparse.Namespace) -> Iterator[Callable[[], Playback]]:
         yield lambda: Playback(timeline, args.recordings)
 
 
-def _serve(server: Server, args: argparse.Namespace, address: Address, guard: Guard) -> NoReturn:
+def _serve(server: Server, args: argparse.Namespace, address: Address, guard: Guard) -> int:
     import asyncio
     import logging
 
@@ -156,8 +155,8 @@ def _serve(server: Server, args: argparse.Namespace, address: Address, guard: Gu
     except OSError as error:
         why = f"--listen: cannot listen at {address.shown}: {error.strerror or error}"
         print(one_line(f"fasaco-edge: {why}"), file=sys.stderr)
-        _leave(Exit.ERROR)
-    _leave(Exit.OK)
+        return Exit.ERROR
+    return Exit.OK
 
 
 def _tls(args: argparse.Namespace) -> ssl.SSLContext | None:
@@ -189,12 +188,6 @@ def _say(address: Address, guard: Guard, tokens: Path | None, secured: bool) -> 
             f"page at {page}, " + ("with commands" if guard.role == "operator" else "to look only")
         )
     sys.stdout.flush()
-
-
-def _leave(code: int) -> NoReturn:
-    """End the process here, see ``cli.watch``."""
-    sys.stdout.flush()
-    os._exit(code)
 
 
 COMMAND = Command(

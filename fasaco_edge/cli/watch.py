@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import argparse
-import os
 import sys
 from collections.abc import Callable
-from typing import TYPE_CHECKING, NoReturn
+from typing import TYPE_CHECKING
 
 from fasaco_edge.cli.ask import nobody_answers
 from fasaco_edge.cli.console.arguments import (
@@ -16,7 +15,6 @@ from fasaco_edge.cli.console.arguments import (
     robot_on_bus,
     seconds,
 )
-from fasaco_edge.cli.console.logs import say_why
 from fasaco_edge.cli.console.terminal import can_draw, out
 from fasaco_edge.client.phrases import steady_now
 from fasaco_edge.errors import BusUnavailable, FasacoError
@@ -79,24 +77,10 @@ def run(args: argparse.Namespace) -> int:
             with fleet_on_bus(args.fleet, keys, bus, out()) as (watched, no_answer):
                 _watch(args, watched, no_answer)
         sys.stdout.flush()
-        code = Exit.OK
-    except FasacoError as error:
-        say_why(error)
-        code = Exit.ERROR
     except OSError:
         # The terminal is gone, or the reader of a pipe has seen enough.
-        code = Exit.ERROR
-    return _leave(code)
-
-
-def _leave(code: int) -> NoReturn:
-    """End the process here.
-
-    A session that has lost its router leaves threads behind that still release callbacks after
-    it was closed (Zenoh 1.10). Where the interpreter ends meanwhile, the C library aborts the
-    process with "FATAL: exception not rethrown".
-    """
-    os._exit(code)
+        return Exit.ERROR
+    return Exit.OK
 
 
 def _watch_robot(args: argparse.Namespace, keys: Keys, bus: BusSettings) -> None:

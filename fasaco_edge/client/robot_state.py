@@ -31,8 +31,9 @@ if TYPE_CHECKING:
 
 # The daemon publishes a status once a second.
 SILENCE_S = 3.5
-# A map that has grown within this time may grow further [s].
-GROWS_S = 60.0
+# A map is complete once it has not grown for so long [s], and for this share of the time in which
+# it grew: while a robot sweeps what it has found, minutes pass without anything new.
+COMPLETE_S, COMPLETE_SHARE = 180.0, 0.5
 # If no pose has come on its own key for this long [s], the poses in the status are shown.
 POSE_LASTS_S = 2.0
 
@@ -74,6 +75,7 @@ class RobotState:
         self.trouble = ""
         self.gone_since: float | None = None
         self._reported_at = self._posed_at = self._grew_at = float("-inf")
+        self._began_at = 0.0
         self._malformed = 0
         self._readers: dict[str, Callable[[Sample, float], None]] = {
             "pose": self._read_pose,
@@ -88,8 +90,10 @@ class RobotState:
         return self.robot in self.robots
 
     def grows(self, now: float) -> bool:
-        """Whether more floor came into reach of late: the rest of the work is not known then."""
-        return now - self._grew_at < GROWS_S / max(self.settings.robot.time_scale, 1.0)
+        """Whether more floor may come into reach: the rest of the work is not known then."""
+        least_s = COMPLETE_S / max(self.settings.robot.time_scale, 1.0)
+        quiet_s = max(least_s, COMPLETE_SHARE * (self._grew_at - self._began_at))
+        return now - self._grew_at < quiet_s
 
     def silent_s(self, now: float) -> float:
         """Return how long a status of the daemon is overdue [s]; 0 if it is not."""
@@ -148,9 +152,7 @@ class RobotState:
             self.events.add(now, text, tone)
         if self.status is None or status.config != self.status.config:
             self.settings = known_settings(status.config)
-        before = self.status.coverage if self.status else None
-        if before and status.coverage and status.coverage.coverable > before.coverable:
-            self._grew_at = now
+        self._watch_growth(status, now)
         self.status, self.document, self._reported_at = status, sample.payload, now
         if status.path is None:
             # A restarted daemon has none of the old paths.
@@ -164,6 +166,14 @@ class RobotState:
         pose = status.pose
         if pose is not None and now - self._posed_at > POSE_LASTS_S:
             self._move(Pose2D(pose.x, pose.y, pose.yaw))
+
+    def _watch_growth(self, status: Status, now: float) -> None:
+        """Note when there was more floor in reach than before, for the same order."""
+        before = self.status
+        if before is None or before.coverage is None or _order_of(before) != _order_of(status):
+            self._began_at = now
+        elif status.coverage and status.coverage.coverable > before.coverage.coverable:
+            self._grew_at = now
 
     def _read_rooms(self, sample: Sample, _: float) -> None:
         self.rooms = decode_document(sample.payload, Rooms)
@@ -186,6 +196,11 @@ class RobotState:
         if abs(pose.x) <= MAX_COORDINATE_M and abs(pose.y) <= MAX_COORDINATE_M:
             self.pose = pose
             self.walk.passed(pose)
+
+
+def _order_of(status: Status) -> tuple[object, ...]:
+    """Return what tells orders apart."""
+    return status.mission.ordered, *(zone.name for zone in status.mission.zones)
 
 
 def _zones(order: object) -> list[dict[str, object]]:

@@ -35,7 +35,7 @@ Measured (``python -m tests.campaigns.memory``, x86-64): a path of 440,000 cells
 than a mission on a small map, maps of 25 million pixels at 20 Hz 75 MB more, each followed by a map
 update of full size 240 MB, and 50 MB more with a recorder. That mission has 121 MB of its own, 17
 of them for its million pixels, and 228 with pages of libraries, which the system takes back
-(``fasaco-edge bench footprint``): the base has room for what waits for the loop beside maps, 42 MB,
+(``fasaco-edge bench daemon``): the base has room for what waits for the loop beside maps, 42 MB,
 and for the pages in use.
 """
 

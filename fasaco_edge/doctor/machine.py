@@ -1,4 +1,4 @@
-"""Checks of the computer: platform, C library, clock, memory."""
+"""Checks of the computer: platform, clock, memory."""
 
 from __future__ import annotations
 
@@ -7,19 +7,12 @@ import os
 import platform
 import re
 import struct
-import sys
 import time
-from importlib import metadata
 from pathlib import Path
 
 from fasaco_edge.daemon.memory import afforded, has_default_sizes, limits_mib
 from fasaco_edge.doctor.finding import CheckContext, Finding, fail, ok, warn
 
-MACHINES = ("x86_64", "aarch64")
-# Processor features that affect array code, as named in /proc/cpuinfo.
-FEATURES = ("avx2", "avx512f", "asimd", "sve")
-COMPILED = ("eclipse-zenoh", "llvmlite", "msgspec", "numba", "numpy", "pillow", "rerun-sdk")
-LEAST_PYTHON = (3, 11)
 # adjtimex(2): struct timex, and the positions of members in it.
 TIMEX_BYTES, MAXERROR_AT, STATUS_AT = 208, 24, 40
 STA_UNSYNC = 0x40
@@ -32,41 +25,17 @@ PI_CMDLINES = ("boot/firmware/cmdline.txt", "boot/cmdline.txt")
 
 
 def system(context: CheckContext) -> Finding:
-    """Check processor, system and Python."""
-    bits, machine = 8 * struct.calcsize("P"), platform.machine()
+    """Name computer, system and Python; planning needs a core."""
     cores = len(os.sched_getaffinity(0))
-    python = platform.python_version()
-    found = f"{_model(context.root) or machine}, {cores} cores; Python {python}"
+    # A board has a name; of a PC the processor has one.
+    board = _read(context.root / "proc/device-tree/model").rstrip("\0\n")
+    model = board or _field(context.root / "proc/cpuinfo", r"model name\s*: ")
+    found = f"{model or platform.machine()}, {cores} cores; Python {platform.python_version()}"
     name = _field(context.root / "etc/os-release", "PRETTY_NAME=").strip('"') or "Linux"
-    details = [
-        f"{name}, kernel {platform.release()}, {machine}, {bits} bits; {_features(context.root)}"
-    ]
-    if bits != 64:
-        to_do = "install a 64-bit system: there are no packages for 32 bits"
-        return fail(f"{found}: a 32-bit system", to_do, details)
-    if machine not in MACHINES:
-        to_do = f"use one of {', '.join(MACHINES)}: for others there are no packages"
-        return fail(f"{found}: {machine}", to_do, details)
-    if sys.version_info < LEAST_PYTHON:
-        return fail(f"{found}: too old", "install Python 3.11 or newer", details)
+    details = [f"{name}, kernel {platform.release()}, {platform.machine()}"]
     if cores == 1:
         to_do = "give the robot's controller a higher priority: the unit has Nice=10"
         return warn(f"{found}: planning shares it with everything else", to_do, details)
-    return ok(found, details)
-
-
-def c_library(context: CheckContext) -> Finding:
-    """Check that the C library is as new as the installed packages need."""
-    name, _, version = (os.confstr("CS_GNU_LIBC_VERSION") or "").partition(" ")
-    if name != "glibc":
-        to_do = "use a system with glibc, as Debian and Raspberry Pi OS are"
-        return fail("not glibc: the packages are built for that", to_do)
-    needs = {package: need for package in COMPILED if (need := _needed_glibc(package))}
-    least = max(needs.values(), default=(0, 0))
-    details = tuple(f"{package}: {major}.{minor}" for package, (major, minor) in needs.items())
-    found = f"glibc {version}, packages need {least[0]}.{least[1]}"
-    if tuple(int(part) for part in re.findall(r"\d+", version)[:2]) < least:
-        return fail(found, "install a newer system release", details)
     return ok(found, details)
 
 
@@ -101,38 +70,10 @@ def kernel_clock() -> tuple[bool, float] | None:
     return state != TIME_ERROR and not status & STA_UNSYNC, error_us / 1e6
 
 
-def _model(root: Path) -> str:
-    """Return the computer's name: that of a board, or of a PC's processor."""
-    board = _read(root / "proc/device-tree/model").rstrip("\0\n")
-    return board or _cpuinfo(root, "model name")
-
-
-def _features(root: Path) -> str:
-    flags = f"{_cpuinfo(root, 'flags')} {_cpuinfo(root, 'Features')}".split()
-    known = [feature for feature in FEATURES if feature in flags]
-    return "processor features: " + (", ".join(known) or "none relevant")
-
-
-def _cpuinfo(root: Path, name: str) -> str:
-    return _field(root / "proc/cpuinfo", rf"{name}\s*: ")
-
-
 def _field(file: Path, before: str) -> str:
     """Return the rest of the first line with this beginning; "" without one."""
     match = re.search(f"^{before}(.*)$", _read(file), re.MULTILINE)
     return match[1].strip() if match else ""
-
-
-def _needed_glibc(package: str) -> tuple[int, int] | None:
-    """Return the glibc that the wheel of an installed package was built for; None for none."""
-    try:
-        tags = metadata.distribution(package).read_text("WHEEL") or ""
-    except metadata.PackageNotFoundError:
-        return None
-    # A wheel may name several: it needs the oldest of them.
-    versions = [(int(major), int(minor)) for major, minor in re.findall(r"x_(\d+)_(\d+)_", tags)]
-    versions += [(2, 17)] if "manylinux2014" in tags else []
-    return min(versions, default=None)
 
 
 def memory(context: CheckContext) -> Finding:

@@ -16,7 +16,6 @@ from fasaco_edge.errors import BadConfiguration, FasacoError
 
 CHECKS = (
     Check("platform", machine.system, of_machine=True),
-    Check("C library", machine.c_library, of_machine=True),
     Check("memory", machine.memory, of_machine=True),
     Check("clock", machine.clock, of_machine=True),
     Check("kernels", installation.kernels, of_machine=True),
@@ -28,7 +27,6 @@ CHECKS = (
     Check("identity", security.identity),
     Check("secret files", security.secret_files),
     Check("roles", security.roles),
-    Check("limits", security.limits),
 )
 
 

@@ -1,4 +1,4 @@
-"""Checks of access: endpoints, roles, limits, the daemon's identity and its secrets."""
+"""Checks of access: endpoints, roles, the daemon's identity and its secrets."""
 
 from __future__ import annotations
 
@@ -11,7 +11,6 @@ from fasaco_edge.bus.access import ROLES
 from fasaco_edge.config.certificates import read_certificate
 from fasaco_edge.config.config import BusConfig
 from fasaco_edge.config.endpoints import UNIX, is_local, protocol_of
-from fasaco_edge.daemon.loop.inbox import MAP_SPACING_S
 from fasaco_edge.doctor.finding import CheckContext, Finding, fail, ok, warn
 from fasaco_edge.errors import BadConfiguration, ClockBeforeCertificate
 
@@ -75,19 +74,6 @@ def roles(context: CheckContext) -> Finding:
         )
     count = len({name for who in names.values() for name in who})
     return ok(f"names with a role: {count}; everybody else may do nothing", details)
-
-
-def limits(context: CheckContext) -> Finding:
-    """Show how much each sender may send."""
-    bus = context.config.bus
-    if bus.security.kind == "none" and not bus.open_to_everyone:
-        own = f"accepts at most {1 / MAP_SPACING_S:g} maps a second, always the newest"
-        return ok(f"no limits on senders; the daemon {own}")
-    most = bus.security.limits
-    return ok(
-        f"of each: maps up to {most.map_bytes / 1e6:.1f} MB, {most.maps_hz:g} maps, "
-        f"{most.poses_hz:g} poses and {most.queries_hz:g} queries of a key a second"
-    )
 
 
 def _reach(endpoint: str) -> str:

@@ -12,7 +12,6 @@ import time
 from collections import Counter
 from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager
-from pathlib import Path
 
 from fasaco_edge.bus.arrival import Sample
 from fasaco_edge.bus.claim import claims_in
@@ -29,7 +28,6 @@ from fasaco_edge.wire.keys import VERSION
 from fasaco_edge.wire.schemas import TF_MESSAGE
 
 ANSWER_S = 0.5
-LISTENING = "0A"  # proc(5), /proc/net/tcp
 STREAMS = ("tcp", "tls", "ws")
 
 
@@ -70,39 +68,6 @@ def why_not_bound(endpoint: str) -> str:
     return ""
 
 
-def program_at(endpoint: str) -> str:
-    """Return the name and process of the program that listens at an endpoint of this computer.
-
-    "" if it is not visible: those of other users are visible only to root.
-    """
-    address = address_of(endpoint)
-    inodes = _listening(address[1]) if address else set()
-    sockets = {f"socket:[{inode}]" for inode in inodes}
-    for process in Path("/proc").glob("[0-9]*") if sockets else ():
-        try:
-            held = {str(file.readlink()) for file in (process / "fd").iterdir()}
-            if held & sockets:
-                name = (process / "comm").read_text(encoding="utf-8").strip()
-                return f"{name}, process {process.name}"
-        except OSError:
-            continue
-    return ""
-
-
-def _listening(port: int) -> set[str]:
-    """Return the inodes of the sockets that listen at a port."""
-    inodes = set()
-    for table in ("tcp", "tcp6"):
-        try:
-            lines = Path("/proc/net", table).read_text(encoding="ascii").splitlines()[1:]
-        except OSError:
-            continue
-        for fields in map(str.split, lines):
-            if fields[3] == LISTENING and int(fields[1].rpartition(":")[2], 16) == port:
-                inodes.add(fields[9])
-    return inodes
-
-
 # Time to listen for maps and poses [s]; poses come ten times a second.
 LISTEN_S = 0.7
 ASK_S = 0.7
@@ -126,8 +91,7 @@ def session(context: CheckContext) -> Finding:
     for endpoint in bus.listen:
         if answers(from_here(endpoint)):
             is_taken = True
-            who = program_at(endpoint) or "a program of another user"
-            details.append(f"{endpoint}: {who} listens there")
+            details.append(f"{endpoint}: a program listens there")
         elif why := why_not_bound(endpoint):
             to_do = "correct bus.listen: that address is not this computer's, or not for this user"
             return fail(f"{endpoint}: no daemon can listen there: {why}", to_do)
@@ -148,7 +112,7 @@ def session(context: CheckContext) -> Finding:
             met = " and ".join(joined.met()) or "no other session"
             return ok(f"joined {met} as a client", details)
     except BusUnavailable as error:
-        to_do = "stop the program that listens there, or choose another port in bus.listen"
+        to_do = "stop that program (`ss -ltnp` names it), or choose another port in bus.listen"
         found = f"the program that listens there does not accept a Zenoh session: {error}"
         return fail(found, to_do, details)
 

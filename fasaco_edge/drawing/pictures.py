@@ -20,11 +20,10 @@ from fasaco_edge.grid.rooms import FoundRooms
 from fasaco_edge.kernels.lattice.reach import reachable_from
 
 
-def draw_swept(plot: Plot, swept: MapLayer) -> list[KeyEntry]:
+def draw_swept(plot: Plot, swept: MapLayer, words: str) -> list[KeyEntry]:
     """Tint the swept floor; return the meaning of the tint and of a line's marks."""
     plot.paint(swept, palette.COVERED)
-    label = f"floor swept ({swept.area_m2:,.1f} m2)"
-    return [*_ENDS, KeyEntry("tile", palette.COVERED, label)]
+    return [*_ENDS, KeyEntry("tile", palette.COVERED, f"{words} ({swept.area_m2:,.1f} m2)")]
 
 
 def draw_unswept(plot: Plot, unswept: MapLayer) -> list[KeyEntry]:
@@ -210,30 +209,16 @@ def draw_walk(
     if rooms is not None:
         paint_rooms(plot, rooms)
     left = draw_unswept(plot, unswept) if unswept is not None else []
+    key: list[KeyEntry] = []
+    if rooms is None and swept is not None:
+        key = draw_swept(plot, swept, "floor swept")
+    elif rooms is None:
+        key = draw_visits(plot, lattice, visits_of(lattice, cells), tuple(cells[0].tolist()))
+    key += draw_driven(plot, driven, is_backward, lattice.cell_m) + left
     if rooms is not None:
-        key = draw_driven(plot, driven, is_backward, lattice.cell_m) + left
         number_rooms(plot, rooms)
-    else:
-        key = plot_walk(plot, lattice, cells, driven, swept, is_backward) + left
     bar = ("0", f"{len(cells) - 1:,} steps")
     return Sheet(title, lines, key, bar, plot.view.scale).around(plot.finished())
-
-
-def plot_walk(
-    plot: Plot,
-    lattice: CoverageLattice,
-    cells: NDArray[np.int32],
-    line_xy: Points | None = None,
-    swept: MapLayer | None = None,
-    is_backward: NDArray[np.bool_] | None = None,
-) -> list[KeyEntry]:
-    """Draw a walk, all as in ``draw_walk``; return what its tints and marks mean."""
-    line = lattice.centres(cells) if line_xy is None else line_xy
-    if swept is None:
-        key = draw_visits(plot, lattice, _visits(lattice, cells), tuple(cells[0].tolist()))
-    else:
-        key = draw_swept(plot, swept)
-    return key + draw_driven(plot, line, is_backward, lattice.cell_m)
 
 
 def draw_driven(
@@ -264,7 +249,8 @@ def in_pieces(line: Points, longest: float) -> Points:
     return np.vstack([line[:1], line[:-1][segment] + share * ways[segment]])
 
 
-def _visits(lattice: CoverageLattice, cells: NDArray[np.int32]) -> NDArray[np.int64]:
+def visits_of(lattice: CoverageLattice, cells: NDArray[np.int32]) -> NDArray[np.int64]:
+    """Return how often a walk visits each cell of a lattice."""
     visits = np.zeros(lattice.states.shape, np.int64)
     window = lattice.window
     np.add.at(visits, (cells[:, 0] - window.row0, cells[:, 1] - window.col0), 1)
@@ -317,7 +303,7 @@ def draw_mission(
     grid: OccupancyGrid,
     lattice: CoverageLattice,
     driven_xy: NDArray[np.float64],
-    visits: NDArray[np.uint16],
+    visits: NDArray[np.uint16] | None = None,
     *,
     title: str,
     lines: Sequence[str],
@@ -336,7 +322,7 @@ def draw_mission(
         grid: the map at its end.
         lattice: the planning grid at its end.
         driven_xy: float64 (n, 2), n >= 1: where the robot was, (x, y) [m], in order.
-        visits: uint16, shape of the lattice: how often each cell was covered.
+        visits: uint16, shape of the lattice: how often each cell was covered; None with ``swept``.
         title: heading.
         lines: caption below it.
         space: the most the map may take (width, height) [px].
@@ -351,11 +337,10 @@ def draw_mission(
     plot.ground(grid)
     start = lattice.cell_at(*driven_xy[0].tolist())
     if swept is None:
+        assert visits is not None
         key = draw_visits(plot, lattice, visits, start, left_out_words)
     else:
-        plot.paint(swept, palette.COVERED)
-        label = f"reachable floor swept ({swept.area_m2:,.1f} m2)"
-        key = [*_ENDS, KeyEntry("tile", palette.COVERED, label)]
+        key = draw_swept(plot, swept, "reachable floor swept")
     if unswept is not None:
         key += draw_unswept(plot, unswept)
     for _, outline in rooms:

@@ -56,7 +56,6 @@ class Sheet:
         key: symbols and their meaning.
         bar: labels at the beginning and the end of the colour bar; None for no bar.
         scale: pixels per unit of the plot.
-        framed: whether a line goes around the plot.
         unit: of the scale bar.
     """
 
@@ -65,7 +64,6 @@ class Sheet:
     key: Sequence[KeyEntry]
     bar: tuple[str, str] | None
     scale: float
-    framed: bool = True
     unit: str = "m"
 
     def around(self, plot: Image.Image) -> Image.Image:
@@ -89,8 +87,7 @@ class Sheet:
             y += LINE_PX
         x, y = MARGIN + (inner - plot.width) // 2, MARGIN + head
         sheet.paste(plot, (x, y))
-        if self.framed:
-            draw.rectangle((x - 1, y - 1, x + plot.width, y + plot.height), outline=palette.RULE)
+        draw.rectangle((x - 1, y - 1, x + plot.width, y + plot.height), outline=palette.RULE)
         y += plot.height + 18
         self._scale_bar(draw, MARGIN, y, plot.width)
         if self.bar is not None:

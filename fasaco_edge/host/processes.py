@@ -1,4 +1,4 @@
-"""Processes: starting this interpreter again, signals, memory, threads and libraries by proc(5).
+"""Processes: starting this interpreter again, signals, memory and threads by proc(5).
 
 A signal requests an orderly exit.
 """
@@ -16,7 +16,7 @@ import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from functools import lru_cache
-from pathlib import Path, PurePath
+from pathlib import Path
 from types import FrameType
 
 
@@ -108,22 +108,6 @@ def cpu_seconds(pid: int) -> float:
     """
     # clock_getcpuclockid(3): the clock of a process is made of its id.
     return time.clock_gettime((~pid << 3) | 2)
-
-
-def has_loaded(pid: int, package: str) -> bool:
-    """Return whether a Python package's compiled modules are mapped into a process."""
-    maps = Path(f"/proc/{pid}/maps").read_text(encoding="utf-8", errors="replace")
-    files = {line.split(maxsplit=5)[5] for line in maps.splitlines() if line.endswith(".so")}
-    return any(package in _below_packages(PurePath(file)) for file in files)
-
-
-def _below_packages(file: PurePath) -> tuple[str, ...]:
-    """Return a file's folders below site-packages: a user's own folder may have any name."""
-    parts = file.parts
-    for root in ("site-packages", "dist-packages"):
-        if root in parts:
-            return parts[parts.index(root) + 1 :]
-    return ()
 
 
 def _field_mb(pid: int | str, name: str) -> float:

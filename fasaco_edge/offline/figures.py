@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from fasaco_edge.config.robot import RobotConfig
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.judge.driven_line import DriveLimits
@@ -40,95 +38,75 @@ def judged_floor(
     return judge_floor(grid, line_xy, judged)
 
 
-@dataclass(frozen=True, slots=True)
-class PlannedFloor:
-    """The floor that a plan sweeps, as in ``--json``; see ``FloorFigures``."""
-
-    reachable_m2: float
-    swept_share: float | None
-    seconds_per_m2: float | None
-    gap: float | None
-    patches_over_4_dm2: int
-    largest_patch_m2: float
-    illegal_share: float
-
-    def __str__(self) -> str:
-        """Text for tables and pictures."""
-        if self.swept_share is None:
-            return "none is reachable"
-        swept_m2 = self.swept_share * self.reachable_m2
-        words = f"{swept_words(swept_m2, self.reachable_m2)} swept"
-        if count := self.patches_over_4_dm2:
-            patches = "1 patch" if count == 1 else f"{count} patches"
-            words += f", {patches} over 4 dm2 left, the largest {self.largest_patch_m2:,.2f} m2"
-        if self.seconds_per_m2 is not None:
-            words += f", {self.seconds_per_m2:.1f} s/m2"
-        if self.gap is not None:
-            words += f", at most {100 * self.gap:.0f} % above the shortest possible time"
-        if self.illegal_share:
-            words += (
-                f"; {self.illegal_share:.1%} of the line is too close to obstacles or unknown floor"
-            )
-        return words
-
-    @classmethod
-    def of(cls, figures: FloorFigures) -> PlannedFloor:
-        """Return the figures, rounded."""
-        share, pace, gap = figures.swept_share, figures.seconds_per_m2, figures.gap
-        return cls(
-            reachable_m2=round(figures.reachable_m2, 2),
-            swept_share=None if share is None else round(share, 4),
-            seconds_per_m2=None if pace is None else round(pace, 3),
-            gap=None if gap is None else round(gap, 4),
-            patches_over_4_dm2=figures.patches_over_4_dm2,
-            largest_patch_m2=round(figures.largest_patch_m2, 3),
-            illegal_share=round(figures.illegal_share, 4),
-        )
+# Figures of the floor and of the curve in ``--json``, and their digits.
+FLOOR = {
+    "reachable_m2": 2,
+    "swept_share": 4,
+    "seconds_per_m2": 3,
+    "gap": 4,
+    "patches_over_4_dm2": 0,
+    "largest_patch_m2": 3,
+    "illegal_share": 4,
+}
 
 
-@dataclass(frozen=True, slots=True)
-class CurveFigures:
-    """The curve of a robot with a turning radius, as in ``--json``.
+def floor_document(floor: FloorFigures | None) -> dict[str, float | None] | None:
+    """Return the figures of the floor that a line sweeps, as values that JSON has too."""
+    if floor is None:
+        return None
+    values = {name: getattr(floor, name) for name in FLOOR}
+    return {
+        name: None if value is None else round(value, FLOOR[name]) for name, value in values.items()
+    }
 
-    Attributes:
-        turn_radius_m: of its tightest arc [m].
-        reverses: whether it may drive backward.
-        length_m, backward_m: length of the curve, and of what is driven backward [m].
-        seconds: driving time by the judge [s].
-        reversals: changes between forward and backward.
-        spot_turns: turns that do not fit, and stay on the spot, by the judge.
-    """
 
-    turn_radius_m: float
-    reverses: bool
-    length_m: float
-    backward_m: float
-    seconds: float
-    reversals: int
-    spot_turns: int
+def floor_words(floor: FloorFigures) -> str:
+    """Return the floor that a line sweeps and leaves, for tables and pictures."""
+    if floor.swept_share is None:
+        return "none is reachable"
+    words = f"{swept_words(floor.swept_m2, floor.reachable_m2)} swept"
+    if floor.patches_over_4_dm2:
+        words += f", {patches_left(floor)}"
+    if floor.seconds_per_m2 is not None:
+        words += f", {floor.seconds_per_m2:.1f} s/m2"
+    if floor.gap is not None:
+        words += f", at most {100 * floor.gap:.0f} % above the shortest possible time"
+    if floor.illegal_share:
+        share = f"{floor.illegal_share:.1%}"
+        words += f"; {share} of the line is too close to obstacles or unknown floor"
+    return words
 
-    def __str__(self) -> str:
-        """Text for tables and pictures."""
-        count, left = self.reversals, self.spot_turns
-        changes = "1 change" if count == 1 else f"{count} changes"
-        words = (
-            f"arcs of {self.turn_radius_m:g} m or more, {self.length_m:,.1f} m in "
-            f"{self.seconds:,.0f} s, {self.backward_m:,.1f} m of it backward, {changes} between "
-            "forward and backward"
-        )
-        if left:
-            words += f"; {left} turn{'s' * (left != 1)} do{'es' * (left == 1)} not fit"
-        return words
 
-    @classmethod
-    def of(cls, robot: RobotConfig, curve: Curve, judged: FloorFigures) -> CurveFigures:
-        """Return the figures, rounded."""
-        return cls(
-            turn_radius_m=robot.turn_radius_m,
-            reverses=robot.reverses,
-            length_m=round(judged.length_m, 2),
-            backward_m=round(curve.backward_m, 2),
-            seconds=round(judged.seconds, 1),
-            reversals=judged.reversals,
-            spot_turns=judged.spot_turns,
-        )
+def patches_left(floor: FloorFigures) -> str:
+    """Return how many patches of floor a line leaves."""
+    count = floor.patches_over_4_dm2
+    if not count:
+        return "no patch over 4 dm2 left"
+    patches = "1 patch" if count == 1 else f"{count} patches"
+    return f"{patches} over 4 dm2 left, the largest {floor.largest_patch_m2:,.2f} m2"
+
+
+def curve_document(robot: RobotConfig, curve: Curve, judged: FloorFigures) -> dict[str, object]:
+    """Return the figures of a robot's curve, as values that JSON has too."""
+    return {
+        "turn_radius_m": robot.turn_radius_m,
+        "reverses": robot.reverses,
+        "length_m": round(judged.length_m, 2),
+        "backward_m": round(curve.backward_m, 2),
+        "seconds": round(judged.seconds, 1),
+        "reversals": judged.reversals,
+        "spot_turns": judged.spot_turns,
+    }
+
+
+def curve_words(robot: RobotConfig, curve: Curve, judged: FloorFigures) -> str:
+    """Return a robot's curve, for tables and pictures."""
+    changes = "1 change" if judged.reversals == 1 else f"{judged.reversals} changes"
+    words = (
+        f"arcs of {robot.turn_radius_m:g} m or more, {judged.length_m:,.1f} m in "
+        f"{judged.seconds:,.0f} s, {curve.backward_m:,.1f} m of it backward, {changes} between "
+        "forward and backward"
+    )
+    if left := judged.spot_turns:
+        words += f"; {left} turn{'s' * (left != 1)} do{'es' * (left == 1)} not fit"
+    return words

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
@@ -17,7 +17,8 @@ from fasaco_edge.config.robot import RobotConfig
 from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.grid.lattice import Cell
 from fasaco_edge.host.outputs import whole
-from fasaco_edge.offline.figures import PlannedFloor, judged_floor
+from fasaco_edge.judge.floor import FloorFigures
+from fasaco_edge.offline.figures import floor_document, floor_words, judged_floor
 from fasaco_edge.offline.ground import Line
 from fasaco_edge.offline.maps import Map
 from fasaco_edge.offline.plan import plan
@@ -26,9 +27,6 @@ from fasaco_edge.offline.settings import ANYWHERE, CELLS, HOME, Search
 from fasaco_edge.planners.passes import Pass, laid, read_pass
 from fasaco_edge.planners.planner import SearchProgress, StoppingCriterion
 from fasaco_edge.text import duration
-
-# A segment of a line runs along the lanes if it is turned against them by no more than this [deg].
-ALONG_DEG = 15.0
 
 
 @dataclass(frozen=True, repr=False)
@@ -45,7 +43,7 @@ class PassPlans:
 
     def __repr__(self) -> str:
         """Return the passes in one line, without their plans."""
-        swept = "" if self.floor is None else f": {self.floor}"
+        swept = "" if self.floor is None else f": {floor_words(self.floor)}"
         name = self.plans[0].map.name
         return f"<PassPlans {name}, {', '.join(self.names)}{swept}, {duration(self.cost_s)}>"
 
@@ -69,14 +67,14 @@ class PassPlans:
         return math.fsum(plan.cost_s for plan in self.plans)
 
     @cached_property
-    def floor(self) -> PlannedFloor | None:
+    def floor(self) -> FloorFigures | None:
         """Figures of the floor that the whole line sweeps; None for a coverage grid."""
         first = self.plans[0]
         judged = judged_floor(first.map.grid, self.xy, first.robot)
         if judged is None:
             return None
         # The least time is that of one pass.
-        return replace(PlannedFloor.of(judged.figures), gap=None)
+        return replace(judged.figures, least_s=0.0)
 
     @property
     def figures(self) -> dict[str, object]:
@@ -89,9 +87,9 @@ class PassPlans:
             "length_m": round(math.fsum(length_m(plan.xy) for plan in self.plans), 3),
             "cost_s": self.cost_s,
             "wall_s": round(math.fsum(plan.wall_s for plan in self.plans), 6),
-            "floor": asdict(self.floor) if self.floor else None,
+            "floor": floor_document(self.floor),
             "passes": [
-                {"pass": name, "along_share": _along(plan)} | plan.figures
+                {"pass": name} | plan.figures
                 for name, plan in zip(self.names, self.plans, strict=True)
             ],
         }
@@ -204,27 +202,3 @@ def _end(end: str | Cell, plans: Sequence[Plan]) -> str | Cell:
 def length_m(xy: NDArray[np.float64]) -> float:
     """Return the length of a line, float64 (n, 2) [m]."""
     return float(np.hypot(*np.diff(xy, axis=0).T).sum())
-
-
-def along_share(xy: NDArray[np.float64], angle_deg: float) -> float | None:
-    """Return the share of a line's length that runs at an angle; None without length.
-
-    Args:
-        xy: float64 (n, 2), points (x, y) [m].
-        angle_deg: angle to the x axis [deg].
-    """
-    x, y = np.diff(xy, axis=0).T
-    lengths = np.hypot(x, y)
-    aside = np.abs((np.degrees(np.arctan2(y, x)) - angle_deg + 90.0) % 180.0 - 90.0)
-    total = float(lengths.sum())
-    return float(lengths[aside <= ALONG_DEG].sum()) / total if total else None
-
-
-def _along(plan: Plan) -> float | None:
-    """Return the share of a plan's line along its lanes; None without a preferred direction."""
-    cost = plan.problem.cost
-    if not cost.has_lanes:
-        return None
-    across_rows = cost.row_us > 0
-    share = along_share(plan.xy, plan.ground.lattice_deg + 90.0 * across_rows)
-    return None if share is None else round(share, 4)

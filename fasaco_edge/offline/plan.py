@@ -134,7 +134,7 @@ def plan(
         ground = ground.only(problem.to_cover, beyond=covers == "edge")
     bound = None if search.has_local_search else lower_bound_of(problem)
     budget = None if search.most_s is None else TimeBudget(search.most_s)
-    ending = Ending(search, stop, budget, watch, bound)
+    ending = Ending(stop, budget, watch, bound)
     planning = Planning(problem, ground, search, own, ending, observe)
     wall, cpu = time.perf_counter(), time.process_time()
     path, xy = planning.run(line, robot)

@@ -17,8 +17,14 @@ from fasaco_edge.drawing.pictures import draw_walk
 from fasaco_edge.drawing.plot import MapLayer
 from fasaco_edge.drawing.trail import draw_trail
 from fasaco_edge.host.outputs import whole
-from fasaco_edge.judge.floor import JudgedFloor, share_words
-from fasaco_edge.offline.figures import CurveFigures, PlannedFloor, judged_floor
+from fasaco_edge.judge.floor import FloorFigures, JudgedFloor, share_words
+from fasaco_edge.offline.figures import (
+    curve_document,
+    curve_words,
+    floor_document,
+    floor_words,
+    judged_floor,
+)
 from fasaco_edge.offline.ground import Ground, Line
 from fasaco_edge.offline.maps import Map
 from fasaco_edge.offline.rooms import RoomsUnderLine
@@ -132,16 +138,16 @@ class Plan:
         return judged_floor(self.map.grid, self.xy, self.robot)
 
     @property
-    def floor(self) -> PlannedFloor | None:
+    def floor(self) -> FloorFigures | None:
         """Figures of the floor; None for a coverage grid."""
-        return None if self.judged is None else PlannedFloor.of(self.judged.figures)
+        return None if self.judged is None else self.judged.figures
 
     @property
-    def curve_figures(self) -> CurveFigures | None:
-        """Figures of the curve; None for a robot that turns on the spot."""
-        if self.curve is None or self.judged is None:
-            return None
-        return CurveFigures.of(self.robot, self.curve, self.judged.figures)
+    def curve_words(self) -> str:
+        """Text about the curve; "" for a robot that turns on the spot."""
+        if self.curve is None or self.floor is None:
+            return ""
+        return curve_words(self.robot, self.curve, self.floor)
 
     @property
     def swept_share(self) -> float | None:
@@ -158,7 +164,44 @@ class Plan:
     @property
     def figures(self) -> dict[str, object]:
         """All figures, as values that JSON has too: those of ``fasaco-edge plan --json``."""
-        return figures_of(self)
+        path, problem, search, floor = self.path, self.problem, self.search, self.floor
+        cell_m = problem.lattice.cell_m
+        curve = {}
+        if self.curve is not None and floor is not None:
+            curve = {"curve": curve_document(self.robot, self.curve, floor)}
+        return {
+            "planner": path.planner,
+            "seed": path.seed,
+            "ants": path.work.ants,
+            "kicks": path.work.perturbations,
+            "proposals": path.work.proposals,
+            "velocities": self.velocities,
+            "map": self.map.name,
+            "line": self.line,
+            "tool_m": self.robot.tool_width_m,
+            "cell_m": cell_m,
+            "lattice_deg": round(self.ground.lattice_deg, 3),
+            "start": list(problem.start),
+            "end": path.cells[-1].tolist(),
+            **asdict(walk_figures(problem.lattice, path.cells)),
+            # Only cells to cover; the walk may pass over others.
+            "cells": problem.cells,
+            "length_m": round(path.steps * cell_m, 3),
+            "cost_s": path.cost_s,
+            "lower_bound_steps": path.lower_bound_steps,
+            "lower_bound_cost_s": path.lower_bound_cost_s,
+            "gap": None if path.gap is None else round(path.gap, 6),
+            "unreachable_cells": int(np.count_nonzero(problem.unreachable)),
+            **driving(self.robot),
+            "budget_s": search.most_s,
+            "threads": search.threads,
+            "ended_by": self.ended_by,
+            "first_walk_ms": round(1e3 * path.first_walk_s, 3),
+            "wall_s": round(self.wall_s, 6),
+            "cpu_s": round(self.cpu_s, 6),
+            "floor": floor_document(floor),
+            **curve,
+        }
 
     @cached_property
     def rooms(self) -> RoomsUnderLine | None:
@@ -177,46 +220,6 @@ class Plan:
             with whole(Path(file)) as new:
                 picture.save(new, "PNG")
         return picture
-
-
-def figures_of(plan: Plan) -> dict[str, object]:
-    """Return the figures of a walk, of its search, and of the floor under its line."""
-    path, problem, ground, search = plan.path, plan.problem, plan.ground, plan.search
-    cell_m = problem.lattice.cell_m
-    return {
-        "planner": path.planner,
-        "seed": path.seed,
-        "ants": path.work.ants,
-        "kicks": path.work.perturbations,
-        "proposals": path.work.proposals,
-        "velocities": plan.velocities,
-        "map": plan.map.name,
-        "line": plan.line,
-        "tool_m": plan.robot.tool_width_m,
-        "cell_m": cell_m,
-        "lattice_deg": round(ground.lattice_deg, 3),
-        "start": list(problem.start),
-        "end": path.cells[-1].tolist(),
-        **asdict(walk_figures(problem.lattice, path.cells)),
-        # Only cells to cover; the walk may pass over others.
-        "cells": problem.cells,
-        "length_m": round(path.steps * cell_m, 3),
-        "cost_s": path.cost_s,
-        "lower_bound_steps": path.lower_bound_steps,
-        "lower_bound_cost_s": path.lower_bound_cost_s,
-        "gap": None if path.gap is None else round(path.gap, 6),
-        "unreachable_cells": int(np.count_nonzero(problem.unreachable)),
-        **driving(plan.robot),
-        "budget_s": search.most_s,
-        "target_gap": search.target_gap,
-        "threads": search.threads,
-        "ended_by": plan.ended_by,
-        "first_walk_ms": round(1e3 * path.first_walk_s, 3),
-        "wall_s": round(plan.wall_s, 6),
-        "cpu_s": round(plan.cpu_s, 6),
-        "floor": asdict(plan.floor) if plan.floor else None,
-        **({"curve": asdict(plan.curve_figures)} if plan.curve_figures else {}),
-    }
 
 
 def driving(robot: RobotConfig) -> dict[str, float | None]:
@@ -250,9 +253,9 @@ def picture_of(plan: Plan, of: str = "", *, rooms: bool = False) -> Image.Image:
         f"at most {100 * (path.gap or 0.0):.1f} % above the walk's lower bound",
     ]
     if judged is not None:
-        lines.append(f"reachable floor: {plan.floor}")
-    if plan.curve_figures is not None:
-        lines.append(str(plan.curve_figures))
+        lines.append(f"reachable floor: {floor_words(judged.figures)}")
+    if plan.curve_words:
+        lines.append(plan.curve_words)
     shows_floor = judged is not None and plan.line != CELLS
     under = plan.rooms if rooms else None
     if under is not None:

@@ -4,8 +4,8 @@ A line is laid along each of two walks, and annealed three times; the better one
 the budget is used up. The first walk and line are always completed, and each step follows from
 those before it, whatever the budget: more of it is never worse, by the seconds of the line and the
 price of floor that is left. If a share of the floor is asked for, the first line is always annealed
-three times: the price of floor is found meanwhile. All that does not hold without local search, or
-if a gap of the walk is asked for: then there is one walk, which the budget ends.
+three times: the price of floor is found meanwhile. All that does not hold without local search:
+then there is one walk, which the budget ends.
 """
 
 from __future__ import annotations
@@ -25,7 +25,6 @@ from fasaco_edge.planners.path import CoveragePath
 from fasaco_edge.planners.planner import (
     ColonySnapshot,
     CoveragePlanner,
-    GapReached,
     Observer,
     SearchProgress,
     StoppingCriterion,
@@ -48,7 +47,6 @@ class Ending:
     """What ends the searches for walks, and for the line along one.
 
     Args:
-        search: settings.
         stop: ends all searches; None for never.
         budget: ends all but the search for the first line over the floor; None for no limit.
         watch: called with the progress.
@@ -63,7 +61,6 @@ class Ending:
 
     def __init__(
         self,
-        search: Search,
         stop: StoppingCriterion | None,
         budget: StoppingCriterion | None,
         watch: Callable[[SearchProgress], None],
@@ -71,14 +68,9 @@ class Ending:
     ) -> None:
         self.by, self.bound = "the search", bound
         self.is_walk_limited = self.is_walk_cut = False
-        self._watch, self._budget, self._is_first = watch, budget, False
+        self._watch, self._stop, self._budget, self._is_first = watch, stop, budget, False
         self._progress: SearchProgress | None = None
-        self._criteria: dict[str, StoppingCriterion] = {}
         self._limit: StoppingCriterion | None = None
-        if stop is not None:
-            self._criteria["Ctrl-C"] = stop
-        if search.target_gap is not None:
-            self._criteria["target gap"] = GapReached(search.target_gap)
 
     def limit_walk(self, proposals: int, *, is_first: bool) -> None:
         """End the next search for a walk after this many proposals; the first has no budget."""
@@ -108,11 +100,13 @@ class Ending:
 
     def _is_over(self, progress: SearchProgress) -> bool:
         self._watch(progress)
-        over = next((name for name, is_met in self._criteria.items() if is_met(progress)), None)
-        if over is None and self._budget is not None and not self._is_first:
-            over = "budget" if self._budget(progress) else None
-        self.by = over or self.by
-        return over is not None
+        if self._stop is not None and self._stop(progress):
+            self.by = "Ctrl-C"
+            return True
+        if self._budget is not None and not self._is_first and self._budget(progress):
+            self.by = "budget"
+            return True
+        return False
 
 
 @dataclass(frozen=True, slots=True)
@@ -185,11 +179,10 @@ class Planning:
     def _begin(self, line: str, robot: RobotConfig) -> _Laid:
         """Return the better of two walks, by the line along it; the first is always laid.
 
-        There is one alone without local search, if a gap of the walk is asked for, or if the first
-        search came to its end by itself.
+        There is one alone without local search, or if the first search came to its end by itself.
         """
         search, ending = self._search, self._ending
-        has_two = search.has_local_search and search.target_gap is None
+        has_two = search.has_local_search
         most = PROPOSALS_A_CELL * self._problem.cells
         ending.limit_walk(min(most, FIRST_PROPOSALS) if has_two else most, is_first=has_two)
         best = self._lay(line, robot, search.seed, is_one_of_two=has_two)

@@ -44,7 +44,6 @@ class Search:
         budget_s: time limit of the search for walks and the line along one [s]; with local search a
             first walk and line are always completed; None for 2 s, or without local search for no
             limit.
-        target_gap: optimality gap at which the search ends; None for never.
         swept: share of the reachable floor that a line is to sweep, in the least time, for which
             three stages are completed whatever the budget; None for as much as its seconds are
             worth.
@@ -64,7 +63,6 @@ class Search:
     seed: int = 0
     threads: int = 1
     budget_s: float | None = None
-    target_gap: float | None = None
     swept: float | None = None
 
     def __post_init__(self) -> None:
@@ -79,9 +77,6 @@ class Search:
         if self.budget_s is not None:
             possible = math.isfinite(self.budget_s) and self.budget_s > 0.0
             require(possible, "budget", "be finite and above 0 s", self.budget_s)
-        if self.target_gap is not None:
-            possible = 0.0 <= self.target_gap <= 10.0
-            require(possible, "target gap", "be in [0, 10]", self.target_gap)
         if self.swept is not None:
             require(0.0 < self.swept <= 1.0, "swept", "be a share in (0, 1]", self.swept)
 

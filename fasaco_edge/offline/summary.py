@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from fasaco_edge.judge.floor import share_words
+from fasaco_edge.judge.floor import FloorFigures, share_words
+from fasaco_edge.offline.figures import patches_left
 from fasaco_edge.offline.settings import CELLS
 from fasaco_edge.text import duration
 
 if TYPE_CHECKING:
-    from fasaco_edge.offline.figures import PlannedFloor
     from fasaco_edge.offline.passes import PassPlans
     from fasaco_edge.offline.result import Plan
 
@@ -31,8 +31,8 @@ def rows_of(plan: Plan) -> Rows:
         rows.append(("gap", f"at most {100 * gap:.1f} % above the shortest possible time"))
     line = "through the centres of cells" if plan.line == CELLS else f"{plan.line}, over the floor"
     rows.append(("line", f"{metres:,.1f} m, {turns:,.0f} quarter-turns, {line}"))
-    if plan.curve_figures is not None:
-        rows.append(("curve", str(plan.curve_figures)))
+    if plan.curve_words:
+        rows.append(("curve", plan.curve_words))
     if floor is not None and floor.illegal_share:
         rows.append(
             ("caution", f"{100 * floor.illegal_share:.1f} % of the line is too close to obstacles")
@@ -62,13 +62,10 @@ def _metres(plan: Plan) -> str:
     return f"{plan.ground.lattice.cell_m:g} m" + (f" at {deg:g} degrees" if deg else "")
 
 
-def _swept(floor: PlannedFloor) -> str:
+def _swept(floor: FloorFigures) -> str:
     """Return what a line sweeps and leaves, in words."""
     if floor.swept_share is None:
         return "no floor is reachable"
-    count = floor.patches_over_4_dm2
-    left = "no patch over 4 dm2 left"
-    if count:
-        patches = "1 patch" if count == 1 else f"{count} patches"
-        left = f"{patches} over 4 dm2 left, the largest {floor.largest_patch_m2:,.2f} m2"
-    return f"{share_words(floor.swept_share)} of {floor.reachable_m2:,.1f} m2; {left}"
+    return (
+        f"{share_words(floor.swept_share)} of {floor.reachable_m2:,.1f} m2; {patches_left(floor)}"
+    )

@@ -77,20 +77,6 @@ class WorkLimit:
 
 
 @dataclass(frozen=True, slots=True)
-class GapReached:
-    """Stops when the optimality gap is at most ``target``: 0.01 is 1 %.
-
-    Without a bound this never stops a search.
-    """
-
-    target: float
-
-    def __call__(self, progress: SearchProgress) -> bool:
-        gap = progress.gap
-        return gap is not None and gap <= self.target
-
-
-@dataclass(frozen=True, slots=True)
 class Interrupt:
     """Stops when another thread sets ``asked``."""
 

@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING
 
 import msgspec
 
+from fasaco_edge.client.phrases import percent
+
 if TYPE_CHECKING:
     from fasaco_edge.review.moments import Moment
     from fasaco_edge.review.orders import CommandThen, OrderChapter
@@ -262,7 +264,7 @@ class ReviewDocument(msgspec.Struct):
         """The share of the coverable cells that is covered [%], as text."""
         if self.covered_cells is None or not self.coverable_cells:
             return None
-        return f"{100 * self.covered_cells / self.coverable_cells:.1f} %"
+        return percent(self.covered_cells / self.coverable_cells)
 
 
 def explanations() -> Iterator[str]:

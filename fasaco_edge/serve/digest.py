@@ -34,7 +34,13 @@ MOST_M = 1e6
 UNDERWAY = ("planning", "covering", "returning", "degraded", "paused", "charging")
 
 
-def state(view: RobotState, way: Way, now: float, ordered: Status | None = None) -> Digest:
+def state(
+    view: RobotState,
+    way: Way,
+    now: float,
+    ordered: Status | None = None,
+    order: dict[str, Any] | None = None,
+) -> Digest:
     """Return the content of the newest status, and why there is none.
 
     Args:
@@ -42,6 +48,7 @@ def state(view: RobotState, way: Way, now: float, ordered: Status | None = None)
         way: its path.
         now: since the epoch [s].
         ordered: the newest status with an order.
+        order: the newest order by command; None if that is not known.
     """
     status = view.status
     others = sorted(view.robots - {view.robot})[:MOST_ROBOTS]
@@ -67,6 +74,7 @@ def state(view: RobotState, way: Way, now: float, ordered: Status | None = None)
         "simulated": phrases.scale_words(view.settings.robot.time_scale),
         "time_scale": view.settings.robot.time_scale,
         "mission": _mission(mission),
+        "again": _again(mission, order),
         "battery": _battery(status),
         "in_trouble": bool(status.troubles),
         "faults": list(_faults(status)),
@@ -139,6 +147,25 @@ def _mission(mission: MissionReport) -> Digest:
         "left_out": list(mission.left_out),
         "home": [mission.home.x, mission.home.y] if mission.home else None,
     }
+
+
+def _again(mission: MissionReport, order: dict[str, Any] | None) -> Digest | None:
+    """Return an order that is over, to be given again; None while none is known to be over.
+
+    It is empty if it is what Start does.
+    """
+    if order is None or (mission.ordered is not None and mission.stage != "over"):
+        return None
+    # A room may have another outline by now: its number is enough.
+    zones = [
+        {name: value for name, value in zone.items() if name != "polygon" or "room" not in zone}
+        for zone in _items(order.get("zones"))
+        if isinstance(zone, dict)
+    ]
+    is_usual = order.get("passes") in (None, 1) and not (
+        zones or order.get("keep_out") or order.get("return_home")
+    )
+    return {} if is_usual else order | {"zones": zones, "keep_covered": False}
 
 
 def _battery(status: Status) -> Digest | None:

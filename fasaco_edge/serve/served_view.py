@@ -68,6 +68,8 @@ class ServedView(RobotState):
         self._grids: dict[str, GridOctets] = {}
         # The order as received: the status of an older daemon only names its zones.
         self._order: dict[str, object] = {}
+        # The newest order by command, also after its end.
+        self._last_order: dict[str, object] | None = None
         self._others: dict[str, tuple[float, float, float]] = {}
         self._path: Sample | None = None
         # The newest path that leads anywhere: a paused robot goes on with it.
@@ -91,7 +93,7 @@ class ServedView(RobotState):
             "path": self._path_message,
             "pose": lambda _: self._pose_message(),
             "state": lambda now: message_text(
-                "state", **state(self, self._way, now, self._ordered)
+                "state", **state(self, self._way, now, self._ordered, self._last_order)
             ),
             "areas": lambda _: message_text(
                 "areas", **areas(self.settings, self._order, self._mission)
@@ -220,7 +222,7 @@ class ServedView(RobotState):
         super()._follow(document, now)
         order = document.get("order")
         if document.get("command") == "start":
-            self._order = order if isinstance(order, dict) else {}
+            self._order = self._last_order = order if isinstance(order, dict) else {}
         elif document.get("command") in ("cancel", "reset"):
             self._order = {}
 

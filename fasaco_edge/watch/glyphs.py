@@ -20,42 +20,36 @@ HALF = "▀"
 ARROWS, PLAIN_ARROWS = "→↗↑↖←↙↓↘", ">/^\\<,v."
 
 
-# For each kind its colour, ANSI colour and plain character. Colours are dark, so that the path
-# stands out, and differ in brightness, not only in hue. The nearest ANSI colour would be one grey
-# for three kinds.
-_LOOKS: dict[int, tuple[Colour, str, str]] = {
-    picture.UNKNOWN: ((20, 22, 27), "black", " "),
-    picture.FLOOR: ((46, 50, 58), "bright_black", "."),
-    picture.TO_COVER: ((98, 104, 116), "white", "-"),
-    picture.COVERED: ((24, 112, 82), "green", "o"),
-    picture.RECOVERED: ((176, 122, 40), "yellow", "8"),
-    picture.WALL: ((214, 218, 226), "bright_white", "#"),
-    picture.AHEAD: ((72, 128, 240), "bright_blue", "+"),
-    picture.NEXT: ((255, 240, 110), "bright_magenta", "*"),
-    picture.ROBOT: ((222, 36, 56), "red", "@"),
-} | {
-    # From black over violet and orange to yellow; few terminals have such colours of their own.
-    kind: ((red, green, blue), ansi, plain)
-    for kind, (red, green, blue, ansi, plain) in zip(
-        picture.FIELD,
-        (
-            (34, 12, 74, "black", "1"),
-            (84, 15, 109, "blue", "2"),
-            (132, 32, 107, "magenta", "3"),
-            (181, 50, 90, "red", "4"),
-            (221, 81, 58, "bright_red", "5"),
-            (246, 125, 21, "yellow", "6"),
-            (252, 226, 100, "bright_yellow", "7"),
-        ),
-        strict=True,
-    )
+# For each kind its colour and plain character. Colours are dark, so that the path stands out, and
+# differ in brightness, not only in hue.
+_LOOKS: dict[int, tuple[Colour, str]] = {
+    picture.UNKNOWN: ((20, 22, 27), " "),
+    picture.FLOOR: ((46, 50, 58), "."),
+    picture.TO_COVER: ((98, 104, 116), "-"),
+    picture.COVERED: ((24, 112, 82), "o"),
+    picture.RECOVERED: ((176, 122, 40), "8"),
+    picture.WALL: ((214, 218, 226), "#"),
+    picture.AHEAD: ((72, 128, 240), "+"),
+    picture.NEXT: ((255, 240, 110), "*"),
+    picture.ROBOT: ((222, 36, 56), "@"),
+}
+# From black over violet and orange to yellow.
+_FIELD: tuple[Colour, ...] = (
+    (34, 12, 74),
+    (84, 15, 109),
+    (132, 32, 107),
+    (181, 50, 90),
+    (221, 81, 58),
+    (246, 125, 21),
+    (252, 226, 100),
+)
+_LOOKS |= {
+    kind: (colour, str(level))
+    for level, (kind, colour) in enumerate(zip(picture.FIELD, _FIELD, strict=True), 1)
 }
 
-_SYSTEMS = {
-    "standard": ColorSystem.STANDARD,
-    "256": ColorSystem.EIGHT_BIT,
-    "truecolor": ColorSystem.TRUECOLOR,
-}
+# Sixteen colours are too few: three kinds would be one grey.
+_SYSTEMS = {"256": ColorSystem.EIGHT_BIT, "truecolor": ColorSystem.TRUECOLOR}
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,7 +57,7 @@ class GlyphSet:
     """Capabilities of a terminal.
 
     Attributes:
-        colours: None for no colours.
+        colours: None for no colours, or too few.
         unicode: whether it knows more than ASCII.
     """
 
@@ -144,15 +138,14 @@ def _glyph(glyphs: GlyphSet, upper: int, lower: int) -> tuple[str, int, int]:
         arrows = ARROWS if glyphs.unicode else PLAIN_ARROWS
         return arrows[shown - picture.HEADING], picture.WALL, picture.ROBOT
     if glyphs.colours is None:
-        return _LOOKS[shown][2], shown, shown
+        return _LOOKS[shown][1], shown, shown
     if not glyphs.unicode:
         return " ", shown, shown
     return (" ", upper, upper) if upper == lower else (HALF, upper, lower)
 
 
-@lru_cache(maxsize=len(_LOOKS) ** 2)
-def _style(colours: ColorSystem, above: int, below: int) -> Style:
-    (rgb, ansi, _), (rgb_below, ansi_below, _) = _LOOKS[above], _LOOKS[below]
-    if colours is ColorSystem.STANDARD:
-        return Style(color=ansi, bgcolor=ansi_below)
-    return Style(color=Color.from_rgb(*rgb), bgcolor=Color.from_rgb(*rgb_below))
+@lru_cache(maxsize=2 * len(_LOOKS) ** 2)
+def _style(_: ColorSystem, above: int, below: int) -> Style:
+    """Return the style of a character; each keeps what it was first rendered as."""
+    front, back = _LOOKS[above][0], _LOOKS[below][0]
+    return Style(color=Color.from_rgb(*front), bgcolor=Color.from_rgb(*back))

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from rich.console import Console, RenderableType
 from rich.text import Text
 
+from fasaco_edge.client import phrases
 from fasaco_edge.client.events import TROUBLED
-from fasaco_edge.client.phrases import age, clock, percent, time_to_go
+from fasaco_edge.client.phrases import age, clock, percent
 from fasaco_edge.text import one_line
 from fasaco_edge.watch import picture
 from fasaco_edge.watch.blocks import FAINT, Blocks, with_keys
@@ -78,7 +79,7 @@ class Page:
         layout = Layout.of(width, height)
         page = self._blocks.block(headline(view, now, width), width, 1)
         if layout.lines:
-            page += self._middle(view, layout)
+            page += self._middle(view, time_to_go(view, now), layout)
             whole, field = self._picture.path_is_whole, self._picture.shows_field
             key: object = (width, whole, field)
             page += self._blocks.keep(
@@ -95,7 +96,7 @@ class Page:
         self._picture.shows_field = not self._picture.shows_field
         return self._picture.shows_field
 
-    def _middle(self, view: RobotView, layout: Layout) -> list[str]:
+    def _middle(self, view: RobotView, to_go: str, layout: Layout) -> list[str]:
         drawn = self._picture.kinds(view, layout.columns, layout.lines)
         if drawn is None:
             left = self._blocks.block(
@@ -106,14 +107,15 @@ class Page:
         if not layout.figures:
             return left
         # The status is a value: a new one is another object.
-        key = (view.status, view.rooms, layout)
-        right = self._blocks.keep("figures", key, lambda: self._figures(view, layout))
+        key = (view.status, view.rooms, to_go, layout)
+        right = self._blocks.keep("figures", key, lambda: self._figures(view, to_go, layout))
         return [f"{a} {b}" for a, b in zip(left, right, strict=True)]
 
-    def _figures(self, view: RobotView, layout: Layout) -> list[str]:
+    def _figures(self, view: RobotView, to_go: str, layout: Layout) -> list[str]:
         shown: RenderableType = Text("")
         if view.status is not None:
-            shown = figures(view.status, view.rooms, layout.figures, self._blocks.glyphs)
+            glyphs = self._blocks.glyphs
+            shown = figures(view.status, view.rooms, to_go, layout.figures, glyphs)
         return self._blocks.block(shown, layout.figures, layout.lines)
 
     def _legend(self, path_is_whole: bool) -> Text:
@@ -129,6 +131,12 @@ class Page:
         pixel_m = self._picture.pixel_m
         scale = None if pixel_m is None else (pixel_m, max(layout.columns // 4, 4))
         return self._blocks.log(view.events, width, layout.entries, scale)
+
+
+def time_to_go(view: RobotView, now: float) -> str:
+    """Return how long the rest of the path takes, or will take at least; "" if not known."""
+    words = "" if view.status is None else phrases.time_to_go(view.status)
+    return f"at least {words}" if words and view.grows(now) else words
 
 
 def headline(view: RobotView, now: float, width: int) -> Text:
@@ -155,10 +163,9 @@ def headline(view: RobotView, now: float, width: int) -> Text:
         if status.coverage is not None:
             line.append(f"  {percent(status.coverage.fraction)} of cells")
         if status.path is not None:
-            to_go = time_to_go(status)
-            least = "at least " if view.grows(now) else ""
+            to_go = time_to_go(view, now)
             line.append(f"  path {status.path.revision}")
-            line.append(f", {least}{to_go} to go" if to_go else "")
+            line.append(f", {to_go} to go" if to_go else "")
         # What the robot does looks faster, and the time to go is by the clock.
         scale = view.settings.robot.time_scale
         line.append(f"  {scale:g} x real time" if scale != 1.0 else "", "dim")

@@ -34,18 +34,21 @@ MOST_ROOMS = 12
 WIDE = 30
 
 
-def figures(status: Status, rooms: Rooms, width: int, glyphs: GlyphSet) -> Table:
-    """Return all figures of a status, and of rooms, as a table ``width`` characters wide."""
+def figures(status: Status, rooms: Rooms, to_go: str, width: int, glyphs: GlyphSet) -> Table:
+    """Return all figures of a status, and of rooms, as a table ``width`` characters wide.
+
+    ``to_go``: how long the rest of the path takes.
+    """
     table = Table.grid(padding=(0, 1), pad_edge=False)
     table.add_column(width=LABEL_WIDTH, style="cyan", no_wrap=True)
     table.add_column(overflow="fold")
     table.width = width
-    for name, value in _rows(status, rooms, width - LABEL_WIDTH - 1, glyphs):
+    for name, value in _rows(status, rooms, to_go, width - LABEL_WIDTH - 1, glyphs):
         table.add_row(name, value)
     return table
 
 
-def _rows(status: Status, rooms: Rooms, width: int, glyphs: GlyphSet) -> list[Row]:
+def _rows(status: Status, rooms: Rooms, to_go: str, width: int, glyphs: GlyphSet) -> list[Row]:
     state = Text(one_line(status.state), f"bold {state_colour(status.state)}")
     # The path's number is shown with the path.
     if status.path is None or status.reason != f"path {status.path.revision}":
@@ -59,7 +62,7 @@ def _rows(status: Status, rooms: Rooms, width: int, glyphs: GlyphSet) -> list[Ro
             status.coverage, glyphs.bar(status.coverage.fraction, min(width, LONGEST_BAR))
         )
     if status.path is not None:
-        rows += _path(status.path, phrases.time_to_go(status))
+        rows += _path(status.path, to_go)
     if status.coverage is not None and status.coverage.recovered:
         rows.append(("twice", _text(_cells(status.coverage.recovered))))
     if status.floor is not None:

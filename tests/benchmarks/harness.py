@@ -93,13 +93,3 @@ def check_names(grids: Sequence[str]) -> None:
     for name in names:
         if names.count(name) > 1:
             raise BadConfiguration(f"grids must have different names, got {name!r} twice")
-
-
-def check_writable(picture: Path | None) -> None:
-    """Make sure that a picture can be written after minutes of measuring.
-
-    Raises:
-        BadConfiguration: its folder does not exist.
-    """
-    if picture is not None and not picture.parent.is_dir():
-        raise BadConfiguration(f"cannot write {picture}: there is no such folder")

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 
 from fasaco_edge.drawing import palette
-from fasaco_edge.drawing.pictures import plot_walk
+from fasaco_edge.drawing.pictures import draw_driven, draw_visits, visits_of
 from fasaco_edge.drawing.plot import Plot, View
 from fasaco_edge.drawing.sheet import LINE_PX, TEXT_PX, KeyEntry, Sheet, font_of, wrapped
 from fasaco_edge.grid.geometry import Bounds
@@ -50,7 +50,7 @@ def draw_walks(
     view = View.over(bounds_around(centres, cell_m), cell_m, PANEL_PX, PANEL_PX)
     panels = _arranged([_panel(view, walk) for walk in walks], columns)
     scale = view.scale * cell_m
-    sheet = Sheet(title, lines, _key(walks), ("start", "end"), scale, framed=False, unit="cells")
+    sheet = Sheet(title, lines, _key(walks), ("start", "end"), scale, unit="cells")
     return sheet.around(panels)
 
 
@@ -70,7 +70,9 @@ def _key(walks: Sequence[LabelledWalk]) -> tuple[KeyEntry, ...]:
 def _panel(view: View, walk: LabelledWalk) -> Image.Image:
     plot = Plot(view)
     plot.ground(walk.lattice)
-    plot_walk(plot, walk.lattice, walk.cells)
+    lattice, cells = walk.lattice, walk.cells
+    draw_visits(plot, lattice, visits_of(lattice, cells), tuple(cells[0].tolist()))
+    draw_driven(plot, lattice.centres(cells), None, lattice.cell_m)
     return _headed(plot.finished(), walk.label, walk.caption)
 
 

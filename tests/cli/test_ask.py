@@ -7,9 +7,11 @@ import json
 import pytest
 
 from fasaco_edge.cli import main
+from fasaco_edge.cli.console.rooms_table import show_rooms
+from fasaco_edge.wire.documents.rooms import RoomReport, Rooms
 from fasaco_edge.wire.topics import RPC_NAMES
 from tests.support.outsider import Outsider
-from tests.support.processes import daemon_process, fasaco_edge
+from tests.support.processes import daemon_process
 from tests.support.rooms import map_bytes, pose_bytes, room
 
 SAID = {
@@ -45,12 +47,6 @@ def test_every_question_has_an_answer_people_can_read(endpoint, capsys, name):
     assert told.err == ""
 
 
-def test_a_process_answers_as_well(endpoint):
-    ended = fasaco_edge("ask", "version", "--connect", endpoint)
-    assert (ended.code, ended.err) == (0, "")
-    assert SAID["version"] in ended.out
-
-
 def test_a_program_gets_json(endpoint, capsys):
     def told(*words):
         assert main(["ask", *words, "--json", "--connect", endpoint]) == 0
@@ -62,6 +58,13 @@ def test_a_program_gets_json(endpoint, capsys):
     assert path["length_m"] == pytest.approx(0.3 * path["steps"])
     assert trail["rows"] * trail["cols"] == 100
     assert version["package"] == "fasaco-edge"
+
+
+def test_no_room_is_swept_whole_before_it_is(capsys):
+    show_rooms(Rooms("map", 1, (RoomReport(1, swept=0.9996), RoomReport(2, swept=1.0))))
+    told = capsys.readouterr().out
+    assert "99.9 %" in told
+    assert "100.0 %" in told
 
 
 def test_what_is_wrong_is_told(endpoint, capsys):

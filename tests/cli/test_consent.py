@@ -2,19 +2,14 @@
 
 from __future__ import annotations
 
-import contextlib
 import json
-import os
-import pty
-import select
-import subprocess
-import time
 
 import pytest
 
-from tests.support.outsider import TIMEOUT_S, Outsider
-from tests.support.processes import ENVIRONMENT, PROGRAM, daemon_process, fasaco_edge
+from tests.support.outsider import Outsider
+from tests.support.processes import daemon_process, fasaco_edge
 from tests.support.rooms import begin, drive, lanes
+from tests.support.terminal import Terminal
 
 LOSS = "start forgets 11 covered cells (1.0 m2)"
 VASE = "0.9,0.9;2.1,0.9;2.1,2.1;0.9,2.1"
@@ -39,26 +34,10 @@ def covered(outsider):
 
 def on_terminal(answer, *words):
     """Run a command on a terminal, answer its question; return its code and what it wrote."""
-    master, slave = pty.openpty()
-    with subprocess.Popen(
-        ["setsid", "--ctty", *PROGRAM, *words],
-        stdin=slave,
-        stdout=slave,
-        stderr=slave,
-        env=ENVIRONMENT | {"TERM": "xterm-256color", "COLUMNS": "200"},
-    ) as process:
-        os.close(slave)
-        written, deadline, is_answered = "", time.monotonic() + TIMEOUT_S, False
-        with contextlib.suppress(OSError):  # the end of a terminal whose last program is gone
-            while time.monotonic() < deadline:
-                if select.select([master], [], [], 0.1)[0]:
-                    written += os.read(master, 4096).decode()
-                if "[y/N]" in written and not is_answered:
-                    os.write(master, answer.encode())
-                    is_answered = True
-        code = process.wait(TIMEOUT_S)
-    os.close(master)
-    return code, written
+    with Terminal(*words, columns=200) as shell:
+        shell.wait_text("[y/N]")
+        shell.type(answer)
+        return shell.end(), shell.written
 
 
 def test_without_a_terminal_it_is_refused_and_says_how_much(robot):

@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from fasaco_edge.cli.console.arguments import Exit
 from fasaco_edge.cli.demo import COMMAND
 from fasaco_edge.cli.demo.mission import DemoMission
 from fasaco_edge.cli.demo.robots import demo_robots
@@ -23,9 +22,19 @@ from fasaco_edge.review.review import read_review
 from fasaco_edge.simulation.robot import SimulationConfig
 from maps.map_writer import write_map
 from tests.support.processes import fasaco_edge, is_running
-from tests.support.rooms import FREE, RESOLUTION_M, WALL, fill, room
+from tests.support.rooms import (
+    FREE,
+    RADIUS_M,
+    RESOLUTION_M,
+    WALL,
+    cells_of,
+    coverable_cells,
+    fill,
+    room,
+)
 
-CELL_M, RADIUS_M = 0.3, 0.18
+# Corner of the map, and of a cell.
+CORNER = Pose2D(-0.9, -0.3)
 
 
 @pytest.fixture
@@ -33,7 +42,7 @@ def building(tmp_path):
     """A map file of two rooms, a door between them and a crate in one."""
     closed = fill(room(3.9, 2.7), 1.8, 0.0, 1.9, 2.7, WALL)
     pixels = fill(fill(closed, 1.8, 0.9, 1.9, 1.8, FREE), 2.8, 1.1, 3.1, 1.4, WALL)
-    geometry = GridGeometry(*pixels.shape, RESOLUTION_M, Pose2D(-1.0, -0.4))
+    geometry = GridGeometry(*pixels.shape, RESOLUTION_M, CORNER)
     write_map(OccupancyGrid(geometry, pixels), tmp_path / "rooms.yaml")
     return tmp_path / "rooms.yaml"
 
@@ -82,9 +91,10 @@ def test_a_demo_covers_every_cell_that_can_be_reached(tmp_path, building):
 
     grid = read_map(building)
     trail = np.loadtxt(out / "trail.csv", delimiter=",", skiprows=1)
-    reachable = reachable_cells(grid, trail[0])
+    reachable = coverable_cells(grid.cells)
+    visited = set(cells_of(trail - (CORNER.x, CORNER.y)))
     # The line leaves out what is not worth the way, and takes in what lies beside the middles.
-    assert len(reachable - visited_cells(trail)) < 0.05 * len(reachable)
+    assert len(reachable - visited) < 0.05 * len(reachable)
     assert summary["reachable_cells"] == summary["covered_cells"] > len(reachable)
     assert summary["reachable_m2"] == pytest.approx(9.1, abs=0.1)
     assert summary["swept_m2"] / summary["reachable_m2"] > 0.93
@@ -146,12 +156,6 @@ def test_robots_of_a_fleet_cover_a_building_together(tmp_path, building):
     assert not [pid for pid in processes_of(out) if is_running(pid)]
 
 
-def test_mishaps_need_a_fleet(tmp_path, building):
-    ended = fasaco_edge("demo", "--map", building, "--kill-after", 5, "--out", tmp_path)
-    assert ended.code == Exit.CONFIG
-    assert "--robots of 2 or more" in ended.err
-
-
 def test_more_robots_than_places_to_start_from(tmp_path):
     geometry = GridGeometry(12, 12, RESOLUTION_M, Pose2D(-0.15, -0.15))
     write_map(OccupancyGrid(geometry, np.zeros((12, 12), np.int8)), tmp_path / "closet.yaml")
@@ -193,48 +197,6 @@ def clearance(grid, points):
         beside = np.maximum(np.maximum(corners - point, point - corners - size), 0.0)
         gaps.append(np.hypot(*beside.T).min())
     return np.array(gaps)
-
-
-def reachable_cells(grid, start):
-    """Return the cells (row, col) where the robot fits, step by step from ``start`` [m]."""
-    x0, y0, x1, y1 = grid.geometry.bounds()
-    fits = {
-        (row, col)
-        for row in range(math.floor(y0 / CELL_M), math.ceil(y1 / CELL_M))
-        for col in range(math.floor(x0 / CELL_M), math.ceil(x1 / CELL_M))
-        if fits_at(grid, ((col + 0.5) * CELL_M, (row + 0.5) * CELL_M))
-    }
-    first = (math.floor(start[1] / CELL_M), math.floor(start[0] / CELL_M))
-    found, edge = {first}, [first]
-    while edge:
-        row, col = edge.pop()
-        for cell in ((row + 1, col), (row - 1, col), (row, col + 1), (row, col - 1)):
-            if cell in fits - found and fits_between(grid, (row, col), cell):
-                found.add(cell)
-                edge.append(cell)
-    return found
-
-
-def fits_at(grid, point):
-    return clearance(grid, [np.array(point)])[0] > RADIUS_M
-
-
-def fits_between(grid, a, b):
-    """Tell whether the robot fits all along the step from cell to cell."""
-    ends = [np.array(((col + 0.5) * CELL_M, (row + 0.5) * CELL_M)) for row, col in (a, b)]
-    return clearance(grid, np.linspace(*ends, 7)).min() > RADIUS_M
-
-
-def visited_cells(trail):
-    """Return the cells whose centre the tool, a disc as wide as a cell, passed over."""
-    visited = set()
-    for a, b in pairwise(trail):
-        steps = max(2, math.ceil(math.dist(a, b) / 0.02))
-        for x, y in np.linspace(a, b, steps):
-            row, col = math.floor(y / CELL_M), math.floor(x / CELL_M)
-            if math.dist((x, y), ((col + 0.5) * CELL_M, (row + 0.5) * CELL_M)) < CELL_M / 2:
-                visited.add((row, col))
-    return visited
 
 
 def check_clearance(grid, trail):

@@ -56,13 +56,12 @@ def recording(tmp_path):
         ((*PLAN, "--robots", "1,1", "2,2"), "steps ━", "map +.*"),
         (("warmup",), "looking at the kernels ", "kernels ready after [0-9.]+ s in .*"),
         (
-            ("bench", "latency", "--samples", "2"),
-            "warming the kernels' cache ━* 0/2 ",
-            "from map.*",
+            ("bench", "planners", "--maps", "office", "--seeds", "1", "--ants", "8"),
+            "planners ━* +0/6 ",
+            ".*",
         ),
-        (("bench", "speed", "--maps", "flat"), "speed ━* +0/10 ", ".*"),
     ],
-    ids=["plan", "ants", "fleet", "warmup", "latency", "speed"],
+    ids=["plan", "ants", "fleet", "warmup", "planners"],
 )
 def test_progress_is_drawn_and_leaves_nothing_behind(words, shown, first_line):
     with Terminal(*words, columns=120) as shell:
@@ -89,47 +88,33 @@ def test_the_simulation_shows_its_robot_in_one_line():
         assert "waits for" not in text.splitlines()[-1]
 
 
-# Run in a terminal: the lines of a demo, or a bar, with what is done as its arguments.
-LINES = r"""
+# Run in a terminal: bars, with their titles as arguments.
+BARS = r"""
 import sys, time
 from fasaco_edge.cli.console import streams, terminal
-from fasaco_edge.cli.demo.view import LinesView
-from fasaco_edge.wire.documents.json_text import tolerant
-from fasaco_edge.wire.documents.status import Status
-kind, *titles = sys.argv[1:]
 streams.clean_streams()
-coverage = {"covered": 85, "coverable": 424, "fraction": 0.2}
-status = tolerant({"state": "covering", "coverage": coverage, "floor": {"swept_m2": 8.1}}, Status)
-with LinesView(titles) if kind == "demo" else terminal.progress() as bar:
-    for number, title in enumerate(titles):
-        if kind == "demo":
-            bar.show(number, status, 3.0)
-        else:
-            bar.add_task(title, total=100_000, completed=20_000)
+with terminal.progress() as bar:
+    for title in sys.argv[1:]:
+        bar.add_task(title, total=100_000, completed=20_000)
     time.sleep(0.5)
 """
 
 
 @pytest.mark.parametrize(("columns", "lines"), [(60, 20), (80, 24), (200, 50)])
-@pytest.mark.parametrize("kind", ["demo", "bar"])
-def test_bar_and_clock_are_whole(tmp_path, kind, columns, lines):
-    script = tmp_path / "lines.py"
-    script.write_text(LINES)
+def test_bar_and_clock_are_whole(tmp_path, columns, lines):
+    script = tmp_path / "bars.py"
+    script.write_text(BARS)
     titles = ("flat", "robot-1", "second_floor_of_the_hospital_in_the_north")
-    program = (sys.executable, str(script), kind, *titles)
+    program = (sys.executable, str(script), *titles)
     with Terminal(program=program, columns=columns, lines=lines) as shell:
-        done = "covering: 85/424" if kind == "demo" else "20000/100000"
-        screen = shell.wait(lambda seen: seen.count(done) == 3)
+        screen = shell.wait(lambda seen: seen.count("20000/100000") == 3)
         assert shell.end() == 0
-    wide = 32 if kind == "bar" and columns >= 80 else 16
     rows = [line for line in screen.splitlines() if "0:00:00" in line]
     for row, title in zip(rows, titles, strict=True):
         assert len(row) <= columns
-        assert sum(row.count(sign) for sign in BAR) == wide
+        assert sum(row.count(sign) for sign in BAR) == (32 if columns >= 80 else 16)
         name = re.split("[━╸╺]", row)[0].strip()
         assert name == title or (title.startswith(name[:-1]) and name.endswith("…"))
-        if kind == "demo":
-            assert " 20 % 0:00:00 covering: 85/424" in row
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])

@@ -55,7 +55,7 @@ TO_THE_END = [
     ("review night.rrd --at 0:02", {0}, "robot "),
     ("review night.rrd --against night.rrd", {0}, "Both had the same setup."),
     ("replay night.rrd", {0, 1}, "covering: path"),
-    ("bench", {0}, "footprint"),
+    ("bench", {0}, "planners"),
     ("--help", {0}, "check-config"),
 ]
 # What is ended by Ctrl-C once it shows some words, and its exit code: 0 where that is the way to
@@ -66,7 +66,7 @@ ENDED = [
     ("serve --listen 127.0.0.1:{}", "page at http://127.0.0.1:", 0),
     ("record --out .", "records into .; Ctrl-C ends it", 0),
     ("init new.yaml", "Radius of the disc", 130),
-    ("bench speed --repeats 1000 --maps basement", "speed ━", 130),
+    ("bench planners --seeds 1000 --maps basement", "planners ━", 130),
 ]
 # Live pages and bars have tests of their own: test_demo_view.py, test_progress.py, tests/watch.
 ELSEWHERE = {"demo", "simulate"}

@@ -1,29 +1,23 @@
-"""What the journal has of the service: lines with priorities and fields, and few of them."""
+"""What the journal has of the service: lines with priorities, and few of them."""
 
 from __future__ import annotations
 
+import re
 import time
 
-from fasaco_edge.cli.console.logs import message_id
 from tests.deploy.service import Service
 
 
-def test_lines_can_be_looked_for(service: Service):
+def test_it_says_that_it_is_ready(service: Service):
     service.start()
-    ready = next(line for line in service.journal() if line.get("FASACO_EVENT") == "ready")
+    (ready,) = [line for line in service.journal() if line["MESSAGE"].startswith("ready after")]
     assert ready["PRIORITY"] == "6"
-    assert ready["MESSAGE_ID"] == message_id("ready")
-    assert ready["CODE_FILE"].endswith("fasaco_edge/daemon/service.py")
-    assert ready["MESSAGE"].startswith("ready after")
-    found = service.lab.run("journalctl", "-o", "cat", "FASACO_EVENT=ready").stdout
-    assert ready["MESSAGE"] in found
 
 
 def test_why_it_did_not_start_is_an_error(service: Service):
     service.configure("robot: {radius_m: -1}\n")
     service.start(fails=True)
-    (failure,) = [line for line in service.journal() if line.get("FASACO_EVENT") == "failure"]
-    assert (failure["PRIORITY"], failure["FASACO_CODE"]) == ("3", "bad_configuration")
+    (failure,) = [line for line in service.journal() if line["PRIORITY"] == "3"]
     assert "robot.radius_m" in failure["MESSAGE"]
 
 
@@ -33,11 +27,10 @@ def test_a_storm_of_faults_is_a_line(service: Service):
     time.sleep(1.2)  # a status is told once a second
     refused = service.ask()["errors"]["by_code"]["malformed_message"]
     service.stop()
-    lines = [line for line in service.journal() if line.get("FASACO_EVENT") == "fault"]
+    lines = [line["MESSAGE"] for line in service.journal() if line["PRIORITY"] == "4"]
+    counts = [re.search(r"\(and (\d+) more like it\)", line) for line in lines]
     print(f"{refused} faults in {len(lines)} lines")
     assert refused > 100
     # The first, perhaps one in between, and at the end the count of the others.
     assert len(lines) <= 3
-    assert {line["FASACO_CODE"] for line in lines} == {"malformed_message"}
-    told = sum(1 + int(line.get("FASACO_SUPPRESSED", 0)) for line in lines)
-    assert told == refused
+    assert sum(1 + int(count[1] if count else 0) for count in counts) == refused

@@ -46,7 +46,7 @@ def test_it_is_small_and_sleeps_while_nothing_comes(service: Service):
     own_mb = int(status.partition("RssAnon:")[2].split()[0]) * 1024 / 1e6
     print(f"idle: {own_mb:.1f} MB, {100 * share:.2f} % of a core")
     assert own_mb <= IDLE_MB
-    # Four seconds on a busy machine tell not much: the bar is held by bench footprint.
+    # Four seconds on a busy machine tell not much: the bar is held by bench daemon.
     assert share <= 4 * IDLE_SHARE
 
 

@@ -39,8 +39,8 @@ def test_a_wrong_one_is_kept_out(service: Service):
     wait_for(lambda: "refused" in service.show("StatusText"), 5.0, "said")
     assert "planner.ants" in service.show("StatusText")
     assert service.ask()["errors"]["by_code"] == {"bad_configuration": 1}
-    (refused,) = [e for e in service.journal() if e.get("FASACO_EVENT") == "reload_refused"]
-    assert refused["PRIORITY"] == "3"
+    (refused,) = [entry for entry in service.journal() if entry["PRIORITY"] == "3"]
+    assert "planner.ants" in refused["MESSAGE"]
     assert service.ask("config") == before
     assert service.pid == process
     service.configure(**QUIET)

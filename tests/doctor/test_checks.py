@@ -120,21 +120,14 @@ def test_memory_is_short_or_limited(tmp_path, free_kb, limit, level):
 def test_a_board_is_called_by_its_name(tmp_path):
     files = {
         "proc__device-tree__model": "Raspberry Pi 4 Model B Rev 1.4\0",
-        "proc__cpuinfo": "processor\t: 0\nFeatures\t: fp asimd evtstrm crc32\n",
         "etc__os-release": 'PRETTY_NAME="Debian GNU/Linux 12 (bookworm)"\nID=debian\n',
     }
     found = machine.system(computer(tmp_path, **files))
     assert found.found.startswith("Raspberry Pi 4 Model B Rev 1.4, ")
     assert found.details[0].startswith("Debian GNU/Linux 12 (bookworm), kernel ")
-    assert found.details[0].endswith("processor features: asimd")
 
 
-def test_this_computer_can_run_what_is_installed():
-    here = CheckContext(DaemonConfig())
-    found = machine.c_library(here)
-    assert found.level is Level.OK
-    assert any(line.startswith("numba: 2.") for line in found.details)
-    assert machine.system(here).level in (Level.OK, Level.WARN)
+def test_this_computer_has_a_clock():
     is_synchronised, error_s = machine.kernel_clock()
     assert isinstance(is_synchronised, bool)
     assert error_s >= 0.0
@@ -311,7 +304,7 @@ def test_a_daemon_is_found_with_what_it_lacks(tmp_path):
         context = at(daemon.endpoint)
         met = session.session(context)
         assert met.level is Level.OK
-        assert f"process {daemon.pid} listens there" in met.details[0]
+        assert met.details == (f"{daemon.endpoint}: a program listens there",)
         lacking = session.peers(context)
         assert lacking.level is Level.WARN
         assert lacking.found == (

@@ -1,41 +1,7 @@
-"""Charts: names and numbers stand beside what is drawn, and not on it."""
-
-import pytest
+"""Charts: their names, and the numbers on their axes."""
 
 from fasaco_edge.drawing import chart, palette
 from fasaco_edge.drawing.chart import Axis, Line, Panel, draw_panels
-
-X, Y = Axis.linear("s", [100.0]), Axis.linear("%", [100.0])
-
-
-def panel(points, caption=""):
-    lines = (Line("left", palette.BLUE, points), Line("right", palette.VERMILION, points))
-    return Panel("Title", caption, X, Y, lines)
-
-
-@pytest.mark.parametrize(
-    ("points", "is_low", "is_left"),
-    [
-        (((0.0, 0.0), (50.0, 60.0), (100.0, 100.0)), False, True),
-        (((0.0, 100.0), (100.0, 0.0)), False, False),
-        (((0.0, 0.0), (0.0, 100.0), (100.0, 100.0)), True, False),
-    ],
-)
-def test_the_key_stands_where_no_line_runs(points, is_low, is_left, monkeypatch):
-    placed = []
-    text = chart._Pen.text
-    monkeypatch.setattr(
-        chart._Pen,
-        "text",
-        lambda pen, x, y, words, *rest: (
-            placed.append((words, x, y)),
-            text(pen, x, y, words, *rest),
-        ),
-    )
-    picture = draw_panels("", (), [panel(points)], 1)
-    ((x, y),) = {(x, y) for words, x, y in placed if words == "left"}
-    assert (y > picture.height / 2) == is_low
-    assert (x < picture.width / 2) == is_left
 
 
 def test_the_unit_stands_below_the_caption(monkeypatch):
@@ -50,6 +16,15 @@ def test_the_unit_stands_below_the_caption(monkeypatch):
             text(pen, x, y, words, size, colour, anchor),
         ),
     )
-    draw_panels("", (), [panel(((0.0, 0.0),), caption="what is shown")], 1)
+    lines = (Line(palette.BLUE, ((0.0, 0.0),), 0),)
+    axes = Axis.linear("s", [100.0]), Axis.linear("%", [100.0])
+    draw_panels([Panel("Title", "what is shown", *axes, lines)])
     upper, size = placed["what is shown"]
     assert placed["%"][0] > upper + size
+
+
+def test_an_axis_has_round_numbers():
+    axis = Axis.linear("%", [0.3, 1.9])
+    assert (axis.low, axis.high) == (0.0, 2.0)
+    assert [text for _, text in axis.ticks] == ["0", "0.5", "1", "1.5", "2"]
+    assert Axis.linear("%", [0.0]).high > 0.0

@@ -11,7 +11,6 @@ from fasaco_edge.mission.core.events import CommandReceived, MapReceived, PlanRe
 from fasaco_edge.mission.core.lattice_angle import LatticeAngle
 from fasaco_edge.mission.orders.order import read_order
 from fasaco_edge.mission.orders.order_state import OrderState
-from fasaco_edge.offline.passes import along_share
 from fasaco_edge.planners.cost import SearchWork
 from fasaco_edge.planners.planner import WorkLimit
 from fasaco_edge.planners.search.near_optimal import NearOptimal
@@ -19,6 +18,7 @@ from tests.grid.test_floor import room
 from tests.mission import line_robot, world
 from tests.mission.test_control import cells, idle
 from tests.mission.world import CONFIG, Drive, building, pose_at, rectangle
+from tests.support.lanes import along_share
 
 HALL = ("............",) * 9
 EDGE = cells(0, 0, 9, 12) - cells(1, 1, 8, 11)

@@ -94,12 +94,6 @@ def test_a_module_of_one_s_own_is_found_by_its_name(mine, monkeypatch, capsys):
         assert said in capsys.readouterr().err
 
 
-def test_what_is_no_place_of_a_planner_is_told(capsys):
-    with pytest.raises(SystemExit):
-        main(["plan", "office", "--planner", "lab-of-mine:Deep"])
-    assert "FILE.py:NAME or MODULE:NAME, got 'lab-of-mine:Deep'" in capsys.readouterr().err
-
-
 def test_from_python_a_class_and_its_object_are_planners_too():
     class Walk:
         def plan(self, problem):

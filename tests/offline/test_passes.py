@@ -9,10 +9,10 @@ from PIL import Image
 import fasaco_edge as fe
 from fasaco_edge.cli import main
 from fasaco_edge.errors import BadConfiguration
-from fasaco_edge.offline.passes import along_share
 from fasaco_edge.planners.cost import SearchWork
 from fasaco_edge.planners.passes import Pass
 from fasaco_edge.planners.planner import WorkLimit
+from tests.support.lanes import along_share
 
 ENOUGH = WorkLimit(SearchWork(proposals=600_000))
 ROBOT = fe.Robot()
@@ -58,7 +58,6 @@ def test_each_pass_begins_where_the_one_before_ends_and_the_last_ends_at_home(fl
 def test_figures_are_sums_and_those_of_each_pass(flat, tmp_path):
     told = json.loads(json.dumps(flat.figures))
     assert [each["pass"] for each in told["passes"]] == ["edge", "auto", "cross"]
-    assert [each["along_share"] is None for each in told["passes"]] == [True, False, False]
     for name in ("steps", "cost_s"):
         assert told[name] == pytest.approx(sum(each[name] for each in told["passes"]))
     for plan in flat.plans:

@@ -54,7 +54,7 @@ def planned(grid: OccupancyGrid, seed: int, pauses: Pauses, observe=ignore, line
     """Return the ground, walk and line of a search that ends after some pauses."""
     search = fe.Search(seed=seed, budget_s=1e6)
     ground = Ground.of_floor(grid, ROBOT, (0.5, 0.5), WALLS)
-    ending = Ending(search, None, pauses, lambda _: None, None)
+    ending = Ending(None, pauses, lambda _: None, None)
     problem = _problem(ground, ROBOT, ANYWHERE)
     planning = Planning(problem, ground, search, None, ending, observe)
     return ground, *planning.run(line, ROBOT)
@@ -112,7 +112,7 @@ def test_pheromone_is_shown_while_ants_alone_walk():
     problem = _problem(ground, ROBOT, ANYWHERE)
     search = fe.Search(planner="fasaco", ants=64)
     shown = []
-    ending = Ending(search, None, None, lambda _: shown.append("walk"), lower_bound_of(problem))
+    ending = Ending(None, None, lambda _: shown.append("walk"), lower_bound_of(problem))
     Planning(problem, ground, search, None, ending, lambda _: shown.append("ants")).run(
         "quick", ROBOT
     )

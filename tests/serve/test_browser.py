@@ -27,9 +27,11 @@ from websockets.sync.client import ClientConnection, connect
 
 from tests.serve.serving import looking, served
 from tests.serve.test_plain import TECHNICAL
-from tests.support.outsider import TIMEOUT_S, Outsider
-from tests.support.processes import daemon_process
+from tests.support.outsider import TIMEOUT_S, Outsider, open_client
+from tests.support.processes import daemon_process, free_endpoint
 from tests.support.rooms import HALL, UNKNOWN, begin, drive, fill, lanes, map_bytes, pose_bytes
+from tests.support.router import router_process
+from tests.support.statuses import FULL
 from tests.support.waiting import until
 
 BROWSER = shutil.which("chromium")
@@ -163,6 +165,18 @@ def another_server_shows_the_path(folder: Path, endpoint: str) -> bool:
         return bool(looker.wait("path", lambda path: path["revision"])["body"])
 
 
+def order_again(tab: Tab, outsider: Outsider, url: str) -> None:
+    """Give the order that was cancelled again, by one tap on a page opened anew."""
+    tab.call("Page.navigate", url=url)
+    until(lambda: tab.js("find('again').textContent") == "Last order again: area 1")
+    photograph(tab, "again")
+    tab.click("again")
+    again = outsider.wait_status(lambda status: status["state"] == "covering")["mission"]
+    assert [zone["name"] for zone in again["zones"]] == ["area 1"]
+    assert again["keep_out"] == 1
+    until(lambda: tab.js("find('again').offsetParent === null"))
+
+
 def canceled(tab: Tab, outsider: Outsider) -> bool:
     """Tap on Cancel, seen or not; tell whether there is no order any more."""
     tab.js("find('cancel').click()")
@@ -230,6 +244,7 @@ def test_a_mission_is_ordered_by_finger(tmp_path):
         assert outsider.ask_status()["mission"]["ordered"] == "command"
         # On a slow machine the second tap may be too late, and be a first one.
         until(lambda: canceled(tab, outsider))
+        order_again(tab, outsider, page.url)
         tab.js("find('details').open = true")
         tab.click("trail")
         until(lambda: tab.js("Boolean(model.field)"))
@@ -331,6 +346,35 @@ def test_a_reason_shows_its_floor_on_the_map_and_nothing_else(tmp_path):
         photograph(tab, "not_swept_after_cancel")
         assert not TECHNICAL.search(tab.js("document.body.innerText"))
         tab.click("unleft")
+        assert tab.complaints == []
+
+
+@needs_browser
+def test_of_an_older_daemon_the_page_says_why_it_shows_no_place(tmp_path):
+    endpoint = free_endpoint()
+    left = [
+        {"m2": 1.0, "reason": "too narrow for the robot, or too near to a wall or to furniture"}
+    ]
+    status = json.dumps(FULL | {"floor": FULL["floor"] | {"left": left, "out_of_reach": []}})
+    with (
+        router_process(endpoint),
+        open_client(endpoint) as session,
+        served(tmp_path, endpoint) as page,
+        browsing(page.url, tmp_path / "browser") as tab,
+    ):
+
+        def is_shown() -> bool:
+            session.put("fasaco/@v1/robot/status", status)
+            return bool(tab.js("Boolean(model.state && model.state.state)"))
+
+        until(is_shown)
+        tab.js("find('left').open = true; find('left').querySelector('button').click()")
+        reason = "too narrow for the robot, or too close to a wall or furniture"
+        assert tab.js("find('leftname').textContent") == reason
+        tab.js("model.leftAt -= OLD_MS; showBars()")
+        said = tab.js("find('leftname').textContent")
+        assert said == f"{reason} (the robot's program is too old to say where)"
+        photograph(tab, "old_daemon")
         assert tab.complaints == []
 
 

@@ -57,6 +57,30 @@ def test_an_order_is_drawn_until_it_is_cancelled():
     assert heard(view, "areas", 2.0)["zones"] == []
 
 
+@pytest.mark.parametrize("ended", [{"stage": "over", "ordered": "command"}, {"ordered": None}])
+def test_an_order_that_has_ended_can_be_given_again(ended):
+    """As it was, but for what was kept of the one before, and the outline that a room had."""
+    view = ServedView(Keys())
+    tell(view, "status", {"state": "idle", "mission": {"ordered": None}}, 1.0)
+    assert heard(view, "state", 1.0)["again"] is None
+    zones = [{"name": "hall", "polygon": CORNERS, "room": 3}, {"name": "den", "polygon": CORNERS}]
+    order = {"zones": zones, "return_home": True, "keep_covered": True}
+    tell(view, "command", {"command": "start", "order": order}, 2.0)
+    tell(view, "status", {"state": "covering", "mission": {"ordered": "command"}}, 2.0)
+    assert heard(view, "state", 2.0)["again"] is None
+    if ended["ordered"] is None:
+        tell(view, "command", {"command": "cancel"}, 3.0)
+    tell(view, "status", {"state": "done", "mission": ended}, 3.0)
+    assert heard(view, "state", 3.0)["again"] == order | {
+        "zones": [{"name": "hall", "room": 3}, zones[1]],
+        "keep_covered": False,
+    }
+    # Start alone does that.
+    tell(view, "command", {"command": "start", "order": {"passes": 1, "keep_out": []}}, 4.0)
+    tell(view, "status", {"state": "done", "mission": ended, "uptime_s": 9.0}, 4.0)
+    assert heard(view, "state", 4.0)["again"] == {}
+
+
 def test_the_zones_of_an_order_are_drawn_by_the_status_alone():
     view = ServedView(Keys())
     zones = [{"name": "hall", "polygon": CORNERS}, {"name": "of old"}]

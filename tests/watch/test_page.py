@@ -48,14 +48,12 @@ def test_what_is_alike_is_written_once():
     assert plain(line) == " " * 50
 
 
-@pytest.mark.parametrize(
-    ("colours", "code"),
-    [(ColorSystem.EIGHT_BIT, "38;5;"), (ColorSystem.STANDARD, "97;42m")],
-)
-def test_fewer_colours_will_do(colours, code):
-    (line,) = GlyphSet(colours, unicode=True).lines(np.array([[WALL], [COVERED]], np.uint8))
-    assert code in line
+def test_fewer_colours_will_do():
+    glyphs = GlyphSet.of(console(colours="256"))
+    (line,) = glyphs.lines(np.array([[WALL], [COVERED]], np.uint8))
+    assert "38;5;" in line
     assert "38;2" not in line
+    assert GlyphSet.of(console(colours="standard")).colours is None
 
 
 def test_no_colours_will_do():
@@ -135,6 +133,14 @@ def test_the_time_to_go_is_by_the_clock(line_s, scale, said):
     page = page_of(view)
     assert (f"path 7, {said} to go" in page) == bool(said)
     assert f"to go     {said}{', ' if said else ''}30 steps" in page
+
+
+def test_a_time_to_go_is_the_least_wherever_it_stands_while_the_map_grows():
+    view = mid_mission()
+    tell(view, "status", status(coverage={"coverable": 60, "covered": 10}))
+    page = page_of(view)
+    assert "path 7, at least 63 s to go" in page
+    assert "to go     at least 63 s, 30 steps" in page
 
 
 def test_it_shows_rooms_with_their_swept_shares():

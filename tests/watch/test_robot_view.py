@@ -101,6 +101,30 @@ def test_a_second_daemon_is_noted_and_changes_nothing():
     assert view.status.state == "paused"
 
 
+# When floor came into reach in a mission of 19 minutes in an unknown flat, at its first, and at the
+# beginning and end of each quiet time above 45 s.
+GREW_S = (1, 9, 72, 86, 160, 195, 247, 261, 408, 427, 469, 691, 797, 811, 862, 888, 972, 1009)
+
+
+@pytest.mark.parametrize("scale", [1.0, 20.0])
+def test_a_map_grows_until_it_has_been_complete_for_a_while(scale):
+    """The end of the work is "not before" a time all the while, and does not become "done at"."""
+    view, cells, said = RobotView("robot"), 400, []
+    config = {"robot": {"time_scale": scale}}
+    for second in range(2000):
+        cells += second in GREW_S
+        now = NOW + second / scale
+        payload = status(config=config, coverage={"coverable": cells, "covered": 10})
+        view.take("status", Sample("status", payload), now)
+        said.append(view.grows(now))
+    assert [second for second in range(1, 2000) if said[second] != said[second - 1]] == [1, 1514]
+    # Another order has other floor to sweep: nothing has grown.
+    zones = {"ordered": "command", "zones": [{"name": "hall"}]}
+    more = status(config=config, coverage={"coverable": 900, "covered": 0}, mission=zones)
+    view.take("status", Sample("status", more), now + 1.0)
+    assert not view.grows(now + 1.0)
+
+
 def test_updates_are_laid_over_the_map():
     view = mid_mission()
     patch = MapPatch(Window(10, 20, 12, 22), np.full((2, 2), 100, np.int8))

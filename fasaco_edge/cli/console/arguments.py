@@ -7,8 +7,7 @@ from __future__ import annotations
 
 import argparse
 import os
-import re
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from enum import IntEnum
@@ -26,9 +25,6 @@ if TYPE_CHECKING:
 
 DEFAULT_CELL_M = 0.3
 DEFAULT_RADIUS_M = 0.18
-# Options with a value as ``-1,2``, and with several of these.
-WITH_PAIR = ("--start", "--start-xy", "--end", "--keep-out", "--point")
-WITH_PAIRS = ("--robots", "--robots-xy")
 # Environment variables in place of options that are always the same.
 ROBOT, CONNECT = "FASACO_ROBOT", "FASACO_CONNECT"
 
@@ -116,37 +112,6 @@ def seconds(text: str) -> float:
     if not 0 < value <= 3600:
         raise argparse.ArgumentTypeError(f"must be in (0, 3600] s, got {text!r}")
     return value
-
-
-def with_negative_pairs(words: Sequence[str]) -> list[str]:
-    """Return the words of a command line with ``--start -1,2`` as ``--start=-1,2``.
-
-    argparse takes negative numbers for values, but ``-1,2`` for an option. In an option with
-    several values each such value gets an option of its own: ``--robots 0,0 --robots=-1,2 --robots
-    3,3``.
-    """
-    joined: list[str] = []
-    # The option that the next word may be a value of.
-    option = ""
-    for word in words:
-        if option and re.match(r"-[\d.]", word):
-            if joined[-1] == option:
-                joined.pop()
-            joined.append(f"{option}={word}")
-        elif word.startswith("-"):
-            name, has_value, _ = word.partition("=")
-            takes_more = name in WITH_PAIRS or (name in WITH_PAIR and not has_value)
-            option = name if takes_more else ""
-            # A pair that is no option's value is positional: after a space argparse takes it as
-            # such.
-            joined.append(f" {word}" if re.match(r"-[\d.]+,", word) else word)
-            continue
-        else:
-            if option and joined[-1].startswith(f"{option}="):
-                joined.append(option)
-            joined.append(word)
-        option = option if option in WITH_PAIRS else ""
-    return joined
 
 
 def add_robot_on_bus(parser: argparse.ArgumentParser, *, config: bool = True) -> None:
@@ -248,8 +213,7 @@ def check_outputs(outputs: Iterable[Path | None], inputs: Iterable[Path] = ()) -
 
     Raises:
         BadConfiguration: one is a folder, its folder is missing or not writable, it is also an
-            input,
-            or two outputs are the same.
+            input, or two outputs are the same.
     """
     # Unlike Path's methods these do not raise on names no file system takes.
     taken = {os.path.realpath(file): "it is read from" for file in inputs}

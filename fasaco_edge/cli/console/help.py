@@ -12,7 +12,6 @@ from collections.abc import Iterator
 WIDEST = 100
 # Least width of the second column of a row [characters].
 LEAST_COLUMN = 24
-_QUOTED = re.compile(r"'[^']*'|\"[^\"]*\"")
 _ROW = re.compile(r"( +\S.*? {2,})\S")
 
 
@@ -33,8 +32,8 @@ def fitted(text: str, width: int) -> str:
     """Return a text with lines of at most ``width`` characters; those that fit stay as they are.
 
     Lines that are not indented are prose. An indented line is a row: what it goes on with stands
-    below its second column, which follows two spaces, or further in than the row. A command that
-    is too long is continued as a shell reads it.
+    below its second column, which follows two spaces, or further in than the row. A command stays
+    on one line, to be copied.
     """
     return "\n".join(line for block in _blocks(text.strip("\n")) for line in _laid(block, width))
 
@@ -43,55 +42,38 @@ def _blocks(text: str) -> Iterator[list[str]]:
     """Yield the lines of each paragraph, row and gap."""
     block: list[str] = []
     for line in text.splitlines():
-        if block and not _goes_on(block, line):
+        if block and not _goes_on(block[0], line):
             yield block
             block = []
         block.append(line)
     yield block
 
 
-def _goes_on(block: list[str], line: str) -> bool:
-    first = block[0]
-    if not line.strip() or not first.strip():
+def _goes_on(first: str, line: str) -> bool:
+    if not line.strip() or not first.strip() or line.lstrip().startswith("#"):
         return False
-    inward = _inward(line)
-    if not _inward(first):
-        return inward == 0 and not first.endswith(":")
-    row = _ROW.match(first)
-    if line.lstrip().startswith("#"):
-        return False
-    return inward == len(row[1]) if row else inward > _inward(first)
+    inward, row = _inward(line), _ROW.match(first)
+    if row:
+        return inward == len(row[1])
+    return inward > _inward(first) if _inward(first) else not inward and not first.endswith(":")
 
 
 def _laid(block: list[str], width: int) -> list[str]:
     """Return the lines of a block for a width."""
     if all(len(line) <= width for line in block):
         return block
-    first, rest = block[0], [line.strip() for line in block[1:]]
-    inward, row = _inward(first), _ROW.match(first)
-    if not inward:
-        return _wrap(" ".join([first, *rest]), width)
-    begin = row[1] if row else " " * inward
-    words = " ".join([first[len(begin) :], *rest])
-    is_command = first.strip().startswith("fasaco-edge ")
-    if len(begin) > width - LEAST_COLUMN or (is_command and row is None):
+    first, inward, row = block[0], " " * _inward(block[0]), _ROW.match(block[0])
+    words = " ".join(line.strip() for line in block)
+    is_command = words.startswith("fasaco-edge ")
+    if row is None and not is_command:
+        return _wrap(words, width, inward, inward and inward + "  ")
+    begin = row[1] if row else first
+    words = words[len(begin.strip()) :].strip()
+    if is_command or len(begin) > width - LEAST_COLUMN:
         # The second column stands below the first.
-        above, words = (begin, words) if row else (first, " ".join(rest))
-        below = " " * (inward + 4)
-        head = _command(above, width) if is_command else [above.rstrip()]
-        return [*head, *_wrap(words, width, below, below)]
-    # A comment in a file goes on as one.
-    after = "# " if words.startswith("#") else "" if row else "  "
-    return _wrap(words, width, begin, " " * len(begin) + after)
-
-
-def _command(line: str, width: int) -> list[str]:
-    """Return a command on several lines, as a shell reads it: no option without its value."""
-    begin = " " * _inward(line)
-    glued = _QUOTED.sub(lambda quoted: quoted[0].replace(" ", "\0"), line.strip())
-    glued = re.sub(r"(--\S+) (?![-|])", "\\1\0", glued)
-    lines = _wrap(glued, width - 2, begin, begin + "  ")
-    return " \\\n".join(lines).replace("\0", " ").split("\n")
+        below = inward + "    "
+        return [begin.rstrip(), *_wrap(words, width, below, below)]
+    return _wrap(words, width, begin, " " * len(begin))
 
 
 def _wrap(words: str, width: int, begin: str = "", below: str = "") -> list[str]:

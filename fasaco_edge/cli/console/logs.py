@@ -1,8 +1,7 @@
 """Logging: to standard error, or to the systemd journal where standard error leads there.
 
-Lines are rate-limited: one of a kind in ten seconds, with the number of suppressed lines. The
-journal gets a datagram a line, with priority and fields
-(https://systemd.io/JOURNAL_NATIVE_PROTOCOL/).
+Lines are rate-limited: one of a kind in ten seconds, with the number of suppressed lines. For the
+journal each begins with its priority, as sd-daemon(3) has it.
 """
 
 from __future__ import annotations
@@ -12,7 +11,7 @@ import logging
 import os
 import sys
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from types import TracebackType
 from typing import Any
@@ -88,105 +87,23 @@ def _kind_of(record: logging.LogRecord) -> object:
 
 def _add_count(record: logging.LogRecord, left_out: int) -> None:
     if left_out:
-        record.suppressed = left_out
         record.msg, record.args = f"{record.getMessage()} (and {left_out} more like it)", ()
-
-
-SOCKET = "/run/systemd/journal/socket"
-IDENTIFIER = "fasaco-edge"
-# A datagram has to fit into the socket's buffer; a longer value is cut.
-MOST_BYTES = 32_768
-# How long a journal that hangs may delay the loop [s].
-PATIENCE_S = 0.05
-# syslog(3): critical, error, warning, info, debug.
-PRIORITIES = ((50, 2), (40, 3), (30, 4), (20, 6), (0, 7))
-# What a line may have besides its text, see logging's ``extra``.
-EXTRA = ("event", "code", "state", "suppressed")
-
-
-def is_journal(environ: Mapping[str, str] = os.environ) -> bool:
-    """Return whether standard error leads to the journal, and was not redirected."""
-    try:
-        there = os.fstat(sys.stderr.fileno())
-    except (OSError, ValueError):
-        return False
-    return environ.get("JOURNAL_STREAM") == f"{there.st_dev}:{there.st_ino}"
-
-
-class JournalHandler(logging.Handler):
-    """Sends each line to the journal; without a journal, to standard error."""
-
-    def __init__(self, address: str = SOCKET) -> None:
-        super().__init__()
-        self._address = address
-        # The import takes half a megabyte, which a process without a journal does not need.
-        import socket
-
-        self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM | socket.SOCK_CLOEXEC)
-        self._socket.settimeout(PATIENCE_S)
-
-    def emit(self, record: logging.LogRecord) -> None:
-        """Send a line."""
-        fields = fields_of(record, self.format(record))
-        try:
-            self._socket.sendto(encode_entry(fields), self._address)
-        except TimeoutError:
-            pass  # standard error leads to the same journal
-        except OSError:
-            print(f"<{fields['PRIORITY']}>{fields['MESSAGE']}", file=sys.stderr, flush=True)
-
-    def close(self) -> None:
-        """Close the socket."""
-        self._socket.close()
-        super().close()
-
-
-def fields_of(record: logging.LogRecord, message: str) -> dict[str, str]:
-    """Return a line's fields; an event has a fixed id, made of its name."""
-    priority = next(number for level, number in PRIORITIES if record.levelno >= level)
-    fields = {
-        "MESSAGE": message,
-        "PRIORITY": str(priority),
-        "SYSLOG_IDENTIFIER": IDENTIFIER,
-        "CODE_FILE": record.pathname,
-        "CODE_LINE": str(record.lineno),
-        "CODE_FUNC": record.funcName or "",
-        "FASACO_LOGGER": record.name,
-    }
-    for name in EXTRA:
-        if (value := getattr(record, name, None)) is not None:
-            fields[f"FASACO_{name.upper()}"] = one_line(str(value))
-    if event := fields.get("FASACO_EVENT"):
-        fields["MESSAGE_ID"] = message_id(event)
-    return fields
-
-
-def message_id(event: str) -> str:
-    """Return the 128-bit id of an event, 32 hex digits."""
-    import hashlib  # maps four megabytes, for the journal alone
-
-    return hashlib.sha256(f"{IDENTIFIER}/{event}".encode()).hexdigest()[:32]
-
-
-def encode_entry(fields: Mapping[str, str]) -> bytes:
-    """Return an entry as the socket takes it.
-
-    A value of one line follows "="; one of several lines its length, uint64 little endian.
-    """
-    parts = []
-    for name, value in fields.items():
-        raw = value.encode(errors="replace")[:MOST_BYTES]
-        if b"\n" in raw:
-            parts.append(name.encode() + b"\n" + len(raw).to_bytes(8, "little") + raw + b"\n")
-        else:
-            parts.append(name.encode() + b"=" + raw + b"\n")
-    return b"".join(parts)
 
 
 LOG = logging.getLogger(__name__)
 # Longest text of a line: an error that lists all faults of a file, or a traceback [characters].
 MOST_CHARACTERS = 20_000
-PLAIN, JOURNAL = "%(levelname)s %(name)s: %(message)s", "%(message)s"
+# syslog(3): critical, error, warning, info, debug.
+PRIORITIES = ((50, 2), (40, 3), (30, 4), (20, 6), (0, 7))
+
+
+def is_journal() -> bool:
+    """Return whether standard error leads to the journal, and was not redirected."""
+    try:
+        there = os.fstat(sys.stderr.fileno())
+    except (OSError, ValueError):
+        return False
+    return os.environ.get("JOURNAL_STREAM") == f"{there.st_dev}:{there.st_ino}"
 
 
 class OneLine(logging.Formatter):
@@ -201,17 +118,25 @@ class OneLine(logging.Formatter):
         return f"    {_indented(super().formatException(ei))}"
 
 
+class JournalLine(OneLine):
+    """Writes the priority before each line."""
+
+    def format(self, record: logging.LogRecord) -> str:
+        """Return an entry, with its traceback."""
+        priority = next(number for level, number in PRIORITIES if record.levelno >= level)
+        return "\n".join(f"<{priority}>{line}" for line in super().format(record).splitlines())
+
+
 def begin_logging(level: str) -> None:
     """Log from ``level`` on."""
+    target = logging.StreamHandler()
     if is_journal():
-        target: logging.Handler = JournalHandler()
-        target.setFormatter(OneLine(JOURNAL))
+        target.setFormatter(JournalLine("%(message)s"))
         sys.excepthook = _log_uncaught
         # If the watchdog ends a service that hangs (SIGABRT), the log shows the place.
         faulthandler.enable()
     else:
-        target = logging.StreamHandler()
-        target.setFormatter(OneLine(PLAIN))
+        target.setFormatter(OneLine("%(levelname)s %(name)s: %(message)s"))
     logging.basicConfig(level=level.upper(), handlers=[OneOfAKind(target)])
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import re
 import sys
 from collections.abc import Iterable, Sequence
 from difflib import get_close_matches
@@ -19,6 +20,8 @@ class Parser(argparse.ArgumentParser):
 
     def __init__(self, **options: Any) -> None:  # noqa: ANN401 - those of argparse
         super().__init__(**{"formatter_class": HelpText} | options)
+        # Values such as -1,2 are places, too, and no options.
+        self._negative_number_matcher = re.compile(r"-\.?\d")
 
     def parse_known_args(  # type: ignore[override]
         self, args: Sequence[str] | None = None, namespace: argparse.Namespace | None = None
@@ -34,11 +37,11 @@ class Parser(argparse.ArgumentParser):
         print(f"{self.prog}: {message}\nsee: {self.prog} --help", file=sys.stderr)
         sys.exit(USAGE)
 
-    def refuse(self, unknown: Sequence[str], why: str = "") -> NoReturn:
-        """Say which arguments are unknown, ``why`` or what was perhaps meant, and exit."""
+    def refuse(self, unknown: Sequence[str]) -> NoReturn:
+        """Say which arguments are unknown, and what was perhaps meant, and exit."""
         options = [name for name in self._option_string_actions if name.startswith("--")]
         names = [word.partition("=")[0] for word in unknown if word.startswith("-")]
-        meant = why or "".join(f"did you mean {name}?" for name in _close(names[:1], options))
+        meant = "".join(f"did you mean {name}?" for name in _close(names[:1], options))
         self.error(f"unrecognized arguments: {' '.join(unknown)}{meant and f'; {meant}'}")
 
     def _check_value(self, action: argparse.Action, value: Any) -> None:  # noqa: ANN401

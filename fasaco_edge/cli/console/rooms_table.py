@@ -5,6 +5,7 @@ from __future__ import annotations
 from rich.table import Table
 
 from fasaco_edge.cli.console.terminal import out
+from fasaco_edge.client.phrases import percent
 from fasaco_edge.text import duration
 from fasaco_edge.wire.documents.rooms import RoomReport, Rooms
 
@@ -21,7 +22,7 @@ def show_rooms(rooms: Rooms) -> None:
     )
     for room in rooms.rooms:
         beside = ", ".join(map(str, room.neighbours)) or "-"
-        swept = "-" if room.swept is None else f"{100 * room.swept:.0f} %"
+        swept = "-" if room.swept is None else percent(room.swept)
         to_go = "-" if room.to_go_s is None else duration(room.to_go_s)
         row = f"{room.area_m2:.1f}", swept, to_go, beside, _settings(room)
         table.add_row(str(room.id), room.name or "-", *row)

@@ -47,14 +47,6 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--seed", type=int, default=0, metavar="N", help="the planner's seed")
     parser.add_argument(
-        "--line",
-        choices=("cells", "quick", "thorough"),
-        default="thorough",
-        help="what the robot is given: the centres of cells, or a line optimised for the floor "
-        "it sweeps "
-        "(default: %(default)s)",
-    )
-    parser.add_argument(
         "--driver",
         choices=("ideal", "follow"),
         default="ideal",
@@ -68,27 +60,6 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         metavar="MIN",
         help="how long the robot's battery lasts [simulated min], charged where it started; 0 for "
         "ever (default: %(default)g)",
-    )
-    fleet = parser.add_argument_group("of several robots")
-    fleet.add_argument(
-        "--kill-after",
-        type=float,
-        metavar="S",
-        help="kill the last robot's daemon after so many simulated seconds: the others take over",
-    )
-    fleet.add_argument(
-        "--split-after",
-        type=float,
-        metavar="S",
-        help="split the network after so many simulated seconds, for 15 real ones: every second "
-        "robot then receives nothing from the others",
-    )
-    fleet.add_argument(
-        "--record",
-        choices=("all", "fleet"),
-        default="all",
-        help="recordings of each robot and of the fleet, or of the fleet alone, with less load "
-        "(default: %(default)s)",
     )
     parser.add_argument("--cell", type=float, default=DEFAULT_CELL_M, metavar="M", help="[m]")
     parser.add_argument(
@@ -112,8 +83,6 @@ def run(args: argparse.Namespace) -> int:
         args.speed = SPEED if args.robots == 1 else FLEET_SPEED
     if not args.speed > 0:
         raise BadConfiguration(f"--speed must be above 0, got {args.speed}")
-    if args.robots == 1 and (args.kill_after is not None or args.split_after is not None):
-        raise BadConfiguration("--kill-after, --split-after: a fleet has --robots of 2 or more")
     out: Path = args.out or RUNS / f"{datetime.now():%Y-%m-%dT%H-%M-%S}"
     with naming(out):
         if args.out is None:

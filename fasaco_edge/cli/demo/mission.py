@@ -19,7 +19,6 @@ from fasaco_edge.bus.mailbox import LatestSlot
 from fasaco_edge.bus.session import Bus, open_bus
 from fasaco_edge.bus.settings import BusSettings
 from fasaco_edge.cli.console.terminal import command, err
-from fasaco_edge.cli.demo.mishaps import Mishaps
 from fasaco_edge.cli.demo.robots import FLEET, DemoRobot, fleet_recorder
 from fasaco_edge.cli.demo.view import demo_view
 from fasaco_edge.errors import ProcessEnded
@@ -46,18 +45,14 @@ class Ending:
     Attributes:
         statuses: the last status of each daemon.
         wall_s: how long it took [s].
-        replan_ms: time of every plan reported [ms].
         timed_out: whether time ran out first.
         makespan_s: from when the first robot worked until the last was done, in simulated time.
-        killed: name of the robot that was killed; "" for none.
     """
 
     statuses: tuple[Status, ...]
     wall_s: float
-    replan_ms: tuple[float, ...]
     timed_out: bool
     makespan_s: float = 0.0
-    killed: str = ""
 
 
 class DemoMission:
@@ -66,17 +61,7 @@ class DemoMission:
     def __init__(self, args: argparse.Namespace, robots: Sequence[DemoRobot]) -> None:
         self._args, self._robots = args, robots
         self._endpoint = f"tcp/127.0.0.1:{free_port()}"
-        # Another router for every second robot, if the network is to be split.
-        self._far = self._endpoint
-        if args.split_after is not None:
-            self._far = f"tcp/127.0.0.1:{free_port()}"
-        self._view = demo_view(
-            Path(args.map).stem, [robot.name for robot in robots], self._endpoint
-        )
-        self._mishaps = Mishaps(
-            args.kill_after, args.split_after, (self._endpoint, self._far), self._view.say
-        )
-        self._killed = ""
+        self._view = demo_view([robot.name for robot in robots], self._endpoint)
         self._processes: list[tuple[Path, subprocess.Popen[bytes]]] = []
         self._stack = ExitStack()
         # Robots that have not started: log and words of each; keys of absent recorders.
@@ -84,7 +69,6 @@ class DemoMission:
         self._silent: set[str] = set()
         self._newest = [LatestSlot[Sample]() for _ in robots]
         self._statuses = [Status() for _ in robots]
-        self._plans: dict[tuple[int, int], float] = {}
         self._worked_at: list[float] = []
         self._started = 0.0
         self._done_since: float | None = None
@@ -93,9 +77,6 @@ class DemoMission:
         with ExitStack() as stack:
             # The router that connects all processes.
             self._bus = stack.enter_context(open_bus(BusSettings("router", (), (self._endpoint,))))
-            if self._far != self._endpoint:
-                stack.enter_context(open_bus(BusSettings("router", (), (self._far,))))
-            stack.enter_context(self._mishaps)
             stack.callback(self._stop)
             self._start(self._bus)
             self._stack = stack.pop_all()
@@ -115,17 +96,14 @@ class DemoMission:
             ProcessEnded: one of the processes has ended.
         """
         self._started = time.monotonic()
-        with self._view:
-            self._view.run(self._step)
+        self._view.run(self._step)
         worked_at = self._worked_at
         worked_s = worked_at[-1] - worked_at[0] if worked_at else 0.0
         return Ending(
             tuple(self._statuses),
             time.monotonic() - self._started,
-            tuple(self._plans.values()),
             timed_out=self._done_since is None,
             makespan_s=worked_s * self._args.speed,
-            killed=self._killed,
         )
 
     def _step(self, timeout_s: float) -> bool:
@@ -138,39 +116,23 @@ class DemoMission:
             sample = newest.take(timeout_s / len(self._robots))
             if sample is not None:
                 status = decode_tolerant(sample.payload, Status)
-                if status.latency_ms.plan is not None:
-                    self._plans[number, status.plan.plans] = status.latency_ms.plan
                 self._statuses[number] = status
                 if not self._waiting:
                     self._view.show(number, status, now - self._started)
                 self._worked_at += [now] if status.state in AT_WORK else []
-        if self._worked_at:
-            self._let_happen(now, self._worked_at[0])
-        is_done = all(
-            status.state == "done" or robot.name == self._killed
-            for robot, status in zip(self._robots, self._statuses, strict=True)
-        )
+        is_done = all(status.state == "done" for status in self._statuses)
         self._done_since = (self._done_since or now) if is_done else None
         settle_s = max(SETTLE_SIM_S / self._args.speed, 1.5)
         if self._done_since is not None and now - self._done_since >= settle_s:
             return True
         return not self._waiting and bool(now - self._started >= self._args.timeout)
 
-    def _let_happen(self, now: float, began: float) -> None:
-        """Carry out due mishaps; a process of the last robot that they end is no failure."""
-        last = self._robots[-1]
-        victim = [one for log, one in self._processes if log.parent == last.folder]
-        if self._mishaps.step(now, (now - began) * self._args.speed, victim):
-            self._killed = last.name
-            self._view.say(f"{last.name} is killed")
-
     def _start(self, bus: Bus) -> None:
-        for number, (robot, newest) in enumerate(zip(self._robots, self._newest, strict=True)):
-            endpoint = self._far if number % 2 else self._endpoint
+        for robot, newest in zip(self._robots, self._newest, strict=True):
             robot.folder.mkdir(exist_ok=True)
-            robot.write_config(self._args, endpoint)
+            robot.write_config(self._args, self._endpoint)
             bus.listen(Keys(robot.name), topics.STATUS, newest.put)
-            for name, words in robot.programs(self._args, endpoint):
+            for name, words in robot.programs(self._args, self._endpoint):
                 log = robot.folder / f"{name}.log"
                 if name == "robot":
                     self._waiting.append((log, words))
@@ -179,8 +141,7 @@ class DemoMission:
         if len(self._robots) > 1:
             out = self._robots[0].folder.parent
             self._spawn(out / "fleet.log", fleet_recorder(out, self._endpoint))
-        if self._args.record == "all":
-            self._silent = {Keys(robot.name).of(topics.RECORDER_ALIVE) for robot in self._robots}
+        self._silent = {Keys(robot.name).of(topics.RECORDER_ALIVE) for robot in self._robots}
 
     def _let_start(self, bus: Bus, now: float) -> None:
         """Start the robots once all recorders listen, which start more slowly, or after a while."""
@@ -202,7 +163,7 @@ class DemoMission:
 
     def _check_processes(self) -> None:
         for log, process in self._processes:
-            if process.poll() is not None and log.parent.name != self._killed:
+            if process.poll() is not None:
                 last = deque(log.read_text(errors="replace").splitlines(), maxlen=5)
                 raise ProcessEnded(
                     f"the {log.stem} ended with {process.returncode}:\n  " + "\n  ".join(last),

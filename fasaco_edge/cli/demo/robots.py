@@ -59,7 +59,7 @@ class DemoRobot:
                 "time_scale": args.speed,
             },
             "bus": {"mode": "client", "listen": [], "connect": [endpoint]},
-            "planner": {"seed": args.seed, "line": args.line},
+            "planner": {"seed": args.seed},
         }
         if args.robots > 1:
             config["fleet"] = {"name": FLEET}
@@ -71,9 +71,7 @@ class DemoRobot:
 
     def programs(self, args: argparse.Namespace, endpoint: str) -> list[tuple[str, list[str]]]:
         """Return the programs to start: for each its name, and the words after `fasaco-edge`."""
-        daemon = ["run", "--config", str(self.config)]
-        if args.record == "all":
-            daemon += ["--record", str(self.folder)]
+        daemon = ["run", "--config", str(self.config), "--record", str(self.folder)]
         # The daemon gets a fresh state folder of its own: no progress of another daemon or an
         # earlier demo.
         daemon += ["--state", str(self.folder / "state"), "--fresh"]

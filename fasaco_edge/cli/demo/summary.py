@@ -21,7 +21,6 @@ from fasaco_edge.client.phrases import age
 from fasaco_edge.drawing.pictures import draw_mission
 from fasaco_edge.drawing.plot import MapLayer
 from fasaco_edge.errors import ProcessEnded
-from fasaco_edge.grid.geometry import Pose2D
 from fasaco_edge.grid.lattice import CoverageLattice, Footprint
 from fasaco_edge.grid.map_files import find_map, read_map
 from fasaco_edge.grid.occupancy import OccupancyGrid
@@ -32,22 +31,15 @@ from fasaco_edge.judge.floor import (
     share_words,
     swept_words,
 )
-from fasaco_edge.mission.coverage.ledger import CoverageLedger
-from fasaco_edge.mission.map.reachable_area import ReachableArea, anchor_cell
+from fasaco_edge.wire.documents.replies import CoverageReport
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Truth:
-    """The building, its reachable floor, and the floor swept along the robots' trails.
-
-    ``floor`` is judged for all trails together, ``floors`` for each.
-    """
+    """The building, and the floor swept along the robots' trails: by all together, and by each."""
 
     grid: OccupancyGrid
-    lattice: CoverageLattice
-    reachable: NDArray[np.bool_]
     trails: list[NDArray[np.float64]]
-    visits: NDArray[np.uint16]
     floor: JudgedFloor
     floors: list[JudgedFloor]
 
@@ -70,14 +62,15 @@ class RobotFigures:
 
 @dataclass(frozen=True, slots=True)
 class Summary:
-    """The figures of a demo; ``reachable_m2`` and ``swept_m2`` are of floor, not of cells."""
+    """The figures of a demo; areas are of floor, by the true building and tracks.
+
+    Cells are counted by the daemons; of several, by the one with the most cells left.
+    """
 
     map: str
     complete: bool
     reachable_cells: int
     covered_cells: int
-    recovered_cells: int
-    unreachable_cells: int
     reachable_m2: float
     swept_m2: float
     swept_twice_m2: float
@@ -85,12 +78,9 @@ class Summary:
     robots: tuple[RobotFigures, ...]
     plans: int
     paths: int
-    plan_ms_p50: float | None
-    plan_ms_p99: float | None
     errors: int
     wall_s: float
     makespan_s: float
-    killed: str
     recording: list[str]
     fleet_recording: list[str]
     picture: str
@@ -101,18 +91,8 @@ def summarise(
 ) -> Summary:
     """Return the figures of a demo, and draw and write them into ``out``."""
     truth = _truth(args, robots)
-    covered = truth.reachable & (truth.visits > 0)
-    reachable, done = int(truth.reachable.sum()), int(covered.sum())
-    reports = [
-        status.coverage
-        for robot, status in zip(robots, ending.statuses, strict=True)
-        if status.coverage is not None and robot.name != ending.killed
-    ]
-    if args.line != "cells" and reports:
-        # A robot on a line passes beside the centres of cells: use the daemon's own count; of
-        # several daemons, that of the one with the most cells left.
-        report = max(reports, key=lambda report: report.coverable - report.covered)
-        reachable, done = report.coverable, report.covered
+    reports = [status.coverage for status in ending.statuses if status.coverage is not None]
+    cells = max(reports, key=lambda each: each.coverable - each.covered, default=CoverageReport())
     figures = tuple(
         RobotFigures(
             robot.name,
@@ -124,11 +104,9 @@ def summarise(
     )
     summary = Summary(
         map=str(args.map),
-        complete=done == reachable and not ending.timed_out,
-        reachable_cells=reachable,
-        covered_cells=done,
-        recovered_cells=int((truth.reachable & (truth.visits > 1)).sum()),
-        unreachable_cells=int((truth.lattice.coverable & ~truth.reachable).sum()),
+        complete=cells.covered == cells.coverable and not ending.timed_out,
+        reachable_cells=cells.coverable,
+        covered_cells=cells.covered,
         reachable_m2=round(truth.floor.figures.reachable_m2, 2),
         swept_m2=round(truth.floor.figures.swept_m2, 2),
         swept_twice_m2=round(truth.swept_twice_m2, 2),
@@ -136,12 +114,9 @@ def summarise(
         robots=figures,
         plans=sum(status.plan.plans for status in ending.statuses),
         paths=sum(status.path.revision for status in ending.statuses if status.path),
-        plan_ms_p50=_percentile(ending.replan_ms, 50),
-        plan_ms_p99=_percentile(ending.replan_ms, 99),
         errors=sum(status.errors.total for status in ending.statuses),
         wall_s=round(ending.wall_s, 1),
         makespan_s=round(ending.makespan_s, 1),
-        killed=ending.killed,
         recording=[str(file) for robot in robots for file in sorted(robot.folder.glob("*.rrd"))],
         fleet_recording=[str(file) for file in sorted(out.glob("*-fleet-*.rrd"))],
         picture=str(out / "mission.png"),
@@ -201,12 +176,9 @@ def _rows(summary: Summary) -> list[tuple[str, str]]:
     return [
         ("covered", f"{covered} of {cells} cells"),
         ("floor swept", _swept(summary)),
-        ("covered again", f"{summary.recovered_cells} cells"),
-        ("out of reach", f"{summary.unreachable_cells} cells"),
         ("driven", f"{summary.driven_m} m"),
         *(fleet if len(summary.robots) > 1 else ()),
         ("plans, paths", f"{summary.plans}, {summary.paths}"),
-        ("time of a plan", f"{summary.plan_ms_p50} ms, p99 {summary.plan_ms_p99} ms"),
         ("messages refused", str(summary.errors)),
         ("time in all", _time(summary)),
     ]
@@ -222,26 +194,15 @@ def _time(summary: Summary) -> str:
 
 
 def _truth(args: argparse.Namespace, robots: Sequence[DemoRobot]) -> _Truth:
-    grid = read_map(find_map(args.map))
-    lattice = CoverageLattice.from_map(grid, Footprint(args.cell, args.robot_radius))
-    trails, ledger = [_trail(robot) for robot in robots], CoverageLedger(args.cell)
-    for trail in trails:
-        ledger.break_track()
-        for x, y in trail:
-            ledger.record(Pose2D(float(x), float(y)))
-    first = tuple(trails[0][0].tolist())
-    start = anchor_cell(lattice, Pose2D(*first))
-    nowhere = np.zeros(lattice.states.shape, bool)
-    reachable = nowhere if start is None else ReachableArea.around(lattice, start).reachable
+    grid, trails = read_map(find_map(args.map)), [_trail(robot) for robot in robots]
+    x, y = trails[0][0].tolist()
     sweeper = SweepingRobot(args.cell, args.robot_radius)
-    floors = [judge_floor(grid, trail, sweeper, stands_at=first) for trail in trails]
-    floor = floors[0]
-    if len(trails) > 1:
-        # No robot drives from the end of one trail to the start of the next.
-        driven = np.ones(sum(map(len, trails)) - 1, np.bool_)
-        driven[np.cumsum([len(trail) for trail in trails])[:-1] - 1] = False
-        floor = judge_floor(grid, np.vstack(trails), sweeper, driven=driven, stands_at=first)
-    return _Truth(grid, lattice, reachable, trails, ledger.visits(lattice.window), floor, floors)
+    floors = [judge_floor(grid, trail, sweeper, stands_at=(x, y)) for trail in trails]
+    # No robot drives from the end of one trail to the start of the next.
+    driven = np.ones(sum(map(len, trails)) - 1, np.bool_)
+    driven[np.cumsum([len(trail) for trail in trails])[:-1] - 1] = False
+    floor = judge_floor(grid, np.vstack(trails), sweeper, driven=driven, stands_at=(x, y))
+    return _Truth(grid, trails, floor, floors)
 
 
 def _trail(robot: DemoRobot) -> NDArray[np.float64]:
@@ -258,34 +219,26 @@ def _draw(args: argparse.Namespace, truth: _Truth, summary: Summary) -> None:
     ]
     title = f"{Path(args.map).stem}: mapped and covered"
     geometry = truth.floor.geometry
+    lattice = CoverageLattice.from_map(truth.grid, Footprint(args.cell, args.robot_radius))
     unswept = MapLayer(geometry, truth.floor.unswept)
     if len(truth.trails) > 1:
         from fasaco_edge.fleet.review.drawing import draw_fleet_mission
 
         swept = [MapLayer(geometry, floor.swept) for floor in truth.floors]
         names = [robot.name for robot in summary.robots]
+        tracks = dict(zip(names, truth.trails, strict=True))
+        title += f" by {len(names)} robots"
         picture = draw_fleet_mission(
-            truth.grid,
-            truth.lattice,
-            dict(zip(names, truth.trails, strict=True)),
-            swept,
-            unswept,
-            title=f"{title} by {len(names)} robots",
-            lines=lines,
+            truth.grid, lattice, tracks, swept, unswept, title=title, lines=lines
         )
     else:
         picture = draw_mission(
             truth.grid,
-            truth.lattice,
+            lattice,
             truth.trails[0],
-            truth.visits,
             title=title,
             lines=lines,
-            swept=None if args.line == "cells" else MapLayer(geometry, truth.floor.swept),
+            swept=MapLayer(geometry, truth.floor.swept),
             unswept=unswept,
         )
     picture.save(summary.picture)
-
-
-def _percentile(values: tuple[float, ...], percent: float) -> float | None:
-    return round(float(np.percentile(values, percent)), 1) if values else None

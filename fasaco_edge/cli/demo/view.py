@@ -1,75 +1,49 @@
-"""The view of a demo: the live map of ``watch`` on a terminal, a progress bar, or lines of text."""
+"""The view of a demo: the page of ``watch`` on a terminal that can show it, else lines of text."""
 
 from __future__ import annotations
 
 import os
+import sys
 import time
+from collections import deque
 from collections.abc import Callable, Sequence
-from typing import Protocol, Self
+from contextlib import ExitStack
+from typing import TYPE_CHECKING
 
-from rich.progress import BarColumn, TextColumn, TimeElapsedColumn
-from rich.table import Column
-
-from fasaco_edge.cli.console.terminal import (
-    CLOCK,
-    NARROW_BAR,
-    Description,
-    ProgressLines,
-    can_draw,
-    err,
-)
+from fasaco_edge.bus.settings import BusSettings
+from fasaco_edge.cli.console.streams import printed_by
+from fasaco_edge.cli.console.terminal import can_draw, err
+from fasaco_edge.cli.demo.robots import FLEET
 from fasaco_edge.client import phrases
+from fasaco_edge.client.events import ORDER
 from fasaco_edge.wire.documents.status import Status
+from fasaco_edge.wire.keys import Keys
 
-PLAIN_LINE_EVERY_S = 5.0
+if TYPE_CHECKING:
+    from fasaco_edge.watch.live import Watched
+
+LINE_EVERY_S = 5.0
 WAIT_S = 0.25
 # Size of a terminal from which a map in it can be read [characters].
 LEAST_COLUMNS, LEAST_LINES = 60, 20
-# Widths of a percentage, and of as many figures as a name of a robot leaves [characters].
-PERCENT, LEAST_FIGURES = 5, 24
 
 
-class DemoView(Protocol):
-    """Shows a demo; a context manager."""
-
-    def __enter__(self) -> Self:
-        """Begin to show it."""
-
-    def __exit__(self, *_: object) -> None:
-        """Leave the terminal as it was."""
-
-    def run(self, step: Callable[[float], bool]) -> None:
-        """Call ``step`` until it returns True, each time with how long it may wait [s].
-
-        Raises:
-            KeyboardInterrupt: the user quits.
-        """
-
-    def show(self, robot: int, status: Status, elapsed_s: float) -> None:
-        """Show one status of the robot with this number."""
-
-    def say(self, text: str) -> None:
-        """Show what happened in a line."""
-
-
-def demo_view(title: str, robots: Sequence[str], endpoint: str) -> DemoView:
+def demo_view(robots: Sequence[str], endpoint: str) -> LinesView | LiveView:
     """Return the view that fits the terminal.
 
     Args:
-        title: name of the building.
         robots: names of the robots on the bus.
         endpoint: where their bus can be joined.
     """
     if _is_screen():
         try:
-            from fasaco_edge.cli.demo.live_view import LiveView
-
-            return LiveView(robots, endpoint)
+            from fasaco_edge.watch import live  # noqa: F401 - its folder may have been taken away
         except ModuleNotFoundError as error:
-            # Its folder may have been taken away.
             if not (error.name or "").startswith("fasaco_edge.watch"):
                 raise
-    return LinesView(robots if len(robots) > 1 else [title])
+        else:
+            return LiveView(robots, endpoint)
+    return LinesView(robots)
 
 
 def _is_screen() -> bool:
@@ -88,54 +62,87 @@ def _is_screen() -> bool:
 
 
 class LinesView:
-    """Shows the daemons' status as it comes in, a line a robot; without a terminal in plain lines.
+    """Prints the state of each robot, every few seconds."""
 
-    ``titles``: names of the lines.
-    """
-
-    def __init__(self, titles: Sequence[str]) -> None:
-        self._bar = ProgressLines(
-            Description(NARROW_BAR + PERCENT + CLOCK + LEAST_FIGURES + 4, style="bold"),
-            BarColumn(bar_width=NARROW_BAR),
-            TextColumn("{task.percentage:>3.0f} %", markup=False),
-            TimeElapsedColumn(),
-            # In a narrow terminal the figures are cut, and nothing else.
-            TextColumn(
-                "{task.fields[figures]}",
-                markup=False,
-                table_column=Column(ratio=1, no_wrap=True),
-            ),
-            expand=True,
-        )
-        self._titles = titles
-        self._tasks = [self._bar.add_task(text, total=1.0, figures="starting") for text in titles]
-        self._printed_at = [0.0] * len(titles)
-
-    def __enter__(self) -> Self:
-        self._bar.start()
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._bar.stop()
+    def __init__(self, robots: Sequence[str]) -> None:
+        self._names = robots
+        self._printed_at = [0.0] * len(robots)
 
     def run(self, step: Callable[[float], bool]) -> None:
-        """Call ``step`` until it returns True."""
+        """Call ``step`` until it returns True, each time with how long it may wait [s]."""
         while not step(WAIT_S):
             pass
 
     def show(self, robot: int, status: Status, elapsed_s: float) -> None:
-        """Show one status of the robot with this number."""
-        fraction = status.coverage.fraction if status.coverage else 0.0
-        text = phrases.figures(status)
-        self._bar.update(self._tasks[robot], completed=fraction, figures=text)
+        """Print a line, if the one before is old enough."""
         now = time.monotonic()
-        if not self._bar.disable or now - self._printed_at[robot] < PLAIN_LINE_EVERY_S:
+        if now - self._printed_at[robot] < LINE_EVERY_S:
             return
         self._printed_at[robot] = now
-        name = f"{self._titles[robot]}  " if len(self._tasks) > 1 else ""
-        line = f"{elapsed_s:6.1f} s  {name}{100 * fraction:5.1f} % of cells  {text}"
-        err().print(line, soft_wrap=True)
+        name = f"{self._names[robot]}  " if len(self._names) > 1 else ""
+        percent = phrases.percent(status.coverage.fraction if status.coverage else 0.0)
+        words = f"{percent:>7} of cells  {phrases.figures(status)}"
+        err().print(f"{elapsed_s:6.1f} s  {name}{words}", soft_wrap=True)
 
-    def say(self, text: str) -> None:
-        """Print a line above the bar."""
-        err().print(text)
+
+class LiveView:
+    """Shows a demo on the alternate screen of the terminal.
+
+    What is printed meanwhile stands among the events of the page, and afterwards above the summary.
+    """
+
+    def __init__(self, robots: Sequence[str], endpoint: str) -> None:
+        self._robots, self._bus = robots, BusSettings("client", (endpoint,))
+        self._printed: list[str] = []
+        # A log may print on any thread.
+        self._unseen: deque[str] = deque()
+
+    def run(self, step: Callable[[float], bool]) -> None:
+        """Show pages until ``step`` returns True.
+
+        Raises:
+            KeyboardInterrupt: the user quits.
+        """
+        from fasaco_edge.watch.live import watch_on_screen
+
+        is_over = False
+        with ExitStack() as stack:
+            watched = self._watched(stack)
+
+            def go_on() -> bool:
+                nonlocal is_over
+                is_over = step(0.0)
+                while self._unseen:
+                    watched.events.add(phrases.steady_now(), self._unseen.popleft(), ORDER)
+                return not is_over
+
+            stack.callback(self._print_again)
+            stack.enter_context(printed_by(self._keep))
+            watch_on_screen(watched, sys.stderr, go_on)
+        if not is_over:
+            raise KeyboardInterrupt
+
+    def show(self, robot: int, status: Status, elapsed_s: float) -> None:
+        """Do nothing: what is watched comes by the bus."""
+
+    def _print_again(self) -> None:
+        for text in self._printed:
+            err().print(text)
+
+    def _keep(self, text: str) -> None:
+        self._printed += text.splitlines()
+        self._unseen += text.splitlines()
+
+    def _watched(self, stack: ExitStack) -> Watched:
+        keys = Keys(self._robots[0])
+        if len(self._robots) > 1:
+            from fasaco_edge.fleet.cli.watch import fleet_on_bus
+
+            watched, _ = stack.enter_context(fleet_on_bus(FLEET, keys, self._bus, err()))
+            return watched
+        from fasaco_edge.client.feed import Feed
+        from fasaco_edge.watch.robot_view import RobotView
+        from fasaco_edge.watch.robot_watch import RobotWatch
+
+        feed = stack.enter_context(Feed(self._bus, keys))
+        return RobotWatch(feed, RobotView(keys.robot), err())

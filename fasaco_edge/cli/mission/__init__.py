@@ -14,7 +14,13 @@ from fasaco_edge.cli.console.arguments import Command, Exit, add_common
 from fasaco_edge.cli.console.pass_option import WORDS, add_passes
 from fasaco_edge.cli.console.streams import print_json
 from fasaco_edge.cli.console.terminal import agrees, err, may_ask
-from fasaco_edge.cli.mission.keep_outs import add_actions, asked_by, names_of, show_keep_outs
+from fasaco_edge.cli.mission.keep_outs import (
+    add_actions,
+    asked_by,
+    names_of,
+    polygon,
+    show_keep_outs,
+)
 from fasaco_edge.errors import OrderError, WouldForget
 from fasaco_edge.host.plain_yaml import load, read_bounded
 from fasaco_edge.mission.orders.order import FORGETFUL, order_document, read_order
@@ -97,7 +103,7 @@ def _add_commands(parser: argparse.ArgumentParser) -> None:
         command = names.add_parser(name, help=text, description=described)
         command.set_defaults(mission_command=name)
         if name == "keep-out":
-            add_actions(command, _polygon, _add_receiver)
+            add_actions(command, _add_receiver)
             continue
         if name == "start":
             _add_order(command)
@@ -135,7 +141,7 @@ def _add_order(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--keep-out",
-        type=_polygon,
+        type=polygon,
         action="append",
         metavar="X,Y;X,Y;...",
         help="area the robot must not touch, beside those of the daemon's configuration; may be "
@@ -210,7 +216,8 @@ def _order(args: argparse.Namespace) -> dict[str, object]:
     if args.order is None:
         return order_document(read_order(given))
     if given:
-        names = ", ".join(f"--{name.rstrip('s').replace('_', '-')}" for name in given)
+        told = ("zone" if name == "zones" else name.replace("_", "-") for name in given)
+        names = ", ".join(f"--{name}" for name in told)
         raise OrderError(f"--order says it all, got {names} with it", hint="put them into the file")
     try:
         return order_document(read_order(_read(args.order)))
@@ -235,17 +242,7 @@ def _zone(text: str) -> dict[str, object]:
     name, colon, corners = text.partition(":")
     if not name or (not colon and ";" in name):  # corners, the name forgotten
         raise argparse.ArgumentTypeError(f"must be NAME or NAME:x,y;x,y;..., got {text!r}")
-    return {"name": name, "polygon": _polygon(corners)} if colon else {"name": name}
-
-
-def _polygon(text: str) -> list[list[float]]:
-    try:
-        corners = [[float(value) for value in pair.split(",")] for pair in text.split(";")]
-    except ValueError:
-        corners = []
-    if len(corners) < 3 or any(len(corner) != 2 for corner in corners):
-        raise argparse.ArgumentTypeError(f"must be x,y;x,y;x,y;... in metres, got {text!r}")
-    return corners
+    return {"name": name, "polygon": polygon(corners)} if colon else {"name": name}
 
 
 COMMAND = Command(

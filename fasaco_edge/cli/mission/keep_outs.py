@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 
 from rich.table import Table
 
@@ -36,11 +36,9 @@ ACTIONS = {
 
 
 def add_actions(
-    parser: argparse.ArgumentParser,
-    polygon: Callable[[str], list[list[float]]],
-    add_options: Callable[[argparse.ArgumentParser], None],
+    parser: argparse.ArgumentParser, add_options: Callable[[argparse.ArgumentParser], None]
 ) -> None:
-    """Add the commands of ``keep-out``; ``polygon`` reads corners, ``add_options`` is for all."""
+    """Add the commands of ``keep-out``; ``add_options`` is for all."""
     parser.epilog = EPILOG
     actions = parser.add_subparsers(title="commands", required=True, metavar="COMMAND")
     for name, text in ACTIONS.items():
@@ -49,8 +47,6 @@ def add_actions(
             action.add_argument(
                 "corners",
                 nargs="+",
-                action=_Corners,
-                polygon=polygon,
                 metavar="X,Y",
                 help='corners [m] in the frame of the map: "X,Y;X,Y;X,Y" or X,Y X,Y X,Y',
             )
@@ -63,25 +59,15 @@ def add_actions(
         action.set_defaults(keep_out_action=name)
 
 
-class _Corners(argparse.Action):
-    """Corners in one word, or a word for each."""
-
-    def __init__(self, *, polygon: Callable[[str], list[list[float]]], **options: object) -> None:
-        super().__init__(**options)  # type: ignore[arg-type]
-        self._polygon = polygon
-
-    def __call__(
-        self,
-        parser: argparse.ArgumentParser,
-        namespace: argparse.Namespace,
-        values: str | Sequence[object] | None,
-        option_string: str | None = None,
-    ) -> None:
-        words = [str(value).strip() for value in values or ()]
-        try:
-            namespace.corners = self._polygon(";".join(words))
-        except argparse.ArgumentTypeError as error:
-            raise argparse.ArgumentError(self, str(error)) from error
+def polygon(text: str) -> list[list[float]]:
+    """Read ``X,Y;X,Y;X,Y``, three corners at least [m]."""
+    try:
+        corners = [[float(value) for value in pair.split(",")] for pair in text.split(";")]
+    except ValueError:
+        corners = []
+    if len(corners) < 3 or any(len(corner) != 2 for corner in corners):
+        raise argparse.ArgumentTypeError(f"must be x,y;x,y;x,y;... in metres, got {text!r}")
+    return corners
 
 
 def asked_by(args: argparse.Namespace) -> dict[str, object]:
@@ -92,8 +78,13 @@ def asked_by(args: argparse.Namespace) -> dict[str, object]:
     """
     if args.keep_out_action == "list":
         return {"command": "status"}
-    corners = args.corners if args.keep_out_action == "add" else None
-    keep_out = {"name": args.name} | ({"polygon": corners} if corners else {})
+    keep_out = {"name": args.name}
+    if args.keep_out_action == "add":
+        try:
+            # Corners in one word, or a word for each.
+            keep_out["polygon"] = polygon(";".join(map(str.strip, args.corners)))
+        except argparse.ArgumentTypeError as error:
+            args.parser.error(f"argument X,Y: {error}")
     asked: dict[str, object] = {"command": f"keep_out_{args.keep_out_action}", "keep_out": keep_out}
     read_command(asked)
     return asked

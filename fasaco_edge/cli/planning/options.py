@@ -8,7 +8,6 @@ from pathlib import Path
 
 from fasaco_edge.cli.console.arguments import add_json, pair_of_floats, pair_of_ints
 from fasaco_edge.cli.console.pass_option import WORDS, add_passes
-from fasaco_edge.cli.planning.request import add_turning
 from fasaco_edge.config.robot import RobotConfig
 from fasaco_edge.offline.settings import (
     ANYWHERE,
@@ -16,14 +15,11 @@ from fasaco_edge.offline.settings import (
     BUDGET_S,
     CELLS,
     HOME,
-    PAPER_Q0,
-    SEARCH_Q0,
     THOROUGH,
     WALLS,
     Search,
 )
 from fasaco_edge.planners.own.loading import SHAPE, is_place
-from fasaco_edge.planners.paper.colony import VISIBILITIES
 from fasaco_edge.planners.passes import MOST_ANGLE_DEG
 from fasaco_edge.planners.registry import PLANNER_NAMES, PLANNERS
 
@@ -62,13 +58,10 @@ figures:
   curve            (--turn-radius) length_m, seconds and backward_m of the curve;
                    reversals, from forward to backward or back; spot_turns, which do not
                    fit and stay on the spot, of all bends judged on the curve's points
-
-rooms (--rooms)  area_m2 of free floor, reachable_m2 of it, the share of that which the line
-                   sweeps, and how often it enters the room
+  rooms            (--rooms) area_m2 of free floor, reachable_m2 of it, the share of that
+                   which the line sweeps, and how often it enters the room
 
 figures of several passes: sums, and for each pass its own
-  along_share      share of its line's length along its lanes, within 15 degrees; null if
-                   no direction is preferred
 
 figures of several robots:
   makespan_steps   steps of the longest walk; makespan_s seconds of the costliest
@@ -90,9 +83,8 @@ A line over the floor is laid along each of two walks, if the budget allows. Wha
 the budget goes to the better line: each stage of its search takes twice as long as the one
 before. A larger budget gives no worse line, by its seconds and the price of floor that it
 leaves.
-The colony's options apply to fasaco; aco takes all but the velocities, colony-search all
-but ants, visibility and threads, the other planners none; a planner of your own gets the
-seed.
+--ants and --velocities apply to fasaco, --ants to aco, --velocities to colony-search; a planner
+of your own gets the seed. From Python the colony has more settings.
 """
 
 ROBOT, SEARCH = RobotConfig(), Search()
@@ -146,7 +138,7 @@ def _add_problem(group: argparse._ArgumentGroup) -> None:
         help="start cells of several robots that share the floor: one walk each, the longest as "
         "short as possible; the walks are not timed against each other: robots that drive them "
         "have to avoid one another. By colony-search, through the centres of cells; "
-        "without --align, --overlap, --target-gap and --pheromone-png",
+        "without --align, --overlap and --pheromone-png",
     )
     start.add_argument(
         "--robots-xy",
@@ -176,21 +168,12 @@ def _add_problem(group: argparse._ArgumentGroup) -> None:
         help="distance that a line over the floor keeps from walls in addition to the radius, "
         f"except where giving it up gains enough floor [m] (default: {ROBOT.clearance_m:g})",
     )
-    end = group.add_mutually_exclusive_group()
-    end.add_argument(
+    group.add_argument(
         "--end",
         type=_end,
         default=ANYWHERE,
         metavar="anywhere|home|R,C",
         help="where the walk ends: anywhere, at its start, or in a cell (default: %(default)s)",
-    )
-    end.add_argument(
-        "--return-home",
-        dest="end",
-        action="store_const",
-        const=HOME,
-        default=argparse.SUPPRESS,
-        help="short for --end home",
     )
     add_passes(
         group,
@@ -216,10 +199,13 @@ def _add_problem(group: argparse._ArgumentGroup) -> None:
         action="store_true",
         help="a robot with a turning radius never drives backward (default: it may)",
     )
-    add_turning(
-        group,
-        turn_s_help="time of a quarter-turn on the spot [s]; 0 minimises steps, as the paper does "
-        f"(default: 0; {ROBOT.quarter_turn_s:g} for a line over the floor)",
+    group.add_argument(
+        "--turn-s",
+        type=float,
+        metavar="S",
+        help="time of a quarter-turn on the spot [s]; 0 minimises steps, as the paper does "
+        f"(default: 0; {ROBOT.quarter_turn_s:g} for a line over the floor); --config may say "
+        "more of how the robot turns and accelerates",
     )
 
 
@@ -271,36 +257,10 @@ def _add_planner(group: argparse._ArgumentGroup) -> None:
         f"(default: {SEARCH.velocities})",
     )
     group.add_argument(
-        "--q0",
-        type=float,
-        help=f"equation (4)'s threshold (default: {SEARCH_Q0}; {PAPER_Q0} for fasaco and aco)",
-    )
-    group.add_argument(
-        "--visibility",
-        choices=VISIBILITIES,
-        help="eta of equation (5) is the inverse of: the distance to the neighbour (1, as in the "
-        "paper); the distance that an ant goes in this move; the neighbour's number of open "
-        f"neighbours (default: {SEARCH.visibility})",
-    )
-    for name, what in (
-        ("beta", "weight of visibility"),
-        ("alpha", "weight of new pheromone, equations (7) and (8)"),
-        ("tau0", "pheromone that every move begins with, equation (7)"),
-    ):
-        told = f"{what} (default: {getattr(SEARCH, name):g})"
-        group.add_argument(f"--{name}", type=float, help=told)
-    group.add_argument(
         "--seed",
         type=int,
         metavar="N",
         help=f"seed of all draws: the same seed gives the same walk (default: {SEARCH.seed})",
-    )
-    group.add_argument(
-        "--threads",
-        type=int,
-        metavar="N",
-        help="threads that ants walk on; the path is the same for any number (default: "
-        f"{SEARCH.threads})",
     )
     group.add_argument(
         "--budget",
@@ -316,13 +276,6 @@ def _add_planner(group: argparse._ArgumentGroup) -> None:
         metavar="SHARE",
         help="share of the reachable floor that the line is to sweep, in the least time; takes "
         "longer than the default --budget (default: as much as pays)",
-    )
-    group.add_argument(
-        "--target-gap",
-        type=float,
-        metavar="G",
-        help="end the search once the walk is proven to be within this share of the optimum, "
-        "0.01 for 1 %% (default: none)",
     )
 
 

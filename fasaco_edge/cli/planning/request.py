@@ -15,9 +15,10 @@ import msgspec
 from fasaco_edge.cli.console import terminal
 from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.config.loading import load_config
+from fasaco_edge.config.reading import section_faults
 from fasaco_edge.config.robot import RobotConfig
 from fasaco_edge.errors import BadConfiguration
-from fasaco_edge.offline.settings import CELLS, LIKE_OWN, Search, default_line, require
+from fasaco_edge.offline.settings import CELLS, LIKE_OWN, Search, default_line
 from fasaco_edge.planners.own.loading import UserCode, load
 from fasaco_edge.planners.planner import SearchProgress
 
@@ -59,56 +60,6 @@ def _words(search: SearchProgress) -> str:
     return words if search.gap is None else f"{words}, {search.gap:.2%} above the bound"
 
 
-# For each limit: the option's metavar, the range that ``RobotConfig`` allows, its unit, and the
-# help text.
-LIMITS = {
-    "turn_deg_s": ("W", 1.0, 1e3, "deg/s", "rate of turning on the spot, in place of --turn-s; "
-                   "each bend then costs braking and starting, too"),
-    "turn_deg_s2": ("A", 1.0, 1e5, "deg/s2", "its acceleration"),
-    "acceleration_m_s2": ("A", 0.01, 100.0, "m/s2", "acceleration of driving"),
-    "steered_deg": ("DEG", 0.0, 45.0, "deg", "a bend up to this is steered while driving"),
-}  # fmt: skip
-
-
-def add_turning(group: argparse._ArgumentGroup, turn_s_help: str) -> None:
-    """Add the options."""
-    group.add_argument("--turn-s", type=float, metavar="S", help=turn_s_help)
-    robot = RobotConfig()
-    for name, (metavar, _, _, unit, what) in LIMITS.items():
-        default = getattr(robot, name)
-        told = "none" if default is None else f"{default:g}"
-        help_text = f"{what} [{unit}] (default: {told})"
-        group.add_argument(_option(name), type=float, metavar=metavar, help=help_text)
-
-
-def turning_of(args: argparse.Namespace, robot: RobotConfig) -> dict[str, float | None]:
-    """Return the members of a robot's turning that the options change.
-
-    Raises:
-        BadConfiguration: a limit is impossible, or of no use with the other options.
-    """
-    limits = {name: getattr(args, name) for name in LIMITS if getattr(args, name) is not None}
-    has_rate = "turn_deg_s" in limits or (robot.turn_deg_s is not None and args.turn_s is None)
-    if limits and not has_rate:
-        name = next(iter(limits))
-        raise BadConfiguration(f"{_option(name)} counts only with --turn-deg-s, which is missing")
-    if limits and args.turn_s is not None:
-        raise BadConfiguration("--turn-s and --turn-deg-s cannot both be given")
-    for name, value in limits.items():
-        _, least, most, unit, _ = LIMITS[name]
-        if not least <= value <= most:
-            allowed = f"[{least:g}, {most:g}] {unit}"
-            raise BadConfiguration(f"{_option(name)} must be in {allowed}, got {value!r}")
-    if args.turn_s is not None:
-        require(0.0 <= args.turn_s <= 600.0, "--turn-s", "be in [0, 600] s", args.turn_s)
-        return {"quarter_turn_s": args.turn_s, "turn_deg_s": None}
-    return limits
-
-
-def _option(name: str) -> str:
-    return f"--{name.replace('_', '-')}"
-
-
 # Options, and the members of ``RobotConfig`` and ``Search`` that they set.
 ROBOT_OPTIONS = {
     "cell": "tool_width_m",
@@ -116,13 +67,12 @@ ROBOT_OPTIONS = {
     "clearance": "clearance_m",
     "speed_m_s": "speed_m_s",
     "overlap": "overlap",
+    "turn_s": "quarter_turn_s",
     "turn_radius": "turn_radius_m",
 }
 SEARCH_OPTIONS = {
-    **{name: name for name in ("planner", "ants", "velocities", "q0", "visibility", "beta")},
-    **{name: name for name in ("alpha", "tau0", "seed", "threads", "target_gap")},
+    **{name: name for name in ("planner", "ants", "velocities", "seed", "swept")},
     "budget": "budget_s",
-    "swept": "swept",
 }
 
 
@@ -169,20 +119,13 @@ def read_request(args: argparse.Namespace) -> PlanRequest:
     robot = config.robot if config else RobotConfig()
     if config is None and line == CELLS:
         robot = msgspec.structs.replace(robot, quarter_turn_s=0.0)  # as the paper counts
-    for option in ("--cell", "--robot-radius", "--speed-m-s"):
-        value, unit = getattr(args, option[2:].replace("-", "_")), option == "--speed-m-s"
-        if value is not None:
-            require(0.0 < value <= 10.0, option, f"be in (0, 10] m{'/s' * unit}", value)
-    if args.clearance is not None:
-        allowed = 0.0 <= args.clearance <= 1.0
-        require(allowed, "--clearance", "be in [0, 1] m", args.clearance)
-    if args.overlap is not None:
-        allowed = 0.0 <= args.overlap <= 0.5
-        require(allowed, "--overlap", "be in [0, 0.5], of the tool's width", args.overlap)
-    if args.turn_radius is not None:
-        allowed = 0.0 <= args.turn_radius <= 20.0
-        require(allowed, "--turn-radius", "be in [0, 20] m", args.turn_radius)
-    changes = _given(args, ROBOT_OPTIONS) | turning_of(args, robot)
+    changes = _given(args, ROBOT_OPTIONS)
+    for fault in section_faults(RobotConfig, changes):
+        option = next(name for name, member in ROBOT_OPTIONS.items() if member == fault.key)
+        said = str(fault.error).removeprefix(fault.key)
+        raise BadConfiguration(f"--{option.replace('_', '-')}{said}")
+    if args.turn_s is not None:
+        changes["turn_deg_s"] = None
     if args.forward_only:
         changes["reverses"] = False
     if line == CELLS and changes.get("turn_radius_m", robot.turn_radius_m):
@@ -193,16 +136,6 @@ def read_request(args: argparse.Namespace) -> PlanRequest:
     named = args.config, Path(own.file) if own and own.file else None
     sources = tuple(file for file in named if file is not None)
     return PlanRequest(msgspec.structs.replace(robot, **changes), search, line, own, sources)
-
-
-def say_written(args: argparse.Namespace) -> None:
-    """Print where the files are that were asked for, or how to have a picture."""
-    console = terminal.out()
-    for name in ("path_out", "xy_out", "png", "pheromone_png"):
-        if (file := getattr(args, name)) is not None:
-            console.print(f"wrote {file}", soft_wrap=True)
-    if not args.long:
-        console.print("more: --long" + ("" if args.png else "; a picture: --png FILE"))
 
 
 def require_frame(map: Map, xy_out: Path | None) -> None:

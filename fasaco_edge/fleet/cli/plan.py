@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from fasaco_edge.cli.console import terminal
 from fasaco_edge.cli.console.arguments import Exit, writing
 from fasaco_edge.cli.console.streams import print_json
-from fasaco_edge.cli.planning.request import require_frame, say_written, watching
+from fasaco_edge.cli.planning.request import require_frame, watching
+from fasaco_edge.cli.planning.results import say_written
 from fasaco_edge.cli.warmup import compile_kernels
 from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.host.processes import first_signal_calls
@@ -86,11 +87,6 @@ def _check(args: argparse.Namespace, request: PlanRequest) -> None:
         raise BadConfiguration(
             f"--line {request.line}: a line over the floor is for one robot",
             hint="leave --line out",
-        )
-    if search.target_gap is not None:
-        raise BadConfiguration(
-            "--target-gap: how far several robots' walks are from the best is not known well",
-            hint="choose --budget",
         )
     if args.pheromone_png is not None:
         raise BadConfiguration(

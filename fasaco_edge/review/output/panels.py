@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.drawing import palette
-from fasaco_edge.drawing.chart import COLOURS, Axis, Line, Panel
+from fasaco_edge.drawing.chart import Axis, Line, Panel
 from fasaco_edge.drawing.palette import Colour
 from fasaco_edge.review.review import Review
 
@@ -38,6 +38,8 @@ def replan_times(review: Review) -> Points:
 
 
 MOST_POINTS = 700
+COLOURS = palette.BLUE, palette.VERMILION
+OF_TWO = "blue: left; red: right"
 FAINT: Colour = (150, 156, 166)
 # States from the bottom up; other states are drawn as the last one.
 STATES: dict[str, Colour] = {
@@ -85,41 +87,34 @@ class TimeAxis:
         return tuple((float(x), float(y)) for x, y in pairs)
 
 
-def coverage_panel(reviews: Sequence[Review], labels: Sequence[str]) -> Panel:
-    """Return a chart of the covered share; of one review also the share of the cells known then.
-
-    ``labels`` name two of them.
-    """
+def coverage_panel(reviews: Sequence[Review]) -> Panel:
+    """Return a chart of the covered share; of one review also the share of the cells known then."""
     time = TimeAxis.over(max(review.duration_s for review in reviews))
     lines = [
-        Line(
-            label if len(reviews) > 1 else "", colour, _curve(time, review), dotted=False, width=2.2
-        )
-        for review, label, colour in zip(reviews, labels, COLOURS, strict=False)
+        Line(colour, _curve(time, review), 2.2)
+        for review, colour in zip(reviews, COLOURS, strict=False)
     ]
+    caption = f"{OF_TWO}; of all cells that each run knew at the end"
     if len(reviews) == 1:
         known = reviews[0].known_fractions
-        points = time.points(known[:, 0], 100 * known[:, 1])
-        lines.append(Line("", FAINT, points, dotted=False, width=1.4))
-    one = "blue: of all cells known at the end; grey: of those known at the time"
-    caption = one if len(reviews) == 1 else "of all cells that each run knew at the end"
+        lines.append(Line(FAINT, time.points(known[:, 0], 100 * known[:, 1]), 1.4))
+        caption = "blue: of all cells known at the end; grey: of those known at the time"
     y = Axis.linear("%", [100.0])
     return Panel("Covered share of all cells", caption, time.axis, y, tuple(lines))
 
 
-def replan_panel(reviews: Sequence[Review], labels: Sequence[str]) -> Panel:
+def replan_panel(reviews: Sequence[Review]) -> Panel:
     """Return a chart of the durations of replans, a dot each."""
     time = TimeAxis.over(max(review.duration_s for review in reviews))
     found = [replan_times(review) for review in reviews]
-    # Two reviews have the colours of their curves; a single one has another colour than the curve
-    # above.
-    colours = COLOURS if len(reviews) > 1 else COLOURS[1:]
+    # Of one review they have another colour than the curve above.
+    colours, caption = (COLOURS, OF_TWO) if len(reviews) > 1 else (COLOURS[1:], "")
     lines = [
-        Line(label if len(reviews) > 1 else "", colour, _dots(time, at_s, took_ms), joined=False)
-        for (at_s, took_ms), label, colour in zip(found, labels, colours, strict=False)
+        Line(colour, _dots(time, at_s, took_ms), 0)
+        for (at_s, took_ms), colour in zip(found, colours, strict=True)
     ]
     y = Axis.linear("ms", [value for _, took_ms in found for value in took_ms.tolist()] or [1.0])
-    return Panel("Time of each replan", "", time.axis, y, tuple(lines))
+    return Panel("Time of each replan", caption, time.axis, y, tuple(lines))
 
 
 def state_panel(review: Review) -> Panel:
@@ -135,7 +130,7 @@ def state_panel(review: Review) -> Panel:
         begin, end = span.begin_s, max(span.end_s, span.begin_s + least_s)
         points = ((begin / time.unit_s, level), (end / time.unit_s, level))
         colour = STATES.get(span.name, FAINT)
-        lines.append(Line("", colour, points, dotted=False, width=BAND_PX))
+        lines.append(Line(colour, points, BAND_PX))
     ticks = tuple((float(level), SHORT.get(name, name)) for level, name in enumerate(names))
     y = Axis("", -0.7, max(len(names) - 0.3, 0.7), ticks)
     return Panel("State of the mission", "", time.axis, y, tuple(lines))

@@ -42,13 +42,12 @@ def draw_review(review: Review, other: Review | None = None) -> Image.Image:
     It is as wide as it has to be: one is of ``SIZE`` at most, two are wider by a map.
     """
     reviews = [review] if other is None else [review, other]
-    labels = ["left", "right"]
     panels = [
-        coverage_panel(reviews, labels),
-        replan_panel(reviews, labels),
+        coverage_panel(reviews),
+        replan_panel(reviews),
         *([state_panel(review)] if other is None else []),
     ]
-    charts = draw_panels("", (), panels, columns=1)
+    charts = draw_panels(panels)
     space = SIZE[0] - charts.width
     maps = [draw_map(each, (space - AROUND[0], SIZE[1] - AROUND[1])) for each in reviews]
     missions = [each for each in maps if each is not None]
@@ -60,7 +59,6 @@ def draw_review(review: Review, other: Review | None = None) -> Image.Image:
     for mission in missions:
         sheet.paste(mission, (left, (SIZE[1] - mission.height) // 2))
         left += mission.width
-    # The empty title above the charts may be cut off.
     sheet.paste(charts, (left, SIZE[1] - charts.height))
     return sheet
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from msgspec.structs import astuple
 
-from fasaco_edge.client.phrases import scale_words
+from fasaco_edge.client.phrases import percent, scale_words
 from fasaco_edge.review.comparison import figures
 from fasaco_edge.review.document import ReviewDocument
 from fasaco_edge.review.drive import MILESTONES
@@ -95,7 +95,7 @@ def room_rows(document: ReviewDocument, review: Review) -> list[tuple[str, ...]]
                 f"{room.area_m2:.1f}",
                 clock(room.seconds),
                 str(room.entered),
-                NOT_KNOWN if share is None else f"{100 * share:.1f} %",
+                NOT_KNOWN if share is None else percent(share),
                 "-" if room.passes is None else str(room.passes),
                 left + (f": {_some(patches)}" if patches else ""),
             )
@@ -164,7 +164,7 @@ def _shares(document: ReviewDocument) -> str:
         for room in document.rooms
     ]
     known = sorted((share, title) for share, title in shares if share is not None)
-    return ", ".join(f"{title} {share:.0%}" for share, title in known) or NOT_KNOWN
+    return ", ".join(f"{title} {percent(share)}" for share, title in known) or NOT_KNOWN
 
 
 def _lost_way(review: Review) -> str:

@@ -85,6 +85,7 @@ function show(message) {
     case "areas": showDrafts(); showPicked(); break;
     case "rooms": showRooms(); break;
     case "shares": showShares(); break;
+    case "unswept": showBars(); break;
     default: redraw();
   }
 }

@@ -92,8 +92,12 @@ function showLeft(state) {
   if (model.left) { model.left = shown || null; showBars(); if (!shown) wants(); }
 }
 
+// Daemons of earlier releases do not send where floor is not swept [ms].
+const OLD_MS = 6000;
 function showOnMap(part) {
   model.left = part;
+  model.leftAt = Date.now();
+  setTimeout(showBars, OLD_MS + 100);
   picked = "";
   Object.assign(view, { fitted: true, follows: false });
   showTools();
@@ -147,11 +151,30 @@ function showCommands() {
   const underway = mission.ordered !== null && mission.stage !== "over" && mission.ordered !== undefined;
   const chose = drafts.length > 0 || chosen.size > 0;
   find("start").hidden = underway || mission.paused || chose;
+  const again = state.state ? lastOrder(state) : null;
+  find("again").hidden = !again || underway || mission.paused || chose;
+  if (again) find("again").textContent = `Last order again: ${inWords(again)}`;
   find("order").textContent = chose && underway ? "Start anew with these" : chose ? "Start with these" : underway ? "Start anew with everything" : "Start with everything";
   find("pause").hidden = Boolean(mission.paused) || !underway;
   find("resume").hidden = !mission.paused;
   find("cancel").hidden = !underway;
   find("home").disabled = !state.state || state.state === "returning";
+}
+
+// An order that has ended can be given again, also after a restart of the server.
+function lastOrder(state) {
+  const key = `last order of ${state.robot}`;
+  try {
+    if (state.again) localStorage.setItem(key, JSON.stringify(state.again));
+    const kept = JSON.parse(localStorage.getItem(key));
+    return kept && kept.zones ? kept : null;
+  } catch (error) { return state.again && state.again.zones ? state.again : null; }
+}
+
+function inWords(order) {
+  const names = order.zones.map((zone) => zone.name).join(", ") || "everything";
+  const often = Array.isArray(order.passes) ? order.passes.length : order.passes;
+  return names + (often > 1 ? `, ${often} times` : "");
 }
 
 function showDrafts() {
@@ -245,6 +268,7 @@ function order() {
 let sure = null;
 find("order").addEventListener("click", () => find("start").click());
 find("start").addEventListener("click", () => start(order()));
+find("again").addEventListener("click", () => start(lastOrder(model.state)));
 for (const name of ["pause", "resume", "home", "cancel"]) {
   find(name).addEventListener("click", () => {
     if (name !== "cancel" || isSure(find(name))) command(name);

@@ -22,9 +22,7 @@ from fasaco_edge.bench.benchmark import (
     seconds_above_zero,
 )
 from fasaco_edge.drawing.spread import Spread
-from tests.benchmarks.harness import check_writable
 from tests.benchmarks.quality.figures import VARIANTS, GridFigures, by_grid, goals
-from tests.benchmarks.quality.plot import draw
 from tests.benchmarks.quality.runs import QualityPlan, QualityRun, Setting, measure
 
 DEFAULT_MAPS = ("office", "flat", "walled_grid", "basement", "warehouse")
@@ -75,7 +73,6 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         "what perturbs the walk: ants on their trail in half of the perturbations; ants on a "
         "uniform trail; or none",
     )
-    parser.add_argument("--plot", type=Path, metavar="FILE.png", help="draw ratios over budgets")
 
 
 def _add_choice(
@@ -100,7 +97,6 @@ def _count(args: argparse.Namespace) -> int:
 
 
 def _measure(args: argparse.Namespace, say: Say) -> Generator[QualityRun, None, None]:
-    check_writable(args.plot)
     settings = itertools.product(*map(dict.fromkeys, (args.end, args.cost, args.variants)))
     plan = QualityPlan(
         grids=_names(args),
@@ -111,13 +107,6 @@ def _measure(args: argparse.Namespace, say: Say) -> Generator[QualityRun, None, 
         results=args.results,
     )
     return measure(plan, say)
-
-
-def _write(args: argparse.Namespace, runs: Sequence[QualityRun]) -> tuple[Path, ...]:
-    if args.plot is None or not runs:
-        return ()
-    draw(runs, args.turn_s).save(args.plot)
-    return (args.plot,)
 
 
 SUMMARY_HEADER = (
@@ -287,12 +276,11 @@ QUALITY = Benchmark(
     count=_count,
     measure=_measure,
     report=lambda args, runs: report(args.turn_s, args.seeds, runs),
-    write=_write,
     epilog="""\
 examples:
   python -m tests.benchmarks quality
   python -m tests.benchmarks quality --maps office --budgets 0.02 0.1 1 10 --cost steps
-  python -m tests.benchmarks quality --grids *.npy --results results.json --plot quality.png
+  python -m tests.benchmarks quality --grids *.npy --results results.json
   python -m tests.benchmarks quality --end home --cost steps --budgets 1 --json
   python -m tests.benchmarks quality --variants ants flat none
 """,

@@ -19,9 +19,9 @@ from fasaco_edge.bench.benchmark import Benchmark, Say, positive, seconds_above_
 from fasaco_edge.errors import BadConfiguration, ProcessEnded
 from fasaco_edge.host.processes import python_program
 from tests.benchmarks.buildings import building
-from tests.benchmarks.harness import check_writable, within
+from tests.benchmarks.harness import within
 from tests.benchmarks.scale.process import ScaleRun, ScaleTask, SizedRun
-from tests.benchmarks.scale.report import draw, report
+from tests.benchmarks.scale.report import report
 
 DEFAULT_SIZES = (1_000, 5_000, 20_000, 100_000)
 FEWEST_CELLS, MOST_CELLS = 1_000, 2_000_000
@@ -53,9 +53,6 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         help="plan for so long [s]: one time for all sizes, or one for each (default: a minute a "
         "million cells, a second at least)",
     )
-    parser.add_argument(
-        "--plot", type=Path, metavar="FILE.png", help="draw time, memory and gap over size"
-    )
 
 
 def _sizes(args: argparse.Namespace) -> list[int]:
@@ -63,16 +60,8 @@ def _sizes(args: argparse.Namespace) -> list[int]:
 
 
 def _measure(args: argparse.Namespace, say: Say) -> Generator[SizedRun, None, None]:
-    check_writable(args.plot)
     sizes = _sizes(args)
     return measure(sizes, budgets(sizes, args.budget_s), args.seeds, say)
-
-
-def _write(args: argparse.Namespace, runs: Sequence[SizedRun]) -> tuple[Path, ...]:
-    if args.plot is None or not runs:
-        return ()
-    draw(runs).save(args.plot)
-    return (args.plot,)
 
 
 PROGRAM = python_program("tests.benchmarks.scale.process")
@@ -149,11 +138,10 @@ SCALE = Benchmark(
     count=lambda args: len(_sizes(args)) * int(args.seeds),
     measure=_measure,
     report=lambda args, runs: report(args.seeds, runs),
-    write=_write,
     epilog="""\
 examples:
   python -m tests.benchmarks scale
-  python -m tests.benchmarks scale --sizes 1000 10000 100000 1000000 --plot scale.png
+  python -m tests.benchmarks scale --sizes 1000 10000 100000 1000000
   python -m tests.benchmarks scale --sizes 100000 --seeds 1 --budget-s 5 --json
 """,
 )

@@ -103,7 +103,6 @@ def test_points_of_a_map_are_cells_of_it(plan, tmp_path, places):
     "starts",
     [
         ["--robots", "-1,0", "0,0", "-2,-3"],
-        ["--robots=-1,0", "0,0", "-2,-3"],
         ["--robots=-1,0", "--robots", "0,0", "-2,-3"],
     ],
     ids=" ".join,
@@ -153,7 +152,6 @@ def test_without_json_it_prints_a_line_for_each_robot(plan, grid):
         (["--robots", "0,0", "99,5"], "robot 2: start cell (99, 5) lies outside"),
         (["--robots", "0,0", "--end", "1,1"], "cannot end in one cell"),
         (["--robots", "0,0", "--planner", "aco"], "planned for by colony-search"),
-        (["--robots", "0,0", "--target-gap", "0.1"], "--target-gap"),
         (["--robots", "0,0", "--align", "walls"], "--align"),
         (["--robots", "0,0", "--overlap", "0.1"], "--overlap"),
         (["--robots", "0,0", "--clearance", "0.02"], "--clearance"),

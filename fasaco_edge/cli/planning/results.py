@@ -1,0 +1,140 @@
+"""Results of ``fasaco-edge plan``: its files, and its figures as JSON or in words."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+from rich.table import Table
+
+from fasaco_edge.cli.console import terminal
+from fasaco_edge.cli.console.arguments import writing
+from fasaco_edge.cli.console.streams import print_json
+from fasaco_edge.errors import BadConfiguration
+
+if TYPE_CHECKING:
+    from fasaco_edge.offline.passes import PassPlans
+    from fasaco_edge.offline.result import Plan
+    from fasaco_edge.offline.rooms import RoomsUnderLine
+    from fasaco_edge.planners.planner import ColonySnapshot
+
+
+def write_files(
+    args: argparse.Namespace, planned: Plan | PassPlans, trails: Sequence[ColonySnapshot]
+) -> None:
+    """Write the files that the options ask for; rows of several passes begin with their number.
+
+    Raises:
+        BadConfiguration: one cannot be written.
+    """
+    from fasaco_edge.offline.passes import PassPlans
+
+    is_several = isinstance(planned, PassPlans)
+    plans = planned.plans if isinstance(planned, PassPlans) else (planned,)
+    first = "pass," if is_several else ""
+    if args.path_out is not None:
+        rows = _numbered([plan.cells for plan in plans], is_several)
+        with writing(args.path_out) as file:
+            np.savetxt(file, rows, "%d", ",", header=f"{first}row,col", comments="")
+    if args.xy_out is not None:
+        curve = plans[0].curve
+        lines, header = [plan.xy for plan in plans], f"{first}x_m,y_m"
+        if curve is not None:
+            lines, header = [curve.poses], "x_m,y_m,yaw_rad"
+        rows = _numbered(lines, is_several)
+        form = ["%d"] * is_several + ["%.6f"] * (rows.shape[1] - is_several)
+        with writing(args.xy_out) as file:
+            np.savetxt(file, rows, form, ",", header=header, comments="")
+    if args.png is not None:
+        picture = (
+            planned.plot() if isinstance(planned, PassPlans) else planned.plot(rooms=args.rooms)
+        )
+        with writing(args.png) as file:
+            picture.save(file, "PNG")
+    if args.pheromone_png is not None:
+        _draw_pheromone(args.pheromone_png, plans[0], trails)
+
+
+def _numbered(tables: Sequence[NDArray[Any]], is_several: bool) -> NDArray[Any]:
+    """Return tables as one; of several each row with the number of its table, from 1."""
+    if not is_several:
+        return tables[0]
+    numbers = np.repeat(np.arange(1, len(tables) + 1), [len(rows) for rows in tables])
+    return np.column_stack((numbers, np.vstack(tables)))
+
+
+def _draw_pheromone(file: Path, planned: Plan, trails: Sequence[ColonySnapshot]) -> None:
+    from fasaco_edge.offline.result import pheromone_picture_of
+
+    if not trails or trails[0].tau is None:
+        raise BadConfiguration(
+            f"{file}: the search ended before its first cohort of ants",
+            hint="give it a larger --budget, or none",
+        )
+    with writing(file) as new:
+        pheromone_picture_of(planned, trails[0].tau).save(new, "PNG")
+
+
+def print_plan(args: argparse.Namespace, planned: Plan | PassPlans) -> None:
+    """Print the figures as JSON, those that matter in some lines, or all as a table."""
+    from fasaco_edge.offline.figures import floor_words
+    from fasaco_edge.offline.passes import PassPlans
+    from fasaco_edge.offline.summary import rows_of, rows_of_passes
+
+    figures: dict[str, Any] = planned.figures | {"map": str(args.map)}
+    rooms = None if isinstance(planned, PassPlans) or not args.rooms else planned.rooms
+    if rooms is not None:
+        figures["rooms"] = [asdict(room) for room in rooms.rooms]
+    if args.json:
+        print_json(figures)
+        return
+    console, floor, passes = terminal.out(), planned.floor, figures.pop("passes", [])
+    if args.long:
+        figures["floor"] = "not known of a coverage grid" if floor is None else floor_words(floor)
+        if not isinstance(planned, PassPlans):
+            figures["curve"] = planned.curve_words or None
+        rows = [(name.replace("_", " "), text) for name, text in terminal.known(figures)]
+        console.print(terminal.figures(rows))
+    elif isinstance(planned, PassPlans):
+        console.print(terminal.summary(rows_of_passes(planned)))
+    else:
+        console.print(terminal.summary(rows_of(planned)))
+    for number, each in enumerate(passes, 1):
+        gap = each["gap"]
+        words = "" if gap is None else f", at most {gap:.1%} above the bound"
+        console.print(
+            f"pass {number}, {each['pass']}: {each['cells']} cells, {each['steps']} steps, "
+            f"{each['cost_s']:.1f} s{words}"
+        )
+    if rooms is not None:
+        console.print(_table(rooms))
+    say_written(args)
+
+
+def _table(under: RoomsUnderLine) -> Table:
+    """Return a table of the rooms."""
+    from fasaco_edge.judge.floor import share_words
+
+    table = Table(box=None, padding=(0, 2, 0, 0))
+    for name in ("room", "floor", "swept", "entered"):
+        table.add_column(name, justify="right", style="cyan" if name == "room" else "")
+    for room in under.rooms:
+        swept = "-" if room.swept_share is None else share_words(room.swept_share)
+        often = {0: "never", 1: "once"}.get(room.entered, f"{room.entered} times")
+        table.add_row(str(room.room), f"{room.area_m2:,.1f} m2", swept, often)
+    return table
+
+
+def say_written(args: argparse.Namespace) -> None:
+    """Print where the files are that were asked for, or how to have a picture."""
+    console = terminal.out()
+    for name in ("path_out", "xy_out", "png", "pheromone_png"):
+        if (file := getattr(args, name)) is not None:
+            console.print(f"wrote {file}", soft_wrap=True)
+    if not args.long:
+        console.print("more: --long" + ("" if args.png else "; a picture: --png FILE"))
