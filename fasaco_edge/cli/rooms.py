@@ -11,6 +11,7 @@ from fasaco_edge.cli.console.pass_option import WORDS, add_passes
 from fasaco_edge.cli.console.rooms_table import show_rooms
 from fasaco_edge.cli.console.streams import print_json
 from fasaco_edge.cli.console.terminal import out
+from fasaco_edge.cli.geojson import rooms_collection
 from fasaco_edge.mission.orders.order import read_command
 from fasaco_edge.mission.orders.passes import passes_document
 from fasaco_edge.wire.documents.json_text import decode_json, decode_tolerant, encode_json
@@ -19,6 +20,7 @@ from fasaco_edge.wire.documents.rooms import Rooms
 EPILOG = """\
 examples:
   fasaco-edge rooms list
+  fasaco-edge rooms list --geojson > rooms.geojson   for a drawing program; also an order for them
   fasaco-edge rooms name 3 kitchen
   fasaco-edge rooms split kitchen 1.5,0 1.5,3.2      from wall to wall, in metres on the map
   fasaco-edge rooms merge kitchen 5 --name "living room"
@@ -52,7 +54,7 @@ def _add_actions(parser: argparse.ArgumentParser) -> None:
         action.set_defaults(rooms_action=name)
         if name != "list":
             action.add_argument("room", type=_room, metavar="ROOM", help="its number or name")
-        _ADD.get(name, lambda _: None)(action)
+        _ADD[name](action)
         add_common(action)
         add_question(action)
 
@@ -82,7 +84,21 @@ def _add_set(action: argparse.ArgumentParser) -> None:
     )
 
 
-_ADD = {"name": _add_name, "split": _add_split, "merge": _add_merge, "set": _add_set}
+def _add_list(action: argparse.ArgumentParser) -> None:
+    action.add_argument(
+        "--geojson",
+        action="store_true",
+        help="print polygons as GeoJSON, in metres in the frame of the map",
+    )
+
+
+_ADD = {
+    "list": _add_list,
+    "name": _add_name,
+    "split": _add_split,
+    "merge": _add_merge,
+    "set": _add_set,
+}
 
 
 def _room(text: str) -> int | str:
@@ -101,7 +117,9 @@ def run(args: argparse.Namespace) -> int:
             out().print("done")
         return Exit.OK
     reply = ask(args, "rooms")
-    if args.json:
+    if args.geojson:
+        print_json(rooms_collection(decode_tolerant(reply.payload, Rooms)))
+    elif args.json:
         print_json(decode_json(reply.payload))
     else:
         show_rooms(decode_tolerant(reply.payload, Rooms))

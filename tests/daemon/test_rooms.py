@@ -69,6 +69,9 @@ def test_rooms_are_named_ordered_and_known_again(tmp_path):
         heard.wait(lambda sample: any(room["name"] == "kitchen" for room in sample.json()["rooms"]))
         assert room_command(outsider, "name", id=west["id"], name="kitchen")["code"] == "bad_order"
         table = cli(running, "rooms", "list")
+        drawn = json.loads(cli(running, "rooms", "list", "--geojson"))
+        names = {feature["properties"]["name"] for feature in drawn["features"]}
+        assert names == {"kitchen", f"room {west['id']}"}
         assert "kitchen" in table
         assert "passes: 2" in table
 

@@ -14,6 +14,7 @@ from fasaco_edge.cli.console.arguments import Command, Exit, add_common
 from fasaco_edge.cli.console.pass_option import WORDS, add_passes
 from fasaco_edge.cli.console.streams import print_json
 from fasaco_edge.cli.console.terminal import agrees, err, may_ask
+from fasaco_edge.cli.geojson import SUFFIX, is_geojson, order_of
 from fasaco_edge.cli.mission.keep_outs import (
     add_actions,
     asked_by,
@@ -61,6 +62,9 @@ evening.yaml, or the same as JSON; all lengths in metres in the frame of the map
   return_home: true           # at the end: mission.home, mission.dock, or where the mission began
   keep_covered: false         # true: skip what is already covered in the first pass
   unknown: refuse             # wait: for a room of a zone's name, if there is none yet
+
+evening.geojson, as a drawing program writes it: each polygon is a zone with the properties name and
+passes; one with "keep_out": true is not touched. Coordinates are metres in the frame of the map.
 
 Each pass starts from zero: what was covered before is covered again; a rest leaves out what an
 edge has covered. An order, its progress, and
@@ -129,7 +133,10 @@ def _add_receiver(parser: argparse.ArgumentParser) -> None:
 
 def _add_order(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
-        "--order", type=Path, metavar="FILE", help="YAML or JSON; in place of the options below"
+        "--order",
+        type=Path,
+        metavar="FILE",
+        help="YAML, JSON or GeoJSON; in place of the options below",
     )
     parser.add_argument(
         "--zone",
@@ -220,7 +227,8 @@ def _order(args: argparse.Namespace) -> dict[str, object]:
         names = ", ".join(f"--{name}" for name in told)
         raise OrderError(f"--order says it all, got {names} with it", hint="put them into the file")
     try:
-        return order_document(read_order(_read(args.order)))
+        document = _read(args.order)
+        return order_document(read_order(order_of(document) if is_geojson(document) else document))
     except OrderError as error:
         raise OrderError(f"{args.order}: {error}", hint=error.hint) from error
 
@@ -229,7 +237,7 @@ def _read(path: Path) -> object:
     try:
         text = read_bounded(path)
         # YAML 1.1 would take 1e3 for a text.
-        return json.loads(text) if path.suffix == ".json" else load(text)
+        return json.loads(text) if path.suffix in (".json", SUFFIX) else load(text)
     except OSError as error:
         raise OrderError(str(error.strerror), hint="name a file that can be read") from error
     except RecursionError as error:

@@ -289,8 +289,9 @@ def _add_output(group: argparse._ArgumentGroup) -> None:
     group.add_argument(
         "--xy-out",
         type=Path,
-        metavar="FILE.csv",
-        help="write the line to be driven as points in the map frame [m]: header x_m,y_m "
+        metavar="FILE",
+        help="write the line to be driven as points in the map frame [m]: as GeoJSON if it is "
+        "called so (.geojson), else as CSV with the header x_m,y_m "
         "(several robots: robot,x_m,y_m; with --turn-radius: x_m,y_m,yaw_rad, the robot's heading "
         "[rad], which is opposite to its way where it drives backward); needs a YAML map, as a "
         ".npy grid has no frame",

@@ -15,7 +15,9 @@ from rich.table import Table
 from fasaco_edge.cli.console import terminal
 from fasaco_edge.cli.console.arguments import writing
 from fasaco_edge.cli.console.streams import print_json
+from fasaco_edge.cli.geojson import SUFFIX, collection, line_feature
 from fasaco_edge.errors import BadConfiguration
+from fasaco_edge.wire.documents.json_text import encode_json
 
 if TYPE_CHECKING:
     from fasaco_edge.offline.passes import PassPlans
@@ -42,14 +44,7 @@ def write_files(
         with writing(args.path_out) as file:
             np.savetxt(file, rows, "%d", ",", header=f"{first}row,col", comments="")
     if args.xy_out is not None:
-        curve = plans[0].curve
-        lines, header = [plan.xy for plan in plans], f"{first}x_m,y_m"
-        if curve is not None:
-            lines, header = [curve.poses], "x_m,y_m,yaw_rad"
-        rows = _numbered(lines, is_several)
-        form = ["%d"] * is_several + ["%.6f"] * (rows.shape[1] - is_several)
-        with writing(args.xy_out) as file:
-            np.savetxt(file, rows, form, ",", header=header, comments="")
+        _write_lines(args.xy_out, plans, is_several)
     if args.png is not None:
         picture = (
             planned.plot() if isinstance(planned, PassPlans) else planned.plot(rooms=args.rooms)
@@ -58,6 +53,27 @@ def write_files(
             picture.save(file, "PNG")
     if args.pheromone_png is not None:
         _draw_pheromone(args.pheromone_png, plans[0], trails)
+
+
+def _write_lines(file: Path, plans: Sequence[Plan], is_several: bool) -> None:
+    """Write the lines of passes, or poses along a curve, as CSV or GeoJSON by the file's name."""
+    curve = plans[0].curve
+    lines, header = [plan.xy for plan in plans], ["x_m", "y_m"]
+    if curve is not None:
+        lines, header = [curve.poses], ["x_m", "y_m", "yaw_rad"]
+    if file.suffix == SUFFIX:
+        features = (
+            line_feature(line[:, :2].tolist(), {"pass": number, "swept": plan.swept_share})
+            for number, (plan, line) in enumerate(zip(plans, lines, strict=True), 1)
+        )
+        with writing(file) as new:
+            new.write_bytes(encode_json(collection("map", features)))
+        return
+    rows = _numbered(lines, is_several)
+    form = ["%d"] * is_several + ["%.6f"] * (rows.shape[1] - is_several)
+    with writing(file) as new:
+        columns = ",".join(["pass"] * is_several + header)
+        np.savetxt(new, rows, form, ",", header=columns, comments="")
 
 
 def _numbered(tables: Sequence[NDArray[Any]], is_several: bool) -> NDArray[Any]:
